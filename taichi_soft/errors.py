@@ -1,0 +1,37 @@
+"""What can go wrong, by kind. Every message names the value received and the way out."""
+
+
+class TaichiSoftError(Exception):
+    """Base of every error this package raises on purpose."""
+
+
+class MeshError(TaichiSoftError, ValueError):
+    """A mesh, or the file it comes from, cannot be simulated as it is."""
+
+
+class MaterialError(TaichiSoftError, ValueError):
+    """A material constant lies outside its physical range."""
+
+
+class OptionError(TaichiSoftError, ValueError):
+    """An argument has a value that this call does not take."""
+
+
+class StateError(TaichiSoftError, RuntimeError):
+    """The call is right but comes at the wrong time (for example `step` before `build`)."""
+
+
+class DeviceError(TaichiSoftError, RuntimeError):
+    """The device asked for is not there."""
+
+
+class VideoError(TaichiSoftError, OSError):
+    """A video or picture could not be written as asked."""
+
+
+class UnstableStepWarning(UserWarning):
+    """The substep is larger than the estimate of what stays stable."""
+
+
+class FrozenBodyWarning(UserWarning):
+    """A body went non-finite, was put back to its last finite state and frozen."""

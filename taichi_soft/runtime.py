@@ -1,0 +1,118 @@
+"""Taichi, started once.
+
+Every other module takes `ti` from here, so that the environment below is set before Taichi is
+imported, and only this module calls `ti.init` (which would reset every field in the process).
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+
+os.environ.setdefault("TI_SKIP_VERSION_CHECK", "ON")
+os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
+
+import taichi as ti
+
+from taichi_soft.errors import DeviceError, OptionError
+
+__all__ = ["Device", "device", "init", "is_initialized", "ti"]
+
+# Vulkan and OpenGL only where asked for by name: their first device may be a software renderer.
+_AUTO_ORDER = ("cuda", "metal")
+_ARCHS = ("cpu", "cuda", "vulkan", "metal")
+
+
+@dataclass(frozen=True)
+class Device:
+    """What `init` chose."""
+
+    arch: str  # "cpu", "cuda", "vulkan" or "metal"
+    threads: int  # CPU worker threads (1 on a GPU: the host side is serial)
+    reason: str  # one line for people
+
+    @property
+    def is_gpu(self) -> bool:
+        """True where kernels run on a graphics processor."""
+        return self.arch != "cpu"
+
+
+_device: Device | None = None
+
+
+def init(arch: str = "auto", threads: int | None = None) -> Device:
+    """Start Taichi for this process and say what was chosen.
+
+    Entry points call this; a library that embeds taichi-soft may call it first with its own choice.
+    A second call with compatible arguments does nothing, because starting again would destroy the
+    fields of every world.
+    Args:
+        arch: "auto" (a real GPU if there is one, never a software one, else the CPU), "cpu", "cuda",
+            "vulkan" or "metal".
+        threads: CPU worker threads, 1 or more; None takes one per core available to this process.
+    Returns: the device in use.
+    Raises: OptionError for an unknown arch or thread count, or if already started differently;
+        DeviceError if the device asked for is missing.
+    """
+    global _device
+    if arch != "auto" and arch not in _ARCHS:
+        raise OptionError(f"unknown arch {arch!r}: choose one of 'auto', {', '.join(map(repr, _ARCHS))}")
+    if threads is not None and (isinstance(threads, bool) or not isinstance(threads, int) or threads < 1):
+        raise OptionError(f"threads must be a whole number of at least 1 or None, got {threads!r}")
+    if _device is not None:
+        if arch not in ("auto", _device.arch):
+            raise OptionError(f"Taichi already runs on {_device.arch!r}: call init({arch!r}) first in the process")
+        if threads is not None and _device.arch == "cpu" and threads != _device.threads:
+            raise OptionError(f"Taichi already runs with {_device.threads} threads: call init(threads={threads}) first")
+        return _device
+
+    chosen, reason = _choose(arch)
+    count = threads or _available_cores()
+    try:
+        ti.init(
+            arch=getattr(ti, chosen),
+            cpu_max_num_threads=count,
+            default_fp=ti.f32,
+            default_ip=ti.i32,
+            offline_cache=True,
+            enable_fallback=False,
+            log_level=ti.ERROR,
+        )
+    except RuntimeError as error:
+        raise DeviceError(f"cannot start Taichi on {chosen!r}: {error}. Use init('cpu')") from error
+    _device = Device(arch=chosen, threads=count if chosen == "cpu" else 1, reason=reason)
+    return _device
+
+
+def device() -> Device:
+    """The device in use. Raises: StateError-like DeviceError before `init`."""
+    if _device is None:
+        raise DeviceError("Taichi is not started: call taichi_soft.init() first")
+    return _device
+
+
+def is_initialized() -> bool:
+    """True once `init` has run in this process."""
+    return _device is not None
+
+
+def _choose(arch: str) -> tuple[str, str]:
+    if arch != "auto":
+        return arch, "asked for by name"
+    for candidate in _AUTO_ORDER:
+        if _has(candidate):
+            return candidate, f"a {candidate} device was found"
+    return "cpu", "no CUDA or Metal device was found"
+
+
+def _has(arch: str) -> bool:
+    from taichi._lib import core
+
+    probe = {"cuda": core.with_cuda, "metal": core.with_metal}[arch]
+    return bool(probe())
+
+
+def _available_cores() -> int:
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
