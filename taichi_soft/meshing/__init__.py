@@ -1,0 +1,25 @@
+"""Bodies at rest: particles, edges and tetrahedra, where they come from and how good they are."""
+
+from taichi_soft.meshing.body_mesh import BodyMesh
+from taichi_soft.meshing.ordering import renumbered, spatial_order, tet_order
+from taichi_soft.meshing.particle_mesh import ParticleMesh
+from taichi_soft.meshing.quality import MeshQuality
+from taichi_soft.meshing.shapes import beam, box, cylinder, extrude, sphere, torus, voxels
+from taichi_soft.meshing.tet_mesh import TetMesh
+
+__all__ = [
+    "BodyMesh",
+    "MeshQuality",
+    "ParticleMesh",
+    "TetMesh",
+    "beam",
+    "box",
+    "cylinder",
+    "extrude",
+    "renumbered",
+    "spatial_order",
+    "sphere",
+    "tet_order",
+    "torus",
+    "voxels",
+]

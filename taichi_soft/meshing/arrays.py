@@ -1,0 +1,103 @@
+"""Arrays at the boundary: what a caller passes in becomes a checked, read-only copy."""
+
+from __future__ import annotations
+
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taichi_soft.errors import MeshError
+
+FloatArray: TypeAlias = NDArray[np.float64]
+IntArray: TypeAlias = NDArray[np.int32]
+
+# Products of three lengths must stay finite in float64 (largest 1.8e308), with room to spare.
+LARGEST_COORDINATE = 1e30
+
+
+def read_only(array: NDArray[Any]) -> NDArray[Any]:
+    """The same array, C-contiguous and locked against writing."""
+    array = np.ascontiguousarray(array)
+    array.flags.writeable = False
+    return array
+
+
+def _as_array(values: ArrayLike, name: str) -> NDArray[Any]:
+    try:
+        return np.array(values)
+    except (ValueError, TypeError) as error:
+        raise MeshError(f"{name} is not a rectangular array of numbers ({error})") from None
+
+
+def as_real(values: ArrayLike, name: str, shape: tuple[int | None, ...], what: str) -> FloatArray:
+    """A float64 copy of `values` after checking its shape (None: any length) and that it is finite.
+
+    Raises: MeshError naming the shape, the dtype or the first bad row (called `what`).
+    """
+    array = _as_array(values, name)
+    wanted = "(" + ", ".join("n" if length is None else str(length) for length in shape) + ")"
+    if array.size == 0:
+        raise MeshError(f"{name} is empty (shape {array.shape}): pass an array of shape {wanted}")
+    if array.dtype.kind not in "fiu":
+        raise MeshError(f"{name} has dtype {array.dtype}: pass real numbers")
+    if array.ndim != len(shape) or any(
+        want not in (None, got) for want, got in zip(shape, array.shape, strict=True)
+    ):
+        raise MeshError(f"{name} has shape {array.shape}: pass an array of shape {wanted}")
+    real = array.astype(np.float64)
+    bad = ~np.isfinite(real).reshape(len(real), -1).all(axis=1)
+    if bad.any():
+        row = int(np.argmax(bad))
+        raise MeshError(f"{what} {row} is {real[row].tolist()}: every number must be finite")
+    return real
+
+
+def as_points(values: ArrayLike, name: str = "vertices", dimension: int = 3) -> FloatArray:
+    """Points as a float64 copy of shape (n, dimension) [m].
+
+    Raises: MeshError if the shape or dtype is wrong or a coordinate is not finite or absurdly large.
+    """
+    points = as_real(values, name, (None, dimension), "vertex")
+    far = np.abs(points).max(axis=1) > LARGEST_COORDINATE
+    if far.any():
+        row = int(np.argmax(far))
+        raise MeshError(
+            f"vertex {row} is {points[row].tolist()}: coordinates must lie within {LARGEST_COORDINATE:g} m"
+        )
+    return points
+
+
+def as_indices(values: ArrayLike, name: str, width: int, vertex_count: int, what: str) -> IntArray:
+    """Vertex indices as an int32 copy of shape (m, width), each in 0..vertex_count-1.
+
+    Raises: MeshError if the shape or dtype is wrong, or a row (called `what`) has an index out of range
+        or the same vertex twice.
+    """
+    array = _as_array(values, name)
+    if array.size == 0:
+        raise MeshError(f"{name} is empty (shape {array.shape}): a mesh needs at least one {what}")
+    if array.dtype.kind not in "iu":
+        raise MeshError(f"{name} has dtype {array.dtype}: pass integer vertex indices")
+    if array.ndim != 2 or array.shape[1] != width:
+        raise MeshError(f"{name} has shape {array.shape}: pass an array of shape (m, {width})")
+    outside = ((array < 0) | (array >= vertex_count)).any(axis=1)
+    if outside.any():
+        row = int(np.argmax(outside))
+        raise MeshError(
+            f"{what} {row} names vertices {name_vertices(array[row])}, but there are {vertex_count} of them: "
+            f"indices run from 0 to {vertex_count - 1}"
+        )
+    ordered = np.sort(array, axis=1)
+    repeated = (ordered[:, 1:] == ordered[:, :-1]).any(axis=1)
+    if repeated.any():
+        row = int(np.argmax(repeated))
+        raise MeshError(
+            f"{what} {row} names a vertex twice (vertices {name_vertices(array[row])}): repair or remove it"
+        )
+    return array.astype(np.int32)
+
+
+def name_vertices(indices: NDArray[Any]) -> str:
+    """The indices of one element, as they appear in messages: `4, 9, 2, 31`."""
+    return ", ".join(str(int(index)) for index in indices)

@@ -1,0 +1,89 @@
+"""What every body is made of: particles and the edges between them."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from functools import cached_property
+from typing import Any, NoReturn, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from taichi_soft.errors import MeshError
+from taichi_soft.meshing.arrays import FloatArray, IntArray, as_real, read_only
+
+Self = TypeVar("Self", bound="BodyMesh")
+
+# How far a rotation matrix may be from orthonormal: the rounding of a float32 matrix, with room.
+ROTATION_TOLERANCE = 1e-5
+
+
+class BodyMesh(ABC):
+    """Particles and edges of a body at rest; `ParticleMesh` and `TetMesh` are its two kinds.
+
+    Immutable: attributes cannot be set, arrays cannot be written to, the moves return new meshes.
+
+    Attributes:
+        vertices: float64 (n, 3), positions at rest [m].
+        edges: int32 (k, 2), each row i < j, rows in ascending order.
+        tets: int32 (m, 4), vertex indices of the tetrahedra; m = 0 for a `ParticleMesh`.
+    """
+
+    vertices: FloatArray
+    edges: IntArray
+    tets: IntArray
+
+    def __init__(self, vertices: FloatArray, edges: IntArray, tets: IntArray) -> None:
+        # Through __dict__, past the lock below; cached_property stores its value the same way.
+        self.__dict__.update(vertices=read_only(vertices), edges=read_only(edges), tets=read_only(tets))
+
+    def __setattr__(self, name: str, value: object) -> NoReturn:
+        raise AttributeError(
+            f"{type(self).__name__} is immutable: make a new one instead of setting {name!r}"
+        )
+
+    def __delattr__(self, name: str) -> NoReturn:
+        raise AttributeError(f"{type(self).__name__} is immutable: {name!r} cannot be deleted")
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({len(self.vertices)} vertices, {len(self.edges)} edges)"
+
+    @abstractmethod
+    def _with_vertices(self: Self, vertices: FloatArray) -> Self:
+        """The same mesh with its particles elsewhere."""
+
+    @cached_property
+    def edge_lengths(self) -> FloatArray:
+        """Length of every edge at rest, float64 (k,) [m]."""
+        ends = self.vertices[self.edges]
+        lengths: FloatArray = read_only(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
+        return lengths
+
+    @property
+    def bounds(self) -> FloatArray:
+        """Lowest and highest corner of the bounding box, float64 (2, 3) [m]."""
+        return np.stack([self.vertices.min(axis=0), self.vertices.max(axis=0)])
+
+    def translated(self: Self, offset: ArrayLike) -> Self:
+        """A copy moved by `offset` (3,) [m]. Raises: MeshError if it is not three finite numbers."""
+        return self._with_vertices(self.vertices + as_real(offset, "offset", (3,), "offset component"))
+
+    def scaled(self: Self, factor: float) -> Self:
+        """A copy `factor` times as large about the origin. Raises: MeshError if factor is not positive."""
+        if not (np.ndim(factor) == 0 and np.isfinite(factor) and factor > 0):
+            raise MeshError(f"factor is {factor!r}: pass one positive number")
+        return self._with_vertices(self.vertices * float(factor))
+
+    def rotated(self: Self, matrix: ArrayLike) -> Self:
+        """A copy turned about the origin: each vertex x becomes `matrix @ x`.
+
+        Raises: MeshError if `matrix` (3, 3) is not a rotation (orthonormal, determinant +1).
+        """
+        rotation: Any = as_real(matrix, "matrix", (3, 3), "matrix row")
+        error = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
+        if error > ROTATION_TOLERANCE or np.linalg.det(rotation) < 0:
+            raise MeshError(
+                f"matrix is not a rotation (off from orthonormal by {error:.2g}, determinant "
+                f"{np.linalg.det(rotation):.3g}): pass an orthonormal matrix with determinant +1"
+            )
+        return self._with_vertices(self.vertices @ rotation.T)

@@ -1,0 +1,92 @@
+"""Shapes made of box-shaped cells: five tetrahedra in each, one in the middle and one at four corners."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taichi_soft.errors import MeshError
+from taichi_soft.meshing.parameters import count, positive
+from taichi_soft.meshing.tet_mesh import TetMesh
+
+# Corner i of a cell lies at the bits of i: x = bit 0, y = bit 1, z = bit 2.
+CORNERS: NDArray[np.int64] = np.array([(i & 1, i >> 1 & 1, i >> 2) for i in range(8)])
+# Two ways to cut a cell, mirror images. Neighbours take opposite ways, so that diagonals of faces meet.
+EVEN_CELL: NDArray[np.int64] = np.array(
+    [(0, 3, 5, 6), (1, 0, 3, 5), (2, 0, 6, 3), (4, 0, 5, 6), (7, 3, 6, 5)]
+)
+ODD_CELL: NDArray[np.int64] = EVEN_CELL ^ 1
+
+
+def box(
+    size: tuple[float, float, float] = (1.0, 1.0, 1.0), cells: tuple[int, int, int] = (4, 4, 4)
+) -> TetMesh:
+    """A box about the origin.
+
+    Args:
+        size: edge lengths along x, y and z [m].
+        cells: number of cells along x, y and z; five tetrahedra in each. The smallest dihedral angle is
+            54.7 degrees with cubic cells.
+    Raises: OptionError for sizes that are not positive or counts below 1.
+    """
+    lengths = np.array([positive(f"size[{axis}]", value) for axis, value in enumerate(_three("size", size))])
+    counts = [count(f"cells[{axis}]", value) for axis, value in enumerate(_three("cells", cells))]
+    return voxels(np.ones(counts, dtype=bool), tuple(lengths / counts))
+
+
+def beam(length: float = 4.0, width: float = 1.0, height: float = 1.0, cells_across: int = 2) -> TetMesh:
+    """A bar along x about the origin, in cells as near to cubes as whole numbers of them allow.
+
+    Args:
+        length, width, height: edges along x, y and z [m].
+        cells_across: number of cells along the shortest edge. The smallest dihedral angle is 54.7 degrees
+            if the cells come out cubic and at least 35 if every edge is 1 or more cells long.
+    Raises: OptionError for sizes that are not positive or a count below 1.
+    """
+    size = (positive("length", length), positive("width", width), positive("height", height))
+    cell = min(size) / count("cells_across", cells_across)
+    nx, ny, nz = (max(1, round(edge / cell)) for edge in size)
+    return box(size, (nx, ny, nz))
+
+
+def voxels(mask: ArrayLike, spacing: float | tuple[float, ...] = 1.0) -> TetMesh:
+    """A body of cells, one for every True in a grid: frames, letters, scanned shapes.
+
+    Args:
+        mask: bool (nx, ny, nz), which cells are filled. The bounding box of the filled ones is centred at
+            the origin.
+        spacing: edge of a cell [m], one number or three (x, y, z). The smallest dihedral angle is 54.7
+            degrees with cubic cells.
+    Raises: MeshError for a mask of another shape or type, or without any cell; OptionError for a spacing
+        that is not positive.
+    """
+    filled = np.asarray(mask)
+    if filled.dtype != np.bool_ or filled.ndim != 3:
+        raise MeshError(f"mask has shape {filled.shape}, dtype {filled.dtype}: pass bool (nx, ny, nz)")
+    steps = (spacing,) * 3 if np.ndim(spacing) == 0 else spacing
+    edges = np.array(
+        [positive(f"spacing[{axis}]", step) for axis, step in enumerate(_three("spacing", steps))]
+    )
+    cells = np.argwhere(filled)
+    if len(cells) == 0:
+        raise MeshError(f"mask of shape {filled.shape} has no filled cell: set at least one to True")
+    cells -= cells.min(axis=0)
+
+    corners = cells[:, None, :] + CORNERS
+    shape = corners.max(axis=(0, 1)) + 1
+    keys = np.ravel_multi_index(tuple(corners.reshape(-1, 3).T), tuple(shape))
+    used, inverse = np.unique(keys, return_inverse=True)
+    grid = np.stack(np.unravel_index(used, tuple(shape)), axis=1)
+    vertices = (grid - (shape - 1) / 2.0) * edges
+
+    odd = cells.sum(axis=1) % 2 == 1
+    local = np.where(odd[:, None, None], ODD_CELL, EVEN_CELL).reshape(len(cells), -1)
+    tets = np.take_along_axis(inverse.reshape(len(cells), 8), local, axis=1).reshape(-1, 4)
+    return TetMesh(vertices, tets, fix_orientation=True)
+
+
+def _three(name: str, values: object) -> tuple[float, ...]:
+    array = np.asarray(values, dtype=object)
+    if array.shape != (3,):
+        raise MeshError(f"{name} is {values!r}: pass three numbers (x, y, z)")
+    return tuple(array)

@@ -1,0 +1,69 @@
+"""Orders in which neighbours in space are neighbours in memory."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taichi_soft.meshing.arrays import IntArray, as_indices, as_points
+
+# Bits per axis: three axes fill 63 of the 64 bits of one key.
+AXIS_BITS = 21
+# Steps that pull the bits of a 21-bit number apart, leaving two zeros after each.
+SPREAD = (
+    (32, 0x1F00000000FFFF),
+    (16, 0x1F0000FF0000FF),
+    (8, 0x100F00F00F00F00F),
+    (4, 0x10C30C30C30C30C3),
+    (2, 0x1249249249249249),
+)
+
+
+def spatial_order(vertices: ArrayLike) -> IntArray:
+    """Order of points along a Morton curve (the bits of x, y and z interleaved).
+
+    Args:
+        vertices: (n, 3) [m].
+    Returns: int32 (n,), a permutation: `vertices[spatial_order(vertices)]` lie along the curve. Equal
+        points keep their order, so the result is the same on every machine.
+    Raises: MeshError if the points are not finite or have the wrong shape.
+    """
+    points = as_points(vertices)
+    low = points.min(axis=0)
+    # One scale for all axes: cells of the curve are cubes whatever the body's proportions.
+    extent = float((points.max(axis=0) - low).max())
+    scale = (2**AXIS_BITS - 1) / extent if extent > 0 else 0.0
+    cells = ((points - low) * scale).astype(np.uint64)
+    keys = _spread(cells[:, 0]) << np.uint64(2) | _spread(cells[:, 1]) << np.uint64(1) | _spread(cells[:, 2])
+    return np.argsort(keys, kind="stable").astype(np.int32)
+
+
+def tet_order(tets: ArrayLike, vertex_order: ArrayLike) -> IntArray:
+    """Order of tetrahedra that walks through renumbered vertices from first to last.
+
+    Args:
+        tets: (m, 4) vertex indices in the old numbering.
+        vertex_order: (n,) permutation, as `spatial_order` returns it: entry i is the old index of the
+            vertex that comes i-th.
+    Returns: int32 (m,), a permutation of the rows of `tets`, by their lowest new vertex, then the next.
+        The rows themselves stay in old numbers: `renumbered(vertex_order)[tets[order]]` is the new array.
+    Raises: MeshError if a tetrahedron names a vertex that is not there.
+    """
+    new_index = renumbered(vertex_order)
+    rows = as_indices(tets, "tets", 4, len(new_index), "tetrahedron")
+    keys = np.sort(new_index[rows], axis=1)
+    return np.lexsort(keys.T[::-1]).astype(np.int32)
+
+
+def renumbered(order: ArrayLike) -> IntArray:
+    """The inverse permutation: new index of each old one, int32 (n,)."""
+    old_index = np.asarray(order)
+    new_index: IntArray = np.empty(len(old_index), dtype=np.int32)
+    new_index[old_index] = np.arange(len(old_index), dtype=np.int32)
+    return new_index
+
+
+def _spread(cells: NDArray[np.uint64]) -> NDArray[np.uint64]:
+    for shift, mask in SPREAD:
+        cells = (cells | cells << np.uint64(shift)) & np.uint64(mask)
+    return cells

@@ -1,0 +1,66 @@
+"""Particles joined by edges, without volume: cloth, ropes, spring lattices."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from taichi_soft.errors import MeshError
+from taichi_soft.meshing.arrays import FloatArray, as_indices, as_points, as_real, name_vertices, read_only
+from taichi_soft.meshing.body_mesh import BodyMesh
+
+
+class ParticleMesh(BodyMesh):
+    """A body of particles and edges whose masses are given, not derived from a volume. Immutable.
+
+    Args:
+        vertices: (n, 3) positions at rest [m].
+        edges: (k, 2) integer vertex indices, in any order and direction; they are stored with i < j and
+            with the rows in ascending order, so values per edge belong to `mesh.edges`, not to the input.
+        masses: (n,) mass of each particle [kg], all positive; one number serves for all.
+
+    Raises: MeshError for wrong shapes or dtypes, numbers that are not finite, indices out of range, an edge
+        from a vertex to itself, an edge given twice or of zero length, a mass that is not positive, or no
+        vertices or edges at all.
+
+    The arrays are copied. `tets` is empty, (0, 4).
+    """
+
+    masses: FloatArray
+
+    def __init__(self, vertices: ArrayLike, edges: ArrayLike, masses: ArrayLike) -> None:
+        points = as_points(vertices)
+        pairs = np.sort(as_indices(edges, "edges", 2, len(points), "edge"), axis=1)
+        order = np.lexsort((pairs[:, 1], pairs[:, 0]))
+        in_order = pairs[order]
+        same = (in_order[1:] == in_order[:-1]).all(axis=1)
+        if same.any():
+            first, second = sorted(order[int(np.argmax(same)) :][:2].tolist())
+            raise MeshError(
+                f"edges {first} and {second} join the same vertices ({name_vertices(pairs[first])}): "
+                "remove one of them"
+            )
+        ends = points[pairs]
+        flat = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) <= 0
+        if flat.any():
+            row = int(np.argmax(flat))
+            raise MeshError(
+                f"edge {row} has zero length (vertices {name_vertices(pairs[row])} lie on the same spot): "
+                "merge the two vertices or move them apart"
+            )
+        super().__init__(points, in_order, np.zeros((0, 4), dtype=np.int32))
+        mass = np.full(len(points), masses) if np.ndim(masses) == 0 else masses
+        kilograms = as_real(mass, "masses", (len(points),), "mass")
+        if not (kilograms > 0).all():
+            row = int(np.argmax(kilograms <= 0))
+            raise MeshError(f"mass {row} is {kilograms[row]:g} kg: every mass must be positive")
+        self.__dict__["masses"] = read_only(kilograms)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Copying and unpickling rebuild the mesh, so that its arrays are locked again.
+        return (ParticleMesh, (self.vertices, self.edges, self.masses))
+
+    def _with_vertices(self, vertices: FloatArray) -> ParticleMesh:
+        return ParticleMesh(vertices, self.edges, self.masses)

@@ -1,0 +1,102 @@
+"""Shapes swept from a flat triangulation: layers of prisms, three tetrahedra in each."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taichi_soft.errors import OptionError
+from taichi_soft.meshing.arrays import FloatArray, as_indices, as_points
+from taichi_soft.meshing.parameters import count, positive
+from taichi_soft.meshing.tet_mesh import TetMesh
+
+
+def extrude(points: ArrayLike, triangles: ArrayLike, layers: int = 1, height: float = 1.0) -> TetMesh:
+    """A flat triangulation drawn out along z, from -height/2 to height/2.
+
+    Args:
+        points: (n, 2) points in the plane [m]; their bounding box is moved to the origin.
+        triangles: (t, 3) vertex indices, wound either way.
+        layers: number of layers of prisms.
+        height: total height [m].
+    Raises: MeshError for arrays that do not make a mesh; OptionError for a count below 1 or a height that
+        is not positive.
+    """
+    flat = as_points(points, "points", 2)
+    corners = as_indices(triangles, "triangles", 3, len(flat), "triangle")
+    layers, height = count("layers", layers), positive("height", height)
+    flat -= (flat.min(axis=0) + flat.max(axis=0)) / 2.0
+    levels = np.linspace(-height / 2.0, height / 2.0, layers + 1)
+    vertices = np.column_stack([np.tile(flat, (layers + 1, 1)), np.repeat(levels, len(flat))])
+    return TetMesh(vertices, _prism_tets(corners, len(flat), layers, layers + 1), fix_orientation=True)
+
+
+def cylinder(radius: float = 0.5, height: float = 1.0, rings: int = 3, layers: int = 4) -> TetMesh:
+    """A cylinder about the origin with its axis along z.
+
+    Args:
+        radius: of the circle that the outer vertices lie on [m].
+        height: along z [m].
+        rings: concentric rings of 6, 12, 18, ... points round the axis, evenly spaced.
+        layers: number of layers; height / layers near radius / rings gives the best shape, with a smallest
+            dihedral angle of 35 to 41 degrees.
+    Raises: OptionError for sizes that are not positive or counts below 1.
+    """
+    flat, triangles = _disc(count("rings", rings))
+    return extrude(positive("radius", radius) * flat, triangles, layers, height)
+
+
+def torus(
+    major_radius: float = 1.0, minor_radius: float = 0.3, rings: int = 2, segments: int = 40
+) -> TetMesh:
+    """A ring about the origin whose axis of symmetry is z.
+
+    Args:
+        major_radius: of the circle in the plane z = 0 along which the tube runs [m].
+        minor_radius: of the tube [m], less than `major_radius`.
+        rings: concentric rings of points in the tube's cross-section, as in `cylinder`.
+        segments: pieces round the axis, 3 or more; 2 pi major_radius / segments near minor_radius / rings
+            gives the best shape, with a smallest dihedral angle of 31 degrees at the default proportions.
+    Raises: OptionError for sizes that are not positive, a tube too thick for its ring, or counts too low.
+    """
+    major, minor = positive("major_radius", major_radius), positive("minor_radius", minor_radius)
+    if minor >= major:
+        raise OptionError(f"minor_radius is {minor:g} and major_radius {major:g}: the minor must be smaller")
+    segments = count("segments", segments, 3)
+    flat, triangles = _disc(count("rings", rings))
+    angle = np.repeat(np.arange(segments) * (2.0 * np.pi / segments), len(flat))
+    across, up = np.tile(minor * flat, (segments, 1)).T
+    vertices = np.column_stack([(major + across) * np.cos(angle), (major + across) * np.sin(angle), up])
+    return TetMesh(vertices, _prism_tets(triangles, len(flat), segments, segments), fix_orientation=True)
+
+
+def _disc(rings: int) -> tuple[FloatArray, NDArray[np.int64]]:
+    """The unit disc as a point and rings of 6k points, and the 6 * rings**2 triangles between them."""
+    angles = [np.arange(6 * k) * (np.pi / (3 * k)) for k in range(1, rings + 1)]
+    points = [np.zeros((1, 2))]
+    points += [np.column_stack([np.cos(a), np.sin(a)]) * (k + 1) / rings for k, a in enumerate(angles)]
+    triangles = []
+    for k in range(1, rings + 1):
+        outer, inner = 3 * k * (k - 1) + 1, 3 * (k - 1) * (k - 2) + 1
+        for sector in range(6):
+            # Ring k has k steps in each sixth, the ring inside it k - 1.
+            outside = outer + (sector * k + np.arange(k + 1)) % (6 * k)
+            inside = inner + (sector * (k - 1) + np.arange(k)) % (6 * (k - 1)) if k > 1 else np.zeros(1, int)
+            triangles.append(np.column_stack([outside[:-1], outside[1:], inside]))
+            triangles.append(np.column_stack([inside[:-1], outside[1:-1], inside[1:]]))
+    return np.concatenate(points), np.concatenate(triangles)
+
+
+def _prism_tets(triangles: NDArray[np.integer], stride: int, layers: int, levels: int) -> NDArray[np.int64]:
+    """Three tetrahedra for every prism between level and next level (after the last comes the first).
+
+    Vertex i of the triangulation is vertex i + level * stride. In each side face of a prism the diagonal
+    starts at the lower of the two numbers below, which both neighbours see alike, so the faces meet.
+    """
+    a, b, c = np.sort(triangles.astype(np.int64), axis=1).T
+    level = np.arange(layers)[:, None] * stride
+    above = (np.arange(layers)[:, None] + 1) % levels * stride
+    first = np.stack([a + level, b + level, c + level, c + above], axis=2)
+    second = np.stack([a + level, b + level, b + above, c + above], axis=2)
+    third = np.stack([a + level, a + above, b + above, c + above], axis=2)
+    return np.concatenate([first, second, third], axis=1).reshape(-1, 4)

@@ -1,0 +1,70 @@
+"""How well shaped the tetrahedra of a mesh are. Small angles make a simulation stiff and fragile."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from taichi_soft.meshing.arrays import FloatArray, IntArray, read_only
+from taichi_soft.meshing.topology import LOCAL_EDGES, LOCAL_FACES
+
+
+@dataclass(frozen=True, eq=False)
+class MeshQuality:
+    """Shape measures of every tetrahedron.
+
+    Attributes:
+        min_dihedral: float64 (m,), smallest of the six angles between faces [degrees]; 70.53 if regular.
+        max_dihedral: float64 (m,), largest of them [degrees].
+        aspect_ratio: float64 (m,), 3 * inradius / circumradius; 1 if regular, towards 0 as it flattens.
+        shortest_edge: shortest edge of the mesh [m].
+        longest_edge: longest edge of the mesh [m].
+    """
+
+    min_dihedral: FloatArray
+    max_dihedral: FloatArray
+    aspect_ratio: FloatArray
+    shortest_edge: float
+    longest_edge: float
+
+    def summary(self) -> str:
+        """One line with the worst values, for logs and reports."""
+        return (
+            f"dihedral angles {self.min_dihedral.min():.1f} to {self.max_dihedral.max():.1f} deg, "
+            f"aspect ratio {self.aspect_ratio.min():.3f} to {self.aspect_ratio.max():.3f}, "
+            f"edges {self.shortest_edge:.4g} to {self.longest_edge:.4g} m"
+        )
+
+
+def measure_quality(vertices: FloatArray, tets: IntArray) -> MeshQuality:
+    """Measure the tetrahedra `tets` (m, 4) of positive volume over `vertices` (n, 3) [m]."""
+    corners = vertices[tets]
+    a, b, c = (corners[:, i] - corners[:, 0] for i in (1, 2, 3))
+    volume = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0
+
+    faces = corners[:, LOCAL_FACES]
+    area_vectors = 0.5 * np.cross(faces[:, :, 1] - faces[:, :, 0], faces[:, :, 2] - faces[:, :, 0])
+    areas = np.linalg.norm(area_vectors, axis=2)
+    # Faces i and j (opposite vertices i and j) enclose pi minus the angle between their outward normals.
+    first, second = area_vectors[:, LOCAL_EDGES[:, 0]], area_vectors[:, LOCAL_EDGES[:, 1]]
+    cosine = -np.einsum("tej,tej->te", first, second)
+    dihedral = np.degrees(np.arctan2(np.linalg.norm(np.cross(first, second), axis=2), cosine))
+
+    def squared(x: FloatArray) -> FloatArray:
+        squares: FloatArray = np.einsum("ij,ij->i", x, x)
+        return squares[:, None]
+
+    towards_centre = squared(a) * np.cross(b, c) + squared(b) * np.cross(c, a) + squared(c) * np.cross(a, b)
+    circumradius = np.linalg.norm(towards_centre, axis=1) / (12.0 * volume)
+    inradius = 3.0 * volume / areas.sum(axis=1)
+
+    ends = corners[:, LOCAL_EDGES]
+    lengths = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
+    return MeshQuality(
+        min_dihedral=read_only(dihedral.min(axis=1)),
+        max_dihedral=read_only(dihedral.max(axis=1)),
+        aspect_ratio=read_only(3.0 * inradius / circumradius),
+        shortest_edge=float(lengths.min()),
+        longest_edge=float(lengths.max()),
+    )

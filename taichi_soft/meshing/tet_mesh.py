@@ -1,0 +1,145 @@
+"""The usual body: particles, edges and tetrahedra that fill a volume."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from taichi_soft.errors import MeshError
+from taichi_soft.meshing.arrays import FloatArray, IntArray, as_indices, as_points, name_vertices, read_only
+from taichi_soft.meshing.body_mesh import BodyMesh
+from taichi_soft.meshing.quality import MeshQuality, measure_quality
+from taichi_soft.meshing.topology import LOCAL_EDGES, edges_of, first_duplicate, surface_of
+
+# A tetrahedron flatter than this (volume over longest edge cubed; 0.118 if regular) has lost its shape in
+# float32, in which it will be simulated (rounding 1.2e-7).
+FLATTEST = 1e-7
+
+
+class TetMesh(BodyMesh):
+    """A tetrahedral mesh, checked once and immutable from then on.
+
+    Args:
+        vertices: (n, 3) positions at rest [m].
+        tets: (m, 4) integer vertex indices. A tetrahedron has positive volume when
+            det[x1-x0, x2-x0, x3-x0] > 0.
+        fix_orientation: turn tetrahedra of negative volume round by swapping their last two vertices.
+
+    Attributes:
+        vertices: float64 (n, 3) [m].
+        tets: int32 (m, 4), in the order given.
+        edges: int32 (k, 2), each row i < j, rows in ascending order.
+        tet_edges: int32 (m, 6), rows of `edges` that are each tetrahedron's edges
+            (0,1), (0,2), (0,3), (1,2), (1,3), (2,3).
+        surface: int32 (f, 3), boundary triangles, counterclockwise seen from outside.
+        volumes: float64 (m,), volume of each tetrahedron, all positive [m^3].
+
+    Raises: MeshError, naming the element, for wrong shapes or dtypes, numbers that are not finite, indices
+        out of range, a vertex twice in a tetrahedron, the same tetrahedron twice, a tetrahedron of zero
+        volume (against its longest edge) or negative volume, a vertex of no tetrahedron, a face of more than
+        two tetrahedra, neighbours that overlap, or an empty mesh.
+
+    The arrays are copied. A mesh may have several parts that do not touch.
+    """
+
+    tet_edges: IntArray
+    surface: IntArray
+    volumes: FloatArray
+
+    def __init__(self, vertices: ArrayLike, tets: ArrayLike, *, fix_orientation: bool = False) -> None:
+        points = as_points(vertices)
+        corners = as_indices(tets, "tets", 4, len(points), "tetrahedron")
+        duplicate = first_duplicate(corners)
+        if duplicate is not None:
+            raise MeshError(
+                f"tetrahedra {duplicate[0]} and {duplicate[1]} have the same vertices "
+                f"({name_vertices(corners[duplicate[0]])}): remove one of them"
+            )
+        volumes = _checked_volumes(points, corners, fix_orientation)
+        turned = volumes < 0
+        corners[turned] = corners[turned][:, [0, 1, 3, 2]]
+        _refuse_unused(len(points), corners)
+        surface = surface_of(corners)
+        edges, tet_edges = edges_of(corners)
+        super().__init__(points, edges, corners)
+        self.__dict__.update(
+            tet_edges=read_only(tet_edges),
+            surface=read_only(surface),
+            volumes=read_only(np.abs(volumes)),
+        )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Copying and unpickling rebuild the mesh, so that its arrays are locked again.
+        return (TetMesh, (self.vertices, self.tets))
+
+    def __repr__(self) -> str:
+        return f"TetMesh({len(self.vertices)} vertices, {len(self.tets)} tetrahedra, {self.volume:.6g} m^3)"
+
+    def _with_vertices(self, vertices: FloatArray) -> TetMesh:
+        return TetMesh(vertices, self.tets)
+
+    @property
+    def volume(self) -> float:
+        """Volume of the whole mesh [m^3]."""
+        return float(self.volumes.sum())
+
+    @cached_property
+    def vertex_volumes(self) -> FloatArray:
+        """Each particle's share, a quarter of every tetrahedron it belongs to, float64 (n,) [m^3]."""
+        shares = np.bincount(self.tets.ravel(), np.repeat(self.volumes / 4.0, 4), len(self.vertices))
+        volumes: FloatArray = read_only(shares)
+        return volumes
+
+    @cached_property
+    def edge_valence(self) -> IntArray:
+        """How many tetrahedra share each edge, int32 (k,)."""
+        valence: IntArray = read_only(np.bincount(self.tet_edges.ravel()).astype(np.int32))
+        return valence
+
+    @cached_property
+    def surface_vertices(self) -> IntArray:
+        """Indices of the vertices on the surface, ascending, int32."""
+        indices: IntArray = read_only(np.unique(self.surface))
+        return indices
+
+    @cached_property
+    def quality(self) -> MeshQuality:
+        """Angles, aspect ratios and edge lengths; `mesh.quality.summary()` is one line."""
+        return measure_quality(self.vertices, self.tets)
+
+
+def _checked_volumes(points: FloatArray, tets: IntArray, allow_negative: bool) -> FloatArray:
+    """Signed volumes (m,) [m^3], after refusing flat and, unless allowed, inverted tetrahedra."""
+    corners = points[tets]
+    a, b, c = (corners[:, i] - corners[:, 0] for i in (1, 2, 3))
+    volumes: FloatArray = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0
+    ends = corners[:, LOCAL_EDGES]
+    longest = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2).max(axis=1)
+    # Written so that 0 > 0, where everything has underflowed, counts as flat too.
+    flat = ~(np.abs(volumes) > FLATTEST * longest**3)
+    if flat.any():
+        row = int(np.argmax(flat))
+        raise MeshError(
+            f"tetrahedron {row} has no volume ({volumes[row]:.2g} m^3 with a longest edge of "
+            f"{longest[row]:.2g} m, vertices {name_vertices(tets[row])}): remove it or repair the mesh"
+        )
+    if not allow_negative and (volumes < 0).any():
+        row = int(np.argmax(volumes < 0))
+        raise MeshError(
+            f"tetrahedron {row} has volume {volumes[row]:.2g} m^3 (vertices {name_vertices(tets[row])}): "
+            "pass fix_orientation=True or repair the mesh"
+        )
+    return volumes
+
+
+def _refuse_unused(vertex_count: int, tets: IntArray) -> None:
+    uses = np.bincount(tets.ravel(), minlength=vertex_count)
+    if (uses == 0).any():
+        unused = np.flatnonzero(uses == 0)
+        raise MeshError(
+            f"vertex {unused[0]} belongs to no tetrahedron ({len(unused)} such vertices): remove them, "
+            "a particle without volume has no mass"
+        )

@@ -1,0 +1,78 @@
+"""Edges and faces of a set of tetrahedra: index arrays in, index arrays out."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.errors import MeshError
+from taichi_soft.meshing.arrays import IntArray, name_vertices
+
+# The six edges of a tetrahedron in local vertex numbers.
+LOCAL_EDGES: NDArray[np.int64] = np.array([(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)])
+# Face i lies opposite vertex i; seen from outside a tetrahedron of positive volume it runs counterclockwise.
+LOCAL_FACES: NDArray[np.int64] = np.array([(1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)])
+
+
+def edges_of(tets: IntArray) -> tuple[IntArray, IntArray]:
+    """Edges (k, 2), rows i < j in ascending order, and (m, 6) each tetrahedron's rows in them."""
+    pairs = np.sort(tets[:, LOCAL_EDGES].reshape(-1, 2), axis=1).astype(np.int64)
+    stride = int(tets.max()) + 1
+    keys, inverse = np.unique(pairs[:, 0] * stride + pairs[:, 1], return_inverse=True)
+    edges = np.stack([keys // stride, keys % stride], axis=1).astype(np.int32)
+    return edges, inverse.reshape(-1, 6).astype(np.int32)
+
+
+def surface_of(tets: IntArray) -> IntArray:
+    """Triangles (f, 3) that belong to one tetrahedron only, wound outwards, in the order of `tets`.
+
+    The tetrahedra must have positive volume.
+    Raises: MeshError if more than two of them share a face, or two lie on the same side of one.
+    """
+    faces = tets[:, LOCAL_FACES].reshape(-1, 3)
+    order, starts, counts = _groups(np.sort(faces, axis=1))
+    if counts.max() > 2:
+        start = starts[int(np.argmax(counts))]
+        face = order[start]
+        owners = sorted(int(row) // 4 for row in order[start : start + counts.max()])
+        raise MeshError(
+            f"face with vertices {name_vertices(faces[face])} is shared by {len(owners)} tetrahedra "
+            f"({', '.join(map(str, owners))}): at most two can meet in a face, repair the mesh"
+        )
+    first, second = order[starts[counts == 2]], order[starts[counts == 2] + 1]
+    # Neighbours see their common face from opposite sides, so they run through it in opposite directions.
+    folded = _turns(faces[first]) == _turns(faces[second])
+    if folded.any():
+        pair = int(np.argmax(folded))
+        raise MeshError(
+            f"tetrahedra {first[pair] // 4} and {second[pair] // 4} lie on the same side of the face they "
+            f"share (vertices {name_vertices(faces[first[pair]])}): they overlap, repair the mesh"
+        )
+    return np.ascontiguousarray(faces[np.sort(order[starts[counts == 1]])])
+
+
+def first_duplicate(tets: IntArray) -> tuple[int, int] | None:
+    """Two rows that name the same four vertices, lower row first; None if there are none."""
+    order, starts, counts = _groups(np.sort(tets, axis=1))
+    if counts.max() == 1:
+        return None
+    start = starts[int(np.argmax(counts > 1))]
+    first, second = sorted(order[start : start + 2].tolist())
+    return first, second
+
+
+def _groups(rows: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+    """Equal rows brought together: the order that does it, where each group starts, how many it has."""
+    order = np.lexsort(rows.T[::-1])
+    in_order = rows[order]
+    starts = np.flatnonzero(np.r_[True, (in_order[1:] != in_order[:-1]).any(axis=1)])
+    return order, starts, np.diff(np.r_[starts, len(rows)])
+
+
+def _turns(faces: NDArray[Any]) -> NDArray[np.bool_]:
+    """Whether each triangle runs through its vertices in ascending cyclic order."""
+    a, b, c = faces.T
+    turns: NDArray[np.bool_] = ((a < b) & (b < c)) | ((b < c) & (c < a)) | ((c < a) & (a < b))
+    return turns
