@@ -1,0 +1,14 @@
+"""Numbers with a unit and a reason."""
+
+from __future__ import annotations
+
+GRAVITY_EARTH = 9.81
+"""Standard fall on Earth [m/s^2], as the thesis uses it."""
+
+LANES = 8
+"""Tetrahedra per block. Eight float32 fill one AVX register: the compiler then computes a block in
+vector instructions. Four were 1.3 times slower, sixteen compiled ten times longer for no gain."""
+
+POSITION_LIMIT = 1.0e7
+"""Farthest coordinate [m] that still counts as finite. Beyond it float32 cannot resolve a body at all
+(its spacing is 1 m), so a particle out there has been thrown by an explosion."""

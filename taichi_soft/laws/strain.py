@@ -1,0 +1,71 @@
+"""Strain of a tetrahedron in its deformed orientation (thesis section 6.1).
+
+F = U R carries the rest shape into the deformed one; F F^T = U^2 holds no rotation. All functions take
+F as columns and return a symmetric 3x3 strain as columns.
+"""
+
+from taichi_soft.math.eigen import symmetric_eigen
+from taichi_soft.math.tensors import determinant, outer_square, scaled_plus_identity
+from taichi_soft.runtime import ti
+
+
+@ti.func
+def linear_strain(F):
+    """1/2 (F F^T - I), thesis eq. 6.7: exact to first order, half the square beyond."""
+    return scaled_plus_identity(outer_square(F), 0.5, -0.5)
+
+
+@ti.func
+def exact_strain(F):
+    """U - I with U = sqrt(F F^T), the root that thesis chapter 7 leaves open. Blind to flips."""
+    stretch, axes = principal_stretches(F)
+    stretch.z = ti.abs(stretch.z)
+    return _from_axes(stretch - 1.0, axes)
+
+
+@ti.func
+def exact_strain_recovering(F):
+    """As `exact_strain`, but a flipped tetrahedron has its smallest stretch counted negative."""
+    stretch, axes = principal_stretches(F)
+    return _from_axes(stretch - 1.0, axes)
+
+
+@ti.func
+def linear_strain_recovering(F):
+    """As `linear_strain`; a flipped tetrahedron is continued past flat along its smallest stretch.
+
+    The square of eq. 6.7 has its minimum at s = 0, where it would stop pushing back. For s < 0 the
+    strain of that axis goes on as s - 1/2: continuous at flat (-1/2) and growing with the inversion.
+    """
+    stretch, axes = principal_stretches(F)
+    strain = 0.5 * (stretch * stretch - 1.0)
+    if stretch.z < 0.0:
+        strain.z = stretch.z - 0.5
+    return _from_axes(strain, axes)
+
+
+@ti.func
+def principal_stretches(F):
+    """Stretches, largest first, the last with the sign of det F; and their axes as columns.
+
+    The smallest one is det F / (s0 s1): the root of a small eigenvalue would lose half the digits.
+    """
+    squares, axes = symmetric_eigen(outer_square(F))
+    s0 = ti.sqrt(ti.max(squares.x, 0.0))
+    s1 = ti.sqrt(ti.max(squares.y, 0.0))
+    s2 = s0 * 0.0
+    area = s0 * s1
+    if area > 0.0:
+        s2 = ti.max(ti.min(determinant(F) / area, s1), -s1)
+    return ti.Vector([s0, s1, s2]), axes
+
+
+@ti.func
+def _from_axes(values, axes):
+    """The symmetric matrix with these principal values, as columns."""
+    a, b, c = axes[0] * values.x, axes[1] * values.y, axes[2] * values.z
+    return (
+        a * axes[0].x + b * axes[1].x + c * axes[2].x,
+        a * axes[0].y + b * axes[1].y + c * axes[2].y,
+        a * axes[0].z + b * axes[1].z + c * axes[2].z,
+    )
