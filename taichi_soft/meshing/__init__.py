@@ -1,6 +1,7 @@
 """Bodies at rest: particles, edges and tetrahedra, where they come from and how good they are."""
 
 from taichi_soft.meshing.body_mesh import BodyMesh
+from taichi_soft.meshing.io import load_mesh, save_mesh
 from taichi_soft.meshing.ordering import renumbered, spatial_order, tet_order
 from taichi_soft.meshing.particle_mesh import ParticleMesh
 from taichi_soft.meshing.quality import MeshQuality
@@ -16,7 +17,9 @@ __all__ = [
     "box",
     "cylinder",
     "extrude",
+    "load_mesh",
     "renumbered",
+    "save_mesh",
     "spatial_order",
     "sphere",
     "tet_order",

@@ -40,7 +40,7 @@ def beam(length: float = 4.0, width: float = 1.0, height: float = 1.0, cells_acr
     Args:
         length, width, height: edges along x, y and z [m].
         cells_across: number of cells along the shortest edge. The smallest dihedral angle is 54.7 degrees
-            if the cells come out cubic and at least 35 if every edge is 1 or more cells long.
+            if the cells come out cubic and at least 32 otherwise.
     Raises: OptionError for sizes that are not positive or a count below 1.
     """
     size = (positive("length", length), positive("width", width), positive("height", height))

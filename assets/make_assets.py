@@ -1,0 +1,102 @@
+"""Make the mesh files in this folder. The same command makes the same files: every random choice is seeded.
+
+Needs `pip install "taichi-soft[assets]"`. Prints a row of the table in README.md for each file.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from layouts import disc, plate_with_hole, rod
+from unstructured import Cloud, polish, spread_on_sphere, triangulate
+
+from taichi_soft.meshing import TetMesh, box, extrude, save_mesh, voxels
+
+FOLDER = Path(__file__).parent
+
+
+def sphere() -> TetMesh:
+    """The ball of section 6.6: 381 particles, 4 m^3; fine at the surface, coarse inside."""
+    total, inner, depth, seed = 381, 17, 0.5, 2
+    # 200 degrees per metre of the unit ball: as good a time step as 15 degrees allows.
+    angle_per_height = 200.0
+    outer = spread_on_sphere(total - inner - 1, seed)
+    shell = depth * spread_on_sphere(inner, seed + 1)
+    free = np.full(total, np.nan)
+    on_sphere = np.r_[np.ones(len(outer)), free[len(outer) :]]
+    cloud = Cloud(np.concatenate([outer, shell, np.zeros((1, 3))]), on_sphere, free, free)
+    tets = triangulate(cloud)
+    for round_seed in range(4):
+        polish(cloud, tets, round_seed, 2000, angle_per_height)
+        tets = triangulate(cloud)
+    polish(cloud, tets, 9, 6000, angle_per_height)
+    mesh = TetMesh(cloud.points, tets)
+    return mesh.scaled(float(np.cbrt(4.0 / mesh.volume)))
+
+
+def cylinder_long() -> TetMesh:
+    """The cylinder that is stretched in section 6.6: 4 m long, 1.5 m across."""
+    cap = [(8, 0.45, 0.1), (2, 0.15, 0.0)]
+    points, tets = rod(4.0, 0.75, around=13, bands=[3, 2, 2, 2, 2, 3], cap=cap, axis=1.5)
+    return TetMesh(points, tets, fix_orientation=True)
+
+
+def cylinder_flat() -> TetMesh:
+    """The cylinder of figure 6.4, pulled and sheared by its flat ends: 0.5 m high, 2 m across."""
+    points, triangles = disc([(6, 0.27, 0.0), (12, 0.53, 0.0), (17, 0.78, 0.0), (18, 1.0, 0.0)])
+    return extrude(points, triangles, layers=2, height=0.5)
+
+
+def cube() -> TetMesh:
+    """The cube of figures 5.1 and 5.2: edge 1 m."""
+    return box((1.0, 1.0, 1.0), (4, 4, 4))
+
+
+def bars() -> TetMesh:
+    """Three bars that cross in the middle, each 13 times as long as thick, to see them bend."""
+    mask = np.zeros((26, 26, 26), dtype=bool)
+    mask[:, 12:14, 12:14] = mask[12:14, :, 12:14] = mask[12:14, 12:14, :] = True
+    return voxels(mask, 0.1)
+
+
+def beam_with_hole() -> TetMesh:
+    """A beam along x with a round hole through it along z: the larger body, for timing."""
+    points, triangles = plate_with_hole(3.0, 1.0, 0.25, spacing=0.117)
+    return extrude(points, triangles, layers=5, height=0.6)
+
+
+BODIES: dict[str, Callable[[], TetMesh]] = {
+    make.__name__: make for make in (sphere, cylinder_long, cylinder_flat, cube, bars, beam_with_hole)
+}
+
+
+def table_row(name: str, mesh: TetMesh) -> str:
+    """The measures of one mesh, as a row of the table in README.md."""
+    size = " x ".join(f"{edge:.3g}" for edge in mesh.bounds[1] - mesh.bounds[0])
+    quality = mesh.quality
+    return (
+        f"| `{name}.npz` | {len(mesh.vertices)} | {len(mesh.tets)} | {size} | {mesh.volume:.4f} "
+        f"| {quality.min_dihedral.min():.1f} | {quality.shortest_edge:.3f} |"
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"which to make: {', '.join(BODIES)} (all)")
+    parser.add_argument("--out", type=Path, default=FOLDER, help="folder for the files (this one)")
+    arguments = parser.parse_args()
+    unknown = sorted(set(arguments.names) - set(BODIES))
+    if unknown:
+        parser.error(f"unknown name {unknown[0]!r}: choose from {', '.join(BODIES)}")
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    for name in arguments.names or BODIES:
+        mesh = BODIES[name]()
+        save_mesh(mesh, arguments.out / f"{name}.npz")
+        print(table_row(name, mesh), flush=True)
+
+
+if __name__ == "__main__":
+    main()

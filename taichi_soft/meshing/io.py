@@ -1,0 +1,132 @@
+"""Meshes from and to files; the suffix of the path says the format.
+
+    .npz          this package's own: arrays `vertices` and `tets`, compressed
+    .node, .ele   TetGen, a pair of files; name either
+    .msh          Gmsh 2.2 and 4.1 (written as 4.1 text)
+    .vtk, .vtu    VTK unstructured grids (written as text)
+
+Gmsh and VTK files need the extra `taichi-soft[io]`.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from taichi_soft.errors import MeshError
+from taichi_soft.meshing.interchange import FORMATS, read_interchange, write_interchange
+from taichi_soft.meshing.tet_mesh import TetMesh
+from taichi_soft.meshing.tetgen import read_tetgen, write_elements, write_nodes
+
+SUFFIXES = (".npz", ".node", ".ele", *FORMATS)
+
+
+def load_mesh(path: str | os.PathLike[str], *, fix_orientation: bool = True) -> TetMesh:
+    """Read a tetrahedral mesh.
+
+    Vertices that no tetrahedron uses (Gmsh files hold the construction points) are dropped and the rest
+    renumbered in their order. All blocks of tetrahedra become one mesh; other cells are left out.
+
+    Args:
+        path: file whose suffix is one of .npz, .node, .ele, .msh, .vtk, .vtu. Coordinates are metres.
+        fix_orientation: turn tetrahedra of negative volume round. True by default, unlike in `TetMesh`,
+            because programs do not agree on the sense; neighbours that overlap are refused either way.
+    Raises: MeshError, in one line that starts with the file's name, if the file is missing, of another kind,
+        cut short, without tetrahedra, not a sound mesh (see `TetMesh`), or if meshio is needed and missing.
+    """
+    source = _checked_path(path)
+    suffix = source.suffix.lower()
+    read = _read_npz if suffix == ".npz" else read_interchange if suffix in FORMATS else read_tetgen
+    try:
+        vertices, tets = read(source)
+    except OSError as error:
+        raise MeshError(f"{_named(error, source)}: cannot be read ({error.strerror or error})") from None
+    except UnicodeDecodeError:
+        raise MeshError(f"{source.name}: not a text file, so not a {suffix} mesh") from None
+    try:
+        return TetMesh(*_without_unused(vertices, tets), fix_orientation=fix_orientation)
+    except MeshError as error:
+        raise MeshError(f"{source.name}: {error}") from None
+
+
+def save_mesh(mesh: TetMesh, path: str | os.PathLike[str]) -> None:
+    """Write a tetrahedral mesh in the format that the suffix of `path` names; every digit is kept.
+
+    The file appears whole or not at all: one that was there before stays until the new one is complete.
+    Naming either of TetGen's two files writes both.
+    Raises: MeshError for an unknown suffix, something that is not a TetMesh, a place that cannot be written
+        to, or if meshio is needed and missing.
+    """
+    if not isinstance(mesh, TetMesh):
+        raise MeshError(f"save_mesh got a {type(mesh).__name__}: only a TetMesh has a file format")
+    target = _checked_path(path)
+    suffix = target.suffix.lower()
+    writers: dict[Path, Callable[[Path], None]]
+    if suffix == ".npz":
+        writers = {target: lambda temporary: _write_npz(mesh, temporary)}
+    elif suffix in FORMATS:
+        writers = {target: lambda temporary: write_interchange(mesh, temporary, suffix)}
+    else:
+        writers = {
+            target.with_suffix(".node"): lambda temporary: write_nodes(mesh, temporary),
+            target.with_suffix(".ele"): lambda temporary: write_elements(mesh, temporary),
+        }
+    temporaries = {final: final.with_name(f".{final.name}.{os.getpid()}.tmp") for final in writers}
+    try:
+        for final, write in writers.items():
+            if final.is_dir():
+                raise MeshError(f"{final.name}: cannot be written (there is a folder of that name)")
+            write(temporaries[final])
+        for final, temporary in temporaries.items():
+            os.replace(temporary, final)
+    except OSError as error:
+        raise MeshError(f"{target.name}: cannot be written ({error.strerror or error})") from None
+    except MeshError as error:
+        message = str(error)
+        raise MeshError(message if message.startswith(target.stem) else f"{target.name}: {message}") from None
+    finally:
+        for temporary in temporaries.values():
+            temporary.unlink(missing_ok=True)
+
+
+def _checked_path(path: str | os.PathLike[str]) -> Path:
+    checked = Path(path)
+    if checked.suffix.lower() not in SUFFIXES:
+        raise MeshError(f"{checked.name}: unknown mesh format {checked.suffix!r}: use {', '.join(SUFFIXES)}")
+    return checked
+
+
+def _named(error: OSError, source: Path) -> str:
+    """The file that the error is about: with TetGen it may be the other one of the pair."""
+    return Path(os.fsdecode(error.filename)).name if error.filename else source.name
+
+
+def _read_npz(path: Path) -> tuple[Any, Any]:
+    try:
+        with np.load(path, allow_pickle=False) as contents:
+            return contents["vertices"], contents["tets"]
+    except KeyError as error:
+        raise MeshError(f"{path.name}: has no array {error.args[0]!r}, so it is not a mesh") from None
+    except OSError:
+        raise
+    # Not a zip file, cut short, damaged inside, holding Python objects: each raises something else.
+    except Exception as error:
+        reason = " ".join(str(error).split())[:200]
+        raise MeshError(f"{path.name}: not a mesh file, or damaged ({reason})") from None
+
+
+def _write_npz(mesh: TetMesh, path: Path) -> None:
+    with path.open("wb") as file:  # given a name, numpy would add its own suffix
+        np.savez_compressed(file, vertices=mesh.vertices, tets=mesh.tets)
+
+
+def _without_unused(vertices: Any, tets: Any) -> tuple[Any, Any]:
+    """Drop vertices that no tetrahedron names; what is not even an index array is left for TetMesh."""
+    if tets.dtype.kind not in "iu" or tets.size == 0 or tets.min() < 0 or tets.max() >= len(vertices):
+        return vertices, tets
+    used, inverse = np.unique(tets, return_inverse=True)
+    return vertices[used], inverse.reshape(tets.shape)
