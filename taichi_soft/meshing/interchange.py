@@ -13,11 +13,12 @@ import numpy as np
 from taichi_soft.errors import MeshError
 from taichi_soft.meshing.tet_mesh import TetMesh
 
-# meshio's module for each suffix, and how to make it write text that older programs read too.
+# meshio's module for each suffix, and how to make it write what older programs read too, with every digit
+# (its text form of .vtu keeps twelve).
 FORMATS: dict[str, tuple[str, dict[str, object]]] = {
     ".msh": ("gmsh", {"fmt_version": "4.1", "binary": False}),
     ".vtk": ("vtk", {"fmt_version": "4.2", "binary": False}),
-    ".vtu": ("vtu", {"binary": False}),
+    ".vtu": ("vtu", {"binary": True}),
 }
 # Four corners come first in tetrahedra of every order.
 TETRAHEDRA = ("tetra", "tetra10", "tetra20", "tetra35", "tetra56")
@@ -45,7 +46,7 @@ def read_interchange(path: Path) -> tuple[Any, Any]:
 
 
 def write_interchange(mesh: TetMesh, path: Path, suffix: str) -> None:
-    """Write as text in the format that `suffix` names. Raises: MeshError if meshio is missing or fails."""
+    """Write in the format that `suffix` names. Raises: MeshError if meshio is missing or fails."""
     name, options = FORMATS[suffix]
     writer = _meshio_module(name)
     meshio = importlib.import_module("meshio")

@@ -3,7 +3,7 @@
     .npz          this package's own: arrays `vertices` and `tets`, compressed
     .node, .ele   TetGen, a pair of files; name either
     .msh          Gmsh 2.2 and 4.1 (written as 4.1 text)
-    .vtk, .vtu    VTK unstructured grids (written as text)
+    .vtk, .vtu    VTK unstructured grids (.vtk written as text)
 
 Gmsh and VTK files need the extra `taichi-soft[io]`.
 """
@@ -108,15 +108,17 @@ def _named(error: OSError, source: Path) -> str:
 def _read_npz(path: Path) -> tuple[Any, Any]:
     try:
         with np.load(path, allow_pickle=False) as contents:
-            return contents["vertices"], contents["tets"]
-    except KeyError as error:
-        raise MeshError(f"{path.name}: has no array {error.args[0]!r}, so it is not a mesh") from None
+            missing = {"vertices", "tets"} - set(contents.files)
+            arrays = None if missing else (contents["vertices"], contents["tets"])
     except OSError:
         raise
     # Not a zip file, cut short, damaged inside, holding Python objects: each raises something else.
     except Exception as error:
         reason = " ".join(str(error).split())[:200]
         raise MeshError(f"{path.name}: not a mesh file, or damaged ({reason})") from None
+    if arrays is None:
+        raise MeshError(f"{path.name}: has no array {min(missing)!r}, so it is not a mesh")
+    return arrays
 
 
 def _write_npz(mesh: TetMesh, path: Path) -> None:

@@ -32,8 +32,8 @@ def spatial_order(vertices: ArrayLike) -> IntArray:
     low = points.min(axis=0)
     # One scale for all axes: cells of the curve are cubes whatever the body's proportions.
     extent = float((points.max(axis=0) - low).max())
-    scale = (2**AXIS_BITS - 1) / extent if extent > 0 else 0.0
-    cells = ((points - low) * scale).astype(np.uint64)
+    share = (points - low) / extent if extent > 0 else np.zeros_like(points)
+    cells = (share * (2**AXIS_BITS - 1)).astype(np.uint64)
     keys = _spread(cells[:, 0]) << np.uint64(2) | _spread(cells[:, 1]) << np.uint64(1) | _spread(cells[:, 2])
     return np.argsort(keys, kind="stable").astype(np.int32)
 

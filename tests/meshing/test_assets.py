@@ -22,7 +22,7 @@ def test_files_are_as_stated(name):
     vertices, tets, size, volume, angle, edge = ROWS[name].split(" | ")
     mesh = load_mesh(FOLDER / f"{name}.npz", fix_orientation=False)
     assert (len(mesh.vertices), len(mesh.tets)) == (int(vertices), int(tets))
-    assert np.ptp(mesh.bounds, axis=0)[0] == pytest.approx([float(s) for s in size.split(" x ")], abs=0.006)
+    assert np.ptp(mesh.bounds, axis=0) == pytest.approx([float(s) for s in size.split(" x ")], abs=0.006)
     assert mesh.volume == pytest.approx(float(volume), abs=1e-4)
     assert mesh.quality.min_dihedral.min() == pytest.approx(float(angle), abs=0.06)
     assert mesh.quality.shortest_edge == pytest.approx(float(edge), abs=6e-4)

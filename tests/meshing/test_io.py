@@ -71,7 +71,7 @@ $Elements
 1 15 2 0 1 3
 2 4 2 0 1 1 2 4 5
 3 2 2 0 1 1 2 4
-4 4 2 0 1 2 4 5 6
+4 4 2 0 1 4 2 5 6
 $EndElements
 """
 MSH41 = """$MeshFormat
@@ -107,7 +107,7 @@ $Elements
 3 1 4 1
 2 1 2 4 5
 3 2 4 1
-3 2 4 5 6
+3 4 2 5 6
 $EndElements
 """
 VTK = """# vtk DataFile Version 3.0
@@ -119,7 +119,7 @@ POINTS 6 float
 CELLS 3 14
 4 0 1 3 4
 3 0 1 3
-4 1 3 4 5
+4 3 1 4 5
 CELL_TYPES 3
 10
 5
@@ -192,7 +192,7 @@ def test_unknown_formats_are_refused(tmp_path, name):
 
 def test_files_without_tetrahedra_are_refused(tmp_path):
     pytest.importorskip("meshio")
-    text = VTK.replace("4 0 1 3 4\n", "").replace("4 1 3 4 5\n", "").replace("10\n5\n10", "5")
+    text = VTK.replace("4 0 1 3 4\n", "").replace("4 3 1 4 5\n", "").replace("10\n5\n10", "5")
     (tmp_path / "x.vtk").write_text(text.replace("CELLS 3 14", "CELLS 1 4").replace("TYPES 3", "TYPES 1"))
     with pytest.raises(MeshError, match=r"x\.vtk: holds no tetrahedra, only triangle"):
         load_mesh(tmp_path / "x.vtk")
@@ -200,7 +200,7 @@ def test_files_without_tetrahedra_are_refused(tmp_path):
 
 def test_archives_of_other_things_are_refused(tmp_path):
     np.savez(tmp_path / "x.npz", vertices=np.eye(3))
-    with pytest.raises(MeshError, match=r"x\.npz: has no array 'tets'"):
+    with pytest.raises(MeshError, match=r"x\.npz: has no array 'tets', so it is not"):
         load_mesh(tmp_path / "x.npz")
     np.savez(tmp_path / "y.npz", vertices=np.array([{}], dtype=object), tets=np.eye(4))
     with pytest.raises(MeshError, match=r"y\.npz: not a mesh file"):

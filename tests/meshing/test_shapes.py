@@ -32,7 +32,7 @@ def test_box(cells):
     assert mesh.volume == pytest.approx(6)
     assert len(mesh.tets) == 5 * np.prod(cells)
     assert len(mesh.vertices) == np.prod(np.array(cells) + 1)
-    assert np.ptp(mesh.bounds, axis=0)[0] == pytest.approx([1, 2, 3])
+    assert np.ptp(mesh.bounds, axis=0) == pytest.approx([1, 2, 3])
     assert centred(mesh)
     assert euler(mesh) == 1
 
