@@ -1,0 +1,210 @@
+"""One soft body of a world: what a user reads from it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taichi_soft.checks import as_rows
+from taichi_soft.errors import OptionError, StateError
+from taichi_soft.integrators import StableStep, stable_step
+from taichi_soft.scene import BodyDescription, rest_inverses, vertex_masses
+
+if TYPE_CHECKING:
+    from taichi_soft.world import World
+
+Floats32 = NDArray[np.float32]
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why a body was frozen."""
+
+    body: int
+    tetrahedron: int | None  # that broke first, in the caller's order; None if it cannot be told
+    step: int  # of the world, counted from 0, which was undone for this body
+    substep: int | None  # within that step
+    time: float  # [s], of the last sound state, in which the body now rests
+
+
+class Body:
+    """A handle to one body. Positions and velocities come back in the caller's vertex order.
+
+    Energies, momentum and volume are computed in float64 from the float32 state, at the time of the call.
+    """
+
+    def __init__(self, world: World, index: int, description: BodyDescription) -> None:
+        """Made by `World.add_body`."""
+        self._world = world
+        self._description = description
+        self._stable: StableStep | None = None
+        self._masses: Floats | None = None
+        self.index = index
+        self.failure: Failure | None = None
+
+    def __repr__(self) -> str:
+        state = "frozen" if self.is_frozen else "active"
+        return f"Body({self.index}, {self.vertex_count} vertices, {len(self.tets)} tetrahedra, {state})"
+
+    @property
+    def mesh(self):  # type: ignore[no-untyped-def]
+        """The rest shape, as added."""
+        return self._description.mesh
+
+    @property
+    def material(self):  # type: ignore[no-untyped-def]
+        """The material, as added."""
+        return self._description.material
+
+    @property
+    def vertex_count(self) -> int:
+        """Number of vertices, n."""
+        return len(self._description.mesh.vertices)
+
+    @property
+    def tets(self) -> NDArray[np.int32]:
+        """Vertices of each tetrahedron, (m, 4)."""
+        return self._description.mesh.tets
+
+    @property
+    def surface(self) -> NDArray[np.int32]:
+        """Surface triangles, outward, (f, 3)."""
+        return np.asarray(self.mesh.surface)
+
+    @property
+    def masses(self) -> Floats:
+        """Mass of each vertex, (n,) [kg]."""
+        if self._masses is None:
+            density = self._description.material.per_tet("density", len(self.tets))
+            self._masses = vertex_masses(self.mesh, density)
+        return self._masses
+
+    @property
+    def stable_step(self) -> StableStep:
+        """Estimate of the largest stable substep."""
+        if self._stable is None:
+            self._stable = stable_step(self.mesh, self.material, self._description.model)
+        return self._stable
+
+    @property
+    def is_frozen(self) -> bool:
+        """True once the body went non-finite; it stays in its last finite state from then on."""
+        return self.failure is not None
+
+    def positions(self, out: Floats32 | None = None) -> Floats32:
+        """Vertex positions after the last step, float32 (n, 3) [m].
+
+        Args:
+            out: C-contiguous float32 array to fill and return; None makes a new one.
+        Raises: OptionError if `out` does not fit.
+        """
+        return self._world.read_positions(self, 1.0, out)
+
+    def velocities(self) -> Floats32:
+        """Vertex velocities at the time of the positions, float32 (n, 3) [m/s].
+
+        Leapfrog keeps them half a substep behind; they are brought up with the present acceleration.
+        """
+        return self._world.read_velocities(self)
+
+    def set_motion(self, positions: ArrayLike, velocities: ArrayLike) -> None:
+        """Put the body into a given state between two steps; a frozen body is active again.
+
+        Args:
+            positions: (n, 3) [m].
+            velocities: (n, 3) [m/s], of the same moment.
+        Raises: OptionError for wrong shapes or numbers that are not finite; StateError before `build`.
+        """
+        shape = (self.vertex_count, 3)
+        x, v = as_rows(positions, "positions", shape, "m"), as_rows(velocities, "velocities", shape, "m/s")
+        self._world.write_motion(self, x, v)
+        self.failure = None
+
+    def volumes(self) -> Floats:
+        """Signed volume of each tetrahedron, (m,) [m^3]: negative where it is flipped."""
+        corners = self.positions().astype(np.float64)[self.tets]
+        return np.asarray(np.linalg.det(corners[:, 1:] - corners[:, :1]) / 6.0)
+
+    def volume(self) -> float:
+        """Volume of the body, flipped tetrahedra counted negative [m^3]."""
+        return float(self.volumes().sum())
+
+    def flipped_count(self) -> int:
+        """Number of tetrahedra that are inside out."""
+        return int((self.volumes() < 0).sum())
+
+    def center_of_mass(self) -> Floats:
+        """(3,) [m]."""
+        return np.asarray(self.masses @ self.positions().astype(np.float64) / self.masses.sum())
+
+    def momentum(self) -> Floats:
+        """Linear momentum, (3,) [kg m/s]."""
+        return np.asarray(self.masses @ self.velocities().astype(np.float64))
+
+    def angular_momentum(self) -> Floats:
+        """About the world's origin, (3,) [kg m^2/s]."""
+        impulses = self.masses[:, None] * self.velocities().astype(np.float64)
+        return np.asarray(np.cross(self.positions().astype(np.float64), impulses).sum(axis=0))
+
+    def kinetic_energy(self) -> float:
+        """1/2 sum m v^2 [J]."""
+        return float(0.5 * self.masses @ (self.velocities().astype(np.float64) ** 2).sum(axis=1))
+
+    def gravitational_energy(self) -> float:
+        """- sum m g.x, zero at the origin [J]."""
+        return float(-(self.masses @ self.positions().astype(np.float64)) @ self._world.gravity)
+
+    def elastic_energy(self) -> float:
+        """1/2 sum V0 sigma : eps of the linear strain [J].
+
+        An indicator, not a conserved energy: the stress of the thesis's laws is not the derivative of any
+        energy (except of another one at poisson = 1/4), so the total may drift without damping.
+        """
+        count = len(self.tets)
+        strain = self.strains()
+        trace = np.einsum("maa->m", strain)
+        lame_lambda = self.material.per_tet("lame_lambda", count)
+        lame_mu = self.material.per_tet("lame_mu", count)
+        density = 0.5 * lame_lambda * trace**2 + lame_mu * np.einsum("mab,mab->m", strain, strain)
+        return float(density @ self.mesh.volumes)
+
+    def strains(self) -> Floats:
+        """Linear strain 1/2 (F F^T - I) of each tetrahedron (thesis eq. 6.7), (m, 3, 3)."""
+        corners = self.positions().astype(np.float64)[self.tets]
+        shapes = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
+        F = shapes @ rest_inverses(self.mesh)
+        return np.asarray(0.5 * (F @ np.swapaxes(F, 1, 2) - np.eye(3)))
+
+    def vertex_stress(self) -> Floats:
+        """Von Mises stress averaged to the vertices by volume, (n,) [Pa]: for colours."""
+        strain = self.strains()
+        deviator = strain - np.einsum("maa->m", strain)[:, None, None] / 3.0 * np.eye(3)
+        mu = self.material.per_tet("lame_mu", len(self.tets))
+        mises = 2 * mu * np.sqrt(1.5 * np.einsum("mab,mab->m", deviator, deviator))
+        volumes = self.mesh.volumes
+        flat = self.tets.ravel()
+        total = np.bincount(flat, np.repeat(mises * volumes, 4), minlength=self.vertex_count)
+        return np.asarray(total / np.bincount(flat, np.repeat(volumes, 4), minlength=self.vertex_count))
+
+
+def require_buffer(out: Floats32 | None, count: int) -> Floats32:
+    """`out` if it can take (count, 3) positions, or a new array. Raises: OptionError."""
+    if out is None:
+        return np.empty((count, 3), dtype=np.float32)
+    if not isinstance(out, np.ndarray):
+        raise OptionError(f"out must be a numpy array, got {type(out).__name__}")
+    if out.shape != (count, 3) or out.dtype != np.float32:
+        raise OptionError(f"out must be float32 of shape ({count}, 3), got {out.dtype} of shape {out.shape}")
+    if not (out.flags.c_contiguous and out.flags.writeable):
+        raise OptionError("out must be C-contiguous and writeable: make it with numpy.empty((n, 3), numpy.float32)")
+    return out
+
+
+def require_built(is_built: bool) -> None:
+    """Raises: StateError before `World.build`."""
+    if not is_built:
+        raise StateError("the world is not built: call world.build() after the last add_body")

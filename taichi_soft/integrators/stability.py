@@ -1,0 +1,158 @@
+"""Largest substep that stays stable, from the frequencies of the elements at rest.
+
+One oscillator under leapfrog with a lagging damper, x'' = -w^2 x - c x', stays bounded while
+h^2 w^2 + 2 h c < 4 (the roots of z^2 - (2 - h c - h^2 w^2) z + 1 - h c lie in the unit circle). For a body
+the left side is the largest eigenvalue of M^-1 (h^2 K + 2 h C), summed from its elements. The elements'
+own frequencies bound it (Irons and Treharne 1971) and tell which tetrahedron is to blame; as that bound is
+up to twice too strict on irregular meshes, power iteration finds the body's own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.laws import ElementModel
+from taichi_soft.materials import Material
+from taichi_soft.meshing import TetMesh
+from taichi_soft.scene import edge_damping, rest_inverses, vertex_masses
+from taichi_soft.types import DampingModel
+
+Floats = NDArray[np.float64]
+Operator = Callable[[Floats], Floats]
+
+MARGIN = 0.9
+"""Part of the linear limit that is recommended: compression stiffens an element beyond its rest value."""
+
+_ITERATIONS = 30
+_DAMPING_PASSES = 5
+
+
+@dataclass(frozen=True)
+class StableStep:
+    """What limits the substep of one body."""
+
+    limit: float  # [s], largest stable substep for small motion
+    stiffest_tet: int  # whose own frequency is highest, in the caller's order
+    period: float  # [s] of the fastest vibration
+
+    @property
+    def recommended(self) -> float:
+        """Substep with a margin for large deformation [s]."""
+        return MARGIN * self.limit
+
+
+def stable_step(mesh: TetMesh, material: Material, model: ElementModel) -> StableStep:
+    """Estimate the largest stable substep of a body.
+
+    It holds for motion about the rest shape. A body under strong compression is stiffer and a flattened
+    tetrahedron has no bound at all, which is why `recommended` leaves a margin.
+    """
+    count = len(mesh.tets)
+    mass = vertex_masses(mesh, material.per_tet("density", count))
+    elastic = _ElasticOperator(mesh, material, mass)
+    damping = _damping_operator(mesh, material, model, mass)
+    u = np.random.default_rng(0).normal(size=(len(mass), 3))
+    frequency2, u = _largest_eigenvalue(elastic.apply, u, _ITERATIONS)
+    limit = 2.0 / np.sqrt(frequency2)
+    if damping is not None:
+        # Each pass makes the quadratic form h^2 K + 2 h C touch 4 along the direction that is worst so far.
+        for _ in range(_DAMPING_PASSES):
+            h = limit
+            value, u = _largest_eigenvalue(lambda u, h=h: h * h * elastic.apply(u) + 2 * h * damping(u), u, 8)
+            # Between h (all damping) and h^2 (all stiffness) lies how the form grows: 2/3 is safe for both.
+            limit = h * (4.0 / value) ** (2 / 3)
+    worst = int(elastic.element_bounds().argmax())
+    return StableStep(float(limit), worst, float(2 * np.pi / np.sqrt(frequency2)))
+
+
+class _ElasticOperator:
+    """M^-1 K of a body at rest, applied tetrahedron by tetrahedron."""
+
+    def __init__(self, mesh: TetMesh, material: Material, mass: Floats) -> None:
+        count = len(mesh.tets)
+        self.tets = mesh.tets
+        self.root_mass = np.sqrt(mass)[:, None]
+        inverse = rest_inverses(mesh)
+        self.gradients = np.concatenate([-inverse.sum(axis=1, keepdims=True), inverse], axis=1)  # (m, 4, 3)
+        self.volumes = mesh.volumes
+        self.lame_lambda = material.per_tet("lame_lambda", count)
+        self.lame_mu = material.per_tet("lame_mu", count)
+        self.density = material.per_tet("density", count)
+
+    def element_bounds(self) -> Floats:
+        """Largest w^2 of every tetrahedron on its own quarter masses, (m,) [1/s^2].
+
+        K_e = V sum (lambda g_i g_j + mu (g_j g_i + g_i.g_j I)) has the spectrum of a 6x6 matrix
+        C^1/2 (b b^T) C^1/2, where b maps displacements to strain (Mandel order).
+        """
+        g = self.gradients
+        b = np.zeros((len(g), 6, 4, 3))
+        for axis in range(3):
+            b[:, axis, :, axis] = g[:, :, axis]
+        for row, (p, q) in enumerate(((1, 2), (0, 2), (0, 1)), start=3):
+            b[:, row, :, p] = g[:, :, q] / np.sqrt(2)
+            b[:, row, :, q] = g[:, :, p] / np.sqrt(2)
+        b = b.reshape(len(g), 6, 12)
+        shear = np.sqrt(2 * self.lame_mu)
+        bulk = np.sqrt(3 * self.lame_lambda + 2 * self.lame_mu)
+        hydrostatic = np.zeros((6, 6))
+        hydrostatic[:3, :3] = 1 / 3
+        root = shear[:, None, None] * np.eye(6) + (bulk - shear)[:, None, None] * hydrostatic
+        gram = root @ (b @ np.swapaxes(b, 1, 2)) @ root
+        return np.asarray(np.linalg.eigvalsh(gram)[:, -1] * 4.0 / self.density)
+
+    def apply(self, u: Floats) -> Floats:
+        """M^-1/2 K M^-1/2 u for (n, 3) u."""
+        displaced = (u / self.root_mass)[self.tets]
+        gradient = np.einsum("mia,mib->mab", displaced, self.gradients)
+        strain = (gradient + np.swapaxes(gradient, 1, 2)) / 2
+        trace = np.einsum("maa->m", strain)
+        stress = 2 * self.lame_mu[:, None, None] * strain
+        stress += (self.lame_lambda * trace)[:, None, None] * np.eye(3)
+        forces = np.einsum("mab,mib->mia", stress * self.volumes[:, None, None], self.gradients)
+        return _summed(self.tets, forces, len(u)) / self.root_mass
+
+
+def _damping_operator(mesh: TetMesh, material: Material, model: ElementModel, mass: Floats) -> Operator | None:
+    """M^-1/2 C M^-1/2, or None where nothing damps."""
+    tet_damping = material.per_tet("damping", len(mesh.tets))
+    if not tet_damping.any():
+        return None
+    root_mass = np.sqrt(mass)[:, None]
+    damping = edge_damping(mesh, tet_damping)
+    ends = mesh.vertices[mesh.edges]
+    direction = ends[:, 1] - ends[:, 0]
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+
+    def along_edges(u: Floats) -> Floats:
+        v = (u / root_mass)[mesh.edges]
+        along = damping * np.einsum("ka,ka->k", direction, v[:, 0] - v[:, 1])
+        force = along[:, None] * direction
+        return _summed(mesh.edges, np.stack([force, -force], axis=1), len(u)) / root_mass
+
+    def to_the_mean(u: Floats) -> Floats:
+        v = (u / root_mass)[mesh.tets]
+        force = tet_damping[:, None, None] * (v - v.mean(axis=1, keepdims=True))
+        return _summed(mesh.tets, force, len(u)) / root_mass
+
+    return along_edges if model.damping_model is DampingModel.EDGE else to_the_mean
+
+
+def _summed(owner: NDArray[np.int32], rows: Floats, count: int) -> Floats:
+    flat = rows.reshape(-1, 3)
+    return np.stack([np.bincount(owner.ravel(), flat[:, a], minlength=count) for a in range(3)], axis=1)
+
+
+def _largest_eigenvalue(apply: Operator, u: Floats, iterations: int) -> tuple[float, Floats]:
+    """Power iteration from `u`: the eigenvalue (from below) and its direction so far."""
+    value = 0.0
+    for _ in range(iterations):
+        u = u / np.linalg.norm(u)
+        image = apply(u)
+        value = float(np.sum(u * image))
+        u = image
+    return value, u

@@ -1,0 +1,174 @@
+"""Schedule `flat`: all tetrahedra, then all particles, of all bodies in parallel, substep by substep.
+
+For bodies too large for one thread. Forces are stored per corner and per edge, and each particle gathers
+its own in a fixed order, so the result does not depend on the number of threads.
+
+On a CPU the substeps lie inside one kernel call: one task per thread, which meet at a spinning barrier.
+Waking a thread pool costs 5 to 90 us per loop, a barrier well under one. All tasks of a loop run at
+once because Taichi's pool has exactly that many threads. A GPU has no such barrier: there each substep
+is a launch of its own.
+"""
+
+from taichi_soft.constants import LANES
+from taichi_soft.kernels.damping import edge_force_of
+from taichi_soft.kernels.elastic import compute_block_forces, compute_lane_forces, corner_force_at
+from taichi_soft.kernels.motion import move_particle, particle_is_sound, remember_particle, restore_particle
+from taichi_soft.runtime import ti
+from taichi_soft.state import ACTIVE, CORNER_ROWS, FROZEN
+
+_FAILING = 2
+
+
+@ti.func
+def _edge_phase(state: ti.template(), e):
+    state.edge_force[e] = edge_force_of(state, e)
+
+
+@ti.func
+def gathered_force(state: ti.template(), p):
+    """Internal force on one particle [N]: its corners' forces, then its edges'."""
+    force = ti.Vector([0.0, 0.0, 0.0])
+    corners = state.particle_corners[p]
+    for k in range(corners[0], corners[1]):
+        force += corner_force_at(state, state.corner_slot[k])
+    edges = state.particle_edges[p]
+    for k in range(edges[0], edges[1]):
+        e = state.incident_edge[k]
+        if e >= 0:
+            force += state.edge_force[e]
+        else:
+            force -= state.edge_force[-1 - e]
+    return force
+
+
+@ti.func
+def _move_phase(state: ti.template(), program: ti.template(), p, h, is_first):
+    body = state.particle_body[p]
+    if state.body_status[body] == ACTIVE:
+        kick = h
+        if is_first:
+            kick = 0.5 * (state.body_velocity_lag[body] + h)
+        move_particle(state, program, p, gathered_force(state, p), h, kick)
+
+
+@ti.func
+def _check_phase(state: ti.template(), p):
+    if particle_is_sound(state, p) == 0:
+        ti.atomic_max(state.body_status[state.particle_body[p]], _FAILING)
+
+
+@ti.func
+def _fall_back_phase(state: ti.template(), p):
+    if state.body_status[state.particle_body[p]] == _FAILING:
+        restore_particle(state, p)
+
+
+@ti.func
+def _settle_body(state: ti.template(), body, h):
+    failed = 0
+    if state.body_status[body] == _FAILING:
+        state.body_status[body] = FROZEN
+        failed = 1
+    elif state.body_status[body] == ACTIVE:
+        state.body_velocity_lag[body] = h
+    return failed
+
+
+@ti.func
+def _meet(state: ti.template(), worker_count: ti.template()):
+    """Wait until all workers have come here as often as this one."""
+    arrived = ti.atomic_add(state.barrier[0], 1) + 1
+    target = (arrived + worker_count - 1) // worker_count * worker_count
+    # A maximum with -1 changes nothing; it is here because it cannot be optimised into a plain load.
+    while ti.atomic_max(state.barrier[0], -1) < target:
+        pass
+
+
+@ti.kernel
+def step_flat_cpu(
+    state: ti.template(),
+    program: ti.template(),
+    body_count: ti.i32,
+    block_count: ti.i32,
+    edge_count: ti.i32,
+    particle_count: ti.i32,
+    substeps: ti.i32,
+    h: ti.f32,
+) -> ti.i32:
+    """One fixed step of all bodies by `program.worker_count` threads. Returns how many failed."""
+    failed = 0
+    state.barrier[0] = 0
+    ti.loop_config(block_dim=1)
+    for worker in range(program.worker_count):
+        workers = program.worker_count
+        p0, p1 = particle_count * worker // workers, particle_count * (worker + 1) // workers
+        b0, b1 = block_count * worker // workers, block_count * (worker + 1) // workers
+        e0, e1 = edge_count * worker // workers, edge_count * (worker + 1) // workers
+        for p in range(p0, p1):
+            remember_particle(state, p)
+        for s in range(substeps):
+            for block in range(b0, b1):
+                for m, model in ti.static(enumerate(program.models)):
+                    if state.block_model[block] == m:
+                        compute_block_forces(
+                            state, model, block, block * CORNER_ROWS * LANES
+                        )
+            for e in range(e0, e1):
+                _edge_phase(state, e)
+            _meet(state, workers)
+            for p in range(p0, p1):
+                _move_phase(state, program, p, h, s == 0)
+            _meet(state, workers)
+        for p in range(p0, p1):
+            _check_phase(state, p)
+        _meet(state, workers)
+        for p in range(p0, p1):
+            _fall_back_phase(state, p)
+    ti.loop_config(serialize=True)
+    for body in range(body_count):
+        failed += _settle_body(state, body, h)
+    return failed
+
+
+@ti.kernel
+def begin_flat(state: ti.template(), particle_count: ti.i32):
+    """Remember where every particle is."""
+    for p in range(particle_count):
+        remember_particle(state, p)
+
+
+@ti.kernel
+def substep_flat(
+    state: ti.template(),
+    program: ti.template(),
+    block_count: ti.i32,
+    edge_count: ti.i32,
+    particle_count: ti.i32,
+    h: ti.f32,
+    is_first: ti.i32,
+):
+    """One substep with one tetrahedron, edge or particle per thread."""
+    for t in range(block_count * LANES):
+        block, lane = t // LANES, t % LANES
+        for m, model in ti.static(enumerate(program.models)):
+            if state.block_model[block] == m:
+                compute_lane_forces(
+                    state, model, block, lane, block * CORNER_ROWS * LANES
+                )
+    for e in range(edge_count):
+        _edge_phase(state, e)
+    for p in range(particle_count):
+        _move_phase(state, program, p, h, is_first)
+
+
+@ti.kernel
+def end_flat(state: ti.template(), body_count: ti.i32, particle_count: ti.i32, h: ti.f32) -> ti.i32:
+    """Freeze what went non-finite. Returns how many bodies failed."""
+    failed = 0
+    for p in range(particle_count):
+        _check_phase(state, p)
+    for p in range(particle_count):
+        _fall_back_phase(state, p)
+    for body in range(body_count):
+        failed += _settle_body(state, body, h)
+    return failed

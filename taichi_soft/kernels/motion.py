@@ -1,0 +1,36 @@
+"""Motion of particles: from force to velocity to position, with the floor in the way."""
+
+from taichi_soft.collision.floor import resolve_floor
+from taichi_soft.math.finite import is_finite, is_in_reach
+from taichi_soft.runtime import ti
+
+
+@ti.func
+def remember_particle(state: ti.template(), p):
+    """Keep where a particle is before the step: to interpolate from, and to fall back to."""
+    state.prev_position[p] = state.particle_position[p]
+    state.prev_velocity[p] = state.particle_velocity[p]
+
+
+@ti.func
+def restore_particle(state: ti.template(), p):
+    """Put a particle back to where it was before the step."""
+    state.particle_position[p] = state.prev_position[p]
+    state.particle_velocity[p] = state.prev_velocity[p]
+
+
+@ti.func
+def move_particle(state: ti.template(), program: ti.template(), p, force, h, kick):
+    """One substep of one particle under the internal force on it [N]."""
+    acceleration = force * state.particle_inv_mass[p] + state.gravity[None]
+    x, v = program.advance(state.particle_position[p], state.particle_velocity[p], acceleration, h, kick)
+    if ti.static(program.has_floor):
+        x, v = resolve_floor(x, v, h, state.floor[None])
+    state.particle_position[p] = x
+    state.particle_velocity[p] = v
+
+
+@ti.func
+def particle_is_sound(state: ti.template(), p):
+    """True (1) where position and velocity can still be computed with."""
+    return is_in_reach(state.particle_position[p]) & is_finite(state.particle_velocity[p])

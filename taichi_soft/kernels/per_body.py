@@ -1,0 +1,70 @@
+"""Schedule `per_body`: each body runs all substeps of a step on one thread, bodies side by side.
+
+Nothing waits between substeps and a body stays in one core's cache, so this is the fastest schedule for
+bodies of up to some ten thousand tetrahedra, and its result does not depend on the number of threads.
+"""
+
+from taichi_soft.kernels.damping import accumulate_edge_damping
+from taichi_soft.kernels.elastic import accumulate_elastic_forces
+from taichi_soft.kernels.motion import move_particle, particle_is_sound, remember_particle, restore_particle
+from taichi_soft.runtime import ti
+from taichi_soft.state import ACTIVE, FROZEN
+from taichi_soft.types import DampingModel
+
+
+@ti.func
+def accumulate_forces(state: ti.template(), program: ti.template(), body):
+    """Add all internal forces of one body to its particles."""
+    for m, model in ti.static(enumerate(program.models)):
+        if state.body_model[body] == m:
+            accumulate_elastic_forces(state, model, body)
+            if ti.static(model.damping_model == DampingModel.EDGE):
+                accumulate_edge_damping(state, body)
+
+
+@ti.func
+def move_body(state: ti.template(), program: ti.template(), body, h, kick):
+    """Move all particles of one body and clear their forces."""
+    particles = state.body_particles[body]
+    for p in range(particles[0], particles[1]):
+        move_particle(state, program, p, state.particle_force[p], h, kick)
+        state.particle_force[p] = ti.Vector([0.0, 0.0, 0.0])
+
+
+@ti.func
+def _settle_body(state: ti.template(), body):
+    """Freeze a body that went non-finite in its last sound state. Returns 1 where that happened."""
+    particles = state.body_particles[body]
+    sound = 1
+    for p in range(particles[0], particles[1]):
+        sound = sound & particle_is_sound(state, p)
+    if sound == 0:
+        for p in range(particles[0], particles[1]):
+            restore_particle(state, p)
+            state.particle_force[p] = ti.Vector([0.0, 0.0, 0.0])
+        state.body_status[body] = FROZEN
+    return 1 - sound
+
+
+@ti.kernel
+def step_per_body(
+    state: ti.template(), program: ti.template(), body_count: ti.i32, substeps: ti.i32, h: ti.f32
+) -> ti.i32:
+    """One fixed step of every active body. Returns how many bodies failed in it."""
+    failed = 0
+    ti.loop_config(block_dim=1)
+    for body in range(body_count):
+        particles = state.body_particles[body]
+        for p in range(particles[0], particles[1]):
+            remember_particle(state, p)
+        if state.body_status[body] == ACTIVE:
+            kick = 0.5 * (state.body_velocity_lag[body] + h)
+            for _ in range(substeps):
+                accumulate_forces(state, program, body)
+                move_body(state, program, body, h, kick)
+                kick = h
+            gone = _settle_body(state, body)
+            if gone == 0:
+                state.body_velocity_lag[body] = h
+            failed += gone
+    return failed

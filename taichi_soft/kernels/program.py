@@ -1,0 +1,23 @@
+"""What a step kernel is compiled for."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from taichi_soft.integrators import ADVANCE
+from taichi_soft.laws import ElementModel
+from taichi_soft.types import Integrator
+
+
+@dataclass(frozen=True)
+class Program:
+    """Structure of a world's step: everything that shapes the code, and no number."""
+
+    models: tuple[ElementModel, ...]  # a body names one by its index
+    integrator: Integrator
+    has_floor: bool
+    worker_count: int  # threads that share one flat step
+
+    @property
+    def advance(self) -> Any:
+        """The integrator's ti.func (x, v, a, h, kick) -> (x, v)."""
+        return ADVANCE[self.integrator]

@@ -1,0 +1,56 @@
+"""How the step of a world is launched: one object per schedule, one call per fixed step."""
+
+from collections.abc import Callable
+
+from taichi_soft.kernels.flat import begin_flat, end_flat, step_flat_cpu, substep_flat
+from taichi_soft.kernels.per_body import step_per_body
+from taichi_soft.kernels.program import Program
+from taichi_soft.runtime import Device
+from taichi_soft.scene import Scene
+from taichi_soft.state import State
+from taichi_soft.types import Schedule
+
+FLAT_FROM_TETS = 12_000
+"""Tetrahedra in a world's largest body from which the threads share it rather than take turns.
+Measured with `taichi-soft profile --crossover`; below, the barriers cost more than the second thread wins."""
+
+Launch = Callable[[int, float], int]
+
+
+def choose_schedule(asked: Schedule, scene: Scene, device: Device) -> Schedule:
+    """The schedule to use where `asked` leaves it open.
+
+    A GPU needs one thread per tetrahedron. On a CPU, bodies run side by side as long as there are enough
+    of them to keep the threads busy, or too few tetrahedra to be worth sharing.
+    """
+    if asked is not Schedule.AUTO:
+        return asked
+    if device.is_gpu:
+        return Schedule.FLAT
+    sizes = [len(body.tet_vertices) for body in scene.bodies]
+    is_balanced = max(sizes) * device.threads <= 1.25 * sum(sizes)
+    if device.threads == 1 or is_balanced or max(sizes) < FLAT_FROM_TETS:
+        return Schedule.PER_BODY
+    return Schedule.FLAT
+
+
+def make_launch(schedule: Schedule, state: State, program: Program, scene: Scene, device: Device) -> Launch:
+    """A function (substeps, h) -> number of bodies that failed, which makes one fixed step."""
+    bodies, particles = len(scene.bodies), scene.particle_count
+    blocks, edges = scene.block_count, scene.edge_count
+
+    def per_body(substeps: int, h: float) -> int:
+        return int(step_per_body(state, program, bodies, substeps, h))
+
+    def flat_cpu(substeps: int, h: float) -> int:
+        return int(step_flat_cpu(state, program, bodies, blocks, edges, particles, substeps, h))
+
+    def flat_gpu(substeps: int, h: float) -> int:
+        begin_flat(state, particles)
+        for s in range(substeps):
+            substep_flat(state, program, blocks, edges, particles, h, int(s == 0))
+        return int(end_flat(state, bodies, particles, h))
+
+    if schedule is Schedule.PER_BODY:
+        return per_body
+    return flat_gpu if device.is_gpu else flat_cpu

@@ -1,0 +1,192 @@
+"""The Taichi fields that hold particles, edges and tetrahedra of all bodies of one world.
+
+Fields live as long as the process: Taichi compiles kernels per set of fields, and destroying one while
+a game runs stalls it. A closed world therefore gives its state back, and the next world of the same
+capacity takes it over with its kernels compiled.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.constants import LANES
+from taichi_soft.runtime import ti
+from taichi_soft.scene import BodyArrays, Ranges, Scene, blocks_of
+
+CORNER_ROWS = 13
+"""Rows per block of corner forces: x, y, z of four vertices, and six times the signed volume."""
+
+ACTIVE, FROZEN = 0, 1
+
+
+@dataclass(frozen=True)
+class Capacity:
+    """Room in a state. Rounded up to powers of two, so that similar worlds share compiled kernels."""
+
+    particles: int
+    edges: int
+    blocks: int
+    bodies: int
+    parallel: bool  # room for the force of every corner and edge at once, as the flat schedule needs
+
+    @classmethod
+    def of(cls, scene: Scene, parallel: bool) -> "Capacity":
+        """Room for `scene`."""
+        return cls(
+            _power_of_two(scene.particle_count, 512),
+            _power_of_two(scene.edge_count, 2048),
+            _power_of_two(scene.block_count, 128),
+            _power_of_two(len(scene.bodies), 8),
+            parallel,
+        )
+
+
+def _power_of_two(count: int, least: int) -> int:
+    return max(least, 1 << max(count - 1, 0).bit_length())
+
+
+@ti.data_oriented
+class State:
+    """Particles, edges, tetrahedra and bodies, each quantity one field.
+
+    Tetrahedra lie in blocks of `LANES`, quantity by quantity: entry k of lane l in block b of a quantity
+    with K entries is at (b K + k) LANES + l. The arrays are flat because Taichi 1.7 confuses stores at a
+    constant index with loads at a computed one in fields of several dimensions.
+    """
+
+    def __init__(self, capacity: Capacity) -> None:
+        """Allocate `capacity`; contents are zero until `load`."""
+        self.capacity = capacity
+        n, k, b, bodies = capacity.particles, capacity.edges, capacity.blocks, capacity.bodies
+        self.particle_position = ti.Vector.field(3, ti.f32, n)  # [m]
+        self.particle_velocity = ti.Vector.field(3, ti.f32, n)  # [m/s], see body_velocity_lag
+        self.particle_force = ti.Vector.field(3, ti.f32, n)  # [N], zero between steps
+        self.particle_inv_mass = ti.field(ti.f32, n)  # [1/kg]
+        self.particle_body = ti.field(ti.i32, n)
+        self.particle_of_vertex = ti.field(ti.i32, n)  # where the caller's next vertex lies
+        self.prev_position = ti.Vector.field(3, ti.f32, n)  # before the last fixed step
+        self.prev_velocity = ti.Vector.field(3, ti.f32, n)
+
+        self.tet_vertices = ti.field(ti.i32, b * 4 * LANES)
+        self.tet_rest_inverse = ti.field(ti.f32, b * 9 * LANES)  # [1/m], column by column
+        self.tet_lame = ti.field(ti.f32, b * 2 * LANES)  # [Pa]
+        self.tet_damping = ti.field(ti.f32, b * LANES)  # [N s/m], for damping by the mean velocity
+        self.corner_force = ti.field(ti.f32, (b if capacity.parallel else bodies) * CORNER_ROWS * LANES)
+
+        self.edge_vertices = ti.Vector.field(2, ti.i32, k)
+        self.edge_damping = ti.field(ti.f32, k)  # [N s/m]
+        if capacity.parallel:
+            self.edge_force = ti.Vector.field(3, ti.f32, k)
+            self.particle_corners = ti.Vector.field(2, ti.i32, n)  # range in corner_slot
+            self.corner_slot = ti.field(ti.i32, b * 4 * LANES)  # where a corner's x lies in corner_force
+            self.particle_edges = ti.Vector.field(2, ti.i32, n)  # range in incident_edge
+            self.incident_edge = ti.field(ti.i32, 2 * k)  # e as first end, -1 - e as second
+            self.barrier = ti.field(ti.i32, 2)
+
+        self.body_particles = ti.Vector.field(2, ti.i32, bodies)  # range
+        self.body_edges = ti.Vector.field(2, ti.i32, bodies)
+        self.body_blocks = ti.Vector.field(2, ti.i32, bodies)
+        self.body_model = ti.field(ti.i32, bodies)
+        self.body_status = ti.field(ti.i32, bodies)
+        self.body_velocity_lag = ti.field(ti.f32, bodies)  # substep [s] by half of which leapfrog lags
+        self.block_model = ti.field(ti.i32, b)
+
+        self.gravity = ti.Vector.field(3, ti.f32, ())  # [m/s^2]
+        self.floor = ti.Vector.field(3, ti.f32, ())  # height [m], restitution, friction
+
+    def load(self, scene: Scene, models: list[int]) -> None:
+        """Fill every field from `scene`; `models[i]` is the number of body i's force model."""
+        ranges = scene.ranges
+        bodies = scene.bodies
+        mass = np.concatenate([body.mass for body in bodies])
+        position = np.concatenate([body.start_position for body in bodies])
+        velocity = np.concatenate([body.start_velocity for body in bodies])
+        _fill(self.particle_position, position)
+        _fill(self.prev_position, position)
+        _fill(self.particle_velocity, velocity)
+        _fill(self.prev_velocity, velocity)
+        _fill(self.particle_force, np.zeros((0, 3)))
+        _fill(self.particle_inv_mass, 1.0 / mass)
+        _fill(self.particle_body, np.repeat(np.arange(len(bodies)), [len(body.mass) for body in bodies]))
+
+        ranks = [b.rank + r.particles[0] for b, r in zip(bodies, ranges, strict=True)]
+        _fill(self.particle_of_vertex, np.concatenate(ranks))
+
+        vertices, corners = _tet_blocks(bodies, ranges)
+        _fill(self.tet_vertices, vertices)
+        _fill(self.tet_rest_inverse, _blocks(bodies, lambda b: np.swapaxes(b.rest_inverse, 1, 2), 9))
+        _fill(self.tet_lame, _blocks(bodies, lambda b: b.lame, 2))
+        _fill(self.tet_damping, _blocks(bodies, lambda b: b.tet_damping, 1))
+
+        edges = np.concatenate([b.edge_vertices + r.particles[0] for b, r in zip(bodies, ranges, strict=True)])
+        _fill(self.edge_vertices, edges)
+        _fill(self.edge_damping, np.concatenate([body.edge_damping for body in bodies]))
+        if self.capacity.parallel:
+            self._load_gather_lists(corners, edges, scene.particle_count)
+
+        _fill(self.body_particles, np.array([r.particles for r in ranges]))
+        _fill(self.body_edges, np.array([r.edges for r in ranges]))
+        _fill(self.body_blocks, np.array([r.blocks for r in ranges]))
+        _fill(self.body_model, np.array(models))
+        _fill(self.body_status, np.zeros(0))
+        _fill(self.body_velocity_lag, np.zeros(0))
+        _fill(self.block_model, np.repeat(models, [r.blocks[1] - r.blocks[0] for r in ranges]))
+
+    def _load_gather_lists(self, corners: NDArray[np.int64], edges: NDArray[np.int64], count: int) -> None:
+        """For each particle, the corner forces and edge forces that act on it, in a fixed order."""
+        order = np.argsort(corners[:, 0], kind="stable")
+        _fill(self.corner_slot, corners[order, 1])
+        _fill(self.particle_corners, _row_ranges(corners[:, 0], count))
+        ends = edges.T.reshape(-1)
+        numbers = np.arange(len(edges))
+        incident = np.concatenate([numbers, -1 - numbers])
+        _fill(self.incident_edge, incident[np.argsort(ends, kind="stable")])
+        _fill(self.particle_edges, _row_ranges(ends, count))
+
+
+def _row_ranges(owner: NDArray[np.int64], count: int) -> NDArray[np.int64]:
+    ends = np.cumsum(np.bincount(owner, minlength=count))
+    return np.stack([np.concatenate([[0], ends[:-1]]), ends], axis=1)
+
+
+def _blocks(bodies: list[BodyArrays], quantity, width: int) -> NDArray[np.generic]:  # type: ignore[no-untyped-def]
+    return np.concatenate([blocks_of(quantity(body).reshape(-1, width), width, 0) for body in bodies])
+
+
+def _tet_blocks(bodies: list[BodyArrays], ranges: list[Ranges]) -> tuple[NDArray[np.generic], NDArray[np.int64]]:
+    """Vertices of all blocks; and for each real corner its particle and its place in corner_force.
+
+    The lanes that pad a last block name the body's first particle four times: no shape, no force.
+    """
+    blocks, corners = [], []
+    for body, place in zip(bodies, ranges, strict=True):
+        rows = body.tet_vertices + place.particles[0]
+        blocks.append(blocks_of(rows, 4, place.particles[0]))
+        block, lane = np.divmod(np.arange(len(rows)), LANES)
+        for corner in range(4):
+            slot = ((block + place.blocks[0]) * CORNER_ROWS + 3 * corner) * LANES + lane
+            corners.append(np.stack([rows[:, corner], slot], axis=1))
+    return np.concatenate(blocks), np.concatenate(corners).astype(np.int64)
+
+
+def _fill(target, rows: NDArray[np.generic]) -> None:  # type: ignore[no-untyped-def]
+    """Write `rows` to the front of a field and zeros behind them."""
+    shape = tuple(target.shape) + ((target.n,) if hasattr(target, "n") else ())
+    whole = np.zeros(shape, dtype=np.float32 if target.dtype == ti.f32 else np.int32)
+    whole[: len(rows)] = rows
+    target.from_numpy(whole)
+
+
+_free: dict[Capacity, list[State]] = {}
+
+
+def acquire(capacity: Capacity) -> State:
+    """A state of that capacity: one that a closed world gave back, or a new one."""
+    waiting = _free.get(capacity)
+    return waiting.pop() if waiting else State(capacity)
+
+
+def release(state: State) -> None:
+    """Take back the state of a world that is gone."""
+    _free.setdefault(state.capacity, []).append(state)

@@ -1,0 +1,250 @@
+"""The world: add bodies, build, step, read."""
+
+from __future__ import annotations
+
+import math
+import warnings
+import weakref
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taichi_soft.body import Body, Failure, Floats32, require_buffer, require_built
+from taichi_soft.checks import as_count, as_number, as_positive, as_rotation, as_vector
+from taichi_soft.constants import GRAVITY_EARTH, LANES
+from taichi_soft.errors import FrozenBodyWarning, MeshError, OptionError, StateError, UnstableStepWarning
+from taichi_soft.kernels.evaluate import compute_body_forces, find_failure
+from taichi_soft.kernels.program import Program
+from taichi_soft.kernels.readout import read_positions, read_velocities, write_motion
+from taichi_soft.kernels.schedules import Launch, choose_schedule, make_launch
+from taichi_soft.laws import element_model
+from taichi_soft.materials import Material, require_material
+from taichi_soft.meshing import TetMesh
+from taichi_soft.runtime import init
+from taichi_soft.scene import BodyDescription, Scene, arrange
+from taichi_soft.state import FROZEN, Capacity, State, acquire, release
+from taichi_soft.types import DampingModel, Flips, Integrator, Schedule, Strain
+
+
+class World:
+    """Soft bodies under gravity, above a floor. SI units, z is up.
+
+    Args:
+        gravity: (3,) [m/s^2].
+        floor: height of a horizontal floor [m], or None for none.
+        restitution: of the floor, 0 (default: bodies bounce by their own elasticity) to 1.
+        friction: Coulomb coefficient of the floor, 0 or more.
+        integrator: "leapfrog", "lazy_leapfrog" or "explicit_euler".
+        schedule: "auto", "per_body" or "flat": in which loops the work runs; no effect on the physics.
+    Raises: OptionError for a value out of range or a name that is not known.
+    """
+
+    def __init__(
+        self,
+        *,
+        gravity: ArrayLike = (0.0, 0.0, -GRAVITY_EARTH),
+        floor: float | None = 0.0,
+        restitution: float = 0.0,
+        friction: float = 0.5,
+        integrator: str | Integrator = Integrator.LEAPFROG,
+        schedule: str | Schedule = Schedule.AUTO,
+    ) -> None:
+        self.gravity: NDArray[np.float64] = as_vector(gravity, "gravity", "m/s^2")
+        self.floor = None if floor is None else as_number(floor, "floor", -1e6, 1e6, "a height [m] or None")
+        self.restitution = as_number(restitution, "restitution", 0.0, 1.0, "a number from 0 to 1")
+        self.friction = as_number(friction, "friction", 0.0, 1e6, "a number of 0 or more")
+        self.integrator = Integrator.parse(integrator)
+        self.schedule = Schedule.parse(schedule)
+        self.step_count = 0
+        self.time = 0.0
+        self._bodies: list[Body] = []
+        self._scene = Scene()
+        self._state: State | None = None
+        self._program: Program | None = None
+        self._launch: Launch | None = None
+        self._checked_step: tuple[Any, Any] = (None, None)
+        self._step_values = (0.0, 0, 0.0)
+        self._warned_steps: set[float] = set()
+
+    @property
+    def bodies(self) -> Sequence[Body]:
+        """All bodies, in the order in which they were added."""
+        return tuple(self._bodies)
+
+    @property
+    def is_built(self) -> bool:
+        """True from `build` on."""
+        return self._state is not None
+
+    def add_body(
+        self,
+        mesh: TetMesh,
+        material: Material,
+        *,
+        law: str = "virial",
+        strain: str | Strain = Strain.LINEAR,
+        flips: str | Flips = Flips.TOLERANT,
+        damping_model: str | DampingModel = DampingModel.EDGE,
+        position: ArrayLike = (0.0, 0.0, 0.0),
+        rotation: ArrayLike | None = None,
+        velocity: ArrayLike = (0.0, 0.0, 0.0),
+    ) -> Body:
+        """Add a body before `build`.
+
+        Args:
+            mesh: rest shape. A `ParticleMesh`, which has no tetrahedra, needs a law for springs: none yet.
+            material: constants in SI units.
+            law: "virial" (thesis 6.3) or "face" (6.2).
+            strain: "linear" (eq. 6.7) or "exact" (square root of U^2).
+            flips: "tolerant" (the thesis: a mirrored tetrahedron is at rest too), "recover" or "off".
+            damping_model: "edge" (eq. 3.9) or "tet_mean" (which section 6.4 rejects: it stops rotation).
+            position: where the mesh's origin goes, (3,) [m].
+            rotation: about the mesh's origin, matrix (3, 3) or quaternion (x, y, z, w).
+            velocity: of the whole body, (3,) [m/s].
+        Returns: a handle.
+        Raises: MeshError, MaterialError or OptionError for bad input; StateError after `build`.
+        """
+        if self.is_built:
+            raise StateError("the world is already built: add bodies first, then call build() once")
+        if not isinstance(mesh, TetMesh):
+            raise MeshError(f"law {law!r} needs tetrahedra: pass a TetMesh, got {type(mesh).__name__}")
+        description = BodyDescription(
+            mesh,
+            require_material(material),
+            element_model(law, strain, flips, damping_model),
+            as_vector(position, "position", "m"),
+            as_rotation(rotation),
+            as_vector(velocity, "velocity", "m/s"),
+        )
+        arrays = arrange(description)
+        self._scene.append(arrays)
+        body = Body(self, len(self._bodies), description)
+        self._bodies.append(body)
+        return body
+
+    def build(self) -> None:
+        """Move all bodies into Taichi fields and fix the kernels. Starts Taichi if nobody has.
+
+        Raises: StateError without bodies or when called twice.
+        """
+        if self.is_built:
+            raise StateError("the world is already built")
+        if not self._bodies:
+            raise StateError("the world is empty: call add_body before build")
+        device = init()
+        models = list(dict.fromkeys(body._description.model for body in self._bodies))
+        schedule = choose_schedule(self.schedule, self._scene, device)
+        capacity = Capacity.of(self._scene, parallel=schedule is Schedule.FLAT)
+        program = Program(tuple(models), self.integrator, self.floor is not None, device.threads)
+        state = acquire(capacity)
+        weakref.finalize(self, release, state)
+        state.load(self._scene, [models.index(body._description.model) for body in self._bodies])
+        state.gravity[None] = self.gravity.tolist()
+        state.floor[None] = [self.floor or 0.0, self.restitution, self.friction]
+        self.schedule = schedule
+        self._program, self._state = program, state
+        self._launch = make_launch(schedule, state, program, self._scene, device)
+
+    def stable_substeps(self, dt: float) -> int:
+        """Number of substeps that a fixed step of `dt` [s] needs, with a margin, for the stiffest body."""
+        if not self._bodies:
+            raise StateError("the world is empty: call add_body first")
+        longest = min(body.stable_step.recommended for body in self._bodies)
+        return max(1, math.ceil(as_positive(dt, "dt", "s") / longest))
+
+    def step(self, dt: float, substeps: int | None = None) -> None:
+        """Make one fixed step of `dt` [s] in `substeps` equal substeps; None chooses their number.
+
+        A body that goes non-finite is put back to where it was before the step and frozen, with a
+        `FrozenBodyWarning` and `body.failure`; the other bodies go on.
+        Raises: OptionError if dt is not a positive number or substeps not a positive whole one;
+            StateError before `build`.
+        """
+        if self._launch is None:
+            require_built(False)
+        if self._checked_step != (dt, substeps):
+            self._step_values = self._check_step(dt, substeps)
+            self._checked_step = (dt, substeps)
+        seconds, count, h = self._step_values
+        failed = self._launch(count, h)  # type: ignore[misc]
+        if failed:
+            self._report_failures(count, h)
+        self.step_count += 1
+        self.time += seconds
+
+    def _check_step(self, dt: float, substeps: int | None) -> tuple[float, int, float]:
+        seconds = as_positive(dt, "dt", "s")
+        count = self.stable_substeps(seconds) if substeps is None else as_count(substeps, "substeps")
+        h = seconds / count
+        stiffest = min(self._bodies, key=lambda body: body.stable_step.limit)
+        limit = stiffest.stable_step.limit
+        if h > limit and h not in self._warned_steps:
+            self._warned_steps.add(h)
+            warnings.warn(
+                f"substep {h * 1e3:.4g} ms is longer than the {limit * 1e3:.4g} ms that body {stiffest.index} "
+                f"can take (stiffest tetrahedron {stiffest.stable_step.stiffest_tet}): it may explode. Use "
+                f"substeps={self.stable_substeps(seconds)} or leave substeps out",
+                UnstableStepWarning,
+                stacklevel=3,
+            )
+        return seconds, count, h
+
+    def _report_failures(self, substeps: int, h: float) -> None:
+        assert self._state is not None
+        assert self._program is not None
+        status = self._state.body_status.to_numpy()
+        for body in self._bodies:
+            if status[body.index] != FROZEN or body.is_frozen:
+                continue
+            found = np.full(2, -1, dtype=np.int32)
+            find_failure(self._state, self._program, body.index, substeps, h, found)
+            tet = None
+            if found[0] >= 0:
+                first_slot = self._scene.ranges[body.index].blocks[0] * LANES
+                row = min(int(found[0]) - first_slot, len(body.tets) - 1)
+                tet = int(self._scene.bodies[body.index].tet_order[row])
+            substep = int(found[1]) if tet is not None else None
+            body.failure = Failure(body.index, tet, self.step_count, substep, self.time)
+            where = "" if tet is None else f" (tetrahedron {tet} first, in substep {substep})"
+            warnings.warn(
+                f"body {body.index} went non-finite in step {self.step_count}{where}: put back to t = "
+                f"{self.time:.4g} s and frozen. Use more substeps or a softer material",
+                FrozenBodyWarning,
+                stacklevel=4,
+            )
+
+    def read_positions(self, body: Body, alpha: float, out: Floats32 | None = None) -> Floats32:
+        """Positions of a body between the previous step (alpha 0) and the last one (alpha 1), (n, 3) [m].
+
+        Raises: OptionError if `out` does not fit; StateError before `build`.
+        """
+        require_built(self.is_built)
+        rows = require_buffer(out, body.vertex_count)
+        begin = self._scene.ranges[body.index].particles[0]
+        read_positions(self._state, begin, body.vertex_count, alpha, rows)
+        return rows
+
+    def read_velocities(self, body: Body) -> Floats32:
+        """Velocities of a body at the time of its positions, (n, 3) [m/s]. Raises: StateError before `build`."""
+        require_built(self.is_built)
+        assert self._state is not None
+        rows = np.empty((body.vertex_count, 3), dtype=np.float32)
+        read_velocities(self._state, self._scene.ranges[body.index].particles[0], body.vertex_count, rows)
+        lag = float(self._state.body_velocity_lag[body.index])
+        if self.integrator is Integrator.LEAPFROG and lag > 0.0 and not body.is_frozen:
+            forces = np.empty_like(rows)
+            compute_body_forces(self._state, self._program, body.index, forces)
+            by_vertex = forces[self._scene.bodies[body.index].rank]
+            acceleration = by_vertex / body.masses[:, None] + self.gravity
+            rows += (0.5 * lag * acceleration).astype(np.float32)
+        return rows
+
+    def write_motion(self, body: Body, positions: NDArray[Any], velocities: NDArray[Any]) -> None:
+        """Put a body somewhere else. Raises: StateError before `build`."""
+        require_built(self.is_built)
+        x, v = positions.astype(np.float32), velocities.astype(np.float32)
+        if not (np.isfinite(x).all() and np.isfinite(v).all()):
+            raise OptionError("positions and velocities must fit float32")
+        write_motion(self._state, body.index, x, v)
