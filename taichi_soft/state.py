@@ -14,8 +14,8 @@ from taichi_soft.constants import LANES
 from taichi_soft.runtime import ti
 from taichi_soft.scene import BodyArrays, Ranges, Scene, blocks_of
 
-CORNER_ROWS = 13
-"""Rows per block of corner forces: x, y, z of four vertices, and six times the signed volume."""
+CORNER_ROWS = 12
+"""Rows per block of corner forces: x, y, z of four vertices."""
 
 ACTIVE, FROZEN = 0, 1
 
@@ -72,11 +72,11 @@ class State:
         self.tet_rest_inverse = ti.field(ti.f32, b * 9 * LANES)  # [1/m], column by column
         self.tet_lame = ti.field(ti.f32, b * 2 * LANES)  # [Pa]
         self.tet_damping = ti.field(ti.f32, b * LANES)  # [N s/m], for damping by the mean velocity
-        self.corner_force = ti.field(ti.f32, (b if capacity.parallel else bodies) * CORNER_ROWS * LANES)
 
         self.edge_vertices = ti.Vector.field(2, ti.i32, k)
         self.edge_damping = ti.field(ti.f32, k)  # [N s/m]
         if capacity.parallel:
+            self.corner_force = ti.field(ti.f32, b * CORNER_ROWS * LANES)  # [N]
             self.edge_force = ti.Vector.field(3, ti.f32, k)
             self.particle_corners = ti.Vector.field(2, ti.i32, n)  # range in corner_slot
             self.corner_slot = ti.field(ti.i32, b * 4 * LANES)  # where a corner's x lies in corner_force
@@ -119,7 +119,9 @@ class State:
         _fill(self.tet_lame, _blocks(bodies, lambda b: b.lame, 2))
         _fill(self.tet_damping, _blocks(bodies, lambda b: b.tet_damping, 1))
 
-        edges = np.concatenate([b.edge_vertices + r.particles[0] for b, r in zip(bodies, ranges, strict=True)])
+        edges = np.concatenate(
+            [b.edge_vertices + r.particles[0] for b, r in zip(bodies, ranges, strict=True)]
+        )
         _fill(self.edge_vertices, edges)
         _fill(self.edge_damping, np.concatenate([body.edge_damping for body in bodies]))
         if self.capacity.parallel:
@@ -154,7 +156,9 @@ def _blocks(bodies: list[BodyArrays], quantity, width: int) -> NDArray[np.generi
     return np.concatenate([blocks_of(quantity(body).reshape(-1, width), width, 0) for body in bodies])
 
 
-def _tet_blocks(bodies: list[BodyArrays], ranges: list[Ranges]) -> tuple[NDArray[np.generic], NDArray[np.int64]]:
+def _tet_blocks(
+    bodies: list[BodyArrays], ranges: list[Ranges]
+) -> tuple[NDArray[np.generic], NDArray[np.int64]]:
     """Vertices of all blocks; and for each real corner its particle and its place in corner_force.
 
     The lanes that pad a last block name the body's first particle four times: no shape, no force.

@@ -2,52 +2,35 @@
 
 from taichi_soft.constants import LANES
 from taichi_soft.kernels.damping import accumulate_edge_damping
-from taichi_soft.kernels.elastic import compute_lane_forces, corner_force_at
+from taichi_soft.kernels.elastic import lane_forces
 from taichi_soft.kernels.motion import particle_is_sound, restore_particle
 from taichi_soft.kernels.per_body import move_body
 from taichi_soft.laws.damping import edge_damping_force, tet_mean_damping_forces
 from taichi_soft.laws.model import flipped_forces, upright_forces
 from taichi_soft.math.finite import is_finite
 from taichi_soft.runtime import ti
-from taichi_soft.state import CORNER_ROWS
 from taichi_soft.types import DampingModel
-
-
-@ti.func
-def _is_broken(state: ti.template(), block, lane, place):
-    """True (1) where a corner of a tetrahedron is out of reach or the force on it is not finite."""
-    broken = 0
-    for corner in ti.static(range(4)):
-        p = state.tet_vertices[(block * 4 + corner) * LANES + lane]
-        force = corner_force_at(state, place + 3 * corner * LANES + lane)
-        if (particle_is_sound(state, p) & is_finite(force)) == 0:
-            broken = 1
-    return broken
 
 
 @ti.func
 def accumulate_forces_one_by_one(state: ti.template(), program: ti.template(), body):
     """Add all internal forces of one body to its particles, tetrahedron by tetrahedron.
 
-    Not in vector lanes, which take seconds to compile. Returns the first tetrahedron (block times
-    `LANES` plus lane) that is broken, or -1.
+    Returns the first tetrahedron (block times `LANES` plus lane) with a corner out of reach or a force that
+    is not finite, or -1.
     """
-    place = body * CORNER_ROWS * LANES
-    if ti.static(state.capacity.parallel):
-        place = state.body_blocks[body][0] * CORNER_ROWS * LANES
     broken = -1
     for m, model in ti.static(enumerate(program.models)):
         if state.body_model[body] == m:
             blocks = state.body_blocks[body]
             for t in range(blocks[0] * LANES, blocks[1] * LANES):
                 block, lane = t // LANES, t % LANES
-                compute_lane_forces(state, model, block, lane, place)
-                if broken < 0 and _is_broken(state, block, lane, place):
-                    broken = t
+                forces = lane_forces(state, model, block, lane)
                 for corner in ti.static(range(4)):
                     p = state.tet_vertices[(block * 4 + corner) * LANES + lane]
-                    force = corner_force_at(state, place + 3 * corner * LANES + lane)
-                    state.particle_force[p] = state.particle_force[p] + force
+                    if broken < 0 and (particle_is_sound(state, p) & is_finite(forces[corner])) == 0:
+                        broken = t
+                    state.particle_force[p] = state.particle_force[p] + forces[corner]
     accumulate_edge_damping(state, body)
     return broken
 
@@ -128,7 +111,12 @@ def evaluate_tet_forces(
     ti.loop_config(serialize=True)
     for t in range(tets.shape[0]):
         p0, p1, p2, p3 = tets[t, 0], tets[t, 1], tets[t, 2], tets[t, 3]
-        x0, x1, x2, x3 = _vec3(positions, p0), _vec3(positions, p1), _vec3(positions, p2), _vec3(positions, p3)
+        x0, x1, x2, x3 = (
+            _vec3(positions, p0),
+            _vec3(positions, p1),
+            _vec3(positions, p2),
+            _vec3(positions, p3),
+        )
         inverse = (
             ti.Vector([rest_inverse[t, 0, 0], rest_inverse[t, 1, 0], rest_inverse[t, 2, 0]]),
             ti.Vector([rest_inverse[t, 0, 1], rest_inverse[t, 1, 1], rest_inverse[t, 2, 1]]),
@@ -140,7 +128,11 @@ def evaluate_tet_forces(
                 f0, f1, f2, f3 = flipped_forces(model, x0, x1, x2, x3, inverse, lame[t, 0], lame[t, 1])
         if ti.static(model.damping_model == DampingModel.TET_MEAN):
             d0, d1, d2, d3 = tet_mean_damping_forces(
-                _vec3(velocities, p0), _vec3(velocities, p1), _vec3(velocities, p2), _vec3(velocities, p3), damping[t]
+                _vec3(velocities, p0),
+                _vec3(velocities, p1),
+                _vec3(velocities, p2),
+                _vec3(velocities, p3),
+                damping[t],
             )
             f0, f1, f2, f3 = f0 + d0, f1 + d1, f2 + d2, f3 + d3
         _add(out, p0, f0)

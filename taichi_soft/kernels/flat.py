@@ -11,10 +11,10 @@ is a launch of its own.
 
 from taichi_soft.constants import LANES
 from taichi_soft.kernels.damping import edge_force_of
-from taichi_soft.kernels.elastic import compute_block_forces, compute_lane_forces, corner_force_at
+from taichi_soft.kernels.elastic import corner_force_at, store_block_forces, store_lane_forces
 from taichi_soft.kernels.motion import move_particle, particle_is_sound, remember_particle, restore_particle
 from taichi_soft.runtime import ti
-from taichi_soft.state import ACTIVE, CORNER_ROWS, FROZEN
+from taichi_soft.state import ACTIVE, FROZEN
 
 _FAILING = 2
 
@@ -110,9 +110,7 @@ def step_flat_cpu(
             for block in range(b0, b1):
                 for m, model in ti.static(enumerate(program.models)):
                     if state.block_model[block] == m:
-                        compute_block_forces(
-                            state, model, block, block * CORNER_ROWS * LANES
-                        )
+                        store_block_forces(state, model, block)
             for e in range(e0, e1):
                 _edge_phase(state, e)
             _meet(state, workers)
@@ -152,9 +150,7 @@ def substep_flat(
         block, lane = t // LANES, t % LANES
         for m, model in ti.static(enumerate(program.models)):
             if state.block_model[block] == m:
-                compute_lane_forces(
-                    state, model, block, lane, block * CORNER_ROWS * LANES
-                )
+                store_lane_forces(state, model, block, lane)
     for e in range(edge_count):
         _edge_phase(state, e)
     for p in range(particle_count):

@@ -34,11 +34,6 @@ class ElementModel:
     damping_model: DampingModel = DampingModel.EDGE
 
     @property
-    def is_branch_free(self) -> bool:
-        """True where forces need no eigenvalues, so that a block of tetrahedra runs in vector lanes."""
-        return self.strain is Strain.LINEAR
-
-    @property
     def repairs_flips(self) -> bool:
         """True where a flipped tetrahedron takes another path than an upright one."""
         return self.flips is Flips.RECOVER
