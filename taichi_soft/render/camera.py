@@ -1,0 +1,132 @@
+"""Where a picture is taken from: a perspective camera that looks at a point."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taichi_soft.errors import OptionError
+from taichi_soft.render.arguments import as_number, as_point
+
+Point = tuple[float, float, float]
+
+# Nearest visible depth as a share of the distance to the target: nearer than that is inside the lens.
+NEAREST = 1e-3
+# Sine of the smallest angle between the line of sight and `up` that still says where up is.
+STEEPEST = 1e-4
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A camera at `eye` that looks at `target`; world z is up, lengths in metres.
+
+    Args:
+        eye: where it stands [m].
+        target: what lies in the middle of the picture [m].
+        up: direction that is upright in the picture, of any length.
+        fov_degrees: angle of view across the shorter side of the picture, 1 to 150, so that a view that
+            fits a square fits every aspect ratio.
+    Raises: OptionError for numbers that are not finite, eye on target, `up` along the line of sight or an
+        angle out of range.
+    """
+
+    eye: Point
+    target: Point = (0.0, 0.0, 0.0)
+    up: Point = (0.0, 0.0, 1.0)
+    fov_degrees: float = 40.0
+    distance: float = field(init=False, repr=False)  # from the eye to the target [m]
+
+    def __post_init__(self) -> None:
+        for name in ("eye", "target", "up"):
+            object.__setattr__(self, name, as_point(getattr(self, name), name))
+        fov = as_number(self.fov_degrees, "fov_degrees", 1.0, 150.0)
+        object.__setattr__(self, "fov_degrees", fov)
+        distance = math.dist(self.eye, self.target)
+        if not 1e-6 < distance < 1e6:
+            raise OptionError(
+                f"eye {self.eye} is {distance:g} m from target {self.target}: keep 1e-6 to 1e6 m"
+            )
+        object.__setattr__(self, "distance", distance)
+        length = math.hypot(*self.up)
+        forward = (np.array(self.target) - self.eye) / distance
+        if length == 0.0 or float(np.linalg.norm(np.cross(forward, self.up))) < STEEPEST * length:
+            raise OptionError(f"up {self.up} must have a length and not lie along the line of sight")
+
+    @classmethod
+    def framing(
+        cls,
+        lower: ArrayLike,
+        upper: ArrayLike,
+        *,
+        azimuth: float = -60.0,
+        elevation: float = 18.0,
+        fov_degrees: float = 30.0,
+        margin: float = 1.1,
+        aspect: float = 1.0,
+    ) -> Camera:
+        """The nearest camera that sees the whole box.
+
+        Args:
+            lower, upper: opposite corners of the box [m].
+            azimuth: direction from the box to the eye in the ground plane, from the x axis to y [degrees].
+            elevation: of the eye above the horizon, -89 to 89 [degrees].
+            fov_degrees: see `Camera`.
+            margin: room round the box, 1 (none) to 10.
+            aspect: width over height of the picture; with 1 the box fits into a picture of any.
+        Raises: OptionError for a box without extent or numbers out of range.
+        """
+        low, high = np.array(as_point(lower, "lower")), np.array(as_point(upper, "upper"))
+        if (low > high).any() or not (low < high).any():
+            raise OptionError(f"the box from {low.tolist()} to {high.tolist()} has no extent to frame")
+        a = math.radians(as_number(azimuth, "azimuth", -1e4, 1e4))
+        e = math.radians(as_number(elevation, "elevation", -89.0, 89.0))
+        half = math.tan(math.radians(as_number(fov_degrees, "fov_degrees", 1.0, 150.0)) / 2.0)
+        half /= as_number(margin, "margin", 1.0, 10.0)
+        ratio = as_number(aspect, "aspect", 0.05, 20.0)
+        # Tangents across the picture and down it; the angle of view belongs to the shorter side.
+        reach = half * np.array([max(ratio, 1.0), max(1.0 / ratio, 1.0)])
+        outward = np.array([math.cos(a) * math.cos(e), math.sin(a) * math.cos(e), math.sin(e)])
+        target = (low + high) / 2.0
+        probe = cls(tuple(target + outward), tuple(target), fov_degrees=fov_degrees)
+        corners = np.array(np.meshgrid(*zip(low, high, strict=True), indexing="ij")).reshape(3, -1).T
+        seen = (corners - target) @ probe.axes.T
+        # A corner at depth d + z is inside where |x| and |y| are at most reach * (d + z).
+        distance = float(((np.abs(seen[:, :2]) / reach).max(axis=1) - seen[:, 2]).max())
+        return cls(tuple(target + distance * outward), tuple(target), fov_degrees=fov_degrees)
+
+    @property
+    def axes(self) -> NDArray[np.float64]:
+        """Unit vectors right, down and forward of the picture as the rows of a (3, 3)."""
+        forward = (np.array(self.target) - self.eye) / self.distance
+        right = np.cross(forward, self.up)
+        right /= np.linalg.norm(right)
+        return np.array([right, np.cross(forward, right), forward])
+
+    @property
+    def near(self) -> float:
+        """Depth in front of which nothing is drawn [m]."""
+        return NEAREST * self.distance
+
+    def matrix(self, width: int, height: int) -> NDArray[np.float64]:
+        """(3, 4) that takes (x, y, z, 1) to (u d, v d, d): pixel u to the right, v down, and depth d [m].
+
+        The first pixel covers u and v from 0 to 1.
+        """
+        focal = min(width, height) / (2.0 * math.tan(math.radians(self.fov_degrees) / 2.0))
+        lens = np.array([[focal, 0.0, width / 2.0], [0.0, focal, height / 2.0], [0.0, 0.0, 1.0]])
+        turn = self.axes
+        matrix: NDArray[np.float64] = lens @ np.column_stack([turn, -turn @ np.array(self.eye)])
+        return matrix
+
+    def project(self, points: ArrayLike, width: int, height: int) -> NDArray[np.float64]:
+        """Where points (n, 3) [m] lie in a picture: pixel right, pixel down and depth [m], (n, 3).
+
+        Points nearer than `near` or behind the camera have no place in the picture: their pixels are NaN.
+        """
+        rows = np.asarray(points, dtype=np.float64).reshape(-1, 3)
+        seen = np.column_stack([rows, np.ones(len(rows))]) @ self.matrix(width, height).T
+        depth = np.where(seen[:, 2] >= self.near, seen[:, 2], np.nan)
+        return np.column_stack([seen[:, 0] / depth, seen[:, 1] / depth, seen[:, 2]])

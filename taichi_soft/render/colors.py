@@ -1,0 +1,78 @@
+"""Colours: of bodies, and of numbers."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taichi_soft.errors import OptionError
+from taichi_soft.render.arguments import as_array, as_color, as_number
+
+Color = tuple[float, float, float]
+
+PALETTE: tuple[Color, ...] = (
+    (0.91, 0.42, 0.32),  # coral
+    (0.16, 0.58, 0.62),  # teal
+    (0.95, 0.70, 0.28),  # honey
+    (0.40, 0.45, 0.78),  # periwinkle
+    (0.50, 0.70, 0.38),  # leaf
+    (0.80, 0.42, 0.60),  # rose
+    (0.32, 0.62, 0.85),  # sky
+    (0.66, 0.50, 0.38),  # clay
+)
+"""Body colours, sRGB from 0 to 1, told apart by hue at about the same lightness; cycle through them."""
+
+FLIPPED: Color = (0.93, 0.10, 0.42)
+"""Colour of what is turned inside out, found in no body of `PALETTE`, sRGB from 0 to 1."""
+
+
+def colormap(values: ArrayLike, low: float, high: float) -> NDArray[np.float32]:
+    """Numbers as colours that run evenly from dark violet (`low`) to bright yellow (`high`): viridis.
+
+    Args:
+        values: (n,), one per vertex; those out of range take the colour of the end they passed.
+        low, high: the range, low < high.
+    Returns: sRGB from 0 to 1, float32 (n, 3).
+    Raises: OptionError for values that are not finite or an empty range.
+    """
+    numbers = as_array(values, "values", (None,))
+    start, end = as_number(low, "low", -1e300, 1e300), as_number(high, "high", -1e300, 1e300)
+    if not start < end:
+        raise OptionError(f"low must be below high, got {start:g} and {end:g}")
+    # The library has 256 colours; between two of them is interpolated.
+    table = cv2.applyColorMap(np.arange(256, dtype=np.uint8).reshape(-1, 1), cv2.COLORMAP_VIRIDIS)
+    rgb = table[:, 0, ::-1].astype(np.float32) / 255.0
+    place = np.clip((numbers - start) / (end - start), 0.0, 1.0) * 255.0
+    channels = [np.interp(place, np.arange(256), rgb[:, k]) for k in range(3)]
+    return np.stack(channels, axis=1).astype(np.float32)
+
+
+def highlight(flagged: ArrayLike, color: ArrayLike, marked: ArrayLike = FLIPPED) -> NDArray[np.float32]:
+    """Vertex colours that show which vertices are flagged, for example those of flipped tetrahedra.
+
+    Args:
+        flagged: (n,) of bool.
+        color, marked: sRGB of the others and of the flagged.
+    Returns: sRGB from 0 to 1, float32 (n, 3).
+    Raises: OptionError for wrong shapes or colours.
+    """
+    flags = np.asarray(flagged)
+    if flags.ndim != 1 or flags.dtype != np.bool_:
+        raise OptionError(f"flagged must be bools of shape (n,), got {flags.dtype} of shape {flags.shape}")
+    usual, special = as_color(color, "color"), as_color(marked, "marked")
+    return np.where(flags[:, None], special, usual).astype(np.float32)
+
+
+def to_linear(srgb: NDArray[np.float32]) -> NDArray[np.float32]:
+    """sRGB from 0 to 1 as linear light, in which colours may be added."""
+    low = srgb <= 0.04045
+    return np.where(low, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4).astype(np.float32)
+
+
+def to_srgb(linear: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Linear light from 0 to 1 as sRGB."""
+    low = linear <= 0.0031308
+    return np.where(low, linear * 12.92, 1.055 * np.maximum(linear, 0.0031308) ** (1 / 2.4) - 0.055).astype(
+        np.float32
+    )

@@ -1,0 +1,60 @@
+"""Which tiles of a picture can show a shadow on the floor; the others are copied as they are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.render.raster_kernels import TILE
+
+
+class FloorTiles:
+    """The floor under each tile of a picture, found once per camera.
+
+    Args:
+        rays: (3, 3), takes (u, v, 1) to the direction through a pixel.
+        eye: where the camera stands [m].
+        floor: height of the floor [m], or None.
+    """
+
+    def __init__(
+        self,
+        width: int,
+        height: int,
+        rays: NDArray[np.float64],
+        eye: NDArray[np.float64],
+        floor: float | None,
+    ) -> None:
+        top, left = np.meshgrid(np.arange(0, height, TILE), np.arange(0, width, TILE), indexing="ij")
+        corners = np.stack([left, top, np.ones_like(left)], axis=-1).reshape(-1, 1, 3)
+        corners = corners + TILE * np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0)])
+        directions = corners @ rays.T  # (tiles, 4, 3)
+        down = directions[..., 2] < -1e-6
+        sees_floor = floor is not None and eye[2] > floor
+        # A tile across the horizon reaches infinitely far: it is never ruled out.
+        self._unbounded = down.any(axis=1) & ~down.all(axis=1) & sees_floor
+        self._bounded = down.all(axis=1) & sees_floor
+        drop = (floor or 0.0) - eye[2]
+        hits = eye + directions * (drop / np.minimum(directions[..., 2], -1e-6))[..., None]
+        self._hits = np.concatenate([hits, np.ones_like(hits[..., :1])], axis=-1)
+
+    def shadowed(self, maps: Sequence[tuple[NDArray[np.float32], NDArray[np.bool_]]]) -> NDArray[np.int32]:
+        """1 for tiles on which a shadow may lie, else 0, int32 (tiles,).
+
+        Args:
+            maps: pairs of a matrix (4, 4) from (x, y, z, 1) to texels, and which texels (n, n) are dark.
+        """
+        touched = np.zeros(len(self._hits), dtype=bool)
+        for matrix, dark in maps:
+            rows, columns = np.flatnonzero(dark.any(axis=1)), np.flatnonzero(dark.any(axis=0))
+            if len(rows) == 0:
+                continue
+            texels = self._hits @ matrix[:2].T.astype(np.float64)
+            low, high = texels.min(axis=1), texels.max(axis=1)
+            # A tile's floor is convex, so its corners bound it; texels reach one further when interpolated.
+            across = (low[:, 0] <= columns[-1] + 2) & (high[:, 0] >= columns[0] - 1)
+            along = (low[:, 1] <= rows[-1] + 2) & (high[:, 1] >= rows[0] - 1)
+            touched |= self._unbounded | (self._bounded & across & along)
+        return touched.astype(np.int32)

@@ -1,0 +1,133 @@
+"""Words on a picture: a panel in a corner, and captions under bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taichi_soft.errors import OptionError
+from taichi_soft.render.arguments import as_array
+from taichi_soft.types import Choice
+
+Picture = NDArray[np.uint8]
+
+FONT = cv2.FONT_HERSHEY_SIMPLEX
+LINE = 1 / 26  # height of a line of text [shorter side of the picture]
+SMALLEST_LINE = 11.0  # pixels; below it letters cannot be read
+LETTER = 22.0  # height of a line of this font at scale 1 [pixels]
+GAP = 0.45  # between lines, and round the words [line heights]
+PANEL, OPACITY, INK = (22, 26, 34), 0.62, (245, 247, 250)
+
+
+class Corner(Choice):
+    """Where a panel lies."""
+
+    TOP_LEFT = "top left"
+    TOP_RIGHT = "top right"
+    BOTTOM_LEFT = "bottom left"
+    BOTTOM_RIGHT = "bottom right"
+
+
+def draw_text(picture: Picture, lines: Sequence[str], *, corner: Corner | str = Corner.TOP_LEFT) -> Picture:
+    """The picture with lines of text on a dark panel in a corner; it is changed in place and returned.
+
+    Letters scale with the picture and shrink until the widest line and all lines fit.
+    Args:
+        picture: uint8 (height, width, 3).
+        lines: of plain ASCII text; none at all draws nothing.
+    Raises: OptionError for another picture, text or corner.
+    """
+    _check(picture, lines)
+    place = Corner.parse(corner).value
+    if not lines:
+        return picture
+    height, width = picture.shape[:2]
+    margin = round(0.02 * min(height, width))
+    line = _line_height(lines, width - 2 * margin, height - 2 * margin, min(height, width))
+    pad, wide, high = _panel_size(lines, line)
+    left = margin if "left" in place else width - margin - wide
+    top = margin if "top" in place else height - margin - high
+    _draw_panel(picture, lines, left, top, line, pad, wide, high)
+    return picture
+
+
+def draw_labels(picture: Picture, labels: Sequence[str], places: ArrayLike) -> Picture:
+    """The picture with a caption centred below each place; it is changed in place and returned.
+
+    Args:
+        picture: uint8 (height, width, 3).
+        labels: n captions of plain ASCII text.
+        places: (n, 2) or more columns, pixel right and down, as `Camera.project` gives them. Captions are
+            moved to stay inside the picture; a place that is NaN (behind the camera) gets none.
+    Raises: OptionError for another picture, text or number of places.
+    """
+    _check(picture, labels)
+    pixels = np.asarray(places, dtype=np.float64)
+    if pixels.ndim != 2 or len(pixels) != len(labels) or pixels.shape[1] < 2:
+        raise OptionError(f"places must have shape ({len(labels)}, 2), got {pixels.shape}")
+    height, width = picture.shape[:2]
+    for label, (u, v) in zip(labels, pixels[:, :2], strict=True):
+        if not (np.isfinite(u) and np.isfinite(v)):
+            continue
+        line = _line_height([label], width, height, min(height, width))
+        pad, wide, high = _panel_size([label], line)
+        left = int(np.clip(u - wide / 2, 0, width - wide))
+        top = int(np.clip(v + pad, 0, height - high))
+        _draw_panel(picture, [label], left, top, line, pad, wide, high)
+    return picture
+
+
+def _check(picture: Picture, lines: Sequence[str]) -> None:
+    if not isinstance(picture, np.ndarray) or picture.dtype != np.uint8 or picture.shape[2:] != (3,):
+        raise OptionError("picture must be uint8 of shape (height, width, 3)")
+    as_array(picture.shape[:2], "picture size", (2,))
+    for line in [lines] if isinstance(lines, str) else lines:
+        if (
+            isinstance(lines, str)
+            or not isinstance(line, str)
+            or not line.isascii()
+            or not line.isprintable()
+        ):
+            raise OptionError(f"text must be a list of lines of plain ASCII, got {line!r}")
+
+
+def _width(text: str, line: float) -> int:
+    (width, _), _ = cv2.getTextSize(text, FONT, line / LETTER, _stroke(line))
+    return int(width)
+
+
+def _stroke(line: float) -> int:
+    return max(1, round(line / 16.0))
+
+
+def _line_height(lines: Sequence[str], width: int, height: int, side: int) -> float:
+    """The line height at which everything fits, at most the usual one."""
+    line = max(LINE * side, SMALLEST_LINE)
+    while line > 2.0:
+        _, wide, high = _panel_size(lines, line)
+        if wide <= width and high <= height:
+            break
+        line *= 0.93
+    return line
+
+
+def _panel_size(lines: Sequence[str], line: float) -> tuple[int, int, int]:
+    """Padding, width and height of a panel [pixels]."""
+    pad = round(GAP * line) + 1
+    wide = max(_width(text, line) for text in lines) + 2 * pad
+    return pad, wide, round(len(lines) * line + (len(lines) - 1) * GAP * line) + 2 * pad
+
+
+def _draw_panel(
+    picture: Picture, lines: Sequence[str], left: int, top: int, line: float, pad: int, wide: int, high: int
+) -> None:
+    part = picture[top : top + high, left : left + wide]
+    part[:] = np.round(part * (1.0 - OPACITY) + np.array(PANEL) * OPACITY).astype(np.uint8)
+    canvas = np.ascontiguousarray(part)
+    for row, text in enumerate(lines):
+        base = round(pad + row * line * (1.0 + GAP) + 0.86 * line)
+        cv2.putText(canvas, text, (pad, base), FONT, line / LETTER, INK, _stroke(line), cv2.LINE_AA)
+    part[:] = canvas

@@ -1,0 +1,88 @@
+"""A picture's worth of samples: which triangle is seen where, and how deep."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.render.raster_kernels import PLANE, TILE, matrix, project_triangles, rasterize
+from taichi_soft.render.scene import SceneArrays
+from taichi_soft.runtime import ti
+
+# Places of samples inside a pixel [pixels]. Four lie on a turned grid: no two in a row or column, which
+# smooths the nearly upright and nearly level edges that the eye sees best.
+CENTER = np.zeros((1, 2), dtype=np.float32)
+ROTATED_GRID = np.array([(-1, -3), (3, -1), (-3, 1), (1, 3)], dtype=np.float32) / 8.0
+
+NOTHING_BEHIND = (0.0, 0.0, -1e30)
+
+
+class Raster:
+    """Buffers of one picture size, allocated once; the lists of triangles grow with the scene.
+
+    Attributes:
+        depth: float32 (height * width * samples,), the q of `project_triangles` seen there.
+        owner: int32, of the same length, index of the triangle seen there or -1.
+        planes: float32 (m, 12), edges and depth of the triangles of the last `draw`.
+        tile_begin: int32, running sum of triangles per tile; a tile without any is not cleared if
+            `draw` was told to keep it.
+    """
+
+    def __init__(self, width: int, height: int, samples: NDArray[np.float32]) -> None:
+        self.width, self.height, self.samples = width, height, samples
+        tiles = -(-width // TILE) * -(-height // TILE)
+        self.depth = np.zeros(width * height * len(samples), dtype=np.float32)
+        self.owner = np.full(width * height * len(samples), -1, dtype=np.int32)
+        self.tile_begin = np.zeros(tiles + 1, dtype=np.int32)
+        self._tile_next = np.zeros(tiles, dtype=np.int32)
+        self._tile_triangles = np.zeros(1024, dtype=np.int32)
+        self.planes = np.zeros((1, PLANE), dtype=np.float32)
+        self._boxes = np.zeros((1, 4), dtype=np.int32)
+
+    def draw(
+        self,
+        scene: SceneArrays,
+        to_picture: NDArray[np.float64],
+        near: float,
+        backdrop: tuple[float, float, float] = NOTHING_BEHIND,
+        *,
+        keep_empty_tiles: bool = False,
+    ) -> None:
+        """Find what each sample sees.
+
+        Args:
+            to_picture: (4, 4), see `project_triangles`.
+            near: smallest depth drawn.
+            backdrop: plane of q = a u + b v + c that hides what is behind it.
+            keep_empty_tiles: leave the samples of tiles without triangles as they are, to save time.
+        """
+        if len(self.planes) != len(scene.triangles):
+            self.planes = np.zeros((len(scene.triangles), PLANE), dtype=np.float32)
+            self._boxes = np.zeros((len(scene.triangles), 4), dtype=np.int32)
+        entries = project_triangles(
+            matrix(to_picture.tolist()),
+            near,
+            self.width,
+            self.height,
+            scene.positions,
+            scene.triangles,
+            self.planes,
+            self._boxes,
+            self.tile_begin,
+        )
+        if entries > len(self._tile_triangles):
+            self._tile_triangles = np.zeros(2 * entries, dtype=np.int32)
+        rasterize(
+            self.width,
+            self.height,
+            self.samples,
+            ti.Vector(backdrop),
+            0 if keep_empty_tiles else 1,
+            self.planes,
+            self._boxes,
+            self.tile_begin,
+            self._tile_next,
+            self._tile_triangles,
+            self.depth,
+            self.owner,
+        )

@@ -1,0 +1,151 @@
+"""Pictures of soft bodies on the processor: no display, no graphics driver."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.errors import OptionError
+from taichi_soft.render.arguments import as_count, as_number
+from taichi_soft.render.camera import Camera
+from taichi_soft.render.colors import to_srgb
+from taichi_soft.render.floor_tiles import FloorTiles
+from taichi_soft.render.raster import NOTHING_BEHIND, ROTATED_GRID, Raster
+from taichi_soft.render.scene import SceneArrays
+from taichi_soft.render.shade_kernels import paint_backdrop, shade
+from taichi_soft.render.shadows import ShadowMaps
+from taichi_soft.render.surface import Surface
+from taichi_soft.runtime import init, is_initialized, ti
+
+LARGEST = 8192  # pixels along a picture; beyond it sample numbers leave 32 bits
+
+
+class Renderer:
+    """Draws surfaces lit by a sun and the sky, over a checked floor, with soft shadows.
+
+    Args:
+        width, height: of the picture, 16 to 8192 [pixels].
+        camera: where it is taken from; it may be replaced between frames. The sun stands over its left
+            shoulder at first and stays there in the world.
+        floor: height of the floor [m], or None for bodies in empty air.
+        check: edge of a check of the floor [m]; None takes a round number that suits the camera's distance.
+    Raises: OptionError for arguments out of range.
+
+    Starts Taichi on the processor if nothing has started it. The buffers are allocated here, and compiling
+    happens at the first frame; a picture has the same bits on every run and for any number of threads.
+    """
+
+    def __init__(
+        self,
+        width: int,
+        height: int,
+        *,
+        camera: Camera,
+        floor: float | None = 0.0,
+        check: float | None = None,
+    ) -> None:
+        self.width = as_count(width, "width", 16, LARGEST)
+        self.height = as_count(height, "height", 16, LARGEST)
+        self.floor = None if floor is None else as_number(floor, "floor", -1e6, 1e6)
+        if not isinstance(camera, Camera):
+            raise OptionError(f"camera must be a Camera, got {type(camera).__name__}")
+        self._scale = camera.distance * math.tan(math.radians(camera.fov_degrees) / 2.0) * 2.0
+        self.check = (
+            _round_length(self._scale / 5.0) if check is None else as_number(check, "check", 1e-6, 1e6)
+        )
+        if not is_initialized():
+            init("cpu")
+        self._raster = Raster(self.width, self.height, ROTATED_GRID)
+        self._shadows = ShadowMaps(camera, self.floor, self._scale)
+        self._backdrop = np.empty((self.height, self.width, 4), dtype=np.float32)
+        self._plain = np.empty((self.height, self.width, 3), dtype=np.uint8)
+        self._encode = 255.0 * to_srgb(np.linspace(0.0, 1.0, 4096, dtype=np.float32))
+        self._camera: Camera | None = None
+        self.camera = camera
+
+    @property
+    def camera(self) -> Camera:
+        """Where the next picture is taken from."""
+        assert self._camera is not None
+        return self._camera
+
+    @camera.setter
+    def camera(self, camera: Camera) -> None:
+        if not isinstance(camera, Camera):
+            raise OptionError(f"camera must be a Camera, got {type(camera).__name__}")
+        if camera == self._camera:
+            return
+        self._camera = camera
+        self._to_picture = np.vstack([camera.matrix(self.width, self.height), [0.0, 0.0, 0.0, 1.0]])
+        rays = np.linalg.inv(self._to_picture[:3, :3])
+        self._rays = rays.astype(np.float32)
+        self._tiles = FloorTiles(self.width, self.height, rays, np.array(camera.eye), self.floor)
+        paint_backdrop(
+            self._rays,
+            ti.Vector(camera.eye),
+            ti.Vector(camera.target),
+            self.floor or 0.0,
+            int(self.floor is not None),
+            self.check,
+            3.0 * camera.distance,
+            self._encode,
+            self._backdrop,
+            self._plain,
+        )
+
+    def render(self, surfaces: Sequence[Surface]) -> NDArray[np.uint8]:
+        """The picture of these surfaces, sRGB, uint8 (height, width, 3); an array of its own every time.
+
+        Raises: OptionError for anything that is not a `Surface`.
+        """
+        scene = SceneArrays.of(surfaces)
+        camera = self.camera
+        self._shadows.update(scene, camera)
+        self._raster.draw(scene, self._to_picture, camera.near, self._floor_depth(), keep_empty_tiles=True)
+        picture = np.empty((self.height, self.width, 3), dtype=np.uint8)
+        maps = self._shadows
+        shade(
+            self._rays,
+            ti.Vector(camera.eye),
+            ti.Vector(maps.sun),
+            -1e6 if self.floor is None else self.floor,
+            0.12 * self._scale,
+            maps.matrix,
+            maps.texel,
+            maps.depth,
+            maps.near_shadow,
+            maps.far_shadow,
+            maps.far_height,
+            maps.contact,
+            maps.contact_matrix,
+            self._backdrop,
+            self._plain,
+            scene.positions,
+            scene.normals,
+            scene.colors,
+            scene.triangles,
+            self._raster.planes,
+            self._raster.tile_begin,
+            self._tiles.shadowed(maps.extents),
+            self._raster.samples,
+            self._raster.owner,
+            self._encode,
+            picture,
+        )
+        return picture
+
+    def _floor_depth(self) -> tuple[float, float, float]:
+        """Plane of 1 / depth of the floor over the picture; it hides what has sunk into it."""
+        if self.floor is None or self.camera.eye[2] <= self.floor:
+            return NOTHING_BEHIND
+        a, b, c = (float(x) / (self.floor - self.camera.eye[2]) for x in self._rays[2])
+        return a, b, c
+
+
+def _round_length(length: float) -> float:
+    """The nearest of 1, 2 and 5 times a power of ten below a length."""
+    power = 10.0 ** math.floor(math.log10(length))
+    return max(step * power for step in (1.0, 2.0, 5.0) if step * power <= length)

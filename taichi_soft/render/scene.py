@@ -1,0 +1,56 @@
+"""All surfaces of one frame as flat arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.errors import OptionError
+from taichi_soft.render.raster_kernels import compute_normals
+from taichi_soft.render.surface import Surface
+
+
+@dataclass(frozen=True)
+class SceneArrays:
+    """Vertices and triangles of every surface, one after the other.
+
+    Attributes:
+        positions, normals, colors: float32 (n, 3), [m], unit length, linear light.
+        triangles: int32 (m, 3), outward counterclockwise.
+    """
+
+    positions: NDArray[np.float32]
+    normals: NDArray[np.float32]
+    colors: NDArray[np.float32]
+    triangles: NDArray[np.int32]
+
+    @property
+    def is_empty(self) -> bool:
+        """True where there is nothing to see."""
+        return len(self.triangles) == 1
+
+    @classmethod
+    def of(cls, surfaces: Sequence[Surface]) -> SceneArrays:
+        """Collect the surfaces; none at all gives one triangle of no area, which nothing can see.
+
+        Raises: OptionError for anything that is not a `Surface`.
+        """
+        for surface in surfaces:
+            if not isinstance(surface, Surface):
+                raise OptionError(f"render takes Surface objects, got {type(surface).__name__}")
+        if not surfaces:
+            nothing = np.zeros((1, 3), dtype=np.float32)
+            return cls(nothing, nothing, nothing, np.zeros((1, 3), dtype=np.int32))
+        positions = np.concatenate([surface.positions for surface in surfaces])
+        counts = [len(surface.positions) for surface in surfaces]
+        offsets = np.cumsum([0, *counts[:-1]], dtype=np.int32)
+        triangles = np.concatenate(
+            [s.triangles + offset for s, offset in zip(surfaces, offsets, strict=True)], dtype=np.int32
+        )
+        normals = np.empty_like(positions)
+        compute_normals(positions, triangles, normals)
+        colors = np.concatenate([surface.color for surface in surfaces])
+        return cls(positions, normals, colors, triangles)

@@ -1,0 +1,144 @@
+"""Shadows of one frame: what the sun sees, and what the floor sees above it."""
+
+from __future__ import annotations
+
+import math
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.render.camera import Camera
+from taichi_soft.render.look import SUN_AZIMUTH, SUN_ELEVATION
+from taichi_soft.render.raster import CENTER, Raster
+from taichi_soft.render.scene import SceneArrays
+from taichi_soft.render.shade_kernels import COARSE as COARSE_TEXELS
+from taichi_soft.render.shade_kernels import FAINTEST
+
+COARSE = int(COARSE_TEXELS)
+SIZE = 512  # texels along the sun's map
+CONTACT_SIZE = 192  # texels along the map of what lies over the floor
+# In shares of the size of the scene: blur of a shadow cast from right above the floor, and of one cast from
+# `FAR_HEIGHT` or more; blur and fading height of the darkening where a body touches the floor.
+NEAR_BLUR, FAR_BLUR, FAR_HEIGHT = 0.004, 0.022, 0.3
+CONTACT_BLUR, CONTACT_HEIGHT = 0.016, 0.05
+SUNK = 0.05  # what lies deeper than this under the floor casts no shadow on it [size of the scene]
+# Bodies farther from the camera's target than this many camera distances cast no shadow, so that one that
+# flies away does not take all texels.
+WITHIN = 3.0
+
+Floats = NDArray[np.float32]
+
+
+class ShadowMaps:
+    """Maps of the sun and of contact with the floor, allocated once.
+
+    The sun's map holds surfaces that face away from it: a body then never shadows its own lit side, and what
+    lies behind a body is in its shadow. What faces the sun on the floor is found by blurring that map.
+
+    Attributes:
+        sun: unit vector to the sun.
+        matrix: float32 (4, 4), takes (x, y, z, 1) to texel right, texel down, 1 and height to the sun [m].
+        texel: edge of a texel [m].
+        depth: float32 (SIZE * SIZE,), height to the sun of the first surface that faces away from it [m].
+        near_shadow: float32 (SIZE, SIZE), shadow of what lies right above the floor, 0 to 1.
+        far_shadow, far_height: float32 (SIZE / COARSE,) * 2, shadow of what lies high above, and its height
+            over the floor times that shadow, 1 at `FAR_HEIGHT`.
+        contact_matrix, contact: the same looking up from the floor; darkening by what is close, 0 to 1.
+    """
+
+    def __init__(self, camera: Camera, floor: float | None, scale: float) -> None:
+        """`scale`: size of the scene [m]; softness and darkening are measured by it."""
+        self._floor, self._scale = floor, scale
+        outward = np.subtract(camera.eye, camera.target)
+        azimuth = math.atan2(outward[1], outward[0]) - SUN_AZIMUTH
+        flat = math.cos(SUN_ELEVATION)
+        self.sun = np.array([flat * math.cos(azimuth), flat * math.sin(azimuth), math.sin(SUN_ELEVATION)])
+        right = np.array([-self.sun[1], self.sun[0], 0.0]) / flat
+        self._axes = np.array([right, np.cross(self.sun, right), self.sun])
+        self._raster = Raster(SIZE, SIZE, CENTER)
+        self._contact_raster = Raster(CONTACT_SIZE, CONTACT_SIZE, CENTER)
+        coarse = SIZE // COARSE
+        self.near_shadow: Floats = np.zeros((SIZE, SIZE), dtype=np.float32)
+        self.far_shadow: Floats = np.zeros((coarse, coarse), dtype=np.float32)
+        self.far_height: Floats = np.zeros((coarse, coarse), dtype=np.float32)
+        self.contact: Floats = np.zeros((CONTACT_SIZE, CONTACT_SIZE), dtype=np.float32)
+        self.matrix = self.contact_matrix = np.eye(4, dtype=np.float32)
+        self.texel = 1.0
+
+    @property
+    def depth(self) -> Floats:
+        """See above."""
+        return self._raster.depth
+
+    def update(self, scene: SceneArrays, camera: Camera) -> None:
+        """Draw the maps for the bodies where they are now."""
+        away = np.abs(scene.positions - np.array(camera.target)).max(axis=1)
+        bodies = scene.positions[away < WITHIN * camera.distance]
+        if len(bodies) == 0 or scene.is_empty:
+            for shadow in (self.near_shadow, self.far_shadow, self.far_height, self.contact):
+                shadow[:] = 0.0
+            return
+        matrix, self.texel = _fit(self._axes, bodies, SIZE, FAR_BLUR * self._scale)
+        self._raster.draw(scene, matrix, 0.5)
+        self.matrix = matrix.astype(np.float32)
+        if self._floor is not None:
+            self._spread_sun(self._floor)
+            self._spread_contact(self._floor, scene, bodies)
+
+    def _spread_sun(self, floor: float) -> None:
+        """Blur the sun's map to the floor's shadows."""
+        # Where the light ray of each row of texels meets the floor: along a row the floor is level.
+        down = (np.arange(0.5, SIZE)[:, None] - self.matrix[1, 3]) * self.texel
+        height = self._raster.depth.reshape(SIZE, SIZE) - (floor - down * self._axes[1, 2]) / self.sun[2]
+        height *= self.sun[2] / (FAR_HEIGHT * self._scale)
+        covered = (height > -SUNK / FAR_HEIGHT).astype(np.float32)
+        high = (np.maximum(height, 0.0) * covered).astype(np.float32)
+        small = (SIZE // COARSE, SIZE // COARSE)
+        share, high = (cv2.resize(fine, small, interpolation=cv2.INTER_AREA) for fine in (covered, high))
+        blur = max(FAR_BLUR * self._scale / (self.texel * COARSE), 0.8)
+        self.near_shadow = _blurred(covered, max(NEAR_BLUR * self._scale / self.texel, 1.2))
+        self.far_shadow, self.far_height = _blurred(share, blur), _blurred(high, blur)
+
+    def _spread_contact(self, floor: float, scene: SceneArrays, bodies: Floats) -> None:
+        """Find how near the lowest surface over each place of the floor is."""
+        blur = CONTACT_BLUR * self._scale
+        matrix, texel = _fit(np.diag([1.0, 1.0, -1.0]), bodies, CONTACT_SIZE, blur)
+        self._contact_raster.draw(scene, matrix, 0.5)
+        self.contact_matrix = matrix.astype(np.float32)
+        height = (-self._contact_raster.depth.reshape(CONTACT_SIZE, -1) - floor) / self._scale
+        closeness = np.exp(-np.clip(height / CONTACT_HEIGHT, 0.0, 30.0))
+        self.contact = _blurred(np.where(height > -SUNK, closeness, 0.0), blur / texel)
+
+    @property
+    def extents(self) -> list[tuple[Floats, NDArray[np.bool_]]]:
+        """Where the floor may be dark: pairs of a matrix to texels and the mask of the dark ones."""
+        coarse = (self.matrix / np.array([[COARSE], [COARSE], [1.0], [1.0]])).astype(np.float32)
+        return [(coarse, self.far_shadow > FAINTEST), (self.contact_matrix, self.contact > FAINTEST)]
+
+
+def _fit(
+    axes: NDArray[np.float64], points: NDArray[np.floating], size: int, blur: float
+) -> tuple[NDArray[np.float64], float]:
+    """(4, 4) that fits points into a (size, size) map seen against the last axis, and its texel [m].
+
+    Texel sizes come in steps and texels keep their places in the world, so that shadows do not crawl while a
+    body moves; round the points stays room for a blur.
+    """
+    seen = points @ axes[:2].T.astype(np.float32)
+    low, high = seen.min(axis=0) - 3.0 * blur, seen.max(axis=0) + 3.0 * blur
+    texel = 2.0 ** (math.ceil(4.0 * math.log2(float((high - low).max()) / (size - 4))) / 4.0)
+    corner = np.floor((low + high) / 2.0 / texel) - size // 2
+    matrix = np.zeros((4, 4))
+    matrix[:2, :3] = axes[:2] / texel
+    matrix[:2, 3] = -corner
+    matrix[2, 3] = 1.0
+    matrix[3, :3] = axes[2]
+    return matrix, texel
+
+
+def _blurred(values: NDArray[np.floating], sigma: float) -> Floats:
+    blurred: Floats = cv2.GaussianBlur(
+        values.astype(np.float32), (0, 0), sigma, borderType=cv2.BORDER_REPLICATE
+    )
+    return blurred

@@ -1,0 +1,89 @@
+"""What is drawn: a closed surface of triangles whose vertices move and may have colours."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taichi_soft.errors import MeshError, OptionError
+from taichi_soft.meshing import TetMesh
+from taichi_soft.render.arguments import as_array
+from taichi_soft.render.colors import PALETTE, to_linear
+
+# Coordinates beyond this [m] come from an explosion; their products would overflow in float32.
+FARTHEST = 1e7
+
+
+class Surface:
+    """Triangles over the vertices of a body. Set `positions`, and `color` if it changes, before each frame.
+
+    Args:
+        positions: (n, 3), all vertices of the body, inner ones too [m].
+        triangles: (m, 3) vertex indices, counterclockwise seen from outside. Triangles are seen from
+            outside only, and shadows take the surface to be closed.
+        color: sRGB from 0 to 1, either (3,) for the whole body or (n, 3), one per vertex.
+    Raises: OptionError for wrong shapes, positions that are not finite (a picture of an exploded body shows
+        nothing) or colours out of range; MeshError for indices out of range.
+    """
+
+    def __init__(self, positions: ArrayLike, triangles: ArrayLike, *, color: ArrayLike = PALETTE[0]) -> None:
+        first = as_array(positions, "positions", (None, 3))
+        self.vertex_count = len(first)
+        corners = np.array(triangles)
+        if corners.ndim != 2 or corners.shape[1] != 3 or corners.dtype.kind not in "iu" or len(corners) == 0:
+            raise MeshError(f"triangles must be whole numbers of shape (m, 3), got shape {corners.shape}")
+        if corners.min() < 0 or corners.max() >= self.vertex_count:
+            raise MeshError(
+                f"triangles name vertices {corners.min()} to {corners.max()}, there are {self.vertex_count}"
+            )
+        # Only the vertices on the surface are projected and lit.
+        self._used, local = np.unique(corners, return_inverse=True)
+        self.triangles: NDArray[np.int32] = np.ascontiguousarray(local.reshape(-1, 3), dtype=np.int32)
+        self.positions = first
+        self.color = color
+
+    @classmethod
+    def of(cls, mesh: TetMesh, *, color: ArrayLike = PALETTE[0]) -> Surface:
+        """The surface of a tetrahedral mesh, at rest until its `positions` are set."""
+        return cls(mesh.vertices, mesh.surface, color=color)
+
+    @property
+    def positions(self) -> NDArray[np.float32]:
+        """The vertices on the surface, in ascending order of index, float32 (k, 3) [m].
+
+        Set it to all n vertices of the body, (n, 3).
+        """
+        return self._positions
+
+    @positions.setter
+    def positions(self, values: ArrayLike) -> None:
+        rows = np.asarray(values)
+        if rows.shape != (self.vertex_count, 3) or rows.dtype.kind not in "fiu":
+            raise OptionError(f"positions must have shape ({self.vertex_count}, 3), got {rows.shape}")
+        outer = rows[self._used].astype(np.float32)
+        if not np.abs(outer).max() < FARTHEST:  # written so that NaN is refused too
+            bad = int(np.argmin((np.abs(outer) < FARTHEST).all(axis=1)))
+            raise OptionError(
+                f"vertex {self._used[bad]} is at {outer[bad].tolist()}: positions must be finite and below "
+                f"{FARTHEST:g} m (has the simulation exploded?)"
+            )
+        self._positions: NDArray[np.float32] = outer
+
+    @property
+    def color(self) -> NDArray[np.float32]:
+        """Linear light of the vertices on the surface, float32 (k, 3). Set it to sRGB, (3,) or (n, 3)."""
+        return self._color
+
+    @color.setter
+    def color(self, values: ArrayLike) -> None:
+        rows = np.asarray(values)
+        if rows.shape == (3,):
+            rows = np.broadcast_to(rows, (self.vertex_count, 3))
+        if rows.shape != (self.vertex_count, 3) or rows.dtype.kind not in "fiu":
+            raise OptionError(
+                f"color must have shape (3,) or ({self.vertex_count}, 3), got {np.shape(values)}"
+            )
+        outer = rows[self._used].astype(np.float32)
+        if not (outer.min() >= 0.0 and outer.max() <= 1.0):
+            raise OptionError(f"color must be sRGB from 0 to 1, got {outer.min():g} to {outer.max():g}")
+        self._color = to_linear(outer)
