@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.render.raster_kernels import TILE
+from taichi_soft.render.kernel_types import TILE
 
 
 class FloorTiles:

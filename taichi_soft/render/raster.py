@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.render.raster_kernels import PLANE, TILE, matrix, project_triangles, rasterize
+from taichi_soft.render.geometry_kernels import PLANE, project_triangles
+from taichi_soft.render.kernel_types import TILE, matrix
+from taichi_soft.render.raster_kernels import rasterize
 from taichi_soft.render.scene import SceneArrays
 from taichi_soft.runtime import ti
 

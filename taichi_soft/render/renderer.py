@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 
 from taichi_soft.errors import OptionError
 from taichi_soft.render.arguments import as_count, as_number
+from taichi_soft.render.backdrop_kernels import paint_backdrop
 from taichi_soft.render.camera import Camera
 from taichi_soft.render.colors import to_srgb
 from taichi_soft.render.floor_tiles import FloorTiles
 from taichi_soft.render.raster import NOTHING_BEHIND, ROTATED_GRID, Raster
 from taichi_soft.render.scene import SceneArrays
-from taichi_soft.render.shade_kernels import paint_backdrop, shade
+from taichi_soft.render.shade_kernels import shade
 from taichi_soft.render.shadows import ShadowMaps
 from taichi_soft.render.surface import Surface
 from taichi_soft.runtime import init, is_initialized, ti

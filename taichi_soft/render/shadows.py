@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.render.camera import Camera
+from taichi_soft.render.light_funcs import COARSE as COARSE_TEXELS
+from taichi_soft.render.light_funcs import FAINTEST
 from taichi_soft.render.look import SUN_AZIMUTH, SUN_ELEVATION
 from taichi_soft.render.raster import CENTER, Raster
 from taichi_soft.render.scene import SceneArrays
-from taichi_soft.render.shade_kernels import COARSE as COARSE_TEXELS
-from taichi_soft.render.shade_kernels import FAINTEST
 
 COARSE = int(COARSE_TEXELS)
-SIZE = 512  # texels along the sun's map
+SIZE = 384  # texels along the sun's map
 CONTACT_SIZE = 192  # texels along the map of what lies over the floor
 # In shares of the size of the scene: blur of a shadow cast from right above the floor, and of one cast from
 # `FAR_HEIGHT` or more; blur and fading height of the darkening where a body touches the floor.

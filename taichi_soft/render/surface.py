@@ -9,6 +9,7 @@ from taichi_soft.errors import MeshError, OptionError
 from taichi_soft.meshing import TetMesh
 from taichi_soft.render.arguments import as_array
 from taichi_soft.render.colors import PALETTE, to_linear
+from taichi_soft.render.creases import split_at_creases
 
 # Coordinates beyond this [m] come from an explosion; their products would overflow in float32.
 FARTHEST = 1e7
@@ -18,7 +19,8 @@ class Surface:
     """Triangles over the vertices of a body. Set `positions`, and `color` if it changes, before each frame.
 
     Args:
-        positions: (n, 3), all vertices of the body, inner ones too [m].
+        positions: (n, 3), all vertices of the body, inner ones too [m]. Where the surface bends by more than
+            60 degrees between two triangles now, it keeps a sharp edge; elsewhere it is shaded as round.
         triangles: (m, 3) vertex indices, counterclockwise seen from outside. Triangles are seen from
             outside only, and shadows take the surface to be closed.
         color: sRGB from 0 to 1, either (3,) for the whole body or (n, 3), one per vertex.
@@ -36,9 +38,8 @@ class Surface:
             raise MeshError(
                 f"triangles name vertices {corners.min()} to {corners.max()}, there are {self.vertex_count}"
             )
-        # Only the vertices on the surface are projected and lit.
-        self._used, local = np.unique(corners, return_inverse=True)
-        self.triangles: NDArray[np.int32] = np.ascontiguousarray(local.reshape(-1, 3), dtype=np.int32)
+        # Only vertices on the surface are projected and lit, those on sharp edges once per side.
+        self._used, self.triangles = split_at_creases(first, corners)
         self.positions = first
         self.color = color
 
@@ -49,7 +50,7 @@ class Surface:
 
     @property
     def positions(self) -> NDArray[np.float32]:
-        """The vertices on the surface, in ascending order of index, float32 (k, 3) [m].
+        """The vertices on the surface, float32 (k, 3) [m]; those on sharp edges once per side.
 
         Set it to all n vertices of the body, (n, 3).
         """
@@ -71,7 +72,7 @@ class Surface:
 
     @property
     def color(self) -> NDArray[np.float32]:
-        """Linear light of the vertices on the surface, float32 (k, 3). Set it to sRGB, (3,) or (n, 3)."""
+        """Linear light of `positions`, float32 (k, 3). Set it to sRGB, (3,) or (n, 3)."""
         return self._color
 
     @color.setter

@@ -1,0 +1,90 @@
+# mypy: ignore-errors
+# (Taichi's argument annotations are values, which a type checker cannot read.)
+"""Sky and floor, painted once per camera, and how light becomes a pixel."""
+
+from taichi_soft.render import look
+from taichi_soft.render.kernel_types import image, picture, reals, rows, vec3
+from taichi_soft.runtime import ti
+
+
+@ti.func
+def smoothstep(low, high, x):
+    """0 below `low`, 1 above `high`, smooth between."""
+    s = ti.math.clamp((x - low) / (high - low), 0.0, 1.0)
+    return s * s * (3.0 - 2.0 * s)
+
+
+@ti.func
+def pixel_ray(rays: ti.template(), u, v):
+    """Direction through a pixel [m per m of depth], not of unit length; `rays` is (3, 3), columns u, v, 1."""
+    return ti.Vector([rays[k, 0] * u + rays[k, 1] * v + rays[k, 2] for k in ti.static(range(3))])
+
+
+@ti.func
+def check_average(x, width):
+    """Integral mean of a square wave of period 2 (+1 on [0, 1), -1 on [1, 2)) over `width` about x."""
+    low, high = (x - 0.5 * width) * 0.5, (x + 0.5 * width) * 0.5
+    low_wave = ti.abs(low - ti.floor(low) - 0.5)
+    high_wave = ti.abs(high - ti.floor(high) - 0.5)
+    return 2.0 * (low_wave - high_wave) / width
+
+
+@ti.func
+def write_pixel(color, encode: ti.template(), out: ti.template(), x, y):
+    """Store linear light as sRGB; `encode` is sRGB, 0 to 255, of linear light 0 to 1 in equal steps."""
+    # A fixed pattern of less than one step of brightness, against bands in smooth gradients.
+    grain = ti.math.fract(52.9829189 * ti.math.fract(0.06711056 * x + 0.00583715 * y))
+    for k in ti.static(range(3)):
+        level = encode[ti.i32(ti.math.clamp(color[k], 0.0, 1.0) * (encode.shape[0] - 1) + 0.5)]
+        out[y, x, k] = ti.u8(ti.min(level + grain, 255.0))
+
+
+@ti.kernel
+def paint_backdrop(
+    rays: rows,
+    eye: vec3,
+    target: vec3,
+    floor: ti.f32,
+    has_floor: ti.i32,
+    check: ti.f32,
+    fade: ti.f32,
+    encode: reals,
+    out: image,
+    plain: picture,
+):
+    """Sky and floor without shadows.
+
+    Args:
+        rays: see `pixel_ray`.
+        target: the checks fade with the distance from it [m].
+        check: edge of a check [m].
+        fade: distance at which the floor has become air [m].
+        out: (height, width, 4), linear light and the share of it that is floor.
+        plain: (height, width, 3), that light as sRGB.
+    """
+    for y, x in ti.ndrange(out.shape[0], out.shape[1]):
+        ray = pixel_ray(rays, x + 0.5, y + 0.5)
+        up = ray.z / ray.norm()
+        # Brightest at the horizon, deeper upwards; below it, where the floor has faded, it stays bright.
+        color = look.HORIZON + (look.ZENITH - look.HORIZON) * smoothstep(-0.05, 0.9, ti.sqrt(ti.max(up, 0.0)))
+        share = 0.0
+        depth = (floor - eye.z) / ti.select(ti.abs(ray.z) > 1e-9, ray.z, 1e-9)
+        if has_floor != 0 and depth > 0.0 and eye.z > floor:
+            at = eye + depth * ray
+            # Size of the pixel on the floor along x and y, to average the checks over it.
+            right = pixel_ray(rays, x + 1.5, y + 0.5)
+            below = pixel_ray(rays, x + 0.5, y + 1.5)
+            steep = ti.min(ray.z, -1e-6)
+            at_right = eye + (floor - eye.z) / ti.min(right.z, -1e-6) * right
+            at_below = eye + (floor - eye.z) / ti.min(below.z, -1e-6) * below
+            wide_x = (ti.abs(at_right.x - at.x) + ti.abs(at_below.x - at.x)) / check + 1e-4
+            wide_y = (ti.abs(at_right.y - at.y) + ti.abs(at_below.y - at.y)) / check + 1e-4
+            wave = check_average(at.x / check, wide_x) * check_average(at.y / check, wide_y)
+            tiles = look.FLOOR_DARK + (look.FLOOR_BRIGHT - look.FLOOR_DARK) * (0.5 + 0.5 * wave)
+            far = ti.sqrt((at.x - target.x) ** 2 + (at.y - target.y) ** 2) / fade
+            share = ti.exp(-2.5 * far * far) * smoothstep(0.0, 0.06, -steep / ray.norm())
+            color = color + (tiles - color) * share
+        for k in ti.static(range(3)):
+            out[y, x, k] = color[k]
+        out[y, x, 3] = share
+        write_pixel(color, encode, plain, x, y)

@@ -1,0 +1,23 @@
+# mypy: ignore-errors
+# (Taichi's argument annotations are values, which a type checker cannot read.)
+"""Arguments of the drawing kernels. NumPy arrays go in as they are, and a new length compiles nothing."""
+
+from taichi_soft.runtime import ti
+
+TILE = 32
+"""Pixels along a tile. Smaller ones repeat triangles, larger ones divide badly among threads."""
+
+vec3 = ti.types.vector(3, ti.f32)
+matrix = ti.types.matrix(4, 4, ti.f32)
+reals = ti.types.ndarray(dtype=ti.f32, ndim=1)
+rows = ti.types.ndarray(dtype=ti.f32, ndim=2)
+ints = ti.types.ndarray(dtype=ti.i32, ndim=1)
+int_rows = ti.types.ndarray(dtype=ti.i32, ndim=2)
+image = ti.types.ndarray(dtype=ti.f32, ndim=3)
+picture = ti.types.ndarray(dtype=ti.u8, ndim=3)
+
+
+@ti.func
+def row_vec3(array: ti.template(), i):
+    """Row i of an (n, 3) array as a vector."""
+    return ti.Vector([array[i, 0], array[i, 1], array[i, 2]])

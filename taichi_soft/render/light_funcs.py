@@ -1,0 +1,133 @@
+# mypy: ignore-errors
+# (Taichi's argument annotations are values, which a type checker cannot read.)
+"""Light on a point: shadows from their maps, and what a body sends to the eye."""
+
+from taichi_soft.render import look
+from taichi_soft.runtime import ti
+
+COARSE = 4.0
+"""Texels of the sun's map along one of the maps of far shadows."""
+
+FAINTEST = 0.002
+"""Share of a shadow below which it is not drawn."""
+
+SOFT_TAPS = 6
+"""Width of the box over which shadows on bodies are averaged [texels of the shadow map]."""
+
+LIFT = 0.7
+"""How far a point is lifted off its surface, and again towards the sun, before it is looked up [texels]."""
+
+
+@ti.func
+def bilinear(map: ti.template(), size, u, v):
+    """Value of a (size, size) map at texel coordinates (u, v), 0 outside."""
+    value = 0.0
+    x, y = u - 0.5, v - 0.5
+    if x > 0.0 and y > 0.0 and x < size - 1.0 and y < size - 1.0:
+        i, j = ti.i32(x), ti.i32(y)
+        fx, fy = x - i, y - j
+        near = map[j, i] + fx * (map[j, i + 1] - map[j, i])
+        far = map[j + 1, i] + fx * (map[j + 1, i + 1] - map[j + 1, i])
+        value = near + fy * (far - near)
+    return value
+
+
+@ti.func
+def light_place(light: ti.template(), p):
+    """Texel coordinates and height towards the light [m] of a point; `light` is (4, 4), rows u, v, -, q."""
+    row = [
+        light[k, 0] * p.x + light[k, 1] * p.y + light[k, 2] * p.z + light[k, 3] for k in ti.static((0, 1, 3))
+    ]
+    return ti.Vector(row)
+
+
+@ti.func
+def box_average(depth: ti.template(), size, left, top, fu, fv, height):
+    """Share of a box of the shadow map that is open above `height`.
+
+    The box starts at (fu, fv) inside the texel (left, top).
+    """
+    lit = 0.0
+    for j in range(SOFT_TAPS + 1):
+        weight = ti.select(j == 0, 1.0 - fv, ti.select(j == SOFT_TAPS, fv, 1.0))
+        for i in range(SOFT_TAPS + 1):
+            share = weight * ti.select(i == 0, 1.0 - fu, ti.select(i == SOFT_TAPS, fu, 1.0))
+            lit += ti.select(depth[(top + j) * size + left + i] > height, 0.0, share)
+    return lit / (SOFT_TAPS * SOFT_TAPS)
+
+
+@ti.func
+def sunlight(light: ti.template(), depth: ti.template(), size, p, normal, texel):
+    """Share of the sun that reaches a point of a body, 0 to 1, averaged over a box in the shadow map.
+
+    The map holds what faces away from the sun, so that a body does not shadow the side that it is lit from;
+    `LIFT` is for the rim of that side.
+    """
+    place = light_place(light, p + LIFT * texel * normal)
+    u, v, height = place.x - 0.5 * SOFT_TAPS, place.y - 0.5 * SOFT_TAPS, place.z + LIFT * texel
+    left, top = ti.i32(ti.floor(u)), ti.i32(ti.floor(v))
+    fu, fv = u - left, v - top
+    lit = 1.0
+    if left >= 0 and top >= 0 and left + SOFT_TAPS < size and top + SOFT_TAPS < size:
+        # Nine of the texels first: where they agree, so do the others between them.
+        open_texels = 0
+        for j in range(3):
+            for i in range(3):
+                i_texel = (top + j * (SOFT_TAPS // 2)) * size + left + i * (SOFT_TAPS // 2)
+                open_texels += ti.select(depth[i_texel] > height, 0, 1)
+        lit = ti.select(open_texels == 0, 0.0, 1.0)
+        if open_texels > 0 and open_texels < 9:
+            lit = box_average(depth, size, left, top, fu, fv, height)
+    return lit
+
+
+@ti.func
+def floor_shadow(
+    at,
+    light: ti.template(),
+    near_shadow: ti.template(),
+    far_shadow: ti.template(),
+    far_height: ti.template(),
+    contact_place: ti.template(),
+    contact: ti.template(),
+):
+    """Share of its light that a point of the floor lacks, per colour."""
+    lack = ti.Vector([0.0, 0.0, 0.0])
+    place = light_place(light, at)
+    u, v = place.x / COARSE, place.y / COARSE
+    far = bilinear(far_shadow, far_shadow.shape[0], u, v)
+    if far > FAINTEST:
+        # The higher what casts the shadow, the softer its edge.
+        height = bilinear(far_height, far_shadow.shape[0], u, v) / far
+        near = bilinear(near_shadow, near_shadow.shape[0], place.x, place.y)
+        lack = (near + (far - near) * ti.min(height, 1.0)) * (1.0 - look.SHADED)
+    spot = light_place(contact_place, at)
+    dark = bilinear(contact, contact.shape[0], spot.x, spot.y) * (1.0 - look.CONTACT)
+    return 1.0 - (1.0 - lack) * (1.0 - dark)
+
+
+@ti.func
+def glow(color, normal, view, sun, lit, above):
+    """Light that a point of a body sends to the eye.
+
+    Args:
+        color: share of the light that it throws back.
+        normal, view, sun: unit vectors out of the body, to the eye and to the sun.
+        lit: share of the sun that reaches it.
+        above: 0 on the floor to 1 well above it, where its underside sees light.
+    """
+    upward = 0.5 + 0.5 * normal.z
+    below = look.FLOOR_LIGHT * (0.35 + 0.65 * above)
+    over = look.SKY_LIGHT * (0.7 + 0.3 * above)
+    around = below + (over - below) * upward
+    facing = ti.max(normal.dot(sun), 0.0) * lit
+    half = sun + view
+    shine = ti.max(normal.dot(half) / ti.sqrt(half.dot(half)), 0.0)
+    for _ in ti.static(range(5)):
+        shine *= shine
+    grazing = 1.0 - ti.max(normal.dot(view), 0.0)
+    grazing = grazing * grazing
+    rim = look.RIM * grazing * grazing * upward
+    return (
+        color * (look.SUN * facing + around) + look.HORIZON * rim + look.SUN * (look.HIGHLIGHT * shine * lit)
+    )
