@@ -16,7 +16,8 @@ from taichi_soft.runtime import ti
 CENTER = np.zeros((1, 2), dtype=np.float32)
 ROTATED_GRID = np.array([(-1, -3), (3, -1), (-3, 1), (1, 3)], dtype=np.float32) / 8.0
 
-NOTHING_BEHIND = (0.0, 0.0, -1e30)
+NO_LIMIT = 1e30
+NOTHING_BEHIND = (0.0, 0.0, -NO_LIMIT)
 
 
 class Raster:
@@ -45,7 +46,7 @@ class Raster:
         self,
         scene: SceneArrays,
         to_picture: NDArray[np.float64],
-        near: float,
+        near: float | None,
         backdrop: tuple[float, float, float] = NOTHING_BEHIND,
         *,
         keep_empty_tiles: bool = False,
@@ -54,7 +55,7 @@ class Raster:
 
         Args:
             to_picture: (4, 4), see `project_triangles`.
-            near: smallest depth drawn.
+            near: smallest depth drawn [m]; None without perspective, where every depth is 1.
             backdrop: plane of q = a u + b v + c that hides what is behind it.
             keep_empty_tiles: leave the samples of tiles without triangles as they are, to save time.
         """
@@ -63,7 +64,7 @@ class Raster:
             self._boxes = np.zeros((len(scene.triangles), 4), dtype=np.int32)
         entries = project_triangles(
             matrix(to_picture.tolist()),
-            near,
+            near or 0.5,
             self.width,
             self.height,
             scene.positions,
@@ -79,6 +80,7 @@ class Raster:
             self.height,
             self.samples,
             ti.Vector(backdrop),
+            NO_LIMIT if near is None else 1.0 / near,
             0 if keep_empty_tiles else 1,
             self.planes,
             self._boxes,

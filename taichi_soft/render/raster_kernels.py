@@ -29,6 +29,7 @@ def rasterize(
     height: ti.i32,
     samples: rows,
     backdrop: vec3,
+    nearest: ti.f32,
     clear_all: ti.i32,
     planes: rows,
     boxes: int_rows,
@@ -43,6 +44,7 @@ def rasterize(
     Args:
         samples: (s, 2), places inside a pixel, from its middle [pixels].
         backdrop: a, b, c of the plane q = a u + b v + c behind which nothing is seen.
+        nearest: largest q that is drawn.
         clear_all: 0 leaves tiles without triangles as they are.
         tile_next: scratch, as long as there are tiles.
         tile_triangles: scratch, at least as long as `project_triangles` returned.
@@ -103,6 +105,6 @@ def rasterize(
                         )
                         i = (y * width + x) * count + s
                         q_here = q + aq * du + bq * dv
-                        if (inside >= 0.0) & (q_here > depth[i]):
+                        if (inside >= 0.0) & (q_here > depth[i]) & (q_here <= nearest):
                             depth[i] = q_here
                             owner[i] = t

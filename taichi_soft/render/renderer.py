@@ -97,6 +97,11 @@ class Renderer:
             self._plain,
         )
 
+    @property
+    def sun(self) -> NDArray[np.float64]:
+        """Unit vector to the sun, (3,)."""
+        return self._shadows.sun.copy()
+
     def render(self, surfaces: Sequence[Surface]) -> NDArray[np.uint8]:
         """The picture of these surfaces, sRGB, uint8 (height, width, 3); an array of its own every time.
 

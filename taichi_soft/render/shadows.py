@@ -80,7 +80,7 @@ class ShadowMaps:
                 shadow[:] = 0.0
             return
         matrix, self.texel = _fit(self._axes, bodies, SIZE, FAR_BLUR * self._scale)
-        self._raster.draw(scene, matrix, 0.5)
+        self._raster.draw(scene, matrix, None)
         self.matrix = matrix.astype(np.float32)
         if self._floor is not None:
             self._spread_sun(self._floor)
@@ -104,7 +104,7 @@ class ShadowMaps:
         """Find how near the lowest surface over each place of the floor is."""
         blur = CONTACT_BLUR * self._scale
         matrix, texel = _fit(np.diag([1.0, 1.0, -1.0]), bodies, CONTACT_SIZE, blur)
-        self._contact_raster.draw(scene, matrix, 0.5)
+        self._contact_raster.draw(scene, matrix, None)
         self.contact_matrix = matrix.astype(np.float32)
         height = (-self._contact_raster.depth.reshape(CONTACT_SIZE, -1) - floor) / self._scale
         closeness = np.exp(-np.clip(height / CONTACT_HEIGHT, 0.0, 30.0))
