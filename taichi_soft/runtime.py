@@ -80,6 +80,7 @@ def init(arch: str = "auto", threads: int | None = None) -> Device:
                 offline_cache=True,
                 enable_fallback=False,
                 cfg_optimization=False,  # halves the compile time; the kernels run as fast without it
+                make_cpu_multithreading_loop=False,  # it would put up to 512 bodies into one thread
                 log_level=ti.ERROR,
             )
     except RuntimeError as error:
