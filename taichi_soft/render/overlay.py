@@ -15,7 +15,7 @@ from taichi_soft.types import Choice
 Picture = NDArray[np.uint8]
 
 FONT = cv2.FONT_HERSHEY_SIMPLEX
-LINE = 1 / 26  # height of a line of text [shorter side of the picture]
+LINE = 1 / 32  # height of a line of text [shorter side of the picture]
 SMALLEST_LINE = 11.0  # pixels; below it letters cannot be read
 LETTER = 22.0  # height of a line of this font at scale 1 [pixels]
 GAP = 0.45  # between lines, and round the words [line heights]
@@ -100,7 +100,7 @@ def _width(text: str, line: float) -> int:
 
 
 def _stroke(line: float) -> int:
-    return max(1, round(line / 16.0))
+    return max(1, round(line / 18.0))
 
 
 def _line_height(lines: Sequence[str], width: int, height: int, side: int) -> float:

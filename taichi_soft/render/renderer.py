@@ -35,8 +35,9 @@ class Renderer:
         check: edge of a check of the floor [m]; None takes a round number that suits the camera's distance.
     Raises: OptionError for arguments out of range.
 
-    Starts Taichi on the processor if nothing has started it. The buffers are allocated here, and compiling
-    happens at the first frame; a picture has the same bits on every run and for any number of threads.
+    Starts Taichi if nothing has started it, as a `World` does; the kernels are made for the processor. The
+    buffers are allocated here, and compiling happens at the first frame; a picture has the same bits on every
+    run and for any number of threads.
     """
 
     def __init__(
@@ -58,7 +59,7 @@ class Renderer:
             _round_length(self._scale / 5.0) if check is None else as_number(check, "check", 1e-6, 1e6)
         )
         if not is_initialized():
-            init("cpu")
+            init()
         self._raster = Raster(self.width, self.height, ROTATED_GRID)
         self._shadows = ShadowMaps(camera, self.floor, self._scale)
         self._backdrop = np.empty((self.height, self.width, 4), dtype=np.float32)
@@ -100,7 +101,8 @@ class Renderer:
     @property
     def sun(self) -> NDArray[np.float64]:
         """Unit vector to the sun, (3,)."""
-        return self._shadows.sun.copy()
+        direction: NDArray[np.float64] = self._shadows.sun.copy()
+        return direction
 
     def render(self, surfaces: Sequence[Surface]) -> NDArray[np.uint8]:
         """The picture of these surfaces, sRGB, uint8 (height, width, 3); an array of its own every time.

@@ -114,9 +114,9 @@ def test_an_exception_inside_leaves_the_old_film(tmp_path, suffix):
     path = tmp_path / f"film{suffix}"
     kept = tmp_path / "film_0000.png" if suffix == ".png" else path
     kept.write_bytes(b"old")
-    with pytest.raises(ZeroDivisionError), VideoWriter(path, fps=25, size=(WIDTH, HEIGHT)) as video:
-        video.write(frame(COLORS[0]))
-        raise ZeroDivisionError
+    frames = (frame(COLORS[i]) for i in range(len(COLORS) + 1))  # the last one fails
+    with pytest.raises(IndexError):
+        film(path, frames)
     assert names(tmp_path) == [kept.name]
     assert kept.read_bytes() == b"old"
 
