@@ -1,0 +1,6 @@
+"""What a game loop talks to: fixed steps from frames of any length, and positions in between."""
+
+from engine_adapter.adapter import EngineAdapter
+from engine_adapter.fixed_step import FixedStep
+
+__all__ = ["EngineAdapter", "FixedStep"]

@@ -1,0 +1,125 @@
+"""A world inside a game loop."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine_adapter.fixed_step import Accumulator, FixedStep
+from taichi_soft import Body, OptionError, StateError, World
+from taichi_soft.checks import as_number
+
+
+class EngineAdapter:
+    """Runs a built world in fixed steps, whatever the frame rate, and gives the positions to draw.
+
+    While an adapter is in use, only the adapter steps its world: `alpha` and `time` count its steps.
+
+        adapter = EngineAdapter(world, FixedStep(dt=1 / 60))
+        while running:
+            adapter.advance(seconds_since_last_frame)
+            adapter.positions(body, out=vertex_buffer)
+
+    Args:
+        world: built.
+        fixed_step: length of a step, its substeps, and how many one frame may make.
+    Raises: StateError if the world is not built; OptionError if `fixed_step` is not a FixedStep.
+    """
+
+    def __init__(self, world: World, fixed_step: FixedStep | None = None) -> None:
+        fixed_step = FixedStep() if fixed_step is None else fixed_step
+        if not isinstance(world, World):
+            raise OptionError(f"world must be a taichi_soft.World, got {type(world).__name__}")
+        if not isinstance(fixed_step, FixedStep):
+            raise OptionError(f"fixed_step must be a FixedStep, got {type(fixed_step).__name__}")
+        if not world.is_built:
+            raise StateError("the world is not built: call world.build() before EngineAdapter(world)")
+        self._world = world
+        self._fixed_step = fixed_step
+        self._accumulator = Accumulator(fixed_step)
+        self._bodies = tuple(world.bodies)
+        self._dropped_time = 0.0
+        self._total_dropped_time = 0.0
+
+    @property
+    def world(self) -> World:
+        """The world that is stepped."""
+        return self._world
+
+    @property
+    def fixed_step(self) -> FixedStep:
+        """How time is cut into steps."""
+        return self._fixed_step
+
+    @property
+    def alpha(self) -> float:
+        """How far the picture is from the previous step to the last one, at least 0 and below 1."""
+        return self._accumulator.alpha
+
+    @property
+    def time(self) -> float:
+        """Simulated time of the interpolated positions [s]: `alpha` of the way through the last step.
+
+        It is one step behind all the time put in. Before the first step it is the world's time.
+        """
+        if self._world.step_count == 0:
+            return self._world.time
+        return self._world.time - (1.0 - self.alpha) * self._fixed_step.dt
+
+    @property
+    def dropped_time(self) -> float:
+        """Time that the last `advance` dropped [s], 0 where the machine keeps up."""
+        return self._dropped_time
+
+    @property
+    def total_dropped_time(self) -> float:
+        """Time dropped so far [s]."""
+        return self._total_dropped_time
+
+    def step(self) -> None:
+        """Make exactly one fixed step, past the accumulator: for replays, tests and servers.
+
+        Raises: what `World.step` raises.
+        """
+        self._world.step(self._fixed_step.dt, self._fixed_step.substeps)
+
+    def advance(self, frame_dt: float) -> int:
+        """Put in the time of one frame and make the steps that are due.
+
+        Args:
+            frame_dt: time since the last frame [s], 0 or more.
+        Returns: how many steps were made, at most `max_steps`. Time for more is dropped, the part of a step
+            included (see `dropped_time`).
+        Raises: OptionError for a frame_dt that is negative or not finite, with nothing changed; what
+            `World.step` raises: the steps not made then count as dropped.
+        """
+        seconds = as_number(frame_dt, "frame_dt", 0.0, math.inf, "a number of 0 s or more")
+        steps, dropped = self._accumulator.put(seconds)
+        made = 0
+        try:
+            for _ in range(steps):
+                self.step()
+                made += 1
+        finally:
+            self._dropped_time = dropped + (steps - made) * self._fixed_step.dt
+            self._total_dropped_time += self._dropped_time
+        return made
+
+    def positions(self, body: Body, out: NDArray[np.float32] | None = None) -> NDArray[np.float32]:
+        """Positions of a body to draw, between the previous step and the last one, float32 (n, 3) [m].
+
+        Args:
+            body: of this adapter's world.
+            out: C-contiguous float32 array to fill and return; None makes a new one.
+        Raises: OptionError if `out` does not fit or the body belongs to another world.
+        """
+        self._require_own(body)
+        return self._world.read_positions(body, self._accumulator.alpha, out)
+
+    def _require_own(self, body: Any) -> None:
+        index = body.index if isinstance(body, Body) else len(self._bodies)
+        if index >= len(self._bodies) or self._bodies[index] is not body:
+            raise OptionError(f"body must be one that this adapter's world made, got {body!r}")
