@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.checks import as_rows
 from taichi_soft.errors import OptionError, StateError
-from taichi_soft.integrators import StableStep, stable_step
+from taichi_soft.integrators import StableStep
 from taichi_soft.scene import BodyDescription, rest_inverses, vertex_masses
 
 if TYPE_CHECKING:
@@ -41,7 +41,6 @@ class Body:
         """Made by `World.add_body`."""
         self._world = world
         self._description = description
-        self._stable: StableStep | None = None
         self._masses: Floats | None = None
         self.index = index
         self.failure: Failure | None = None
@@ -86,9 +85,7 @@ class Body:
     @property
     def stable_step(self) -> StableStep:
         """Estimate of the largest stable substep."""
-        if self._stable is None:
-            self._stable = stable_step(self.mesh, self.material, self._description.model)
-        return self._stable
+        return self._world.stable_step(self)
 
     @property
     def is_frozen(self) -> bool:
@@ -200,7 +197,9 @@ def require_buffer(out: Floats32 | None, count: int) -> Floats32:
     if out.shape != (count, 3) or out.dtype != np.float32:
         raise OptionError(f"out must be float32 of shape ({count}, 3), got {out.dtype} of shape {out.shape}")
     if not (out.flags.c_contiguous and out.flags.writeable):
-        raise OptionError("out must be C-contiguous and writeable: make it with numpy.empty((n, 3), numpy.float32)")
+        raise OptionError(
+            "out must be C-contiguous and writeable: make it with numpy.empty((n, 3), numpy.float32)"
+        )
     return out
 
 

@@ -63,9 +63,13 @@ def init(arch: str = "auto", threads: int | None = None) -> Device:
         raise OptionError(f"threads must be a whole number of at least 1 or None, got {threads!r}")
     if _device is not None:
         if arch not in ("auto", _device.arch):
-            raise OptionError(f"Taichi already runs on {_device.arch!r}: call init({arch!r}) first in the process")
+            raise OptionError(
+                f"Taichi already runs on {_device.arch!r}: call init({arch!r}) first in the process"
+            )
         if threads is not None and _device.arch == "cpu" and threads != _device.threads:
-            raise OptionError(f"Taichi already runs with {_device.threads} threads: call init(threads={threads}) first")
+            raise OptionError(
+                f"Taichi already runs with {_device.threads} threads: call init(threads={threads}) first"
+            )
         return _device
 
     chosen, reason = _choose(arch)

@@ -15,11 +15,12 @@ from taichi_soft.body import Body, Failure, Floats32, require_buffer, require_bu
 from taichi_soft.checks import as_count, as_number, as_positive, as_rotation, as_vector
 from taichi_soft.constants import GRAVITY_EARTH, LANES
 from taichi_soft.errors import FrozenBodyWarning, MeshError, OptionError, StateError, UnstableStepWarning
+from taichi_soft.integrators import StableStep, stable_step
 from taichi_soft.kernels.evaluate import compute_body_forces, find_failure
 from taichi_soft.kernels.program import Program
 from taichi_soft.kernels.readout import read_positions, read_velocities, write_motion
 from taichi_soft.kernels.schedules import Launch, choose_schedule, make_launch
-from taichi_soft.laws import element_model
+from taichi_soft.laws import ElementModel, element_model
 from taichi_soft.materials import Material, require_material
 from taichi_soft.meshing import TetMesh
 from taichi_soft.runtime import init
@@ -67,6 +68,7 @@ class World:
         self._checked_step: tuple[Any, Any] = (None, None)
         self._step_values = (0.0, 0, 0.0)
         self._warned_steps: set[float] = set()
+        self._stable_steps: dict[tuple[int, int, ElementModel], StableStep] = {}
 
     @property
     def bodies(self) -> Sequence[Body]:
@@ -146,6 +148,14 @@ class World:
         self.schedule = schedule
         self._program, self._state = program, state
         self._launch = make_launch(schedule, state, program, self._scene, device)
+
+    def stable_step(self, body: Body) -> StableStep:
+        """Estimate of the largest stable substep of a body; copies of one body share it."""
+        described = body._description
+        key = (id(described.mesh), id(described.material), described.model)
+        if key not in self._stable_steps:
+            self._stable_steps[key] = stable_step(described.mesh, described.material, described.model)
+        return self._stable_steps[key]
 
     def stable_substeps(self, dt: float) -> int:
         """Number of substeps that a fixed step of `dt` [s] needs, with a margin, for the stiffest body."""

@@ -1,0 +1,33 @@
+"""A beam whose density grows to the right falls flat: the heavy side bounces last and least (fig. 6.3)."""
+
+import numpy as np
+
+from engine_adapter import FixedStep
+from taichi_soft import Material, World, box
+from taichi_soft.film import Actor, Stage
+from taichi_soft.render import Camera, colormap
+
+LIGHT, HEAVY = 200.0, 2000.0  # [kg/m^3]
+
+
+def stage() -> Stage:
+    """The beam, level, above the floor."""
+    mesh = box((4.0, 1.0, 1.0), (16, 4, 4))
+    mesh = mesh.translated(-np.mean(mesh.bounds, axis=0))
+    right = (mesh.vertices[mesh.tets].mean(axis=1)[:, 0] + 2.0) / 4.0
+    material = Material(young=1.0e6, poisson=0.2, density=LIGHT + (HEAVY - LIGHT) * right, damping=50.0)
+    world = World()
+    body = world.add_body(mesh, material, position=(0.0, 0.0, 3.5))
+    world.build()
+    colors = colormap(mesh.vertices[:, 0], -2.5, 2.5)
+    camera = Camera.framing((-2.6, -1.0, 0.0), (2.6, 1.0, 4.2), aspect=16 / 9, azimuth=-75.0, elevation=10.0)
+    title = f"density from {LIGHT:g} (left) to {HEAVY:g} kg/m^3 (right)"
+    actor = Actor(body, paint=lambda body: colors)
+    return Stage(title, world, [actor], camera, FixedStep(dt=1 / 50), seconds=5.0)
+
+
+def proof(stage: Stage) -> float:
+    """How much higher the light end is than the heavy one [m]."""
+    body = stage.actors[0].body
+    x, now = body.mesh.vertices[:, 0], body.positions()[:, 2]
+    return float(now[x < x.min() + 0.1].mean() - now[x > x.max() - 0.1].mean())

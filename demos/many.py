@@ -1,0 +1,32 @@
+"""Sixty-four of the thesis's spheres rain down: bodies run side by side, one per processor core at a time."""
+
+from engine_adapter import FixedStep
+from taichi_soft import World, load_mesh, preset
+from taichi_soft.film import Actor, Stage
+from taichi_soft.render import PALETTE, Camera
+from taichi_soft.stages import ASSETS
+
+ROWS = 8
+PITCH = 3.0  # between spheres [m]
+
+
+def stage() -> Stage:
+    """A square of spheres, each a little higher than the last."""
+    mesh, material = load_mesh(ASSETS / "sphere.npz"), preset("thesis_sphere")
+    world = World()
+    actors = []
+    for i in range(ROWS * ROWS):
+        row, column = divmod(i, ROWS)
+        place = (PITCH * (column - 3.5), PITCH * (row - 3.5), 2.0 + 0.35 * (row + column))
+        body = world.add_body(mesh, material, position=place)
+        actors.append(Actor(body, PALETTE[(row + column) % len(PALETTE)]))
+    world.build()
+    edge = PITCH * ROWS / 2
+    camera = Camera.framing((-edge, -edge, 0.0), (edge, edge, 6.0), aspect=16 / 9, elevation=24.0)
+    title = f"{len(actors)} spheres, {len(actors) * len(mesh.tets):,} tetrahedra"
+    return Stage(title, world, actors, camera, FixedStep(dt=1 / 50, substeps=14), seconds=6.0)
+
+
+def proof(stage: Stage) -> float:
+    """Number of spheres that are whole: no flipped tetrahedron, not frozen."""
+    return float(sum(a.body.flipped_count() == 0 and not a.body.is_frozen for a in stage.actors))

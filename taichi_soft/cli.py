@@ -1,0 +1,179 @@
+"""The command line: demos, what was chosen on this machine, and profiles."""
+
+from __future__ import annotations
+
+import json
+import platform
+import sys
+import warnings
+from dataclasses import asdict
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from taichi_soft.errors import OptionError, TaichiSoftError
+from taichi_soft.runtime import Device, init
+
+app = typer.Typer(
+    help="Real-time soft bodies from real material parameters.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+console = Console()
+errors = Console(stderr=True)
+
+Arch = Annotated[str, typer.Option(help="Device: auto, cpu, cuda, vulkan or metal.")]
+Threads = Annotated[int | None, typer.Option(help="CPU threads; one per core by default.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")]
+
+
+def main() -> None:
+    """Run the command line; an error of ours is one line and exit code 1, a wrong option 2."""
+    warnings.showwarning = _show_warning
+    try:
+        app()
+    except TaichiSoftError as error:
+        errors.print(f"[bold red]error:[/] {error}", soft_wrap=True, highlight=False)
+        sys.exit(1)
+    except KeyboardInterrupt:
+        errors.print("interrupted")
+        sys.exit(130)
+
+
+def _show_warning(message: Warning | str, category: type[Warning], *_: Any) -> None:
+    errors.print(f"[yellow]{category.__name__}:[/] {message}", soft_wrap=True, highlight=False)
+
+
+@app.command()
+def demo(
+    name: Annotated[str | None, typer.Argument(help="Which demo; without a name, lists them.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Film to write: .mp4, .webm, .gif, or .png for pictures.")
+    ] = None,
+    seconds: Annotated[float | None, typer.Option(help="Length of the film [s].")] = None,
+    fps: Annotated[float, typer.Option(help="Frames per second.")] = 50.0,
+    size: Annotated[str, typer.Option(help="Width x height in pixels.")] = "1280x720",
+    video: Annotated[bool, typer.Option(help="Write a film, or only run and time the steps.")] = True,
+    arch: Arch = "auto",
+    threads: Threads = None,
+) -> None:
+    """Run a demo without a display, film it, and say how much faster than real time it ran."""
+    from taichi_soft.stages import demo_names, load_demo
+
+    if name is None:
+        for each in demo_names():
+            summary = (load_demo(each).__doc__ or "").strip().splitlines()[0]
+            console.print(f"[bold]{each:10}[/]{summary}", highlight=False)
+        return
+    pixels = _size_of(size)
+    module = load_demo(name)
+    path = (out or Path("out") / f"{name}.mp4") if video else None
+    init(arch, threads)
+    from taichi_soft.film import film
+
+    stage = module.stage()
+    columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
+    with Progress(*columns, console=errors, disable=not errors.is_terminal) as progress:
+        task = progress.add_task(name)
+        report = film(
+            stage,
+            path,
+            fps=fps,
+            size=pixels,
+            seconds=seconds,
+            on_frame=lambda done, total: progress.update(task, completed=done, total=total),
+        )
+    if report.path is not None:
+        console.print(f"wrote {report.path}: {report.frames} frames, {report.frames / fps:.1f} s", highlight=False)
+    if len(report.step_times):
+        median = sorted(report.step_times)[len(report.step_times) // 2] * 1e3
+        console.print(
+            f"{name}: {report.simulated:.2f} s simulated, median {median:.2f} ms per frame of "
+            f"{1e3 / fps:.1f} ms: {report.real_time_factor:.1f} x faster than real time",
+            highlight=False,
+        )
+
+
+def _size_of(text: str) -> tuple[int, int]:
+    width, _, height = text.lower().partition("x")
+    if not (width.isdecimal() and height.isdecimal()):
+        raise OptionError(f"size must be width x height in pixels, such as 1280x720, got {text!r}")
+    return int(width), int(height)
+
+
+@app.command()
+def info(arch: Arch = "auto", threads: Threads = None, as_json: AsJson = False) -> None:
+    """Say which device, versions, laws and materials there are."""
+    from taichi_soft.laws import LAWS
+    from taichi_soft.materials import PRESETS
+    from taichi_soft.profiling.baseline import find_compiler
+
+    device = init(arch, threads)
+    facts = {
+        **_device_facts(device),
+        "python": platform.python_version(),
+        "platform": platform.platform(),
+        "c++ compiler": find_compiler() or "none",
+        **{name: _version_of(name) for name in ("taichi-soft", "taichi", "numpy", "opencv-python-headless")},
+        "laws": ", ".join(LAWS),
+        "materials": ", ".join(PRESETS),
+    }
+    if as_json:
+        print(json.dumps(facts, indent=2))
+        return
+    table = Table(show_header=False, box=None)
+    for key, value in facts.items():
+        table.add_row(f"[bold]{key}[/]", str(value))
+    console.print(table)
+
+
+def _device_facts(device: Device) -> dict[str, Any]:
+    return {"device": device.arch, "threads": device.threads, "chosen because": device.reason}
+
+
+def _version_of(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return "not installed"
+
+
+@app.command()
+def profile(
+    bodies: Annotated[int, typer.Option(min=1, max=4096, help="Spheres of about 1,000 tetrahedra.")] = 16,
+    baseline: Annotated[bool, typer.Option("--baseline", help="Compare with plain C++ on one thread.")] = False,
+    crossover: Annotated[
+        bool, typer.Option("--crossover", help="Compare the schedules on one body of growing size.")
+    ] = False,
+    repeats: Annotated[int, typer.Option(min=3, help="Measurements of each figure.")] = 121,
+    as_json: AsJson = False,
+    arch: Arch = "auto",
+    threads: Threads = None,
+) -> None:
+    """Measure what a frame costs and how many bodies fit one of 60 Hz and of 120 Hz."""
+    device = init(arch, threads)
+    from taichi_soft import profiling
+    from taichi_soft.profiling import report
+
+    with errors.status("measuring frames") as status:
+        found: dict[str, Any] = {"budget": profiling.measure_budget(bodies, repeats)}
+        if baseline:
+            status.update("measuring against C++")
+            found["baseline"] = profiling.compare_with_baseline(max(3, repeats // 4))
+        if crossover:
+            status.update("measuring schedules")
+            found["crossover"] = profiling.measure_crossover(max(3, repeats // 6))
+    if as_json:
+        rows = {key: [asdict(row) for row in value] for key, value in found.items()}
+        print(json.dumps({"device": _device_facts(device), **rows}, indent=2))
+        return
+    console.print(f"{device.arch}, {device.threads} threads ({device.reason})", highlight=False)
+    for table in report.tables(found):
+        console.print(table)

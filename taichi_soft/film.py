@@ -1,0 +1,163 @@
+"""Films of a world: steps it as a game loop would, draws every frame, and times the steps."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine_adapter import EngineAdapter, FixedStep
+from taichi_soft.body import Body
+from taichi_soft.checks import as_positive
+from taichi_soft.render import PALETTE, Camera, Renderer, Surface, VideoWriter, draw_labels, draw_text
+from taichi_soft.world import World
+
+Color = tuple[float, float, float]
+Paint = Callable[[Body], NDArray[np.float32]]
+Progress = Callable[[int, int], None]
+
+_COMPILING = 2
+"""Frames at the start that are left out of the times: the first draws, the second makes the first step."""
+
+
+@dataclass
+class Actor:
+    """A body and how it is drawn."""
+
+    body: Body
+    color: Color = PALETTE[0]
+    paint: Paint | None = None  # vertex colours (n, 3) of the present moment, instead of `color`
+    label: str = ""  # below the body
+
+
+@dataclass
+class Stage:
+    """A built world, how it is stepped and how it is seen."""
+
+    title: str
+    world: World
+    actors: list[Actor]
+    camera: Camera
+    step: FixedStep
+    seconds: float  # that a film of it shows
+
+
+@dataclass(frozen=True)
+class FilmReport:
+    """What a film took. Drawing and writing are not part of the step times."""
+
+    path: Path | None
+    frames: int
+    fps: float
+    step_times: NDArray[np.float64]  # of stepping and reading each frame [s], without those that compile
+
+    @property
+    def simulated(self) -> float:
+        """Time that passed in the world [s]."""
+        return (self.frames - 1) / self.fps
+
+    @property
+    def real_time_factor(self) -> float:
+        """Simulated time over the time it took; 0 if too few frames were made to tell."""
+        if len(self.step_times) == 0:
+            return 0.0
+        return float(len(self.step_times) / self.fps / self.step_times.sum())
+
+
+def film(
+    stage: Stage,
+    path: str | Path | None,
+    *,
+    fps: float = 50.0,
+    size: tuple[int, int] = (1280, 720),
+    seconds: float | None = None,
+    on_frame: Progress | None = None,
+) -> FilmReport:
+    """Run a stage and write what it shows.
+
+    Args:
+        stage: what to film; it goes on from where it stands.
+        path: of the film, see `VideoWriter`; None draws and writes nothing.
+        fps: frames per second.
+        size: width and height [pixels].
+        seconds: length [s]; None takes the stage's own.
+        on_frame: called with (frames made, frames in all) after each.
+    Raises: VideoError or OptionError, before anything moves where the arguments are wrong.
+    """
+    length = as_positive(stage.seconds if seconds is None else seconds, "seconds", "s")
+    count = max(1, round(length * as_positive(fps, "fps", "1/s")))
+    take = _Take(stage, fps)
+    if path is None:
+        for number in range(count):
+            take.play(number)
+            if on_frame:
+                on_frame(number + 1, count)
+        return FilmReport(None, count, fps, np.array(take.times[_COMPILING:]))
+    artist = _Artist(stage, size, fps)
+    with VideoWriter(path, fps=fps, size=size) as writer:
+        for number in range(count):
+            positions = take.play(number)
+            writer.write(artist.draw(positions, number, take.times))
+            if on_frame:
+                on_frame(number + 1, count)
+    return FilmReport(Path(path), count, fps, np.array(take.times[_COMPILING:]))
+
+
+class _Take:
+    """Steps a stage frame by frame, as a game loop does, with a clock at its side."""
+
+    def __init__(self, stage: Stage, fps: float) -> None:
+        self.adapter = EngineAdapter(stage.world, stage.step)
+        self.fps = fps
+        self.bodies = [actor.body for actor in stage.actors]
+        self.buffers = [np.empty((body.vertex_count, 3), dtype=np.float32) for body in self.bodies]
+        self.times: list[float] = []
+
+    def play(self, number: int) -> list[NDArray[np.float32]]:
+        """Go on to frame `number`; the first shows the stage as it stands. Returns positions to draw."""
+        start = time.perf_counter()
+        if number > 0:
+            self.adapter.advance(1.0 / self.fps)
+        for body, buffer in zip(self.bodies, self.buffers, strict=True):
+            self.adapter.positions(body, buffer)
+        self.times.append(time.perf_counter() - start)
+        return self.buffers
+
+
+class _Artist:
+    """Draws a stage and writes beside it what the steps cost."""
+
+    def __init__(self, stage: Stage, size: tuple[int, int], fps: float) -> None:
+        self.stage = stage
+        self.fps = fps
+        self.renderer = Renderer(*size, camera=stage.camera, floor=stage.world.floor)
+        self.surfaces = [Surface.of(actor.body.mesh, color=actor.color) for actor in stage.actors]
+
+    def draw(self, positions: list[NDArray[np.float32]], number: int, times: list[float]) -> NDArray[np.uint8]:
+        """The picture of the present moment."""
+        for actor, surface, rows in zip(self.stage.actors, self.surfaces, positions, strict=True):
+            surface.positions = rows
+            if actor.paint:
+                surface.color = actor.paint(actor.body)
+        picture = self.renderer.render(self.surfaces)
+        self._draw_labels(picture, positions)
+        lines = [self.stage.title, f"t = {number / self.fps:.2f} s"]
+        recent = times[_COMPILING:][-25:]
+        if recent:
+            mean = float(np.mean(recent))
+            lines.append(f"step {mean * 1e3:.2f} ms, {1.0 / self.fps / mean:.0f} x real time")
+        return draw_text(picture, lines)
+
+    def _draw_labels(self, picture: NDArray[np.uint8], positions: list[NDArray[np.float32]]) -> None:
+        """A caption on the floor in front of each body that has one."""
+        named = [(a.label, rows) for a, rows in zip(self.stage.actors, positions, strict=True) if a.label]
+        if not named:
+            return
+        feet = np.array([rows.mean(axis=0) for _, rows in named])
+        feet[:, 2] = [rows[:, 2].min() for _, rows in named]
+        places = self.stage.camera.project(feet, self.renderer.width, self.renderer.height)
+        draw_labels(picture, [label for label, _ in named], places)

@@ -1,0 +1,23 @@
+"""What a frame costs: measured, never guessed."""
+
+from taichi_soft.profiling.baseline import Baseline, compile_baseline, find_compiler
+from taichi_soft.profiling.budget import Budget, measure_budget
+from taichi_soft.profiling.comparison import Comparison, compare_with_baseline
+from taichi_soft.profiling.crossover import Crossover, measure_crossover
+from taichi_soft.profiling.phases import Phases, measure_phases
+from taichi_soft.profiling.spread import Spread
+
+__all__ = [
+    "Baseline",
+    "Budget",
+    "Comparison",
+    "Crossover",
+    "Phases",
+    "Spread",
+    "compare_with_baseline",
+    "compile_baseline",
+    "find_compiler",
+    "measure_budget",
+    "measure_crossover",
+    "measure_phases",
+]

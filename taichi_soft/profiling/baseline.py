@@ -1,0 +1,76 @@
+"""The C++ yardstick: compiled where it is run, on the same arrays in the same order as the Taichi kernels."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.constants import GRAVITY_EARTH
+from taichi_soft.errors import DeviceError
+from taichi_soft.scene import BodyArrays
+
+SOURCE = Path(__file__).with_name("baseline.cpp")
+FLAGS = ("-O3", "-march=native", "-ffast-math", "-shared", "-fPIC", "-std=c++17")
+"""As Taichi compiles its own kernels: for this processor, with relaxed rounding."""
+
+NO_FLOOR = -1.0e9
+
+
+def find_compiler() -> str | None:
+    """The C++ compiler there is: $CXX, g++, clang++ or c++."""
+    for name in (os.environ.get("CXX", ""), "g++", "clang++", "c++"):
+        if name and shutil.which(name):
+            return name
+    return None
+
+
+def compile_baseline() -> ctypes.CDLL:
+    """The yardstick as a loaded library. Raises: DeviceError without a C++ compiler or if it fails."""
+    compiler = find_compiler()
+    if compiler is None:
+        raise DeviceError("no C++ compiler found: install g++ or clang++, or name one in CXX")
+    library = Path(tempfile.mkdtemp(prefix="taichi-soft-")) / "baseline.so"
+    command = [compiler, *FLAGS, str(SOURCE), "-o", str(library)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        said = done.stderr.strip().splitlines() or ["no message"]
+        raise DeviceError(f"{compiler} cannot compile the baseline: {said[0]}")
+    return ctypes.CDLL(str(library))
+
+
+class Baseline:
+    """One body in plain C++."""
+
+    def __init__(self, library: ctypes.CDLL, body: BodyArrays) -> None:
+        """Take over the arrays of `body`, in kernel order."""
+        self._run = library.run_substeps
+        self._run.restype = None
+        self.positions = body.start_position.astype(np.float32)
+        self.velocities = body.start_velocity.astype(np.float32)
+        self._arrays: list[NDArray[np.generic]] = [
+            self.positions,
+            self.velocities,
+            np.zeros_like(self.positions),
+            (1.0 / body.mass).astype(np.float32),
+            np.ascontiguousarray(body.tet_vertices, dtype=np.int32),
+            np.ascontiguousarray(body.rest_inverse, dtype=np.float32),
+            np.ascontiguousarray(body.lame, dtype=np.float32),
+            np.ascontiguousarray(body.edge_vertices, dtype=np.int32),
+            body.edge_damping.astype(np.float32),
+        ]
+        self._counts = [
+            ctypes.c_int(n) for n in (len(body.mass), len(body.tet_vertices), len(body.edge_vertices))
+        ]
+
+    def step(self, substeps: int, h: float) -> None:
+        """Make `substeps` substeps of `h` [s], in free fall."""
+        pointers = [rows.ctypes.data_as(ctypes.c_void_p) for rows in self._arrays]
+        numbers = [ctypes.c_float(x) for x in (h, -GRAVITY_EARTH, NO_FLOOR)]
+        self._run(*self._counts, *pointers, *numbers, ctypes.c_int(substeps))

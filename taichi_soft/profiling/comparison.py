@@ -1,0 +1,70 @@
+"""Time per tetrahedron and substep against plain C++, in turns within one run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from taichi_soft.laws import element_model
+from taichi_soft.materials import Material
+from taichi_soft.meshing import box
+from taichi_soft.profiling.baseline import Baseline, compile_baseline
+from taichi_soft.profiling.spread import Spread, time_in_turns
+from taichi_soft.scene import BodyDescription, arrange
+from taichi_soft.world import World
+
+SIZES = {1_000: (6, 6, 6), 5_000: (10, 10, 10), 25_000: (17, 17, 17)}
+"""Cells of a box that has about as many tetrahedra."""
+
+MATERIAL = Material(young=1.0e5, poisson=0.1, density=1000.0, damping=0.1)
+SUBSTEP = 1.0e-5  # [s], far below every limit: the bodies just fall
+PUSHED_APART = 0.02  # initial stretch, so that elastic forces act
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """One body on one thread, with Taichi and in C++."""
+
+    tets: int
+    taichi: Spread  # [ns per tetrahedron and substep], Python included
+    native: Spread
+    ratio: Spread  # Taichi over C++, pair by pair
+    deviation: float  # largest difference in position after the same steps, over the body's size
+
+
+def compare_with_baseline(repeats: int = 31, sizes: dict[int, tuple[int, int, int]] = SIZES) -> list[Comparison]:
+    """Measure every size. Raises: DeviceError without a C++ compiler."""
+    library = compile_baseline()
+    found = []
+    for cells in sizes.values():
+        mesh = box((1.0, 1.0, 1.0), cells)
+        world = World(floor=None, schedule="per_body")
+        body = world.add_body(mesh, MATERIAL, position=(0.0, 0.0, 1.0))
+        world.build()
+        model = element_model("virial", "linear", "tolerant", "edge")
+        arrays = arrange(
+            BodyDescription(mesh, MATERIAL, model, np.array([0.0, 0.0, 1.0]), np.eye(3), np.zeros(3))
+        )
+        native = Baseline(library, arrays)
+        stretched = mesh.vertices * (1.0 + PUSHED_APART) + (0.0, 0.0, 1.0)
+        body.set_motion(stretched, np.zeros_like(stretched))
+        native.positions[:] = stretched[arrays.order]
+        substeps = max(4, 2_000_000 // len(mesh.tets) // 10)
+        dt = substeps * SUBSTEP
+        calls = [lambda w=world: w.step(dt, substeps), lambda n=native: n.step(substeps, SUBSTEP)]  # type: ignore[misc]
+        time_in_turns(calls, 2)
+        ours, theirs = time_in_turns(calls, repeats)
+        moved = np.abs(body.positions()[arrays.order] - native.positions).max()
+        per = 1e9 / substeps / len(mesh.tets)
+        ratios = [a / b for a, b in zip(ours, theirs, strict=True)]
+        found.append(
+            Comparison(
+                len(mesh.tets),
+                Spread.of(ours).scaled(per),
+                Spread.of(theirs).scaled(per),
+                Spread.of(ratios),
+                float(moved / np.ptp(mesh.vertices)),
+            )
+        )
+    return found

@@ -1,0 +1,27 @@
+"""A small world for the adapter to run."""
+
+import gc
+
+import pytest
+
+from taichi_soft import Material, World, box
+
+
+@pytest.fixture(autouse=True)
+def release_worlds():
+    """A world that is gone gives its state back, and the next one takes it with its kernels compiled."""
+    yield
+    gc.collect()
+
+
+@pytest.fixture
+def make_world():
+    """Builds a world with one soft cube that falls from 1 m."""
+
+    def build(**options):
+        world = World(**options)
+        world.add_body(box(cells=(2, 2, 2)), Material(1e5, 0.2, 1000.0, 20.0), position=(0, 0, 1.0))
+        world.build()
+        return world
+
+    return build
