@@ -94,7 +94,7 @@ def init(arch: str = "auto", threads: int | None = None) -> Device:
 
 
 def device() -> Device:
-    """The device in use. Raises: StateError-like DeviceError before `init`."""
+    """The device in use. Raises: DeviceError before `init`."""
     if _device is None:
         raise DeviceError("Taichi is not started: call taichi_soft.init() first")
     return _device

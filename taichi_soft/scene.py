@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from taichi_soft.constants import LANES
 from taichi_soft.laws import ElementModel
 from taichi_soft.materials import Material
-from taichi_soft.meshing import BodyMesh, TetMesh, renumbered, spatial_order, tet_order
+from taichi_soft.meshing import TetMesh, renumbered, spatial_order, tet_order
 from taichi_soft.types import DampingModel
 
 Floats = NDArray[np.float64]
@@ -21,7 +21,7 @@ Ints = NDArray[np.int32]
 class BodyDescription:
     """One body as the user added it."""
 
-    mesh: BodyMesh
+    mesh: TetMesh
     material: Material
     model: ElementModel
     position: Floats  # (3,) [m], where the mesh's origin goes
@@ -109,7 +109,6 @@ def rest_inverses(mesh: TetMesh) -> Floats:
 def arrange(description: BodyDescription) -> BodyArrays:
     """Reorder a body along a space-filling curve, so that neighbours share cache lines."""
     mesh = description.mesh
-    assert isinstance(mesh, TetMesh)
     count = len(mesh.tets)
     material = description.material
     order = spatial_order(mesh.vertices)

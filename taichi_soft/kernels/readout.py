@@ -4,17 +4,11 @@ from taichi_soft.runtime import ti
 
 
 @ti.kernel
-def read_positions(
-    state: ti.template(),
-    begin: ti.i32,
-    count: ti.i32,
-    alpha: ti.f32,
-    out: ti.types.ndarray(dtype=ti.f32, ndim=2),
-):
-    """Positions of one body [m], `alpha` of the way from the previous step (0) to the last one (1)."""
+def read_positions(state: ti.template(), alpha: ti.f32, out: ti.types.ndarray(dtype=ti.f32, ndim=2)):
+    """Positions of all bodies [m], `alpha` of the way from the previous step (0) to the last one (1)."""
     ti.loop_config(serialize=True)
-    for i in range(count):
-        p = state.particle_of_vertex[begin + i]
+    for i in range(out.shape[0]):
+        p = state.particle_of_vertex[i]
         before, after = state.prev_position[p], state.particle_position[p]
         x = before + alpha * (after - before)
         if alpha == 1.0:

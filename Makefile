@@ -1,0 +1,37 @@
+# make demo: set everything up, drop the thesis's sphere, write out/bounce.mp4
+# make test: set everything up, run the tests
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test lint profile clean
+
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+
+help:
+	@echo "make demo     set up, drop a soft sphere, write out/bounce.mp4"
+	@echo "make test     set up, run the tests"
+	@echo "make profile  set up, measure what a frame costs here"
+	@echo "make lint     set up, check style and types"
+	@echo "make clean    delete the environment and what was written"
+
+setup: $(READY)
+
+$(READY): pyproject.toml setup.sh
+	@sh setup.sh "$(VENV)"
+	@touch $@
+
+demo: $(READY)
+	@$(BIN)/taichi-soft demo bounce --out out/bounce.mp4
+
+test: $(READY)
+	@$(BIN)/python -m pytest
+
+profile: $(READY)
+	@$(BIN)/taichi-soft profile
+
+lint: $(READY)
+	@$(BIN)/ruff check . && $(BIN)/ruff format --check . && $(BIN)/mypy
+
+clean:
+	rm -rf $(VENV) out build *.egg-info
