@@ -36,7 +36,7 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print JSON and nothing els
 
 def main() -> None:
     """Run the command line; an error of ours is one line and exit code 1, a wrong option 2."""
-    warnings.showwarning = _show_warning
+    warnings.showwarning = _show_warning  # type: ignore[assignment]
     try:
         app()
     except TaichiSoftError as error:
@@ -91,7 +91,9 @@ def demo(
             on_frame=lambda done, total: progress.update(task, completed=done, total=total),
         )
     if report.path is not None:
-        console.print(f"wrote {report.path}: {report.frames} frames, {report.frames / fps:.1f} s", highlight=False)
+        console.print(
+            f"wrote {report.path}: {report.frames} frames, {report.frames / fps:.1f} s", highlight=False
+        )
     if len(report.step_times):
         median = sorted(report.step_times)[len(report.step_times) // 2] * 1e3
         console.print(
@@ -148,7 +150,9 @@ def _version_of(name: str) -> str:
 @app.command()
 def profile(
     bodies: Annotated[int, typer.Option(min=1, max=4096, help="Spheres of about 1,000 tetrahedra.")] = 16,
-    baseline: Annotated[bool, typer.Option("--baseline", help="Compare with plain C++ on one thread.")] = False,
+    baseline: Annotated[
+        bool, typer.Option("--baseline", help="Compare with plain C++ on one thread.")
+    ] = False,
     crossover: Annotated[
         bool, typer.Option("--crossover", help="Compare the schedules on one body of growing size.")
     ] = False,

@@ -137,7 +137,9 @@ class _Artist:
         self.renderer = Renderer(*size, camera=stage.camera, floor=stage.world.floor)
         self.surfaces = [Surface.of(actor.body.mesh, color=actor.color) for actor in stage.actors]
 
-    def draw(self, positions: list[NDArray[np.float32]], number: int, times: list[float]) -> NDArray[np.uint8]:
+    def draw(
+        self, positions: list[NDArray[np.float32]], number: int, times: list[float]
+    ) -> NDArray[np.uint8]:
         """The picture of the present moment."""
         for actor, surface, rows in zip(self.stage.actors, self.surfaces, positions, strict=True):
             surface.positions = rows

@@ -117,7 +117,9 @@ class _ElasticOperator:
         return _summed(self.tets, forces, len(u)) / self.root_mass
 
 
-def _damping_operator(mesh: TetMesh, material: Material, model: ElementModel, mass: Floats) -> Operator | None:
+def _damping_operator(
+    mesh: TetMesh, material: Material, model: ElementModel, mass: Floats
+) -> Operator | None:
     """M^-1/2 C M^-1/2, or None where nothing damps."""
     tet_damping = material.per_tet("damping", len(mesh.tets))
     if not tet_damping.any():

@@ -26,4 +26,6 @@ def element_model(
     """The model that these names choose. Raises: OptionError for a name that is not known."""
     if law not in LAWS:
         raise OptionError(f"unknown law {law!r}: choose one of {', '.join(map(repr, LAWS))}")
-    return ElementModel(LAWS[law], Strain.parse(strain), Flips.parse(flips), DampingModel.parse(damping_model))
+    return ElementModel(
+        LAWS[law], Strain.parse(strain), Flips.parse(flips), DampingModel.parse(damping_model)
+    )

@@ -43,9 +43,13 @@ class Material:
         try:
             values = np.array(given, dtype=np.float64)
         except (TypeError, ValueError):
-            raise MaterialError(f"{name} must be a number or one number per tetrahedron, got {given!r}") from None
+            raise MaterialError(
+                f"{name} must be a number or one number per tetrahedron, got {given!r}"
+            ) from None
         if values.ndim > 1 or values.size == 0:
-            raise MaterialError(f"{name} must be a number or a flat array, got an array of shape {values.shape}")
+            raise MaterialError(
+                f"{name} must be a number or a flat array, got an array of shape {values.shape}"
+            )
         bad = ~(np.isfinite(values) & is_valid(values))
         if bad.any():
             first = int(np.flatnonzero(bad)[0])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -33,7 +34,9 @@ class Comparison:
     deviation: float  # largest difference in position after the same steps, over the body's size
 
 
-def compare_with_baseline(repeats: int = 31, sizes: dict[int, tuple[int, int, int]] = SIZES) -> list[Comparison]:
+def compare_with_baseline(
+    repeats: int = 31, sizes: dict[int, tuple[int, int, int]] = SIZES
+) -> list[Comparison]:
     """Measure every size. Raises: DeviceError without a C++ compiler."""
     library = compile_baseline()
     found = []
@@ -52,7 +55,7 @@ def compare_with_baseline(repeats: int = 31, sizes: dict[int, tuple[int, int, in
         native.positions[:] = stretched[arrays.order]
         substeps = max(4, 2_000_000 // len(mesh.tets) // 10)
         dt = substeps * SUBSTEP
-        calls = [lambda w=world: w.step(dt, substeps), lambda n=native: n.step(substeps, SUBSTEP)]  # type: ignore[misc]
+        calls = [partial(world.step, dt, substeps), partial(native.step, substeps, SUBSTEP)]
         time_in_turns(calls, 2)
         ours, theirs = time_in_turns(calls, repeats)
         moved = np.abs(body.positions()[arrays.order] - native.positions).max()

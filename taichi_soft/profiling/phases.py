@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,7 +76,7 @@ def measure_phases(count: int = 16, dt: float = 1 / 60, repeats: int = 121) -> P
     )
 
 
-def _phase_call(world: World, phase: str, substeps: int):  # type: ignore[no-untyped-def]
+def _phase_call(world: World, phase: str, substeps: int) -> Callable[[], object]:
     state, program, count = world._state, world._program, len(world.bodies)
     return lambda: repeat_phase(state, program, phase, count, substeps, TINY_H)
 

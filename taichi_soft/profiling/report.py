@@ -38,7 +38,9 @@ def _cells(spread: Spread, digits: int) -> list[str]:
 
 def _phase_table(budgets: list[Budget]) -> Table:
     measured = budgets[0].measured
-    title = f"{measured.bodies} spheres, {measured.tets:,} tetrahedra, {measured.substeps} substeps a frame [ms]"
+    title = (
+        f"{measured.bodies} spheres, {measured.tets:,} tetrahedra, {measured.substeps} substeps a frame [ms]"
+    )
     table = _table(title, "", "least", "p50", "p99", "most")
     for name, spread in measured.phases.items():
         table.add_row(f"{name}, one thread", *_cells(spread, 3))

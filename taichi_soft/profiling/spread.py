@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from time import perf_counter
 
@@ -41,7 +41,7 @@ def time_calls(call: Callable[[], object], repeats: int) -> list[float]:
     return times
 
 
-def time_in_turns(calls: list[Callable[[], object]], repeats: int) -> list[list[float]]:
+def time_in_turns(calls: Sequence[Callable[[], object]], repeats: int) -> list[list[float]]:
     """As `time_calls` for several calls, one after the other in every round.
 
     A machine that slows down for a while then slows all of them, and their ratio holds.

@@ -1,0 +1,61 @@
+"""Worlds with one small body."""
+
+import gc
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from taichi_soft import Material, World, box, load_mesh
+
+ASSETS = Path(__file__).parents[2] / "assets"
+
+
+@pytest.fixture(autouse=True)
+def release_worlds():
+    """A world that is gone gives its state back, and the next one takes it with its kernels compiled."""
+    yield
+    gc.collect()
+
+
+@pytest.fixture(scope="session")
+def thesis_mesh():
+    """The thesis's sphere, diameter about 2 m."""
+    return load_mesh(ASSETS / "sphere.npz")
+
+
+@pytest.fixture(scope="session")
+def cube():
+    """A cube of 1 m about the origin: 27 vertices, 40 tetrahedra."""
+    return box(cells=(2, 2, 2))
+
+
+@pytest.fixture(scope="session")
+def jelly():
+    return Material(young=1e5, poisson=0.2, density=1000.0, damping=20.0)
+
+
+@pytest.fixture(scope="session")
+def turned():
+    """A rotation matrix about a skew axis, from the exponential of its generator."""
+    axis = np.array([0.3, -0.5, 0.8])
+    axis = axis / np.linalg.norm(axis) * 0.9
+    generator = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    matrix, term = np.eye(3), np.eye(3)
+    for power in range(1, 25):
+        term = term @ generator / power
+        matrix = matrix + term
+    return matrix
+
+
+@pytest.fixture
+def solo():
+    """Builds a world with one body. Returns both."""
+
+    def build(mesh, material, world_options=None, **body_options):
+        world = World(**(world_options or {}))
+        body = world.add_body(mesh, material, **body_options)
+        world.build()
+        return world, body
+
+    return build
