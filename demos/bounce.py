@@ -23,7 +23,5 @@ def stage() -> Stage:
 def proof(stage: Stage) -> float:
     """How far the sphere has fallen [m]: g t^2 / 2 until it lands."""
     body = stage.actors[0].body
-    start = (
-        body.masses @ (body.mesh.vertices + (0.0, 0.0, HEIGHT - body.mesh.bounds[0][2])) / body.masses.sum()
-    )
-    return float(start[2] - body.center_of_mass()[2])
+    start = body.masses @ body.mesh.vertices[:, 2] / body.masses.sum() + HEIGHT - body.mesh.bounds[0][2]
+    return float(start - body.center_of_mass()[2])

@@ -1,4 +1,4 @@
-"""A beam whose density grows to the right falls flat: the heavy side is pressed deepest, lifts off last (fig. 6.3)."""
+"""A beam whose density grows to the right falls flat: its heavy side is pressed deepest (fig. 6.3)."""
 
 import numpy as np
 

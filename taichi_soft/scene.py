@@ -31,7 +31,7 @@ class BodyDescription:
     @property
     def start_positions(self) -> Floats:
         """Vertices in the world, (n, 3) [m], in the caller's order."""
-        return self.mesh.vertices @ self.rotation.T + self.position
+        return np.asarray(self.mesh.vertices @ self.rotation.T + self.position)
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ def edge_damping(mesh: TetMesh, tet_damping: Floats) -> Floats:
 def vertex_masses(mesh: TetMesh, density: Floats) -> Floats:
     """A quarter of the mass of each neighbouring tetrahedron, (n,) [kg] (thesis chapter 6)."""
     quarter = np.repeat(mesh.volumes * density / 4.0, 4)
-    return np.bincount(mesh.tets.ravel(), quarter, minlength=len(mesh.vertices))
+    return np.bincount(mesh.tets.ravel(), quarter, minlength=len(mesh.vertices)).astype(np.float64)
 
 
 def rest_inverses(mesh: TetMesh) -> Floats:

@@ -197,8 +197,8 @@ class World:
         if h > limit and h not in self._warned_steps:
             self._warned_steps.add(h)
             warnings.warn(
-                f"substep {h * 1e3:.4g} ms is longer than the {limit * 1e3:.4g} ms that body {stiffest.index} "
-                f"can take (stiffest tetrahedron {stiffest.stable_step.stiffest_tet}): it may explode. Use "
+                f"substep {h * 1e3:.4g} ms is longer than the {limit * 1e3:.4g} ms that body "
+                f"{stiffest.index} can take (stiffest tetrahedron {stiffest.stable_step.stiffest_tet}): it may explode. Use "
                 f"substeps={self.stable_substeps(seconds)} or leave substeps out",
                 UnstableStepWarning,
                 stacklevel=3,
@@ -246,7 +246,7 @@ class World:
         return rows
 
     def read_velocities(self, body: Body) -> Floats32:
-        """Velocities of a body at the time of its positions, (n, 3) [m/s]. Raises: StateError before `build`."""
+        """Velocities at the time of the positions, (n, 3) [m/s]. Raises: StateError before `build`."""
         require_built(self.is_built)
         assert self._state is not None
         rows = np.empty((body.vertex_count, 3), dtype=np.float32)

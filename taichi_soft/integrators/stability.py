@@ -62,7 +62,11 @@ def stable_step(mesh: TetMesh, material: Material, model: ElementModel) -> Stabl
         # Each pass makes the quadratic form h^2 K + 2 h C touch 4 along the direction that is worst so far.
         for _ in range(_DAMPING_PASSES):
             h = limit
-            value, u = _largest_eigenvalue(lambda u, h=h: h * h * elastic.apply(u) + 2 * h * damping(u), u, 8)
+
+            def form(w: Floats, h: float = h, damping: Operator = damping) -> Floats:
+                return np.asarray(h * h * elastic.apply(w) + 2 * h * damping(w))
+
+            value, u = _largest_eigenvalue(form, u, 8)
             # Between h (all damping) and h^2 (all stiffness) lies how the form grows: 2/3 is safe for both.
             limit = h * (4.0 / value) ** (2 / 3)
     worst = int(elastic.element_bounds().argmax())
@@ -96,13 +100,13 @@ class _ElasticOperator:
         for row, (p, q) in enumerate(((1, 2), (0, 2), (0, 1)), start=3):
             b[:, row, :, p] = g[:, :, q] / np.sqrt(2)
             b[:, row, :, q] = g[:, :, p] / np.sqrt(2)
-        b = b.reshape(len(g), 6, 12)
+        rows = b.reshape(len(g), 6, 12)
         shear = np.sqrt(2 * self.lame_mu)
         bulk = np.sqrt(3 * self.lame_lambda + 2 * self.lame_mu)
         hydrostatic = np.zeros((6, 6))
         hydrostatic[:3, :3] = 1 / 3
         root = shear[:, None, None] * np.eye(6) + (bulk - shear)[:, None, None] * hydrostatic
-        gram = root @ (b @ np.swapaxes(b, 1, 2)) @ root
+        gram = root @ (rows @ np.swapaxes(rows, 1, 2)) @ root
         return np.asarray(np.linalg.eigvalsh(gram)[:, -1] * 4.0 / self.density)
 
     def apply(self, u: Floats) -> Floats:

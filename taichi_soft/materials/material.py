@@ -76,7 +76,7 @@ class Material:
         values = np.asarray(getattr(self, name), dtype=np.float64)
         if values.ndim == 1 and values.shape[0] != tet_count:
             raise MaterialError(
-                f"{name} has {values.shape[0]} values for a mesh of {tet_count} tetrahedra: give one each, or a number"
+                f"{name} has {values.shape[0]} values for a mesh of {tet_count} tetrahedra: give one each"
             )
         return np.ascontiguousarray(np.broadcast_to(values, (tet_count,)))
 
