@@ -13,6 +13,7 @@ from typing import Annotated, Any
 
 import typer
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
@@ -40,7 +41,7 @@ def main() -> None:
     try:
         app()
     except TaichiSoftError as error:
-        errors.print(f"[bold red]error:[/] {error}", soft_wrap=True, highlight=False)
+        errors.print(f"[bold red]error:[/] {escape(str(error))}", soft_wrap=True, highlight=False)
         sys.exit(1)
     except KeyboardInterrupt:
         errors.print("interrupted")
@@ -48,7 +49,7 @@ def main() -> None:
 
 
 def _show_warning(message: Warning | str, category: type[Warning], *_: Any) -> None:
-    errors.print(f"[yellow]{category.__name__}:[/] {message}", soft_wrap=True, highlight=False)
+    errors.print(f"[yellow]{category.__name__}:[/] {escape(str(message))}", soft_wrap=True, highlight=False)
 
 
 @app.command()
@@ -70,7 +71,7 @@ def demo(
     if name is None:
         for each in demo_names():
             summary = (load_demo(each).__doc__ or "").strip().splitlines()[0]
-            console.print(f"[bold]{each:10}[/]{summary}", highlight=False)
+            _say(f"[bold]{each:10}[/]{escape(summary)}")
         return
     pixels = _size_of(size)
     module = load_demo(name)
@@ -91,16 +92,18 @@ def demo(
             on_frame=lambda done, total: progress.update(task, completed=done, total=total),
         )
     if report.path is not None:
-        console.print(
-            f"wrote {report.path}: {report.frames} frames, {report.frames / fps:.1f} s", highlight=False
-        )
+        _say(f"wrote {escape(str(report.path))}: {report.frames} frames, {report.frames / fps:.1f} s")
     if len(report.step_times):
         median = sorted(report.step_times)[len(report.step_times) // 2] * 1e3
-        console.print(
+        _say(
             f"{name}: {report.simulated:.2f} s simulated, median {median:.2f} ms per frame of "
-            f"{1e3 / fps:.1f} ms: {report.real_time_factor:.1f} x faster than real time",
-            highlight=False,
+            f"{1e3 / fps:.1f} ms: {report.real_time_factor:.1f} x faster than real time"
         )
+
+
+def _say(line: str) -> None:
+    """Print one line as one line, however narrow the terminal is."""
+    console.print(line, soft_wrap=True, highlight=False)
 
 
 def _size_of(text: str) -> tuple[int, int]:
@@ -178,6 +181,6 @@ def profile(
         rows = {key: [asdict(row) for row in value] for key, value in found.items()}
         print(json.dumps({"device": _device_facts(device), **rows}, indent=2))
         return
-    console.print(f"{device.arch}, {device.threads} threads ({device.reason})", highlight=False)
+    _say(f"{device.arch}, {device.threads} threads ({device.reason})")
     for table in report.tables(found):
         console.print(table)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -23,10 +24,10 @@ class Crossover:
     ratio: Spread  # flat over per_body, pair by pair
 
 
-def measure_crossover(repeats: int = 21) -> list[Crossover]:
+def measure_crossover(repeats: int = 21, cells: Sequence[int] = CELLS) -> list[Crossover]:
     """Time one body of growing size, in turns."""
     found = []
-    for n in CELLS:
+    for n in cells:
         mesh = box((1.0, 1.0, 1.0), (n, n, n))
         worlds = [spheres(1, schedule, mesh) for schedule in ("per_body", "flat")]
         dt = SUBSTEPS * 1e-6

@@ -1,0 +1,100 @@
+"""The command line, run as a user runs it: in a process of its own."""
+
+import json
+import subprocess
+import sys
+
+import cv2
+import pytest
+
+
+def run(*arguments: str, cwd=None) -> subprocess.CompletedProcess:
+    return subprocess.run(
+        [sys.executable, "-m", "taichi_soft", *arguments],
+        capture_output=True,
+        text=True,
+        cwd=cwd,
+        timeout=300,
+    )
+
+
+@pytest.mark.parametrize("command", [(), ("demo",), ("info",), ("profile",)])
+def test_every_command_explains_itself(command):
+    done = run(*command, "--help")
+    assert done.returncode == 0
+    assert "Usage" in done.stdout
+    assert done.stderr == ""
+
+
+def test_demo_without_a_name_lists_the_demos_with_a_summary_each():
+    done = run("demo")
+    assert done.returncode == 0
+    lines = done.stdout.splitlines()
+    assert [line.split()[0] for line in lines if not line.startswith(" ")][:5] == sorted(
+        ["bars", "bounce", "density", "dents", "many"]
+    )
+
+
+def test_demo_writes_a_film_and_says_how_much_faster_than_real_time_it_ran(tmp_path):
+    film = tmp_path / "films" / "b.webm"
+    done = run("demo", "bounce", "--seconds", "0.2", "--size", "128x96", "--out", str(film), "--threads", "1")
+    assert done.returncode == 0, done.stderr
+    capture = cv2.VideoCapture(str(film))
+    assert int(capture.get(cv2.CAP_PROP_FRAME_COUNT)) == 10
+    assert "faster than real time" in done.stdout.replace("\n", " ")
+    assert done.stderr == ""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (("demo", "nope"), "'nope'"),
+        (("demo", "bounce", "--size", "12"), "'12'"),
+        (("demo", "bounce", "--out", "x.mkv"), ".mp4"),
+        (("demo", "bounce", "--out", "/proc/nowhere/x.mp4"), "/proc/nowhere"),
+        (("demo", "bounce", "--seconds", "-1"), "-1"),
+        (("demo", "bounce", "--fps", "nan"), "nan"),
+        (("info", "--arch", "abacus"), "'abacus'"),
+        (("info", "--threads", "0"), "0"),
+    ],
+)
+def test_a_wrong_argument_gives_one_line_that_names_it_and_exit_code_1(arguments, named, tmp_path):
+    done = run(*arguments, cwd=tmp_path)
+    assert done.returncode == 1
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert named in done.stderr
+    assert "Traceback" not in done.stderr
+    assert [path.name for path in tmp_path.iterdir()] in ([], ["out"])
+
+
+def test_an_unknown_option_gives_exit_code_2():
+    done = run("info", "--nonsense")
+    assert done.returncode == 2
+    assert "--nonsense" in done.stderr
+
+
+def test_info_says_which_device_and_versions():
+    facts = json.loads(run("info", "--json", "--arch", "cpu", "--threads", "1").stdout)
+    assert facts["device"] == "cpu"
+    assert facts["threads"] == 1
+    assert facts["taichi"] == "1.7.4"
+    assert facts["laws"] == "virial, face"
+
+
+def test_profile_prints_phases_and_budgets_as_json():
+    done = run("profile", "--json", "--bodies", "2", "--repeats", "5", "--arch", "cpu")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert [row["rate"] for row in found["budget"]] == [60, 120]
+    measured = found["budget"][0]["measured"]
+    assert set(measured["phases"]) == {"elastic", "damping", "motion"}
+    for spread in (*measured["phases"].values(), measured["frame"], measured["python"]):
+        assert 0 < spread["least"] <= spread["median"] <= spread["p99"] <= spread["most"]
+    assert found["budget"][0]["tets"] == found["budget"][0]["bodies"] * measured["tets"] // 2
+
+
+def test_profile_prints_tables_for_people():
+    done = run("profile", "--bodies", "1", "--repeats", "3", "--arch", "cpu")
+    assert done.returncode == 0, done.stderr
+    assert "What fits a frame" in done.stdout
+    assert "120 Hz" in done.stdout

@@ -1,0 +1,75 @@
+"""Every demo for a few frames; each has to come out at one number."""
+
+import numpy as np
+import pytest
+
+from taichi_soft import OptionError
+from taichi_soft.film import film
+from taichi_soft.stages import demo_names, load_demo
+
+
+def run(name: str, seconds: float):
+    demo = load_demo(name)
+    stage = demo.stage()
+    steps = round(seconds / stage.step.dt)
+    for _ in range(steps):
+        stage.world.step(stage.step.dt, stage.step.substeps)
+    return demo.proof(stage), stage
+
+
+def test_bounce_falls_by_half_g_t_squared():
+    fallen, stage = run("bounce", 1.0)
+    assert stage.step.dt / stage.step.substeps == pytest.approx(1 / 700)
+    assert fallen == pytest.approx(0.5 * 9.81 * 1.0**2, rel=1e-4)
+
+
+def test_dents_stay_where_flips_are_tolerated_and_vanish_where_they_are_driven_back():
+    more_flips, stage = run("dents", 3.0)
+    assert more_flips > 50
+    assert stage.actors[1].body.flipped_count() == 0
+
+
+def test_bars_keep_their_volume_while_they_bend():
+    ratio, stage = run("bars", 1.2)
+    assert ratio == pytest.approx(1.0, abs=0.03)
+    assert stage.actors[0].body.vertex_stress().max() > 1e4
+
+
+def test_the_heavy_side_of_the_density_beam_sinks_deepest_at_landing():
+    difference, _ = run("density", 0.84)
+    assert difference > 0.1
+
+
+def test_all_of_many_spheres_land_whole():
+    whole, stage = run("many", 1.2)
+    assert whole == 64
+    assert min(actor.body.positions()[:, 2].min() for actor in stage.actors) < 0.01
+
+
+@pytest.mark.parametrize("name", demo_names())
+def test_every_demo_can_be_filmed(name, tmp_path):
+    stage = load_demo(name).stage()
+    report = film(stage, tmp_path / f"{name}.png", seconds=0.06, size=(160, 90))
+    assert len(list(tmp_path.glob(f"{name}_*.png"))) == report.frames == 3
+    assert stage.world.step_count >= 1
+
+
+def test_there_are_the_five_demos_of_the_readme():
+    assert demo_names() == ["bars", "bounce", "density", "dents", "many"]
+
+
+def test_an_unknown_demo_is_refused_with_the_names_there_are():
+    with pytest.raises(OptionError, match=r"'nope'.*bounce"):
+        load_demo("nope")
+
+
+def test_every_demo_stands_above_the_floor_inside_the_picture():
+    for name in demo_names():
+        stage = load_demo(name).stage()
+        for actor in stage.actors:
+            rows = actor.body.positions()
+            assert rows[:, 2].min() > 0
+            pixels = stage.camera.project(rows, 1280, 720)
+            assert np.isfinite(pixels).all()
+            assert pixels[:, :2].min() > 0
+            assert (pixels[:, :2] < (1280, 720)).all()

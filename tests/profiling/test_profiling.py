@@ -1,0 +1,44 @@
+"""Profiles work and their yardstick computes the same motion. No time is asserted."""
+
+import subprocess
+import sys
+
+import pytest
+
+from taichi_soft.profiling import compare_with_baseline, find_compiler, measure_crossover
+from taichi_soft.profiling.spread import Spread
+
+needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler here")
+
+
+def test_a_spread_holds_least_median_99th_percentile_and_most():
+    spread = Spread.of([float(x) for x in range(101)])
+    assert (spread.least, spread.median, spread.p99, spread.most) == (0.0, 50.0, 99.0, 100.0)
+    assert spread.scaled(2.0).median == 100.0
+
+
+@needs_compiler
+def test_the_baseline_moves_a_body_as_the_kernels_do():
+    (row,) = compare_with_baseline(3, {1_000: (6, 6, 6)})
+    assert row.tets > 900
+    assert row.deviation < 1e-4
+    assert row.ratio.least > 0
+
+
+def test_the_crossover_times_both_schedules():
+    rows = measure_crossover(3, cells=(3,))
+    assert rows[0].ratio.median > 0
+
+
+def test_a_missing_compiler_gives_one_line():
+    code = "import sys; sys.argv=['x','profile','--baseline','--repeats','3','--bodies','1','--arch','cpu'];"
+    code += "from taichi_soft.cli import main; main()"
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        env={"PATH": "", "HOME": "/tmp"},
+        timeout=200,
+    )
+    assert done.returncode == 1
+    assert done.stderr.strip().splitlines()[-1].startswith("error: no C++ compiler")
