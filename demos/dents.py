@@ -12,20 +12,20 @@ from taichi_soft.film import Actor, Stage
 from taichi_soft.render import PALETTE, Camera, highlight
 from taichi_soft.stages import ASSETS
 
-SOFT = Material(young=3.0e5, poisson=0.1, density=1000.0, damping=100.0)
+SOFT = Material(young=2.0e5, poisson=0.1, density=1000.0, damping=100.0)
 
 
 def stage() -> Stage:
-    """Two spheres above the floor, on their way down at 9 m/s."""
+    """Two spheres above the floor, on their way down at 6 m/s."""
     mesh = load_mesh(ASSETS / "sphere.npz")
     world = World()
     actors = []
     for flips, x, color in (("tolerant", -1.6, PALETTE[0]), ("recover", 1.6, PALETTE[1])):
-        body = world.add_body(mesh, SOFT, flips=flips, position=(x, 0.0, 3.0), velocity=(0.0, 0.0, -9.0))
+        body = world.add_body(mesh, SOFT, flips=flips, position=(x, 0.0, 3.0), velocity=(0.0, 0.0, -6.0))
         actors.append(Actor(body, paint=_mark_flips(color), label=f'flips="{flips}"'))
     world.build()
-    camera = Camera.framing((-3.0, -1.5, 0.0), (3.0, 1.5, 4.0), aspect=16 / 9, azimuth=-90.0, elevation=14.0)
-    title = "E = 0.3 MPa at 9 m/s; flipped tetrahedra are pink"
+    camera = Camera.framing((-3.0, -1.5, 0.0), (3.0, 1.5, 4.6), aspect=16 / 9, azimuth=-90.0, elevation=14.0)
+    title = "E = 0.2 MPa at 6 m/s; flipped tetrahedra are pink"
     return Stage(title, world, actors, camera, FixedStep(dt=1 / 50, substeps=14), seconds=6.0)
 
 

@@ -1,0 +1,68 @@
+"""What the README prints has to run as printed."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from taichi_soft import LAWS, PRESETS
+from taichi_soft.stages import demo_names
+from taichi_soft.types import DampingModel, Flips, Integrator, Strain
+
+ROOT = Path(__file__).resolve().parents[1]
+TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
+BLOCKS = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
+
+
+def run_block(number: int) -> dict:
+    names: dict = {}
+    exec(compile(BLOCKS[number], f"README block {number}", "exec"), names)
+    return names
+
+
+def test_the_ten_lines_of_embedding_code_drop_a_ball_onto_the_floor():
+    lines = [line for line in BLOCKS[0].splitlines() if line and not line.startswith(("import", "from"))]
+    assert len(lines) <= 10
+    names = run_block(0)
+    assert names["game"].total_dropped_time == 0.0
+    assert names["world"].step_count == pytest.approx(90 / 75 * 60, abs=1)
+    assert np.isfinite(names["vertices"]).all()
+    assert -0.01 < names["vertices"][:, 2].min() < 1.2
+
+
+def test_the_force_example_pulls_a_stretched_box_together():
+    names = run_block(1)
+    top = names["mesh"].vertices[:, 2] > names["mesh"].vertices[:, 2].max() - 1e-9
+    force = names["forces"][top, 2].sum()
+    strain = (1.01**2 - 1) / 2
+    assert force == pytest.approx(-2.0e7 * strain, rel=1e-9)  # cork: nu = 0, so the area stays 1 m^2
+
+
+@pytest.mark.parametrize("names", [LAWS, PRESETS, demo_names()])
+def test_every_name_there_is_stands_in_the_readme(names):
+    for name in names:
+        assert f"`{name}`" in TEXT or f'"{name}"' in TEXT
+
+
+@pytest.mark.parametrize("choice", [Strain, Flips, DampingModel, Integrator])
+def test_every_choice_there_is_stands_in_the_tables(choice):
+    for member in choice:
+        assert f'"{member.value}"' in TEXT
+
+
+def test_every_file_the_readme_points_to_exists():
+    for target in re.findall(r"\]\(([^)#]+)\)", TEXT):
+        if not target.startswith("http"):
+            assert (ROOT / target).exists(), target
+
+
+def test_every_command_of_the_readme_exists():
+    done = subprocess.run([sys.executable, "-m", "taichi_soft", "--help"], capture_output=True, text=True)
+    for command in re.findall(r"^ +taichi-soft (\w+)", TEXT, re.MULTILINE):
+        assert command in done.stdout
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    for target in re.findall(r"^ +make (\w+)", TEXT, re.MULTILINE):
+        assert f"\n{target}:" in makefile
