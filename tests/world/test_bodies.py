@@ -1,0 +1,162 @@
+"""Several bodies in one world, worlds one after another, and one after the other's end."""
+
+import gc
+import warnings
+
+import numpy as np
+import pytest
+
+from taichi_soft import Material, World, beam, box, sphere
+
+# mesh, material, options: everything in which bodies can differ.
+KINDS = {
+    "cube": (box(cells=(2, 2, 2)), Material(1e5, 0.2, 1000.0, 20.0), {}),
+    "ball": (
+        sphere(0.5, 3),
+        Material(2e5, 0.4, 500.0, 10.0),
+        {"law": "face", "strain": "exact", "flips": "recover"},
+    ),
+    "beam": (
+        beam(2.0, 0.5, 0.5, 2),
+        Material(np.linspace(1e5, 3e5, len(beam(2.0, 0.5, 0.5, 2).tets)), -0.2, 800.0, 5.0),
+        {"damping_model": "tet_mean", "flips": "off"},
+    ),
+}
+
+
+def fall(names, schedule="per_body", steps=60):
+    """Positions and velocities of each body after they fell and hit the floor."""
+    world = World(schedule=schedule)
+    for name in names:
+        mesh, material, options = KINDS[name]
+        place = (3.0 * list(KINDS).index(name), 1.0, 0.9)
+        tilt = (0.0, np.sin(0.2), 0.0, np.cos(0.2))
+        world.add_body(mesh, material, **options, position=place, rotation=tilt, velocity=(0, 1, -1))
+    world.build()
+    for _ in range(steps):
+        world.step(1 / 60, 8)
+    assert all(body.failure is None for body in world.bodies)
+    return {
+        name: (body.positions(), body.velocities()) for name, body in zip(names, world.bodies, strict=True)
+    }
+
+
+@pytest.fixture(scope="module")
+def together():
+    return fall(list(KINDS))
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_a_body_among_others_moves_as_if_alone(together, name):
+    """Bit for bit, whatever the others are made of."""
+    alone = fall([name])
+    assert together[name][0].tobytes() == alone[name][0].tobytes()
+    assert together[name][1].tobytes() == alone[name][1].tobytes()
+
+
+def test_a_second_run_has_the_same_bits(together):
+    again = fall(list(KINDS))
+    for name in KINDS:
+        assert again[name][0].tobytes() == together[name][0].tobytes()
+        assert again[name][1].tobytes() == together[name][1].tobytes()
+
+
+def test_both_schedules_tell_the_same_story(together):
+    """Of bodies of two models: each block of tetrahedra has to find its own."""
+    names = ["cube", "beam"]
+    flat, per_body = (fall(names, schedule, steps=10) for schedule in ("flat", "per_body"))
+    for name in names:
+        np.testing.assert_allclose(flat[name][0], per_body[name][0], atol=1e-4)
+        np.testing.assert_allclose(flat[name][1], per_body[name][1], atol=1e-2)
+
+
+def test_two_worlds_do_not_disturb_each_other(solo, cube, jelly):
+    lone, lone_body = solo(cube, jelly, position=(0, 0, 0.7))
+    for _ in range(40):
+        lone.step(1 / 60, 8)
+    expected = lone_body.positions().tobytes()
+    first, first_body = solo(cube, jelly, position=(0, 0, 0.7))
+    second, second_body = solo(cube, jelly, {"gravity": (0, 0, 3.0)}, position=(1, 0, 0.7))
+    for _ in range(40):
+        first.step(1 / 60, 8)
+        second.step(1 / 30, 16)
+    assert first_body.positions().tobytes() == expected
+    assert second_body.center_of_mass()[2] == pytest.approx(0.7 + 1.5 * (40 / 30) ** 2, rel=1e-3)
+
+
+def test_a_state_is_reused_and_clean(jelly):
+    """The world that was there before was larger, broken, elsewhere and had another floor."""
+
+    def run(world, body):
+        for _ in range(30):
+            world.step(1 / 60, 8)
+        return body.positions().tobytes()
+
+    def small():
+        world = World()
+        body = world.add_body(box(cells=(2, 2, 2)), jelly, position=(0, 0, 0.6), velocity=(0.5, 0, 0))
+        world.build()
+        return world, body
+
+    world, body = small()
+    expected = run(world, body)
+    del world, body
+    gc.collect()
+
+    previous = World(gravity=(0, 0, 5.0), floor=3.0, restitution=1.0, friction=0.0)
+    broken = previous.add_body(box(cells=(3, 3, 3)), Material(1e9, 0.2, 1000.0, 20.0), position=(0, 0, 4))
+    previous.add_body(box(cells=(3, 3, 3)), jelly, position=(2, 0, 4))
+    previous.build()
+    with warnings.catch_warnings(record=True):
+        for _ in range(20):
+            previous.step(1 / 60, 2)
+    assert broken.is_frozen
+    state = previous._state
+    del previous, broken
+    gc.collect()
+
+    world, body = small()
+    assert world._state is state
+    assert run(world, body) == expected
+
+
+def test_bodies_keep_a_world_in_use(cube, jelly):
+    """The handle is enough: a state goes back only when nobody can read it any more."""
+
+    def make():
+        world = World()
+        body = world.add_body(cube, jelly, position=(0, 0, 5.0))
+        world.build()
+        return body
+
+    body = make()
+    before = body.positions()
+    gc.collect()
+    other = World()
+    other.add_body(cube, jelly, position=(0, 0, 1.0))
+    other.build()
+    other.step(1 / 60)
+    assert body.positions().tobytes() == before.tobytes()
+
+
+def test_bodies_come_in_the_order_of_adding(cube, jelly):
+    world = World()
+    bodies = [world.add_body(cube, jelly, position=(2 * i, 0, 1)) for i in range(9)]
+    assert list(world.bodies) == bodies
+    assert [body.index for body in bodies] == list(range(9))
+    world.build()
+    for i, body in enumerate(bodies):
+        assert body.center_of_mass()[0] == pytest.approx(2 * i, abs=1e-5)
+
+
+def test_set_motion_starts_afresh(solo, cube, jelly):
+    """A body that is put back to its start moves as at the first time."""
+    world, body = solo(cube, jelly, position=(0, 0, 0.6), velocity=(1, 0, 0))
+    start, speed = body.positions(), body.velocities()
+    runs = []
+    for _ in range(2):
+        body.set_motion(start, speed)
+        for _ in range(40):
+            world.step(1 / 60, 8)
+        runs.append(body.positions().tobytes())
+    assert runs[0] == runs[1]
