@@ -1,0 +1,394 @@
+"""Bad input: a clear error, and nothing changed."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from taichi_soft import (
+    Material,
+    MaterialError,
+    MeshError,
+    OptionError,
+    ParticleMesh,
+    StateError,
+    TaichiSoftError,
+    World,
+    init,
+)
+
+NAN, INF = float("nan"), float("inf")
+
+
+def gap(reason):
+    """A check that the world lacks so far; strict, so that the mark goes when the check comes."""
+    return pytest.mark.xfail(strict=True, reason=reason)
+
+
+EQUAL_COUNT = gap("World.step compares with the last call by ==, and 4.0 == 4, True == 1")
+ROOT = Path(__file__).parents[2]
+
+
+def snapshot(world):
+    """Positions, velocities and counters."""
+    bodies = [(b.positions().tobytes(), b.velocities().tobytes(), b.failure) for b in world.bodies]
+    before = [world.read_positions(b, 0.0).tobytes() for b in world.bodies]
+    return bodies, before, world.step_count, world.time, world.is_built
+
+
+@pytest.fixture
+def falling(solo, cube, jelly):
+    """A world in the middle of a fall."""
+    world, body = solo(cube, jelly, position=(0, 0, 1.0), velocity=(0.1, 0, 0))
+    for _ in range(5):
+        world.step(1 / 60, 4)
+    return world, body
+
+
+@pytest.mark.parametrize("dt", [0, 0.0, -1 / 60, NAN, INF, -INF, "1/60", None, True, [1 / 60], 1j])
+def test_steps_of_no_length(falling, dt):
+    world, _ = falling
+    before = snapshot(world)
+    with pytest.raises(OptionError, match="dt must be"):
+        world.step(dt, 4)
+    with pytest.raises(OptionError, match="dt must be"):
+        world.step(dt)
+    assert snapshot(world) == before
+
+
+@pytest.mark.parametrize(
+    "substeps", [0, -3, 1.5, pytest.param(4.0, marks=EQUAL_COUNT), True, False, "4", NAN]
+)
+def test_substeps_that_are_no_count(falling, substeps):
+    world, _ = falling
+    before = snapshot(world)
+    with pytest.raises(OptionError, match="substeps must be"):
+        world.step(1 / 60, substeps)
+    assert snapshot(world) == before
+
+
+def test_a_refused_step_leaves_the_motion_as_it_would_have_been(solo, cube, jelly):
+    ends = []
+    for is_disturbed in (False, True):
+        world, body = solo(cube, jelly, position=(0, 0, 0.7))
+        for _ in range(30):
+            world.step(1 / 60, 4)
+            if is_disturbed:
+                with pytest.raises(OptionError):
+                    world.step(NAN, 4)
+                with pytest.raises(OptionError):
+                    world.step(1 / 60, 0)
+        ends.append(body.positions().tobytes())
+    assert ends[0] == ends[1]
+
+
+@EQUAL_COUNT
+def test_one_is_a_count_but_true_is_not(falling):
+    """True equals 1: a step that was checked before must not let it through."""
+    world, _ = falling
+    world.step(1 / 600, 1)
+    with pytest.raises(OptionError, match="substeps must be"):
+        world.step(1 / 600, True)
+
+
+def test_nothing_runs_before_build(cube, jelly):
+    world = World()
+    body = world.add_body(cube, jelly)
+    zeros = np.zeros((27, 3))
+    calls = [
+        lambda: world.step(1 / 60),
+        lambda: world.step(1 / 60, 4),
+        body.positions,
+        body.velocities,
+        body.volume,
+        body.flipped_count,
+        body.momentum,
+        body.kinetic_energy,
+        body.elastic_energy,
+        lambda: body.set_motion(zeros, zeros),
+        lambda: world.read_positions(body, 0.5),
+    ]
+    for call in calls:
+        with pytest.raises(StateError, match="build"):
+            call()
+    assert (world.step_count, world.time, world.is_built) == (0, 0.0, False)
+    world.build()
+    world.step(1 / 60)
+
+
+def test_an_empty_world_is_not_built():
+    world = World()
+    for call in (world.build, lambda: world.stable_substeps(1 / 60)):
+        with pytest.raises(StateError, match="add_body"):
+            call()
+    assert not world.is_built
+
+
+def test_a_world_is_built_once_and_complete(falling, cube, jelly):
+    world, _ = falling
+    before = snapshot(world)
+    with pytest.raises(StateError, match="already built"):
+        world.build()
+    with pytest.raises(StateError, match="already built"):
+        world.add_body(cube, jelly)
+    assert len(world.bodies) == 1
+    assert snapshot(world) == before
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("integrator", "verlet"),
+        ("integrator", 3),
+        ("schedule", "fast"),
+        ("schedule", None),
+        ("gravity", (0, 0)),
+        ("gravity", -9.81),
+        ("gravity", (0, 0, NAN)),
+        ("gravity", (0, INF, 0)),
+        ("gravity", "down"),
+        ("floor", NAN),
+        ("floor", INF),
+        ("floor", "ground"),
+        ("floor", True),
+        ("floor", (0, 0)),
+        ("restitution", 2),
+        ("restitution", -0.1),
+        ("restitution", NAN),
+        ("restitution", "1"),
+        ("friction", -0.5),
+        ("friction", NAN),
+        ("friction", INF),
+        ("friction", None),
+    ],
+)
+def test_worlds_that_cannot_be(name, value):
+    with pytest.raises(OptionError, match=name):
+        World(**{name: value})
+
+
+SHEAR = [[1, 0.1, 0], [0, 1, 0], [0, 0, 1]]
+MIRROR = np.diag([1.0, 1.0, -1.0])
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("law", "neo_hooke"),
+        ("strain", "green"),
+        ("flips", "never"),
+        ("flips", None),
+        ("damping_model", "air"),
+        ("position", (0, 0)),
+        ("position", (0, 0, NAN)),
+        ("position", (INF, 0, 0)),
+        ("position", "here"),
+        ("position", [[0, 0, 0]]),
+        ("velocity", 3.0),
+        ("velocity", (0, NAN, 0)),
+        ("velocity", (0, 0, 0, 0)),
+        ("rotation", SHEAR),
+        ("rotation", MIRROR),
+        ("rotation", 2 * np.eye(3)),
+        ("rotation", np.zeros((3, 3))),
+        ("rotation", np.full((3, 3), NAN)),
+        ("rotation", np.eye(4)),
+        ("rotation", (0, 0, 0, 2)),
+        ("rotation", (0, 0, 0, 0)),
+        ("rotation", (0, 0, NAN, 1)),
+        ("rotation", 90),
+    ],
+)
+def test_bodies_that_cannot_be(cube, jelly, name, value):
+    world = World()
+    with pytest.raises(OptionError, match=name.split("_")[0]):
+        world.add_body(cube, jelly, **{name: value})
+    assert world.bodies == ()
+
+
+def test_unknown_names_are_answered_with_those_there_are(cube, jelly):
+    with pytest.raises(OptionError, match=r"'virial'.*'face'|'face'.*'virial'"):
+        World().add_body(cube, jelly, law="neo_hooke")
+    with pytest.raises(OptionError, match=r"'tolerant', 'recover', 'off'"):
+        World().add_body(cube, jelly, flips="never")
+    with pytest.raises(OptionError, match=r"'auto', 'per_body', 'flat'"):
+        World(schedule="fast")
+
+
+@pytest.mark.parametrize("material", [None, 1e5, "rubber", {"young": 1e5}, Material])
+def test_what_is_no_material(cube, material):
+    world = World()
+    with pytest.raises(MaterialError, match=r"taichi_soft\.Material"):
+        world.add_body(cube, material)
+    assert world.bodies == ()
+
+
+@pytest.mark.parametrize("name", ["young", "poisson", "density", "damping"])
+def test_an_array_of_another_length(cube, name):
+    constants = {"young": 1e5, "poisson": 0.2, "density": 1000.0, "damping": 1.0}
+    constants[name] = np.full(39, constants[name])
+    world = World()
+    with pytest.raises(MaterialError, match="39 values for a mesh of 40"):
+        world.add_body(cube, Material(**constants))
+    assert world.bodies == ()
+    world.add_body(cube, Material(1e5, 0.2, 1000.0))
+    world.build()  # no trace of the refused one
+    assert world.bodies[0].index == 0
+
+
+@pytest.mark.parametrize("mesh", [None, "cube", np.zeros((4, 3))])
+def test_what_is_no_mesh(jelly, mesh):
+    with pytest.raises(MeshError, match="TetMesh"):
+        World().add_body(mesh, jelly)
+
+
+def test_particle_meshes_need_another_law(jelly):
+    particles = ParticleMesh([[0, 0, 0], [1, 0, 0]], [[0, 1]], 1.0)
+    with pytest.raises(MeshError, match=r"tetrahedra.*ParticleMesh"):
+        World().add_body(particles, jelly)
+
+
+@pytest.mark.parametrize(
+    ("positions", "velocities", "named"),
+    [
+        (np.zeros((26, 3)), np.zeros((27, 3)), "positions"),
+        (np.zeros((27, 3)), np.zeros((27, 2)), "velocities"),
+        (np.zeros(81), np.zeros((27, 3)), "positions"),
+        (np.full((27, 3), NAN), np.zeros((27, 3)), "positions"),
+        (np.zeros((27, 3)), np.full((27, 3), INF), "velocities"),
+        (np.full((27, 3), 1e39), np.zeros((27, 3)), "float32"),
+        (np.zeros((27, 3)), np.full((27, 3), -1e39), "float32"),
+        ("there", np.zeros((27, 3)), "positions"),
+        (None, np.zeros((27, 3)), "positions"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore:overflow")
+def test_motion_that_does_not_fit(falling, positions, velocities, named):
+    world, body = falling
+    before = snapshot(world)
+    with pytest.raises(OptionError, match=named):
+        body.set_motion(positions, velocities)
+    assert snapshot(world) == before
+
+
+def read_only(n):
+    rows = np.zeros((n, 3), dtype=np.float32)
+    rows.flags.writeable = False
+    return rows
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda n: np.zeros((n, 3)),
+        lambda n: np.zeros((n + 1, 3), dtype=np.float32),
+        lambda n: np.zeros((n, 4), dtype=np.float32)[:, :3],
+        lambda n: np.zeros((3, n), dtype=np.float32).T,
+        read_only,
+        lambda n: [[0.0] * 3] * n,
+    ],
+)
+def test_buffers_that_do_not_fit(falling, make):
+    world, body = falling
+    before = snapshot(world)
+    out = make(body.vertex_count)
+    with pytest.raises(OptionError, match="out must be"):
+        body.positions(out)
+    assert not np.any(out)
+    assert snapshot(world) == before
+
+
+@pytest.mark.parametrize("dt", [0, -1, NAN, "1"])
+def test_substeps_for_no_step(falling, dt):
+    with pytest.raises(OptionError, match="dt"):
+        falling[0].stable_substeps(dt)
+
+
+@pytest.mark.parametrize("arch", ["gpu", "CPU", "", None, 3])
+def test_unknown_archs(arch):
+    with pytest.raises(OptionError, match="arch"):
+        init(arch)
+
+
+@pytest.mark.parametrize("threads", [0, -1, 1.5, "2", True])
+def test_thread_counts_that_are_none(threads):
+    with pytest.raises(OptionError, match="threads"):
+        init("cpu", threads=threads)
+
+
+def test_starting_again_otherwise():
+    """In a process of its own: the first start fixes arch and threads, the second is a no-op or refused."""
+    script = """
+from taichi_soft import Material, OptionError, World, box, device, init
+for bad in ({"arch": "gpu"}, {"threads": 0}):
+    try:
+        init(**bad)
+    except OptionError:
+        pass
+    else:
+        raise AssertionError(bad)
+first = init("cpu", threads=1)
+world = World()
+body = world.add_body(box(cells=(1, 1, 1)), Material(1e5, 0.2, 1000.0), position=(0, 0, 1))
+world.build()
+before = body.positions().tobytes()
+assert init() is first and init("cpu") is first and init("cpu", threads=1) is first and device() is first
+for bad in ({"arch": "cpu", "threads": 2}, {"arch": "vulkan"}):
+    try:
+        init(**bad)
+    except OptionError as error:
+        assert "already runs" in str(error)
+    else:
+        raise AssertionError(bad)
+assert device() is first
+assert body.positions().tobytes() == before
+world.step(1 / 60)
+print("done")
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, timeout=120
+    )
+    assert done.stdout == "done\n", done.stderr
+
+
+def test_no_device_before_the_start():
+    script = "from taichi_soft import device; device()"
+    done = subprocess.run(
+        [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, timeout=60
+    )
+    assert done.returncode == 1
+    assert "DeviceError: Taichi is not started" in done.stderr
+
+
+# Numbers that are finite in Python and not in float32, in which the world computes.
+
+
+@gap("add_body takes what overflows float32")
+@pytest.mark.parametrize("name", ["position", "velocity"])
+def test_bodies_out_of_reach(cube, jelly, name):
+    world = World()
+    with pytest.raises(TaichiSoftError, match=name):
+        world.add_body(cube, jelly, **{name: (0, 0, 1e39)})
+
+
+@gap("World takes a gravity that overflows float32")
+def test_gravity_out_of_reach():
+    with pytest.raises(TaichiSoftError, match="gravity"):
+        World(gravity=(0, 0, -1e39))
+
+
+@gap("read_positions takes any body and reads the rows at its index")
+def test_a_body_of_another_world(falling, solo, cube, jelly):
+    _, stranger = solo(cube, jelly)
+    with pytest.raises(OptionError, match="world"):
+        falling[0].read_positions(stranger, 1.0)
+
+
+@gap("read_positions does not check alpha")
+@pytest.mark.parametrize("alpha", [NAN, INF, -0.1, 1.1, "half", None])
+def test_alpha_out_of_range(falling, alpha):
+    world, body = falling
+    with pytest.raises(OptionError, match="alpha"):
+        world.read_positions(body, alpha)
