@@ -46,25 +46,44 @@ def _settle_body(state: ti.template(), body):
     return 1 - sound
 
 
+@ti.func
+def _step_body(state: ti.template(), program: ti.template(), body, substeps, h):
+    """One fixed step of one body. Returns 1 where it failed."""
+    particles = state.body_particles[body]
+    for p in range(particles[0], particles[1]):
+        remember_particle(state, p)
+    failed = 0
+    if state.body_status[body] == ACTIVE:
+        kick = 0.5 * (state.body_velocity_lag[body] + h)
+        for _ in range(substeps):
+            accumulate_forces(state, program, body)
+            move_body(state, program, body, h, kick)
+            kick = h
+        failed = _settle_body(state, body)
+        if failed == 0:
+            state.body_velocity_lag[body] = h
+    return failed
+
+
 @ti.kernel
 def step_per_body(
     state: ti.template(), program: ti.template(), body_count: ti.i32, substeps: ti.i32, h: ti.f32
 ) -> ti.i32:
-    """One fixed step of every active body. Returns how many bodies failed in it."""
+    """One fixed step of every active body, side by side. Returns how many failed in it."""
     failed = 0
     ti.loop_config(block_dim=1)
     for body in range(body_count):
-        particles = state.body_particles[body]
-        for p in range(particles[0], particles[1]):
-            remember_particle(state, p)
-        if state.body_status[body] == ACTIVE:
-            kick = 0.5 * (state.body_velocity_lag[body] + h)
-            for _ in range(substeps):
-                accumulate_forces(state, program, body)
-                move_body(state, program, body, h, kick)
-                kick = h
-            gone = _settle_body(state, body)
-            if gone == 0:
-                state.body_velocity_lag[body] = h
-            failed += gone
+        failed += _step_body(state, program, body, substeps, h)
+    return failed
+
+
+@ti.kernel
+def step_in_turn(
+    state: ti.template(), program: ti.template(), body_count: ti.i32, substeps: ti.i32, h: ti.f32
+) -> ti.i32:
+    """As `step_per_body` in the calling thread: a single body need not wait for another thread to wake up."""
+    failed = 0
+    ti.loop_config(serialize=True)
+    for body in range(body_count):
+        failed += _step_body(state, program, body, substeps, h)
     return failed

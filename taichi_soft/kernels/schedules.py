@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from taichi_soft.kernels.flat import begin_flat, end_flat, step_flat_cpu, substep_flat
-from taichi_soft.kernels.per_body import step_per_body
+from taichi_soft.kernels.per_body import step_in_turn, step_per_body
 from taichi_soft.kernels.program import Program
 from taichi_soft.runtime import Device
 from taichi_soft.scene import Scene
@@ -39,8 +39,10 @@ def make_launch(schedule: Schedule, state: State, program: Program, scene: Scene
     bodies, particles = len(scene.bodies), scene.particle_count
     blocks, edges = scene.block_count, scene.edge_count
 
+    step_bodies = step_in_turn if bodies == 1 or device.threads == 1 else step_per_body
+
     def per_body(substeps: int, h: float) -> int:
-        return int(step_per_body(state, program, bodies, substeps, h))
+        return int(step_bodies(state, program, bodies, substeps, h))
 
     def flat_cpu(substeps: int, h: float) -> int:
         return int(step_flat_cpu(state, program, bodies, blocks, edges, particles, substeps, h))
