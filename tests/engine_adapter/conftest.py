@@ -7,6 +7,13 @@ import pytest
 from taichi_soft import Material, World, box
 
 
+@pytest.fixture(autouse=True, scope="session")
+def settle_imports():
+    """What the imports made stays: the collector need not walk it after every test."""
+    gc.collect()
+    gc.freeze()
+
+
 @pytest.fixture(autouse=True)
 def release_worlds():
     """A world that is gone gives its state back, and the next one takes it with its kernels compiled."""

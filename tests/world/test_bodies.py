@@ -26,6 +26,7 @@ KINDS = {
 
 def fall(names, schedule="per_body", steps=60):
     """Positions and velocities of each body after they fell and hit the floor."""
+    gc.collect()
     world = World(schedule=schedule)
     for name in names:
         mesh, material, options = KINDS[name]
