@@ -159,6 +159,12 @@ def profile(
     crossover: Annotated[
         bool, typer.Option("--crossover", help="Compare the schedules on one body of growing size.")
     ] = False,
+    scaling: Annotated[
+        bool, typer.Option("--scaling", help="Compare 64 spheres on one thread and on all.")
+    ] = False,
+    startup: Annotated[
+        bool, typer.Option("--startup", help="Time a new process to its first frame, cold and warm.")
+    ] = False,
     repeats: Annotated[int, typer.Option(min=3, help="Measurements of each figure.")] = 121,
     as_json: AsJson = False,
     arch: Arch = "auto",
@@ -177,6 +183,12 @@ def profile(
         if crossover:
             status.update("measuring schedules")
             found["crossover"] = profiling.measure_crossover(max(3, repeats // 6))
+        if scaling:
+            status.update("measuring threads")
+            found["scaling"] = profiling.measure_scaling(device.threads, max(3, repeats // 3))
+        if startup:
+            status.update("starting new processes")
+            found["startup"] = [profiling.measure_startup(device.arch, device.threads)]
     if as_json:
         rows = {key: [asdict(row) for row in value] for key, value in found.items()}
         print(json.dumps({"device": _device_facts(device), **rows}, indent=2))

@@ -197,9 +197,9 @@ class World:
         if h > limit and h not in self._warned_steps:
             self._warned_steps.add(h)
             warnings.warn(
-                f"substep {h * 1e3:.4g} ms is longer than the {limit * 1e3:.4g} ms that body "
-                f"{stiffest.index} can take (stiffest tetrahedron {stiffest.stable_step.stiffest_tet}): it may "
-                f"explode. Use substeps={self.stable_substeps(seconds)} or leave substeps out",
+                f"substep {h * 1e3:.4g} ms is longer than the {limit * 1e3:.4g} ms that body {stiffest.index} can "
+                f"take (stiffest tetrahedron {stiffest.stable_step.stiffest_tet}): it may explode. Use "
+                f"substeps={self.stable_substeps(seconds)} or leave substeps out",
                 UnstableStepWarning,
                 stacklevel=3,
             )

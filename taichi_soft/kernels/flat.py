@@ -5,8 +5,9 @@ its own in a fixed order, so the result does not depend on the number of threads
 
 On a CPU the substeps lie inside one kernel call: one task per thread, which meet at a spinning barrier.
 Waking a thread pool costs 5 to 90 us per loop, a barrier well under one. All tasks of a loop run at
-once because Taichi's pool has exactly that many threads. A GPU has no such barrier: there each substep
-is a launch of its own.
+once because Taichi's pool has exactly that many threads. The price: where other programs keep a core busy,
+every barrier may wait for the operating system, which is why only very large bodies use this by themselves.
+A GPU has no such barrier: there each substep is a launch of its own.
 """
 
 from taichi_soft.constants import LANES

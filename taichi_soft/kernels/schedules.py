@@ -10,9 +10,12 @@ from taichi_soft.scene import Scene
 from taichi_soft.state import State
 from taichi_soft.types import Schedule
 
-FLAT_FROM_TETS = 12_000
-"""Tetrahedra in a world's largest body from which the threads share it rather than take turns.
-Measured with `taichi-soft profile --crossover`; below, the barriers cost more than the second thread wins."""
+FLAT_FROM_TETS = 100_000
+"""Tetrahedra in a world's largest body from which the threads share it rather than leave it to one of them.
+Measured with `taichi-soft profile --crossover`: with both cores free, two threads win from some 20,000 on
+(0.75 of the time, 0.70 at 110,000). But a barrier that waits for a thread which another program has pushed
+off its core stands still for milliseconds: with a third process at work, bodies of 1,000 to 50,000 ran 4 to
+300 times slower than on one thread, and only the largest still won."""
 
 Launch = Callable[[int, float], int]
 

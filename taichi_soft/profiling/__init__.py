@@ -5,7 +5,9 @@ from taichi_soft.profiling.budget import Budget, measure_budget
 from taichi_soft.profiling.comparison import Comparison, compare_with_baseline
 from taichi_soft.profiling.crossover import Crossover, measure_crossover
 from taichi_soft.profiling.phases import Phases, measure_phases
+from taichi_soft.profiling.scaling import Scaling, measure_scaling
 from taichi_soft.profiling.spread import Spread
+from taichi_soft.profiling.startup import Startup, measure_startup
 
 __all__ = [
     "Baseline",
@@ -13,11 +15,15 @@ __all__ = [
     "Comparison",
     "Crossover",
     "Phases",
+    "Scaling",
     "Spread",
+    "Startup",
     "compare_with_baseline",
     "compile_baseline",
     "find_compiler",
     "measure_budget",
     "measure_crossover",
     "measure_phases",
+    "measure_scaling",
+    "measure_startup",
 ]

@@ -22,6 +22,16 @@ def tables(found: dict[str, Any]) -> Iterator[Table]:
         yield _baseline_table(found["baseline"])
     if "crossover" in found:
         yield _crossover_table(found["crossover"])
+    if "scaling" in found:
+        table = _table("64 spheres on several threads", "threads", "frame [ms]", "speed-up")
+        for row in found["scaling"]:
+            table.add_row(str(row.threads), f"{row.frame:.2f}", f"{row.speedup:.2f}")
+        yield table
+    if "startup" in found:
+        table = _table("A new process to its first frame [s]", "kernel cache", "time")
+        table.add_row("empty", f"{found['startup'][0].cold:.2f}")
+        table.add_row("full", f"{found['startup'][0].warm:.2f}")
+        yield table
 
 
 def _table(title: str, *columns: str) -> Table:
