@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from taichi_soft.constants import POSITION_LIMIT
 from taichi_soft.errors import OptionError
 
 Floats = NDArray[np.float64]
@@ -41,8 +42,11 @@ def as_count(value: Any, name: str) -> int:
 
 
 def as_vector(value: ArrayLike, name: str, unit: str) -> Floats:
-    """`value` as three finite numbers. Raises: OptionError."""
-    return as_rows(value, name, (3,), unit)
+    """`value` as three numbers that float32 can still compute with. Raises: OptionError."""
+    vector = as_rows(value, name, (3,), unit)
+    if np.abs(vector).max() > POSITION_LIMIT:
+        raise OptionError(f"{name} must lie within {POSITION_LIMIT:g} {unit} of zero, got {vector.tolist()}")
+    return vector
 
 
 def as_rows(value: ArrayLike, name: str, shape: tuple[int, ...], unit: str) -> Floats:

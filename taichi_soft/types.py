@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from enum import Enum
 from typing import TypeVar
 
@@ -18,7 +19,8 @@ class Choice(str, Enum):
             return cls(value)
         except ValueError:
             names = ", ".join(repr(member.value) for member in cls)
-            raise OptionError(f"unknown {cls.__name__.lower()} {value!r}: choose one of {names}") from None
+            option = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", cls.__name__).lower()
+            raise OptionError(f"unknown {option} {value!r}: choose one of {names}") from None
 
 
 ChoiceT = TypeVar("ChoiceT", bound=Choice)

@@ -65,7 +65,7 @@ class World:
         self._state: State | None = None
         self._program: Program | None = None
         self._launch: Launch | None = None
-        self._checked_step: tuple[Any, Any] = (None, None)
+        self._checked_step: tuple[Any, ...] = ()
         self._step_values = (0.0, 0, 0.0)
         self._read: Floats32 = np.empty((0, 3), dtype=np.float32)
         self._read_alpha: float | None = None  # of what `_read` holds; None once the world has moved on
@@ -177,35 +177,39 @@ class World:
         """
         if self._launch is None:
             require_built(False)
-        if self._checked_step != (dt, substeps):
+        asked = (dt, substeps, type(dt), type(substeps))  # 4.0 == 4 and True == 1, but they are refused
+        if self._checked_step != asked:
             self._step_values = self._check_step(dt, substeps)
-            self._checked_step = (dt, substeps)
+            self._checked_step = asked
         seconds, count, h = self._step_values
         self._read_alpha = None
         failed = self._launch(count, h)  # type: ignore[misc]
-        if failed:
-            self._report_failures(count, h)
+        reports = self._note_failures(count, h) if failed else []
         self.step_count += 1
         self.time += seconds
+        for report in reports:
+            warnings.warn(report, FrozenBodyWarning, stacklevel=2)
 
     def _check_step(self, dt: float, substeps: int | None) -> tuple[float, int, float]:
         seconds = as_positive(dt, "dt", "s")
         count = self.stable_substeps(seconds) if substeps is None else as_count(substeps, "substeps")
         h = seconds / count
         stiffest = min(self._bodies, key=lambda body: body.stable_step.limit)
-        limit = stiffest.stable_step.limit
+        limit, tet = stiffest.stable_step.limit, stiffest.stable_step.stiffest_tet
         if h > limit and h not in self._warned_steps:
             self._warned_steps.add(h)
             warnings.warn(
-                f"substep {h * 1e3:.4g} ms is longer than the {limit * 1e3:.4g} ms that body {stiffest.index} can "
-                f"take (stiffest tetrahedron {stiffest.stable_step.stiffest_tet}): it may explode. Use "
+                f"substep {h * 1e3:.4g} ms is longer than the {limit * 1e3:.4g} ms that body "
+                f"{stiffest.index} can take (stiffest tetrahedron {tet}): it may explode. Use "
                 f"substeps={self.stable_substeps(seconds)} or leave substeps out",
                 UnstableStepWarning,
                 stacklevel=3,
             )
         return seconds, count, h
 
-    def _report_failures(self, substeps: int, h: float) -> None:
+    def _note_failures(self, substeps: int, h: float) -> list[str]:
+        """Fill in `failure` of the bodies that the last step froze; a line about each."""
+        reports = []
         assert self._state is not None
         assert self._program is not None
         status = self._state.body_status.to_numpy()
@@ -222,21 +226,25 @@ class World:
             substep = int(found[1]) if tet is not None else None
             body.failure = Failure(body.index, tet, self.step_count, substep, self.time)
             where = "" if tet is None else f" (tetrahedron {tet} first, in substep {substep})"
-            warnings.warn(
+            reports.append(
                 f"body {body.index} went non-finite in step {self.step_count}{where}: put back to t = "
-                f"{self.time:.4g} s and frozen. Use more substeps or a softer material",
-                FrozenBodyWarning,
-                stacklevel=4,
+                f"{self.time:.4g} s and frozen. Use more substeps or a softer material"
             )
+        return reports
 
     def read_positions(self, body: Body, alpha: float, out: Floats32 | None = None) -> Floats32:
         """Positions of a body between the previous step (alpha 0) and the last one (alpha 1), (n, 3) [m].
 
         The first read after a step copies all bodies at once; further bodies at the same alpha come from
         that copy, because calling a kernel costs more than copying a thousand vertices.
-        Raises: OptionError if `out` does not fit; StateError before `build`.
+        Raises: OptionError for a body of another world, an alpha out of range or an `out` that does not
+            fit; StateError before `build`.
         """
         require_built(self.is_built)
+        if body._world is not self:
+            raise OptionError(f"{body!r} belongs to another world: read it from there")
+        if type(alpha) is not float or not 0.0 <= alpha <= 1.0:
+            alpha = as_number(alpha, "alpha", 0.0, 1.0, "a number from 0 to 1")
         rows = require_buffer(out, body.vertex_count)
         if self._read_alpha != alpha:
             read_positions(self._state, alpha, self._read)
@@ -257,6 +265,9 @@ class World:
             compute_body_forces(self._state, self._program, body.index, forces)
             by_vertex = forces[self._scene.bodies[body.index].rank]
             acceleration = by_vertex / body.masses[:, None] + self.gravity
+            if self.floor is not None:
+                # What lies on the floor is carried by it: its velocity already is that after contact.
+                acceleration[body.positions()[:, 2] <= self.floor] = 0.0
             rows += (0.5 * lag * acceleration).astype(np.float32)
         return rows
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.errors import MeshError
+from taichi_soft.errors import MeshError, OptionError
 from taichi_soft.meshing.parameters import count, positive
 from taichi_soft.meshing.tet_mesh import TetMesh
 
@@ -88,5 +88,5 @@ def voxels(mask: ArrayLike, spacing: float | tuple[float, ...] = 1.0) -> TetMesh
 def _three(name: str, values: object) -> tuple[float, ...]:
     array = np.asarray(values, dtype=object)
     if array.shape != (3,):
-        raise MeshError(f"{name} is {values!r}: pass three numbers (x, y, z)")
+        raise OptionError(f"{name} is {values!r}: pass three numbers (x, y, z)")
     return tuple(array)

@@ -259,7 +259,6 @@ def test_positions_between_two_steps(solo, cube, jelly):
     assert world.read_positions(body, 1.0).tobytes() == now.tobytes()
 
 
-@pytest.mark.xfail(strict=True, reason="leapfrog velocities are brought up to date without the floor's force")
 def test_a_body_at_rest_has_no_velocity(solo, cube):
     """The floor carries the weight: gravity alone must not show in the velocities of the soles."""
     world, body = solo(cube, Material(1e5, 0.2, 1000.0, 300.0), position=(0, 0, 0.55))

@@ -141,7 +141,6 @@ def test_the_tetrahedron_that_failed_first_is_near_the_fault(solo, cube):
     assert body.positions().tobytes() == x.astype(np.float32).tobytes()
 
 
-@pytest.mark.xfail(strict=True, reason="World._report_failures: stacklevel 4 names the caller's caller")
 def test_the_report_points_at_the_line_that_steps(solo, cube):
     caught = freeze(solo, cube)[-1]
     unstable, frozen = (one.lineno for one in caught)
