@@ -12,8 +12,8 @@ from taichi_soft.types import Schedule
 
 FLAT_FROM_TETS = 100_000
 """Tetrahedra in a world's largest body from which the threads share it rather than leave it to one of them.
-Measured with `taichi-soft profile --crossover`: with both cores free, two threads win from some 20,000 on
-(0.75 of the time, 0.70 at 110,000). But a barrier that waits for a thread which another program has pushed
+Measured with `taichi-soft profile --crossover`: with both cores free, two threads win from some 5,000 on
+(0.83 of the time, 0.69 at 110,000). But a barrier that waits for a thread which another program has pushed
 off its core stands still for milliseconds: with a third process at work, bodies of 1,000 to 50,000 ran 4 to
 300 times slower than on one thread, and only the largest still won."""
 

@@ -23,9 +23,9 @@ def tables(found: dict[str, Any]) -> Iterator[Table]:
     if "crossover" in found:
         yield _crossover_table(found["crossover"])
     if "scaling" in found:
-        table = _table("64 spheres on several threads", "threads", "frame [ms]", "speed-up")
+        table = _table("64 spheres on several threads", "substeps", "threads", "step [ms]", "speed-up")
         for row in found["scaling"]:
-            table.add_row(str(row.threads), f"{row.frame:.2f}", f"{row.speedup:.2f}")
+            table.add_row(str(row.substeps), str(row.threads), f"{row.step:.2f}", f"{row.speedup:.2f}")
         yield table
     if "startup" in found:
         table = _table("A new process to its first frame [s]", "kernel cache", "time")
