@@ -1,0 +1,151 @@
+"""Forces of deformed bodies, written again in NumPy float64 straight from the equations.
+
+Nothing of taichi_soft is called here but the mesh's `vertices` and `tets`, so that a mistake there cannot
+hide. Thesis sections 6.1 to 6.4 with the corrections: sigma = 1/V sum x f^T, and the force on a vertex is
+sigma times a third of the outward area vector of the face opposite to it.
+"""
+
+from itertools import combinations
+
+import numpy as np
+
+from taichi_soft import Material, TetMesh, box, sphere, torus
+
+LAWS = ("virial", "face")
+STRAINS = ("linear", "exact")
+FLIPS = ("tolerant", "off", "recover")
+MODES = [(law, strain, flips) for law in LAWS for strain in STRAINS for flips in FLIPS]
+MODE_IDS = ["-".join(mode) for mode in MODES]
+
+ONE_TET = TetMesh([[0.1, 0.0, 0.0], [1.2, 0.1, -0.1], [0.2, 0.9, 0.0], [0.3, 0.2, 1.1]], [[0, 1, 2, 3]])
+MESHES = {
+    "tet": ONE_TET,
+    "box": box((1.0, 0.7, 1.3), (2, 2, 2)),
+    "sphere": sphere(0.7, 2),
+    "torus": torus(1.0, 0.4, 2, 8),
+}
+
+# The face opposite to each vertex, wound so that its right-hand normal points out of an upright tetrahedron.
+OPPOSITE_FACES = ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1))
+
+
+def lame(young, poisson):
+    """Lame's constants from E and nu [Pa]."""
+    return young * poisson / (1 + poisson) / (1 - 2 * poisson), young / 2 / (1 + poisson)
+
+
+def hooke(strain, lame_lambda, lame_mu):
+    """Stress of an isotropic material [Pa]."""
+    return lame_lambda * np.trace(strain) * np.eye(3) + 2 * lame_mu * strain
+
+
+def strain_of(F, kind, flips):
+    """Strain in the deformed orientation, from the singular values of F."""
+    axes, stretches, _ = np.linalg.svd(F)
+    linear = (stretches**2 - 1) / 2
+    exact = stretches - 1
+    if flips == "recover" and np.linalg.det(F) < 0:
+        linear[2] = -stretches[2] - 0.5
+        exact[2] = -stretches[2] - 1
+    return axes @ np.diag(linear if kind == "linear" else exact) @ axes.T
+
+
+def strain_by_root(F, kind):
+    """The same for upright bodies in one formula each: 1/2 (F F^T - I), or sqrt(F F^T) - I."""
+    square = F @ F.T
+    if kind == "linear":
+        return (square - np.eye(3)) / 2
+    values, axes = np.linalg.eigh(square)
+    return (axes * np.sqrt(values)) @ axes.T - np.eye(3)
+
+
+def area_vectors(corners):
+    """Area vectors of the faces opposite to each of four corners, outward if upright, (4, 3) [m^2]."""
+    return (
+        np.array([np.cross(corners[b] - corners[a], corners[c] - corners[a]) for a, b, c in OPPOSITE_FACES])
+        / 2
+    )
+
+
+def signed_volume(corners):
+    """Volume of one tetrahedron, negative if it is inside out [m^3]."""
+    return np.dot(corners[1] - corners[0], np.cross(corners[2] - corners[0], corners[3] - corners[0])) / 6
+
+
+def volume_gradient(corners):
+    """Derivative of `signed_volume` by each corner: inwards to the opposite face's normal, (4, 3) [m^2]."""
+    return -area_vectors(corners) / 3
+
+
+def deformation(rest, corners):
+    """F, which carries the edges of the rest shape into the deformed ones."""
+    return np.linalg.solve((rest[1:] - rest[0]), (corners[1:] - corners[0])).T
+
+
+def elastic_forces(mesh, young, poisson, positions, strain="linear", flips="tolerant"):
+    """Elastic forces on all vertices, (n, 3) [N]; `young` and `poisson` one number or one per tetrahedron."""
+    count = len(mesh.tets)
+    forces = np.zeros((len(mesh.vertices), 3))
+    for tet, E, nu in zip(
+        mesh.tets, np.broadcast_to(young, count), np.broadcast_to(poisson, count), strict=True
+    ):
+        corners = positions[tet]
+        stress = hooke(strain_of(deformation(mesh.vertices[tet], corners), strain, flips), *lame(E, nu))
+        areas = area_vectors(corners)
+        if flips == "tolerant" and signed_volume(corners) < 0:
+            areas = -areas  # outward again
+        for vertex, area in zip(tet, areas, strict=True):
+            forces[vertex] += stress @ area / 3
+    return forces
+
+
+def edge_damping_forces(mesh, damping, positions, velocities):
+    """Eq. 3.9: n (b (dv . n)) on one end, the opposite on the other, b the mean over the tets on the edge."""
+    around = {}
+    for tet, b in zip(mesh.tets, np.broadcast_to(damping, len(mesh.tets)), strict=True):
+        for pair in combinations(sorted(int(v) for v in tet), 2):
+            around.setdefault(pair, []).append(b)
+    forces = np.zeros_like(positions)
+    for (p, q), values in around.items():
+        n = (positions[q] - positions[p]) / np.linalg.norm(positions[q] - positions[p])
+        force = n * (np.mean(values) * np.dot(velocities[q] - velocities[p], n))
+        forces[p] += force
+        forces[q] -= force
+    return forces
+
+
+def mean_damping_forces(mesh, damping, velocities):
+    """Section 6.4: b (mean velocity of the tetrahedron - own velocity)."""
+    forces = np.zeros_like(velocities)
+    for tet, b in zip(mesh.tets, np.broadcast_to(damping, len(mesh.tets)), strict=True):
+        forces[tet] += b * (velocities[tet].mean(axis=0) - velocities[tet])
+    return forces
+
+
+def rotation(rng):
+    """A rotation, evenly from all of them."""
+    Q, R = np.linalg.qr(rng.normal(size=(3, 3)))
+    Q = Q * np.sign(np.diag(R))
+    return Q if np.linalg.det(Q) > 0 else -Q
+
+
+def stretched_rotation(rng, low, high):
+    """F = U R with principal stretches between `low` and `high`."""
+    axes = rotation(rng)
+    return axes @ np.diag(rng.uniform(low, high, 3)) @ axes.T @ rotation(rng)
+
+
+def shaken(mesh, rng, amount):
+    """The mesh's vertices with noise of `amount` mean edge lengths: at 0.5 about a third of the tets flip."""
+    return mesh.vertices + rng.normal(size=mesh.vertices.shape) * amount * mesh.edge_lengths.mean()
+
+
+def uneven_material(mesh, rng, damping=0.0):
+    """A material with different constants in every tetrahedron."""
+    count = len(mesh.tets)
+    return Material(
+        rng.uniform(1e5, 1e6, count),
+        rng.uniform(-0.6, 0.45, count),
+        rng.uniform(500, 2000, count),
+        damping * rng.uniform(0.5, 2, count),
+    )
