@@ -8,6 +8,7 @@ from typing import Any
 
 from taichi_soft.laws import strain as strains
 from taichi_soft.laws.hooke import hooke_stress
+from taichi_soft.laws.recovery import recovering_stress
 from taichi_soft.math.tensors import determinant, product
 from taichi_soft.math.tetrahedron import shape
 from taichi_soft.runtime import ti
@@ -66,9 +67,4 @@ def flipped_forces(model: ti.template(), x0, x1, x2, x3, rest_inverse, lame_lamb
     """Forces of `flips="recover"` on a tetrahedron whose volume is negative [N]."""
     B = shape(x0, x1, x2, x3)
     F = product(B, rest_inverse)
-    strain = (
-        strains.linear_strain_recovering(F)
-        if ti.static(model.strain == Strain.LINEAR)
-        else strains.exact_strain_recovering(F)
-    )
-    return model.law.forces(B, hooke_stress(strain, lame_lambda, lame_mu))
+    return model.law.forces(B, recovering_stress(model.strain, F, lame_lambda, lame_mu))

@@ -20,28 +20,7 @@ def exact_strain(F):
     """U - I with U = sqrt(F F^T), the root that thesis chapter 7 leaves open. Blind to flips."""
     stretch, axes = principal_stretches(F)
     stretch.z = ti.abs(stretch.z)
-    return _from_axes(stretch - 1.0, axes)
-
-
-@ti.func
-def exact_strain_recovering(F):
-    """As `exact_strain`, but a flipped tetrahedron has its smallest stretch counted negative."""
-    stretch, axes = principal_stretches(F)
-    return _from_axes(stretch - 1.0, axes)
-
-
-@ti.func
-def linear_strain_recovering(F):
-    """As `linear_strain`; a flipped tetrahedron is continued past flat along its smallest stretch.
-
-    The square of eq. 6.7 has its minimum at s = 0, where it would stop pushing back. For s < 0 the
-    strain of that axis goes on as s - 1/2: continuous at flat (-1/2) and growing with the inversion.
-    """
-    stretch, axes = principal_stretches(F)
-    strain = 0.5 * (stretch * stretch - 1.0)
-    if stretch.z < 0.0:
-        strain.z = stretch.z - 0.5
-    return _from_axes(strain, axes)
+    return from_axes(stretch - 1.0, axes)
 
 
 @ti.func
@@ -61,7 +40,7 @@ def principal_stretches(F):
 
 
 @ti.func
-def _from_axes(values, axes):
+def from_axes(values, axes):
     """The symmetric matrix with these principal values, as columns."""
     a, b, c = axes[0] * values.x, axes[1] * values.y, axes[2] * values.z
     return (

@@ -1,0 +1,303 @@
+"""Tetrahedra turned inside out, through a face, an edge or a point, and whole bodies in their mirror image.
+
+`tolerant` is at rest in the mirror, `off` is not handled, `recover` finds back to its own orientation.
+"""
+
+import force_oracle as oracle
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from taichi_soft import Material, TetMesh, internal_forces
+
+REST = oracle.ONE_TET.vertices
+MESHES = oracle.MESHES
+EACH_MODE = pytest.mark.parametrize(("law", "strain", "flips"), oracle.MODES, ids=oracle.MODE_IDS)
+EACH_STRAIN = pytest.mark.parametrize("strain", oracle.STRAINS)
+MATERIAL = Material(1e6, 0.3, 1000.0)
+NU_ZERO = Material(1e6, 0.0, 1000.0)
+seeds = st.integers(0, 2**32 - 1)
+
+# Apex above an equilateral base in the plane z = 0, all edges 1 m.
+HEIGHT = np.sqrt(2 / 3)
+BASE_AREA = np.sqrt(3) / 4
+REGULAR = TetMesh(
+    [[0, 0, HEIGHT], [1 / np.sqrt(3), 0, 0], [-np.sqrt(1 / 12), 0.5, 0], [-np.sqrt(1 / 12), -0.5, 0]],
+    [[0, 1, 2, 3]],
+    fix_orientation=True,
+)
+
+
+def through_the_face(x):
+    """The first corner in its mirror image behind the opposite face."""
+    normal = np.cross(x[2] - x[1], x[3] - x[1])
+    normal /= np.linalg.norm(normal)
+    y = x.copy()
+    y[0] -= 2 * np.dot(x[0] - x[1], normal) * normal
+    return y
+
+
+def through_the_edge(x):
+    """The second corner pushed past edge 2-3: mirrored in the plane that holds 2, 3 and is square to the first."""
+    along = x[3] - x[2]
+    across = np.cross(along, np.cross(along, x[0] - x[2]))
+    across /= np.linalg.norm(across)
+    return x - 2 * np.outer((x - x[2]) @ across, across)
+
+
+def through_the_point(x):
+    """Every corner on the other side of the centre."""
+    return 2 * x.mean(axis=0) - x
+
+
+FLIPPED = pytest.mark.parametrize(
+    "mirror", [through_the_face, through_the_edge, through_the_point], ids=["face", "edge", "point"]
+)
+
+
+def forces_of(x, mode, mesh=oracle.ONE_TET, material=MATERIAL):
+    law, strain, flips = mode
+    return internal_forces(mesh, material, x, law=law, strain=strain, flips=flips)
+
+
+@FLIPPED
+def test_these_poses_are_inside_out_and_congruent_to_the_rest_shape(mirror):
+    x = mirror(REST)
+    assert oracle.signed_volume(x) == pytest.approx(-oracle.signed_volume(REST))
+    np.testing.assert_allclose(
+        np.linalg.norm(x[:, None] - x, axis=2), np.linalg.norm(REST[:, None] - REST, axis=2), atol=1e-12
+    )
+
+
+@FLIPPED
+@pytest.mark.parametrize("law", oracle.LAWS)
+@EACH_STRAIN
+def test_tolerant_is_at_rest_in_its_mirror_image(mirror, law, strain):
+    assert np.abs(forces_of(mirror(REST), (law, strain, "tolerant"))).max() < 1e-8
+
+
+@pytest.mark.parametrize("law", oracle.LAWS)
+@EACH_STRAIN
+@settings(max_examples=10, deadline=None)
+@given(seed=seeds, name=st.sampled_from(list(MESHES)), amount=st.floats(0.01, 1))
+def test_tolerant_feels_the_mirrored_force_in_the_mirrored_body(law, strain, seed, name, amount):
+    """f(Q x) = Q f(x) for reflections Q as well as for rotations: the whole body mirrored."""
+    rng = np.random.default_rng(seed)
+    mesh = MESHES[name]
+    x = oracle.shaken(mesh, rng, amount)
+    Q = np.diag([1, 1, -1]) @ oracle.rotation(rng)
+    before, after = (forces_of(y, (law, strain, "tolerant"), mesh) for y in (x, x @ Q.T))
+    np.testing.assert_allclose(after, before @ Q.T, atol=1e-10 * np.abs(before).max())
+
+
+@pytest.mark.parametrize("law", oracle.LAWS)
+@EACH_STRAIN
+@settings(max_examples=6, deadline=None)
+@given(seed=seeds)
+def test_off_feels_the_opposite_of_it(law, strain, seed):
+    """So the mirrored body is at rest, but what should draw it back drives it away."""
+    rng = np.random.default_rng(seed)
+    mesh = MESHES["sphere"]
+    x = oracle.shaken(mesh, rng, 0.2)
+    Q = np.diag([1, 1, -1]) @ oracle.rotation(rng)
+    before, after = (forces_of(y, (law, strain, "off"), mesh) for y in (x, x @ Q.T))
+    np.testing.assert_allclose(after, -before @ Q.T, atol=1e-10 * np.abs(before).max())
+
+
+@EACH_STRAIN
+@settings(max_examples=10, deadline=None)
+@given(seed=seeds)
+def test_upright_tetrahedra_do_not_know_how_flips_are_handled(strain, seed):
+    rng = np.random.default_rng(seed)
+    x = oracle.ONE_TET.vertices @ oracle.stretched_rotation(rng, 0.1, 3.0).T
+    tolerant, off, recover = (forces_of(x, ("virial", strain, flips)) for flips in oracle.FLIPS)
+    assert tolerant.tobytes() == off.tobytes() == recover.tobytes()
+
+
+def apex_force(stretch, strain, flips, material=NU_ZERO):
+    """Upward force on the apex of a regular tetrahedron whose height is `stretch` times that at rest."""
+    x = REGULAR.vertices * [1, 1, stretch]
+    forces = internal_forces(REGULAR, material, x, strain=strain, flips=flips)
+    apex = int(np.argmax(REGULAR.vertices[:, 2]))
+    np.testing.assert_allclose(forces[apex, :2], 0, atol=1e-6)
+    return forces[apex, 2]
+
+
+@EACH_STRAIN
+@pytest.mark.parametrize("flips", oracle.FLIPS)
+@pytest.mark.parametrize("s", [1.5, 1.0, 0.5, 0.01, -0.01, -0.3, -0.9, -1.1, -2.0])
+def test_force_on_an_apex_pushed_through_the_base_in_closed_form(strain, flips, s):
+    """E A / 3 times the strain along the height; the base and its area stay as they are."""
+    if flips == "recover" and s < 0:
+        # Beyond -1 the height is not the smallest stretch any more: two of the base's are.
+        if s < -1:
+            assert apex_force(s, strain, flips) != 0
+            return
+        value = s - 0.5 if strain == "linear" else s - 1
+    else:
+        value = (s * s - 1) / 2 if strain == "linear" else abs(s) - 1
+    sign = -1 if flips == "tolerant" and s < 0 else 1
+    expected = -sign * 1e6 * value * BASE_AREA / 3
+    assert apex_force(s, strain, flips) == pytest.approx(expected, rel=1e-9, abs=1e-6)
+
+
+@EACH_STRAIN
+def test_off_pushes_a_shallow_flip_back_and_one_past_its_mirror_runs_away(strain):
+    for nu in (0.0, 0.3):
+        material = Material(1e6, nu, 1000.0)
+        for s in (-0.01, -0.3, -0.9):
+            assert apex_force(s, strain, "off", material) > 0  # up, to where it came from
+        pushes = [apex_force(s, strain, "off", material) for s in (-1.1, -1.5, -2.0, -4.0)]
+        assert max(pushes) < 0  # down, and ever harder
+        assert pushes == sorted(pushes, reverse=True)
+
+
+@EACH_STRAIN
+def test_tolerant_settles_in_the_mirror_from_either_side(strain):
+    """A dent stays a dent, and nothing runs away."""
+    assert min(apex_force(s, strain, "tolerant") for s in (-1.1, -1.5, -4.0)) > 0
+    assert max(apex_force(s, strain, "tolerant") for s in (-0.01, -0.5, -0.9)) < 0
+
+
+@pytest.mark.parametrize("law", oracle.LAWS)
+@EACH_STRAIN
+@settings(max_examples=25, deadline=None)
+@given(seed=seeds, nu=st.floats(0, 0.45))
+def test_recover_drives_every_compressed_flip_towards_positive_volume(law, strain, seed, nu):
+    """sum f_i . dV/dx_i > 0 for any inverted pose that is nowhere longer than at rest."""
+    rng = np.random.default_rng(seed)
+    F = oracle.stretched_rotation(rng, 0.02, 1.0) @ np.diag([1, 1, -1])
+    x = REST @ F.T + rng.normal(size=3)
+    assert oracle.signed_volume(x) < 0
+    forces = forces_of(x, (law, strain, "recover"), material=Material(1e6, nu, 1000.0))
+    assert np.sum(forces * oracle.volume_gradient(x)) > 0
+
+
+def settled(x, mesh, strain, flips, steps=1500):
+    """Where steepest descent along the forces ends."""
+    for _ in range(steps):
+        x = x + 4e-7 * internal_forces(mesh, NU_ZERO, x, strain=strain, flips=flips)
+    return x
+
+
+@EACH_STRAIN
+@FLIPPED
+def test_recover_returns_from_every_mirror_to_the_rest_shape(mirror, strain):
+    noise = np.random.default_rng(0).normal(scale=1e-3, size=(4, 3))
+    x = settled(mirror(REST) + noise, oracle.ONE_TET, strain, "recover")
+    assert oracle.signed_volume(x) == pytest.approx(oracle.signed_volume(REST), rel=1e-6)
+    F = oracle.deformation(REST, x)
+    np.testing.assert_allclose(F @ F.T, np.eye(3), atol=1e-6)
+
+
+@EACH_STRAIN
+@pytest.mark.parametrize("seed", range(6))
+def test_recover_returns_from_any_pose(strain, seed):
+    """Corners thrown anywhere, stretched and inverted alike."""
+    x = np.random.default_rng(seed).uniform(-1, 1, size=(4, 3))
+    if oracle.signed_volume(x) > 0:
+        x = x[[1, 0, 2, 3]]
+    x = settled(x, oracle.ONE_TET, strain, "recover")
+    assert oracle.signed_volume(x) == pytest.approx(oracle.signed_volume(REST), rel=1e-6)
+
+
+@EACH_STRAIN
+@FLIPPED
+def test_tolerant_stays_inside_out(mirror, strain):
+    noise = np.random.default_rng(0).normal(scale=1e-3, size=(4, 3))
+    x = settled(mirror(REST) + noise, oracle.ONE_TET, strain, "tolerant")
+    assert oracle.signed_volume(x) == pytest.approx(-oracle.signed_volume(REST), rel=1e-6)
+
+
+def around_flat(seed, volume):
+    """One random pose with a corner moved so that the signed volume is +volume, and one with -volume."""
+    x = np.random.default_rng(seed).uniform(-1, 1, size=(4, 3))
+    normal = np.cross(x[2] - x[1], x[3] - x[1])
+    double_area = np.linalg.norm(normal)
+    normal /= double_area
+    x[0] -= np.dot(x[0] - x[1], normal) * normal
+    poses = [x.copy(), x.copy()]
+    for pose, v in zip(poses, (volume, -volume), strict=True):
+        pose[0] -= normal * v * 6 / double_area  # the corner lies below its face in an upright tetrahedron
+        assert oracle.signed_volume(pose) == pytest.approx(v, rel=1e-5)
+    return poses
+
+
+@EACH_MODE
+@settings(max_examples=8, deadline=None)
+@given(seed=seeds)
+def test_forces_are_continuous_through_flat_except_where_the_mirror_is_tolerated(law, strain, flips, seed):
+    """At volumes of plus and minus 1e-9 m^3: the same force, but with `tolerant` the opposite one."""
+    above, below = (forces_of(x, (law, strain, flips)) for x in around_flat(seed, 1e-9))
+    expected = -below if flips == "tolerant" else below
+    np.testing.assert_allclose(above, expected, atol=1e-5 * np.abs(above).max())
+
+
+@EACH_STRAIN
+@settings(max_examples=15, deadline=None)
+@given(seed=seeds)
+def test_a_tetrahedron_that_is_squeezed_flat_is_opened_again(strain, seed):
+    """Just upright or just flipped, `recover` pushes the corner to its own side of the face."""
+    F = oracle.stretched_rotation(np.random.default_rng(seed), 0.3, 1.0)
+    axes, stretches, turn = np.linalg.svd(F)
+    for s in (1e-9, 0.0, -1e-9):
+        flat = axes @ np.diag([stretches[0], stretches[1], s]) @ turn
+        x = REST @ flat.T
+        forces = forces_of(x, ("virial", strain, "recover"))
+        assert np.sum(forces * oracle.volume_gradient(x)) > 0
+
+
+A, B, C = REST[0], REST[1], REST[2]
+DEGENERATE = {
+    "flat": REST * [1, 1, 0],
+    "flat and askew": REST @ np.array([[1, 0, 0.5], [0, 1, 0.3], [0, 0, 0]]),
+    "two corners in one": np.array([A, A, B, C]),
+    "two pairs": np.array([A, A, B, B]),
+    "on a line": np.outer([0.0, 1.0, -0.5, 2.0], [1.0, 2.0, 3.0]),
+    "a line along x": REST * [1, 0, 0],
+    "three corners in one": np.array([A, A, A, B]),
+    "a point": np.tile(A, (4, 1)),
+    "the origin": np.zeros((4, 3)),
+    "almost a point": REST * 1e-20,
+    "almost a line": REST * [1, 1e-18, -1e-18],
+    "far too large": REST * 1e6,
+}
+
+
+@EACH_MODE
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+def test_degenerate_shapes_have_finite_forces_that_sum_to_zero(law, strain, flips, dtype):
+    v = np.random.default_rng(1).normal(size=(4, 3))
+    material = Material(1e6, 0.3, 1000.0, 10.0)
+    for name, x in DEGENERATE.items():
+        forces = internal_forces(
+            oracle.ONE_TET, material, x, v, law=law, strain=strain, flips=flips, dtype=dtype
+        )
+        assert np.isfinite(forces).all(), name
+        scale = max(np.abs(forces).max(), 1e-30)
+        assert np.abs(forces.sum(axis=0)).max() <= 1e2 * np.finfo(dtype).eps * scale, name
+
+
+@EACH_MODE
+def test_no_force_is_left_in_a_body_that_is_one_point(law, strain, flips):
+    """Its faces have no area for a stress to act on."""
+    mesh = MESHES["sphere"]
+    forces = forces_of(np.ones_like(mesh.vertices), (law, strain, flips), mesh)
+    assert np.abs(forces).max() == 0
+
+
+@EACH_MODE
+def test_one_tetrahedron_inside_out_leaves_the_rest_of_the_body_alone(law, strain, flips):
+    """One vertex of a sphere is pushed through the opposite face of one of its tetrahedra."""
+    mesh = MESHES["sphere"]
+    x = mesh.vertices.copy()
+    tet = mesh.tets[0]
+    x[tet] = through_the_face(x[tet])
+    expected = oracle.elastic_forces(mesh, 1e6, 0.3, x, strain, flips)
+    forces = forces_of(x, (law, strain, flips), mesh)
+    touched = np.unique(mesh.tets[(mesh.tets == tet[0]).any(axis=1)])
+    outside = np.setdiff1d(np.arange(len(x)), touched)
+    assert np.abs(forces[outside]).max() < 1e-8 < 1 < np.abs(forces[touched]).max()
+    if flips != "recover":  # the axis that a mirrored rest shape recovers along is any
+        np.testing.assert_allclose(forces, expected, atol=1e-9 * np.abs(expected).max())
