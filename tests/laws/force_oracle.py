@@ -39,15 +39,20 @@ def hooke(strain, lame_lambda, lame_mu):
     return lame_lambda * np.trace(strain) * np.eye(3) + 2 * lame_mu * strain
 
 
-def strain_of(F, kind, flips):
-    """Strain in the deformed orientation, from the singular values of F."""
+def stress_of(F, strain, flips, lame_lambda, lame_mu):
+    """Stress from the singular values of F [Pa].
+
+    A flipped tetrahedron that recovers counts its smallest stretch negative; and as the areas across its other
+    two axes are negative, the stresses of these change sign.
+    """
     axes, stretches, _ = np.linalg.svd(F)
-    linear = (stretches**2 - 1) / 2
-    exact = stretches - 1
+    strains = (stretches**2 - 1) / 2 if strain == "linear" else stretches - 1
+    signs = np.ones(3)
     if flips == "recover" and np.linalg.det(F) < 0:
-        linear[2] = -stretches[2] - 0.5
-        exact[2] = -stretches[2] - 1
-    return axes @ np.diag(linear if kind == "linear" else exact) @ axes.T
+        strains[2] = -stretches[2] - (0.5 if strain == "linear" else 1.0)
+        signs[:2] = -1
+    stresses = signs * np.diag(hooke(np.diag(strains), lame_lambda, lame_mu))
+    return (axes * stresses) @ axes.T
 
 
 def strain_by_root(F, kind):
@@ -90,7 +95,7 @@ def elastic_forces(mesh, young, poisson, positions, strain="linear", flips="tole
         mesh.tets, np.broadcast_to(young, count), np.broadcast_to(poisson, count), strict=True
     ):
         corners = positions[tet]
-        stress = hooke(strain_of(deformation(mesh.vertices[tet], corners), strain, flips), *lame(E, nu))
+        stress = stress_of(deformation(mesh.vertices[tet], corners), strain, flips, *lame(E, nu))
         areas = area_vectors(corners)
         if flips == "tolerant" and signed_volume(corners) < 0:
             areas = -areas  # outward again
