@@ -42,8 +42,8 @@ def hooke(strain, lame_lambda, lame_mu):
 def stress_of(F, strain, flips, lame_lambda, lame_mu):
     """Stress from the singular values of F [Pa].
 
-    A flipped tetrahedron that recovers counts its smallest stretch negative; and as the areas across its other
-    two axes are negative, the stresses of these change sign.
+    A flipped tetrahedron that recovers counts its smallest stretch negative; and as the areas across its
+    other two axes are negative, the stresses of these change sign.
     """
     axes, stretches, _ = np.linalg.svd(F)
     strains = (stretches**2 - 1) / 2 if strain == "linear" else stretches - 1

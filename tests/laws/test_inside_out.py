@@ -39,7 +39,7 @@ def through_the_face(x):
 
 
 def through_the_edge(x):
-    """The second corner pushed past edge 2-3: mirrored in the plane that holds 2, 3 and is square to the first."""
+    """The edge 0-1 pushed past the edge 2-3, in the plane that holds the latter and faces corner 0."""
     along = x[3] - x[2]
     across = np.cross(along, np.cross(along, x[0] - x[2]))
     across /= np.linalg.norm(across)

@@ -1,0 +1,30 @@
+"""Worlds without floor, one body each."""
+
+import gc
+
+import numpy as np
+import pytest
+
+from taichi_soft import World
+
+
+@pytest.fixture(autouse=True)
+def release_worlds():
+    """A world that is gone gives its state back, and the next one takes it with its kernels compiled."""
+    yield
+    gc.collect()
+
+
+@pytest.fixture
+def flight():
+    """Builds a world of one body in a given motion. Returns both."""
+
+    def build(mesh, material, x=None, v=None, integrator="leapfrog", gravity=(0, 0, 0), **options):
+        world = World(gravity=gravity, floor=None, integrator=integrator)
+        body = world.add_body(mesh, material, **options)
+        world.build()
+        x = mesh.vertices if x is None else x
+        body.set_motion(x, np.zeros_like(mesh.vertices) if v is None else v)
+        return world, body
+
+    return build
