@@ -98,7 +98,7 @@ def test_small_vibration_follows_the_integrators_own_closed_formula(flight, inte
 
 
 def there_and_back(flight, integrator, mesh, steps, h, seed=0):
-    """Run forth and, with velocities negated, back: gaps to the start in place and speed, and how far it went."""
+    """Run forth and, with velocities negated, back: gaps to the start in place and speed; how far it went."""
     v0 = random_motion(mesh, seed)
     world, body = flight(mesh, JELLY, v=v0, integrator=integrator)
     for _ in range(steps):
