@@ -278,7 +278,7 @@ def test_forces_are_continuous_through_flat_except_where_the_mirror_is_tolerated
     """At volumes of plus and minus 1e-9 m^3: the same force, but with `tolerant` the opposite one."""
     above, below = (forces_of(x, (law, strain, flips)) for x in around_flat(seed, 1e-9))
     expected = -below if flips == "tolerant" else below
-    np.testing.assert_allclose(above, expected, atol=1e-5 * np.abs(above).max())
+    np.testing.assert_allclose(above, expected, atol=1e-5 * np.abs(above).max() + 0.1)  # of E A = 1e6 N
 
 
 @EACH_STRAIN
