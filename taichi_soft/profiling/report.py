@@ -69,17 +69,17 @@ def _budget_table(budgets: list[Budget]) -> Table:
 
 def _baseline_table(rows: list[Comparison]) -> Table:
     title = "Against plain C++ on one thread [ns per tetrahedron and substep, median]"
-    table = _table(title, "tetrahedra", "Taichi", "C++", "ratio least", "ratio median", "ratio most")
-    for row in rows:
-        ratio = [f"{x:.2f}" for x in (row.ratio.least, row.ratio.median, row.ratio.most)]
-        table.add_row(f"{row.tets:,}", f"{row.taichi.median:.1f}", f"{row.native.median:.1f}", *ratio)
-    return table
+    return _ratio_table(title, ("Taichi", "C++"), [(r.tets, r.taichi, r.native, r.ratio) for r in rows])
 
 
 def _crossover_table(rows: list[Crossover]) -> Table:
     title = "One body, flat against per_body [ns per tetrahedron and substep, median]"
-    table = _table(title, "tetrahedra", "per_body", "flat", "ratio least", "ratio median", "ratio most")
-    for row in rows:
-        ratio = [f"{x:.2f}" for x in (row.ratio.least, row.ratio.median, row.ratio.most)]
-        table.add_row(f"{row.tets:,}", f"{row.per_body.median:.1f}", f"{row.flat.median:.1f}", *ratio)
+    return _ratio_table(title, ("per_body", "flat"), [(r.tets, r.per_body, r.flat, r.ratio) for r in rows])
+
+
+def _ratio_table(title: str, names: tuple[str, str], rows: list[tuple[int, Spread, Spread, Spread]]) -> Table:
+    table = _table(title, "tetrahedra", *names, "ratio least", "ratio median", "ratio most")
+    for tets, one, other, ratio in rows:
+        ratios = [f"{x:.2f}" for x in (ratio.least, ratio.median, ratio.most)]
+        table.add_row(f"{tets:,}", f"{one.median:.1f}", f"{other.median:.1f}", *ratios)
     return table
