@@ -52,6 +52,8 @@ def as_vector(value: ArrayLike, name: str, unit: str) -> Floats:
 def as_rows(value: ArrayLike, name: str, shape: tuple[int, ...], unit: str) -> Floats:
     """`value` as finite numbers of that shape, copied. Raises: OptionError."""
     try:
+        if np.asarray(value).dtype.kind not in "iuf":
+            raise TypeError
         rows = np.array(value, dtype=np.float64)
     except (TypeError, ValueError):
         raise OptionError(f"{name} must be numbers of shape {shape} [{unit}], got {value!r}") from None

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
+from taichi_soft.constants import POSITION_LIMIT
 from taichi_soft.errors import MeshError, OptionError
 from taichi_soft.kernels.evaluate import evaluate_edge_damping, evaluate_tet_forces
 from taichi_soft.laws import element_model
@@ -46,14 +47,14 @@ def internal_forces(
     require_material(material)
     if not isinstance(mesh, TetMesh):
         raise MeshError(f"mesh must be a TetMesh, got {type(mesh).__name__}")
-    real = np.dtype(dtype)
-    if real not in (np.dtype(np.float64), np.dtype(np.float32)):
-        raise OptionError(f"dtype must be float64 or float32, got {real}")
+    real = _real(dtype)
     x = _rows(positions, mesh, "positions", real)
     v = np.zeros_like(x) if velocities is None else _rows(velocities, mesh, "velocities", real)
+    count = len(mesh.tets)
+    for name in ("young", "poisson", "density", "damping"):
+        material.per_tet(name, count)
     init()
 
-    count = len(mesh.tets)
     damping = material.per_tet("damping", count) * (velocities is not None)
     lame = np.stack([material.per_tet("lame_lambda", count), material.per_tet("lame_mu", count)], axis=1)
     out = np.zeros_like(x)
@@ -64,13 +65,30 @@ def internal_forces(
     return out
 
 
+def _real(dtype: DTypeLike) -> np.dtype[Any]:
+    try:
+        real = np.dtype(dtype)
+    except TypeError:
+        raise OptionError(f"dtype must be float64 or float32, got {dtype!r}") from None
+    if real not in (np.dtype(np.float64), np.dtype(np.float32)):
+        raise OptionError(f"dtype must be float64 or float32, got {real}")
+    return real
+
+
 def _rows(values: ArrayLike, mesh: TetMesh, name: str, real: np.dtype[Any]) -> NDArray[Any]:
     try:
-        rows = np.array(values, dtype=real, order="C")
+        given = np.asarray(values)
+        rows = np.array(given, dtype=real if given.dtype.kind in "iuf" else None, order="C")
+        if rows.dtype != real:
+            raise TypeError
     except (TypeError, ValueError):
         raise MeshError(f"{name} must be an array of numbers, got {type(values).__name__}") from None
     if rows.shape != mesh.vertices.shape:
         raise MeshError(f"{name} has shape {rows.shape}: this mesh needs {mesh.vertices.shape}")
     if not np.isfinite(rows).all():
         raise MeshError(f"{name}[{int(np.argmin(np.isfinite(rows).all(axis=1)))}] is not finite")
+    if real == np.float32 and np.abs(rows).max() > POSITION_LIMIT:
+        raise MeshError(
+            f"{name} go up to {np.abs(rows).max():g}, beyond {POSITION_LIMIT:g}: use dtype float64"
+        )
     return rows

@@ -35,7 +35,8 @@ class World:
     Args:
         gravity: (3,) [m/s^2].
         floor: height of a horizontal floor [m], or None for none.
-        restitution: of the floor, 0 (default: bodies bounce by their own elasticity) to 1.
+        restitution: of the floor, 0 (default: bodies bounce by their own elasticity) to 1. It throws each
+            vertex back by itself, so a damped body may well bounce lower with it than without.
         friction: Coulomb coefficient of the floor, 0 or more.
         integrator: "leapfrog", "lazy_leapfrog" or "explicit_euler".
         schedule: "auto", "per_body" or "flat": in which loops the work runs; no effect on the physics.

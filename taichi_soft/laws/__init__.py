@@ -24,7 +24,7 @@ def element_model(
     damping_model: str | DampingModel = DampingModel.EDGE,
 ) -> ElementModel:
     """The model that these names choose. Raises: OptionError for a name that is not known."""
-    if law not in LAWS:
+    if not isinstance(law, str) or law not in LAWS:
         raise OptionError(f"unknown law {law!r}: choose one of {', '.join(map(repr, LAWS))}")
     return ElementModel(
         LAWS[law], Strain.parse(strain), Flips.parse(flips), DampingModel.parse(damping_model)

@@ -12,6 +12,9 @@ from taichi_soft.errors import MaterialError
 
 Array = NDArray[np.float64]
 
+LARGEST = 1e20
+"""Constants from here on overflow float32 on their way to a force."""
+
 
 @dataclass(frozen=True, eq=False)
 class Material:
@@ -33,14 +36,32 @@ class Material:
     damping: float | Array = 0.0
 
     def __post_init__(self) -> None:
-        self._check("young", lambda x: x > 0, "above 0 Pa")
-        self._check("poisson", lambda x: (x > -1) & (x < 0.5), "above -1 and below 0.5 (use 0.49 for rubber)")
-        self._check("density", lambda x: x > 0, "above 0 kg/m^3")
-        self._check("damping", lambda x: x >= 0, "0 N s/m or more")
+        self._check("young", lambda x: (x > 0) & (x < LARGEST), f"above 0 Pa and below {LARGEST:g}")
+        self._check(
+            "poisson",
+            lambda x: (x > -1) & (x < 0.5),
+            "above -1 and below 0.5 (use 0.49 for rubber)",
+        )
+        self._check("density", lambda x: (x > 0) & (x < LARGEST), f"above 0 kg/m^3 and below {LARGEST:g}")
+        self._check("damping", lambda x: (x >= 0) & (x < LARGEST), f"0 N s/m or more and below {LARGEST:g}")
+        lengths = {
+            name: value.size
+            for name in ("young", "poisson", "density", "damping")
+            if isinstance(value := getattr(self, name), np.ndarray)
+        }
+        if len(set(lengths.values())) > 1:
+            raise MaterialError(
+                f"arrays of different lengths {lengths}: give one value per tetrahedron in each"
+            )
+        stiffest = float(np.max(self.lame_lambda))
+        if stiffest >= LARGEST:
+            raise MaterialError(f"lambda = {stiffest:g} Pa overflows: lower young, or poisson away from 0.5")
 
     def _check(self, name: str, is_valid: Any, range_text: str) -> None:
         given = getattr(self, name)
         try:
+            if np.asarray(given).dtype.kind not in "iuf":
+                raise TypeError
             values = np.array(given, dtype=np.float64)
         except (TypeError, ValueError):
             raise MaterialError(

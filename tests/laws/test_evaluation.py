@@ -132,3 +132,25 @@ def test_a_mesh_without_tetrahedra_is_refused():
 def test_what_is_no_material_is_refused(value):
     with pytest.raises(MaterialError, match="got"):
         internal_forces(BALL, value, BALL.vertices)
+
+
+@pytest.mark.parametrize(
+    ("options", "error"),
+    [
+        ({"law": []}, OptionError),
+        ({"dtype": "banana"}, OptionError),
+        ({"positions": BALL.vertices + 1j}, MeshError),
+        ({"positions": BALL.vertices.astype(str)}, MeshError),
+        ({"positions": BALL.vertices + 1e12, "dtype": np.float32}, MeshError),
+        ({"material": Material(1e5, 0.1, np.full(3, 1000.0))}, MaterialError),
+    ],
+)
+def test_what_would_be_misread_or_overflow_is_refused(options, error):
+    given_values = {
+        "mesh": BALL,
+        "material": Material(1e5, 0.1, 1000.0),
+        "positions": BALL.vertices,
+        **options,
+    }
+    with pytest.raises(error):
+        internal_forces(**given_values)

@@ -163,3 +163,20 @@ def test_unknown_presets_are_refused_with_the_list(name):
 def test_what_is_no_material_is_refused(value):
     with pytest.raises(MaterialError, match=r"taichi_soft\.Material, got"):
         require_material(value)
+
+
+@pytest.mark.parametrize(
+    "constants",
+    [
+        (True, 0.3, 1000),
+        ("1e6", 0.3, 1000),
+        (1e6 + 1j, 0.3, 1000),
+        (1e308, 0.3, 1000),
+        (1e19, 0.4999999, 1000),
+        (1e6, 0.3, 1e39),
+        ([1e6, 1e6], [0.1, 0.2, 0.3], 1000),
+    ],
+)
+def test_what_is_no_number_overflows_or_does_not_match_is_refused(constants):
+    with pytest.raises(MaterialError):
+        Material(*constants)
