@@ -11,7 +11,8 @@ fail() {
 supported='import sys; sys.exit(not (3, 10) <= sys.version_info[:2] <= (3, 13))'
 
 if [ -z "${PYTHON:-}" ] && command -v uv >/dev/null 2>&1; then
-    uv venv --quiet --clear --python ">=3.10,<3.14" "$venv" || fail "uv found no Python 3.10 to 3.13"
+    rm -rf "$venv"
+    uv venv --quiet --python ">=3.10,<3.14" "$venv" || fail "uv found no Python 3.10 to 3.13"
     uv pip install --quiet --python "$venv/bin/python" -e ".[dev]"
     exit 0
 fi
