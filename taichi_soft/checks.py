@@ -12,6 +12,8 @@ from taichi_soft.errors import OptionError
 
 Floats = NDArray[np.float64]
 
+LARGEST_COUNT = 1_000_000
+
 
 def as_number(value: Any, name: str, low: float, high: float, text: str) -> float:
     """`value` as a float within [low, high]. Raises: OptionError saying `text`."""
@@ -19,7 +21,7 @@ def as_number(value: Any, name: str, low: float, high: float, text: str) -> floa
         raise OptionError(f"{name} must be {text}, got {value!r}")
     try:
         number = float(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise OptionError(f"{name} must be {text}, got {value!r}") from None
     if not (np.isfinite(number) and low <= number <= high):
         raise OptionError(f"{name} must be {text}, got {number:g}")
@@ -38,6 +40,8 @@ def as_count(value: Any, name: str) -> int:
     """`value` as a whole number of at least 1. Raises: OptionError."""
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)) or value < 1:
         raise OptionError(f"{name} must be a whole number of at least 1, got {value!r}")
+    if value > LARGEST_COUNT:
+        raise OptionError(f"{name} must be at most {LARGEST_COUNT}, got {value}: a step would take minutes")
     return int(value)
 
 

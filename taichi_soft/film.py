@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from engine_adapter import EngineAdapter, FixedStep
 from taichi_soft.body import Body
 from taichi_soft.checks import as_positive
+from taichi_soft.errors import OptionError
 from taichi_soft.render import PALETTE, Camera, Renderer, Surface, VideoWriter, draw_labels, draw_text
 from taichi_soft.world import World
 
@@ -53,12 +54,8 @@ class FilmReport:
     path: Path | None
     frames: int
     fps: float
+    simulated: float  # time that passed in the world [s]
     step_times: NDArray[np.float64]  # of stepping and reading each frame [s], without those that compile
-
-    @property
-    def simulated(self) -> float:
-        """Time that passed in the world [s]."""
-        return (self.frames - 1) / self.fps
 
     @property
     def real_time_factor(self) -> float:
@@ -90,13 +87,19 @@ def film(
     """
     length = as_positive(stage.seconds if seconds is None else seconds, "seconds", "s")
     count = max(1, round(length * as_positive(fps, "fps", "1/s")))
+    if 1.0 / fps > stage.step.dt * stage.step.max_steps:
+        raise OptionError(
+            f"fps is {fps:g}: a frame takes at most {stage.step.max_steps} steps of {stage.step.dt:g} s: use "
+            f"{1.0 / (stage.step.dt * stage.step.max_steps):g} or more"
+        )
+    start = stage.world.time
     take = _Take(stage, fps)
     if path is None:
         for number in range(count):
             take.play(number)
             if on_frame:
                 on_frame(number + 1, count)
-        return FilmReport(None, count, fps, np.array(take.times[_COMPILING:]))
+        return FilmReport(None, count, fps, stage.world.time - start, np.array(take.times[_COMPILING:]))
     artist = _Artist(stage, size, fps)
     with VideoWriter(path, fps=fps, size=size) as writer:
         for number in range(count):
@@ -104,7 +107,7 @@ def film(
             writer.write(artist.draw(positions, number, take.times))
             if on_frame:
                 on_frame(number + 1, count)
-    return FilmReport(Path(path), count, fps, np.array(take.times[_COMPILING:]))
+    return FilmReport(Path(path), count, fps, stage.world.time - start, np.array(take.times[_COMPILING:]))
 
 
 class _Take:

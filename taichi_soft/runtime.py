@@ -20,7 +20,7 @@ from taichi_soft.errors import DeviceError, OptionError
 
 __all__ = ["Device", "device", "init", "is_initialized", "ti"]
 
-# Vulkan and OpenGL only where asked for by name: their first device may be a software renderer.
+# Vulkan only where asked for by name: its first device may be a software renderer.
 _AUTO_ORDER = ("cuda", "metal")
 _ARCHS = ("cpu", "cuda", "vulkan", "metal")
 

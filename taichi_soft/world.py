@@ -28,6 +28,9 @@ from taichi_soft.scene import BodyDescription, Scene, arrange
 from taichi_soft.state import FROZEN, Capacity, State, acquire, release
 from taichi_soft.types import DampingModel, Flips, Integrator, Schedule, Strain
 
+_PLAIN = {float, int, np.float64, type(None)}
+"""Types whose values can be compared with those of the last step."""
+
 
 class World:
     """Soft bodies under gravity, above a floor. SI units, z is up.
@@ -179,7 +182,7 @@ class World:
         if self._launch is None:
             require_built(False)
         asked = (dt, substeps, type(dt), type(substeps))  # 4.0 == 4 and True == 1, but they are refused
-        if self._checked_step != asked:
+        if not {type(dt), type(substeps)} <= _PLAIN or self._checked_step != asked:
             self._step_values = self._check_step(dt, substeps)
             self._checked_step = asked
         seconds, count, h = self._step_values
@@ -193,7 +196,7 @@ class World:
 
     def _check_step(self, dt: float, substeps: int | None) -> tuple[float, int, float]:
         seconds = as_positive(dt, "dt", "s")
-        count = self.stable_substeps(seconds) if substeps is None else as_count(substeps, "substeps")
+        count = as_count(self.stable_substeps(seconds) if substeps is None else substeps, "substeps")
         h = seconds / count
         stiffest = min(self._bodies, key=lambda body: body.stable_step.limit)
         limit, tet = stiffest.stable_step.limit, stiffest.stable_step.stiffest_tet

@@ -59,3 +59,16 @@ def test_a_film_of_no_known_kind_is_refused_before_anything_moves(tmp_path):
     with pytest.raises(VideoError, match="webm"):
         film(stage, tmp_path / "f.xyz")
     assert stage.world.step_count == 0
+
+
+def test_frames_too_long_for_the_steps_they_may_take_are_refused(tmp_path):
+    stage = falling_box()
+    with pytest.raises(OptionError, match=r"6\.25 or more"):
+        film(stage, None, fps=2)
+    assert stage.world.step_count == 0
+
+
+def test_simulated_time_is_that_of_the_world():
+    stage = falling_box(dt=1 / 60)
+    report = film(stage, None, seconds=0.5)
+    assert report.simulated == stage.world.time > 0.4

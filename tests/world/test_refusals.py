@@ -379,3 +379,21 @@ def test_alpha_out_of_range(falling, alpha):
     world, body = falling
     with pytest.raises(OptionError, match="alpha"):
         world.read_positions(body, alpha)
+
+
+@pytest.mark.parametrize("substeps", [2**31, 10**12, 2**70, np.array([1, 2])])
+def test_more_substeps_than_anyone_can_wait_for(falling, substeps):
+    world, _ = falling
+    before = snapshot(world)
+    with pytest.raises(OptionError, match="substeps must be"):
+        world.step(1 / 60, substeps)
+    assert snapshot(world) == before
+
+
+@pytest.mark.parametrize("dt", [np.array([1.0, 2.0]), 10**400])
+def test_steps_that_are_no_number_after_a_good_one(falling, dt):
+    world, _ = falling
+    before = snapshot(world)
+    with pytest.raises(OptionError, match="dt must be"):
+        world.step(dt, 4)
+    assert snapshot(world) == before
