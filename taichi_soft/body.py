@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.checks import as_rows
+from taichi_soft.checks import as_array
 from taichi_soft.errors import OptionError, StateError
 from taichi_soft.integrators import StableStep
 from taichi_soft.scene import BodyDescription, rest_inverses, vertex_masses
@@ -117,7 +117,7 @@ class Body:
         Raises: OptionError for wrong shapes or numbers that are not finite; StateError before `build`.
         """
         shape = (self.vertex_count, 3)
-        x, v = as_rows(positions, "positions", shape, "m"), as_rows(velocities, "velocities", shape, "m/s")
+        x, v = as_array(positions, "positions", shape, "m"), as_array(velocities, "velocities", shape, "m/s")
         self._world.write_motion(self, x, v)
         self.failure = None
 

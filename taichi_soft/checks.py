@@ -13,18 +13,20 @@ from taichi_soft.errors import OptionError
 Floats = NDArray[np.float64]
 
 LARGEST_COUNT = 1_000_000
+"""Substeps, bodies or pixels: more would not end within minutes, or not fit 32 bits."""
 
 
-def as_number(value: Any, name: str, low: float, high: float, text: str) -> float:
-    """`value` as a float within [low, high]. Raises: OptionError saying `text`."""
-    if isinstance(value, (bool, str)) or np.ndim(value) != 0:
-        raise OptionError(f"{name} must be {text}, got {value!r}")
+def as_number(value: Any, name: str, low: float, high: float, text: str = "") -> float:
+    """`value` as a float within [low, high]. Raises: OptionError saying `text`, or the range."""
+    wanted = text or f"a number from {low:g} to {high:g}"
+    if isinstance(value, (bool, np.bool_, str)) or np.ndim(value) != 0:
+        raise OptionError(f"{name} must be {wanted}, got {value!r}")
     try:
         number = float(value)
     except (TypeError, ValueError, OverflowError):
-        raise OptionError(f"{name} must be {text}, got {value!r}") from None
+        raise OptionError(f"{name} must be {wanted}, got {value!r}") from None
     if not (np.isfinite(number) and low <= number <= high):
-        raise OptionError(f"{name} must be {text}, got {number:g}")
+        raise OptionError(f"{name} must be {wanted}, got {number:g}")
     return number
 
 
@@ -36,36 +38,42 @@ def as_positive(value: Any, name: str, unit: str) -> float:
     return number
 
 
-def as_count(value: Any, name: str) -> int:
-    """`value` as a whole number of at least 1. Raises: OptionError."""
-    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)) or value < 1:
-        raise OptionError(f"{name} must be a whole number of at least 1, got {value!r}")
-    if value > LARGEST_COUNT:
-        raise OptionError(f"{name} must be at most {LARGEST_COUNT}, got {value}: a step would take minutes")
+def as_count(value: Any, name: str, low: int = 1, high: int = LARGEST_COUNT) -> int:
+    """`value` as a whole number from `low` to `high`. Raises: OptionError."""
+    is_whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+    if not is_whole or not low <= value <= high:
+        raise OptionError(f"{name} must be a whole number from {low} to {high}, got {value!r}")
     return int(value)
 
 
 def as_vector(value: ArrayLike, name: str, unit: str) -> Floats:
     """`value` as three numbers that float32 can still compute with. Raises: OptionError."""
-    vector = as_rows(value, name, (3,), unit)
+    vector = as_array(value, name, (3,), unit)
     if np.abs(vector).max() > POSITION_LIMIT:
         raise OptionError(f"{name} must lie within {POSITION_LIMIT:g} {unit} of zero, got {vector.tolist()}")
     return vector
 
 
-def as_rows(value: ArrayLike, name: str, shape: tuple[int, ...], unit: str) -> Floats:
-    """`value` as finite numbers of that shape, copied. Raises: OptionError."""
+def as_array(values: ArrayLike, name: str, shape: tuple[int | None, ...], unit: str = "") -> Floats:
+    """`values` as finite float64 of that shape (None: any length), copied. Raises: OptionError."""
+    lengths = ", ".join("n" if length is None else str(length) for length in shape)
+    wanted = f"({lengths}{',' if len(shape) == 1 else ''})" + (f" [{unit}]" if unit else "")
     try:
-        if np.asarray(value).dtype.kind not in "iuf":
-            raise TypeError
-        rows = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise OptionError(f"{name} must be numbers of shape {shape} [{unit}], got {value!r}") from None
-    if rows.shape != shape:
-        raise OptionError(f"{name} must have shape {shape} [{unit}], got shape {rows.shape}")
-    if not np.isfinite(rows).all():
-        raise OptionError(f"{name} must be finite, got {rows[~np.isfinite(rows)][0]} in it")
-    return rows
+        array = np.array(values)
+    except ValueError as error:
+        raise OptionError(f"{name} is not an array of numbers ({error})") from None
+    if array.dtype.kind not in "fiu":
+        raise OptionError(f"{name} must be numbers of shape {wanted}, got {values!r}")
+    if array.ndim != len(shape) or any(
+        want not in (None, got) for want, got in zip(shape, array.shape, strict=True)
+    ):
+        raise OptionError(f"{name} must have shape {wanted}, got shape {array.shape}")
+    real = array.astype(np.float64)
+    # The sum is finite for all sound arrays but absurd ones, and quicker than looking at every number.
+    if not np.isfinite(real.sum()) and not np.isfinite(real).all():
+        first = int(np.argmin(np.isfinite(real.reshape(len(real), -1)).all(axis=1)))
+        raise OptionError(f"{name} must be finite, but entry {first} is {real[first].tolist()}")
+    return real
 
 
 def as_rotation(value: ArrayLike | None) -> Floats:
@@ -76,7 +84,7 @@ def as_rotation(value: ArrayLike | None) -> Floats:
     if value is None:
         return np.eye(3)
     if np.shape(value) == (4,):
-        q = as_rows(value, "rotation", (4,), "quaternion x, y, z, w")
+        q = as_array(value, "rotation", (4,), "quaternion x, y, z, w")
         length = float(np.linalg.norm(q))
         if abs(length - 1.0) > 1e-3:
             raise OptionError(f"rotation is a quaternion of length {length:g}: normalise it")
@@ -88,7 +96,7 @@ def as_rotation(value: ArrayLike | None) -> Floats:
                 [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
             ]
         )
-    matrix = as_rows(value, "rotation", (3, 3), "matrix, or quaternion of shape (4,)")
+    matrix = as_array(value, "rotation", (3, 3), "matrix, or quaternion of shape (4,)")
     if np.abs(matrix @ matrix.T - np.eye(3)).max() > 1e-5 or np.linalg.det(matrix) < 0:
         raise OptionError("rotation must be an orthonormal matrix with determinant +1")
     return matrix

@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from taichi_soft.checks import as_array
 from taichi_soft.errors import OptionError
-from taichi_soft.render.arguments import as_array
 from taichi_soft.types import Choice
 
 Picture = NDArray[np.uint8]

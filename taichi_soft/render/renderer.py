@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from taichi_soft.checks import as_count, as_number
 from taichi_soft.errors import OptionError
-from taichi_soft.render.arguments import as_count, as_number
 from taichi_soft.render.backdrop_kernels import paint_backdrop
 from taichi_soft.render.camera import Camera
 from taichi_soft.render.colors import to_srgb

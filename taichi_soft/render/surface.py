@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from taichi_soft.checks import as_array
 from taichi_soft.errors import MeshError, OptionError
 from taichi_soft.meshing import TetMesh
-from taichi_soft.render.arguments import as_array
 from taichi_soft.render.colors import PALETTE, to_linear
 from taichi_soft.render.creases import split_at_creases
 
