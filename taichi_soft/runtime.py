@@ -22,6 +22,7 @@ __all__ = ["Device", "device", "init", "is_initialized", "ti"]
 
 # Vulkan only where asked for by name: its first device may be a software renderer.
 _AUTO_ORDER = ("cuda", "metal")
+_MOST_THREADS = 256
 _ARCHS = ("cpu", "cuda", "vulkan", "metal")
 
 
@@ -59,8 +60,12 @@ def init(arch: str = "auto", threads: int | None = None) -> Device:
     global _device
     if arch != "auto" and arch not in _ARCHS:
         raise OptionError(f"unknown arch {arch!r}: choose one of 'auto', {', '.join(map(repr, _ARCHS))}")
-    if threads is not None and (isinstance(threads, bool) or not isinstance(threads, int) or threads < 1):
-        raise OptionError(f"threads must be a whole number of at least 1 or None, got {threads!r}")
+    if threads is not None and (
+        isinstance(threads, bool) or not isinstance(threads, int) or not 1 <= threads <= _MOST_THREADS
+    ):
+        raise OptionError(
+            f"threads must be None or a whole number from 1 to {_MOST_THREADS}, got {threads!r}"
+        )
     if _device is not None:
         if arch not in ("auto", _device.arch):
             raise OptionError(

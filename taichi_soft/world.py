@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.body import Body, Failure, Floats32, require_buffer, require_built
 from taichi_soft.checks import as_count, as_number, as_positive, as_rotation, as_vector
-from taichi_soft.constants import GRAVITY_EARTH, LANES
+from taichi_soft.constants import GRAVITY_EARTH, LANES, POSITION_LIMIT
 from taichi_soft.errors import FrozenBodyWarning, MeshError, OptionError, StateError, UnstableStepWarning
 from taichi_soft.integrators import StableStep, stable_step
 from taichi_soft.kernels.evaluate import compute_body_forces, find_failure
@@ -279,7 +279,8 @@ class World:
         """Put a body somewhere else. Raises: StateError before `build`."""
         require_built(self.is_built)
         x, v = positions.astype(np.float32), velocities.astype(np.float32)
-        if not (np.isfinite(x).all() and np.isfinite(v).all()):
-            raise OptionError("positions and velocities must fit float32")
+        for name, rows in (("positions", x), ("velocities", v)):
+            if not np.abs(rows).max() < POSITION_LIMIT:
+                raise OptionError(f"{name} must lie within {POSITION_LIMIT:g} of zero")
         write_motion(self._state, body.index, x, v)
         self._read_alpha = None

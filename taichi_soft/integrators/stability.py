@@ -15,8 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from taichi_soft.errors import OptionError
 from taichi_soft.laws import ElementModel
-from taichi_soft.materials import Material
+from taichi_soft.materials import Material, require_material
 from taichi_soft.meshing import TetMesh
 from taichi_soft.scene import edge_damping, rest_inverses, vertex_masses
 from taichi_soft.types import DampingModel
@@ -51,6 +52,9 @@ def stable_step(mesh: TetMesh, material: Material, model: ElementModel) -> Stabl
     It holds for motion about the rest shape. A body under strong compression is stiffer and a flattened
     tetrahedron has no bound at all, which is why `recommended` leaves a margin.
     """
+    if not isinstance(model, ElementModel):
+        raise OptionError(f"model must come from element_model(...), got {model!r}")
+    require_material(material)
     count = len(mesh.tets)
     mass = vertex_masses(mesh, material.per_tet("density", count))
     elastic = _ElasticOperator(mesh, material, mass)

@@ -12,8 +12,8 @@ from taichi_soft.errors import MaterialError
 
 Array = NDArray[np.float64]
 
-LARGEST = 1e20
-"""Constants from here on overflow float32 on their way to a force."""
+SMALLEST, LARGEST = 1e-9, 1e20
+"""Constants beyond overflow float32 on their way to a force or an acceleration."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,13 +36,21 @@ class Material:
     damping: float | Array = 0.0
 
     def __post_init__(self) -> None:
-        self._check("young", lambda x: (x > 0) & (x < LARGEST), f"above 0 Pa and below {LARGEST:g}")
+        self._check(
+            "young",
+            lambda x: (x >= SMALLEST) & (x < LARGEST),
+            f"above 0 Pa, from {SMALLEST:g} to {LARGEST:g}",
+        )
         self._check(
             "poisson",
             lambda x: (x > -1) & (x < 0.5),
             "above -1 and below 0.5 (use 0.49 for rubber)",
         )
-        self._check("density", lambda x: (x > 0) & (x < LARGEST), f"above 0 kg/m^3 and below {LARGEST:g}")
+        self._check(
+            "density",
+            lambda x: (x >= SMALLEST) & (x < LARGEST),
+            f"above 0 kg/m^3, from {SMALLEST:g} to {LARGEST:g}",
+        )
         self._check("damping", lambda x: (x >= 0) & (x < LARGEST), f"0 N s/m or more and below {LARGEST:g}")
         lengths = {
             name: value.size
@@ -53,9 +61,11 @@ class Material:
             raise MaterialError(
                 f"arrays of different lengths {lengths}: give one value per tetrahedron in each"
             )
-        stiffest = float(np.max(self.lame_lambda))
+        stiffest = float(np.max([np.max(np.abs(self.lame_lambda)), np.max(self.lame_mu)]))
         if stiffest >= LARGEST:
-            raise MaterialError(f"lambda = {stiffest:g} Pa overflows: lower young, or poisson away from 0.5")
+            raise MaterialError(
+                f"a Lame parameter of {stiffest:g} Pa overflows: keep poisson away from -1 and 0.5"
+            )
 
     def _check(self, name: str, is_valid: Any, range_text: str) -> None:
         given = getattr(self, name)

@@ -23,6 +23,6 @@ PRESETS = {
 
 def preset(name: str) -> Material:
     """The material of that name. Raises: OptionError with the names there are."""
-    if name not in PRESETS:
+    if not isinstance(name, str) or name not in PRESETS:
         raise OptionError(f"unknown material {name!r}: choose one of {', '.join(map(repr, PRESETS))}")
     return PRESETS[name]

@@ -7,13 +7,16 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.errors import MeshError
+from taichi_soft.errors import MeshError, OptionError
 
 FloatArray: TypeAlias = NDArray[np.float64]
 IntArray: TypeAlias = NDArray[np.int32]
 
 # Products of three lengths must stay finite in float64 (largest 1.8e308), with room to spare.
 LARGEST_COORDINATE = 1e30
+
+MOST_TETS = 10_000_000
+"""Of a built-in shape: more take minutes and tens of gigabytes to make."""
 
 
 def read_only(array: NDArray[Any]) -> NDArray[Any]:
@@ -96,6 +99,12 @@ def as_indices(values: ArrayLike, name: str, width: int, vertex_count: int, what
             f"{what} {row} names a vertex twice (vertices {name_vertices(array[row])}): repair or remove it"
         )
     return array.astype(np.int32)
+
+
+def require_tet_count(tets: int) -> None:
+    """Raises: OptionError if a shape would have more tetrahedra than `MOST_TETS`."""
+    if tets > MOST_TETS:
+        raise OptionError(f"that is {tets:,} tetrahedra: ask for a coarser shape of at most {MOST_TETS:,}")
 
 
 def name_vertices(indices: NDArray[Any]) -> str:

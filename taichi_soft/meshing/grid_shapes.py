@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from taichi_soft.checks import as_count, as_positive
 from taichi_soft.errors import MeshError, OptionError
-from taichi_soft.meshing.parameters import count, positive
+from taichi_soft.meshing.arrays import FloatArray, require_tet_count
 from taichi_soft.meshing.tet_mesh import TetMesh
 
 # Corner i of a cell lies at the bits of i: x = bit 0, y = bit 1, z = bit 2.
@@ -29,8 +32,9 @@ def box(
             54.7 degrees with cubic cells.
     Raises: OptionError for sizes that are not positive or counts below 1.
     """
-    lengths = np.array([positive(f"size[{axis}]", value) for axis, value in enumerate(_three("size", size))])
-    counts = [count(f"cells[{axis}]", value) for axis, value in enumerate(_three("cells", cells))]
+    lengths = _lengths("size", size)
+    counts = [as_count(value, f"cells[{axis}]") for axis, value in enumerate(_three("cells", cells))]
+    require_tet_count(5 * math.prod(counts))
     return voxels(np.ones(counts, dtype=bool), tuple(lengths / counts))
 
 
@@ -43,8 +47,12 @@ def beam(length: float = 4.0, width: float = 1.0, height: float = 1.0, cells_acr
             if the cells come out cubic and at least 32 otherwise.
     Raises: OptionError for sizes that are not positive or a count below 1.
     """
-    size = (positive("length", length), positive("width", width), positive("height", height))
-    cell = min(size) / count("cells_across", cells_across)
+    size = (
+        as_positive(length, "length", "m"),
+        as_positive(width, "width", "m"),
+        as_positive(height, "height", "m"),
+    )
+    cell = min(size) / as_count(cells_across, "cells_across")
     nx, ny, nz = (max(1, round(edge / cell)) for edge in size)
     return box(size, (nx, ny, nz))
 
@@ -64,9 +72,7 @@ def voxels(mask: ArrayLike, spacing: float | tuple[float, ...] = 1.0) -> TetMesh
     if filled.dtype != np.bool_ or filled.ndim != 3:
         raise MeshError(f"mask has shape {filled.shape}, dtype {filled.dtype}: pass bool (nx, ny, nz)")
     steps = (spacing,) * 3 if np.ndim(spacing) == 0 else spacing
-    edges = np.array(
-        [positive(f"spacing[{axis}]", step) for axis, step in enumerate(_three("spacing", steps))]
-    )
+    edges = _lengths("spacing", steps)
     cells = np.argwhere(filled)
     if len(cells) == 0:
         raise MeshError(f"mask of shape {filled.shape} has no filled cell: set at least one to True")
@@ -83,6 +89,10 @@ def voxels(mask: ArrayLike, spacing: float | tuple[float, ...] = 1.0) -> TetMesh
     local = np.where(odd[:, None, None], ODD_CELL, EVEN_CELL).reshape(len(cells), -1)
     tets = np.take_along_axis(inverse.reshape(len(cells), 8), local, axis=1).reshape(-1, 4)
     return TetMesh(vertices, tets, fix_orientation=True)
+
+
+def _lengths(name: str, values: object) -> FloatArray:
+    return np.array([as_positive(v, f"{name}[{axis}]", "m") for axis, v in enumerate(_three(name, values))])
 
 
 def _three(name: str, values: object) -> tuple[float, ...]:

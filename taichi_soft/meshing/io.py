@@ -45,8 +45,6 @@ def load_mesh(path: str | os.PathLike[str], *, fix_orientation: bool = True) -> 
         vertices, tets = read(source)
     except OSError as error:
         raise MeshError(f"{_named(error, source)}: cannot be read ({error.strerror or error})") from None
-    except UnicodeDecodeError:
-        raise MeshError(f"{source.name}: not a text file, so not a {suffix} mesh") from None
     try:
         return TetMesh(*_without_unused(vertices, tets), fix_orientation=fix_orientation)
     except MeshError as error:
@@ -94,7 +92,12 @@ def save_mesh(mesh: TetMesh, path: str | os.PathLike[str]) -> None:
 
 
 def _checked_path(path: str | os.PathLike[str]) -> Path:
-    checked = Path(path)
+    try:
+        checked = Path(path)
+    except TypeError:
+        raise MeshError(f"path must be a string or a Path, got {path!r}") from None
+    if not checked.name:
+        raise MeshError(f"path {str(path)!r} names no file")
     if checked.suffix.lower() not in SUFFIXES:
         raise MeshError(f"{checked.name}: unknown mesh format {checked.suffix!r}: use {', '.join(SUFFIXES)}")
     return checked

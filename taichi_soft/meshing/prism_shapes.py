@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from taichi_soft.checks import as_count, as_positive
 from taichi_soft.errors import OptionError
-from taichi_soft.meshing.arrays import FloatArray, as_indices, as_points
-from taichi_soft.meshing.parameters import count, positive
+from taichi_soft.meshing.arrays import FloatArray, as_indices, as_points, require_tet_count
 from taichi_soft.meshing.tet_mesh import TetMesh
 
 
@@ -24,7 +24,8 @@ def extrude(points: ArrayLike, triangles: ArrayLike, layers: int = 1, height: fl
     """
     flat = as_points(points, "points", 2)
     corners = as_indices(triangles, "triangles", 3, len(flat), "triangle")
-    layers, height = count("layers", layers), positive("height", height)
+    layers, height = as_count(layers, "layers"), as_positive(height, "height", "m")
+    require_tet_count(3 * len(corners) * layers)
     flat -= (flat.min(axis=0) + flat.max(axis=0)) / 2.0
     levels = np.linspace(-height / 2.0, height / 2.0, layers + 1)
     vertices = np.column_stack([np.tile(flat, (layers + 1, 1)), np.repeat(levels, len(flat))])
@@ -42,8 +43,10 @@ def cylinder(radius: float = 0.5, height: float = 1.0, rings: int = 3, layers: i
             dihedral angle of 35 to 41 degrees.
     Raises: OptionError for sizes that are not positive or counts below 1.
     """
-    flat, triangles = _disc(count("rings", rings))
-    return extrude(positive("radius", radius) * flat, triangles, layers, height)
+    rings, layers = as_count(rings, "rings"), as_count(layers, "layers")
+    require_tet_count(18 * rings**2 * layers)
+    flat, triangles = _disc(rings)
+    return extrude(as_positive(radius, "radius", "m") * flat, triangles, layers, height)
 
 
 def torus(
@@ -59,11 +62,13 @@ def torus(
             gives the best shape, with a smallest dihedral angle of 31 degrees at the default proportions.
     Raises: OptionError for sizes that are not positive, a tube too thick for its ring, or counts too low.
     """
-    major, minor = positive("major_radius", major_radius), positive("minor_radius", minor_radius)
+    major = as_positive(major_radius, "major_radius", "m")
+    minor = as_positive(minor_radius, "minor_radius", "m")
     if minor >= major:
         raise OptionError(f"minor_radius is {minor:g} and major_radius {major:g}: the minor must be smaller")
-    segments = count("segments", segments, 3)
-    flat, triangles = _disc(count("rings", rings))
+    segments, rings = as_count(segments, "segments", 3), as_count(rings, "rings")
+    require_tet_count(18 * rings**2 * segments)
+    flat, triangles = _disc(rings)
     angle = np.repeat(np.arange(segments) * (2.0 * np.pi / segments), len(flat))
     across, up = np.tile(minor * flat, (segments, 1)).T
     vertices = np.column_stack([(major + across) * np.cos(angle), (major + across) * np.sin(angle), up])

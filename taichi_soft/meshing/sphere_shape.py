@@ -7,8 +7,8 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.meshing.arrays import FloatArray
-from taichi_soft.meshing.parameters import count, positive
+from taichi_soft.checks import as_count, as_positive
+from taichi_soft.meshing.arrays import FloatArray, require_tet_count
 from taichi_soft.meshing.tet_mesh import TetMesh
 
 UNIT: NDArray[np.int64] = np.eye(4, dtype=np.int64)
@@ -32,7 +32,8 @@ def sphere(radius: float = 0.5, resolution: int = 4) -> TetMesh:
             44 degrees at the default resolution and falls slowly, to 39.8 at 10.
     Raises: OptionError for a radius that is not positive or a resolution below 1.
     """
-    radius, resolution = positive("radius", radius), count("resolution", resolution)
+    radius, resolution = as_positive(radius, "radius", "m"), as_count(resolution, "resolution")
+    require_tet_count(20 * resolution**3)
     corners, faces = _icosahedron()
     lattice, cells, octahedra = _cut_tetrahedron(resolution)
     positions = np.concatenate([_shells(corners[face], lattice) for face in faces])

@@ -58,7 +58,10 @@ def _write_lines(path: Path, header: str, rows: Iterable[str]) -> None:
 
 def _read_table(path: Path, what: str) -> tuple[list[int], FloatArray]:
     """The header line's numbers and the rows under it."""
-    text = re.sub(r"#[^\n]*", "", path.read_text(encoding="utf-8"))
+    try:
+        text = re.sub(r"#[^\n]*", "", path.read_text(encoding="utf-8"))
+    except UnicodeDecodeError:
+        raise MeshError(f"{path.name}: not a text file, so not a {path.suffix} mesh") from None
     lines = [line for line in text.splitlines() if line.strip()]
     try:
         header = [int(word) for word in lines[0].split()] if lines else []

@@ -1,24 +1,8 @@
 """A small world for the adapter to run."""
 
-import gc
-
 import pytest
 
 from taichi_soft import Material, World, box
-
-
-@pytest.fixture(autouse=True, scope="session")
-def settle_imports():
-    """What the imports made stays: the collector need not walk it after every test."""
-    gc.collect()
-    gc.freeze()
-
-
-@pytest.fixture(autouse=True)
-def release_worlds():
-    """A world that is gone gives its state back, and the next one takes it with its kernels compiled."""
-    yield
-    gc.collect()
 
 
 @pytest.fixture

@@ -1,18 +1,9 @@
 """Worlds without floor, one body each."""
 
-import gc
-
 import numpy as np
 import pytest
 
 from taichi_soft import World
-
-
-@pytest.fixture(autouse=True)
-def release_worlds():
-    """A world that is gone gives its state back, and the next one takes it with its kernels compiled."""
-    yield
-    gc.collect()
 
 
 @pytest.fixture

@@ -7,6 +7,7 @@ import pytest
 
 from taichi_soft import (
     Material,
+    TaichiSoftError,
     UnstableStepWarning,
     World,
     beam,
@@ -180,3 +181,12 @@ def test_a_world_warns_of_a_substep_above_the_limit_and_keeps_to_it_by_itself():
         world.step(0.99 * limit, 1)
         world.step(1 / 60)
     assert world.stable_substeps(1 / 60) >= (1 / 60) / limit
+
+
+@pytest.mark.parametrize(
+    ("material", "model", "named"),
+    [(SOFT, "virial", "element_model"), (SOFT, None, "element_model"), (None, VIRIAL, "Material")],
+)
+def test_an_estimate_needs_a_material_and_a_model(material, model, named):
+    with pytest.raises(TaichiSoftError, match=named):
+        stable_step(MESHES["box"], material, model)

@@ -31,7 +31,7 @@ def tumbling(x, rng):
     return rng.normal(size=3) + np.cross(rng.normal(size=3), x)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=seeds, name=names, amount=amounts, model=st.sampled_from(["edge", "tet_mean"]))
 def test_damping_equals_the_equations_in_numpy(seed, name, amount, model):
     """With one b per tetrahedron: an edge takes the mean of the tetrahedra around it."""
@@ -49,7 +49,7 @@ def test_damping_equals_the_equations_in_numpy(seed, name, amount, model):
 
 
 @pytest.mark.parametrize("model", ["edge", "tet_mean"])
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(seed=seeds, name=names)
 def test_damping_is_added_to_the_elastic_forces(model, seed, name):
     rng = np.random.default_rng(seed)
@@ -78,7 +78,7 @@ def test_one_damping_constant_belongs_to_an_edge_however_many_tetrahedra_share_i
     assert uneven[0] == pytest.approx([50, 0, 0], abs=1e-9)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=seeds, name=names, amount=amounts)
 def test_edge_damping_leaves_rigid_motion_alone(seed, name, amount):
     """Translation and rotation, of the rest shape or of a deformed one."""
@@ -90,7 +90,7 @@ def test_edge_damping_leaves_rigid_motion_alone(seed, name, amount):
     assert np.abs(forces).max() < 1e-11 * 100 * np.abs(v).max()
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=seeds, name=names)
 def test_mean_damping_brakes_rotation_which_is_why_the_thesis_rejects_it(seed, name):
     """Section 6.4: it spares translation only."""
@@ -106,7 +106,7 @@ def test_mean_damping_brakes_rotation_which_is_why_the_thesis_rejects_it(seed, n
     assert np.dot(moment, np.cross(x, turn).sum(axis=0)) < 0  # it takes angular momentum away
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=seeds, name=names, amount=amounts)
 def test_edge_damping_conserves_momentum_and_angular_momentum(seed, name, amount):
     rng = np.random.default_rng(seed)
@@ -120,7 +120,7 @@ def test_edge_damping_conserves_momentum_and_angular_momentum(seed, name, amount
     assert np.abs(np.cross(x, forces).sum(axis=0)).max() < 1e-12 * scale * np.abs(x).max()
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     seed=seeds, name=names, amount=amounts, model=st.sampled_from(["edge", "tet_mean"]), rigid=st.booleans()
 )

@@ -15,7 +15,7 @@ MATERIAL = Material(1e6, 0.3, 1000.0, 50.0)
 
 
 @pytest.mark.parametrize(("law", "strain", "flips"), oracle.MODES, ids=oracle.MODE_IDS)
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=6)
 @given(
     seed=st.integers(0, 2**32 - 1),
     name=st.sampled_from(list(MESHES)),

@@ -79,7 +79,7 @@ def test_tolerant_is_at_rest_in_its_mirror_image(mirror, law, strain):
 
 @pytest.mark.parametrize("law", oracle.LAWS)
 @EACH_STRAIN
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(seed=seeds, name=st.sampled_from(list(MESHES)), amount=st.floats(0.01, 1))
 def test_tolerant_feels_the_mirrored_force_in_the_mirrored_body(law, strain, seed, name, amount):
     """f(Q x) = Q f(x) for reflections Q as well as for rotations: the whole body mirrored."""
@@ -93,7 +93,7 @@ def test_tolerant_feels_the_mirrored_force_in_the_mirrored_body(law, strain, see
 
 @pytest.mark.parametrize("law", oracle.LAWS)
 @EACH_STRAIN
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=6)
 @given(seed=seeds)
 def test_off_feels_the_opposite_of_it(law, strain, seed):
     """So the mirrored body is at rest, but what should draw it back drives it away."""
@@ -106,7 +106,7 @@ def test_off_feels_the_opposite_of_it(law, strain, seed):
 
 
 @EACH_STRAIN
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(seed=seeds)
 def test_upright_tetrahedra_do_not_know_how_flips_are_handled(strain, seed):
     rng = np.random.default_rng(seed)
@@ -173,7 +173,7 @@ def opening_powers(x, forces):
 
 @pytest.mark.parametrize("law", oracle.LAWS)
 @EACH_STRAIN
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=seeds, nu=st.floats(0, 0.45))
 def test_recover_pushes_every_compressed_flip_through_its_thinnest_axis(law, strain, seed, nu):
     """The negative stretch grows, in any inverted pose that is nowhere longer than at rest."""
@@ -187,7 +187,7 @@ def test_recover_pushes_every_compressed_flip_through_its_thinnest_axis(law, str
 
 @pytest.mark.parametrize("law", oracle.LAWS)
 @EACH_STRAIN
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=seeds)
 def test_recover_brings_every_axis_of_a_flip_nearer_to_its_length_at_rest(law, strain, seed):
     """Stretched axes shrink, compressed ones grow, the negative one grows towards +1 (nu = 0)."""
@@ -202,7 +202,7 @@ def test_recover_brings_every_axis_of_a_flip_nearer_to_its_length_at_rest(law, s
 
 
 @EACH_STRAIN
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=seeds)
 def test_recover_gains_volume_from_a_flip_of_about_the_size_at_rest(strain, seed):
     """sum f_i . dV/dx_i > 0 for stretches between 0.6 and 1.1 and a thinner third one inside out.
@@ -272,7 +272,7 @@ def around_flat(seed, volume):
 
 
 @EACH_MODE
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(seed=seeds)
 def test_forces_are_continuous_through_flat_except_where_the_mirror_is_tolerated(law, strain, flips, seed):
     """At volumes of plus and minus 1e-9 m^3: the same force, but with `tolerant` the opposite one."""
@@ -282,7 +282,7 @@ def test_forces_are_continuous_through_flat_except_where_the_mirror_is_tolerated
 
 
 @EACH_STRAIN
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(seed=seeds)
 def test_a_tetrahedron_that_is_squeezed_flat_is_opened_again(strain, seed):
     """Just upright or just flipped, `recover` pushes the corner to its own side of the face."""

@@ -42,7 +42,7 @@ def test_no_force_at_rest(law, strain, flips, name):
 
 
 @EACH_MODE
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(name=st.sampled_from(list(MESHES)), q=unit_quaternions, shift=st.tuples(*[st.floats(-10, 10)] * 3))
 def test_no_force_after_any_rotation_and_translation(law, strain, flips, name, q, shift):
     mesh = MESHES[name]
@@ -52,7 +52,7 @@ def test_no_force_after_any_rotation_and_translation(law, strain, flips, name, q
 
 
 @EACH_MODE
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=6)
 @given(q=unit_quaternions, seed=seeds)
 def test_forces_turn_with_a_deformed_body(law, strain, flips, q, seed):
     """Objectivity: f(Q x + t) = Q f(x), flipped tetrahedra included."""
@@ -65,7 +65,7 @@ def test_forces_turn_with_a_deformed_body(law, strain, flips, q, seed):
 
 
 @EACH_MODE
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=5)
 @given(seed=seeds)
 def test_the_order_of_a_tetrahedrons_corners_does_not_matter(law, strain, flips, seed):
     """The first corner is where the shape matrix starts, and nothing else."""
@@ -81,7 +81,7 @@ def test_the_order_of_a_tetrahedrons_corners_does_not_matter(law, strain, flips,
 
 
 @EACH_MODE
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=5)
 @given(seed=seeds)
 def test_where_and_how_the_rest_shape_lies_does_not_matter(law, strain, flips, seed):
     """An isotropic material has no memory of directions."""
@@ -95,7 +95,7 @@ def test_where_and_how_the_rest_shape_lies_does_not_matter(law, strain, flips, s
 
 
 @pytest.mark.parametrize("strain", oracle.STRAINS)
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(seed=seeds, name=st.sampled_from(list(MESHES)), nu=st.floats(-0.9, 0.45))
 def test_small_deformation_is_always_resisted(strain, seed, name, nu):
     """The rest shape is a minimum: every small displacement but a rigid one meets negative work."""
@@ -106,7 +106,7 @@ def test_small_deformation_is_always_resisted(strain, seed, name, nu):
     assert np.sum(forces * u) < 0
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(seed=seeds, name=st.sampled_from(list(MESHES)))
 def test_both_strains_agree_for_small_deformation(seed, name):
     """1/2 (U^2 - I) and U - I differ in the second order only."""

@@ -15,7 +15,7 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 @EACH_MODE
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(seed=seeds, name=st.sampled_from(list(MESHES)), amount=st.sampled_from([0.01, 0.2, 0.6, 3.0]))
 def test_forces_equal_those_of_the_equations_in_numpy(law, strain, flips, seed, name, amount):
     rng = np.random.default_rng(seed)
@@ -30,7 +30,7 @@ def test_forces_equal_those_of_the_equations_in_numpy(law, strain, flips, seed, 
 
 @pytest.mark.parametrize("flips", oracle.FLIPS)
 @UPRIGHT
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(seed=seeds, name=st.sampled_from(list(MESHES)), amount=st.floats(0, 5))
 @example(seed=0, name="torus", amount=0.6)
 def test_virial_theorem_and_faces_give_the_same_forces_to_round_off(strain, flips, seed, name, amount):
@@ -54,7 +54,7 @@ def test_the_noise_of_these_tests_does_flip_tetrahedra():
 
 
 @UPRIGHT
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=seeds, name=st.sampled_from(list(MESHES)), nu=st.floats(-0.9, 0.49))
 def test_uniform_deformation_gives_the_stress_of_hookes_law_everywhere(strain, seed, name, nu):
     """Every vertex is pulled by sigma times a third of the outward areas of the faces it does not touch."""
@@ -75,7 +75,7 @@ def test_uniform_deformation_gives_the_stress_of_hookes_law_everywhere(strain, s
 
 
 @UPRIGHT
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(seed=seeds, name=st.sampled_from(["box", "sphere", "torus"]))
 def test_uniform_deformation_leaves_the_interior_in_balance(strain, seed, name):
     """Constant stress has no divergence: all forces lie on the surface, where they carry the traction."""
@@ -96,7 +96,7 @@ def test_uniform_deformation_leaves_the_interior_in_balance(strain, seed, name):
 
 
 @EACH_MODE
-@settings(max_examples=4, deadline=None)
+@settings(max_examples=4)
 @given(seed=seeds, amount=st.sampled_from([0.1, 0.8]))
 def test_internal_forces_carry_no_momentum_and_no_angular_momentum(law, strain, flips, seed, amount):
     """Whatever the deformation: they sum to zero, and so do their moments (the stress is symmetric)."""

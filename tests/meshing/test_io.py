@@ -190,6 +190,22 @@ def test_unknown_formats_are_refused(tmp_path, name):
             call(tmp_path / name)
 
 
+@pytest.mark.parametrize("path", [None, 5, "", ".", "/"])
+def test_what_names_no_file_is_refused(path):
+    for call in (load_mesh, lambda p: save_mesh(MESH, p)):
+        with pytest.raises(MeshError, match="path"):
+            call(path)
+
+
+@pytest.mark.parametrize("suffix", [".node", ".ele"])
+@pytest.mark.parametrize("broken", [".node", ".ele"])
+def test_the_broken_half_of_a_pair_is_named(tmp_path, suffix, broken):
+    save_mesh(MESH, tmp_path / "ball.node")
+    (tmp_path / f"ball{broken}").write_bytes(b"\x00\xff\xfe" * 50)
+    with pytest.raises(MeshError, match=rf"^ball\{broken}: not a text file"):
+        load_mesh(tmp_path / f"ball{suffix}")
+
+
 def test_files_without_tetrahedra_are_refused(tmp_path):
     pytest.importorskip("meshio")
     text = VTK.replace("4 0 1 3 4\n", "").replace("4 3 1 4 5\n", "").replace("10\n5\n10", "5")

@@ -1,6 +1,5 @@
 """Worlds with one small body."""
 
-import gc
 from pathlib import Path
 
 import numpy as np
@@ -9,20 +8,6 @@ import pytest
 from taichi_soft import Material, World, box, load_mesh
 
 ASSETS = Path(__file__).parents[2] / "assets"
-
-
-@pytest.fixture(autouse=True, scope="session")
-def settle_imports():
-    """What the imports made stays: the collector need not walk it after every test."""
-    gc.collect()
-    gc.freeze()
-
-
-@pytest.fixture(autouse=True)
-def release_worlds():
-    """A world that is gone gives its state back, and the next one takes it with its kernels compiled."""
-    yield
-    gc.collect()
 
 
 @pytest.fixture(scope="session")
