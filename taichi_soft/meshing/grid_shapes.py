@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.checks import as_count, as_positive
 from taichi_soft.errors import MeshError, OptionError
-from taichi_soft.meshing.arrays import FloatArray, require_tet_count
+from taichi_soft.meshing.arrays import MOST_TETS, FloatArray, require_tet_count
 from taichi_soft.meshing.tet_mesh import TetMesh
 
 # Corner i of a cell lies at the bits of i: x = bit 0, y = bit 1, z = bit 2.
@@ -53,7 +53,7 @@ def beam(length: float = 4.0, width: float = 1.0, height: float = 1.0, cells_acr
         as_positive(height, "height", "m"),
     )
     cell = min(size) / as_count(cells_across, "cells_across")
-    nx, ny, nz = (max(1, round(edge / cell)) for edge in size)
+    nx, ny, nz = (max(1, round(min(edge / cell, MOST_TETS))) for edge in size)
     return box(size, (nx, ny, nz))
 
 

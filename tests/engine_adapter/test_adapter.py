@@ -96,7 +96,7 @@ def test_default_is_sixty_steps_a_second(make_world):
     assert adapter.advance(0.1) == 6
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(alpha=st.floats(0, 0.999))
 def test_positions_lie_between_the_last_two_steps(alpha, shared_run):
     adapter, before, now = shared_run(alpha)

@@ -17,7 +17,7 @@ FRAMES = st.lists(
 )
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(DTS, st.integers(1, 9), FRAMES)
 def test_steps_and_dropped_time_and_remainder_are_the_time_put_in(dt, max_steps, frames):
     accumulator = Accumulator(FixedStep(dt=dt, max_steps=max_steps))
@@ -32,7 +32,7 @@ def test_steps_and_dropped_time_and_remainder_are_the_time_put_in(dt, max_steps,
         assert abs(put_in - given_out - Fraction(accumulator.remainder)) < Fraction(1e-12)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(st.integers(1, 200), st.integers(1, 12), st.lists(st.integers(0, 500), max_size=60))
 def test_steps_are_those_of_exact_arithmetic(parts, max_steps, frames):
     """Frames are whole hundredths of a second and so is the step: each decision can be made exactly."""

@@ -12,7 +12,7 @@ from taichi_soft.meshing import TetMesh, renumbered, spatial_order, sphere, tet_
 POINTS = hnp.arrays(float, st.tuples(st.integers(1, 60), st.just(3)), elements=st.floats(-1e6, 1e6))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(POINTS)
 def test_spatial_order_is_a_permutation(points):
     order = spatial_order(points)

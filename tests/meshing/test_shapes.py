@@ -98,7 +98,7 @@ def test_torus_volume_converges_to_pappus():
     assert np.log2(np.divide(errors[:-1], errors[1:])) == pytest.approx([2, 2], abs=0.25)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(hnp.arrays(bool, st.tuples(*[st.integers(1, 4)] * 3)).filter(np.any), st.floats(0.1, 10))
 def test_voxels_fill_what_the_mask_fills(mask, spacing):
     mesh = voxels(mask, spacing)
@@ -148,7 +148,7 @@ REFUSED = [
     (sphere, {"resolution": 100}, "20,000,000 tetrahedra"),
     (box, {"cells": (1000, 1000, 1000)}, "5,000,000,000 tetrahedra: ask for a coarser"),
     (beam, {"cells_across": 1000}, "tetrahedra"),
-    (beam, {"length": 1e300, "width": 1e-300}, "tetrahedra"),
+    (beam, {"length": 1e300, "width": 1e-300}, "cells"),
     (cylinder, {"rings": 10_000}, "tetrahedra"),
     (torus, {"rings": 10_000}, "tetrahedra"),
     (extrude, {"points": [[0, 0], [1, 0], [0, 1]], "triangles": [[0, 1, 2]], "layers": 10**7}, "layers"),

@@ -129,7 +129,7 @@ def test_copies_are_locked_too():
         assert not twin.vertices.flags.writeable
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.integers(0, 2**32 - 1), st.floats(0.01, 100))
 def test_moves_change_volume_as_they_should(seed, factor):
     """Rotation and translation keep volumes, scaling takes the cube; the connections stay."""
@@ -142,7 +142,7 @@ def test_moves_change_volume_as_they_should(seed, factor):
     assert moved.tets.tolist() == mesh.tets.tolist()
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(0, 2**32 - 1))
 def test_fix_orientation_undoes_any_shuffle_of_corners(seed):
     random = np.random.default_rng(seed)
