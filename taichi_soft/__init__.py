@@ -31,6 +31,7 @@ from taichi_soft.meshing import (
     voxels,
 )
 from taichi_soft.runtime import Device, device, init
+from taichi_soft.settings import Settings
 from taichi_soft.world import World
 
 __all__ = [
@@ -47,6 +48,7 @@ __all__ = [
     "MeshQuality",
     "OptionError",
     "ParticleMesh",
+    "Settings",
     "StableStep",
     "StateError",
     "TaichiSoftError",

@@ -153,7 +153,7 @@ class Body:
 
     def gravitational_energy(self) -> float:
         """- sum m g.x, zero at the origin [J]."""
-        return float(-(self.masses @ self.positions().astype(np.float64)) @ self._world.gravity)
+        return float(-(self.masses @ self.positions().astype(np.float64)) @ self._world.settings.gravity)
 
     def elastic_energy(self) -> float:
         """1/2 sum V0 sigma : eps of the linear strain [J].

@@ -30,7 +30,7 @@ app = typer.Typer(
 console = Console()
 errors = Console(stderr=True)
 
-Arch = Annotated[str, typer.Option(help="Device: auto, cpu, cuda, vulkan or metal.")]
+Arch = Annotated[str, typer.Option(help="Device: auto (the CPU), cpu; untried: cuda, vulkan, metal.")]
 Threads = Annotated[int | None, typer.Option(help="CPU threads; one per core by default.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")]
 

@@ -137,7 +137,7 @@ class _Artist:
     def __init__(self, stage: Stage, size: tuple[int, int], fps: float) -> None:
         self.stage = stage
         self.fps = fps
-        self.renderer = Renderer(*size, camera=stage.camera, floor=stage.world.floor)
+        self.renderer = Renderer(*size, camera=stage.camera, floor=stage.world.settings.floor)
         self.surfaces = [Surface.of(actor.body.mesh, color=actor.color) for actor in stage.actors]
 
     def draw(

@@ -6,6 +6,7 @@ import math
 import warnings
 import weakref
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,7 @@ from taichi_soft.materials import Material, require_material
 from taichi_soft.meshing import TetMesh
 from taichi_soft.runtime import init
 from taichi_soft.scene import BodyDescription, Scene, arrange
+from taichi_soft.settings import Settings
 from taichi_soft.state import FROZEN, Capacity, State, acquire, release
 from taichi_soft.types import DampingModel, Flips, Integrator, Schedule, Strain
 
@@ -56,14 +58,18 @@ class World:
         integrator: str | Integrator = Integrator.LEAPFROG,
         schedule: str | Schedule = Schedule.AUTO,
     ) -> None:
-        self.gravity: NDArray[np.float64] = as_vector(gravity, "gravity", "m/s^2")
-        self.floor = None if floor is None else as_number(floor, "floor", -1e6, 1e6, "a height [m] or None")
-        self.restitution = as_number(restitution, "restitution", 0.0, 1.0, "a number from 0 to 1")
-        self.friction = as_number(friction, "friction", 0.0, 1e6, "a number of 0 or more")
-        self.integrator = Integrator.parse(integrator)
-        self.schedule = Schedule.parse(schedule)
-        self.step_count = 0
-        self.time = 0.0
+        downwards = as_vector(gravity, "gravity", "m/s^2")
+        downwards.flags.writeable = False
+        self._settings = Settings(
+            gravity=downwards,
+            floor=None if floor is None else as_number(floor, "floor", -1e6, 1e6, "a height [m] or None"),
+            restitution=as_number(restitution, "restitution", 0.0, 1.0, "a number from 0 to 1"),
+            friction=as_number(friction, "friction", 0.0, 1e6, "a number from 0 to 1,000,000"),
+            integrator=Integrator.parse(integrator),
+            schedule=Schedule.parse(schedule),
+        )
+        self._step_count = 0
+        self._time = 0.0
         self._bodies: list[Body] = []
         self._scene = Scene()
         self._state: State | None = None
@@ -75,6 +81,21 @@ class World:
         self._read_alpha: float | None = None  # of what `_read` holds; None once the world has moved on
         self._warned_steps: set[float] = set()
         self._stable_steps: dict[tuple[int, int, ElementModel], StableStep] = {}
+
+    @property
+    def settings(self) -> Settings:
+        """Gravity, floor, integrator and schedule, as they were checked and chosen."""
+        return self._settings
+
+    @property
+    def step_count(self) -> int:
+        """Fixed steps made so far."""
+        return self._step_count
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return self._time
 
     @property
     def bodies(self) -> Sequence[Body]:
@@ -143,15 +164,17 @@ class World:
             raise StateError("the world is empty: call add_body before build")
         device = init()
         models = list(dict.fromkeys(body._description.model for body in self._bodies))
-        schedule = choose_schedule(self.schedule, self._scene, device)
+        schedule = choose_schedule(self.settings.schedule, self._scene, device)
         capacity = Capacity.of(self._scene, parallel=schedule is Schedule.FLAT)
-        program = Program(tuple(models), self.integrator, self.floor is not None, device.threads)
+        program = Program(
+            tuple(models), self.settings.integrator, self.settings.floor is not None, device.threads
+        )
         state = acquire(capacity)
         weakref.finalize(self, release, state)
         state.load(self._scene, [models.index(body._description.model) for body in self._bodies])
-        state.gravity[None] = self.gravity.tolist()
-        state.floor[None] = [self.floor or 0.0, self.restitution, self.friction]
-        self.schedule = schedule
+        chosen = self._settings = replace(self._settings, schedule=schedule)
+        state.gravity[None] = chosen.gravity.tolist()
+        state.floor[None] = [chosen.floor or 0.0, chosen.restitution, chosen.friction]
         self._read = np.empty((self._scene.particle_count, 3), dtype=np.float32)
         self._program, self._state = program, state
         self._launch = make_launch(schedule, state, program, self._scene, device)
@@ -189,8 +212,8 @@ class World:
         self._read_alpha = None
         failed = self._launch(count, h)  # type: ignore[misc]
         reports = self._note_failures(count, h) if failed else []
-        self.step_count += 1
-        self.time += seconds
+        self._step_count += 1
+        self._time += seconds
         for report in reports:
             warnings.warn(report, FrozenBodyWarning, stacklevel=2)
 
@@ -264,14 +287,15 @@ class World:
         rows = np.empty((body.vertex_count, 3), dtype=np.float32)
         read_velocities(self._state, self._scene.ranges[body.index].particles[0], body.vertex_count, rows)
         lag = float(self._state.body_velocity_lag[body.index])
-        if self.integrator is Integrator.LEAPFROG and lag > 0.0 and not body.is_frozen:
+        if self.settings.integrator is Integrator.LEAPFROG and lag > 0.0 and not body.is_frozen:
             forces = np.empty_like(rows)
             compute_body_forces(self._state, self._program, body.index, forces)
             by_vertex = forces[self._scene.bodies[body.index].rank]
-            acceleration = by_vertex / body.masses[:, None] + self.gravity
-            if self.floor is not None:
+            acceleration = by_vertex / body.masses[:, None] + self.settings.gravity
+            floor = self.settings.floor
+            if floor is not None:
                 # What lies on the floor is carried by it: its velocity already is that after contact.
-                acceleration[body.positions()[:, 2] <= self.floor] = 0.0
+                acceleration[body.positions()[:, 2] <= floor] = 0.0
             rows += (0.5 * lag * acceleration).astype(np.float32)
         return rows
 

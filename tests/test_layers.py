@@ -14,7 +14,7 @@ LAYERS = """
     errors  constants
     types  runtime  checks
     math
-    materials  meshing
+    materials  meshing  settings
     laws  collision
     scene
     state  integrators
@@ -25,7 +25,7 @@ LAYERS = """
     render
     engine_adapter
     stages
-    film  experiments  profiling
+    film  profiling
     cli
     __main__
     demos
@@ -38,7 +38,7 @@ LEVEL = {name: level for level, line in enumerate(LAYERS.split("\n")) for name i
 NO_TAICHI = ("errors", "constants", "types", "checks", "materials", "meshing")
 """Parts that are tested in milliseconds: numpy only."""
 
-FACES = ("render", "stages", "film", "experiments", "profiling", "cli", "__main__")
+FACES = ("render", "stages", "film", "profiling", "cli", "__main__")
 """Parts of taichi_soft that lie above its public names."""
 
 

@@ -160,6 +160,32 @@ def test_worlds_that_cannot_be(name, value):
         World(**{name: value})
 
 
+@pytest.mark.parametrize("name", ["settings", "time", "step_count", "bodies", "is_built"])
+def test_a_world_is_not_changed_behind_its_kernels_back(falling, name):
+    world, _ = falling
+    with pytest.raises(AttributeError):
+        setattr(world, name, 3)
+
+
+@pytest.mark.parametrize("name", ["gravity", "floor", "restitution", "friction", "integrator", "schedule"])
+def test_settings_stay_as_they_were_checked(falling, name):
+    world, _ = falling
+    with pytest.raises(AttributeError):
+        setattr(world.settings, name, 0.5)
+    with pytest.raises(ValueError, match="read-only"):
+        world.settings.gravity[2] = 0.0
+
+
+def test_settings_say_which_schedule_was_chosen(cube, jelly):
+    world = World(gravity=(0, 0, -1.6), floor=None, integrator="explicit_euler")
+    assert world.settings.schedule == "auto"
+    world.add_body(cube, jelly)
+    world.build()
+    found = world.settings
+    assert (found.schedule, found.floor, found.integrator) == ("per_body", None, "explicit_euler")
+    assert found.gravity.tolist() == [0, 0, -1.6]
+
+
 SHEAR = [[1, 0.1, 0], [0, 1, 0], [0, 0, 1]]
 MIRROR = np.diag([1.0, 1.0, -1.0])
 

@@ -1,0 +1,22 @@
+"""What holds for all bodies of a world."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.types import Integrator, Schedule
+
+
+@dataclass(frozen=True, eq=False)
+class Settings:
+    """The checked arguments of a world. They stay as they are: its kernels are compiled for them."""
+
+    gravity: NDArray[np.float64]  # (3,) [m/s^2], read-only
+    floor: float | None  # height [m]
+    restitution: float
+    friction: float
+    integrator: Integrator
+    schedule: Schedule  # as chosen by `World.build`; AUTO before where it is left open
