@@ -99,6 +99,9 @@ def demo(
             f"{name}: {report.simulated:.2f} s simulated, median {median:.2f} ms per frame of "
             f"{1e3 / fps:.1f} ms: {report.real_time_factor:.1f} x faster than real time"
         )
+    if len(report.draw_times):
+        median = sorted(report.draw_times)[len(report.draw_times) // 2] * 1e3
+        _say(f"a picture of {size} took {median:.1f} ms to draw, at the median")
 
 
 def _say(line: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -31,7 +32,7 @@ class Actor:
 
     body: Body
     color: Color = PALETTE[0]
-    paint: Paint | None = None  # vertex colours (n, 3) of the present moment, instead of `color`
+    paint: Paint | None = None  # vertex colours (n, 3) after the last step, instead of `color`
     label: str = ""  # below the body
 
 
@@ -56,6 +57,7 @@ class FilmReport:
     fps: float
     simulated: float  # time that passed in the world [s]
     step_times: NDArray[np.float64]  # of stepping and reading each frame [s], without those that compile
+    draw_times: NDArray[np.float64]  # of drawing each frame [s], likewise; empty where nothing is drawn
 
     @property
     def real_time_factor(self) -> float:
@@ -94,20 +96,22 @@ def film(
         )
     start = stage.world.time
     take = _Take(stage, fps)
-    if path is None:
-        for number in range(count):
-            take.play(number)
-            if on_frame:
-                on_frame(number + 1, count)
-        return FilmReport(None, count, fps, stage.world.time - start, np.array(take.times[_COMPILING:]))
-    artist = _Artist(stage, size, fps)
-    with VideoWriter(path, fps=fps, size=size) as writer:
+    artist = None if path is None else _Artist(stage, size, fps)
+    with nullcontext() if path is None else VideoWriter(path, fps=fps, size=size) as writer:
         for number in range(count):
             positions = take.play(number)
-            writer.write(artist.draw(positions, number, take.times))
+            if artist and writer:
+                writer.write(artist.draw(positions, take.adapter.time, take.times))
             if on_frame:
                 on_frame(number + 1, count)
-    return FilmReport(Path(path), count, fps, stage.world.time - start, np.array(take.times[_COMPILING:]))
+    return FilmReport(
+        None if path is None else Path(path),
+        count,
+        fps,
+        stage.world.time - start,
+        np.array(take.times[_COMPILING:]),
+        np.array(artist.times[_COMPILING:] if artist else []),
+    )
 
 
 class _Take:
@@ -138,24 +142,28 @@ class _Artist:
         self.stage = stage
         self.fps = fps
         self.renderer = Renderer(*size, camera=stage.camera, floor=stage.world.settings.floor)
+        self.times: list[float] = []
         self.surfaces = [Surface.of(actor.body.mesh, color=actor.color) for actor in stage.actors]
 
     def draw(
-        self, positions: list[NDArray[np.float32]], number: int, times: list[float]
+        self, positions: list[NDArray[np.float32]], moment: float, step_times: list[float]
     ) -> NDArray[np.uint8]:
-        """The picture of the present moment."""
+        """The picture of the bodies at `positions`, where they are at `moment` [s]."""
+        start = time.perf_counter()
         for actor, surface, rows in zip(self.stage.actors, self.surfaces, positions, strict=True):
             surface.positions = rows
             if actor.paint:
                 surface.color = actor.paint(actor.body)
         picture = self.renderer.render(self.surfaces)
         self._draw_labels(picture, positions)
-        lines = [self.stage.title, f"t = {number / self.fps:.2f} s"]
-        recent = times[_COMPILING:][-25:]
+        lines = [self.stage.title, f"t = {moment:.2f} s"]
+        recent = step_times[_COMPILING:][-25:]
         if recent:
             mean = float(np.mean(recent))
             lines.append(f"step {mean * 1e3:.2f} ms, {1.0 / self.fps / mean:.0f} x real time")
-        return draw_text(picture, lines)
+        draw_text(picture, lines)
+        self.times.append(time.perf_counter() - start)
+        return picture
 
     def _draw_labels(self, picture: NDArray[np.uint8], positions: list[NDArray[np.float32]]) -> None:
         """A caption on the floor in front of each body that has one."""

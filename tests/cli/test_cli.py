@@ -42,6 +42,7 @@ def test_demo_writes_a_film_and_says_how_much_faster_than_real_time_it_ran(tmp_p
     capture = cv2.VideoCapture(str(film))
     assert int(capture.get(cv2.CAP_PROP_FRAME_COUNT)) == 10
     assert "faster than real time" in done.stdout.replace("\n", " ")
+    assert "a picture of 128x96 took" in done.stdout
     assert done.stderr == ""
 
 

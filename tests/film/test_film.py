@@ -7,7 +7,7 @@ import pytest
 from engine_adapter import FixedStep
 from taichi_soft import Material, OptionError, VideoError, World, box
 from taichi_soft.film import Actor, Stage, film
-from taichi_soft.render import Camera
+from taichi_soft.render import Camera, Renderer
 
 
 def falling_box(dt: float = 1 / 50) -> Stage:
@@ -23,10 +23,28 @@ def test_frames_show_every_fixed_step_where_both_rates_agree(tmp_path):
     seen = []
     report = film(stage, tmp_path / "b.mp4", size=(160, 120), on_frame=lambda *now: seen.append(now))
     assert report.frames == 50
+    assert len(report.draw_times) == 48
     assert seen == [(i + 1, 50) for i in range(50)]
     assert stage.world.step_count == 49
     assert report.simulated == pytest.approx(0.98)
     assert int(cv2.VideoCapture(str(report.path)).get(cv2.CAP_PROP_FRAME_COUNT)) == 50
+
+
+def test_the_time_in_the_picture_is_that_of_the_body_in_it(tmp_path, monkeypatch):
+    """In free fall from z0 the lowest point is at z0 - g t^2 / 2 at the time that the panel tells."""
+    told, drawn = [], []
+    monkeypatch.setattr("taichi_soft.film.draw_text", lambda picture, lines: told.append(lines[1]))
+    original = Renderer.render
+
+    def watched(self, surfaces):
+        drawn.append(surfaces[0].positions[:, 2].min())
+        return original(self, surfaces)
+
+    monkeypatch.setattr(Renderer, "render", watched)
+    film(falling_box(), tmp_path / "b.png", seconds=0.5, size=(160, 120))
+    times = np.array([float(line.split()[2]) for line in told])
+    assert times[-1] == pytest.approx(0.46)  # of 0.48 put in: one step behind, to interpolate
+    np.testing.assert_allclose(drawn, 3.5 - 0.5 * 9.81 * times**2, atol=1e-5)
 
 
 def test_the_real_time_factor_is_simulated_time_over_time_taken():
@@ -35,6 +53,7 @@ def test_the_real_time_factor_is_simulated_time_over_time_taken():
     expected = len(report.step_times) * 0.02 / report.step_times.sum()
     assert report.real_time_factor == pytest.approx(expected)
     assert report.path is None
+    assert len(report.draw_times) == 0
 
 
 def test_the_picture_changes_as_the_body_falls(tmp_path):
