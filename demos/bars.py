@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from engine_adapter import FixedStep
 from taichi_soft import Body, Material, World, load_mesh
+from taichi_soft.cli import main
 from taichi_soft.film import Actor, Stage
 from taichi_soft.render import Camera, colormap
 from taichi_soft.stages import ASSETS
@@ -43,3 +44,7 @@ def proof(stage: Stage) -> float:
     """Volume over the volume at rest."""
     body = stage.actors[0].body
     return body.volume() / body.mesh.volume
+
+
+if __name__ == "__main__":
+    main("demo", "bars")

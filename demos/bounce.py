@@ -2,6 +2,7 @@
 
 from engine_adapter import FixedStep
 from taichi_soft import World, load_mesh, preset
+from taichi_soft.cli import main
 from taichi_soft.film import Actor, Stage
 from taichi_soft.render import Camera
 from taichi_soft.stages import ASSETS
@@ -17,7 +18,9 @@ def stage() -> Stage:
     world.build()
     camera = Camera.framing((-1.5, -1.5, 0.0), (1.5, 1.5, HEIGHT + 2.0), aspect=16 / 9, elevation=8.0)
     step = FixedStep(dt=1 / 50, substeps=14)
-    return Stage("sphere, E = 1 MPa, 968 tetrahedra", world, [Actor(body)], camera, step, seconds=8.0)
+    return Stage(
+        f"sphere, E = 1 MPa, {len(mesh.tets)} tetrahedra", world, [Actor(body)], camera, step, seconds=8.0
+    )
 
 
 def proof(stage: Stage) -> float:
@@ -25,3 +28,7 @@ def proof(stage: Stage) -> float:
     body = stage.actors[0].body
     start = body.masses @ body.mesh.vertices[:, 2] / body.masses.sum() + HEIGHT - body.mesh.bounds[0][2]
     return float(start - body.center_of_mass()[2])
+
+
+if __name__ == "__main__":
+    main("demo", "bounce")

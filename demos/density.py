@@ -4,6 +4,7 @@ import numpy as np
 
 from engine_adapter import FixedStep
 from taichi_soft import Material, World, box
+from taichi_soft.cli import main
 from taichi_soft.film import Actor, Stage
 from taichi_soft.render import Camera, colormap
 
@@ -31,3 +32,7 @@ def proof(stage: Stage) -> float:
     body = stage.actors[0].body
     x, now = body.mesh.vertices[:, 0], body.positions()[:, 2]
     return float(now[x < x.min() + 0.1].mean() - now[x > x.max() - 0.1].mean())
+
+
+if __name__ == "__main__":
+    main("demo", "density")

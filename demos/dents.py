@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from engine_adapter import FixedStep
 from taichi_soft import Body, Material, World, load_mesh
+from taichi_soft.cli import main
 from taichi_soft.film import Actor, Stage
 from taichi_soft.render import PALETTE, Camera, highlight
 from taichi_soft.stages import ASSETS
@@ -42,3 +43,7 @@ def proof(stage: Stage) -> float:
     """Flipped tetrahedra of the tolerant sphere less those of the recovering one."""
     tolerant, recover = (actor.body.flipped_count() for actor in stage.actors)
     return float(tolerant - recover)
+
+
+if __name__ == "__main__":
+    main("demo", "dents")

@@ -2,6 +2,7 @@
 
 from engine_adapter import FixedStep
 from taichi_soft import World, load_mesh, preset
+from taichi_soft.cli import main
 from taichi_soft.film import Actor, Stage
 from taichi_soft.render import PALETTE, Camera
 from taichi_soft.stages import ASSETS
@@ -30,3 +31,7 @@ def stage() -> Stage:
 def proof(stage: Stage) -> float:
     """Number of spheres that are whole: no flipped tetrahedron, not frozen."""
     return float(sum(a.body.flipped_count() == 0 and not a.body.is_frozen for a in stage.actors))
+
+
+if __name__ == "__main__":
+    main("demo", "many")

@@ -27,6 +27,7 @@ from taichi_soft.meshing import (
     load_mesh,
     save_mesh,
     sphere,
+    surface_mesh,
     torus,
     voxels,
 )
@@ -69,6 +70,7 @@ __all__ = [
     "save_mesh",
     "sphere",
     "stable_step",
+    "surface_mesh",
     "torus",
     "voxels",
 ]

@@ -18,6 +18,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from taichi_soft.errors import OptionError, TaichiSoftError
+from taichi_soft.materials import Material
 from taichi_soft.runtime import Device, init
 
 app = typer.Typer(
@@ -35,11 +36,15 @@ Threads = Annotated[int | None, typer.Option(help="CPU threads; one per core by 
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")]
 
 
-def main() -> None:
-    """Run the command line; an error of ours is one line and exit code 1, a wrong option 2."""
+def main(*arguments: str) -> None:
+    """Run the command line; an error of ours is one line and exit code 1, a wrong option 2.
+
+    Args:
+        arguments: to run with; without any, those of the process.
+    """
     warnings.showwarning = _show_warning  # type: ignore[assignment]
     try:
-        app()
+        app(arguments or None)
     except TaichiSoftError as error:
         errors.print(f"[bold red]error:[/] {escape(str(error))}", soft_wrap=True, highlight=False)
         sys.exit(1)
@@ -130,16 +135,24 @@ def info(arch: Arch = "auto", threads: Threads = None, as_json: AsJson = False) 
         "platform": platform.platform(),
         "c++ compiler": find_compiler() or "none",
         **{name: _version_of(name) for name in ("taichi-soft", "taichi", "numpy", "opencv-python-headless")},
-        "laws": ", ".join(LAWS),
-        "materials": ", ".join(PRESETS),
+        "laws": {law.name: f"{law.summary} (thesis {law.section})" for law in LAWS.values()},
+        "materials": {name: _material_line(material) for name, material in PRESETS.items()},
     }
     if as_json:
         print(json.dumps(facts, indent=2))
         return
     table = Table(show_header=False, box=None)
     for key, value in facts.items():
-        table.add_row(f"[bold]{key}[/]", str(value))
+        lines = [f"{name}: {text}" for name, text in value.items()] if isinstance(value, dict) else [value]
+        table.add_row(f"[bold]{key}[/]", escape("\n".join(map(str, lines))))
     console.print(table)
+
+
+def _material_line(material: Material) -> str:
+    return (
+        f"E = {material.young:g} Pa, nu = {material.poisson:g}, {material.density:g} kg/m^3, "
+        f"b = {material.damping:g} N s/m"
+    )
 
 
 def _device_facts(device: Device) -> dict[str, Any]:

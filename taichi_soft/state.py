@@ -82,7 +82,7 @@ class State:
             self.corner_slot = ti.field(ti.i32, b * 4 * LANES)  # where a corner's x lies in corner_force
             self.particle_edges = ti.Vector.field(2, ti.i32, n)  # range in incident_edge
             self.incident_edge = ti.field(ti.i32, 2 * k)  # e as first end, -1 - e as second
-            self.barrier = ti.field(ti.i32, 2)
+            self.barrier = ti.field(ti.i32, 1)
 
         self.body_particles = ti.Vector.field(2, ti.i32, bodies)  # range
         self.body_edges = ti.Vector.field(2, ti.i32, bodies)

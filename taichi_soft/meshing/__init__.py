@@ -6,6 +6,7 @@ from taichi_soft.meshing.ordering import renumbered, spatial_order, tet_order
 from taichi_soft.meshing.particle_mesh import ParticleMesh
 from taichi_soft.meshing.quality import MeshQuality
 from taichi_soft.meshing.shapes import beam, box, cylinder, extrude, sphere, torus, voxels
+from taichi_soft.meshing.surface_mesh import surface_mesh
 from taichi_soft.meshing.tet_mesh import TetMesh
 
 __all__ = [
@@ -22,6 +23,7 @@ __all__ = [
     "save_mesh",
     "spatial_order",
     "sphere",
+    "surface_mesh",
     "tet_order",
     "torus",
     "voxels",

@@ -11,7 +11,7 @@ from taichi_soft.laws import element_model
 from taichi_soft.materials import Material
 from taichi_soft.meshing import box
 from taichi_soft.profiling.baseline import Baseline, compile_baseline
-from taichi_soft.profiling.spread import Spread, time_in_turns
+from taichi_soft.profiling.spread import Spread, compare
 from taichi_soft.scene import BodyDescription, arrange
 from taichi_soft.world import World
 
@@ -55,19 +55,8 @@ def compare_with_baseline(
         native.positions[:] = stretched[arrays.order]
         substeps = max(4, 2_000_000 // len(mesh.tets) // 10)
         dt = substeps * SUBSTEP
-        calls = [partial(world.step, dt, substeps), partial(native.step, substeps, SUBSTEP)]
-        time_in_turns(calls, 2)
-        ours, theirs = time_in_turns(calls, repeats)
+        ours, theirs = partial(world.step, dt, substeps), partial(native.step, substeps, SUBSTEP)
+        spreads = compare(ours, theirs, repeats, 1e9 / substeps / len(mesh.tets))
         moved = np.abs(body.positions()[arrays.order] - native.positions).max()
-        per = 1e9 / substeps / len(mesh.tets)
-        ratios = [a / b for a, b in zip(ours, theirs, strict=True)]
-        found.append(
-            Comparison(
-                len(mesh.tets),
-                Spread.of(ours).scaled(per),
-                Spread.of(theirs).scaled(per),
-                Spread.of(ratios),
-                float(moved / np.ptp(mesh.vertices)),
-            )
-        )
+        found.append(Comparison(len(mesh.tets), *spreads, float(moved / np.ptp(mesh.vertices))))
     return found

@@ -8,7 +8,7 @@ from functools import partial
 
 from taichi_soft.meshing import box
 from taichi_soft.profiling.phases import spheres
-from taichi_soft.profiling.spread import Spread, time_in_turns
+from taichi_soft.profiling.spread import Spread, compare
 
 CELLS = (6, 10, 14, 18, 22, 28)
 SUBSTEPS = 20
@@ -19,8 +19,8 @@ class Crossover:
     """One body under both schedules [ns per tetrahedron and substep]."""
 
     tets: int
-    per_body: Spread
     flat: Spread
+    per_body: Spread
     ratio: Spread  # flat over per_body, pair by pair
 
 
@@ -29,19 +29,11 @@ def measure_crossover(repeats: int = 21, cells: Sequence[int] = CELLS) -> list[C
     found = []
     for n in cells:
         mesh = box((1.0, 1.0, 1.0), (n, n, n))
-        worlds = [spheres(1, schedule, mesh) for schedule in ("per_body", "flat")]
-        dt = SUBSTEPS * 1e-6
-        calls = [partial(world.step, dt, SUBSTEPS) for world in worlds]
-        time_in_turns(calls, 2)
-        one, all_threads = time_in_turns(calls, repeats)
-        per = 1e9 / SUBSTEPS / len(mesh.tets)
-        ratios = [b / a for a, b in zip(one, all_threads, strict=True)]
+        flat, per_body = (
+            partial(spheres(1, schedule, mesh).step, SUBSTEPS * 1e-6, SUBSTEPS)
+            for schedule in ("flat", "per_body")
+        )
         found.append(
-            Crossover(
-                len(mesh.tets),
-                Spread.of(one).scaled(per),
-                Spread.of(all_threads).scaled(per),
-                Spread.of(ratios),
-            )
+            Crossover(len(mesh.tets), *compare(flat, per_body, repeats, 1e9 / SUBSTEPS / len(mesh.tets)))
         )
     return found

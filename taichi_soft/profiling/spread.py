@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from time import perf_counter
 
@@ -41,13 +41,14 @@ def time_calls(call: Callable[[], object], repeats: int) -> list[float]:
     return times
 
 
-def time_in_turns(calls: Sequence[Callable[[], object]], repeats: int) -> list[list[float]]:
-    """As `time_calls` for several calls, one after the other in every round.
+def compare(
+    one: Callable[[], object], other: Callable[[], object], repeats: int, unit: float
+) -> tuple[Spread, Spread, Spread]:
+    """Time two calls in turns, after two rounds to warm up.
 
-    A machine that slows down for a while then slows all of them, and their ratio holds.
+    A machine that slows down for a while then slows both, and their ratio holds.
+    Returns: the times of each, in seconds times `unit`, and `one` over `other`, pair by pair.
     """
-    times: list[list[float]] = [[] for _ in calls]
-    for _ in range(repeats):
-        for row, call in zip(times, calls, strict=True):
-            row.extend(time_calls(call, 1))
-    return times
+    pairs = [(time_calls(one, 1)[0], time_calls(other, 1)[0]) for _ in range(repeats + 2)][2:]
+    ones, others = ([pair[i] for pair in pairs] for i in (0, 1))
+    return Spread.of(ones).scaled(unit), Spread.of(others).scaled(unit), Spread.of([a / b for a, b in pairs])
