@@ -18,9 +18,8 @@ def stage() -> Stage:
     world.build()
     camera = Camera.framing((-1.5, -1.5, 0.0), (1.5, 1.5, HEIGHT + 2.0), aspect=16 / 9, elevation=8.0)
     step = FixedStep(dt=1 / 50, substeps=14)
-    return Stage(
-        f"sphere, E = 1 MPa, {len(mesh.tets)} tetrahedra", world, [Actor(body)], camera, step, seconds=8.0
-    )
+    title = f"sphere, E = 1 MPa, {len(mesh.tets)} tetrahedra"
+    return Stage(title, world, [Actor(body)], camera, step, seconds=8.0)
 
 
 def proof(stage: Stage) -> float:

@@ -135,22 +135,23 @@ def info(arch: Arch = "auto", threads: Threads = None, as_json: AsJson = False) 
         "platform": platform.platform(),
         "c++ compiler": find_compiler() or "none",
         **{name: _version_of(name) for name in ("taichi-soft", "taichi", "numpy", "opencv-python-headless")},
-        "laws": {law.name: f"{law.summary} (thesis {law.section})" for law in LAWS.values()},
-        "materials": {name: _material_line(material) for name, material in PRESETS.items()},
+        "law": {law.name: f"{law.summary} (thesis {law.section})" for law in LAWS.values()},
+        "material": {name: _material_line(material) for name, material in PRESETS.items()},
     }
     if as_json:
         print(json.dumps(facts, indent=2))
         return
     table = Table(show_header=False, box=None)
     for key, value in facts.items():
-        lines = [f"{name}: {text}" for name, text in value.items()] if isinstance(value, dict) else [value]
-        table.add_row(f"[bold]{key}[/]", escape("\n".join(map(str, lines))))
+        rows = value.items() if isinstance(value, dict) else [("", value)]
+        for name, text in rows:
+            table.add_row(f"[bold]{key}[/] {name}", escape(str(text)))
     console.print(table)
 
 
 def _material_line(material: Material) -> str:
     return (
-        f"E = {material.young:g} Pa, nu = {material.poisson:g}, {material.density:g} kg/m^3, "
+        f"E = {material.young / 1e6:g} MPa, nu = {material.poisson:g}, {material.density:g} kg/m^3, "
         f"b = {material.damping:g} N s/m"
     )
 

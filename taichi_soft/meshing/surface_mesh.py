@@ -23,8 +23,8 @@ def surface_mesh(mesh: TetMesh, positions: ArrayLike | None = None) -> trimesh.T
     Args:
         mesh: whose surface.
         positions: of all vertices, (n, 3) [m], such as `Body.positions()` gives; None takes the rest shape.
-    Returns: a `trimesh.Trimesh` of its own arrays, triangles counterclockwise seen from outside; z is up, also
-        in a file.
+    Returns: a `trimesh.Trimesh` of its own arrays, triangles counterclockwise seen from outside. z is up,
+        in files too.
     Raises: MeshError for something else than a TetMesh or positions that do not fit.
     """
     if not isinstance(mesh, TetMesh):

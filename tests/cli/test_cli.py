@@ -79,8 +79,8 @@ def test_info_says_which_device_and_versions():
     assert facts["device"] == "cpu"
     assert facts["threads"] == 1
     assert facts["taichi"] == "1.7.4"
-    assert facts["laws"]["virial"] == "stress to vertex forces by the virial theorem (thesis 6.3)"
-    assert facts["materials"]["thesis_sphere"].startswith("E = 1e+06 Pa, nu = 0.1")
+    assert facts["law"]["virial"] == "stress to vertex forces by the virial theorem (thesis 6.3)"
+    assert facts["material"]["thesis_sphere"].startswith("E = 1 MPa, nu = 0.1")
 
 
 def test_profile_prints_phases_and_budgets_as_json():
