@@ -8,12 +8,13 @@ fail() {
     echo "taichi-soft: $1" >&2
     exit 1
 }
+no_install="the packages could not be installed, for the reason above (without a network: give pip an index or a cache)"
 supported='import sys; sys.exit(not (3, 10) <= sys.version_info[:2] <= (3, 13))'
 
 if [ -z "${PYTHON:-}" ] && command -v uv >/dev/null 2>&1; then
     rm -rf "$venv"
     uv venv --quiet --python ">=3.10,<3.14" "$venv" || fail "uv found no Python 3.10 to 3.13"
-    uv pip install --quiet --python "$venv/bin/python" -e ".[dev]"
+    uv pip install --quiet --python "$venv/bin/python" -e ".[dev]" || fail "$no_install"
     exit 0
 fi
 
@@ -36,5 +37,5 @@ fi
 
 echo "setting up $venv with $("$python" --version)"
 rm -rf "$venv"
-"$python" -m venv "$venv"
-"$venv/bin/python" -m pip install --quiet --disable-pip-version-check -e ".[dev]"
+"$python" -m venv "$venv" || fail "$python could not make $venv, for the reason above"
+"$venv/bin/python" -m pip install --quiet --disable-pip-version-check -e ".[dev]" || fail "$no_install"

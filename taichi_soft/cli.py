@@ -211,5 +211,6 @@ def profile(
         print(json.dumps({"device": _device_facts(device), **rows}, indent=2))
         return
     _say(f"{device.arch}, {device.threads} threads ({device.reason})")
-    for table in report.tables(found):
+    for title, table in report.tables(found):
+        _say(f"\n[bold]{escape(title)}[/]")  # not the table's own title, which breaks at the table's width
         console.print(table)

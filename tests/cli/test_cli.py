@@ -7,6 +7,8 @@ import sys
 import cv2
 import pytest
 
+from taichi_soft.profiling import find_compiler
+
 
 def run(*arguments: str, cwd=None) -> subprocess.CompletedProcess:
     return subprocess.run(
@@ -93,6 +95,15 @@ def test_profile_prints_phases_and_budgets_as_json():
     for spread in (*measured["phases"].values(), measured["frame"], measured["python"]):
         assert 0 < spread["least"] <= spread["median"] <= spread["p99"] <= spread["most"]
     assert found["budget"][0]["tets"] == found["budget"][0]["bodies"] * measured["tets"] // 2
+
+
+@pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler here")
+def test_profile_compares_with_cpp_threads_and_a_cold_start():
+    options = ("--baseline", "--scaling", "--startup", "--repeats", "3", "--bodies", "1")
+    done = run("profile", *options, "--threads", "2", "--arch", "cpu")
+    assert done.returncode == 0, done.stderr
+    for title in ("Against plain C++", "64 spheres on several threads", "A new process to its first frame"):
+        assert title in done.stdout
 
 
 def test_profile_prints_tables_for_people():

@@ -6,6 +6,7 @@ import sys
 import pytest
 
 from taichi_soft.profiling import compare_with_baseline, find_compiler, measure_crossover
+from taichi_soft.profiling.report import tables
 from taichi_soft.profiling.spread import Spread
 
 needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler here")
@@ -28,6 +29,9 @@ def test_the_baseline_moves_a_body_as_the_kernels_do():
 def test_the_crossover_times_both_schedules():
     rows = measure_crossover(3, cells=(3,))
     assert rows[0].ratio.median > 0
+    ((title, table),) = tables({"crossover": rows})
+    assert "flat against per_body" in title
+    assert table.row_count == 1
 
 
 def test_a_missing_compiler_gives_one_line():
