@@ -169,7 +169,7 @@ def _version_of(name: str) -> str:
 
 @app.command()
 def profile(
-    bodies: Annotated[int, typer.Option(min=1, max=4096, help="Spheres of about 1,000 tetrahedra.")] = 16,
+    bodies: Annotated[int, typer.Option(min=1, max=4096, help="Spheres of 1,280 tetrahedra.")] = 16,
     baseline: Annotated[
         bool, typer.Option("--baseline", help="Compare with plain C++ on one thread.")
     ] = False,

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 
 from taichi_soft import LAWS, PRESETS
 from taichi_soft.stages import demo_names
@@ -17,24 +18,33 @@ TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
 
 
-def run_block(number: int) -> dict:
+def run_blocks(*numbers: int) -> dict:
     names: dict = {}
-    exec(compile(BLOCKS[number], f"README block {number}", "exec"), names)
+    for number in numbers:
+        exec(compile(BLOCKS[number], f"README block {number}", "exec"), names)
     return names
 
 
 def test_the_ten_lines_of_embedding_code_drop_a_ball_onto_the_floor():
     lines = [line for line in BLOCKS[0].splitlines() if line and not line.startswith(("import", "from"))]
     assert len(lines) <= 10
-    names = run_block(0)
+    names = run_blocks(0)
     assert names["game"].total_dropped_time == 0.0
     assert names["world"].step_count == pytest.approx(90 / 75 * 60, abs=1)
     assert np.isfinite(names["vertices"]).all()
     assert -0.01 < names["vertices"][:, 2].min() < 1.2
 
 
+def test_the_surface_example_writes_the_ball_where_it_lies(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names = run_blocks(0, 1)
+    found = trimesh.load(tmp_path / "ball.glb", force="mesh")
+    assert found.volume == pytest.approx(names["ball"].volume(), rel=1e-4)
+    assert found.bounds[0, 2] == pytest.approx(names["ball"].positions()[:, 2].min(), abs=1e-5)
+
+
 def test_the_force_example_pulls_a_stretched_box_together():
-    names = run_block(1)
+    names = run_blocks(2)
     top = names["mesh"].vertices[:, 2] > names["mesh"].vertices[:, 2].max() - 1e-9
     force = names["forces"][top, 2].sum()
     strain = (1.01**2 - 1) / 2

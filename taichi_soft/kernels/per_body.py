@@ -1,7 +1,7 @@
 """Schedule `per_body`: each body runs all substeps of a step on one thread, bodies side by side.
 
-Nothing waits between substeps and a body stays in one core's cache, so this is the fastest schedule for
-bodies of up to some ten thousand tetrahedra, and its result does not depend on the number of threads.
+Nothing waits between substeps and a body stays in one core's cache. The result does not depend on the number
+of threads.
 """
 
 from taichi_soft.kernels.damping import accumulate_edge_damping

@@ -33,7 +33,7 @@ class Phases:
 
 
 def spheres(count: int, schedule: str = "auto", mesh: TetMesh | None = None) -> World:
-    """A built world of equal spheres of about a thousand tetrahedra, each in free fall."""
+    """A built world of equal bodies in free fall, spheres of 1,280 tetrahedra unless `mesh` is given."""
     mesh = mesh or sphere(radius=1.0, resolution=4)
     world = World(schedule=schedule)
     side = int(np.ceil(np.sqrt(count)))
