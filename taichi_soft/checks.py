@@ -19,7 +19,7 @@ LARGEST_COUNT = 1_000_000
 def as_number(value: Any, name: str, low: float, high: float, text: str = "") -> float:
     """`value` as a float within [low, high]. Raises: OptionError saying `text`, or the range."""
     wanted = text or f"a number from {low:g} to {high:g}"
-    if isinstance(value, (bool, np.bool_, str)) or np.ndim(value) != 0:
+    if isinstance(value, (bool, np.bool_, str)) or getattr(value, "ndim", 0) != 0:
         raise OptionError(f"{name} must be {wanted}, got {value!r}")
     try:
         number = float(value)
@@ -76,14 +76,14 @@ def as_array(values: ArrayLike, name: str, shape: tuple[int | None, ...], unit: 
     return real
 
 
-def as_rotation(value: ArrayLike | None) -> Floats:
+def as_rotation(value: Any) -> Floats:
     """A rotation matrix from a matrix (3, 3), a quaternion (x, y, z, w), or None for no rotation.
 
     Raises: OptionError if it is neither orthonormal with determinant +1 nor of length 1.
     """
     if value is None:
         return np.eye(3)
-    if np.shape(value) == (4,):
+    if hasattr(value, "__len__") and getattr(value, "ndim", 1) == 1 and len(value) == 4:
         q = as_array(value, "rotation", (4,), "quaternion x, y, z, w")
         length = float(np.linalg.norm(q))
         if abs(length - 1.0) > 1e-3:
@@ -96,7 +96,7 @@ def as_rotation(value: ArrayLike | None) -> Floats:
                 [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
             ]
         )
-    matrix = as_array(value, "rotation", (3, 3), "matrix, or quaternion of shape (4,)")
+    matrix = as_array(value, "rotation", (3, 3), "or quaternion of shape (4,)")
     if np.abs(matrix @ matrix.T - np.eye(3)).max() > 1e-5 or np.linalg.det(matrix) < 0:
         raise OptionError("rotation must be an orthonormal matrix with determinant +1")
     return matrix

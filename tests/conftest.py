@@ -2,6 +2,7 @@
 
 import gc
 
+import numpy as np
 import pytest
 from hypothesis import settings
 
@@ -21,3 +22,31 @@ def release_worlds():
     """World and bodies name each other, so only the collector ends them."""
     yield
     gc.collect()
+
+
+def _read_only(n):
+    rows = np.zeros((n, 3), dtype=np.float32)
+    rows.flags.writeable = False
+    return rows
+
+
+@pytest.fixture(
+    params=[
+        lambda n: np.zeros((n, 3)),
+        lambda n: np.zeros((n, 3), dtype=np.int32),
+        lambda n: np.zeros((n, 3), dtype=">f4"),
+        lambda n: np.zeros((n - 1, 3), dtype=np.float32),
+        lambda n: np.zeros((n, 4), dtype=np.float32),
+        lambda n: np.zeros(3 * n, dtype=np.float32),
+        lambda n: np.zeros((1, n, 3), dtype=np.float32),
+        lambda n: np.zeros((3, n), dtype=np.float32).T,
+        lambda n: np.zeros((2 * n, 3), dtype=np.float32)[::2],
+        lambda n: np.zeros((n, 4), dtype=np.float32)[:, :3],
+        _read_only,
+        lambda n: [[0.0] * 3] * n,
+        lambda n: memoryview(bytearray(12 * n)),
+    ]
+)
+def unfit_buffer(request):
+    """Makes what is no C-contiguous, writeable float32 array of shape (n, 3)."""
+    return request.param

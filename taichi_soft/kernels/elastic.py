@@ -1,7 +1,7 @@
 """Elastic forces of tetrahedra: loads values, calls the law, stores corner forces.
 
 The lanes of a block run in one loop that reads fields and writes local arrays only. Then LLVM's loop
-vectoriser turns the eight lanes into one pass over vector registers (`taichi-soft profile --baseline` shows it).
+vectoriser turns the eight lanes into one pass over vector registers (see `taichi-soft profile --baseline`).
 It needs two things that are easy to lose: nothing in the loop may store to a field (it could overlap what
 the next lane reads), and index arithmetic must be seen not to overflow, which masking by `BLOCK_BITS` shows.
 """

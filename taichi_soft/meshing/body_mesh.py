@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from functools import cached_property
-from typing import Any, NoReturn, TypeVar
+from typing import NoReturn, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from taichi_soft.errors import MeshError
-from taichi_soft.meshing.arrays import FloatArray, IntArray, as_real, read_only
+from taichi_soft.checks import as_array, as_positive, as_rotation
+from taichi_soft.meshing.arrays import FloatArray, IntArray, read_only
 
 Self = TypeVar("Self", bound="BodyMesh")
-
-# How far a rotation matrix may be from orthonormal: the rounding of a float32 matrix, with room.
-ROTATION_TOLERANCE = 1e-5
 
 
 class BodyMesh(ABC):
@@ -65,25 +62,16 @@ class BodyMesh(ABC):
         return np.stack([self.vertices.min(axis=0), self.vertices.max(axis=0)])
 
     def translated(self: Self, offset: ArrayLike) -> Self:
-        """A copy moved by `offset` (3,) [m]. Raises: MeshError if it is not three finite numbers."""
-        return self._with_vertices(self.vertices + as_real(offset, "offset", (3,), "offset component"))
+        """A copy moved by `offset` (3,) [m]. Raises: OptionError if it is not three finite numbers."""
+        return self._with_vertices(self.vertices + as_array(offset, "offset", (3,), "m"))
 
     def scaled(self: Self, factor: float) -> Self:
-        """A copy `factor` times as large about the origin. Raises: MeshError if factor is not positive."""
-        if not (np.ndim(factor) == 0 and np.isfinite(factor) and factor > 0):
-            raise MeshError(f"factor is {factor!r}: pass one positive number")
-        return self._with_vertices(self.vertices * float(factor))
+        """A copy `factor` times as large about the origin. Raises: OptionError if factor is not positive."""
+        return self._with_vertices(self.vertices * as_positive(factor, "factor", "(one number)"))
 
-    def rotated(self: Self, matrix: ArrayLike) -> Self:
-        """A copy turned about the origin: each vertex x becomes `matrix @ x`.
+    def rotated(self: Self, rotation: ArrayLike) -> Self:
+        """A copy turned about the origin by a matrix (3, 3) or a quaternion (x, y, z, w).
 
-        Raises: MeshError if `matrix` (3, 3) is not a rotation (orthonormal, determinant +1).
+        Raises: OptionError if it is no rotation.
         """
-        rotation: Any = as_real(matrix, "matrix", (3, 3), "matrix row")
-        error = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
-        if error > ROTATION_TOLERANCE or np.linalg.det(rotation) < 0:
-            raise MeshError(
-                f"matrix is not a rotation (off from orthonormal by {error:.2g}, determinant "
-                f"{np.linalg.det(rotation):.3g}): pass an orthonormal matrix with determinant +1"
-            )
-        return self._with_vertices(self.vertices @ rotation.T)
+        return self._with_vertices(self.vertices @ as_rotation(rotation).T)

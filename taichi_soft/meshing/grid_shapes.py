@@ -71,7 +71,7 @@ def voxels(mask: ArrayLike, spacing: float | tuple[float, ...] = 1.0) -> TetMesh
     filled = np.asarray(mask)
     if filled.dtype != np.bool_ or filled.ndim != 3:
         raise MeshError(f"mask has shape {filled.shape}, dtype {filled.dtype}: pass bool (nx, ny, nz)")
-    steps = (spacing,) * 3 if np.ndim(spacing) == 0 else spacing
+    steps = spacing if hasattr(spacing, "__len__") else (spacing,) * 3
     edges = _lengths("spacing", steps)
     cells = np.argwhere(filled)
     if len(cells) == 0:

@@ -51,7 +51,7 @@ class ParticleMesh(BodyMesh):
                 "merge the two vertices or move them apart"
             )
         super().__init__(points, in_order, np.zeros((0, 4), dtype=np.int32))
-        mass = np.full(len(points), masses) if np.ndim(masses) == 0 else masses
+        mass = masses if hasattr(masses, "__len__") else np.full(len(points), masses)
         kilograms = as_real(mass, "masses", (len(points),), "mass")
         if not (kilograms > 0).all():
             row = int(np.argmax(kilograms <= 0))

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from taichi_soft.errors import MeshError
+from taichi_soft.errors import MeshError, OptionError
 from taichi_soft.meshing import BodyMesh, TetMesh, beam, box, cylinder, extrude, sphere, torus, voxels
 
 CORNER = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
@@ -154,21 +154,23 @@ def test_fix_orientation_undoes_any_shuffle_of_corners(seed):
     assert fixed.edges.tolist() == mesh.edges.tolist()
 
 
-@pytest.mark.parametrize("bad", [0, -1, np.nan, np.inf, (1, 2, 3)])
+@pytest.mark.parametrize("bad", [0, -1, np.nan, np.inf, (1, 2, 3), [[1], [1, 2]]])
 def test_scaled_refuses(bad):
-    with pytest.raises(MeshError, match="factor"):
+    with pytest.raises(OptionError, match="factor"):
         box().scaled(bad)
 
 
-@pytest.mark.parametrize("bad", [np.diag([1, 1, -1]), 2 * np.eye(3), np.eye(2), np.full((3, 3), np.nan)])
+@pytest.mark.parametrize(
+    "bad", [np.diag([1, 1, -1]), 2 * np.eye(3), np.eye(2), np.full((3, 3), np.nan), [[1], [1, 2]], "up"]
+)
 def test_rotated_refuses(bad):
-    with pytest.raises(MeshError, match="matrix"):
+    with pytest.raises(OptionError, match="rotation"):
         box().rotated(bad)
 
 
 @pytest.mark.parametrize("bad", [[1, 2], [1, 2, np.nan], "abc"])
 def test_translated_refuses(bad):
-    with pytest.raises(MeshError, match="offset"):
+    with pytest.raises(OptionError, match="offset"):
         box().translated(bad)
 
 
