@@ -1,4 +1,4 @@
-"""A beam whose density grows to the right falls flat: its heavy side is pressed deepest (fig. 6.3)."""
+"""A block that grows denser to the right: its heavy side is pressed most, rises last and least (fig. 6.3)."""
 
 import numpy as np
 
@@ -12,16 +12,16 @@ LIGHT, HEAVY = 200.0, 2000.0  # [kg/m^3]
 
 
 def stage() -> Stage:
-    """The beam, level, above the floor."""
-    mesh = box((4.0, 1.0, 1.0), (16, 4, 4))
+    """The block, level, above the floor."""
+    mesh = box((3.0, 1.5, 1.5), (8, 4, 4))
     mesh = mesh.translated(-np.mean(mesh.bounds, axis=0))
-    right = (mesh.vertices[mesh.tets].mean(axis=1)[:, 0] + 2.0) / 4.0
-    material = Material(young=2.0e6, poisson=0.2, density=LIGHT + (HEAVY - LIGHT) * right, damping=50.0)
+    right = (mesh.vertices[mesh.tets].mean(axis=1)[:, 0] + 1.5) / 3.0
+    material = Material(young=4.0e5, poisson=0.2, density=LIGHT + (HEAVY - LIGHT) * right, damping=20.0)
     world = World()
-    body = world.add_body(mesh, material, position=(0.0, 0.0, 3.5))
+    body = world.add_body(mesh, material, position=(0.0, 0.0, 3.75))
     world.build()
-    colors = colormap(mesh.vertices[:, 0], -2.5, 2.5)
-    camera = Camera.framing((-2.6, -1.0, 0.0), (2.6, 1.0, 4.2), aspect=16 / 9, azimuth=-75.0, elevation=10.0)
+    colors = colormap(mesh.vertices[:, 0], -1.9, 1.9)
+    camera = Camera.framing((-2.2, -1.2, 0.0), (2.2, 1.2, 4.9), aspect=16 / 9, azimuth=-75.0, elevation=10.0)
     title = f"density from {LIGHT:g} (left) to {HEAVY:g} kg/m^3 (right)"
     actor = Actor(body, paint=lambda body: colors)
     return Stage(title, world, [actor], camera, FixedStep(dt=1 / 50), seconds=5.0)

@@ -160,7 +160,8 @@ class _Artist:
         recent = step_times[_COMPILING:][-25:]
         if recent:
             mean = float(np.mean(recent))
-            lines.append(f"step {mean * 1e3:.2f} ms, {1.0 / self.fps / mean:.0f} x real time")
+            factor = 1.0 / self.fps / mean
+            lines.append(f"step {mean * 1e3:.2f} ms, {factor:.{0 if factor >= 10 else 1}f} x real time")
         draw_text(picture, lines)
         self.times.append(time.perf_counter() - start)
         return picture
