@@ -16,7 +16,9 @@ def stage() -> Stage:
     world = World()
     body = world.add_body(mesh, preset("thesis_sphere"), position=(0.0, 0.0, HEIGHT - mesh.bounds[0][2]))
     world.build()
-    camera = Camera.framing((-1.5, -1.5, 0.0), (1.5, 1.5, HEIGHT + 2.0), aspect=16 / 9, elevation=8.0)
+    camera = Camera.framing(
+        (-6.0, -1.5, 0.0), (1.5, 1.5, HEIGHT + 2.0), aspect=16 / 9, azimuth=-90.0, elevation=8.0
+    )
     step = FixedStep(dt=1 / 50, substeps=14)
     title = f"sphere, E = 1 MPa, {len(mesh.tets)} tetrahedra"
     return Stage(title, world, [Actor(body)], camera, step, seconds=8.0)
