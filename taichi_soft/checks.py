@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -54,26 +56,41 @@ def as_vector(value: ArrayLike, name: str, unit: str) -> Floats:
     return vector
 
 
+def to_array(values: Any, name: str) -> NDArray[Any]:
+    """`values` as an array of whatever they hold. Raises: OptionError for rows of unequal lengths."""
+    try:
+        return np.asarray(values)
+    except (ValueError, TypeError) as error:
+        raise OptionError(f"{name} is not an array of numbers ({error})") from None
+
+
 def as_array(values: ArrayLike, name: str, shape: tuple[int | None, ...], unit: str = "") -> Floats:
     """`values` as finite float64 of that shape (None: any length), copied. Raises: OptionError."""
     lengths = ", ".join("n" if length is None else str(length) for length in shape)
     wanted = f"({lengths}{',' if len(shape) == 1 else ''})" + (f" [{unit}]" if unit else "")
-    try:
-        array = np.array(values)
-    except ValueError as error:
-        raise OptionError(f"{name} is not an array of numbers ({error})") from None
+    array = to_array(values, name)
     if array.dtype.kind not in "fiu":
         raise OptionError(f"{name} must be numbers of shape {wanted}, got {values!r}")
     if array.ndim != len(shape) or any(
         want not in (None, got) for want, got in zip(shape, array.shape, strict=True)
     ):
         raise OptionError(f"{name} must have shape {wanted}, got shape {array.shape}")
-    real = array.astype(np.float64)
+    real = array.astype(np.float64)  # a copy, also of float64
     # The sum is finite for all sound arrays but absurd ones, and quicker than looking at every number.
     if not np.isfinite(real.sum()) and not np.isfinite(real).all():
         first = int(np.argmin(np.isfinite(real.reshape(len(real), -1)).all(axis=1)))
         raise OptionError(f"{name} must be finite, but entry {first} is {real[first].tolist()}")
     return real
+
+
+def as_path(value: Any) -> Path:
+    """`value` as the path of a file. Raises: OptionError."""
+    if not isinstance(value, (str, os.PathLike)):
+        raise OptionError(f"path must be a string or a Path, got {value!r}")
+    path = Path(os.fsdecode(value))
+    if not path.name:
+        raise OptionError(f"path {str(path)!r} names no file")
+    return path
 
 
 def as_rotation(value: Any) -> Floats:

@@ -2,7 +2,10 @@
 
 
 class TaichiSoftError(Exception):
-    """Base of every error this package raises on purpose."""
+    """Base of every error this package raises on purpose. Its text is one line, whatever was received."""
+
+    def __str__(self) -> str:
+        return " ".join(super().__str__().split())
 
 
 class MeshError(TaichiSoftError, ValueError):

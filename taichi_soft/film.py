@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from engine_adapter import EngineAdapter, FixedStep
 from taichi_soft.body import Body
-from taichi_soft.checks import as_positive
+from taichi_soft.checks import LARGEST_COUNT, as_positive
 from taichi_soft.errors import OptionError
 from taichi_soft.render import PALETTE, Camera, Renderer, Surface, VideoWriter, draw_labels, draw_text
 from taichi_soft.world import World
@@ -88,7 +88,12 @@ def film(
     Raises: VideoError or OptionError, before anything moves where the arguments are wrong.
     """
     length = as_positive(stage.seconds if seconds is None else seconds, "seconds", "s")
-    count = max(1, round(length * as_positive(fps, "fps", "1/s")))
+    frames = length * as_positive(fps, "fps", "1/s")
+    if frames > LARGEST_COUNT:
+        raise OptionError(
+            f"seconds is {length:g} at {fps:g} frames per second: at most {LARGEST_COUNT:,} frames"
+        )
+    count = max(1, round(frames))
     if 1.0 / fps > stage.step.dt * stage.step.max_steps:
         raise OptionError(
             f"fps is {fps:g}: a frame takes at most {stage.step.max_steps} steps of {stage.step.dt:g} s: use "
@@ -96,8 +101,8 @@ def film(
         )
     start = stage.world.time
     take = _Take(stage, fps)
-    artist = None if path is None else _Artist(stage, size, fps)
     with nullcontext() if path is None else VideoWriter(path, fps=fps, size=size) as writer:
+        artist = _Artist(stage, writer.size, fps) if writer else None
         for number in range(count):
             positions = take.play(number)
             if artist and writer:

@@ -56,7 +56,7 @@ def init(arch: str = "auto", threads: int | None = None) -> Device:
         DeviceError if the device asked for is missing.
     """
     global _device
-    if arch != "auto" and arch not in _ARCHS:
+    if not isinstance(arch, str) or arch not in ("auto", *_ARCHS):
         raise OptionError(f"unknown arch {arch!r}: choose one of 'auto', {', '.join(map(repr, _ARCHS))}")
     if threads is not None and (
         isinstance(threads, bool) or not isinstance(threads, int) or not 1 <= threads <= _MOST_THREADS

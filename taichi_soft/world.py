@@ -268,8 +268,8 @@ class World:
             fit; StateError before `build`.
         """
         require_built(self.is_built)
-        if body._world is not self:
-            raise OptionError(f"{body!r} belongs to another world: read it from there")
+        if getattr(body, "_world", None) is not self:
+            raise OptionError(f"body must be one that this world made, got {body!r}")
         if type(alpha) is not float or not 0.0 <= alpha <= 1.0:
             alpha = as_number(alpha, "alpha", 0.0, 1.0, "a number from 0 to 1")
         rows = require_buffer(out, body.vertex_count)

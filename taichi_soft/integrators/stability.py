@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.errors import OptionError
+from taichi_soft.errors import MeshError, OptionError
 from taichi_soft.laws import ElementModel
 from taichi_soft.materials import Material, require_material
 from taichi_soft.meshing import TetMesh
@@ -52,6 +52,8 @@ def stable_step(mesh: TetMesh, material: Material, model: ElementModel) -> Stabl
     It holds for motion about the rest shape. A body under strong compression is stiffer and a flattened
     tetrahedron has no bound at all, which is why `recommended` leaves a margin.
     """
+    if not isinstance(mesh, TetMesh):
+        raise MeshError(f"a stable step needs tetrahedra: pass a TetMesh, got {type(mesh).__name__}")
     if not isinstance(model, ElementModel):
         raise OptionError(f"model must come from element_model(...), got {model!r}")
     require_material(material)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from taichi_soft.checks import as_count
 from taichi_soft.errors import MaterialError
 
 Array = NDArray[np.float64]
@@ -104,6 +105,7 @@ class Material:
 
         Raises: MaterialError if the constant is an array of another length.
         """
+        tet_count = as_count(tet_count, "tet_count", high=2**31 - 1)
         values = np.asarray(getattr(self, name), dtype=np.float64)
         if values.ndim == 1 and values.shape[0] != tet_count:
             raise MaterialError(

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.checks import as_count, as_positive
+from taichi_soft.checks import as_count, as_positive, to_array
 from taichi_soft.errors import MeshError, OptionError
 from taichi_soft.meshing.arrays import MOST_TETS, FloatArray, require_tet_count
 from taichi_soft.meshing.tet_mesh import TetMesh
@@ -68,7 +68,7 @@ def voxels(mask: ArrayLike, spacing: float | tuple[float, ...] = 1.0) -> TetMesh
     Raises: MeshError for a mask of another shape or type, or without any cell; OptionError for a spacing
         that is not positive.
     """
-    filled = np.asarray(mask)
+    filled = to_array(mask, "mask")
     if filled.dtype != np.bool_ or filled.ndim != 3:
         raise MeshError(f"mask has shape {filled.shape}, dtype {filled.dtype}: pass bool (nx, ny, nz)")
     steps = spacing if hasattr(spacing, "__len__") else (spacing,) * 3

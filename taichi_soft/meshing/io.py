@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from taichi_soft.checks import as_path
 from taichi_soft.errors import MeshError
 from taichi_soft.meshing.interchange import FORMATS, read_interchange, write_interchange
 from taichi_soft.meshing.tet_mesh import TetMesh
@@ -36,7 +37,8 @@ def load_mesh(path: str | os.PathLike[str], *, fix_orientation: bool = True) -> 
         fix_orientation: turn tetrahedra of negative volume round. True by default, unlike in `TetMesh`,
             because programs do not agree on the sense; neighbours that overlap are refused either way.
     Raises: MeshError, in one line that starts with the file's name, if the file is missing, of another kind,
-        cut short, without tetrahedra, not a sound mesh (see `TetMesh`), or if meshio is needed and missing.
+        cut short, without tetrahedra, not a sound mesh (see `TetMesh`), or if meshio is needed and missing;
+        OptionError for a path that names no file.
     """
     source = _checked_path(path)
     suffix = source.suffix.lower()
@@ -57,7 +59,7 @@ def save_mesh(mesh: TetMesh, path: str | os.PathLike[str]) -> None:
     The file appears whole or not at all: one that was there before stays until the new one is complete.
     Naming either of TetGen's two files writes both.
     Raises: MeshError for an unknown suffix, something that is not a TetMesh, a place that cannot be written
-        to, or if meshio is needed and missing.
+        to, or if meshio is needed and missing; OptionError for a path that names no file.
     """
     if not isinstance(mesh, TetMesh):
         raise MeshError(f"save_mesh got a {type(mesh).__name__}: only a TetMesh has a file format")
@@ -92,12 +94,7 @@ def save_mesh(mesh: TetMesh, path: str | os.PathLike[str]) -> None:
 
 
 def _checked_path(path: str | os.PathLike[str]) -> Path:
-    try:
-        checked = Path(path)
-    except TypeError:
-        raise MeshError(f"path must be a string or a Path, got {path!r}") from None
-    if not checked.name:
-        raise MeshError(f"path {str(path)!r} names no file")
+    checked = as_path(path)
     if checked.suffix.lower() not in SUFFIXES:
         raise MeshError(f"{checked.name}: unknown mesh format {checked.suffix!r}: use {', '.join(SUFFIXES)}")
     return checked

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.checks import as_number
+from taichi_soft.checks import as_array, as_count, as_number
 from taichi_soft.errors import OptionError
 from taichi_soft.render.arguments import as_point
 
@@ -116,6 +116,7 @@ class Camera:
 
         The first pixel covers u and v from 0 to 1.
         """
+        as_count(width, "width"), as_count(height, "height")
         focal = min(width, height) / (2.0 * math.tan(math.radians(self.fov_degrees) / 2.0))
         lens = np.array([[focal, 0.0, width / 2.0], [0.0, focal, height / 2.0], [0.0, 0.0, 1.0]])
         turn = self.axes
@@ -127,7 +128,7 @@ class Camera:
 
         Points nearer than `near` or behind the camera have no place in the picture: their pixels are NaN.
         """
-        rows = np.asarray(points, dtype=np.float64).reshape(-1, 3)
+        rows = as_array(points, "points", (None, 3), "m")
         seen = np.column_stack([rows, np.ones(len(rows))]) @ self.matrix(width, height).T
         depth = np.where(seen[:, 2] >= self.near, seen[:, 2], np.nan)
         return np.column_stack([seen[:, 0] / depth, seen[:, 1] / depth, seen[:, 2]])

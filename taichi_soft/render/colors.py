@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.checks import as_array, as_number
+from taichi_soft.checks import as_array, as_number, to_array
 from taichi_soft.errors import OptionError
 from taichi_soft.render.arguments import as_color
 
@@ -58,7 +58,7 @@ def highlight(flagged: ArrayLike, color: ArrayLike, marked: ArrayLike = FLIPPED)
     Returns: sRGB from 0 to 1, float32 (n, 3).
     Raises: OptionError for wrong shapes or colours.
     """
-    flags = np.asarray(flagged)
+    flags = to_array(flagged, "flagged")
     if flags.ndim != 1 or flags.dtype != np.bool_:
         raise OptionError(f"flagged must be bools of shape (n,), got {flags.dtype} of shape {flags.shape}")
     usual, special = as_color(color, "color"), as_color(marked, "marked")

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.checks import as_array
+from taichi_soft.checks import as_array, to_array
 from taichi_soft.errors import OptionError
 from taichi_soft.types import Choice
 
@@ -65,8 +65,8 @@ def draw_labels(picture: Picture, labels: Sequence[str], places: ArrayLike) -> P
     Raises: OptionError for another picture, text or number of places.
     """
     _check(picture, labels)
-    pixels = np.asarray(places, dtype=np.float64)
-    if pixels.ndim != 2 or len(pixels) != len(labels) or pixels.shape[1] < 2:
+    pixels = to_array(places, "places")
+    if pixels.dtype.kind not in "fiu" or pixels.shape[:1] != (len(labels),) or pixels.shape[1:] < (2,):
         raise OptionError(f"places must have shape ({len(labels)}, 2), got {pixels.shape}")
     height, width = picture.shape[:2]
     for label, (u, v) in zip(labels, pixels[:, :2], strict=True):
@@ -84,13 +84,10 @@ def _check(picture: Picture, lines: Sequence[str]) -> None:
     if not isinstance(picture, np.ndarray) or picture.dtype != np.uint8 or picture.shape[2:] != (3,):
         raise OptionError("picture must be uint8 of shape (height, width, 3)")
     as_array(picture.shape[:2], "picture size", (2,))
-    for line in [lines] if isinstance(lines, str) else lines:
-        if (
-            isinstance(lines, str)
-            or not isinstance(line, str)
-            or not line.isascii()
-            or not line.isprintable()
-        ):
+    if not isinstance(lines, (list, tuple)):
+        raise OptionError(f"text must be a list of lines of plain ASCII, got {lines!r}")
+    for line in lines:
+        if not (isinstance(line, str) and line.isascii() and line.isprintable()):
             raise OptionError(f"text must be a list of lines of plain ASCII, got {line!r}")
 
 

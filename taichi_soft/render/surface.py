@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.checks import as_array
+from taichi_soft.checks import as_array, to_array
 from taichi_soft.errors import MeshError, OptionError
 from taichi_soft.meshing import TetMesh
 from taichi_soft.render.colors import PALETTE, to_linear
@@ -31,7 +31,7 @@ class Surface:
     def __init__(self, positions: ArrayLike, triangles: ArrayLike, *, color: ArrayLike = PALETTE[0]) -> None:
         first = as_array(positions, "positions", (None, 3))
         self.vertex_count = len(first)
-        corners = np.array(triangles)
+        corners = to_array(triangles, "triangles").copy()
         if corners.ndim != 2 or corners.shape[1] != 3 or corners.dtype.kind not in "iu" or len(corners) == 0:
             raise MeshError(f"triangles must be whole numbers of shape (m, 3), got shape {corners.shape}")
         if corners.min() < 0 or corners.max() >= self.vertex_count:
@@ -46,6 +46,8 @@ class Surface:
     @classmethod
     def of(cls, mesh: TetMesh, *, color: ArrayLike = PALETTE[0]) -> Surface:
         """The surface of a tetrahedral mesh, at rest until its `positions` are set."""
+        if not isinstance(mesh, TetMesh):
+            raise MeshError(f"a surface is made of a TetMesh, got {type(mesh).__name__}")
         return cls(mesh.vertices, mesh.surface, color=color)
 
     @property
@@ -58,7 +60,7 @@ class Surface:
 
     @positions.setter
     def positions(self, values: ArrayLike) -> None:
-        rows = np.asarray(values)
+        rows = to_array(values, "positions")
         if rows.shape != (self.vertex_count, 3) or rows.dtype.kind not in "fiu":
             raise OptionError(f"positions must have shape ({self.vertex_count}, 3), got {rows.shape}")
         outer = rows[self._used].astype(np.float32)
@@ -77,13 +79,11 @@ class Surface:
 
     @color.setter
     def color(self, values: ArrayLike) -> None:
-        rows = np.asarray(values)
+        rows = to_array(values, "color")
         if rows.shape == (3,):
             rows = np.broadcast_to(rows, (self.vertex_count, 3))
         if rows.shape != (self.vertex_count, 3) or rows.dtype.kind not in "fiu":
-            raise OptionError(
-                f"color must have shape (3,) or ({self.vertex_count}, 3), got {np.shape(values)}"
-            )
+            raise OptionError(f"color must have shape (3,) or ({self.vertex_count}, 3), got {rows.shape}")
         outer = rows[self._used].astype(np.float32)
         if not (outer.min() >= 0.0 and outer.max() <= 1.0):
             raise OptionError(f"color must be sRGB from 0 to 1, got {outer.min():g} to {outer.max():g}")

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.checks import as_count, as_number
+from taichi_soft.checks import as_count, as_number, as_path
 from taichi_soft.errors import StateError, VideoError
 from taichi_soft.render.containers import Container, Gif, Pictures, Stream, measure, quiet
 
@@ -36,12 +36,12 @@ class VideoWriter:
     """
 
     def __init__(self, path: str | Path, *, fps: float, size: tuple[int, int]) -> None:
-        self.path = Path(path)
+        self.path = as_path(path)
         suffix = self.path.suffix.lower()
         if suffix not in CONTAINERS or not self.path.stem:
             raise VideoError(f"cannot write {str(path)!r}: name a file that ends in {', '.join(CONTAINERS)}")
         self.fps = as_number(fps, "fps", 1e-3, 240.0)
-        if len(size) != 2:
+        if not isinstance(size, (tuple, list)) or len(size) != 2:
             raise VideoError(f"size must be (width, height), got {size!r}")
         self.size = as_count(size[0], "width", 2, 16384), as_count(size[1], "height", 2, 16384)
         if CONTAINERS[suffix] is Stream and (self.size[0] % 2 or self.size[1] % 2):

@@ -1,0 +1,198 @@
+"""Every argument of the public face with every odd value: taken, or refused in one line, nothing changed."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+import taichi_soft as ts
+from engine_adapter import EngineAdapter, FixedStep
+from taichi_soft.film import Actor, Stage, film
+from taichi_soft.render import (
+    Camera,
+    Renderer,
+    Surface,
+    VideoWriter,
+    colormap,
+    draw_labels,
+    draw_text,
+    highlight,
+)
+
+ODD = (
+    *(None, True, 0, -0.0, -1, 1.5, np.nan, np.inf, 10**400, 1j, np.float32(2), np.int64(3)),
+    *("x", "", b"x", [], [1, 2], [[1], [1, 2]], {}, {1}, (1, 2, 3, 4), object(), len),
+    *(np.datetime64("2020"), np.zeros(0), np.array(3.0), np.zeros((3, 3)), np.full((8, 3), np.nan)),
+)
+
+MESH = ts.box(cells=(1, 1, 1))
+JELLY = ts.Material(1e5, 0.2, 1000.0)
+POINTS = MESH.vertices
+ZEROS = np.zeros((8, 3))
+CORNER = [[0, 0], [1, 0], [0, 1]]
+CAMERA = Camera.framing((-1, -1, 0), (1, 1, 2))
+PICTURE = np.zeros((64, 64, 3), np.uint8)
+
+
+def keywords(call, *names):
+    return {f"{call.__name__} {name}": lambda v, _, n=name: call(**{n: v}) for name in names}
+
+
+def add_body(**options):
+    ts.World().add_body(MESH, JELLY, **options)
+
+
+def material(**constants):
+    ts.Material(**{"young": 1e5, "poisson": 0.2, "density": 1e3, "damping": 0.0, **constants})
+
+
+def forces(**options):
+    ts.internal_forces(MESH, JELLY, POINTS, **options)
+
+
+def framing(**options):
+    Camera.framing((0, 0, 0), (1, 1, 1), **options)
+
+
+def renderer(**options):
+    Renderer(64, 64, **{"camera": CAMERA, **options})
+
+
+CALLS = {
+    **keywords(ts.World, "gravity", "floor", "restitution", "friction", "integrator", "schedule"),
+    **keywords(add_body, "law", "strain", "flips", "damping_model", "position", "rotation", "velocity"),
+    "add_body mesh": lambda v, _: ts.World().add_body(v, JELLY),
+    "add_body material": lambda v, _: ts.World().add_body(MESH, v),
+    **keywords(material, "young", "poisson", "density", "damping"),
+    "per_tet": lambda v, _: JELLY.per_tet("young", v),
+    "preset": lambda v, _: ts.preset(v),
+    "TetMesh vertices": lambda v, _: ts.TetMesh(v, [[0, 1, 2, 3]]),
+    "TetMesh tets": lambda v, _: ts.TetMesh(POINTS, v),
+    "ParticleMesh vertices": lambda v, _: ts.ParticleMesh(v, [[0, 1]], 1.0),
+    "ParticleMesh edges": lambda v, _: ts.ParticleMesh(POINTS, v, 1.0),
+    "ParticleMesh masses": lambda v, _: ts.ParticleMesh(POINTS, [[0, 1]], v),
+    "scaled": lambda v, _: MESH.scaled(v),
+    "translated": lambda v, _: MESH.translated(v),
+    "rotated": lambda v, _: MESH.rotated(v),
+    **keywords(ts.box, "size", "cells"),
+    **keywords(ts.sphere, "radius", "resolution"),
+    **keywords(ts.cylinder, "radius", "rings", "layers"),
+    **keywords(ts.torus, "minor_radius", "segments"),
+    **keywords(ts.beam, "length", "cells_across"),
+    "voxels mask": lambda v, _: ts.voxels(v),
+    "voxels spacing": lambda v, _: ts.voxels(np.ones((1, 1, 1), bool), v),
+    "extrude points": lambda v, _: ts.extrude(v, [[0, 1, 2]]),
+    "extrude triangles": lambda v, _: ts.extrude(CORNER, v),
+    "load_mesh": lambda v, _: ts.load_mesh(v),
+    "save_mesh": lambda v, _: ts.save_mesh(MESH, v),
+    "save_mesh mesh": lambda v, _: ts.save_mesh(v, "x.npz"),
+    "surface_mesh": lambda v, _: ts.surface_mesh(v),
+    "surface_mesh positions": lambda v, _: ts.surface_mesh(MESH, v),
+    "internal_forces mesh": lambda v, _: ts.internal_forces(v, JELLY, POINTS),
+    "internal_forces material": lambda v, _: ts.internal_forces(MESH, v, POINTS),
+    "internal_forces positions": lambda v, _: ts.internal_forces(MESH, JELLY, v),
+    "internal_forces velocities": lambda v, _: ts.internal_forces(MESH, JELLY, POINTS, v),
+    **keywords(forces, "law", "strain", "flips", "damping_model", "dtype"),
+    "element_model": lambda v, _: ts.element_model(v),
+    "stable_step mesh": lambda v, _: ts.stable_step(v, JELLY, ts.element_model("virial")),
+    "stable_step material": lambda v, _: ts.stable_step(MESH, v, ts.element_model("virial")),
+    "stable_step model": lambda v, _: ts.stable_step(MESH, JELLY, v),
+    "stable_substeps": lambda v, game: game.world.stable_substeps(v),
+    "read_positions body": lambda v, game: game.world.read_positions(v, 1.0),
+    "read_positions alpha": lambda v, game: game.world.read_positions(game.world.bodies[0], v),
+    "adapter body": lambda v, game: game.positions(v),
+    "adapter world": lambda v, _: EngineAdapter(v),
+    "adapter step": lambda v, game: EngineAdapter(game.world, v),
+    **keywords(FixedStep, "dt", "substeps", "max_steps"),
+    "init arch": lambda v, _: ts.init(v),
+    "init threads": lambda v, _: ts.init("cpu", v),
+    **keywords(framing, "aspect", "azimuth", "elevation"),
+    "framing lower": lambda v, _: Camera.framing(v, (1, 1, 1)),
+    "project": lambda v, _: CAMERA.project(v, 100, 100),
+    "project width": lambda v, _: CAMERA.project([[0, 0, 0]], v, 100),
+    "Surface positions": lambda v, _: Surface(v, MESH.surface),
+    "Surface triangles": lambda v, _: Surface(POINTS, v),
+    "Surface color": lambda v, _: Surface(POINTS, MESH.surface, color=v),
+    "Surface.of": lambda v, _: Surface.of(v),
+    "set positions": lambda v, _: setattr(Surface.of(MESH), "positions", v),
+    "set color": lambda v, _: setattr(Surface.of(MESH), "color", v),
+    **keywords(renderer, "camera", "floor"),
+    "Renderer width": lambda v, _: Renderer(v, 64, camera=CAMERA),
+    "colormap": lambda v, _: colormap(v, 0.0, 1.0),
+    "colormap low": lambda v, _: colormap([1.0], v, 1.0),
+    "highlight": lambda v, _: highlight(v, (1, 0, 0)),
+    "draw_text picture": lambda v, _: draw_text(v, ["a"]),
+    "draw_text lines": lambda v, _: draw_text(PICTURE, v),
+    "draw_labels places": lambda v, _: draw_labels(PICTURE, ["a"], v),
+    "VideoWriter path": lambda v, _: VideoWriter(v, fps=10, size=(64, 64)),
+    "VideoWriter fps": lambda v, _: VideoWriter("x.png", fps=v, size=(64, 64)),
+    "VideoWriter size": lambda v, _: VideoWriter("x.png", fps=10, size=v),
+    "VideoWriter.write": lambda v, _: VideoWriter("x.png", fps=10, size=(64, 64)).write(v),
+}
+
+MOVES = {
+    "step dt": lambda v, game: game.world.step(v),
+    "step substeps": lambda v, game: game.world.step(0.001, v),
+    "advance": lambda v, game: game.advance(v),
+    "set_motion": lambda v, game: game.world.bodies[0].set_motion(v, ZEROS),
+    "set_motion velocities": lambda v, game: game.world.bodies[0].set_motion(POINTS, v),
+    "film fps": lambda v, game: film(stage_of(game), None, fps=v, seconds=0.05),
+    "film seconds": lambda v, game: film(stage_of(game), None, seconds=v),
+    "film size": lambda v, game: film(stage_of(game), "x.png", size=v, seconds=0.05),
+}
+
+
+def stage_of(game):
+    return Stage("odd", game.world, [Actor(game.world.bodies[0])], CAMERA, FixedStep(), 1.0)
+
+
+@pytest.fixture(scope="module")
+def game():
+    world = ts.World()
+    world.add_body(MESH, JELLY, position=(0, 0, 1))
+    world.build()
+    return EngineAdapter(world)
+
+
+def refusal(call, value, game):
+    """The error of ours that a call ends in, or None; any other error is a failure that names the value."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            call(value, game)
+        except ts.TaichiSoftError as error:
+            return error
+        except Exception as error:
+            pytest.fail(f"{value!r}: {type(error).__name__}: {error}")
+    return None
+
+
+def seen(game):
+    body = game.world.bodies[0]
+    return (
+        game.world.time,
+        game.world.step_count,
+        body.positions().tobytes(),
+        body.velocities().tobytes(),
+        body.is_frozen,
+    )
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_odd_values_are_taken_or_refused_and_move_nothing(game, name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    before = seen(game)
+    refusals = [refusal(CALLS[name], value, game) for value in ODD]
+    assert any(refusals)
+    assert all(len(str(error)) > 0 and "\n" not in str(error) for error in refusals if error)
+    assert seen(game) == before
+
+
+@pytest.mark.parametrize("name", MOVES)
+def test_a_refused_move_moves_nothing(game, name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for value in ODD:
+        before = seen(game)
+        if refusal(MOVES[name], value, game):
+            assert seen(game) == before
+    assert not game.world.bodies[0].is_frozen
