@@ -91,7 +91,7 @@ def film(
     frames = length * as_positive(fps, "fps", "1/s")
     if frames > LARGEST_COUNT:
         raise OptionError(
-            f"seconds is {length:g} at {fps:g} frames per second: at most {LARGEST_COUNT:,} frames"
+            f"seconds is {length:g} at {fps:g} per second: at most {LARGEST_COUNT:,} frames"
         )
     count = max(1, round(frames))
     if 1.0 / fps > stage.step.dt * stage.step.max_steps:
