@@ -90,9 +90,7 @@ def film(
     length = as_positive(stage.seconds if seconds is None else seconds, "seconds", "s")
     frames = length * as_positive(fps, "fps", "1/s")
     if frames > LARGEST_COUNT:
-        raise OptionError(
-            f"seconds is {length:g} at {fps:g} per second: at most {LARGEST_COUNT:,} frames"
-        )
+        raise OptionError(f"seconds is {length:g} at {fps:g} per second: at most {LARGEST_COUNT:,} frames")
     count = max(1, round(frames))
     if 1.0 / fps > stage.step.dt * stage.step.max_steps:
         raise OptionError(
