@@ -65,9 +65,7 @@ class EngineAdapter:
 
         It is one step behind all the time put in. Before the first step it is the world's time.
         """
-        if self._world.step_count == 0:
-            return self._world.time
-        return self._world.time - (1.0 - self.alpha) * self._fixed_step.dt
+        return self._world.time - (1.0 - self.alpha) * self._world.last_dt
 
     @property
     def dropped_time(self) -> float:
@@ -98,12 +96,13 @@ class EngineAdapter:
         """
         seconds = as_number(frame_dt, "frame_dt", 0.0, math.inf, "a number of 0 s or more")
         steps, dropped = self._accumulator.put(seconds)
+        before = self._world.step_count
         made = 0
         try:
             for _ in range(steps):
                 self.step()
-                made += 1
         finally:
+            made = self._world.step_count - before  # also a step whose warning was raised
             self._dropped_time = dropped + (steps - made) * self._fixed_step.dt
             self._total_dropped_time += self._dropped_time
         return made

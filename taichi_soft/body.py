@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -39,11 +40,19 @@ class Body:
 
     def __init__(self, world: World, index: int, description: BodyDescription) -> None:
         """Made by `World.add_body`."""
-        self._world = world
+        # Weak, or a world that is dropped would wait for the garbage collector to give its state back.
+        self._world_ref = weakref.ref(world)
         self._description = description
         self._masses: Floats | None = None
         self.index = index
         self.failure: Failure | None = None
+
+    @property
+    def _world(self) -> World:
+        world = self._world_ref()
+        if world is None:
+            raise StateError(f"the world of body {self.index} is gone: keep a reference to it")
+        return world
 
     def __repr__(self) -> str:
         state = "frozen" if self.is_frozen else "active"
@@ -106,7 +115,7 @@ class Body:
 
         Leapfrog keeps them half a substep behind; they are brought up with the present acceleration.
         """
-        return self._world.read_velocities(self)
+        return self._world._read_velocities(self)
 
     def set_motion(self, positions: ArrayLike, velocities: ArrayLike) -> None:
         """Put the body into a given state between two steps; a frozen body is active again.
@@ -118,7 +127,7 @@ class Body:
         """
         shape = (self.vertex_count, 3)
         x, v = as_array(positions, "positions", shape, "m"), as_array(velocities, "velocities", shape, "m/s")
-        self._world.write_motion(self, x, v)
+        self._world._write_motion(self, x, v)
         self.failure = None
 
     def volumes(self) -> Floats:

@@ -88,7 +88,7 @@ def as_path(value: Any) -> Path:
     if not isinstance(value, (str, os.PathLike)):
         raise OptionError(f"path must be a string or a Path, got {value!r}")
     path = Path(os.fsdecode(value))
-    if not path.name:
+    if not path.name or "\0" in str(path):
         raise OptionError(f"path {str(path)!r} names no file")
     return path
 

@@ -192,11 +192,12 @@ def profile(
     from taichi_soft import profiling
     from taichi_soft.profiling import report
 
+    library = profiling.compile_baseline() if baseline else None
     with errors.status("measuring frames") as status:
         found: dict[str, Any] = {"budget": profiling.measure_budget(bodies, repeats)}
-        if baseline:
+        if library:
             status.update("measuring against C++")
-            found["baseline"] = profiling.compare_with_baseline(max(3, repeats // 4))
+            found["baseline"] = profiling.compare_with_baseline(library, max(3, repeats // 4))
         if crossover:
             status.update("measuring schedules")
             found["crossover"] = profiling.measure_crossover(max(3, repeats // 6))

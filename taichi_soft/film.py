@@ -87,6 +87,10 @@ def film(
         on_frame: called with (frames made, frames in all) after each.
     Raises: VideoError or OptionError, before anything moves where the arguments are wrong.
     """
+    if not isinstance(stage, Stage):
+        raise OptionError(f"stage must be a Stage, got {type(stage).__name__}")
+    if not (on_frame is None or callable(on_frame)):
+        raise OptionError(f"on_frame must be a function (frames made, frames in all), got {on_frame!r}")
     length = as_positive(stage.seconds if seconds is None else seconds, "seconds", "s")
     frames = length * as_positive(fps, "fps", "1/s")
     if frames > LARGEST_COUNT:

@@ -13,6 +13,7 @@ from taichi_soft.kernels.evaluate import evaluate_edge_damping, evaluate_tet_for
 from taichi_soft.laws import element_model
 from taichi_soft.materials import Material, require_material
 from taichi_soft.meshing import TetMesh
+from taichi_soft.meshing.arrays import LARGEST_COORDINATE
 from taichi_soft.runtime import init
 from taichi_soft.scene import edge_damping, rest_inverses
 from taichi_soft.types import DampingModel, Flips, Strain
@@ -87,8 +88,8 @@ def _rows(values: ArrayLike, mesh: TetMesh, name: str, real: np.dtype[Any]) -> N
         raise MeshError(f"{name} has shape {rows.shape}: this mesh needs {mesh.vertices.shape}")
     if not np.isfinite(rows).all():
         raise MeshError(f"{name}[{int(np.argmin(np.isfinite(rows).all(axis=1)))}] is not finite")
-    if real == np.float32 and np.abs(rows).max() > POSITION_LIMIT:
-        raise MeshError(
-            f"{name} go up to {np.abs(rows).max():g}, beyond {POSITION_LIMIT:g}: use dtype float64"
-        )
+    limit = POSITION_LIMIT if real == np.float32 else LARGEST_COORDINATE
+    if np.abs(rows).max() > limit:
+        wider = ": use dtype float64" if real == np.float32 else ""
+        raise MeshError(f"{name} go up to {np.abs(rows).max():g}, beyond {limit:g}{wider}")
     return rows

@@ -50,7 +50,8 @@ def init(arch: str = "auto", threads: int | None = None) -> Device:
     Args:
         arch: "auto" or "cpu"; or a GPU by name, "cuda", "vulkan" or "metal". "auto" takes the CPU: the GPU
             kernels have been tested on a CPU only, and games want their GPU for pictures.
-        threads: CPU worker threads, 1 or more; None takes one per core available to this process.
+        threads: CPU worker threads, 1 or more, of which no more are used than there are cores available to
+            this process; None takes as many as there are cores.
     Returns: the device in use.
     Raises: OptionError for an unknown arch or thread count, or if already started differently;
         DeviceError if the device asked for is missing.
@@ -64,19 +65,25 @@ def init(arch: str = "auto", threads: int | None = None) -> Device:
         raise OptionError(
             f"threads must be None or a whole number from 1 to {_MOST_THREADS}, got {threads!r}"
         )
+    cores = _available_cores()
+    count = min(threads or cores, cores)  # Taichi starts no more, and the flat schedule waits for all of them
     if _device is not None:
         if arch not in ("auto", _device.arch):
             raise OptionError(
                 f"Taichi already runs on {_device.arch!r}: call init({arch!r}) first in the process"
             )
-        if threads is not None and _device.arch == "cpu" and threads != _device.threads:
+        if threads is not None and _device.arch == "cpu" and count != _device.threads:
             raise OptionError(
                 f"Taichi already runs with {_device.threads} threads: call init(threads={threads}) first"
             )
         return _device
 
     chosen, reason = ("cpu", "the default") if arch == "auto" else (arch, "asked for by name")
-    count = threads or _available_cores()
+    if ti.lang.impl.get_runtime().prog is not None:
+        raise DeviceError(
+            "Taichi was started by ti.init, and starting it again would destroy the fields made since: call "
+            "taichi_soft.init() instead, first in the process"
+        )
     try:
         with contextlib.redirect_stdout(io.StringIO()):  # Taichi announces itself
             ti.init(

@@ -8,10 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.constants import LANES
+from taichi_soft.errors import MeshError
 from taichi_soft.laws import ElementModel
 from taichi_soft.materials import Material
 from taichi_soft.meshing import TetMesh, renumbered, spatial_order, tet_order
 from taichi_soft.types import DampingModel
+
+SHORTEST_EDGE = 1e-6
+"""[m]; volumes of smaller tetrahedra run out of float32's range."""
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -107,9 +111,17 @@ def rest_inverses(mesh: TetMesh) -> Floats:
 
 
 def arrange(description: BodyDescription) -> BodyArrays:
-    """Reorder a body along a space-filling curve, so that neighbours share cache lines."""
+    """Reorder a body along a space-filling curve, so that neighbours share cache lines.
+
+    Raises: MeshError for edges below `SHORTEST_EDGE`.
+    """
     mesh = description.mesh
     count = len(mesh.tets)
+    shortest = float(mesh.edge_lengths.min())
+    if shortest < SHORTEST_EDGE:
+        raise MeshError(
+            f"the shortest edge is {shortest:.3g} m: scale the mesh (in metres) to {SHORTEST_EDGE:g} or more"
+        )
     material = description.material
     order = spatial_order(mesh.vertices)
     tets = tet_order(mesh.tets, order)

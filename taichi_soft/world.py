@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.body import Body, Failure, Floats32, require_buffer, require_built
-from taichi_soft.checks import as_count, as_number, as_positive, as_rotation, as_vector
+from taichi_soft.checks import as_count, as_number, as_rotation, as_vector
 from taichi_soft.constants import GRAVITY_EARTH, LANES, POSITION_LIMIT
 from taichi_soft.errors import FrozenBodyWarning, MeshError, OptionError, StateError, UnstableStepWarning
 from taichi_soft.integrators import StableStep, stable_step
@@ -29,6 +29,9 @@ from taichi_soft.scene import BodyDescription, Scene, arrange
 from taichi_soft.settings import Settings
 from taichi_soft.state import FROZEN, Capacity, State, acquire, release
 from taichi_soft.types import DampingModel, Flips, Integrator, Schedule, Strain
+
+SHORTEST_STEP, LONGEST_STEP = 1e-9, 1e4
+"""Fixed steps [s]: shorter ones are lost in float32, longer ones would take days of computing."""
 
 _PLAIN = {float, int, np.float64, type(None)}
 """Types whose values can be compared with those of the last step."""
@@ -70,6 +73,7 @@ class World:
         )
         self._step_count = 0
         self._time = 0.0
+        self._last_dt = 0.0
         self._bodies: list[Body] = []
         self._scene = Scene()
         self._state: State | None = None
@@ -96,6 +100,11 @@ class World:
     def time(self) -> float:
         """Simulated time [s]."""
         return self._time
+
+    @property
+    def last_dt(self) -> float:
+        """Length of the last fixed step [s], 0 before the first."""
+        return self._last_dt
 
     @property
     def bodies(self) -> Sequence[Body]:
@@ -147,11 +156,26 @@ class World:
             as_rotation(rotation),
             as_vector(velocity, "velocity", "m/s"),
         )
+        self._require_place(description)
         arrays = arrange(description)
         self._scene.append(arrays)
         body = Body(self, len(self._bodies), description)
         self._bodies.append(body)
         return body
+
+    def _require_place(self, description: BodyDescription) -> None:
+        """Raises: OptionError where a body starts out of reach, or below the floor, which would crush it."""
+        lower, upper = (getattr(description.start_positions, side)(axis=0) for side in ("min", "max"))
+        if not max(np.abs(lower).max(), np.abs(upper).max()) < POSITION_LIMIT:
+            raise OptionError(f"position puts the body beyond {POSITION_LIMIT:g} m: stay nearer the origin")
+        floor = self.settings.floor
+        if floor is not None and lower[2] < floor - 1e-3 * (upper[2] - lower[2]):
+            depth = floor - lower[2]
+            x, y, z = description.position
+            raise OptionError(
+                f"the body starts {depth:.4g} m below the floor: position=({x:g}, {y:g}, {z + depth:.6g}) "
+                "puts it on the floor, World(floor=None) has none"
+            )
 
     def build(self) -> None:
         """Move all bodies into Taichi fields and fix the kernels. Starts Taichi if nobody has.
@@ -169,6 +193,13 @@ class World:
         program = Program(
             tuple(models), self.settings.integrator, self.settings.floor is not None, device.threads
         )
+        if self.settings.integrator is Integrator.EXPLICIT_EULER:
+            warnings.warn(
+                "explicit_euler gains energy at every substep, however short, and explodes sooner or later: "
+                "it is here for comparison, leapfrog is for use",
+                UnstableStepWarning,
+                stacklevel=2,
+            )
         state = acquire(capacity)
         weakref.finalize(self, release, state)
         state.load(self._scene, [models.index(body._description.model) for body in self._bodies])
@@ -192,7 +223,8 @@ class World:
         if not self._bodies:
             raise StateError("the world is empty: call add_body first")
         longest = min(body.stable_step.recommended for body in self._bodies)
-        return max(1, math.ceil(as_positive(dt, "dt", "s") / longest))
+        seconds = as_number(dt, "dt", SHORTEST_STEP, LONGEST_STEP, "a number above 0 s, from 1e-9 to 1e4")
+        return max(1, math.ceil(seconds / longest))
 
     def step(self, dt: float, substeps: int | None = None) -> None:
         """Make one fixed step of `dt` [s] in `substeps` equal substeps; None chooses their number.
@@ -214,17 +246,17 @@ class World:
         reports = self._note_failures(count, h) if failed else []
         self._step_count += 1
         self._time += seconds
-        for report in reports:
-            warnings.warn(report, FrozenBodyWarning, stacklevel=2)
+        self._last_dt = seconds
+        if reports:
+            warnings.warn("; ".join(reports), FrozenBodyWarning, stacklevel=2)
 
     def _check_step(self, dt: float, substeps: int | None) -> tuple[float, int, float]:
-        seconds = as_positive(dt, "dt", "s")
+        seconds = as_number(dt, "dt", SHORTEST_STEP, LONGEST_STEP, "a number above 0 s, from 1e-9 to 1e4")
         count = as_count(self.stable_substeps(seconds) if substeps is None else substeps, "substeps")
         h = seconds / count
         stiffest = min(self._bodies, key=lambda body: body.stable_step.limit)
         limit, tet = stiffest.stable_step.limit, stiffest.stable_step.stiffest_tet
         if h > limit and h not in self._warned_steps:
-            self._warned_steps.add(h)
             warnings.warn(
                 f"substep {h * 1e3:.4g} ms is longer than the {limit * 1e3:.4g} ms that body "
                 f"{stiffest.index} can take (stiffest tetrahedron {tet}): it may explode. Use "
@@ -232,6 +264,7 @@ class World:
                 UnstableStepWarning,
                 stacklevel=3,
             )
+            self._warned_steps.add(h)
         return seconds, count, h
 
     def _note_failures(self, substeps: int, h: float) -> list[str]:
@@ -280,7 +313,7 @@ class World:
         rows[:] = self._read[begin:end]
         return rows
 
-    def read_velocities(self, body: Body) -> Floats32:
+    def _read_velocities(self, body: Body) -> Floats32:
         """Velocities at the time of the positions, (n, 3) [m/s]. Raises: StateError before `build`."""
         require_built(self.is_built)
         assert self._state is not None
@@ -299,7 +332,7 @@ class World:
             rows += (0.5 * lag * acceleration).astype(np.float32)
         return rows
 
-    def write_motion(self, body: Body, positions: NDArray[Any], velocities: NDArray[Any]) -> None:
+    def _write_motion(self, body: Body, positions: NDArray[Any], velocities: NDArray[Any]) -> None:
         """Put a body somewhere else. Raises: StateError before `build`."""
         require_built(self.is_built)
         x, v = positions.astype(np.float32), velocities.astype(np.float32)

@@ -1,4 +1,4 @@
-"""For all tests: a world that is gone gives its state and its compiled kernels to the next one."""
+"""For all tests: repeatable property tests, and buffers that fit nowhere."""
 
 import gc
 
@@ -15,13 +15,6 @@ def settle_imports():
     """What the imports made stays: the collector need not walk it after every test."""
     gc.collect()
     gc.freeze()
-
-
-@pytest.fixture(autouse=True)
-def release_worlds():
-    """World and bodies name each other, so only the collector ends them."""
-    yield
-    gc.collect()
 
 
 def _read_only(n):

@@ -39,7 +39,7 @@ def keywords(call, *names):
 
 
 def add_body(**options):
-    ts.World().add_body(MESH, JELLY, **options)
+    ts.World(floor=None).add_body(MESH, JELLY, **options)
 
 
 def material(**constants):
@@ -61,8 +61,8 @@ def renderer(**options):
 CALLS = {
     **keywords(ts.World, "gravity", "floor", "restitution", "friction", "integrator", "schedule"),
     **keywords(add_body, "law", "strain", "flips", "damping_model", "position", "rotation", "velocity"),
-    "add_body mesh": lambda v, _: ts.World().add_body(v, JELLY),
-    "add_body material": lambda v, _: ts.World().add_body(MESH, v),
+    "add_body mesh": lambda v, _: ts.World(floor=None).add_body(v, JELLY),
+    "add_body material": lambda v, _: ts.World(floor=None).add_body(MESH, v),
     **keywords(material, "young", "poisson", "density", "damping"),
     "per_tet": lambda v, _: JELLY.per_tet("young", v),
     "preset": lambda v, _: ts.preset(v),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import importlib
 import io
+import re
 from pathlib import Path
 from typing import Any
 
@@ -32,8 +33,8 @@ def read_interchange(path: Path) -> tuple[Any, Any]:
     """
     name, _ = FORMATS[path.suffix.lower()]
     reader = _meshio_module(name)
-    with path.open("rb"):
-        pass  # a missing or locked file is the caller's OSError, before meshio words it
+    with path.open("rb") as file:  # a missing or locked file is the caller's OSError, before meshio words it
+        _require_end(path, name, file.read())
     # The format's own reader: meshio.read() prints and ends the process when a file is bad.
     with _quiet(f"{path.name}: cannot be read as {name}"):
         contents = reader.read(str(path))
@@ -43,6 +44,23 @@ def read_interchange(path: Path) -> tuple[Any, Any]:
     if not blocks:
         raise MeshError(f"{path.name}: holds no tetrahedra, only {', '.join(kinds) or 'points'}")
     return points, np.concatenate(blocks)
+
+
+def _require_end(path: Path, name: str, content: bytes) -> None:
+    """Raises: MeshError where a file is cut short in a way that meshio reads as another mesh."""
+    if name == "vtk" and b"ASCII" in content[:1000]:
+        if not content.endswith(b"\n"):
+            raise MeshError(
+                f"{path.name}: the last line has no end: the file is cut short (or add a newline)"
+            )
+        announced = re.search(rb"CELL_TYPES\s+(\d+)((?:\s+\d+)*)", content)
+        if announced and len(announced[2].split()) < int(announced[1]):
+            raise MeshError(f"{path.name}: fewer cell types than announced: the file is cut short")
+    if name == "gmsh":
+        opened = re.findall(rb"^\$(?!End)(\w+)", content, re.MULTILINE)
+        closed = re.findall(rb"^\$End(\w+)\s", content + b"\n", re.MULTILINE)
+        if set(opened) - set(closed):
+            raise MeshError(f"{path.name}: section ${opened[-1].decode()} has no end: the file is cut short")
 
 
 def write_interchange(mesh: TetMesh, path: Path, suffix: str) -> None:

@@ -10,6 +10,7 @@ Gmsh and VTK files need the extra `taichi-soft[io]`.
 
 from __future__ import annotations
 
+import contextlib
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -90,7 +91,8 @@ def save_mesh(mesh: TetMesh, path: str | os.PathLike[str]) -> None:
         raise MeshError(message if message.startswith(target.stem) else f"{target.name}: {message}") from None
     finally:
         for temporary in temporaries.values():
-            temporary.unlink(missing_ok=True)
+            with contextlib.suppress(OSError):  # such as for a name too long to exist
+                temporary.unlink(missing_ok=True)
 
 
 def _checked_path(path: str | os.PathLike[str]) -> Path:
@@ -118,6 +120,8 @@ def _read_npz(path: Path) -> tuple[Any, Any]:
         raise MeshError(f"{path.name}: not a mesh file, or damaged ({reason})") from None
     if arrays is None:
         raise MeshError(f"{path.name}: has no array {min(missing)!r}, so it is not a mesh")
+    if any(array.ndim != 2 for array in arrays):
+        raise MeshError(f"{path.name}: vertices and tets must be tables, so it is not a mesh")
     return arrays
 
 

@@ -62,6 +62,8 @@ def _read_table(path: Path, what: str) -> tuple[list[int], FloatArray]:
         text = re.sub(r"#[^\n]*", "", path.read_text(encoding="utf-8"))
     except UnicodeDecodeError:
         raise MeshError(f"{path.name}: not a text file, so not a {path.suffix} mesh") from None
+    if text and not text.endswith("\n"):
+        raise MeshError(f"{path.name}: the last line has no end: the file is cut short (or add a newline)")
     lines = [line for line in text.splitlines() if line.strip()]
     try:
         header = [int(word) for word in lines[0].split()] if lines else []

@@ -36,13 +36,15 @@ def compile_baseline() -> ctypes.CDLL:
     compiler = find_compiler()
     if compiler is None:
         raise DeviceError("no C++ compiler found: install g++ or clang++, or name one in CXX")
-    library = Path(tempfile.mkdtemp(prefix="taichi-soft-")) / "baseline.so"
-    command = [compiler, *FLAGS, str(SOURCE), "-o", str(library)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        said = done.stderr.strip().splitlines() or ["no message"]
-        raise DeviceError(f"{compiler} cannot compile the baseline: {said[0]}")
-    return ctypes.CDLL(str(library))
+    # A library that is loaded needs its file no more, but Windows does not let go of it.
+    with tempfile.TemporaryDirectory(prefix="taichi-soft-", ignore_cleanup_errors=True) as folder:
+        library = Path(folder) / "baseline.so"
+        command = [compiler, *FLAGS, str(SOURCE), "-o", str(library)]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if done.returncode != 0:
+            said = done.stderr.strip().splitlines() or ["no message"]
+            raise DeviceError(f"{compiler} cannot compile the baseline: {said[0]}")
+        return ctypes.CDLL(str(library))
 
 
 class Baseline:

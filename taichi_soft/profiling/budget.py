@@ -21,15 +21,13 @@ class Budget:
 
 
 def measure_budget(count: int = 16, repeats: int = 121) -> list[Budget]:
-    """Measure `count` spheres at each rate and scale to a full frame.
+    """Measure `count` spheres at each rate and scale to a full frame, what a frame costs by itself included.
 
     The substep is limited by the material, so a frame twice as short needs half the substeps.
     """
     found = []
     for rate in FRAME_RATES:
         phases = measure_phases(count, 1.0 / rate, repeats)
-        fixed = phases.python.p99
-        per_body = max(phases.frame.p99 - fixed, 1e-6) / count
-        bodies = max(0, int((1e3 / rate - fixed) / per_body))
+        bodies = int(count * 1e3 / rate / phases.frame.p99)
         found.append(Budget(rate, phases.substeps, bodies, bodies * phases.tets // count, phases))
     return found

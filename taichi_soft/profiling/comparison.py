@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 from dataclasses import dataclass
 from functools import partial
 
@@ -10,7 +11,7 @@ import numpy as np
 from taichi_soft.laws import element_model
 from taichi_soft.materials import Material
 from taichi_soft.meshing import box
-from taichi_soft.profiling.baseline import Baseline, compile_baseline
+from taichi_soft.profiling.baseline import Baseline
 from taichi_soft.profiling.spread import Spread, compare
 from taichi_soft.scene import BodyDescription, arrange
 from taichi_soft.world import World
@@ -35,10 +36,9 @@ class Comparison:
 
 
 def compare_with_baseline(
-    repeats: int = 31, sizes: dict[int, tuple[int, int, int]] = SIZES
+    library: ctypes.CDLL, repeats: int = 31, sizes: dict[int, tuple[int, int, int]] = SIZES
 ) -> list[Comparison]:
-    """Measure every size. Raises: DeviceError without a C++ compiler."""
-    library = compile_baseline()
+    """Measure every size against the library that `compile_baseline` made."""
     found = []
     for cells in sizes.values():
         mesh = box((1.0, 1.0, 1.0), cells)

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.checks import as_array, to_array
+from taichi_soft.checks import to_array
 from taichi_soft.errors import OptionError
 from taichi_soft.types import Choice
 
@@ -81,9 +81,14 @@ def draw_labels(picture: Picture, labels: Sequence[str], places: ArrayLike) -> P
 
 
 def _check(picture: Picture, lines: Sequence[str]) -> None:
-    if not isinstance(picture, np.ndarray) or picture.dtype != np.uint8 or picture.shape[2:] != (3,):
-        raise OptionError("picture must be uint8 of shape (height, width, 3)")
-    as_array(picture.shape[:2], "picture size", (2,))
+    if (
+        not isinstance(picture, np.ndarray)
+        or picture.dtype != np.uint8
+        or picture.shape[2:] != (3,)
+        or picture.size == 0
+        or not picture.flags.writeable
+    ):
+        raise OptionError("picture must be uint8 of shape (height, width, 3), writeable and not empty")
     if not isinstance(lines, (list, tuple)):
         raise OptionError(f"text must be a list of lines of plain ASCII, got {lines!r}")
     for line in lines:

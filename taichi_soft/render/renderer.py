@@ -51,7 +51,7 @@ class Renderer:
     ) -> None:
         self.width = as_count(width, "width", 16, LARGEST)
         self.height = as_count(height, "height", 16, LARGEST)
-        self.floor = None if floor is None else as_number(floor, "floor", -1e6, 1e6)
+        self._floor = None if floor is None else as_number(floor, "floor", -1e6, 1e6)
         if not isinstance(camera, Camera):
             raise OptionError(f"camera must be a Camera, got {type(camera).__name__}")
         self._scale = camera.distance * math.tan(math.radians(camera.fov_degrees) / 2.0) * 2.0
@@ -67,6 +67,11 @@ class Renderer:
         self._encode = 255.0 * to_srgb(np.linspace(0.0, 1.0, 4096, dtype=np.float32))
         self._camera: Camera | None = None
         self.camera = camera
+
+    @property
+    def floor(self) -> float | None:
+        """Height of the floor [m], or None."""
+        return self._floor
 
     @property
     def camera(self) -> Camera:

@@ -38,6 +38,8 @@ class SceneArrays:
 
         Raises: OptionError for anything that is not a `Surface`.
         """
+        if not isinstance(surfaces, (list, tuple)):
+            raise OptionError(f"render takes a list of Surface objects, got {type(surfaces).__name__}")
         for surface in surfaces:
             if not isinstance(surface, Surface):
                 raise OptionError(f"render takes Surface objects, got {type(surface).__name__}")

@@ -1,6 +1,7 @@
 """The adapter against plain stepping of a twin world and interpolation in numpy."""
 
 import time
+import warnings
 
 import numpy as np
 import pytest
@@ -9,7 +10,15 @@ from hypothesis import strategies as st
 
 import engine_adapter
 from engine_adapter import EngineAdapter, FixedStep
-from taichi_soft import Material, OptionError, StateError, World, box
+from taichi_soft import (
+    FrozenBodyWarning,
+    Material,
+    OptionError,
+    StateError,
+    UnstableStepWarning,
+    World,
+    box,
+)
 
 DT = 1 / 60
 
@@ -77,7 +86,12 @@ def test_the_frame_rate_does_not_change_the_motion(make_world, rate, frames):
 
 def test_ten_thousand_equal_frames_make_one_step_each(adapter, monkeypatch):
     calls = []
-    monkeypatch.setattr(adapter.world, "step", lambda dt, substeps: calls.append((dt, substeps)))
+
+    def step(dt, substeps):
+        calls.append((dt, substeps))
+        adapter.world._step_count += 1
+
+    monkeypatch.setattr(adapter.world, "step", step)
     assert {adapter.advance(DT) for _ in range(10_000)} == {1}
     assert calls == [(DT, 4)] * 10_000
 
@@ -233,7 +247,7 @@ def test_a_step_that_raises_leaves_the_count_of_time_in_order(adapter, monkeypat
 
 
 def test_a_world_that_is_not_built_is_refused():
-    world = World()
+    world = World(floor=None)
     world.add_body(box(cells=(1, 1, 1)), Material(1e5, 0.2, 1000.0))
     with pytest.raises(StateError, match="build"):
         EngineAdapter(world)
@@ -299,3 +313,39 @@ def test_python_takes_a_small_part_of_a_frame(adapter, body):
         adapter.positions(body, out)
         seconds.append(time.perf_counter() - start)
     assert np.median(seconds) < 1e-3  # 0.04 ms on an idle machine; a frame of 60 Hz has 16.7 ms
+
+
+def test_time_is_that_of_the_positions_also_after_other_steps(make_world):
+    """The cube falls freely, so its height tells the time."""
+    world = make_world()
+    start = world.bodies[0].positions()[:, 2].astype(float).mean()
+    world.step(0.1, 20)
+    adapter = EngineAdapter(world, FixedStep(dt=DT, substeps=4))
+
+    def told():
+        return start - 0.5 * 9.81 * adapter.time**2
+
+    assert adapter.positions(world.bodies[0])[:, 2].mean() == pytest.approx(told(), abs=1e-5)
+    adapter.advance(DT)
+    assert adapter.time == pytest.approx(0.1)
+    assert adapter.positions(world.bodies[0])[:, 2].mean() == pytest.approx(told(), abs=1e-5)
+
+
+def test_a_step_that_was_made_is_not_dropped_where_its_warning_is_an_error():
+    world = World(gravity=(0, 0, 0), floor=None)
+    mesh = box(cells=(2, 2, 2))
+    bodies = [world.add_body(mesh, Material(1e9, 0.2, 1000.0), position=(x, 0, 0)) for x in (0, 3)]
+    world.build()
+    thrown = np.array(mesh.vertices)
+    thrown[0] *= 50
+    for body in bodies:
+        body.set_motion(thrown, np.zeros_like(thrown))
+    adapter = EngineAdapter(world, FixedStep(dt=DT, substeps=2))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UnstableStepWarning)
+        warnings.simplefilter("error", FrozenBodyWarning)
+        with pytest.raises(FrozenBodyWarning, match=r"body 0 .*; body 1 "):
+            adapter.advance(DT)
+    assert world.step_count == 1
+    assert adapter.dropped_time == 0.0
+    assert all(body.failure for body in bodies)

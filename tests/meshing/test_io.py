@@ -42,9 +42,11 @@ ROWS = ["0 0 0", "1 0 0", "0 1 0", "0 0 1", "1 1 1"]
 @pytest.mark.parametrize("base", [0, 1])
 def test_tetgen_counts_from_zero_or_one(tmp_path, base):
     rows = [f"{i + base}  {row}  0.5 1" for i, row in enumerate(ROWS)]
-    (tmp_path / "m.1.node").write_text(NODES.format("\n# a comment between\n".join(rows)))
+    (tmp_path / "m.1.node").write_text(NODES.format("\n# a comment between\n".join(rows)) + "\n")
     (tmp_path / "m.1.ele").write_text(
-        "2 4 1\n" + "\n".join(f"{i + base} " + " ".join(str(v + base) for v in t) + " 7" for i, t in TETS)
+        "2 4 1\n"
+        + "\n".join(f"{i + base} " + " ".join(str(v + base) for v in t) + " 7" for i, t in TETS)
+        + "\n"
     )
     for suffix in ("node", "ele"):
         mesh = load_mesh(tmp_path / f"m.1.{suffix}")
@@ -152,6 +154,21 @@ def test_files_cut_short_are_refused(tmp_path, capfd, suffix, part):
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.parametrize("suffix", [".msh", ".vtk", ".node", ".ele"])
+def test_text_cut_short_by_any_of_its_last_letters_is_refused(tmp_path, suffix):
+    """Where the last number loses a digit, what is left may still look like a mesh."""
+    needs(suffix)
+    path = tmp_path / f"ball{suffix}"
+    save_mesh(MESH, path)
+    whole = path.read_bytes()
+    for missing in range(1, 60):
+        path.write_bytes(whole[:-missing])
+        if suffix == ".msh" and missing == 1:
+            continue  # only the newline after the end
+        with pytest.raises(MeshError, match=r"^ball\."):
+            load_mesh(path)
+
+
 @pytest.mark.parametrize("suffix", OWN + WITH_MESHIO)
 @pytest.mark.parametrize(
     "content", [b"", b"\x00\xff\xfe" * 50, b"hello\nworld\n", b"\x89PNG\r\n", b"1 2 3 4\n"]
@@ -221,6 +238,17 @@ def test_archives_of_other_things_are_refused(tmp_path):
     np.savez(tmp_path / "y.npz", vertices=np.array([{}], dtype=object), tets=np.eye(4))
     with pytest.raises(MeshError, match=r"y\.npz: not a mesh file"):
         load_mesh(tmp_path / "y.npz")
+
+
+def test_archives_without_tables_are_refused(tmp_path):
+    np.savez(tmp_path / "x.npz", vertices=np.float64(3), tets=MESH.tets)
+    with pytest.raises(MeshError, match=r"x\.npz: vertices and tets must be tables"):
+        load_mesh(tmp_path / "x.npz")
+
+
+def test_a_name_too_long_for_the_disk_is_refused(tmp_path):
+    with pytest.raises(MeshError, match="cannot be written"):
+        save_mesh(MESH, tmp_path / ("x" * 250 + ".npz"))
 
 
 def test_a_missing_meshio_is_explained(tmp_path, monkeypatch):

@@ -5,7 +5,13 @@ import sys
 
 import pytest
 
-from taichi_soft.profiling import compare_with_baseline, find_compiler, measure_crossover
+from taichi_soft.profiling import (
+    compare_with_baseline,
+    compile_baseline,
+    find_compiler,
+    measure_budget,
+    measure_crossover,
+)
 from taichi_soft.profiling.report import tables
 from taichi_soft.profiling.spread import Spread
 
@@ -20,10 +26,18 @@ def test_a_spread_holds_least_median_99th_percentile_and_most():
 
 @needs_compiler
 def test_the_baseline_moves_a_body_as_the_kernels_do():
-    (row,) = compare_with_baseline(3, {1_000: (6, 6, 6)})
+    (row,) = compare_with_baseline(compile_baseline(), 3, {1_000: (6, 6, 6)})
     assert row.tets > 900
     assert row.deviation < 1e-4
     assert row.ratio.least > 0
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_what_fits_a_frame_is_scaled_from_whole_frames(count):
+    """More would have to run faster side by side than they were seen to."""
+    for found in measure_budget(count, 5):
+        assert found.bodies == int(count * 1e3 / found.rate / found.measured.frame.p99)
+        assert found.bodies < 1e5
 
 
 def test_the_crossover_times_both_schedules():

@@ -42,10 +42,11 @@ def turned():
 
 @pytest.fixture
 def solo():
-    """Builds a world with one body. Returns both."""
+    """Builds a world with one body, without a floor where the body lies at the origin. Returns both."""
 
     def build(mesh, material, world_options=None, **body_options):
-        world = World(**(world_options or {}))
+        usual = {} if "position" in body_options else {"floor": None}
+        world = World(**{**usual, **(world_options or {})})
         body = world.add_body(mesh, material, **body_options)
         world.build()
         return world, body

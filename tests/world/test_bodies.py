@@ -6,7 +6,7 @@ import warnings
 import numpy as np
 import pytest
 
-from taichi_soft import Material, World, beam, box, sphere
+from taichi_soft import Material, StateError, World, beam, box, sphere
 
 # mesh, material, options: everything in which bodies can differ.
 KINDS = {
@@ -121,23 +121,24 @@ def test_a_state_is_reused_and_clean(jelly):
     assert run(world, body) == expected
 
 
-def test_bodies_keep_a_world_in_use(cube, jelly):
-    """The handle is enough: a state goes back only when nobody can read it any more."""
+def test_a_world_that_is_dropped_gives_its_state_back_at_once(cube, jelly):
+    """Without waiting for the garbage collector; its bodies say so."""
 
     def make():
         world = World()
         body = world.add_body(cube, jelly, position=(0, 0, 5.0))
         world.build()
-        return body
+        return world._state, body
 
-    body = make()
-    before = body.positions()
-    gc.collect()
-    other = World()
-    other.add_body(cube, jelly, position=(0, 0, 1.0))
-    other.build()
-    other.step(1 / 60)
-    assert body.positions().tobytes() == before.tobytes()
+    gc.disable()
+    try:
+        state, body = make()
+        other, _ = make()
+    finally:
+        gc.enable()
+    assert other is state
+    with pytest.raises(StateError, match="world of body 0 is gone: keep a reference"):
+        body.positions()
 
 
 def test_bodies_come_in_the_order_of_adding(cube, jelly):

@@ -15,6 +15,7 @@ from taichi_soft import (
     ParticleMesh,
     StateError,
     TaichiSoftError,
+    UnstableStepWarning,
     World,
     init,
 )
@@ -85,7 +86,7 @@ def test_one_is_a_count_but_true_is_not(falling):
 
 
 def test_nothing_runs_before_build(cube, jelly):
-    world = World()
+    world = World(floor=None)
     body = world.add_body(cube, jelly)
     zeros = np.zeros((27, 3))
     calls = [
@@ -222,7 +223,7 @@ MIRROR = np.diag([1.0, 1.0, -1.0])
     ],
 )
 def test_bodies_that_cannot_be(cube, jelly, name, value):
-    world = World()
+    world = World(floor=None)
     with pytest.raises(OptionError, match=name.split("_")[0]):
         world.add_body(cube, jelly, **{name: value})
     assert world.bodies == ()
@@ -230,16 +231,16 @@ def test_bodies_that_cannot_be(cube, jelly, name, value):
 
 def test_unknown_names_are_answered_with_those_there_are(cube, jelly):
     with pytest.raises(OptionError, match=r"'virial'.*'face'|'face'.*'virial'"):
-        World().add_body(cube, jelly, law="neo_hooke")
+        World(floor=None).add_body(cube, jelly, law="neo_hooke")
     with pytest.raises(OptionError, match=r"'tolerant', 'recover', 'off'"):
-        World().add_body(cube, jelly, flips="never")
+        World(floor=None).add_body(cube, jelly, flips="never")
     with pytest.raises(OptionError, match=r"'auto', 'per_body', 'flat'"):
         World(schedule="fast")
 
 
 @pytest.mark.parametrize("material", [None, 1e5, "rubber", {"young": 1e5}, Material])
 def test_what_is_no_material(cube, material):
-    world = World()
+    world = World(floor=None)
     with pytest.raises(MaterialError, match=r"taichi_soft\.Material"):
         world.add_body(cube, material)
     assert world.bodies == ()
@@ -249,7 +250,7 @@ def test_what_is_no_material(cube, material):
 def test_an_array_of_another_length(cube, name):
     constants = {"young": 1e5, "poisson": 0.2, "density": 1000.0, "damping": 1.0}
     constants[name] = np.full(39, constants[name])
-    world = World()
+    world = World(floor=None)
     with pytest.raises(MaterialError, match="39 values for a mesh of 40"):
         world.add_body(cube, Material(**constants))
     assert world.bodies == ()
@@ -261,13 +262,13 @@ def test_an_array_of_another_length(cube, name):
 @pytest.mark.parametrize("mesh", [None, "cube", np.zeros((4, 3))])
 def test_what_is_no_mesh(jelly, mesh):
     with pytest.raises(MeshError, match="TetMesh"):
-        World().add_body(mesh, jelly)
+        World(floor=None).add_body(mesh, jelly)
 
 
 def test_particle_meshes_need_another_law(jelly):
     particles = ParticleMesh([[0, 0, 0], [1, 0, 0]], [[0, 1]], 1.0)
     with pytest.raises(MeshError, match=r"tetrahedra.*ParticleMesh"):
-        World().add_body(particles, jelly)
+        World(floor=None).add_body(particles, jelly)
 
 
 @pytest.mark.parametrize(
@@ -374,6 +375,92 @@ def test_bodies_out_of_reach(cube, jelly, name):
     world = World()
     with pytest.raises(TaichiSoftError, match=name):
         world.add_body(cube, jelly, **{name: (0, 0, 1e39)})
+
+
+@pytest.mark.parametrize("position", [(0, 0, 0), (5, 0, 0.4), (0, 0, -3), (0, 0, 0.498)])
+def test_bodies_that_start_below_the_floor(cube, jelly, position):
+    """The floor would press them flat in one substep. The message says where they fit."""
+    world = World()
+    with pytest.raises(OptionError, match=r"starts .* m below the floor: position=\(.*, 0\.5\) puts it on"):
+        world.add_body(cube, jelly, position=position)
+    assert world.bodies == ()
+    world.add_body(cube, jelly, position=(0, 0, 0.5))
+    world.add_body(cube, jelly, position=(0, 0, 0.4999999))
+
+
+@pytest.mark.parametrize(
+    ("scale", "error"), [(1e8, "position puts"), (1e-20, "shortest edge"), (1e-7, "short")]
+)
+def test_bodies_of_a_size_that_float32_cannot_hold(cube, jelly, scale, error):
+    with pytest.raises(TaichiSoftError, match=error):
+        World(floor=None).add_body(cube.scaled(scale), jelly)
+
+
+@pytest.mark.parametrize("dt", [1e-50, 1e308, 1e5])
+def test_steps_that_no_one_can_wait_for_or_see(falling, dt):
+    world, _ = falling
+    before = snapshot(world)
+    for call in (world.step, world.stable_substeps):
+        with pytest.raises(OptionError, match="dt must be"):
+            call(dt)
+    assert snapshot(world) == before
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_step_refused_by_a_warning_made_an_error_is_refused_again(solo, cube):
+    world, body = solo(cube, Material(1e9, 0.2, 1000.0), position=(0, 0, 1))
+    before = snapshot(world)
+    for _ in range(2):
+        with pytest.raises(UnstableStepWarning):
+            world.step(1 / 60, 1)
+        assert snapshot(world) == before
+
+
+def test_explicit_euler_is_announced_as_unstable(cube, jelly):
+    world = World(integrator="explicit_euler")
+    world.add_body(cube, jelly, position=(0, 0, 1))
+    with pytest.warns(UnstableStepWarning, match="explicit_euler gains energy"):
+        world.build()
+
+
+def test_more_threads_than_cores_are_not_waited_for():
+    """The flat schedule's threads wait for each other, so there must be no more than run."""
+    script = """
+from taichi_soft import Material, World, box, device, init
+import os
+init("cpu", threads=64)
+assert device().threads == min(64, len(os.sched_getaffinity(0)))
+init("cpu", threads=64)
+world = World(schedule="flat")
+world.add_body(box(cells=(4, 4, 4)), Material(1e5, 0.2, 1000.0), position=(0, 0, 1))
+world.build()
+world.step(1 / 60, 4)
+print("done")
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, timeout=120
+    )
+    assert done.stdout == "done\n", done.stderr
+
+
+def test_a_taichi_that_someone_else_started_is_left_alone():
+    script = """
+import taichi as ti
+ti.init(ti.cpu)
+x = ti.field(ti.f32, 3)
+x[0] = 5.0
+from taichi_soft import DeviceError, init
+try:
+    init()
+except DeviceError as error:
+    assert "call taichi_soft.init() instead" in str(error)
+assert x[0] == 5.0
+print("done")
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, timeout=120
+    )
+    assert done.stdout.endswith("done\n"), done.stderr
 
 
 def test_gravity_out_of_reach():
