@@ -48,11 +48,11 @@ def as_count(value: Any, name: str, low: int = 1, high: int = LARGEST_COUNT) -> 
     return int(value)
 
 
-def as_vector(value: ArrayLike, name: str, unit: str) -> Floats:
-    """`value` as three numbers that float32 can still compute with. Raises: OptionError."""
+def as_vector(value: ArrayLike, name: str, unit: str, limit: float = POSITION_LIMIT) -> Floats:
+    """`value` as three numbers nearer to zero than `limit`. Raises: OptionError."""
     vector = as_array(value, name, (3,), unit)
-    if np.abs(vector).max() > POSITION_LIMIT:
-        raise OptionError(f"{name} must lie within {POSITION_LIMIT:g} {unit} of zero, got {vector.tolist()}")
+    if not np.abs(vector).max() < limit:
+        raise OptionError(f"{name} must lie within {limit:g} {unit} of zero, got {vector.tolist()}")
     return vector
 
 

@@ -53,8 +53,23 @@ def main(*arguments: str) -> None:
         sys.exit(130)
 
 
+def _show_version(asked: bool) -> None:
+    if asked:
+        _say(f"taichi-soft {_version_of('taichi-soft')}")
+        raise typer.Exit
+
+
 def _show_warning(message: Warning | str, category: type[Warning], *_: Any) -> None:
     errors.print(f"[yellow]{category.__name__}:[/] {escape(str(message))}", soft_wrap=True, highlight=False)
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", is_eager=True, callback=_show_version, help="Print the version.")
+    ] = False,
+) -> None:
+    pass
 
 
 @app.command()

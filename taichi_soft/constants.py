@@ -11,5 +11,8 @@ vector instructions. Four were 1.3 times slower, sixteen compiled ten times long
 
 POSITION_LIMIT = 1.0e7
 """Farthest coordinate [m] that still counts as finite. Beyond it float32 cannot resolve a body at all
-(its spacing is 1 m), so a particle out there has been thrown by an explosion. The same number bounds
-velocities [m/s]."""
+(its spacing is 1 m), so a particle out there has been thrown by an explosion."""
+
+VELOCITY_LIMIT = 2.0e4
+"""Highest velocity [m/s] that still counts as sound: twice what leaves the Earth. A lower bound stops an
+explosion while the body is still somewhere near its shape."""

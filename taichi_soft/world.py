@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.body import Body, Failure, Floats32, require_buffer, require_built
 from taichi_soft.checks import as_count, as_number, as_rotation, as_vector
-from taichi_soft.constants import GRAVITY_EARTH, LANES, POSITION_LIMIT
+from taichi_soft.constants import GRAVITY_EARTH, LANES, POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.errors import FrozenBodyWarning, MeshError, OptionError, StateError, UnstableStepWarning
 from taichi_soft.integrators import StableStep, stable_step
 from taichi_soft.kernels.evaluate import compute_body_forces, find_failure
@@ -154,7 +154,7 @@ class World:
             element_model(law, strain, flips, damping_model),
             as_vector(position, "position", "m"),
             as_rotation(rotation),
-            as_vector(velocity, "velocity", "m/s"),
+            as_vector(velocity, "velocity", "m/s", VELOCITY_LIMIT),
         )
         self._require_place(description)
         arrays = arrange(description)
@@ -336,8 +336,8 @@ class World:
         """Put a body somewhere else. Raises: StateError before `build`."""
         require_built(self.is_built)
         x, v = positions.astype(np.float32), velocities.astype(np.float32)
-        for name, rows in (("positions", x), ("velocities", v)):
-            if not np.abs(rows).max() < POSITION_LIMIT:
-                raise OptionError(f"{name} must lie within {POSITION_LIMIT:g} of zero")
+        for name, rows, limit in (("positions", x, POSITION_LIMIT), ("velocities", v, VELOCITY_LIMIT)):
+            if not np.abs(rows).max() < limit:
+                raise OptionError(f"{name} must lie within {limit:g} of zero")
         write_motion(self._state, body.index, x, v)
         self._read_alpha = None

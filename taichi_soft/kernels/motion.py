@@ -1,7 +1,8 @@
 """Motion of particles: from force to velocity to position, with the floor in the way."""
 
 from taichi_soft.collision.floor import resolve_floor
-from taichi_soft.math.finite import is_in_reach
+from taichi_soft.constants import POSITION_LIMIT, VELOCITY_LIMIT
+from taichi_soft.math.finite import is_within
 from taichi_soft.runtime import ti
 
 
@@ -33,4 +34,5 @@ def move_particle(state: ti.template(), program: ti.template(), p, force, h, kic
 @ti.func
 def particle_is_sound(state: ti.template(), p):
     """True (1) where position and velocity can still be computed with."""
-    return is_in_reach(state.particle_position[p]) & is_in_reach(state.particle_velocity[p])
+    near = is_within(state.particle_position[p], POSITION_LIMIT)
+    return near & is_within(state.particle_velocity[p], VELOCITY_LIMIT)

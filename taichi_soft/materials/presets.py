@@ -1,7 +1,8 @@
 """Named materials. Textbook figures, rounded: a start, not a measurement.
 
 Moduli and densities from M. F. Ashby, Materials Selection in Mechanical Design (property tables);
-gelatine from its usual range of 1 to 100 kPa; `thesis_sphere` from thesis section 6.6. Damping is
+gelatine from the stiff end of its usual range of 1 to 100 kPa (dropped by metres it dents for good, unless
+added with flips="recover"); `thesis_sphere` from thesis section 6.6. Damping is
 no material constant in this model (b is per edge and depends on the mesh); the values keep a body of
 about a metre and a thousand tetrahedra from ringing.
 """
@@ -13,7 +14,7 @@ from taichi_soft.materials.material import Material
 
 PRESETS = {
     "thesis_sphere": Material(young=1.0e6, poisson=0.1, density=1000.0, damping=100.0),
-    "gelatine": Material(young=5.0e4, poisson=0.45, density=1050.0, damping=20.0),
+    "gelatine": Material(young=1.0e5, poisson=0.45, density=1050.0, damping=60.0),
     "soft_rubber": Material(young=2.0e6, poisson=0.47, density=1100.0, damping=100.0),
     "foam": Material(young=1.0e6, poisson=0.3, density=60.0, damping=5.0),
     "cork": Material(young=2.0e7, poisson=0.0, density=180.0, damping=50.0),

@@ -1,6 +1,5 @@
 """Finite or not, decided on the bits: fast-math compilers may assume that NaN never happens."""
 
-from taichi_soft.constants import POSITION_LIMIT
 from taichi_soft.runtime import ti
 
 _EXPONENT = 0x7F800000
@@ -17,10 +16,10 @@ def is_finite(v):
 
 
 @ti.func
-def is_in_reach(position):
-    """True (1) where a position is finite and nearer than `POSITION_LIMIT`."""
-    good = is_finite(position)
+def is_within(v, limit):
+    """True (1) where every component of a float32 vec3 is finite and nearer to zero than `limit`."""
+    good = is_finite(v)
     for i in ti.static(range(3)):
-        if not (ti.abs(position[i]) < POSITION_LIMIT):
+        if not (ti.abs(v[i]) < limit):
             good = 0
     return good

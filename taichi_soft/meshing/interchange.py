@@ -50,9 +50,7 @@ def _require_end(path: Path, name: str, content: bytes) -> None:
     """Raises: MeshError where a file is cut short in a way that meshio reads as another mesh."""
     if name == "vtk" and b"ASCII" in content[:1000]:
         if not content.endswith(b"\n"):
-            raise MeshError(
-                f"{path.name}: the last line has no end: the file is cut short (or add a newline)"
-            )
+            raise MeshError(f"{path.name}: the last line has no end: cut short? (or add a newline)")
         announced = re.search(rb"CELL_TYPES\s+(\d+)((?:\s+\d+)*)", content)
         if announced and len(announced[2].split()) < int(announced[1]):
             raise MeshError(f"{path.name}: fewer cell types than announced: the file is cut short")

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from importlib.metadata import version
 
 import cv2
 import pytest
@@ -74,6 +75,12 @@ def test_an_unknown_option_gives_exit_code_2():
     done = run("info", "--nonsense")
     assert done.returncode == 2
     assert "--nonsense" in done.stderr
+
+
+def test_the_version_is_that_of_the_package():
+    done = run("--version")
+    assert done.returncode == 0
+    assert done.stdout == f"taichi-soft {version('taichi-soft')}\n"
 
 
 def test_info_says_which_device_and_versions():

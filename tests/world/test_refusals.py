@@ -408,7 +408,7 @@ def test_steps_that_no_one_can_wait_for_or_see(falling, dt):
 
 @pytest.mark.filterwarnings("error")
 def test_a_step_refused_by_a_warning_made_an_error_is_refused_again(solo, cube):
-    world, body = solo(cube, Material(1e9, 0.2, 1000.0), position=(0, 0, 1))
+    world, _ = solo(cube, Material(1e9, 0.2, 1000.0), position=(0, 0, 1))
     before = snapshot(world)
     for _ in range(2):
         with pytest.raises(UnstableStepWarning):
