@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from taichi_soft.checks import as_array
 from taichi_soft.errors import OptionError, StateError
 from taichi_soft.integrators import StableStep
+from taichi_soft.laws.law import EnergyLaw
 from taichi_soft.scene import BodyDescription, rest_inverses, vertex_masses
 
 if TYPE_CHECKING:
@@ -165,12 +166,17 @@ class Body:
         return float(-(self.masses @ self.positions().astype(np.float64)) @ self._world.settings.gravity)
 
     def elastic_energy(self) -> float:
-        """1/2 sum V0 sigma : eps of the linear strain [J].
+        """Of the laws "st_venant_kirchhoff" and "neo_hookean": what deforming the body took [J].
 
-        An indicator, not a conserved energy: the stress of the thesis's laws is not the derivative of any
-        energy (except of another one at poisson = 1/4), so the total may drift without damping.
+        Of the thesis's laws 1/2 sum V0 sigma : eps of the linear strain: an indicator, not a conserved
+        energy. Their stress is not the derivative of any energy (except of another one at poisson = 1/4), so
+        the total may drift without damping.
         """
         count = len(self.tets)
+        law = self._description.model.law
+        if isinstance(law, EnergyLaw):
+            constants = (self.material.per_tet(name, count) for name in ("lame_lambda", "lame_mu"))
+            return float(law.energy_density(self.deformations(), *constants) @ self.mesh.volumes)
         strain = self.strains()
         trace = np.einsum("maa->m", strain)
         lame_lambda = self.material.per_tet("lame_lambda", count)
@@ -178,15 +184,18 @@ class Body:
         density = 0.5 * lame_lambda * trace**2 + lame_mu * np.einsum("mab,mab->m", strain, strain)
         return float(density @ self.mesh.volumes)
 
+    def deformations(self) -> Floats:
+        """Deformation gradient F = B A^-1 of each tetrahedron (thesis eq. 6.3), (m, 3, 3)."""
+        corners = self.positions().astype(np.float64)[self.tets]
+        return np.asarray(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2) @ rest_inverses(self.mesh))
+
     def strains(self) -> Floats:
         """Linear strain 1/2 (F F^T - I) of each tetrahedron (thesis eq. 6.7), (m, 3, 3)."""
-        corners = self.positions().astype(np.float64)[self.tets]
-        shapes = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
-        F = shapes @ rest_inverses(self.mesh)
+        F = self.deformations()
         return np.asarray(0.5 * (F @ np.swapaxes(F, 1, 2) - np.eye(3)))
 
     def vertex_stress(self) -> Floats:
-        """Von Mises stress averaged to the vertices by volume, (n,) [Pa]: for colours."""
+        """Von Mises stress by Hooke's law and linear strain, averaged by volume, (n,) [Pa]: for colours."""
         strain = self.strains()
         deviator = strain - np.einsum("maa->m", strain)[:, None, None] / 3.0 * np.eye(3)
         mu = self.material.per_tet("lame_mu", len(self.tets))

@@ -26,8 +26,8 @@ def internal_forces(
     velocities: ArrayLike | None = None,
     *,
     law: str = "virial",
-    strain: str | Strain = Strain.LINEAR,
-    flips: str | Flips = Flips.TOLERANT,
+    strain: str | Strain | None = None,
+    flips: str | Flips | None = None,
     damping_model: str | DampingModel = DampingModel.EDGE,
     dtype: DTypeLike = np.float64,
 ) -> NDArray[Any]:

@@ -122,8 +122,8 @@ class World:
         material: Material,
         *,
         law: str = "virial",
-        strain: str | Strain = Strain.LINEAR,
-        flips: str | Flips = Flips.TOLERANT,
+        strain: str | Strain | None = None,
+        flips: str | Flips | None = None,
         damping_model: str | DampingModel = DampingModel.EDGE,
         position: ArrayLike = (0.0, 0.0, 0.0),
         rotation: ArrayLike | None = None,
@@ -134,9 +134,10 @@ class World:
         Args:
             mesh: rest shape. A `ParticleMesh`, which has no tetrahedra, needs a law for springs: none yet.
             material: constants in SI units.
-            law: "virial" (thesis 6.3) or "face" (6.2).
-            strain: "linear" (eq. 6.7) or "exact" (square root of U^2).
-            flips: "tolerant" (the thesis: a mirrored tetrahedron is at rest too), "recover" or "off".
+            law: "virial" (thesis 6.3), "face" (6.2), "st_venant_kirchhoff" or "neo_hookean".
+            strain: "linear" (eq. 6.7) or "exact" (square root of U^2); None takes the law's own.
+            flips: "tolerant" (the thesis: a mirrored tetrahedron is at rest too), "recover" or "off"; None
+                takes the law's own. A law with an energy does what follows from it, and takes no other.
             damping_model: "edge" (eq. 3.9) or "tet_mean" (which section 6.4 rejects: it stops rotation).
             position: where the mesh's origin goes, (3,) [m].
             rotation: about the mesh's origin, matrix (3, 3) or quaternion (x, y, z, w).

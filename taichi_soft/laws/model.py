@@ -4,10 +4,11 @@ A model holds choices, never numbers, so that one compiled kernel serves every m
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 from taichi_soft.laws import strain as strains
+from taichi_soft.laws.energy import energy_forces
 from taichi_soft.laws.hooke import hooke_stress
+from taichi_soft.laws.law import EnergyLaw, Law
 from taichi_soft.laws.recovery import recovering_stress
 from taichi_soft.math.tensors import determinant, product
 from taichi_soft.math.tetrahedron import shape
@@ -16,28 +17,44 @@ from taichi_soft.types import DampingModel, Flips, Strain
 
 
 @dataclass(frozen=True)
-class Law:
-    """One way to turn the stress of a tetrahedron into forces on its vertices."""
-
-    name: str
-    section: str  # of the thesis
-    summary: str
-    forces: Any  # ti.func (shape columns, stress columns) -> four vec3 [N]
-
-
-@dataclass(frozen=True)
 class ElementModel:
     """The choices that shape one body's force kernel."""
 
     law: Law
-    strain: Strain = Strain.LINEAR
-    flips: Flips = Flips.TOLERANT
-    damping_model: DampingModel = DampingModel.EDGE
+    strain: Strain | None  # None where the law has no strain to choose
+    flips: Flips
+    damping_model: DampingModel
+
+    @property
+    def has_energy(self) -> bool:
+        """True where the forces are the derivative of an energy."""
+        return isinstance(self.law, EnergyLaw)
 
     @property
     def repairs_flips(self) -> bool:
         """True where a flipped tetrahedron takes another path than an upright one."""
-        return self.flips is Flips.RECOVER
+        return self.flips is Flips.RECOVER and not self.has_energy
+
+    @property
+    def mirrors_forces(self) -> bool:
+        """True where a flipped tetrahedron takes the forces of its mirror image."""
+        return self.flips is Flips.TOLERANT and not self.has_energy
+
+
+@ti.func
+def hooke_stress_of(model: ti.template(), F, lame_lambda, lame_mu):
+    """Hooke's stress of the strain that the model names [Pa], as columns."""
+    strain = strains.linear_strain(F) if ti.static(model.strain == Strain.LINEAR) else strains.exact_strain(F)
+    return hooke_stress(strain, lame_lambda, lame_mu)
+
+
+@ti.func
+def elastic_forces(model: ti.template(), B, F, rest_inverse, lame_lambda, lame_mu):
+    """Forces on four vertices [N] by the model's law."""
+    if ti.static(model.has_energy):
+        return energy_forces(model.law.piola(F, lame_lambda, lame_mu), rest_inverse)
+    else:
+        return model.law.forces(B, hooke_stress_of(model, F, lame_lambda, lame_mu))
 
 
 @ti.func
@@ -51,11 +68,9 @@ def upright_forces(model: ti.template(), x0, x1, x2, x3, rest_inverse, lame_lamb
     """
     B = shape(x0, x1, x2, x3)
     F = product(B, rest_inverse)
-    strain = strains.linear_strain(F) if ti.static(model.strain == Strain.LINEAR) else strains.exact_strain(F)
-    stress = hooke_stress(strain, lame_lambda, lame_mu)
-    f0, f1, f2, f3 = model.law.forces(B, stress)
+    f0, f1, f2, f3 = elastic_forces(model, B, F, rest_inverse, lame_lambda, lame_mu)
     volume6 = determinant(B)
-    if ti.static(model.flips == Flips.TOLERANT):
+    if ti.static(model.mirrors_forces):
         # The mirrored shape is at rest too: take the area vectors as a right-handed tetrahedron would.
         mirror = ti.select(volume6 < 0.0, -1.0, 1.0)
         f0, f1, f2, f3 = f0 * mirror, f1 * mirror, f2 * mirror, f3 * mirror

@@ -31,6 +31,20 @@ def outer_square(columns):
 
 
 @ti.func
+def inner_square(columns):
+    """M^T M, as columns (symmetric)."""
+    a, b, c = columns[0], columns[1], columns[2]
+    ab, bc, ca = a.dot(b), b.dot(c), c.dot(a)
+    return ti.Vector([a.dot(a), ab, ca]), ti.Vector([ab, b.dot(b), bc]), ti.Vector([ca, bc, c.dot(c)])
+
+
+@ti.func
+def plus(left, s, right, t):
+    """s M + t N, as columns."""
+    return left[0] * s + right[0] * t, left[1] * s + right[1] * t, left[2] * s + right[2] * t
+
+
+@ti.func
 def scaled_plus_identity(columns, factor, diagonal):
     """factor M + diagonal I, as columns."""
     return (

@@ -7,7 +7,10 @@ from typing import Any
 
 from rich.table import Table
 
+from taichi_soft.laws import LAWS
+from taichi_soft.laws.law import EnergyLaw
 from taichi_soft.profiling.budget import Budget
+from taichi_soft.profiling.law_costs import LawCost
 from taichi_soft.profiling.phases import Phases
 from taichi_soft.profiling.spread import Spread
 
@@ -41,6 +44,25 @@ def tables(found: dict[str, Any]) -> Iterator[tuple[str, Table]]:
         table.add_row("empty", f"{found['startup'][0].cold:.2f}")
         table.add_row("full", f"{found['startup'][0].warm:.2f}")
         yield "A new process to its first frame [s]", table
+
+
+def law_table(costs: list[LawCost]) -> Table:
+    """Every law: what it takes, whether it keeps energy, where it comes from, and what it costs."""
+    table = Table()
+    for name in ("law", "strain", "flips", "energy", "ns", "ratio", "source"):
+        table.add_column(name)
+    for each in costs:
+        law = LAWS[each.law]
+        table.add_row(
+            law.name,
+            each.strain or "its own",
+            ", ".join(choice.value for choice in law.flips),
+            "kept" if isinstance(law, EnergyLaw) else "drifts",
+            f"{each.cost.median:.1f}",
+            f"{each.ratio.median:.2f}",
+            law.source,
+        )
+    return table
 
 
 def _table(*columns: str) -> Table:

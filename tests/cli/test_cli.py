@@ -8,7 +8,10 @@ from importlib.metadata import version
 import cv2
 import pytest
 
-from taichi_soft.profiling import find_compiler
+from taichi_soft.profiling import LawCost, Spread, find_compiler
+from taichi_soft.profiling.report import law_table
+
+SPREAD = Spread(1.0, 1.0, 1.0, 1.0)
 
 
 def run(*arguments: str, cwd=None) -> subprocess.CompletedProcess:
@@ -88,8 +91,23 @@ def test_info_says_which_device_and_versions():
     assert facts["device"] == "cpu"
     assert facts["threads"] == 1
     assert facts["taichi"] == "1.7.4"
-    assert facts["law"]["virial"] == "stress to vertex forces by the virial theorem (thesis 6.3)"
+    assert facts["law"]["virial"] == "Hooke's stress to forces by the virial theorem (thesis 6.3)"
     assert facts["material"]["thesis_sphere"].startswith("E = 1 MPa, nu = 0.1")
+
+
+def test_info_lists_every_law_with_its_cost():
+    costs = json.loads(run("info", "--laws", "--json").stdout)
+    assert [(cost["law"], cost["strain"]) for cost in costs] == [
+        ("virial", "linear"),
+        ("virial", "exact"),
+        ("face", "linear"),
+        ("face", "exact"),
+        ("st_venant_kirchhoff", "linear"),
+        ("neo_hookean", None),
+    ]
+    assert all(cost["ratio"]["least"] > 0 for cost in costs)
+    table = law_table([LawCost(cost["law"], cost["strain"], SPREAD, SPREAD) for cost in costs])
+    assert table.row_count == 6
 
 
 def test_profile_prints_phases_and_budgets_as_json():

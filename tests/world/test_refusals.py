@@ -197,7 +197,6 @@ MIRROR = np.diag([1.0, 1.0, -1.0])
         ("law", "neo_hooke"),
         ("strain", "green"),
         ("flips", "never"),
-        ("flips", None),
         ("damping_model", "air"),
         ("position", (0, 0)),
         ("position", (0, 0, NAN)),
