@@ -2,5 +2,6 @@
 
 from taichi_soft.materials.material import Material, require_material
 from taichi_soft.materials.presets import PRESETS, preset
+from taichi_soft.materials.stiffness import Stiffness
 
-__all__ = ["PRESETS", "Material", "preset", "require_material"]
+__all__ = ["PRESETS", "Material", "Stiffness", "preset", "require_material"]
