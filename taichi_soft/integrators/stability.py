@@ -47,7 +47,7 @@ class StableStep:
 
 
 def stable_step(mesh: TetMesh, material: Material, model: ElementModel) -> StableStep:
-    """Estimate the largest stable substep of a body.
+    """Estimate the largest stable substep of a body under leapfrog; explicit Euler has none.
 
     It holds for motion about the rest shape. A body under strong compression is stiffer and a flattened
     tetrahedron has no bound at all, which is why `recommended` leaves a margin.
