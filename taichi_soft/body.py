@@ -33,6 +33,16 @@ class Failure:
     time: float  # [s], of the last sound state, in which the body now rests
 
 
+@dataclass(frozen=True)
+class FailedStep:
+    """The fixed step in which a body went non-finite."""
+
+    step: int
+    time: float  # [s], before it
+    substeps: int
+    h: float  # [s]
+
+
 class Body:
     """A handle to one body. Positions and velocities come back in the caller's vertex order.
 
@@ -46,7 +56,8 @@ class Body:
         self._description = description
         self._masses: Floats | None = None
         self.index = index
-        self.failure: Failure | None = None
+        self._frozen_in: FailedStep | None = None
+        self._failure: Failure | None = None
 
     @property
     def _world(self) -> World:
@@ -100,7 +111,14 @@ class Body:
     @property
     def is_frozen(self) -> bool:
         """True once the body went non-finite; it stays in its last finite state from then on."""
-        return self.failure is not None
+        return self._frozen_in is not None
+
+    @property
+    def failure(self) -> Failure | None:
+        """What broke first, None while the body is sound. Found out when first asked, not within a step."""
+        if self._frozen_in is not None and self._failure is None:
+            self._failure = self._world._find_failure(self, self._frozen_in)
+        return self._failure
 
     def positions(self, out: Floats32 | None = None) -> Floats32:
         """Vertex positions after the last step, float32 (n, 3) [m].
@@ -129,7 +147,7 @@ class Body:
         shape = (self.vertex_count, 3)
         x, v = as_array(positions, "positions", shape, "m"), as_array(velocities, "velocities", shape, "m/s")
         self._world._write_motion(self, x, v)
-        self.failure = None
+        self._frozen_in = self._failure = None
 
     def volumes(self) -> Floats:
         """Signed volume of each tetrahedron, (m,) [m^3]: negative where it is flipped."""

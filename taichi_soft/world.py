@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.body import Body, Failure, Floats32, require_buffer, require_built
+from taichi_soft.body import Body, FailedStep, Failure, Floats32, require_buffer, require_built
 from taichi_soft.checks import as_count, as_number, as_rotation, as_vector
 from taichi_soft.constants import GRAVITY_EARTH, LANES, POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.errors import FrozenBodyWarning, MeshError, OptionError, StateError, UnstableStepWarning
@@ -269,29 +269,31 @@ class World:
         return seconds, count, h
 
     def _note_failures(self, substeps: int, h: float) -> list[str]:
-        """Fill in `failure` of the bodies that the last step froze; a line about each."""
+        """Mark the bodies that the last step froze; a line about each."""
         reports = []
         assert self._state is not None
-        assert self._program is not None
         status = self._state.body_status.to_numpy()
         for body in self._bodies:
             if status[body.index] != FROZEN or body.is_frozen:
                 continue
-            found = np.full(2, -1, dtype=np.int32)
-            find_failure(self._state, self._program, body.index, substeps, h, found)
-            tet = None
-            if found[0] >= 0:
-                first_slot = self._scene.ranges[body.index].blocks[0] * LANES
-                row = min(int(found[0]) - first_slot, len(body.tets) - 1)
-                tet = int(self._scene.bodies[body.index].tet_order[row])
-            substep = int(found[1]) if tet is not None else None
-            body.failure = Failure(body.index, tet, self.step_count, substep, self.time)
-            where = "" if tet is None else f" (tetrahedron {tet} first, in substep {substep})"
+            body._frozen_in = FailedStep(self.step_count, self.time, substeps, h)
             reports.append(
-                f"body {body.index} went non-finite in step {self.step_count}{where}: put back to t = "
-                f"{self.time:.4g} s and frozen. Use more substeps or a softer material"
+                f"body {body.index} went non-finite in step {self.step_count}: put back to t = "
+                f"{self.time:.4g} s and frozen; body.failure names the tetrahedron. Use more substeps or a "
+                "softer material"
             )
         return reports
+
+    def _find_failure(self, body: Body, failed: FailedStep) -> Failure:
+        """Make the step that froze a body again and see where it breaks; the body stays as it is."""
+        found = np.full(2, -1, dtype=np.int32)
+        find_failure(self._state, self._program, body.index, failed.substeps, failed.h, found)
+        if found[0] < 0:
+            return Failure(body.index, None, failed.step, None, failed.time)
+        first_slot = self._scene.ranges[body.index].blocks[0] * LANES
+        row = min(int(found[0]) - first_slot, len(body.tets) - 1)
+        tet = int(self._scene.bodies[body.index].tet_order[row])
+        return Failure(body.index, tet, failed.step, int(found[1]), failed.time)
 
     def read_positions(self, body: Body, alpha: float, out: Floats32 | None = None) -> Floats32:
         """Positions of a body between the previous step (alpha 0) and the last one (alpha 1), (n, 3) [m].

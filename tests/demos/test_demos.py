@@ -72,6 +72,19 @@ def test_all_of_many_spheres_land_and_bounce_whole():
         assert body.center_of_mass()[2] > 0.5
 
 
+@pytest.mark.filterwarnings("ignore::taichi_soft.FrozenBodyWarning")
+def test_undamped_spheres_gain_energy_by_the_thesiss_laws_and_never_by_those_with_an_energy():
+    """The floor takes energy and gives none, so nobody should have more than at the start."""
+    most, stage = run("compare", 8.0)
+    assert most > 1.5
+    energy = load_demo("compare").energy
+    names = [actor.label.split(",")[0] for actor in stage.actors]
+    start = stage.actors[0].body.masses.sum() * 9.81 * 4.0
+    gained = {n: energy(a.body) / start for n, a in zip(names, stage.actors, strict=True)}
+    assert min(gained["virial"], gained["face"]) > 1.5
+    assert max(gained["st_venant_kirchhoff"], gained["neo_hookean"]) < 1.0
+
+
 @pytest.mark.parametrize("name", demo_names())
 def test_every_demo_can_be_filmed(name, tmp_path):
     stage = load_demo(name).stage()
@@ -80,8 +93,8 @@ def test_every_demo_can_be_filmed(name, tmp_path):
     assert stage.world.step_count >= 1
 
 
-def test_there_are_the_five_demos_of_the_readme():
-    assert demo_names() == ["bars", "bounce", "density", "dents", "many"]
+def test_there_are_the_six_demos_of_the_readme():
+    assert demo_names() == ["bars", "bounce", "compare", "density", "dents", "many"]
 
 
 def test_an_unknown_demo_is_refused_with_the_names_there_are():

@@ -98,7 +98,7 @@ def test_one_that_is_too_stiff_is_warned_about_then_frozen(thesis_mesh, young):
     assert failure.time == pytest.approx(failure.step * DT)
     assert 0 <= failure.substep < SUBSTEPS
     assert 0 <= failure.tetrahedron < len(thesis_mesh.tets)
-    assert f"tetrahedron {failure.tetrahedron}" in report
+    assert f"in step {failure.step}: put back to t = {failure.time:.4g} s" in report
     assert f"step {failure.step}" in report
 
     frozen = body.positions()
@@ -140,6 +140,21 @@ def test_the_tetrahedron_that_failed_first_is_near_the_fault(solo, cube):
     assert np.isin(cube.tets[body.failure.tetrahedron], torn).any()
     assert body.failure.substep == 1  # thrown in the first, out of reach in the second
     assert body.positions().tobytes() == x.astype(np.float32).tobytes()
+
+
+def test_what_broke_first_can_be_asked_at_any_time_later(solo, cube):
+    _, _, twin, _ = freeze(solo, cube)
+    early = twin.bodies[0].failure
+    _, _, world, _ = freeze(solo, cube)
+    (body,) = world.bodies
+    rest = body.positions().tobytes()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        for _ in range(5):
+            world.step(1 / 60, 3)
+    assert body.failure == early
+    assert body.failure is body.failure
+    assert body.positions().tobytes() == rest
 
 
 def test_the_report_points_at_the_line_that_steps(solo, cube):
