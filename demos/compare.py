@@ -9,12 +9,14 @@ from statistics import median
 from engine_adapter import FixedStep
 from taichi_soft import LAWS, Body, Material, TetMesh, World, load_mesh
 from taichi_soft.cli import main
+from taichi_soft.constants import GRAVITY_EARTH
 from taichi_soft.film import Actor, Stage
 from taichi_soft.profiling.spread import time_calls
 from taichi_soft.render import PALETTE, Camera
 from taichi_soft.stages import ASSETS
 
 UNDAMPED = Material(young=1.0e6, poisson=0.4, density=1000.0, damping=0.0)
+HEIGHT = 4.0  # of the centres [m]
 STEP = FixedStep(dt=1 / 50, substeps=20)
 PITCH, DEPTH = 4.2, 2.4  # between spheres: across, and every other one towards the eye [m]
 
@@ -25,7 +27,7 @@ def stage() -> Stage:
     world = World()
     actors = []
     for i, law in enumerate(LAWS):
-        place = PITCH * (i - (len(LAWS) - 1) / 2), DEPTH * (-1) ** i, 4.0
+        place = PITCH * (i - (len(LAWS) - 1) / 2), DEPTH * (-1) ** i, HEIGHT
         body = world.add_body(mesh, UNDAMPED, law=law, position=place)
         actors.append(Actor(body, PALETTE[i % len(PALETTE)], label=f"{law}, {_cost(mesh, law):.2f} ms"))
     world.build()
@@ -51,8 +53,8 @@ def energy(body: Body) -> float:
 
 def proof(stage: Stage) -> float:
     """Energy of the sphere that has gained most, over what each started with."""
-    start = {actor.body.masses.sum() * 9.81 * 4.0 for actor in stage.actors}
-    return max(energy(actor.body) for actor in stage.actors) / min(start)
+    start = stage.actors[0].body.masses.sum() * GRAVITY_EARTH * HEIGHT
+    return max(energy(actor.body) for actor in stage.actors) / float(start)
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import weakref
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -54,7 +55,6 @@ class Body:
         # Weak, or a world that is dropped would wait for the garbage collector to give its state back.
         self._world_ref = weakref.ref(world)
         self._description = description
-        self._masses: Floats | None = None
         self.index = index
         self._frozen_in: FailedStep | None = None
         self._failure: Failure | None = None
@@ -95,13 +95,14 @@ class Body:
         """Surface triangles, outward, (f, 3)."""
         return np.asarray(self.mesh.surface)
 
-    @property
+    @cached_property
     def masses(self) -> Floats:
         """Mass of each vertex, (n,) [kg]."""
-        if self._masses is None:
-            density = self._description.material.per_tet("density", len(self.tets))
-            self._masses = vertex_masses(self.mesh, density)
-        return self._masses
+        return vertex_masses(self.mesh, self.material.per_tet("density", len(self.tets)))
+
+    @cached_property
+    def _rest_inverses(self) -> Floats:
+        return rest_inverses(self.mesh)
 
     @property
     def stable_step(self) -> StableStep:
@@ -205,7 +206,7 @@ class Body:
     def deformations(self) -> Floats:
         """Deformation gradient F = B A^-1 of each tetrahedron (thesis eq. 6.3), (m, 3, 3)."""
         corners = self.positions().astype(np.float64)[self.tets]
-        return np.asarray(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2) @ rest_inverses(self.mesh))
+        return np.asarray(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2) @ self._rest_inverses)
 
     def strains(self) -> Floats:
         """Linear strain 1/2 (F F^T - I) of each tetrahedron (thesis eq. 6.7), (m, 3, 3)."""

@@ -9,6 +9,7 @@ import warnings
 from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from statistics import median
 from typing import Annotated, Any
 
 import typer
@@ -114,14 +115,13 @@ def demo(
     if report.path is not None:
         _say(f"wrote {escape(str(report.path))}: {report.frames} frames, {report.frames / fps:.1f} s")
     if len(report.step_times):
-        median = sorted(report.step_times)[len(report.step_times) // 2] * 1e3
+        frame = f"median {median(report.step_times) * 1e3:.2f} ms per frame of {1e3 / fps:.1f} ms"
         _say(
-            f"{name}: {report.simulated:.2f} s simulated, median {median:.2f} ms per frame of "
-            f"{1e3 / fps:.1f} ms: {report.real_time_factor:.1f} x faster than real time"
+            f"{name}: {report.simulated:.2f} s simulated, {frame}: "
+            f"{report.real_time_factor:.1f} x faster than real time"
         )
     if len(report.draw_times):
-        median = sorted(report.draw_times)[len(report.draw_times) // 2] * 1e3
-        _say(f"a picture of {size} took {median:.1f} ms to draw, at the median")
+        _say(f"a picture of {size} took {median(report.draw_times) * 1e3:.1f} ms to draw, at the median")
 
 
 def _say(line: str) -> None:

@@ -166,7 +166,8 @@ class World:
 
     def _require_place(self, description: BodyDescription) -> None:
         """Raises: OptionError where a body starts out of reach, or below the floor, which would crush it."""
-        lower, upper = (getattr(description.start_positions, side)(axis=0) for side in ("min", "max"))
+        positions = description.start_positions
+        lower, upper = positions.min(axis=0), positions.max(axis=0)
         if not max(np.abs(lower).max(), np.abs(upper).max()) < POSITION_LIMIT:
             raise OptionError(f"position puts the body beyond {POSITION_LIMIT:g} m: stay nearer the origin")
         floor = self.settings.floor
@@ -212,7 +213,12 @@ class World:
         self._launch = make_launch(schedule, state, program, self._scene, device)
 
     def stable_step(self, body: Body) -> StableStep:
-        """Estimate of the largest stable substep of a body; copies of one body share it."""
+        """Estimate of the largest stable substep of a body; copies of one body share it.
+
+        Raises: OptionError for what is no body.
+        """
+        if not isinstance(body, Body):
+            raise OptionError(f"body must be one that a world made, got {body!r}")
         described = body._description
         key = (id(described.mesh), id(described.material), described.model)
         if key not in self._stable_steps:
@@ -224,8 +230,7 @@ class World:
         if not self._bodies:
             raise StateError("the world is empty: call add_body first")
         longest = min(body.stable_step.recommended for body in self._bodies)
-        seconds = as_number(dt, "dt", SHORTEST_STEP, LONGEST_STEP, "a number above 0 s, from 1e-9 to 1e4")
-        return max(1, math.ceil(seconds / longest))
+        return max(1, math.ceil(_as_step(dt) / longest))
 
     def step(self, dt: float, substeps: int | None = None) -> None:
         """Make one fixed step of `dt` [s] in `substeps` equal substeps; None chooses their number.
@@ -252,7 +257,7 @@ class World:
             warnings.warn("; ".join(reports), FrozenBodyWarning, stacklevel=2)
 
     def _check_step(self, dt: float, substeps: int | None) -> tuple[float, int, float]:
-        seconds = as_number(dt, "dt", SHORTEST_STEP, LONGEST_STEP, "a number above 0 s, from 1e-9 to 1e4")
+        seconds = _as_step(dt)
         count = as_count(self.stable_substeps(seconds) if substeps is None else substeps, "substeps")
         h = seconds / count
         stiffest = min(self._bodies, key=lambda body: body.stable_step.limit)
@@ -344,3 +349,7 @@ class World:
                 raise OptionError(f"{name} must lie within {limit:g} of zero")
         write_motion(self._state, body.index, x, v)
         self._read_alpha = None
+
+
+def _as_step(dt: float) -> float:
+    return as_number(dt, "dt", SHORTEST_STEP, LONGEST_STEP, "a number above 0 s, from 1e-9 to 1e4")

@@ -97,6 +97,7 @@ CALLS = {
     "stable_step mesh": lambda v, _: ts.stable_step(v, JELLY, ts.element_model("virial")),
     "stable_step material": lambda v, _: ts.stable_step(MESH, v, ts.element_model("virial")),
     "stable_step model": lambda v, _: ts.stable_step(MESH, JELLY, v),
+    "stable_step body": lambda v, game: game.world.stable_step(v),
     "stable_substeps": lambda v, game: game.world.stable_substeps(v),
     "read_positions body": lambda v, game: game.world.read_positions(v, 1.0),
     "read_positions alpha": lambda v, game: game.world.read_positions(game.world.bodies[0], v),

@@ -116,7 +116,7 @@ class Camera:
 
         The first pixel covers u and v from 0 to 1.
         """
-        as_count(width, "width"), as_count(height, "height")
+        width, height = as_count(width, "width"), as_count(height, "height")
         focal = min(width, height) / (2.0 * math.tan(math.radians(self.fov_degrees) / 2.0))
         lens = np.array([[focal, 0.0, width / 2.0], [0.0, focal, height / 2.0], [0.0, 0.0, 1.0]])
         turn = self.axes

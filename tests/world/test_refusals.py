@@ -1,7 +1,5 @@
 """Bad input: a clear error, and nothing changed."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +15,6 @@ from taichi_soft import (
     TaichiSoftError,
     UnstableStepWarning,
     World,
-    init,
 )
 
 NAN, INF = float("nan"), float("inf")
@@ -310,62 +307,6 @@ def test_substeps_for_no_step(falling, dt):
         falling[0].stable_substeps(dt)
 
 
-@pytest.mark.parametrize("arch", ["gpu", "CPU", "", None, 3])
-def test_unknown_archs(arch):
-    with pytest.raises(OptionError, match="arch"):
-        init(arch)
-
-
-@pytest.mark.parametrize("threads", [0, -1, 1.5, "2", True, 100_000])
-def test_thread_counts_that_are_none(threads):
-    with pytest.raises(OptionError, match="threads"):
-        init("cpu", threads=threads)
-
-
-def test_starting_again_otherwise():
-    """In a process of its own: the first start fixes arch and threads, the second is a no-op or refused."""
-    script = """
-from taichi_soft import Material, OptionError, World, box, device, init
-for bad in ({"arch": "gpu"}, {"threads": 0}):
-    try:
-        init(**bad)
-    except OptionError:
-        pass
-    else:
-        raise AssertionError(bad)
-first = init("cpu", threads=1)
-world = World()
-body = world.add_body(box(cells=(1, 1, 1)), Material(1e5, 0.2, 1000.0), position=(0, 0, 1))
-world.build()
-before = body.positions().tobytes()
-assert init() is first and init("cpu") is first and init("cpu", threads=1) is first and device() is first
-for bad in ({"arch": "cpu", "threads": 2}, {"arch": "vulkan"}):
-    try:
-        init(**bad)
-    except OptionError as error:
-        assert "already runs" in str(error)
-    else:
-        raise AssertionError(bad)
-assert device() is first
-assert body.positions().tobytes() == before
-world.step(1 / 60)
-print("done")
-"""
-    done = subprocess.run(
-        [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, timeout=120
-    )
-    assert done.stdout == "done\n", done.stderr
-
-
-def test_no_device_before_the_start():
-    script = "from taichi_soft import device; device()"
-    done = subprocess.run(
-        [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, timeout=60
-    )
-    assert done.returncode == 1
-    assert "DeviceError: Taichi is not started" in done.stderr
-
-
 # Numbers that are finite in Python and not in float32, in which the world computes.
 
 
@@ -420,46 +361,6 @@ def test_explicit_euler_is_announced_as_unstable(cube, jelly):
     world.add_body(cube, jelly, position=(0, 0, 1))
     with pytest.warns(UnstableStepWarning, match="explicit_euler gains energy"):
         world.build()
-
-
-def test_more_threads_than_cores_are_not_waited_for():
-    """The flat schedule's threads wait for each other, so there must be no more than run."""
-    script = """
-from taichi_soft import Material, World, box, device, init
-import os
-init("cpu", threads=64)
-assert device().threads == min(64, len(os.sched_getaffinity(0)))
-init("cpu", threads=64)
-world = World(schedule="flat")
-world.add_body(box(cells=(4, 4, 4)), Material(1e5, 0.2, 1000.0), position=(0, 0, 1))
-world.build()
-world.step(1 / 60, 4)
-print("done")
-"""
-    done = subprocess.run(
-        [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, timeout=120
-    )
-    assert done.stdout == "done\n", done.stderr
-
-
-def test_a_taichi_that_someone_else_started_is_left_alone():
-    script = """
-import taichi as ti
-ti.init(ti.cpu)
-x = ti.field(ti.f32, 3)
-x[0] = 5.0
-from taichi_soft import DeviceError, init
-try:
-    init()
-except DeviceError as error:
-    assert "call taichi_soft.init() instead" in str(error)
-assert x[0] == 5.0
-print("done")
-"""
-    done = subprocess.run(
-        [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, timeout=120
-    )
-    assert done.stdout.endswith("done\n"), done.stderr
 
 
 def test_gravity_out_of_reach():
