@@ -121,8 +121,9 @@ def accumulate_elastic_forces(state: ti.template(), model: ti.template(), body):
         for lane in range(LANES):
             for corner in ti.static(range(4)):
                 p = state.tet_vertices[(block * 4 + corner) * LANES + lane]
-                g = forces[corner]
-                force = ti.Vector([g[0, lane], g[1, lane], g[2, lane]])
+                # `forces[corner]` has no name of its own: Taichi would copy it onto the stack for every lane,
+                # and a copy that happens to lie across two pages there took twice as long as all the rest.
+                force = ti.Vector([forces[corner][i, lane] for i in ti.static(range(3))])
                 # Not `+=`, which Taichi makes atomic: one thread owns the body.
                 state.particle_force[p] = state.particle_force[p] + force
 
@@ -133,10 +134,10 @@ def store_block_forces(state: ti.template(), model: ti.template(), number):
     block = number & BLOCK_BITS
     forces = block_forces(state, model, block)
     for corner in ti.static(range(4)):
-        g = forces[corner]
         for lane in range(LANES):
             for i in ti.static(range(3)):
-                state.corner_force[(block * CORNER_ROWS + 3 * corner + i) * LANES + lane] = g[i, lane]
+                place = (block * CORNER_ROWS + 3 * corner + i) * LANES + lane
+                state.corner_force[place] = forces[corner][i, lane]
 
 
 @ti.func
