@@ -35,10 +35,12 @@ def tables(found: dict[str, Any]) -> Iterator[tuple[str, Table]]:
             _ratio_table(("flat", "per_body"), rows),
         )
     if "scaling" in found:
-        table = _table("substeps", "threads", "step [ms]", "speed-up")
+        table = _table("substeps", "threads", "one thread", "all threads", "least", "speed-up", "most")
         for row in found["scaling"]:
-            table.add_row(str(row.substeps), str(row.threads), f"{row.step:.2f}", f"{row.speedup:.2f}")
-        yield "64 spheres on several threads", table
+            times = f"{row.single.median:.2f}", f"{row.parallel.median:.2f}"
+            gains = [f"{x:.2f}" for x in (row.speedup.least, row.speedup.median, row.speedup.most)]
+            table.add_row(str(row.substeps), str(row.threads), *times, *gains)
+        yield "64 spheres on several threads [ms]", table
     if "startup" in found:
         table = _table("kernel cache", "time")
         table.add_row("empty", f"{found['startup'][0].cold:.2f}")

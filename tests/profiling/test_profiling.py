@@ -5,12 +5,14 @@ import sys
 
 import pytest
 
+from taichi_soft.errors import DeviceError
 from taichi_soft.profiling import (
     compare_with_baseline,
     compile_baseline,
     find_compiler,
     measure_budget,
     measure_crossover,
+    scaling,
 )
 from taichi_soft.profiling.report import tables
 from taichi_soft.profiling.spread import Spread
@@ -60,3 +62,9 @@ def test_a_missing_compiler_gives_one_line():
     )
     assert done.returncode == 1
     assert done.stderr.strip().splitlines()[-1].startswith("error: no C++ compiler")
+
+
+def test_scaling_says_which_process_failed(monkeypatch):
+    monkeypatch.setattr(scaling, "_PROGRAM", "raise SystemExit({threads})")
+    with pytest.raises(DeviceError, match=r"process of 1 threads failed: try .*--threads 1"):
+        scaling.measure_scaling(2, 3)
