@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from typing import Any
 
 import numpy as np
@@ -9,14 +10,17 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from taichi_soft.constants import POSITION_LIMIT
 from taichi_soft.errors import MeshError, OptionError
-from taichi_soft.kernels.evaluate import evaluate_edge_damping, evaluate_tet_forces
-from taichi_soft.laws import element_model
+from taichi_soft.kernels.evaluate import compute_body_forces
+from taichi_soft.kernels.program import Program
+from taichi_soft.kernels.readout import write_motion
+from taichi_soft.laws import ElementModel, element_model
 from taichi_soft.materials import Material, require_material
 from taichi_soft.meshing import TetMesh
 from taichi_soft.meshing.arrays import LARGEST_COORDINATE
 from taichi_soft.runtime import init
-from taichi_soft.scene import edge_damping, rest_inverses
-from taichi_soft.types import DampingModel, Flips, Strain
+from taichi_soft.scene import BodyDescription, Scene, arrange
+from taichi_soft.state import Capacity, acquire, release
+from taichi_soft.types import DampingModel, Flips, Integrator, Strain
 
 
 def internal_forces(
@@ -33,7 +37,7 @@ def internal_forces(
 ) -> NDArray[Any]:
     """Elastic and damping forces on every vertex of a deformed mesh [N].
 
-    The same element functions as in a running world, one tetrahedron after the other.
+    The functions of a running world, in the precision asked for.
     Args:
         mesh: the body at rest.
         material: constants of the body.
@@ -51,19 +55,46 @@ def internal_forces(
     real = _real(dtype)
     x = _rows(positions, mesh, "positions", real)
     v = np.zeros_like(x) if velocities is None else _rows(velocities, mesh, "velocities", real)
-    count = len(mesh.tets)
     for name in ("young", "poisson", "density", "damping"):
-        material.per_tet(name, count)
-    init()
+        material.per_tet(name, len(mesh.tets))
+    body = _still_body(mesh, material, model, double=real == np.float64)
+    return body.forces(x, v)
 
-    damping = material.per_tet("damping", count) * (velocities is not None)
-    lame = np.stack([material.per_tet("lame_lambda", count), material.per_tet("lame_mu", count)], axis=1)
-    out = np.zeros_like(x)
-    tets, inverse = np.array(mesh.tets), rest_inverses(mesh).astype(real)
-    evaluate_tet_forces(model, x, v, tets, inverse, lame.astype(real), damping.astype(real), out)
-    if velocities is not None and model.damping_model is DampingModel.EDGE:
-        evaluate_edge_damping(x, v, np.array(mesh.edges), edge_damping(mesh, damping).astype(real), out)
-    return out
+
+class _StillBody:
+    """One body in fields of its own: what a world computes with, without its motion."""
+
+    def __init__(self, mesh: TetMesh, material: Material, model: ElementModel, double: bool) -> None:
+        init()
+        origin = np.zeros(3)
+        self.of = mesh, material, model
+        self._rows = arrange(BodyDescription(mesh, material, model, origin, np.eye(3), origin))
+        self._program = Program((model,), Integrator.LEAPFROG, has_floor=False, worker_count=1)
+        scene = Scene()
+        scene.append(self._rows)
+        self._state = acquire(Capacity.of(scene, double=double))
+        weakref.finalize(self, release, self._state)
+        self._state.load(scene, [0])
+
+    def forces(self, positions: NDArray[Any], velocities: NDArray[Any]) -> NDArray[Any]:
+        """Internal forces there, (n, 3) [N], in the mesh's order."""
+        write_motion(self._state, 0, positions, velocities)
+        rows = np.empty_like(positions)
+        compute_body_forces(self._state, self._program, 0, rows)
+        return np.asarray(rows[self._rows.rank])
+
+
+_last: dict[bool, _StillBody] = {}
+
+
+def _still_body(mesh: TetMesh, material: Material, model: ElementModel, *, double: bool) -> _StillBody:
+    """The body of the last call in this precision if it is the same, for loops over deformations."""
+    body = _last.get(double)
+    if body is None or body.of != (mesh, material, model):  # meshes and materials are equal to themselves only
+        _last.pop(double, None)
+        body = None  # so that its fields are free for the next
+        body = _last[double] = _StillBody(mesh, material, model, double)
+    return body
 
 
 def _real(dtype: DTypeLike) -> np.dtype[Any]:

@@ -110,18 +110,19 @@ def rest_inverses(mesh: TetMesh) -> Floats:
     return np.asarray(np.linalg.inv(shapes))
 
 
-def arrange(description: BodyDescription) -> BodyArrays:
-    """Reorder a body along a space-filling curve, so that neighbours share cache lines.
-
-    Raises: MeshError for edges below `SHORTEST_EDGE`.
-    """
-    mesh = description.mesh
-    count = len(mesh.tets)
+def require_size(mesh: TetMesh) -> None:
+    """Raises: MeshError for edges below `SHORTEST_EDGE`."""
     shortest = float(mesh.edge_lengths.min())
     if shortest < SHORTEST_EDGE:
         raise MeshError(
             f"the shortest edge is {shortest:.3g} m: scale the mesh (in metres) to {SHORTEST_EDGE:g} or more"
         )
+
+
+def arrange(description: BodyDescription) -> BodyArrays:
+    """Reorder a body along a space-filling curve, so that neighbours share cache lines."""
+    mesh = description.mesh
+    count = len(mesh.tets)
     material = description.material
     order = spatial_order(mesh.vertices)
     tets = tet_order(mesh.tets, order)

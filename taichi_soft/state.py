@@ -29,9 +29,10 @@ class Capacity:
     blocks: int
     bodies: int
     parallel: bool  # room for the force of every corner and edge at once, as the flat schedule needs
+    double: bool = False  # float64 instead of float32: to evaluate forces, not to move
 
     @classmethod
-    def of(cls, scene: Scene, parallel: bool) -> "Capacity":
+    def of(cls, scene: Scene, *, parallel: bool = False, double: bool = False) -> "Capacity":
         """Room for `scene`."""
         return cls(
             _power_of_two(scene.particle_count, 512),
@@ -39,6 +40,7 @@ class Capacity:
             _power_of_two(scene.block_count, 128),
             _power_of_two(len(scene.bodies), 8),
             parallel,
+            double,
         )
 
 
@@ -59,25 +61,26 @@ class State:
         """Allocate `capacity`; contents are zero until `load`."""
         self.capacity = capacity
         n, k, b, bodies = capacity.particles, capacity.edges, capacity.blocks, capacity.bodies
-        self.particle_position = ti.Vector.field(3, ti.f32, n)  # [m]
-        self.particle_velocity = ti.Vector.field(3, ti.f32, n)  # [m/s], see body_velocity_lag
-        self.particle_force = ti.Vector.field(3, ti.f32, n)  # [N], zero between steps
-        self.particle_inv_mass = ti.field(ti.f32, n)  # [1/kg]
+        real = self.real = ti.f64 if capacity.double else ti.f32
+        self.particle_position = ti.Vector.field(3, real, n)  # [m]
+        self.particle_velocity = ti.Vector.field(3, real, n)  # [m/s], see body_velocity_lag
+        self.particle_force = ti.Vector.field(3, real, n)  # [N], zero between steps
+        self.particle_inv_mass = ti.field(real, n)  # [1/kg]
         self.particle_body = ti.field(ti.i32, n)
         self.particle_of_vertex = ti.field(ti.i32, n)  # where the caller's next vertex lies
-        self.prev_position = ti.Vector.field(3, ti.f32, n)  # before the last fixed step
-        self.prev_velocity = ti.Vector.field(3, ti.f32, n)
+        self.prev_position = ti.Vector.field(3, real, n)  # before the last fixed step
+        self.prev_velocity = ti.Vector.field(3, real, n)
 
         self.tet_vertices = ti.field(ti.i32, b * 4 * LANES)
-        self.tet_rest_inverse = ti.field(ti.f32, b * 9 * LANES)  # [1/m], column by column
-        self.tet_lame = ti.field(ti.f32, b * 2 * LANES)  # [Pa]
-        self.tet_damping = ti.field(ti.f32, b * LANES)  # [N s/m], for damping by the mean velocity
+        self.tet_rest_inverse = ti.field(real, b * 9 * LANES)  # [1/m], column by column
+        self.tet_lame = ti.field(real, b * 2 * LANES)  # [Pa]
+        self.tet_damping = ti.field(real, b * LANES)  # [N s/m], for damping by the mean velocity
 
         self.edge_vertices = ti.Vector.field(2, ti.i32, k)
-        self.edge_damping = ti.field(ti.f32, k)  # [N s/m]
+        self.edge_damping = ti.field(real, k)  # [N s/m]
         if capacity.parallel:
-            self.corner_force = ti.field(ti.f32, b * CORNER_ROWS * LANES)  # [N]
-            self.edge_force = ti.Vector.field(3, ti.f32, k)
+            self.corner_force = ti.field(real, b * CORNER_ROWS * LANES)  # [N]
+            self.edge_force = ti.Vector.field(3, real, k)
             self.particle_corners = ti.Vector.field(2, ti.i32, n)  # range in corner_slot
             self.corner_slot = ti.field(ti.i32, b * 4 * LANES)  # where a corner's x lies in corner_force
             self.particle_edges = ti.Vector.field(2, ti.i32, n)  # range in incident_edge
@@ -89,11 +92,11 @@ class State:
         self.body_blocks = ti.Vector.field(2, ti.i32, bodies)
         self.body_model = ti.field(ti.i32, bodies)
         self.body_status = ti.field(ti.i32, bodies)
-        self.body_velocity_lag = ti.field(ti.f32, bodies)  # substep [s] by half of which leapfrog lags
+        self.body_velocity_lag = ti.field(real, bodies)  # substep [s] by half of which leapfrog lags
         self.block_model = ti.field(ti.i32, b)
 
-        self.gravity = ti.Vector.field(3, ti.f32, ())  # [m/s^2]
-        self.floor = ti.Vector.field(3, ti.f32, ())  # height [m], restitution, friction
+        self.gravity = ti.Vector.field(3, real, ())  # [m/s^2]
+        self.floor = ti.Vector.field(3, real, ())  # height [m], restitution, friction
 
     def load(self, scene: Scene, models: list[int]) -> None:
         """Fill every field from `scene`; `models[i]` is the number of body i's force model."""
@@ -102,49 +105,49 @@ class State:
         mass = np.concatenate([body.mass for body in bodies])
         position = np.concatenate([body.start_position for body in bodies])
         velocity = np.concatenate([body.start_velocity for body in bodies])
-        _fill(self.particle_position, position)
-        _fill(self.prev_position, position)
-        _fill(self.particle_velocity, velocity)
-        _fill(self.prev_velocity, velocity)
-        _fill(self.particle_force, np.zeros((0, 3)))
-        _fill(self.particle_inv_mass, 1.0 / mass)
-        _fill(self.particle_body, np.repeat(np.arange(len(bodies)), [len(body.mass) for body in bodies]))
+        fill(self.particle_position, position)
+        fill(self.prev_position, position)
+        fill(self.particle_velocity, velocity)
+        fill(self.prev_velocity, velocity)
+        fill(self.particle_force, np.zeros((0, 3)))
+        fill(self.particle_inv_mass, 1.0 / mass)
+        fill(self.particle_body, np.repeat(np.arange(len(bodies)), [len(body.mass) for body in bodies]))
 
         ranks = [b.rank + r.particles[0] for b, r in zip(bodies, ranges, strict=True)]
-        _fill(self.particle_of_vertex, np.concatenate(ranks))
+        fill(self.particle_of_vertex, np.concatenate(ranks))
 
         vertices, corners = _tet_blocks(bodies, ranges)
-        _fill(self.tet_vertices, vertices)
-        _fill(self.tet_rest_inverse, _blocks(bodies, lambda b: np.swapaxes(b.rest_inverse, 1, 2), 9))
-        _fill(self.tet_lame, _blocks(bodies, lambda b: b.lame, 2))
-        _fill(self.tet_damping, _blocks(bodies, lambda b: b.tet_damping, 1))
+        fill(self.tet_vertices, vertices)
+        fill(self.tet_rest_inverse, _blocks(bodies, lambda b: np.swapaxes(b.rest_inverse, 1, 2), 9))
+        fill(self.tet_lame, _blocks(bodies, lambda b: b.lame, 2))
+        fill(self.tet_damping, _blocks(bodies, lambda b: b.tet_damping, 1))
 
         edges = np.concatenate(
             [b.edge_vertices + r.particles[0] for b, r in zip(bodies, ranges, strict=True)]
         )
-        _fill(self.edge_vertices, edges)
-        _fill(self.edge_damping, np.concatenate([body.edge_damping for body in bodies]))
+        fill(self.edge_vertices, edges)
+        fill(self.edge_damping, np.concatenate([body.edge_damping for body in bodies]))
         if self.capacity.parallel:
             self._load_gather_lists(corners, edges, scene.particle_count)
 
-        _fill(self.body_particles, np.array([r.particles for r in ranges]))
-        _fill(self.body_edges, np.array([r.edges for r in ranges]))
-        _fill(self.body_blocks, np.array([r.blocks for r in ranges]))
-        _fill(self.body_model, np.array(models))
-        _fill(self.body_status, np.zeros(0))
-        _fill(self.body_velocity_lag, np.zeros(0))
-        _fill(self.block_model, np.repeat(models, [r.blocks[1] - r.blocks[0] for r in ranges]))
+        fill(self.body_particles, np.array([r.particles for r in ranges]))
+        fill(self.body_edges, np.array([r.edges for r in ranges]))
+        fill(self.body_blocks, np.array([r.blocks for r in ranges]))
+        fill(self.body_model, np.array(models))
+        fill(self.body_status, np.zeros(0))
+        fill(self.body_velocity_lag, np.zeros(0))
+        fill(self.block_model, np.repeat(models, [r.blocks[1] - r.blocks[0] for r in ranges]))
 
     def _load_gather_lists(self, corners: NDArray[np.int64], edges: NDArray[np.int64], count: int) -> None:
         """For each particle, the corner forces and edge forces that act on it, in a fixed order."""
         order = np.argsort(corners[:, 0], kind="stable")
-        _fill(self.corner_slot, corners[order, 1])
-        _fill(self.particle_corners, _row_ranges(corners[:, 0], count))
+        fill(self.corner_slot, corners[order, 1])
+        fill(self.particle_corners, _row_ranges(corners[:, 0], count))
         ends = edges.T.reshape(-1)
         numbers = np.arange(len(edges))
         incident = np.concatenate([numbers, -1 - numbers])
-        _fill(self.incident_edge, incident[np.argsort(ends, kind="stable")])
-        _fill(self.particle_edges, _row_ranges(ends, count))
+        fill(self.incident_edge, incident[np.argsort(ends, kind="stable")])
+        fill(self.particle_edges, _row_ranges(ends, count))
 
 
 def _row_ranges(owner: NDArray[np.int64], count: int) -> NDArray[np.int64]:
@@ -174,10 +177,13 @@ def _tet_blocks(
     return np.concatenate(blocks), np.concatenate(corners).astype(np.int64)
 
 
-def _fill(target, rows: NDArray[np.generic]) -> None:  # type: ignore[no-untyped-def]
+_NUMPY = {ti.f32: np.float32, ti.f64: np.float64, ti.i32: np.int32}
+
+
+def fill(target, rows: NDArray[np.generic]) -> None:  # type: ignore[no-untyped-def]
     """Write `rows` to the front of a field and zeros behind them."""
     shape = tuple(target.shape) + ((target.n,) if hasattr(target, "n") else ())
-    whole = np.zeros(shape, dtype=np.float32 if target.dtype == ti.f32 else np.int32)
+    whole = np.zeros(shape, dtype=_NUMPY[target.dtype])
     whole[: len(rows)] = rows
     target.from_numpy(whole)
 

@@ -25,7 +25,7 @@ from taichi_soft.laws import ElementModel, element_model
 from taichi_soft.materials import Material, require_material
 from taichi_soft.meshing import TetMesh
 from taichi_soft.runtime import init
-from taichi_soft.scene import BodyDescription, Scene, arrange
+from taichi_soft.scene import BodyDescription, Scene, arrange, require_size
 from taichi_soft.settings import Settings
 from taichi_soft.state import FROZEN, Capacity, State, acquire, release
 from taichi_soft.types import DampingModel, Flips, Integrator, Schedule, Strain
@@ -157,6 +157,7 @@ class World:
             as_rotation(rotation),
             as_vector(velocity, "velocity", "m/s", VELOCITY_LIMIT),
         )
+        require_size(mesh)
         self._require_place(description)
         arrays = arrange(description)
         self._scene.append(arrays)

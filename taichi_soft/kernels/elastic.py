@@ -84,11 +84,11 @@ def lane_forces(state: ti.template(), model: ti.template(), block, lane):
 @ti.func
 def block_forces(state: ti.template(), model: ti.template(), block):
     """Forces of a block's tetrahedra on their corners [N]: four matrices (3, LANES)."""
-    g0 = ti.Matrix.zero(ti.f32, 3, LANES)
-    g1 = ti.Matrix.zero(ti.f32, 3, LANES)
-    g2 = ti.Matrix.zero(ti.f32, 3, LANES)
-    g3 = ti.Matrix.zero(ti.f32, 3, LANES)
-    volumes = ti.Vector.zero(ti.f32, LANES)
+    g0 = ti.Matrix.zero(state.real, 3, LANES)
+    g1 = ti.Matrix.zero(state.real, 3, LANES)
+    g2 = ti.Matrix.zero(state.real, 3, LANES)
+    g3 = ti.Matrix.zero(state.real, 3, LANES)
+    volumes = ti.Vector.zero(state.real, LANES)
     for lane in range(LANES):
         f0, f1, f2, f3, volume6 = _upright_forces_of(state, model, block, lane)
         for i in ti.static(range(3)):

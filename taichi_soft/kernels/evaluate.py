@@ -1,15 +1,12 @@
-"""Evaluation without motion: forces of a world's body, and of any mesh in any precision."""
+"""Evaluation without motion: forces on a body where it is, or would be; and what broke a frozen one."""
 
 from taichi_soft.constants import LANES
 from taichi_soft.kernels.damping import accumulate_edge_damping
 from taichi_soft.kernels.elastic import lane_forces
 from taichi_soft.kernels.motion import particle_is_sound, restore_particle
 from taichi_soft.kernels.per_body import move_body
-from taichi_soft.laws.damping import edge_damping_force, tet_mean_damping_forces
-from taichi_soft.laws.model import flipped_forces, upright_forces
 from taichi_soft.math.finite import is_finite
 from taichi_soft.runtime import ti
-from taichi_soft.types import DampingModel
 
 
 @ti.func
@@ -37,7 +34,7 @@ def accumulate_forces_one_by_one(state: ti.template(), program: ti.template(), b
 
 @ti.kernel
 def compute_body_forces(
-    state: ti.template(), program: ti.template(), body: ti.i32, out: ti.types.ndarray(dtype=ti.f32, ndim=2)
+    state: ti.template(), program: ti.template(), body: ti.i32, out: ti.types.ndarray(ndim=2)
 ):
     """Internal forces on the particles of one body where they are now [N], in kernel order."""
     ti.loop_config(serialize=True)
@@ -47,7 +44,7 @@ def compute_body_forces(
         for p in range(particles[0], particles[1]):
             for i in ti.static(range(3)):
                 out[p - particles[0], i] = state.particle_force[p][i]
-            state.particle_force[p] = ti.Vector([0.0, 0.0, 0.0])
+            state.particle_force[p] = ti.Vector.zero(state.real, 3)
 
 
 @ti.kernel
@@ -82,78 +79,4 @@ def find_failure(
         particles = state.body_particles[body]
         for p in range(particles[0], particles[1]):
             restore_particle(state, p)
-            state.particle_force[p] = ti.Vector([0.0, 0.0, 0.0])
-
-
-@ti.func
-def _vec3(rows: ti.template(), i):
-    return ti.Vector([rows[i, 0], rows[i, 1], rows[i, 2]])
-
-
-@ti.func
-def _add(rows: ti.template(), i, v):
-    for k in ti.static(range(3)):
-        rows[i, k] = rows[i, k] + v[k]
-
-
-@ti.kernel
-def evaluate_tet_forces(
-    model: ti.template(),
-    positions: ti.types.ndarray(ndim=2),
-    velocities: ti.types.ndarray(ndim=2),
-    tets: ti.types.ndarray(dtype=ti.i32, ndim=2),
-    rest_inverse: ti.types.ndarray(ndim=3),
-    lame: ti.types.ndarray(ndim=2),
-    damping: ti.types.ndarray(ndim=1),
-    out: ti.types.ndarray(ndim=2),
-):
-    """Add the forces of every tetrahedron to `out` (n, 3) [N], in the precision of the arrays."""
-    ti.loop_config(serialize=True)
-    for t in range(tets.shape[0]):
-        p0, p1, p2, p3 = tets[t, 0], tets[t, 1], tets[t, 2], tets[t, 3]
-        x0, x1, x2, x3 = (
-            _vec3(positions, p0),
-            _vec3(positions, p1),
-            _vec3(positions, p2),
-            _vec3(positions, p3),
-        )
-        inverse = (
-            ti.Vector([rest_inverse[t, 0, 0], rest_inverse[t, 1, 0], rest_inverse[t, 2, 0]]),
-            ti.Vector([rest_inverse[t, 0, 1], rest_inverse[t, 1, 1], rest_inverse[t, 2, 1]]),
-            ti.Vector([rest_inverse[t, 0, 2], rest_inverse[t, 1, 2], rest_inverse[t, 2, 2]]),
-        )
-        f0, f1, f2, f3, volume6 = upright_forces(model, x0, x1, x2, x3, inverse, lame[t, 0], lame[t, 1])
-        if ti.static(model.repairs_flips):
-            if volume6 < 0.0:
-                f0, f1, f2, f3 = flipped_forces(model, x0, x1, x2, x3, inverse, lame[t, 0], lame[t, 1])
-        if ti.static(model.damping_model == DampingModel.TET_MEAN):
-            d0, d1, d2, d3 = tet_mean_damping_forces(
-                _vec3(velocities, p0),
-                _vec3(velocities, p1),
-                _vec3(velocities, p2),
-                _vec3(velocities, p3),
-                damping[t],
-            )
-            f0, f1, f2, f3 = f0 + d0, f1 + d1, f2 + d2, f3 + d3
-        _add(out, p0, f0)
-        _add(out, p1, f1)
-        _add(out, p2, f2)
-        _add(out, p3, f3)
-
-
-@ti.kernel
-def evaluate_edge_damping(
-    positions: ti.types.ndarray(ndim=2),
-    velocities: ti.types.ndarray(ndim=2),
-    edges: ti.types.ndarray(dtype=ti.i32, ndim=2),
-    damping: ti.types.ndarray(ndim=1),
-    out: ti.types.ndarray(ndim=2),
-):
-    """Add the damping of every edge to `out` (n, 3) [N], in the precision of the arrays."""
-    ti.loop_config(serialize=True)
-    for e in range(edges.shape[0]):
-        p, q = edges[e, 0], edges[e, 1]
-        r = _vec3(positions, q) - _vec3(positions, p)
-        force = edge_damping_force(r, _vec3(velocities, q) - _vec3(velocities, p), damping[e])
-        _add(out, p, force)
-        _add(out, q, -force)
+            state.particle_force[p] = ti.Vector.zero(state.real, 3)

@@ -28,7 +28,7 @@ def _edge_phase(state: ti.template(), e):
 @ti.func
 def gathered_force(state: ti.template(), p):
     """Internal force on one particle [N]: its corners' forces, then its edges'."""
-    force = ti.Vector([0.0, 0.0, 0.0])
+    force = ti.Vector.zero(state.real, 3)
     corners = state.particle_corners[p]
     for k in range(corners[0], corners[1]):
         force += corner_force_at(state, state.corner_slot[k])

@@ -28,7 +28,7 @@ def move_body(state: ti.template(), program: ti.template(), body, h, kick):
     particles = state.body_particles[body]
     for p in range(particles[0], particles[1]):
         move_particle(state, program, p, state.particle_force[p], h, kick)
-        state.particle_force[p] = ti.Vector([0.0, 0.0, 0.0])
+        state.particle_force[p] = ti.Vector.zero(state.real, 3)
 
 
 @ti.func
@@ -41,7 +41,7 @@ def _settle_body(state: ti.template(), body):
     if sound == 0:
         for p in range(particles[0], particles[1]):
             restore_particle(state, p)
-            state.particle_force[p] = ti.Vector([0.0, 0.0, 0.0])
+            state.particle_force[p] = ti.Vector.zero(state.real, 3)
         state.body_status[body] = FROZEN
     return 1 - sound
 

@@ -33,8 +33,8 @@ def read_velocities(
 def write_motion(
     state: ti.template(),
     body: ti.i32,
-    positions: ti.types.ndarray(dtype=ti.f32, ndim=2),
-    velocities: ti.types.ndarray(dtype=ti.f32, ndim=2),
+    positions: ti.types.ndarray(ndim=2),
+    velocities: ti.types.ndarray(ndim=2),
 ):
     """Put the particles of one body somewhere else, with velocities of the same moment."""
     ti.loop_config(serialize=True)
@@ -44,6 +44,6 @@ def write_motion(
         state.particle_position[p] = x
         state.prev_position[p] = x
         state.particle_velocity[p] = ti.Vector([velocities[i, 0], velocities[i, 1], velocities[i, 2]])
-        state.particle_force[p] = ti.Vector([0.0, 0.0, 0.0])
+        state.particle_force[p] = ti.Vector.zero(state.real, 3)
     state.body_velocity_lag[body] = 0.0
     state.body_status[body] = 0
