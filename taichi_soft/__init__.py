@@ -7,32 +7,39 @@ from taichi_soft.errors import (
     MaterialError,
     MeshError,
     OptionError,
+    SolverWarning,
     StateError,
     TaichiSoftError,
     UnstableStepWarning,
     VideoError,
 )
 from taichi_soft.forces import internal_forces
-from taichi_soft.integrators import StableStep, stable_step
 from taichi_soft.laws import LAWS, element_model
-from taichi_soft.materials import PRESETS, Material, preset
+from taichi_soft.materials import PRESETS, Material, SpringMaterial, preset
 from taichi_soft.meshing import (
     MeshQuality,
     ParticleMesh,
     TetMesh,
     beam,
     box,
+    cloth,
+    cloth_constants,
     cylinder,
+    delaunay_mesh,
+    edges_as_particles,
     extrude,
     load_mesh,
+    rope,
     save_mesh,
     sphere,
     surface_mesh,
     torus,
+    voronoi_graph,
     voxels,
 )
 from taichi_soft.runtime import Device, device, init
 from taichi_soft.settings import Settings
+from taichi_soft.stability import StableStep, stable_step
 from taichi_soft.world import World
 
 __all__ = [
@@ -50,6 +57,8 @@ __all__ = [
     "OptionError",
     "ParticleMesh",
     "Settings",
+    "SolverWarning",
+    "SpringMaterial",
     "StableStep",
     "StateError",
     "TaichiSoftError",
@@ -59,18 +68,24 @@ __all__ = [
     "World",
     "beam",
     "box",
+    "cloth",
+    "cloth_constants",
     "cylinder",
+    "delaunay_mesh",
     "device",
+    "edges_as_particles",
     "element_model",
     "extrude",
     "init",
     "internal_forces",
     "load_mesh",
     "preset",
+    "rope",
     "save_mesh",
     "sphere",
     "stable_step",
     "surface_mesh",
     "torus",
+    "voronoi_graph",
     "voxels",
 ]

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.checks import as_array
-from taichi_soft.errors import OptionError, StateError
-from taichi_soft.integrators import StableStep
+from taichi_soft.errors import MeshError, OptionError, StateError
 from taichi_soft.laws.law import EnergyLaw
-from taichi_soft.scene import BodyDescription, rest_inverses, vertex_masses
+from taichi_soft.scene import BodyDescription, rest_inverses
+from taichi_soft.stability import StableStep
 
 if TYPE_CHECKING:
     from taichi_soft.world import World
@@ -32,6 +32,7 @@ class Failure:
     step: int  # of the world, counted from 0, which was undone for this body
     substep: int | None  # within that step
     time: float  # [s], of the last sound state, in which the body now rests
+    edge: tuple[int, int] | None = None  # instead of a tetrahedron where forces act along edges
 
 
 @dataclass(frozen=True)
@@ -68,7 +69,8 @@ class Body:
 
     def __repr__(self) -> str:
         state = "frozen" if self.is_frozen else "active"
-        return f"Body({self.index}, {self.vertex_count} vertices, {len(self.tets)} tetrahedra, {state})"
+        kind = f"{len(self.tets)} tetrahedra" if len(self.tets) else f"{len(self.mesh.edges)} edges"
+        return f"Body({self.index}, {self.vertex_count} vertices, {kind}, {state})"
 
     @property
     def mesh(self):  # type: ignore[no-untyped-def]
@@ -95,10 +97,20 @@ class Body:
         """Surface triangles, outward, (f, 3)."""
         return np.asarray(self.mesh.surface)
 
-    @cached_property
+    def _require_tets(self) -> None:
+        """Raises: MeshError for a body without tetrahedra."""
+        if len(self.tets) == 0:
+            raise MeshError(f"body {self.index} has no tetrahedra: it is made of particles and edges only")
+
+    @property
     def masses(self) -> Floats:
         """Mass of each vertex, (n,) [kg]."""
-        return vertex_masses(self.mesh, self.material.per_tet("density", len(self.tets)))
+        return self._description.masses
+
+    @property
+    def pinned(self) -> NDArray[np.int32]:
+        """Vertices that stay where they are, ascending."""
+        return self._description.pinned
 
     @cached_property
     def _rest_inverses(self) -> Floats:
@@ -185,14 +197,18 @@ class Body:
         return float(-(self.masses @ self.positions().astype(np.float64)) @ self._world.settings.gravity)
 
     def elastic_energy(self) -> float:
-        """Of the laws "st_venant_kirchhoff" and "neo_hookean": what deforming the body took [J].
+        """Of springs and the laws "st_venant_kirchhoff" and "neo_hookean": what deforming the body took [J].
 
-        Of the thesis's laws 1/2 sum V0 sigma : eps of the linear strain: an indicator, not a conserved
+        Of the other laws 1/2 sum V0 sigma : eps of the linear strain: an indicator, not a conserved
         energy. Their stress is not the derivative of any energy (except of another one at poisson = 1/4), so
         the total may drift without damping.
         """
         count = len(self.tets)
-        law = self._description.model.law
+        law, bonds = self._description.model.law, self._description.bonds
+        if bonds is not None and law.name == "springs":
+            ends = self.positions().astype(np.float64)[self.mesh.edges]
+            growth = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) - bonds.constants[:, 0]
+            return float(0.5 * bonds.constants[:, 1] @ growth**2)
         if isinstance(law, EnergyLaw):
             constants = (self.material.per_tet(name, count) for name in ("lame_lambda", "lame_mu"))
             return float(law.energy_density(self.deformations(), *constants) @ self.mesh.volumes)
@@ -205,6 +221,7 @@ class Body:
 
     def deformations(self) -> Floats:
         """Deformation gradient F = B A^-1 of each tetrahedron (thesis eq. 6.3), (m, 3, 3)."""
+        self._require_tets()
         corners = self.positions().astype(np.float64)[self.tets]
         return np.asarray(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2) @ self._rest_inverses)
 

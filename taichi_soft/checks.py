@@ -83,6 +83,19 @@ def as_array(values: ArrayLike, name: str, shape: tuple[int | None, ...], unit: 
     return real
 
 
+def as_indices(values: ArrayLike, name: str, count: int) -> NDArray[np.int32]:
+    """`values` as distinct whole numbers from 0 to `count` - 1, ascending. Raises: OptionError."""
+    array = to_array(values, name)
+    if array.size == 0 and array.ndim == 1:
+        return np.zeros(0, dtype=np.int32)
+    if array.dtype.kind not in "iu" or array.ndim != 1:
+        raise OptionError(f"{name} must be a list of vertex numbers, got {values!r}")
+    if array.min() < 0 or array.max() >= count:
+        worst = int(array.min() if array.min() < 0 else array.max())
+        raise OptionError(f"{name} names vertex {worst}: there are {count}, from 0 to {count - 1}")
+    return np.unique(array).astype(np.int32)
+
+
 def as_path(value: Any) -> Path:
     """`value` as the path of a file. Raises: OptionError."""
     if not isinstance(value, (str, os.PathLike)):

@@ -181,8 +181,8 @@ def _say_laws(as_json: bool) -> None:
     if as_json:
         print(json.dumps([asdict(cost) for cost in costs], indent=2))
         return
-    _say(escape("A substep on one thread [ns per tetrahedron], and its ratio to the first, at the median"))
-    Console(width=max(console.width, 110)).print(law_table(costs))
+    _say(escape("Median substep on one thread [ns per element], and over that of virial on the same body"))
+    Console(width=max(console.width, 150)).print(law_table(costs))
 
 
 def _material_line(material: Material) -> str:

@@ -38,3 +38,7 @@ class UnstableStepWarning(UserWarning):
 
 class FrozenBodyWarning(UserWarning):
     """A body went non-finite, was put back to its last finite state and frozen."""
+
+
+class SolverWarning(UserWarning):
+    """An implicit solve stopped before it was as exact as asked for."""

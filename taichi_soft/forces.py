@@ -13,9 +13,9 @@ from taichi_soft.errors import MeshError, OptionError
 from taichi_soft.kernels.evaluate import compute_body_forces
 from taichi_soft.kernels.program import Program
 from taichi_soft.kernels.readout import write_motion
-from taichi_soft.laws import ElementModel, element_model
-from taichi_soft.materials import Material, require_material
-from taichi_soft.meshing import TetMesh
+from taichi_soft.laws import ElementModel, element_model, require_body
+from taichi_soft.materials import Material, SpringMaterial
+from taichi_soft.meshing import BodyMesh
 from taichi_soft.meshing.arrays import LARGEST_COORDINATE
 from taichi_soft.runtime import init
 from taichi_soft.scene import BodyDescription, Scene, arrange
@@ -24,8 +24,8 @@ from taichi_soft.types import DampingModel, Flips, Integrator, Strain
 
 
 def internal_forces(
-    mesh: TetMesh,
-    material: Material,
+    mesh: BodyMesh,
+    material: Material | SpringMaterial,
     positions: ArrayLike,
     velocities: ArrayLike | None = None,
     *,
@@ -49,27 +49,22 @@ def internal_forces(
     Raises: OptionError for a name or dtype that is not known; MeshError for arrays that do not fit.
     """
     model = element_model(law, strain, flips, damping_model)
-    require_material(material)
-    if not isinstance(mesh, TetMesh):
-        raise MeshError(f"mesh must be a TetMesh, got {type(mesh).__name__}")
+    require_body(mesh, material, model)
     real = _real(dtype)
     x = _rows(positions, mesh, "positions", real)
     v = np.zeros_like(x) if velocities is None else _rows(velocities, mesh, "velocities", real)
-    for name in ("young", "poisson", "density", "damping"):
-        material.per_tet(name, len(mesh.tets))
-    body = _still_body(mesh, material, model, double=real == np.float64)
-    return body.forces(x, v)
+    return _still_body(mesh, material, model, double=real == np.float64).forces(x, v)
 
 
-class _StillBody:
+class StillBody:
     """One body in fields of its own: what a world computes with, without its motion."""
 
-    def __init__(self, mesh: TetMesh, material: Material, model: ElementModel, double: bool) -> None:
+    def __init__(self, body: BodyDescription, *, double: bool) -> None:
+        """Put it into fields of float64 (`double`) or float32. Starts Taichi if nobody has."""
         init()
-        origin = np.zeros(3)
-        self.of = mesh, material, model
-        self._rows = arrange(BodyDescription(mesh, material, model, origin, np.eye(3), origin))
-        self._program = Program((model,), Integrator.LEAPFROG, has_floor=False, worker_count=1)
+        self.body = body
+        self._rows = arrange(body)
+        self._program = Program((body.model,), Integrator.LEAPFROG, has_floor=False, worker_count=1)
         scene = Scene()
         scene.append(self._rows)
         self._state = acquire(Capacity.of(scene, double=double))
@@ -84,17 +79,21 @@ class _StillBody:
         return np.asarray(rows[self._rows.rank])
 
 
-_last: dict[bool, _StillBody] = {}
+_last: dict[bool, StillBody] = {}
 
 
-def _still_body(mesh: TetMesh, material: Material, model: ElementModel, *, double: bool) -> _StillBody:
+def _still_body(
+    mesh: BodyMesh, material: Material | SpringMaterial, model: ElementModel, *, double: bool
+) -> StillBody:
     """The body of the last call in this precision if it is the same, for loops over deformations."""
-    body = _last.get(double)
-    if body is None or body.of != (mesh, material, model):  # meshes and materials are equal to themselves only
-        _last.pop(double, None)
-        body = None  # so that its fields are free for the next
-        body = _last[double] = _StillBody(mesh, material, model, double)
-    return body
+    last = _last.get(double)
+    if last is not None:
+        body = last.body
+        if (body.mesh, body.material, body.model) == (mesh, material, model):  # equal to themselves only
+            return last
+        del _last[double], last  # their fields serve the next
+    _last[double] = StillBody(BodyDescription.at_rest(mesh, material, model), double=double)
+    return _last[double]
 
 
 def _real(dtype: DTypeLike) -> np.dtype[Any]:
@@ -107,7 +106,7 @@ def _real(dtype: DTypeLike) -> np.dtype[Any]:
     return real
 
 
-def _rows(values: ArrayLike, mesh: TetMesh, name: str, real: np.dtype[Any]) -> NDArray[Any]:
+def _rows(values: ArrayLike, mesh: BodyMesh, name: str, real: np.dtype[Any]) -> NDArray[Any]:
     try:
         given = np.asarray(values)
         rows = np.array(given, dtype=real if given.dtype.kind in "iuf" else None, order="C")

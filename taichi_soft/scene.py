@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.constants import LANES
 from taichi_soft.errors import MeshError
-from taichi_soft.laws import ElementModel
-from taichi_soft.materials import Material
-from taichi_soft.meshing import TetMesh, renumbered, spatial_order, tet_order
+from taichi_soft.laws import BondLaw, ElementModel
+from taichi_soft.laws.bonds import Bonds, Ring
+from taichi_soft.materials import Material, SpringMaterial
+from taichi_soft.meshing import BodyMesh, ParticleMesh, TetMesh, renumbered, spatial_order, tet_order
 from taichi_soft.types import DampingModel
 
 SHORTEST_EDGE = 1e-6
@@ -25,17 +27,68 @@ Ints = NDArray[np.int32]
 class BodyDescription:
     """One body as the user added it."""
 
-    mesh: TetMesh
-    material: Material
+    mesh: BodyMesh
+    material: Material | SpringMaterial
     model: ElementModel
     position: Floats  # (3,) [m], where the mesh's origin goes
     rotation: Floats  # (3, 3)
     velocity: Floats  # (3,) [m/s]
+    pinned: Ints  # vertices that stay where they are
+
+    @classmethod
+    def at_rest(
+        cls, mesh: BodyMesh, material: Material | SpringMaterial, model: ElementModel
+    ) -> BodyDescription:
+        """A body where its mesh is."""
+        origin = np.zeros(3)
+        return cls(mesh, material, model, origin, np.eye(3), origin, np.zeros(0, dtype=np.int32))
 
     @property
     def start_positions(self) -> Floats:
         """Vertices in the world, (n, 3) [m], in the caller's order."""
         return np.asarray(self.mesh.vertices @ self.rotation.T + self.position)
+
+    @cached_property
+    def bonds(self) -> Bonds | None:
+        """What a pairwise law knows of the edges; None for other laws."""
+        law = self.model.law
+        return law.bonds(self.mesh, self.material) if isinstance(law, BondLaw) else None
+
+    @cached_property
+    def masses(self) -> Floats:
+        """Mass of each vertex, (n,) [kg], in the caller's order."""
+        if isinstance(self.mesh, ParticleMesh):
+            return self.mesh.masses
+        if self.bonds is not None and self.bonds.masses is not None:
+            return self.bonds.masses
+        return vertex_masses(self.mesh, self.per_tet("density"))  # type: ignore[arg-type]
+
+    def per_tet(self, name: str) -> Floats:
+        """A constant of the material for each tetrahedron, (m,)."""
+        if isinstance(self.material, SpringMaterial):
+            return np.zeros(0)
+        return self.material.per_tet(name, len(self.mesh.tets))
+
+    @cached_property
+    def edge_damping(self) -> Floats:
+        """Damping of each edge by the law, (k,) [N s/m]."""
+        if isinstance(self.material, SpringMaterial):
+            return self.material.per_edge("damping", len(self.mesh.edges))
+        if self.model.damping_model is not DampingModel.EDGE:
+            return np.zeros(len(self.mesh.edges))
+        damping = edge_damping(self.mesh, self.per_tet("damping"))  # type: ignore[arg-type]
+        return damping if self.bonds is None else damping * self.bonds.is_bond
+
+
+@dataclass(frozen=True)
+class BondArrays:
+    """The bonds of one body, in kernel order."""
+
+    constants: Floats  # (k, 4), see `Bonds`
+    ring: Ints  # (k, 2) rows of each edge in the arrays below
+    members: Ints  # (r, 4) particles or tetrahedra of this body
+    weights: Floats  # (r, 4)
+    names_tets: bool  # whether the members are tetrahedra
 
 
 @dataclass(frozen=True)
@@ -52,8 +105,11 @@ class BodyArrays:
     rest_inverse: Floats  # (m, 3, 3) [1/m]
     lame: Floats  # (m, 2) lambda, mu [Pa]
     tet_damping: Floats  # (m,) [N s/m]
+    tet_edges: Ints  # (m, 6) edges of each, in the order of `LOCAL_EDGES`
     edge_vertices: Ints  # (k, 2)
     edge_damping: Floats  # (k,) [N s/m]
+    bonds: BondArrays | None  # of a pairwise law
+    pinned: Ints  # particles that do not move
 
 
 @dataclass
@@ -63,6 +119,7 @@ class Ranges:
     particles: tuple[int, int] = (0, 0)
     edges: tuple[int, int] = (0, 0)
     blocks: tuple[int, int] = (0, 0)
+    rings: tuple[int, int] = (0, 0)
 
 
 @dataclass
@@ -74,21 +131,30 @@ class Scene:
     particle_count: int = 0
     edge_count: int = 0
     block_count: int = 0
+    ring_count: int = 0
+
+    @property
+    def has_bonds(self) -> bool:
+        """Whether any body has a pairwise law."""
+        return any(body.bonds is not None for body in self.bodies)
 
     def append(self, body: BodyArrays) -> None:
         """Give `body` the next free rows."""
         blocks = -(-len(body.tet_vertices) // LANES)
+        rings = 0 if body.bonds is None else len(body.bonds.members)
         self.ranges.append(
             Ranges(
                 (self.particle_count, self.particle_count + len(body.mass)),
                 (self.edge_count, self.edge_count + len(body.edge_vertices)),
                 (self.block_count, self.block_count + blocks),
+                (self.ring_count, self.ring_count + rings),
             )
         )
         self.bodies.append(body)
         self.particle_count += len(body.mass)
         self.edge_count += len(body.edge_vertices)
         self.block_count += blocks
+        self.ring_count += rings
 
 
 def edge_damping(mesh: TetMesh, tet_damping: Floats) -> Floats:
@@ -103,14 +169,14 @@ def vertex_masses(mesh: TetMesh, density: Floats) -> Floats:
     return np.bincount(mesh.tets.ravel(), quarter, minlength=len(mesh.vertices)).astype(np.float64)
 
 
-def rest_inverses(mesh: TetMesh) -> Floats:
+def rest_inverses(mesh: BodyMesh) -> Floats:
     """A^-1 of thesis eq. 6.1 for every tetrahedron, (m, 3, 3) [1/m]."""
     corners = mesh.vertices[mesh.tets]
     shapes = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
     return np.asarray(np.linalg.inv(shapes))
 
 
-def require_size(mesh: TetMesh) -> None:
+def require_size(mesh: BodyMesh) -> None:
     """Raises: MeshError for edges below `SHORTEST_EDGE`."""
     shortest = float(mesh.edge_lengths.min())
     if shortest < SHORTEST_EDGE:
@@ -122,29 +188,60 @@ def require_size(mesh: TetMesh) -> None:
 def arrange(description: BodyDescription) -> BodyArrays:
     """Reorder a body along a space-filling curve, so that neighbours share cache lines."""
     mesh = description.mesh
-    count = len(mesh.tets)
-    material = description.material
     order = spatial_order(mesh.vertices)
-    tets = tet_order(mesh.tets, order)
+    tets = tet_order(mesh.tets, order) if len(mesh.tets) else np.zeros(0, dtype=np.int32)
     new_index = renumbered(order)
-    edges = np.sort(new_index[mesh.edges], axis=1)
-    edge_order = np.lexsort((edges[:, 1], edges[:, 0]))
-    tet_damping = material.per_tet("damping", count)
-    is_edge_damped = description.model.damping_model is DampingModel.EDGE
-    lame = np.stack([material.per_tet("lame_lambda", count), material.per_tet("lame_mu", count)], axis=1)
+    edges = new_index[mesh.edges]
+    low, high = np.sort(edges, axis=1).T
+    edge_order = np.lexsort((high, low)).astype(np.int64)
+    lame = np.stack([description.per_tet("lame_lambda"), description.per_tet("lame_mu")], axis=1)
     return BodyArrays(
         order=order,
         rank=new_index,
         start_position=description.start_positions[order],
         start_velocity=np.tile(description.velocity, (len(order), 1)),
-        mass=vertex_masses(mesh, material.per_tet("density", count))[order],
+        mass=description.masses[order],
         tet_vertices=new_index[mesh.tets[tets]],
         tet_order=tets,
         rest_inverse=rest_inverses(mesh)[tets],
         lame=lame[tets],
-        tet_damping=tet_damping[tets],
+        tet_damping=description.per_tet("damping")[tets],
+        tet_edges=_arrange_tet_edges(mesh, tets, edge_order),
         edge_vertices=edges[edge_order],
-        edge_damping=edge_damping(mesh, tet_damping)[edge_order] * is_edge_damped,
+        edge_damping=description.edge_damping[edge_order],
+        bonds=_arrange_bonds(description.bonds, description.model, edge_order, new_index, renumbered(tets)),
+        pinned=new_index[description.pinned],
+    )
+
+
+def _arrange_tet_edges(mesh: BodyMesh, tets: Ints, edge_order: NDArray[np.int64]) -> Ints:
+    if not isinstance(mesh, TetMesh):
+        return np.zeros((0, 6), dtype=np.int32)
+    new_edge = np.empty(len(edge_order), dtype=np.int32)
+    new_edge[edge_order] = np.arange(len(edge_order))
+    return np.asarray(new_edge[mesh.tet_edges[tets]])
+
+
+def _arrange_bonds(
+    bonds: Bonds | None, model: ElementModel, edge_order: NDArray[np.int64], new_vertex: Ints, new_tet: Ints
+) -> BondArrays | None:
+    if bonds is None:
+        return None
+    names_tets = isinstance(model.law, BondLaw) and model.law.ring is Ring.EXPANSION
+    count = np.bincount(bonds.ring_edge, minlength=len(edge_order))
+    start = np.cumsum(count) - count
+    ends = np.cumsum(count[edge_order])
+    ring = np.stack([ends - count[edge_order], ends], axis=1)
+    # Row i of the new order is row i of its edge's rows in the old one.
+    rows = np.repeat(start[edge_order] - ring[:, 0], count[edge_order]) + np.arange(len(bonds.ring_edge))
+    members = bonds.ring_members[rows]
+    renamed = (new_tet if names_tets else new_vertex)[np.maximum(members, 0)] if len(members) else members
+    return BondArrays(
+        bonds.constants[edge_order],
+        ring.astype(np.int32),
+        np.where(members >= 0, renamed, 0).astype(np.int32),
+        bonds.ring_weights[rows],
+        names_tets,
     )
 
 

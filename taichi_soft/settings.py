@@ -19,4 +19,6 @@ class Settings:
     restitution: float
     friction: float
     integrator: Integrator
+    tolerance: float  # of implicit solves: residual over right-hand side
+    most_iterations: int  # of an implicit solve
     schedule: Schedule  # as chosen by `World.build`; AUTO before where it is left open

@@ -29,10 +29,14 @@ class Capacity:
     blocks: int
     bodies: int
     parallel: bool  # room for the force of every corner and edge at once, as the flat schedule needs
+    rings: int = 0  # rows of what lies round edges, and whether edges carry force at all
+    implicit: bool = False  # room for the linear system of implicit integration
     double: bool = False  # float64 instead of float32: to evaluate forces, not to move
 
     @classmethod
-    def of(cls, scene: Scene, *, parallel: bool = False, double: bool = False) -> "Capacity":
+    def of(
+        cls, scene: Scene, *, parallel: bool = False, implicit: bool = False, double: bool = False
+    ) -> "Capacity":
         """Room for `scene`."""
         return cls(
             _power_of_two(scene.particle_count, 512),
@@ -40,6 +44,8 @@ class Capacity:
             _power_of_two(scene.block_count, 128),
             _power_of_two(len(scene.bodies), 8),
             parallel,
+            _power_of_two(scene.ring_count, 512) if scene.has_bonds else 0,
+            implicit,
             double,
         )
 
@@ -78,6 +84,26 @@ class State:
 
         self.edge_vertices = ti.Vector.field(2, ti.i32, k)
         self.edge_damping = ti.field(real, k)  # [N s/m]
+        if capacity.rings:
+            self.edge_bond = ti.Vector.field(4, real, k)  # see `laws.bonds.Bonds`
+            self.edge_ring = ti.Vector.field(2, ti.i32, k)  # range in the rings
+            self.ring_members = ti.Vector.field(
+                4, ti.i32, capacity.rings
+            )  # particles, or slots of tetrahedra
+            self.ring_weights = ti.Vector.field(4, real, capacity.rings)
+            self.tet_expansion = ti.field(real, b * LANES)  # dV / V0
+        if capacity.implicit:
+            self.tet_edges = ti.field(ti.i32, b * 6 * LANES)
+            self.particle_block = ti.Matrix.field(3, 3, real, n)  # of the system, on its diagonal
+            self.particle_block_inverse = ti.Matrix.field(3, 3, real, n)
+            self.edge_block = ti.Matrix.field(3, 3, real, k)  # row of the first end, column of the second
+            self.solution = ti.Vector.field(3, real, n)  # change of velocity [m/s]
+            self.residual = ti.Vector.field(3, real, n)
+            self.direction = ti.Vector.field(3, real, n)
+            self.image = ti.Vector.field(3, real, n)
+            self.particle_contact = ti.field(ti.i32, n)  # 1 where the floor holds it from below
+            self.body_residual = ti.field(real, bodies)  # largest of the last step, over the right-hand side
+            self.body_iterations = ti.field(ti.i32, bodies)  # of the last step
         if capacity.parallel:
             self.corner_force = ti.field(real, b * CORNER_ROWS * LANES)  # [N]
             self.edge_force = ti.Vector.field(3, real, k)
@@ -110,7 +136,10 @@ class State:
         fill(self.particle_velocity, velocity)
         fill(self.prev_velocity, velocity)
         fill(self.particle_force, np.zeros((0, 3)))
-        fill(self.particle_inv_mass, 1.0 / mass)
+        inv_mass = 1.0 / mass
+        for body, place in zip(bodies, ranges, strict=True):
+            inv_mass[body.pinned + place.particles[0]] = 0.0
+        fill(self.particle_inv_mass, inv_mass)
         fill(self.particle_body, np.repeat(np.arange(len(bodies)), [len(body.mass) for body in bodies]))
 
         ranks = [b.rank + r.particles[0] for b, r in zip(bodies, ranges, strict=True)]
@@ -127,6 +156,12 @@ class State:
         )
         fill(self.edge_vertices, edges)
         fill(self.edge_damping, np.concatenate([body.edge_damping for body in bodies]))
+        if self.capacity.rings:
+            self._load_bonds(bodies, ranges)
+        if self.capacity.implicit:
+            names = [b.tet_edges + r.edges[0] for b, r in zip(bodies, ranges, strict=True)]
+            fill(self.tet_edges, np.concatenate([blocks_of(rows, 6, 0) for rows in names]))
+            fill(self.particle_contact, np.zeros(0))
         if self.capacity.parallel:
             self._load_gather_lists(corners, edges, scene.particle_count)
 
@@ -137,6 +172,25 @@ class State:
         fill(self.body_status, np.zeros(0))
         fill(self.body_velocity_lag, np.zeros(0))
         fill(self.block_model, np.repeat(models, [r.blocks[1] - r.blocks[0] for r in ranges]))
+
+    def _load_bonds(self, bodies: list[BodyArrays], ranges: list[Ranges]) -> None:
+        """What the pairwise laws know of their edges; zeros for the edges of other bodies."""
+        constants, rings, members, weights = [], [], [], []
+        for body, place in zip(bodies, ranges, strict=True):
+            bonds = body.bonds
+            if bonds is None:
+                constants.append(np.zeros((len(body.edge_vertices), 4)))
+                rings.append(np.zeros((len(body.edge_vertices), 2), dtype=np.int32))
+                continue
+            first = place.blocks[0] * LANES if bonds.names_tets else place.particles[0]
+            constants.append(bonds.constants)
+            rings.append(bonds.ring + place.rings[0])
+            members.append(bonds.members + first)
+            weights.append(bonds.weights)
+        fill(self.edge_bond, np.concatenate(constants))
+        fill(self.edge_ring, np.concatenate(rings))
+        fill(self.ring_members, np.concatenate(members))
+        fill(self.ring_weights, np.concatenate(weights))
 
     def _load_gather_lists(self, corners: NDArray[np.int64], edges: NDArray[np.int64], count: int) -> None:
         """For each particle, the corner forces and edge forces that act on it, in a fixed order."""
@@ -162,7 +216,7 @@ def _blocks(bodies: list[BodyArrays], quantity, width: int) -> NDArray[np.generi
 def _tet_blocks(
     bodies: list[BodyArrays], ranges: list[Ranges]
 ) -> tuple[NDArray[np.generic], NDArray[np.int64]]:
-    """Vertices of all blocks; and for each real corner its particle and its place in corner_force.
+    """Vertices of all blocks; and for each corner with a force its particle and its place in corner_force.
 
     The lanes that pad a last block name the body's first particle four times: no shape, no force.
     """
@@ -170,11 +224,14 @@ def _tet_blocks(
     for body, place in zip(bodies, ranges, strict=True):
         rows = body.tet_vertices + place.particles[0]
         blocks.append(blocks_of(rows, 4, place.particles[0]))
+        if body.bonds is not None:
+            continue
         block, lane = np.divmod(np.arange(len(rows)), LANES)
         for corner in range(4):
             slot = ((block + place.blocks[0]) * CORNER_ROWS + 3 * corner) * LANES + lane
             corners.append(np.stack([rows[:, corner], slot], axis=1))
-    return np.concatenate(blocks), np.concatenate(corners).astype(np.int64)
+    none = np.zeros((0, 2), dtype=np.int64)
+    return np.concatenate(blocks), np.concatenate([none, *corners]).astype(np.int64)
 
 
 _NUMPY = {ti.f32: np.float32, ti.f64: np.float64, ti.i32: np.int32}

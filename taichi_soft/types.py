@@ -54,6 +54,7 @@ class Integrator(Choice):
     EXPLICIT_EULER = "explicit_euler"
     LEAPFROG = "leapfrog"
     LAZY_LEAPFROG = "lazy_leapfrog"
+    IMPLICIT_EULER = "implicit_euler"
 
 
 class Schedule(Choice):

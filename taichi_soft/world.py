@@ -13,20 +13,20 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.body import Body, FailedStep, Failure, Floats32, require_buffer, require_built
-from taichi_soft.checks import as_count, as_number, as_rotation, as_vector
+from taichi_soft.checks import as_count, as_indices, as_number, as_rotation, as_vector
 from taichi_soft.constants import GRAVITY_EARTH, LANES, POSITION_LIMIT, VELOCITY_LIMIT
-from taichi_soft.errors import FrozenBodyWarning, MeshError, OptionError, StateError, UnstableStepWarning
-from taichi_soft.integrators import StableStep, stable_step
+from taichi_soft.errors import FrozenBodyWarning, OptionError, SolverWarning, StateError, UnstableStepWarning
 from taichi_soft.kernels.evaluate import compute_body_forces, find_failure
 from taichi_soft.kernels.program import Program
 from taichi_soft.kernels.readout import read_positions, read_velocities, write_motion
 from taichi_soft.kernels.schedules import Launch, choose_schedule, make_launch
-from taichi_soft.laws import ElementModel, element_model
-from taichi_soft.materials import Material, require_material
-from taichi_soft.meshing import TetMesh
+from taichi_soft.laws import ElementModel, element_model, require_body
+from taichi_soft.materials import Material, SpringMaterial
+from taichi_soft.meshing import BodyMesh
 from taichi_soft.runtime import init
 from taichi_soft.scene import BodyDescription, Scene, arrange, require_size
 from taichi_soft.settings import Settings
+from taichi_soft.stability import StableStep, stable_step
 from taichi_soft.state import FROZEN, Capacity, State, acquire, release
 from taichi_soft.types import DampingModel, Flips, Integrator, Schedule, Strain
 
@@ -46,7 +46,11 @@ class World:
         restitution: of the floor, 0 (default: bodies bounce by their own elasticity) to 1. It throws each
             vertex back by itself, so a damped body may well bounce lower with it than without.
         friction: Coulomb coefficient of the floor, 0 or more.
-        integrator: "leapfrog", "lazy_leapfrog" or "explicit_euler".
+        integrator: "leapfrog", "lazy_leapfrog", "explicit_euler", or "implicit_euler": stable for every step,
+            at the price of a linear solve in each and of damping that grows with its length.
+        tolerance: of implicit solves, residual over right-hand side: 1e-6 to 0.5.
+        most_iterations: of an implicit solve; one that needs more goes on as far as it came and is reported
+            by a `SolverWarning`.
         schedule: "auto", "per_body" or "flat": in which loops the work runs; no effect on the physics.
     Raises: OptionError for a value out of range or a name that is not known.
     """
@@ -59,6 +63,8 @@ class World:
         restitution: float = 0.0,
         friction: float = 0.5,
         integrator: str | Integrator = Integrator.LEAPFROG,
+        tolerance: float = 1e-3,
+        most_iterations: int = 200,
         schedule: str | Schedule = Schedule.AUTO,
     ) -> None:
         downwards = as_vector(gravity, "gravity", "m/s^2")
@@ -69,8 +75,12 @@ class World:
             restitution=as_number(restitution, "restitution", 0.0, 1.0, "a number from 0 to 1"),
             friction=as_number(friction, "friction", 0.0, 1e6, "a number from 0 to 1,000,000"),
             integrator=Integrator.parse(integrator),
+            tolerance=as_number(tolerance, "tolerance", 1e-6, 0.5),
+            most_iterations=as_count(most_iterations, "most_iterations"),
             schedule=Schedule.parse(schedule),
         )
+        if self._is_implicit and self.settings.schedule is Schedule.FLAT:
+            raise OptionError("schedule 'flat' has no implicit_euler: it takes 'per_body' or 'auto'")
         self._step_count = 0
         self._time = 0.0
         self._last_dt = 0.0
@@ -84,12 +94,17 @@ class World:
         self._read: Floats32 = np.empty((0, 3), dtype=np.float32)
         self._read_alpha: float | None = None  # of what `_read` holds; None once the world has moved on
         self._warned_steps: set[float] = set()
+        self._warned_solves: set[int] = set()
         self._stable_steps: dict[tuple[int, int, ElementModel], StableStep] = {}
 
     @property
     def settings(self) -> Settings:
         """Gravity, floor, integrator and schedule, as they were checked and chosen."""
         return self._settings
+
+    @property
+    def _is_implicit(self) -> bool:
+        return self.settings.integrator is Integrator.IMPLICIT_EULER
 
     @property
     def step_count(self) -> int:
@@ -118,8 +133,8 @@ class World:
 
     def add_body(
         self,
-        mesh: TetMesh,
-        material: Material,
+        mesh: BodyMesh,
+        material: Material | SpringMaterial,
         *,
         law: str = "virial",
         strain: str | Strain | None = None,
@@ -128,13 +143,16 @@ class World:
         position: ArrayLike = (0.0, 0.0, 0.0),
         rotation: ArrayLike | None = None,
         velocity: ArrayLike = (0.0, 0.0, 0.0),
+        pinned: ArrayLike = (),
     ) -> Body:
         """Add a body before `build`.
 
         Args:
-            mesh: rest shape. A `ParticleMesh`, which has no tetrahedra, needs a law for springs: none yet.
-            material: constants in SI units.
-            law: "virial" (thesis 6.3), "face" (6.2), "st_venant_kirchhoff" or "neo_hookean".
+            mesh: rest shape. A `ParticleMesh` (rope, cloth) takes law "springs".
+            material: constants in SI units; a `SpringMaterial` for a `ParticleMesh`.
+            law: one of `LAWS`: "virial" (thesis 6.3), "face" (6.2), "st_venant_kirchhoff", "neo_hookean"; and
+                along edges "springs" (3.4), "volume_springs" (chapter 5), "cmpm", "cmpm2",
+                "best_fitting_plane", "tilted_plane" and "tilted_plane_printed" (chapter 4).
             strain: "linear" (eq. 6.7) or "exact" (square root of U^2); None takes the law's own.
             flips: "tolerant" (the thesis: a mirrored tetrahedron is at rest too), "recover" or "off"; None
                 takes the law's own. A law with an energy does what follows from it, and takes no other.
@@ -142,20 +160,22 @@ class World:
             position: where the mesh's origin goes, (3,) [m].
             rotation: about the mesh's origin, matrix (3, 3) or quaternion (x, y, z, w).
             velocity: of the whole body, (3,) [m/s].
+            pinned: vertices that stay where they are.
         Returns: a handle.
         Raises: MeshError, MaterialError or OptionError for bad input; StateError after `build`.
         """
         if self.is_built:
             raise StateError("the world is already built: add bodies first, then call build() once")
-        if not isinstance(mesh, TetMesh):
-            raise MeshError(f"law {law!r} needs tetrahedra: pass a TetMesh, got {type(mesh).__name__}")
+        model = element_model(law, strain, flips, damping_model)
+        require_body(mesh, material, model)
         description = BodyDescription(
             mesh,
-            require_material(material),
-            element_model(law, strain, flips, damping_model),
+            material,
+            model,
             as_vector(position, "position", "m"),
             as_rotation(rotation),
             as_vector(velocity, "velocity", "m/s", VELOCITY_LIMIT),
+            as_indices(pinned, "pinned", len(mesh.vertices)),
         )
         require_size(mesh)
         self._require_place(description)
@@ -191,10 +211,15 @@ class World:
             raise StateError("the world is empty: call add_body before build")
         device = init()
         models = list(dict.fromkeys(body._description.model for body in self._bodies))
-        schedule = choose_schedule(self.settings.schedule, self._scene, device)
-        capacity = Capacity.of(self._scene, parallel=schedule is Schedule.FLAT)
+        schedule = choose_schedule(self.settings.schedule, self._scene, device, self.settings.integrator)
+        capacity = Capacity.of(self._scene, parallel=schedule is Schedule.FLAT, implicit=self._is_implicit)
         program = Program(
-            tuple(models), self.settings.integrator, self.settings.floor is not None, device.threads
+            tuple(models),
+            self.settings.integrator,
+            self.settings.floor is not None,
+            device.threads,
+            self.settings.tolerance,
+            self.settings.most_iterations,
         )
         if self.settings.integrator is Integrator.EXPLICIT_EULER:
             warnings.warn(
@@ -227,9 +252,15 @@ class World:
         return self._stable_steps[key]
 
     def stable_substeps(self, dt: float) -> int:
-        """Number of substeps that a fixed step of `dt` [s] needs, with a margin, for the stiffest body."""
+        """Number of substeps that a fixed step of `dt` [s] needs, with a margin, for the stiffest body.
+
+        1 for implicit Euler, which needs none.
+        """
         if not self._bodies:
             raise StateError("the world is empty: call add_body first")
+        if self._is_implicit:
+            _as_step(dt)
+            return 1
         longest = min(body.stable_step.recommended for body in self._bodies)
         return max(1, math.ceil(_as_step(dt) / longest))
 
@@ -256,23 +287,43 @@ class World:
         self._last_dt = seconds
         if reports:
             warnings.warn("; ".join(reports), FrozenBodyWarning, stacklevel=2)
+        if self._is_implicit:
+            self._check_solves()
 
     def _check_step(self, dt: float, substeps: int | None) -> tuple[float, int, float]:
         seconds = _as_step(dt)
         count = as_count(self.stable_substeps(seconds) if substeps is None else substeps, "substeps")
         h = seconds / count
+        if self._is_implicit:
+            return seconds, count, h
         stiffest = min(self._bodies, key=lambda body: body.stable_step.limit)
-        limit, tet = stiffest.stable_step.limit, stiffest.stable_step.stiffest_tet
+        limit = stiffest.stable_step.limit
         if h > limit and h not in self._warned_steps:
             warnings.warn(
                 f"substep {h * 1e3:.4g} ms is longer than the {limit * 1e3:.4g} ms that body "
-                f"{stiffest.index} can take (stiffest tetrahedron {tet}): it may explode. Use "
+                f"{stiffest.index} can take ({stiffest.stable_step.stiffest}): it may explode. Use "
                 f"substeps={self.stable_substeps(seconds)} or leave substeps out",
                 UnstableStepWarning,
                 stacklevel=3,
             )
             self._warned_steps.add(h)
         return seconds, count, h
+
+    def _check_solves(self) -> None:
+        """Warn of the body whose solve was least exact, once per world and body."""
+        assert self._state is not None
+        residuals = self._state.body_residual.to_numpy()[: len(self._bodies)]
+        for index in np.flatnonzero(residuals > self.settings.tolerance):
+            if int(index) in self._warned_solves or self._bodies[index].is_frozen:
+                continue
+            self._warned_solves.add(int(index))
+            warnings.warn(
+                f"the implicit solve of body {index} stopped at {self.settings.most_iterations} iterations "
+                f"with a residual of {residuals[index]:.2g} (asked for {self.settings.tolerance:g}): raise "
+                "most_iterations or tolerance, or use more substeps",
+                SolverWarning,
+                stacklevel=3,
+            )
 
     def _note_failures(self, substeps: int, h: float) -> list[str]:
         """Mark the bodies that the last step froze; a line about each."""
@@ -285,7 +336,7 @@ class World:
             body._frozen_in = FailedStep(self.step_count, self.time, substeps, h)
             reports.append(
                 f"body {body.index} went non-finite in step {self.step_count}: put back to t = "
-                f"{self.time:.4g} s and frozen; body.failure names the tetrahedron. Use more substeps or a "
+                f"{self.time:.4g} s and frozen; body.failure tells where it broke. Use more substeps or a "
                 "softer material"
             )
         return reports
@@ -296,9 +347,13 @@ class World:
         find_failure(self._state, self._program, body.index, failed.substeps, failed.h, found)
         if found[0] < 0:
             return Failure(body.index, None, failed.step, None, failed.time)
-        first_slot = self._scene.ranges[body.index].blocks[0] * LANES
+        place, arrays = self._scene.ranges[body.index], self._scene.bodies[body.index]
+        if arrays.bonds is not None:
+            p, q = arrays.order[arrays.edge_vertices[int(found[0]) - place.edges[0]]].tolist()
+            return Failure(body.index, None, failed.step, int(found[1]), failed.time, edge=(p, q))
+        first_slot = place.blocks[0] * LANES
         row = min(int(found[0]) - first_slot, len(body.tets) - 1)
-        tet = int(self._scene.bodies[body.index].tet_order[row])
+        tet = int(arrays.tet_order[row])
         return Failure(body.index, tet, failed.step, int(found[1]), failed.time)
 
     def read_positions(self, body: Body, alpha: float, out: Floats32 | None = None) -> Floats32:
@@ -334,6 +389,7 @@ class World:
             compute_body_forces(self._state, self._program, body.index, forces)
             by_vertex = forces[self._scene.bodies[body.index].rank]
             acceleration = by_vertex / body.masses[:, None] + self.settings.gravity
+            acceleration[body.pinned] = 0.0
             floor = self.settings.floor
             if floor is not None:
                 # What lies on the floor is carried by it: its velocity already is that after contact.

@@ -19,7 +19,9 @@ LAYERS = """
     scene
     state  integrators
     kernels
-    body  forces
+    forces
+    stability
+    body
     world
     taichi_soft
     render

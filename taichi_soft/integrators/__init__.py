@@ -3,12 +3,11 @@
 from taichi_soft.integrators.explicit_euler import explicit_euler
 from taichi_soft.integrators.lazy_leapfrog import lazy_leapfrog
 from taichi_soft.integrators.leapfrog import leapfrog
-from taichi_soft.integrators.stability import StableStep, stable_step
 from taichi_soft.types import Integrator
 
-__all__ = ["ADVANCE", "StableStep", "stable_step"]
+__all__ = ["ADVANCE"]
 
-ADVANCE = {
+ADVANCE = {  # implicit Euler moves a whole body at once and so is a kernel: `kernels.implicit_euler`
     Integrator.EXPLICIT_EULER: explicit_euler,
     Integrator.LEAPFROG: leapfrog,
     Integrator.LAZY_LEAPFROG: lazy_leapfrog,

@@ -18,7 +18,7 @@ BLOCK_BITS = (1 << 22) - 1
 
 
 @ti.func
-def _particles_of(state: ti.template(), block, lane):
+def particles_of(state: ti.template(), block, lane):
     base = block * 4 * LANES + lane
     return (
         state.tet_vertices[base],
@@ -29,7 +29,7 @@ def _particles_of(state: ti.template(), block, lane):
 
 
 @ti.func
-def _rest_inverse_of(state: ti.template(), block, lane):
+def rest_inverse_of(state: ti.template(), block, lane):
     base = block * 9 * LANES + lane
     a = [state.tet_rest_inverse[base + k * LANES] for k in ti.static(range(9))]
     return ti.Vector([a[0], a[1], a[2]]), ti.Vector([a[3], a[4], a[5]]), ti.Vector([a[6], a[7], a[8]])
@@ -37,10 +37,10 @@ def _rest_inverse_of(state: ti.template(), block, lane):
 
 @ti.func
 def _upright_forces_of(state: ti.template(), model: ti.template(), block, lane):
-    p0, p1, p2, p3 = _particles_of(state, block, lane)
+    p0, p1, p2, p3 = particles_of(state, block, lane)
     x0, x1 = state.particle_position[p0], state.particle_position[p1]
     x2, x3 = state.particle_position[p2], state.particle_position[p3]
-    inverse = _rest_inverse_of(state, block, lane)
+    inverse = rest_inverse_of(state, block, lane)
     lame_lambda = state.tet_lame[block * 2 * LANES + lane]
     lame_mu = state.tet_lame[(block * 2 + 1) * LANES + lane]
     f0, f1, f2, f3, volume6 = upright_forces(model, x0, x1, x2, x3, inverse, lame_lambda, lame_mu)
@@ -58,14 +58,14 @@ def _upright_forces_of(state: ti.template(), model: ti.template(), block, lane):
 
 @ti.func
 def _flipped_forces_of(state: ti.template(), model: ti.template(), block, lane):
-    p0, p1, p2, p3 = _particles_of(state, block, lane)
+    p0, p1, p2, p3 = particles_of(state, block, lane)
     return flipped_forces(
         model,
         state.particle_position[p0],
         state.particle_position[p1],
         state.particle_position[p2],
         state.particle_position[p3],
-        _rest_inverse_of(state, block, lane),
+        rest_inverse_of(state, block, lane),
         state.tet_lame[block * 2 * LANES + lane],
         state.tet_lame[(block * 2 + 1) * LANES + lane],
     )

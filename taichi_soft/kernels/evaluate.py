@@ -1,6 +1,7 @@
 """Evaluation without motion: forces on a body where it is, or would be; and what broke a frozen one."""
 
 from taichi_soft.constants import LANES
+from taichi_soft.kernels.bonds import accumulate_bond_forces, bond_force_of
 from taichi_soft.kernels.damping import accumulate_edge_damping
 from taichi_soft.kernels.elastic import lane_forces
 from taichi_soft.kernels.motion import particle_is_sound, restore_particle
@@ -10,25 +11,50 @@ from taichi_soft.runtime import ti
 
 
 @ti.func
-def accumulate_forces_one_by_one(state: ti.template(), program: ti.template(), body):
-    """Add all internal forces of one body to its particles, tetrahedron by tetrahedron.
+def _add_tet_forces(state: ti.template(), model: ti.template(), body):
+    """Returns the first broken tetrahedron (block times `LANES` plus lane) or -1."""
+    broken = -1
+    blocks = state.body_blocks[body]
+    for t in range(blocks[0] * LANES, blocks[1] * LANES):
+        block, lane = t // LANES, t % LANES
+        forces = lane_forces(state, model, block, lane)
+        for corner in ti.static(range(4)):
+            p = state.tet_vertices[(block * 4 + corner) * LANES + lane]
+            if broken < 0 and (particle_is_sound(state, p) & is_finite(forces[corner])) == 0:
+                broken = t
+            state.particle_force[p] = state.particle_force[p] + forces[corner]
+    accumulate_edge_damping(state, body)
+    return broken
 
-    Returns the first tetrahedron (block times `LANES` plus lane) with a corner out of reach or a force that
-    is not finite, or -1.
+
+@ti.func
+def _add_bond_forces(state: ti.template(), law: ti.template(), body):
+    """Returns the first broken edge or -1."""
+    broken = -1
+    accumulate_bond_forces(state, law, body)
+    edges = state.body_edges[body]
+    for e in range(edges[0], edges[1]):
+        p, q = state.edge_vertices[e][0], state.edge_vertices[e][1]
+        sound = particle_is_sound(state, p) & particle_is_sound(state, q)
+        if broken < 0 and (sound & is_finite(bond_force_of(state, law, e))) == 0:
+            broken = e
+    return broken
+
+
+@ti.func
+def accumulate_forces_one_by_one(state: ti.template(), program: ti.template(), body):
+    """Add all internal forces of one body to its particles, element by element.
+
+    Returns the first tetrahedron (block times `LANES` plus lane), or edge where forces act along edges, with
+    an end out of reach or a force that is not finite, or -1.
     """
     broken = -1
     for m, model in ti.static(enumerate(program.models)):
         if state.body_model[body] == m:
-            blocks = state.body_blocks[body]
-            for t in range(blocks[0] * LANES, blocks[1] * LANES):
-                block, lane = t // LANES, t % LANES
-                forces = lane_forces(state, model, block, lane)
-                for corner in ti.static(range(4)):
-                    p = state.tet_vertices[(block * 4 + corner) * LANES + lane]
-                    if broken < 0 and (particle_is_sound(state, p) & is_finite(forces[corner])) == 0:
-                        broken = t
-                    state.particle_force[p] = state.particle_force[p] + forces[corner]
-    accumulate_edge_damping(state, body)
+            if ti.static(model.has_bonds):
+                broken = _add_bond_forces(state, model.law, body)
+            else:
+                broken = _add_tet_forces(state, model, body)
     return broken
 
 
@@ -59,8 +85,8 @@ def find_failure(
     """Make the last step of a frozen body again, up to the substep in which it breaks, and undo it.
 
     Args:
-        found: receives the tetrahedron that broke first (block times `LANES` plus lane) and the substep;
-            left alone where nothing breaks.
+        found: receives the tetrahedron (block times `LANES` plus lane) or edge that broke first and the
+            substep; left alone where nothing breaks.
     """
     ti.loop_config(serialize=True)
     for _ in range(1):

@@ -11,6 +11,7 @@ A GPU has no such barrier: there each substep is a launch of its own.
 """
 
 from taichi_soft.constants import LANES
+from taichi_soft.kernels.bonds import bond_force_of, store_block_expansions, store_lane_expansion
 from taichi_soft.kernels.damping import edge_force_of
 from taichi_soft.kernels.elastic import corner_force_at, store_block_forces, store_lane_forces
 from taichi_soft.kernels.motion import move_particle, particle_is_sound, remember_particle, restore_particle
@@ -21,15 +22,34 @@ _FAILING = 2
 
 
 @ti.func
-def _edge_phase(state: ti.template(), e):
-    state.edge_force[e] = edge_force_of(state, e)
+def _block_phase(state: ti.template(), program: ti.template(), block):
+    for m, model in ti.static(enumerate(program.models)):
+        if state.block_model[block] == m:
+            if ti.static(not model.has_bonds):
+                store_block_forces(state, model, block)
+            elif ti.static(model.reads_expansion):
+                store_block_expansions(state, block)
+
+
+@ti.func
+def _edge_phase(state: ti.template(), program: ti.template(), e):
+    if ti.static(program.has_bonds):
+        number = state.body_model[state.particle_body[state.edge_vertices[e][0]]]
+        for m, model in ti.static(enumerate(program.models)):
+            if number == m:
+                if ti.static(model.has_bonds):
+                    state.edge_force[e] = bond_force_of(state, model.law, e)
+                else:
+                    state.edge_force[e] = edge_force_of(state, e)
+    else:
+        state.edge_force[e] = edge_force_of(state, e)
 
 
 @ti.func
 def gathered_force(state: ti.template(), p):
     """Internal force on one particle [N]: its corners' forces, then its edges'."""
     force = ti.Vector.zero(state.real, 3)
-    corners = state.particle_corners[p]
+    corners = state.particle_corners[p]  # none in bodies whose law looks at edges
     for k in range(corners[0], corners[1]):
         force += corner_force_at(state, state.corner_slot[k])
     edges = state.particle_edges[p]
@@ -109,11 +129,11 @@ def step_flat_cpu(
             remember_particle(state, p)
         for s in range(substeps):
             for block in range(b0, b1):
-                for m, model in ti.static(enumerate(program.models)):
-                    if state.block_model[block] == m:
-                        store_block_forces(state, model, block)
+                _block_phase(state, program, block)
+            if ti.static(program.reads_expansion):
+                _meet(state, workers)
             for e in range(e0, e1):
-                _edge_phase(state, e)
+                _edge_phase(state, program, e)
             _meet(state, workers)
             for p in range(p0, p1):
                 _move_phase(state, program, p, h, s == 0)
@@ -151,9 +171,12 @@ def substep_flat(
         block, lane = t // LANES, t % LANES
         for m, model in ti.static(enumerate(program.models)):
             if state.block_model[block] == m:
-                store_lane_forces(state, model, block, lane)
+                if ti.static(not model.has_bonds):
+                    store_lane_forces(state, model, block, lane)
+                elif ti.static(model.reads_expansion):
+                    store_lane_expansion(state, block, lane)
     for e in range(edge_count):
-        _edge_phase(state, e)
+        _edge_phase(state, program, e)
     for p in range(particle_count):
         _move_phase(state, program, p, h, is_first)
 

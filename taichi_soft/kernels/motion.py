@@ -23,7 +23,8 @@ def restore_particle(state: ti.template(), p):
 @ti.func
 def move_particle(state: ti.template(), program: ti.template(), p, force, h, kick):
     """One substep of one particle under the internal force on it [N]."""
-    acceleration = force * state.particle_inv_mass[p] + state.gravity[None]
+    inv_mass = state.particle_inv_mass[p]
+    acceleration = force * inv_mass + state.gravity[None] * ti.select(inv_mass > 0.0, 1.0, 0.0)  # 0: pinned
     x, v = program.advance(state.particle_position[p], state.particle_velocity[p], acceleration, h, kick)
     if ti.static(program.has_floor):
         x, v = resolve_floor(x, v, h, state.floor[None])

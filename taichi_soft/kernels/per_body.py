@@ -4,12 +4,14 @@ Nothing waits between substeps and a body stays in one core's cache. The result 
 of threads.
 """
 
+from taichi_soft.kernels.bonds import accumulate_bond_forces
 from taichi_soft.kernels.damping import accumulate_edge_damping
 from taichi_soft.kernels.elastic import accumulate_elastic_forces
+from taichi_soft.kernels.implicit_euler import implicit_substep
 from taichi_soft.kernels.motion import move_particle, particle_is_sound, remember_particle, restore_particle
 from taichi_soft.runtime import ti
 from taichi_soft.state import ACTIVE, FROZEN
-from taichi_soft.types import DampingModel
+from taichi_soft.types import DampingModel, Integrator
 
 
 @ti.func
@@ -17,9 +19,12 @@ def accumulate_forces(state: ti.template(), program: ti.template(), body):
     """Add all internal forces of one body to its particles."""
     for m, model in ti.static(enumerate(program.models)):
         if state.body_model[body] == m:
-            accumulate_elastic_forces(state, model, body)
-            if ti.static(model.damping_model == DampingModel.EDGE):
-                accumulate_edge_damping(state, body)
+            if ti.static(model.has_bonds):
+                accumulate_bond_forces(state, model.law, body)
+            else:
+                accumulate_elastic_forces(state, model, body)
+                if ti.static(model.damping_model == DampingModel.EDGE):
+                    accumulate_edge_damping(state, body)
 
 
 @ti.func
@@ -55,10 +60,13 @@ def _step_body(state: ti.template(), program: ti.template(), body, substeps, h):
     failed = 0
     if state.body_status[body] == ACTIVE:
         kick = 0.5 * (state.body_velocity_lag[body] + h)
-        for _ in range(substeps):
+        for s in range(substeps):
             accumulate_forces(state, program, body)
-            move_body(state, program, body, h, kick)
-            kick = h
+            if ti.static(program.integrator == Integrator.IMPLICIT_EULER):
+                implicit_substep(state, program, body, h, int(s == 0))
+            else:
+                move_body(state, program, body, h, kick)
+                kick = h
         failed = _settle_body(state, body)
         if failed == 0:
             state.body_velocity_lag[body] = h

@@ -8,7 +8,7 @@ from taichi_soft.kernels.program import Program
 from taichi_soft.runtime import Device
 from taichi_soft.scene import Scene
 from taichi_soft.state import State
-from taichi_soft.types import Schedule
+from taichi_soft.types import Integrator, Schedule
 
 FLAT_FROM_TETS = 100_000
 """Tetrahedra in a world's largest body from which the threads share it rather than leave it to one of them.
@@ -20,17 +20,20 @@ off its core stands still for milliseconds: with a third process at work, bodies
 Launch = Callable[[int, float], int]
 
 
-def choose_schedule(asked: Schedule, scene: Scene, device: Device) -> Schedule:
-    """The schedule to use where `asked` leaves it open.
+def choose_schedule(asked: Schedule, scene: Scene, device: Device, integrator: Integrator) -> Schedule:
+    """The schedule to use where `asked` leaves it open; implicit solves run in one thread per body only.
 
     A GPU needs one thread per tetrahedron. On a CPU, bodies run side by side as long as there are enough
     of them to keep the threads busy, or too few tetrahedra to be worth sharing.
     """
     if asked is not Schedule.AUTO:
         return asked
+    if integrator is Integrator.IMPLICIT_EULER:
+        return Schedule.PER_BODY
     if device.is_gpu:
         return Schedule.FLAT
-    sizes = [len(body.tet_vertices) for body in scene.bodies]
+    # A body without tetrahedra works on its edges, of which there are about twice as many per unit of work.
+    sizes = [max(len(body.tet_vertices), len(body.edge_vertices) // 2) for body in scene.bodies]
     is_balanced = max(sizes) * device.threads <= 1.25 * sum(sizes)
     if device.threads == 1 or is_balanced or max(sizes) < FLAT_FROM_TETS:
         return Schedule.PER_BODY

@@ -1,15 +1,39 @@
 """Force laws by name. A new law is one file with its functions and one line here."""
 
-from taichi_soft.errors import OptionError
+from functools import partial
+
+from taichi_soft.errors import MaterialError, MeshError, OptionError
+from taichi_soft.laws.best_fitting_plane import best_fitting_plane_bonds
+from taichi_soft.laws.bonds import Ring
+from taichi_soft.laws.cmpm import cmpm_bonds
+from taichi_soft.laws.cmpm2 import cmpm2_bonds
 from taichi_soft.laws.face import face_forces
-from taichi_soft.laws.law import EnergyLaw, Law, StressLaw
+from taichi_soft.laws.law import SOLID, BondLaw, EnergyLaw, Law, StressLaw
 from taichi_soft.laws.model import ElementModel
-from taichi_soft.laws.neo_hookean import neo_hookean_energy, neo_hookean_piola
-from taichi_soft.laws.st_venant_kirchhoff import st_venant_kirchhoff_energy, st_venant_kirchhoff_piola
+from taichi_soft.laws.neo_hookean import neo_hookean_energy, neo_hookean_piola, neo_hookean_principal
+from taichi_soft.laws.springs import spring_bonds
+from taichi_soft.laws.st_venant_kirchhoff import (
+    st_venant_kirchhoff_energy,
+    st_venant_kirchhoff_piola,
+    st_venant_kirchhoff_principal,
+)
+from taichi_soft.laws.tilted_plane import PRINTED, tilted_plane_bonds
 from taichi_soft.laws.virial import virial_forces
+from taichi_soft.laws.volume_springs import volume_spring_bonds
+from taichi_soft.materials import CONSTANTS, Material, SpringMaterial
+from taichi_soft.meshing import BodyMesh, ParticleMesh, TetMesh
 from taichi_soft.types import ChoiceT, DampingModel, Flips, Strain
 
-__all__ = ["LAWS", "ElementModel", "Law", "element_model"]
+__all__ = [
+    "LAWS",
+    "BondLaw",
+    "ElementModel",
+    "EnergyLaw",
+    "Law",
+    "StressLaw",
+    "element_model",
+    "require_body",
+]
 
 LAWS: dict[str, Law] = {
     law.name: law
@@ -21,6 +45,7 @@ LAWS: dict[str, Law] = {
             "thesis 6.4 asks for it",
             "Hooke's law as the derivative of an energy: no drift without damping",
             st_venant_kirchhoff_piola,
+            st_venant_kirchhoff_principal,
             st_venant_kirchhoff_energy,
             (Strain.LINEAR,),
             (Flips.TOLERANT,),
@@ -30,9 +55,62 @@ LAWS: dict[str, Law] = {
             "Smith, de Goes and Kim 2018",
             "rubber that keeps its energy and comes back from every flip",
             neo_hookean_piola,
+            neo_hookean_principal,
             neo_hookean_energy,
             (),
             (Flips.RECOVER,),
+        ),
+        BondLaw(
+            "springs",
+            "thesis 3.4",
+            "a spring on every edge",
+            Ring.NONE,
+            spring_bonds,
+            ("young", "density", "damping; or stiffness", "damping", "rest_length"),
+            keeps_energy=True,
+        ),
+        BondLaw(
+            "volume_springs",
+            "thesis 5.1",
+            "springs, and tetrahedra that pull their edges together as they grow",
+            Ring.EXPANSION,
+            volume_spring_bonds,
+            SOLID,
+        ),
+        BondLaw(
+            "cmpm",
+            "thesis 4.1",
+            "a spring along and one across each edge, told apart by its Voronoi face",
+            Ring.VORONOI,
+            cmpm_bonds,
+        ),
+        BondLaw(
+            "cmpm2",
+            "thesis 4.4.1",
+            "the same with barycentric subfaces instead of the Voronoi graph",
+            Ring.SUBFACES,
+            cmpm2_bonds,
+        ),
+        BondLaw(
+            "best_fitting_plane",
+            "thesis 4.4.2",
+            "the same with a plane fitted to the particles round the edge",
+            Ring.PLANE,
+            best_fitting_plane_bonds,
+        ),
+        BondLaw(
+            "tilted_plane",
+            "thesis 4.4.3",
+            "the same with a plane that the particles round the edge tilt",
+            Ring.TILT,
+            tilted_plane_bonds,
+        ),
+        BondLaw(
+            "tilted_plane_printed",
+            "thesis eq. 4.12",
+            "as printed, which tilts the plane by an eighth of the shear",
+            Ring.TILT,
+            partial(tilted_plane_bonds, factor=PRINTED),
         ),
     )
 }
@@ -51,12 +129,41 @@ def element_model(
     if not isinstance(law, str) or law not in LAWS:
         raise OptionError(f"unknown law {law!r}: choose one of {', '.join(map(repr, LAWS))}")
     chosen = LAWS[law]
+    damping = DampingModel.parse(damping_model)
+    if isinstance(chosen, BondLaw) and damping is not DampingModel.EDGE:
+        raise OptionError(f"law {law!r} has no damping_model={damping.value!r}: it takes 'edge'")
     return ElementModel(
         chosen,
         _one_of(chosen, "strain", None if strain is None else Strain.parse(strain), chosen.strains),
         _one_of(chosen, "flips", None if flips is None else Flips.parse(flips), chosen.flips),
-        DampingModel.parse(damping_model),
+        damping,
     )
+
+
+def require_body(mesh: BodyMesh, material: Material | SpringMaterial, model: ElementModel) -> None:
+    """Raises: MeshError or MaterialError where a law cannot be made of this mesh and this material."""
+    law = model.law
+    if not isinstance(mesh, BodyMesh):
+        raise MeshError(f"mesh must be a TetMesh or a ParticleMesh, got {type(mesh).__name__}")
+    if not isinstance(material, (Material, SpringMaterial)):
+        raise MaterialError(f"material must be a taichi_soft.Material, got {type(material).__name__}")
+    if law.name != "springs" or isinstance(material, Material):
+        if not isinstance(mesh, TetMesh):
+            raise MeshError(
+                f"law {law.name!r} needs tetrahedra: pass a TetMesh, got {type(mesh).__name__}"
+                + (" (which takes a SpringMaterial)" if law.name == "springs" else "")
+            )
+        if not isinstance(material, Material):
+            raise MaterialError(f"law {law.name!r} needs a Material, got {type(material).__name__}")
+    elif not isinstance(mesh, ParticleMesh):
+        raise MaterialError("a SpringMaterial tells no density: turn the mesh into a ParticleMesh first")
+    if isinstance(material, Material):
+        for name in CONSTANTS:
+            if getattr(material, name) is not None:
+                material.per_tet(name, len(mesh.tets))
+        given = material.shear_modulus is not None or material.shear_damping is not None
+        if given and not (isinstance(law, BondLaw) and law.takes_shear):
+            raise MaterialError(f"law {law.name!r} takes no shear_modulus or shear_damping of its own")
 
 
 def _one_of(law: Law, option: str, asked: ChoiceT | None, taken: tuple[ChoiceT, ...]) -> ChoiceT | None:

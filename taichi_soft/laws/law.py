@@ -4,7 +4,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from taichi_soft.types import Flips, Strain
+from taichi_soft.laws.bonds import Bonds, Ring
+from taichi_soft.types import Flips, Integrator, Strain
+
+SOLID = ("young", "poisson", "density", "damping")
 
 
 @dataclass(frozen=True)
@@ -17,6 +20,9 @@ class StressLaw:
     forces: Any  # ti.func (shape columns, Cauchy stress columns) -> four vec3 [N]
     strains: tuple[Strain, ...] = (Strain.LINEAR, Strain.EXACT)  # that it takes, its default first
     flips: tuple[Flips, ...] = (Flips.TOLERANT, Flips.RECOVER, Flips.OFF)
+    parameters: tuple[str, ...] = SOLID  # of its material
+    integrators: tuple[Integrator, ...] = tuple(Integrator)
+    keeps_energy: bool = False
 
 
 @dataclass(frozen=True)
@@ -27,9 +33,34 @@ class EnergyLaw:
     source: str
     summary: str
     piola: Any  # ti.func (F columns, lambda, mu) -> d energy / d F, columns [Pa]
+    principal: Any  # ti.func (stretches vec3, lambda, mu) -> the same in their axes, and its derivatives
     energy_density: Callable[..., Any]  # numpy: F (m, 3, 3), lambda, mu (m,) -> (m,) [J per m^3 at rest]
     strains: tuple[Strain, ...]
     flips: tuple[Flips, ...]  # one: what it does with them follows from the energy
+    parameters: tuple[str, ...] = SOLID
+    integrators: tuple[Integrator, ...] = tuple(Integrator)
+    keeps_energy: bool = True
 
 
-Law = StressLaw | EnergyLaw
+@dataclass(frozen=True)
+class BondLaw:
+    """Forces between the two ends of each edge: the pairwise models of thesis chapters 3 to 5."""
+
+    name: str
+    source: str
+    summary: str
+    ring: Ring  # what is looked at besides the two ends
+    bonds: Callable[..., Bonds]  # numpy: (mesh, material) -> constants of every edge
+    parameters: tuple[str, ...] = (*SOLID, "shear_modulus", "shear_damping")
+    keeps_energy: bool = False
+    integrators: tuple[Integrator, ...] = tuple(Integrator)
+    strains: tuple[Strain, ...] = ()
+    flips: tuple[Flips, ...] = ()
+
+    @property
+    def takes_shear(self) -> bool:
+        """Whether shear modulus and shear damping of a material mean anything to it."""
+        return "shear_modulus" in self.parameters
+
+
+Law = StressLaw | EnergyLaw | BondLaw

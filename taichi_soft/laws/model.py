@@ -6,9 +6,10 @@ A model holds choices, never numbers, so that one compiled kernel serves every m
 from dataclasses import dataclass
 
 from taichi_soft.laws import strain as strains
+from taichi_soft.laws.bonds import Ring
 from taichi_soft.laws.energy import energy_forces
 from taichi_soft.laws.hooke import hooke_stress
-from taichi_soft.laws.law import EnergyLaw, Law
+from taichi_soft.laws.law import BondLaw, EnergyLaw, Law
 from taichi_soft.laws.recovery import recovering_stress
 from taichi_soft.math.tensors import determinant, product
 from taichi_soft.math.tetrahedron import shape
@@ -22,13 +23,23 @@ class ElementModel:
 
     law: Law
     strain: Strain | None  # None where the law has no strain to choose
-    flips: Flips
+    flips: Flips | None  # None where the law does not look at tetrahedra
     damping_model: DampingModel
 
     @property
     def has_energy(self) -> bool:
         """True where the forces are the derivative of an energy."""
         return isinstance(self.law, EnergyLaw)
+
+    @property
+    def has_bonds(self) -> bool:
+        """True where forces act between the ends of edges, False where on the corners of tetrahedra."""
+        return isinstance(self.law, BondLaw)
+
+    @property
+    def reads_expansion(self) -> bool:
+        """True where edges look at how their tetrahedra have grown."""
+        return isinstance(self.law, BondLaw) and self.law.ring is Ring.EXPANSION
 
     @property
     def repairs_flips(self) -> bool:

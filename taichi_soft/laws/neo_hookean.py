@@ -8,6 +8,7 @@ section 3.4).
 
 import numpy as np
 
+from taichi_soft.laws.principal import axis_of, cofactors
 from taichi_soft.math.tensors import cofactor, determinant, plus
 from taichi_soft.runtime import ti
 
@@ -20,6 +21,22 @@ def neo_hookean_piola(F, lame_lambda, lame_mu):
     along = lame_mu * 4.0 / 3.0 * (1.0 - 1.0 / (square + 1.0))
     pressure = (lame_lambda + lame_mu * 5.0 / 6.0) * (determinant(F) - 1.0) - lame_mu
     return plus(F, along, cofactor(F), pressure)
+
+
+@ti.func
+def neo_hookean_principal(s, lame_lambda, lame_mu):
+    """The same in principal stretches: p [Pa], and dp/ds as columns."""
+    soft = lame_mu * 4.0 / 3.0
+    bulk = lame_lambda + lame_mu * 5.0 / 6.0
+    square = s.dot(s) + 1.0
+    along = soft * (1.0 - 1.0 / square)
+    pressure = bulk * (s.x * s.y * s.z - 1.0) - lame_mu
+    others, changes = cofactors(s)
+    bend = 2.0 * soft / (square * square)
+    c0 = axis_of(s, 0) * along + s * (bend * s.x) + others * (bulk * others.x) + changes[0] * pressure
+    c1 = axis_of(s, 1) * along + s * (bend * s.y) + others * (bulk * others.y) + changes[1] * pressure
+    c2 = axis_of(s, 2) * along + s * (bend * s.z) + others * (bulk * others.z) + changes[2] * pressure
+    return s * along + others * pressure, (c0, c1, c2)
 
 
 def neo_hookean_energy(F, lame_lambda, lame_mu):

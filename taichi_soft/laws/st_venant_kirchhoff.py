@@ -9,6 +9,7 @@ rest; and under strong compression (a third of a length alone) it gives way.
 import numpy as np
 
 from taichi_soft.laws.hooke import hooke_stress
+from taichi_soft.laws.principal import axis_of
 from taichi_soft.math.tensors import inner_square, product, scaled_plus_identity
 from taichi_soft.runtime import ti
 
@@ -18,6 +19,17 @@ def st_venant_kirchhoff_piola(F, lame_lambda, lame_mu):
     """P = F (lambda tr(E) I + 2 mu E) [Pa], as columns."""
     green = scaled_plus_identity(inner_square(F), 0.5, -0.5)
     return product(F, hooke_stress(green, lame_lambda, lame_mu))
+
+
+@ti.func
+def st_venant_kirchhoff_principal(s, lame_lambda, lame_mu):
+    """p_a = s_a (lambda tr E + 2 mu E_a) [Pa] of the stretches, and dp/ds as columns."""
+    green = 0.5 * (s * s - 1.0)
+    stress = 2.0 * lame_mu * green + lame_lambda * green.sum()
+    c0 = lame_lambda * s.x * s + axis_of(s, 0) * (stress.x + 2.0 * lame_mu * s.x * s.x)
+    c1 = lame_lambda * s.y * s + axis_of(s, 1) * (stress.y + 2.0 * lame_mu * s.y * s.y)
+    c2 = lame_lambda * s.z * s + axis_of(s, 2) * (stress.z + 2.0 * lame_mu * s.z * s.z)
+    return s * stress, (c0, c1, c2)
 
 
 def st_venant_kirchhoff_energy(F, lame_lambda, lame_mu):

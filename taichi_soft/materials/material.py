@@ -6,15 +6,21 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from taichi_soft.checks import as_count
 from taichi_soft.errors import MaterialError
+from taichi_soft.materials.constants import (
+    LARGEST,
+    POSITIVE,
+    Array,
+    as_constant,
+    is_damping,
+    is_positive,
+    spread,
+)
 
-Array = NDArray[np.float64]
-
-SMALLEST, LARGEST = 1e-9, 1e20
-"""Constants beyond overflow float32 on their way to a force or an acceleration."""
+CONSTANTS = ("young", "poisson", "density", "damping", "shear_modulus", "shear_damping")
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +34,8 @@ class Material:
         density: mass per volume [kg/m^3], above 0.
         damping: b of thesis eq. 3.9 [N s/m], one per edge, 0 or more. An array is averaged over the
             tetrahedra that share an edge.
+        shear_modulus: G [Pa] of the laws of chapter 4, which take it by itself; None is E / (2 (1 + nu)).
+        shear_damping: b_m of eq. 4.5 [N s/m] of the same laws, across the edges; None is `damping`.
     Raises: MaterialError with the first value out of range.
     """
 
@@ -35,28 +43,20 @@ class Material:
     poisson: float | Array
     density: float | Array
     damping: float | Array = 0.0
+    shear_modulus: float | Array | None = None
+    shear_damping: float | Array | None = None
 
     def __post_init__(self) -> None:
-        self._check(
-            "young",
-            lambda x: (x >= SMALLEST) & (x < LARGEST),
-            f"above 0 Pa, from {SMALLEST:g} to {LARGEST:g}",
-        )
-        self._check(
-            "poisson",
-            lambda x: (x > -1) & (x < 0.5),
-            "above -1 and below 0.5 (use 0.49 for rubber)",
-        )
-        self._check(
-            "density",
-            lambda x: (x >= SMALLEST) & (x < LARGEST),
-            f"above 0 kg/m^3, from {SMALLEST:g} to {LARGEST:g}",
-        )
-        self._check("damping", lambda x: (x >= 0) & (x < LARGEST), f"0 N s/m or more and below {LARGEST:g}")
+        self._check("young", is_positive, f"above 0 Pa, {POSITIVE}")
+        self._check("poisson", lambda x: (x > -1) & (x < 0.5), "above -1 and below 0.5 (use 0.49 for rubber)")
+        self._check("density", is_positive, f"above 0 kg/m^3, {POSITIVE}")
+        self._check("damping", is_damping, f"0 N s/m or more and below {LARGEST:g}")
+        if self.shear_modulus is not None:
+            self._check("shear_modulus", is_positive, f"above 0 Pa, {POSITIVE}")
+        if self.shear_damping is not None:
+            self._check("shear_damping", is_damping, f"0 N s/m or more and below {LARGEST:g}")
         lengths = {
-            name: value.size
-            for name in ("young", "poisson", "density", "damping")
-            if isinstance(value := getattr(self, name), np.ndarray)
+            name: value.size for name in CONSTANTS if isinstance(value := getattr(self, name), np.ndarray)
         }
         if len(set(lengths.values())) > 1:
             raise MaterialError(
@@ -69,26 +69,8 @@ class Material:
             )
 
     def _check(self, name: str, is_valid: Any, range_text: str) -> None:
-        given = getattr(self, name)
-        try:
-            if np.asarray(given).dtype.kind not in "iuf":
-                raise TypeError
-            values = np.array(given, dtype=np.float64)
-        except (TypeError, ValueError):
-            raise MaterialError(
-                f"{name} must be a number or one number per tetrahedron, got {given!r}"
-            ) from None
-        if values.ndim > 1 or values.size == 0:
-            raise MaterialError(
-                f"{name} must be a number or a flat array, got an array of shape {values.shape}"
-            )
-        bad = ~(np.isfinite(values) & is_valid(values))
-        if bad.any():
-            first = int(np.flatnonzero(bad)[0])
-            where = "" if values.ndim == 0 else f" of tetrahedron {first}"
-            raise MaterialError(f"{name}{where} is {values.reshape(-1)[first]:g}: it must be {range_text}")
-        values.flags.writeable = False
-        object.__setattr__(self, name, float(values) if values.ndim == 0 else values)
+        value = as_constant(getattr(self, name), name, "tetrahedron", is_valid, range_text)
+        object.__setattr__(self, name, value)
 
     @property
     def lame_lambda(self) -> float | Array:
@@ -106,12 +88,7 @@ class Material:
         Raises: MaterialError if the constant is an array of another length.
         """
         tet_count = as_count(tet_count, "tet_count", high=2**31 - 1)
-        values = np.asarray(getattr(self, name), dtype=np.float64)
-        if values.ndim == 1 and values.shape[0] != tet_count:
-            raise MaterialError(
-                f"{name} has {values.shape[0]} values for a mesh of {tet_count} tetrahedra: give one each"
-            )
-        return np.ascontiguousarray(np.broadcast_to(values, (tet_count,)))
+        return spread(getattr(self, name), name, "tetrahedra", tet_count)
 
 
 def require_material(value: ArrayLike | Material) -> Material:

@@ -70,3 +70,9 @@ def determinant(columns):
 def cofactor(columns):
     """det(M) M^-T, as columns: no division, so it also holds where the matrix is singular."""
     return columns[1].cross(columns[2]), columns[2].cross(columns[0]), columns[0].cross(columns[1])
+
+
+@ti.func
+def outer(a, b):
+    """a b^T, as columns."""
+    return a * b.x, a * b.y, a * b.z

@@ -1,30 +1,42 @@
 """Bodies at rest: particles, edges and tetrahedra, where they come from and how good they are."""
 
 from taichi_soft.meshing.body_mesh import BodyMesh
+from taichi_soft.meshing.delaunay import delaunay_mesh
 from taichi_soft.meshing.io import load_mesh, save_mesh
+from taichi_soft.meshing.lattices import cloth, cloth_constants, edges_as_particles, rope
 from taichi_soft.meshing.ordering import renumbered, spatial_order, tet_order
 from taichi_soft.meshing.particle_mesh import ParticleMesh
 from taichi_soft.meshing.quality import MeshQuality
+from taichi_soft.meshing.rings import EdgeRings
 from taichi_soft.meshing.shapes import beam, box, cylinder, extrude, sphere, torus, voxels
 from taichi_soft.meshing.surface_mesh import surface_mesh
 from taichi_soft.meshing.tet_mesh import TetMesh
+from taichi_soft.meshing.voronoi import VoronoiGraph, voronoi_graph
 
 __all__ = [
     "BodyMesh",
+    "EdgeRings",
     "MeshQuality",
     "ParticleMesh",
     "TetMesh",
+    "VoronoiGraph",
     "beam",
     "box",
+    "cloth",
+    "cloth_constants",
     "cylinder",
+    "delaunay_mesh",
+    "edges_as_particles",
     "extrude",
     "load_mesh",
     "renumbered",
+    "rope",
     "save_mesh",
     "spatial_order",
     "sphere",
     "surface_mesh",
     "tet_order",
     "torus",
+    "voronoi_graph",
     "voxels",
 ]

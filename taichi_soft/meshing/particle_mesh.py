@@ -8,7 +8,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from taichi_soft.errors import MeshError
-from taichi_soft.meshing.arrays import FloatArray, as_indices, as_points, as_real, name_vertices, read_only
+from taichi_soft.meshing.arrays import (
+    FloatArray,
+    IntArray,
+    as_indices,
+    as_points,
+    as_real,
+    name_vertices,
+    read_only,
+)
 from taichi_soft.meshing.body_mesh import BodyMesh
 
 
@@ -20,17 +28,22 @@ class ParticleMesh(BodyMesh):
         edges: (k, 2) integer vertex indices, in any order and direction; they are stored with i < j and
             with the rows in ascending order, so values per edge belong to `mesh.edges`, not to the input.
         masses: (n,) mass of each particle [kg], all positive; one number serves for all.
+        surface: (f, 3) triangles to draw, none by default. Triangles are seen from one side, so a sheet has
+            each twice.
 
     Raises: MeshError for wrong shapes or dtypes, numbers that are not finite, indices out of range, an edge
-        from a vertex to itself, an edge given twice or of zero length, a mass that is not positive, or no
-        vertices or edges at all.
+        from a vertex to itself, an edge given twice or of zero length, a vertex of no edge, a mass that is
+        not positive, or no vertices or edges at all.
 
     The arrays are copied. `tets` is empty, (0, 4).
     """
 
     masses: FloatArray
+    surface: IntArray
 
-    def __init__(self, vertices: ArrayLike, edges: ArrayLike, masses: ArrayLike) -> None:
+    def __init__(
+        self, vertices: ArrayLike, edges: ArrayLike, masses: ArrayLike, *, surface: ArrayLike = ()
+    ) -> None:
         points = as_points(vertices)
         pairs = np.sort(as_indices(edges, "edges", 2, len(points), "edge"), axis=1)
         order = np.lexsort((pairs[:, 1], pairs[:, 0]))
@@ -50,17 +63,29 @@ class ParticleMesh(BodyMesh):
                 f"edge {row} has zero length (vertices {name_vertices(pairs[row])} lie on the same spot): "
                 "merge the two vertices or move them apart"
             )
+        alone = np.bincount(pairs.ravel(), minlength=len(points)) == 0
+        if alone.any():
+            raise MeshError(
+                f"vertex {int(np.argmax(alone))} belongs to no edge: remove it, or join it to another"
+            )
         super().__init__(points, in_order, np.zeros((0, 4), dtype=np.int32))
         mass = masses if hasattr(masses, "__len__") else np.full(len(points), masses)
         kilograms = as_real(mass, "masses", (len(points),), "mass")
         if not (kilograms > 0).all():
             row = int(np.argmax(kilograms <= 0))
             raise MeshError(f"mass {row} is {kilograms[row]:g} kg: every mass must be positive")
-        self.__dict__["masses"] = read_only(kilograms)
+        triangles = np.zeros((0, 3), np.int32)
+        if np.size(surface):
+            triangles = as_indices(surface, "surface", 3, len(points), "triangle")
+        self.__dict__.update(masses=read_only(kilograms), surface=read_only(triangles))
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Copying and unpickling rebuild the mesh, so that its arrays are locked again.
-        return (ParticleMesh, (self.vertices, self.edges, self.masses))
+        return (_rebuilt, (self.vertices, self.edges, self.masses, self.surface))
 
     def _with_vertices(self, vertices: FloatArray) -> ParticleMesh:
-        return ParticleMesh(vertices, self.edges, self.masses)
+        return _rebuilt(vertices, self.edges, self.masses, self.surface)
+
+
+def _rebuilt(vertices: FloatArray, edges: IntArray, masses: FloatArray, surface: IntArray) -> ParticleMesh:
+    return ParticleMesh(vertices, edges, masses, surface=surface)

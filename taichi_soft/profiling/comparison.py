@@ -46,9 +46,7 @@ def compare_with_baseline(
         body = world.add_body(mesh, MATERIAL, position=(0.0, 0.0, 1.0))
         world.build()
         model = element_model("virial", "linear", "tolerant", "edge")
-        arrays = arrange(
-            BodyDescription(mesh, MATERIAL, model, np.array([0.0, 0.0, 1.0]), np.eye(3), np.zeros(3))
-        )
+        arrays = arrange(BodyDescription.at_rest(mesh, MATERIAL, model))
         native = Baseline(library, arrays)
         stretched = mesh.vertices * (1.0 + PUSHED_APART) + (0.0, 0.0, 1.0)
         body.set_motion(stretched, np.zeros_like(stretched))

@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import partial
 
-from taichi_soft.laws import LAWS
+from taichi_soft.laws import LAWS, BondLaw
 from taichi_soft.materials import Material
 from taichi_soft.meshing import box
 from taichi_soft.profiling.spread import Spread, compare
 from taichi_soft.world import World
 
 MESH = box((1.0, 1.0, 1.0), (10, 10, 10))
-TETS = len(MESH.tets)
+TETS, EDGES = len(MESH.tets), len(MESH.edges)
 MATERIAL = Material(young=1.0e5, poisson=0.3, density=1000.0, damping=0.1)
 SUBSTEPS = 40
 SUBSTEP = 1.0e-5  # [s], far below every limit: the bodies just fall
@@ -24,7 +24,8 @@ class LawCost:
 
     law: str
     strain: str | None
-    cost: Spread  # of a whole substep, edge damping included [ns per tetrahedron]
+    element: str  # that it works on: "tetrahedron" or "edge"
+    cost: Spread  # of a whole substep, edge damping included [ns per element]
     ratio: Spread  # over that of "virial" with the linear strain, pair by pair
 
 
@@ -35,8 +36,9 @@ def measure_laws(repeats: int = 21) -> list[LawCost]:
     for law in LAWS.values():
         for strain in law.strains or (None,):
             name = None if strain is None else strain.value
-            cost, _, ratio = compare(_falling(law.name, name), usual, repeats, 1e9 / SUBSTEPS / TETS)
-            found.append(LawCost(law.name, name, cost, ratio))
+            element, count = ("edge", EDGES) if isinstance(law, BondLaw) else ("tetrahedron", TETS)
+            cost, _, ratio = compare(_falling(law.name, name), usual, repeats, 1e9 / SUBSTEPS / count)
+            found.append(LawCost(law.name, name, element, cost, ratio))
     return found
 
 

@@ -8,11 +8,11 @@ from typing import Any
 from rich.table import Table
 
 from taichi_soft.laws import LAWS
-from taichi_soft.laws.law import EnergyLaw
 from taichi_soft.profiling.budget import Budget
 from taichi_soft.profiling.law_costs import LawCost
 from taichi_soft.profiling.phases import Phases
 from taichi_soft.profiling.spread import Spread
+from taichi_soft.types import Integrator
 
 
 def tables(found: dict[str, Any]) -> Iterator[tuple[str, Table]]:
@@ -51,18 +51,22 @@ def tables(found: dict[str, Any]) -> Iterator[tuple[str, Table]]:
 def law_table(costs: list[LawCost]) -> Table:
     """Every law: what it takes, whether it keeps energy, where it comes from, and what it costs."""
     table = Table()
-    for name in ("law", "strain", "flips", "energy", "ns", "ratio", "source"):
+    for name in ("law", "source", "parameters", "strain", "flips", "integrators", "energy", "element", "ns"):
         table.add_column(name)
+    table.add_column("of virial", justify="right")
     for each in costs:
         law = LAWS[each.law]
         table.add_row(
             law.name,
-            each.strain or "its own",
-            ", ".join(choice.value for choice in law.flips),
-            "kept" if isinstance(law, EnergyLaw) else "drifts",
+            law.source,
+            ", ".join(law.parameters),
+            each.strain or "-",
+            ", ".join(choice.value for choice in law.flips) or "-",
+            "all" if set(law.integrators) == set(Integrator) else ", ".join(law.integrators),
+            "kept" if law.keeps_energy else "drifts",
+            each.element,
             f"{each.cost.median:.1f}",
             f"{each.ratio.median:.2f}",
-            law.source,
         )
     return table
 

@@ -59,24 +59,25 @@ def draw_labels(picture: Picture, labels: Sequence[str], places: ArrayLike) -> P
 
     Args:
         picture: uint8 (height, width, 3).
-        labels: n captions of plain ASCII text.
+        labels: n captions of plain ASCII text; a line break begins a second line.
         places: (n, 2) or more columns, pixel right and down, as `Camera.project` gives them. Captions are
             moved to stay inside the picture; a place that is NaN (behind the camera) gets none.
     Raises: OptionError for another picture, text or number of places.
     """
-    _check(picture, labels)
+    captions = [str(label).split("\n") for label in labels]
+    _check(picture, [line for lines in captions for line in lines])
     pixels = to_array(places, "places")
     if pixels.dtype.kind not in "fiu" or pixels.shape[:1] != (len(labels),) or pixels.shape[1:] < (2,):
         raise OptionError(f"places must have shape ({len(labels)}, 2), got {pixels.shape}")
     height, width = picture.shape[:2]
-    for label, (u, v) in zip(labels, pixels[:, :2], strict=True):
+    for lines, (u, v) in zip(captions, pixels[:, :2], strict=True):
         if not (np.isfinite(u) and np.isfinite(v)):
             continue
-        line = _line_height([label], width, height, min(height, width))
-        pad, wide, high = _panel_size([label], line)
+        line = _line_height(lines, width, height, min(height, width))
+        pad, wide, high = _panel_size(lines, line)
         left = int(np.clip(u - wide / 2, 0, width - wide))
         top = int(np.clip(v + pad, 0, height - high))
-        _draw_panel(picture, [label], left, top, line, pad, wide, high)
+        _draw_panel(picture, lines, left, top, line, pad, wide, high)
     return picture
 
 

@@ -8,6 +8,7 @@ from importlib.metadata import version
 import cv2
 import pytest
 
+from taichi_soft import LAWS
 from taichi_soft.profiling import LawCost, Spread, find_compiler
 from taichi_soft.profiling.report import law_table
 
@@ -104,10 +105,17 @@ def test_info_lists_every_law_with_its_cost():
         ("face", "exact"),
         ("st_venant_kirchhoff", "linear"),
         ("neo_hookean", None),
+        *((name, None) for name in list(LAWS)[4:]),
     ]
     assert all(cost["ratio"]["least"] > 0 for cost in costs)
-    table = law_table([LawCost(cost["law"], cost["strain"], SPREAD, SPREAD) for cost in costs])
-    assert table.row_count == 6
+    assert {cost["element"] for cost in costs} == {"tetrahedron", "edge"}
+    table = law_table(
+        [LawCost(cost["law"], cost["strain"], cost["element"], SPREAD, SPREAD) for cost in costs]
+    )
+    assert table.row_count == len(costs)
+    cells = {column.header: list(column.cells) for column in table.columns}
+    assert all("young" in text or "stiffness" in text for text in cells["parameters"])
+    assert set(cells["integrators"]) == {"all"}
 
 
 def test_profile_prints_phases_and_budgets_as_json():

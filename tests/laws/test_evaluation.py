@@ -118,13 +118,13 @@ def test_positions_that_are_no_numbers_are_refused(value):
 
 @pytest.mark.parametrize("value", [None, "ball", BALL.vertices, MATERIAL])
 def test_what_is_no_mesh_is_refused(value):
-    with pytest.raises(MeshError, match="mesh must be a TetMesh, got"):
+    with pytest.raises(MeshError, match="mesh must be a TetMesh or a ParticleMesh, got"):
         internal_forces(value, MATERIAL, BALL.vertices)
 
 
 def test_a_mesh_without_tetrahedra_is_refused():
     rod = ParticleMesh([[0, 0, 0], [1, 0, 0]], [[0, 1]], [1.0, 1.0])
-    with pytest.raises(MeshError, match="mesh must be a TetMesh, got ParticleMesh"):
+    with pytest.raises(MeshError, match="law 'virial' needs tetrahedra: pass a TetMesh, got ParticleMesh"):
         internal_forces(rod, MATERIAL, rod.vertices)
 
 

@@ -288,4 +288,4 @@ def test_a_failed_save_leaves_the_old_file(tmp_path, monkeypatch, suffix):
 
 def test_only_tetrahedral_meshes_are_saved(tmp_path):
     with pytest.raises(MeshError, match="ParticleMesh"):
-        save_mesh(ParticleMesh(np.eye(3), [[0, 1]], 1.0), tmp_path / "x.npz")
+        save_mesh(ParticleMesh(np.eye(3), [[0, 1], [1, 2]], 1.0), tmp_path / "x.npz")

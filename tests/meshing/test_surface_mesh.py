@@ -51,7 +51,7 @@ def test_the_mesh_is_not_changed_through_its_surface():
     ("mesh", "positions"),
     [
         (None, None),
-        (ParticleMesh(np.eye(3), [[0, 1]], 1.0), None),
+        (ParticleMesh(np.eye(3), [[0, 1], [1, 2]], 1.0), None),
         (box(), np.zeros((3, 3))),
         (box(), np.full((125, 3), np.nan)),
         (box(), "there"),

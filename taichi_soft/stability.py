@@ -15,11 +15,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.errors import MeshError, OptionError
-from taichi_soft.laws import ElementModel
-from taichi_soft.materials import Material, require_material
-from taichi_soft.meshing import TetMesh
-from taichi_soft.scene import edge_damping, rest_inverses, vertex_masses
+from taichi_soft.errors import OptionError
+from taichi_soft.forces import StillBody
+from taichi_soft.laws import ElementModel, require_body
+from taichi_soft.laws.bonds import Bonds
+from taichi_soft.materials import Material, SpringMaterial
+from taichi_soft.meshing import BodyMesh, TetMesh
+from taichi_soft.scene import BodyDescription, edge_damping, rest_inverses, vertex_masses
 from taichi_soft.types import DampingModel
 
 Floats = NDArray[np.float64]
@@ -37,8 +39,16 @@ class StableStep:
     """What limits the substep of one body."""
 
     limit: float  # [s], largest stable substep for small motion
-    stiffest_tet: int  # whose own frequency is highest, in the caller's order
+    stiffest_tet: int | None  # whose own frequency is highest, in the caller's order
     period: float  # [s] of the fastest vibration
+    stiffest_edge: tuple[int, int] | None = None  # instead of a tetrahedron where forces act along edges
+
+    @property
+    def stiffest(self) -> str:
+        """What is to blame, in words."""
+        if self.stiffest_edge is not None:
+            return f"stiffest edge from vertex {self.stiffest_edge[0]} to {self.stiffest_edge[1]}"
+        return f"stiffest tetrahedron {self.stiffest_tet}"
 
     @property
     def recommended(self) -> float:
@@ -46,17 +56,21 @@ class StableStep:
         return MARGIN * self.limit
 
 
-def stable_step(mesh: TetMesh, material: Material, model: ElementModel) -> StableStep:
+def stable_step(mesh: BodyMesh, material: Material | SpringMaterial, model: ElementModel) -> StableStep:
     """Estimate the largest stable substep of a body under leapfrog; explicit Euler has none.
 
     It holds for motion about the rest shape. A body under strong compression is stiffer and a flattened
     tetrahedron has no bound at all, which is why `recommended` leaves a margin.
+    Raises: MeshError, MaterialError or OptionError for what does not fit together.
     """
-    if not isinstance(mesh, TetMesh):
-        raise MeshError(f"a stable step needs tetrahedra: pass a TetMesh, got {type(mesh).__name__}")
     if not isinstance(model, ElementModel):
         raise OptionError(f"model must come from element_model(...), got {model!r}")
-    require_material(material)
+    require_body(mesh, material, model)
+    description = BodyDescription.at_rest(mesh, material, model)
+    if description.bonds is not None:
+        return _stable_bond_step(description, description.bonds)
+    assert isinstance(mesh, TetMesh)
+    assert isinstance(material, Material)
     count = len(mesh.tets)
     mass = vertex_masses(mesh, material.per_tet("density", count))
     elastic = _ElasticOperator(mesh, material, mass)
@@ -77,6 +91,37 @@ def stable_step(mesh: TetMesh, material: Material, model: ElementModel) -> Stabl
             limit = h * (4.0 / value) ** (2 / 3)
     worst = int(elastic.element_bounds().argmax())
     return StableStep(float(limit), worst, float(2 * np.pi / np.sqrt(frequency2)))
+
+
+def _stable_bond_step(body: BodyDescription, bonds: Bonds) -> StableStep:
+    """Of a law along edges. What its normals do as the body deforms is in the forces only, so they are asked:
+    power iteration on their differences finds the fastest vibration. Damping is bounded edge by edge.
+    """
+    mesh, mass = body.mesh, body.masses
+    edges = mesh.edges
+    still = StillBody(body, double=True)
+    nudge = 1e-6 * float(mesh.edge_lengths.min())
+    rest = np.zeros_like(mesh.vertices)
+    u = np.random.default_rng(0).normal(size=mesh.vertices.shape)
+    growth = []
+    for _ in range(_ITERATIONS):
+        u /= np.linalg.norm(u, axis=1).max()
+        ahead, behind = (still.forces(mesh.vertices + side * nudge * u, rest) for side in (1, -1))
+        u = (behind - ahead) / (2 * nudge * mass[:, None])
+        growth.append(float(np.linalg.norm(u, axis=1).max()))
+    # The force need not be symmetric, and then the growth goes up and down about the largest frequency.
+    frequency2 = float(np.max(growth[_ITERATIONS // 2 :]))
+    per_mass = (1 / mass[edges]).sum(axis=1)
+    damping = np.maximum(body.edge_damping, bonds.constants[:, 3] * bonds.is_bond)
+    braking = float((np.bincount(edges.ravel(), np.repeat(2 * damping, 2), len(mass)) / mass).max())
+    limit = (np.sqrt(braking**2 + 4 * frequency2) - braking) / frequency2
+    worst = int((bonds.constants[:, 1:3].max(axis=1) * per_mass).argmax())
+    return StableStep(
+        float(limit),
+        None,
+        float(2 * np.pi / np.sqrt(frequency2)),
+        (int(edges[worst, 0]), int(edges[worst, 1])),
+    )
 
 
 class _ElasticOperator:

@@ -1,0 +1,165 @@
+"""Forces along and across edges: loads values, calls the law, stores forces."""
+
+from taichi_soft.constants import LANES
+from taichi_soft.kernels.elastic import BLOCK_BITS, particles_of, rest_inverse_of
+from taichi_soft.laws.best_fitting_plane import plane_normal
+from taichi_soft.laws.bonds import Ring
+from taichi_soft.laws.cmpm import bond_damping, bond_force, direction_of
+from taichi_soft.laws.cmpm2 import subface
+from taichi_soft.laws.damping import edge_damping_force
+from taichi_soft.laws.springs import along, spring_tension
+from taichi_soft.laws.tilted_plane import tilt, tilted_normal
+from taichi_soft.laws.volume_springs import expansion
+from taichi_soft.runtime import ti
+
+
+@ti.func
+def store_lane_expansion(state: ti.template(), block, lane):
+    """Growth of one tetrahedron, for the edges to read."""
+    p0, p1, p2, p3 = particles_of(state, block, lane)
+    state.tet_expansion[block * LANES + lane] = expansion(
+        state.particle_position[p0],
+        state.particle_position[p1],
+        state.particle_position[p2],
+        state.particle_position[p3],
+        rest_inverse_of(state, block, lane),
+    )
+
+
+@ti.func
+def store_block_expansions(state: ti.template(), number):
+    """Growth of a block's tetrahedra."""
+    for lane in range(LANES):
+        store_lane_expansion(state, number & BLOCK_BITS, lane)
+
+
+@ti.func
+def _corner(state: ti.template(), k, origin):
+    """A corner of a Voronoi face against `origin` [m]."""
+    members, weights = state.ring_members[k], state.ring_weights[k]
+    arm = state.particle_position[members[0]] * weights[0] - origin
+    for i in ti.static(range(1, 4)):
+        arm += state.particle_position[members[i]] * weights[i]
+    return arm
+
+
+@ti.func
+def _voronoi_normal(state: ti.template(), e, center):
+    """Twice the area vector of a deformed Voronoi face: triangles from the edge's centre (thesis 4.1)."""
+    total = center * 0.0
+    ring = state.edge_ring[e]
+    if ring[1] > ring[0]:
+        arm = _corner(state, ring[0], center)
+        for k in range(ring[0] + 1, ring[1]):
+            following = _corner(state, k, center)
+            total += arm.cross(following)
+            arm = following
+    return total
+
+
+@ti.func
+def _subface_normal(state: ti.template(), e, xp, r):
+    """Area vector of the subfaces of an edge, and the direction it had at rest carried along (4.4.1)."""
+    total, carried = r * 0.0, r * 0.0
+    ring = state.edge_ring[e]
+    for k in range(ring[0], ring[1]):
+        members, weights = state.ring_members[k], state.ring_weights[k]
+        a, b = state.particle_position[members[0]] - xp, state.particle_position[members[1]] - xp
+        total += subface(r * 0.5, a, b)
+        carried += a * weights[0] + b * weights[1] + r * weights[2]
+    return total, carried
+
+
+@ti.func
+def _fitted_normal(state: ti.template(), e, xp, r):
+    """Normal of the plane through the particles round an edge, and its carried direction (4.4.2)."""
+    total, carried = r * 0.0, r * 0.0
+    s0, s1, s2 = r * 0.0, r * 0.0, r * 0.0
+    ring = state.edge_ring[e]
+    for k in range(ring[0], ring[1]):
+        arm = state.particle_position[state.ring_members[k][0]] - xp
+        carried += arm * state.ring_weights[k][0] + r * state.ring_weights[k][1]
+        arm -= r * 0.5
+        total += arm
+        s0 += arm * arm.x
+        s1 += arm * arm.y
+        s2 += arm * arm.z
+    count = ti.max(ring[1] - ring[0], 3)  # of two, the centre of the edge is the third
+    return plane_normal(count, total, (s0, s1, s2), r), carried
+
+
+@ti.func
+def _tilted_normal(state: ti.template(), e, xp, r):
+    """Normal of the plane that the particles round an edge tilt (4.4.3)."""
+    axis = direction_of(r)
+    height = axis.x * 0.0
+    ring = state.edge_ring[e]
+    for k in range(ring[0], ring[1]):
+        height += axis.dot(state.particle_position[state.ring_members[k][0]] - xp)
+    height /= ti.max(ring[1] - ring[0], 1)
+    push = r * 0.0
+    for k in range(ring[0], ring[1]):
+        arm = state.particle_position[state.ring_members[k][0]] - xp
+        push += tilt(axis, arm, height, state.ring_weights[k][1], state.ring_weights[k][0])
+    return tilted_normal(axis, push)
+
+
+@ti.func
+def bond_frame_of(state: ti.template(), law: ti.template(), e):
+    """Of an edge: second end minus first [m], the unit direction of tension, and what is compared with it."""
+    xp = state.particle_position[state.edge_vertices[e][0]]
+    r = state.particle_position[state.edge_vertices[e][1]] - xp
+    normal, compared = r, r
+    if ti.static(law.ring == Ring.VORONOI):
+        normal = _voronoi_normal(state, e, xp + r * 0.5)
+    if ti.static(law.ring == Ring.SUBFACES):
+        normal, compared = _subface_normal(state, e, xp, r)
+    if ti.static(law.ring == Ring.PLANE):
+        normal, compared = _fitted_normal(state, e, xp, r)
+    if ti.static(law.ring == Ring.TILT):
+        normal = _tilted_normal(state, e, xp, r)
+    return r, direction_of(normal), compared
+
+
+@ti.func
+def tension_of(state: ti.template(), law: ti.template(), e, r):
+    """Pull of a spring on its ends [N], with that of the tetrahedra round it where the law has one."""
+    constants = state.edge_bond[e]
+    tension = spring_tension(r, constants)
+    if ti.static(law.ring == Ring.EXPANSION):
+        ring = state.edge_ring[e]
+        for k in range(ring[0], ring[1]):
+            tension += state.ring_weights[k][0] * state.tet_expansion[state.ring_members[k][0]]
+    return tension
+
+
+@ti.func
+def bond_force_of(state: ti.template(), law: ti.template(), e):
+    """Elastic and damping force on the first end of edge `e` [N]; the second feels the opposite."""
+    p, q = state.edge_vertices[e][0], state.edge_vertices[e][1]
+    relative_velocity = state.particle_velocity[q] - state.particle_velocity[p]
+    damping = state.edge_damping[e]
+    if ti.static(law.ring == Ring.NONE or law.ring == Ring.EXPANSION):
+        r = state.particle_position[q] - state.particle_position[p]
+        return along(r, tension_of(state, law, e, r)) + edge_damping_force(r, relative_velocity, damping)
+    else:
+        _, n, compared = bond_frame_of(state, law, e)
+        constants = state.edge_bond[e]
+        return bond_force(compared, n, constants) + bond_damping(
+            compared, n, relative_velocity, damping, constants.w
+        )
+
+
+@ti.func
+def accumulate_bond_forces(state: ti.template(), law: ti.template(), body):
+    """Add the forces of all edges of one body to its particles, in one thread."""
+    if ti.static(law.ring == Ring.EXPANSION):
+        blocks = state.body_blocks[body]
+        for number in range(blocks[0], blocks[1]):
+            store_block_expansions(state, number)
+    edges = state.body_edges[body]
+    for e in range(edges[0], edges[1]):
+        p, q = state.edge_vertices[e][0], state.edge_vertices[e][1]
+        force = bond_force_of(state, law, e)
+        state.particle_force[p] = state.particle_force[p] + force
+        state.particle_force[q] = state.particle_force[q] - force

@@ -1,0 +1,66 @@
+"""What a pairwise law knows of every edge of a body at rest: made once, in numpy, by the law's own file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+class Ring(Enum):
+    """What the rows of an edge's ring name, and what is made of them while the body deforms."""
+
+    NONE = "none"  # a spring looks at its two ends only
+    EXPANSION = "expansion"  # tetrahedra, whose change of volume pulls or pushes along the edge
+    VORONOI = "voronoi"  # corners of the Voronoi face, each in barycentric coordinates of four particles
+    SUBFACES = "subfaces"  # the two particles that span a barycentric subface
+    PLANE = "plane"  # particles to fit a plane to
+    TILT = "tilt"  # particles whose rise tilts a plane
+
+
+@dataclass(frozen=True, eq=False)
+class Bonds:
+    """Rows for every edge of a mesh, in the order and direction of `mesh.edges`.
+
+    Attributes:
+        constants: (k, 4): length at rest [m], stiffness along and across it [N/m], damping across it
+            [N s/m]. Zero where an edge is no bond. Laws that compare directions take length 1 and [N].
+        ring_edge: (r,) the edge of each row of the rings, ascending.
+        ring_members: (r, 4) vertices, or tetrahedra in the first column; -1 where a law needs fewer.
+        ring_weights: (r, 4), see the law.
+        normals: (k, 3) unit normal at rest of the plane that tells tension from shear; NaN where none.
+        masses: (n,) [kg], where the law distributes mass its own way.
+    """
+
+    constants: Floats
+    ring_edge: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
+    ring_members: Ints = field(default_factory=lambda: np.zeros((0, 4), np.int64))
+    ring_weights: Floats = field(default_factory=lambda: np.zeros((0, 4)))
+    normals: Floats | None = None
+    masses: Floats | None = None
+
+    @property
+    def is_bond(self) -> NDArray[np.bool_]:
+        """Whether each edge carries force, (k,)."""
+        return np.asarray(self.constants[:, 1] > 0)
+
+
+def columns(*values: Floats | float, count: int) -> Floats:
+    """The given columns side by side, zeros to the right, (count, 4)."""
+    rows = np.zeros((count, 4))
+    for i, value in enumerate(values):
+        rows[:, i] = value
+    return rows
+
+
+def member_columns(*values: Ints, count: int) -> Ints:
+    """The given columns side by side, -1 to the right, (count, 4)."""
+    rows = np.full((count, 4), -1, dtype=np.int64)
+    for i, value in enumerate(values):
+        rows[:, i] = value
+    return rows

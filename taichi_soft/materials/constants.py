@@ -1,0 +1,59 @@
+"""Constants that are one number for a whole body or one per element."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.errors import MaterialError
+
+Array = NDArray[np.float64]
+
+SMALLEST, LARGEST = 1e-9, 1e20
+"""Constants beyond overflow float32 on their way to a force or an acceleration."""
+
+POSITIVE = f"from {SMALLEST:g} to {LARGEST:g}"
+
+
+def is_positive(x: Array) -> NDArray[np.bool_]:
+    """Which values are above 0 and can be computed with."""
+    return np.asarray((x >= SMALLEST) & (x < LARGEST))
+
+
+def is_damping(x: Array) -> NDArray[np.bool_]:
+    """Which values are 0 or more and can be computed with."""
+    return np.asarray((x >= 0) & (x < LARGEST))
+
+
+def as_constant(
+    given: Any, name: str, element: str, is_valid: Callable[[Array], Any], range_text: str
+) -> float | Array:
+    """A number, or a read-only array of one per `element`. Raises: MaterialError with the first bad value."""
+    try:
+        if np.asarray(given).dtype.kind not in "iuf":
+            raise TypeError
+        values = np.array(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise MaterialError(f"{name} must be a number or one number per {element}, got {given!r}") from None
+    if values.ndim > 1 or values.size == 0:
+        raise MaterialError(f"{name} must be a number or a flat array, got an array of shape {values.shape}")
+    bad = ~(np.isfinite(values) & is_valid(values))
+    if bad.any():
+        first = int(np.flatnonzero(bad)[0])
+        where = "" if values.ndim == 0 else f" of {element} {first}"
+        raise MaterialError(f"{name}{where} is {values.reshape(-1)[first]:g}: it must be {range_text}")
+    values.flags.writeable = False
+    return float(values) if values.ndim == 0 else values
+
+
+def spread(given: float | Array, name: str, elements: str, count: int) -> Array:
+    """One value for each of `count` elements. Raises: MaterialError for an array of another length."""
+    values = np.asarray(given, dtype=np.float64)
+    if values.ndim == 1 and values.shape[0] != count:
+        raise MaterialError(
+            f"{name} has {values.shape[0]} values for a mesh of {count} {elements}: give one each"
+        )
+    return np.ascontiguousarray(np.broadcast_to(values, (count,)))

@@ -1,0 +1,109 @@
+"""Bodies of particles and springs: ropes, cloth, and the edges of a solid (thesis section 3.4, fig. 3.4)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taichi_soft.checks import as_array, as_count, as_positive
+from taichi_soft.errors import MeshError, OptionError
+from taichi_soft.meshing.arrays import FloatArray
+from taichi_soft.meshing.particle_mesh import ParticleMesh
+from taichi_soft.meshing.tet_mesh import TetMesh
+
+KINDS = {"tensile": ((1, 0), (0, 1)), "shear": ((1, 1), (1, -1)), "bend": ((2, 0), (0, 2))}
+"""Springs of a cloth by the steps over its grid that they span."""
+
+
+def rope(length: float, segments: int, mass: float) -> ParticleMesh:
+    """A chain of particles along x, from the origin.
+
+    Args:
+        length: of the whole [m].
+        segments: number of springs.
+        mass: of the whole [kg]; the ends weigh half.
+    """
+    count = as_count(segments, "segments")
+    x = np.linspace(0.0, as_positive(length, "length", "m"), count + 1)
+    weights = np.full(count + 1, as_positive(mass, "mass", "kg") / count)
+    weights[[0, -1]] /= 2
+    numbers = np.arange(count)
+    vertices = np.stack([x, np.zeros_like(x), np.zeros_like(x)], axis=1)
+    return ParticleMesh(vertices, np.stack([numbers, numbers + 1], axis=1), weights)
+
+
+def cloth(
+    size: ArrayLike, cells: tuple[int, int], mass: float, *, springs: tuple[str, ...] = tuple(KINDS)
+) -> ParticleMesh:
+    """A rectangle of cloth in the x-y plane, one corner at the origin.
+
+    Vertex i (cells[1] + 1) + j lies at column i and row j.
+    Args:
+        size: (2,) along x and y [m].
+        cells: meshes along x and y.
+        mass: of the whole [kg], by the area round each particle.
+        springs: of which kinds: "tensile" along the threads, "shear" across the meshes, "bend" over two.
+    Raises: OptionError for a number out of range or an unknown kind.
+    """
+    width, height = as_array(size, "size", (2,), "m")
+    for value in (width, height):
+        as_positive(value, "size", "m")
+    if not isinstance(cells, (tuple, list)) or len(cells) != 2:
+        raise OptionError(f"cells must be two whole numbers, got {cells!r}")
+    nx, ny = (as_count(value, "cells") for value in cells)
+    if isinstance(springs, str) or not set(springs) <= set(KINDS) or not springs:
+        raise OptionError(f"springs must be some of {', '.join(map(repr, KINDS))}, got {springs!r}")
+    i, j = (grid.ravel() for grid in np.meshgrid(np.arange(nx + 1), np.arange(ny + 1), indexing="ij"))
+    vertices = np.stack([i * (width / nx), j * (height / ny), np.zeros(len(i))], axis=1)
+    pairs = []
+    for di, dj in (step for kind in springs for step in KINDS[kind]):
+        fits = (i + di <= nx) & (j + dj <= ny) & (j + dj >= 0)
+        first = np.flatnonzero(fits)
+        pairs.append(np.stack([first, first + di * (ny + 1) + dj], axis=1))
+    share = np.where((i == 0) | (i == nx), 0.5, 1.0) * np.where((j == 0) | (j == ny), 0.5, 1.0)
+    masses = as_positive(mass, "mass", "kg") * share / (nx * ny)
+    corner = np.flatnonzero((i < nx) & (j < ny))
+    a, b, c, d = corner, corner + ny + 1, corner + ny + 2, corner + 1
+    front = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    return ParticleMesh(
+        vertices, np.concatenate(pairs), masses, surface=np.concatenate([front, front[:, ::-1]])
+    )
+
+
+def cloth_constants(mesh: ParticleMesh, cells: tuple[int, int], **values: float) -> FloatArray:
+    """One value for each spring of a `cloth`, (k,), such as its stiffness, by kind.
+
+    Args:
+        mesh: made by `cloth`.
+        cells: as given to it.
+        values: tensile=, shear= and bend=; a kind that the cloth has and that is not given is 0.
+    Raises: OptionError for an unknown kind; MeshError for a mesh of other cells.
+    """
+    unknown = set(values) - set(KINDS)
+    if unknown:
+        raise OptionError(f"unknown spring kind {min(unknown)!r}: choose of {', '.join(map(repr, KINDS))}")
+    rows = cells[1] + 1
+    if len(mesh.vertices) != (cells[0] + 1) * rows:
+        raise MeshError(
+            f"a cloth of {cells} cells has {(cells[0] + 1) * rows} vertices, not {len(mesh.vertices)}"
+        )
+    i, j = np.divmod(mesh.edges, rows)
+    step = np.stack([i[:, 1] - i[:, 0], j[:, 1] - j[:, 0]], axis=1)
+    chosen = np.zeros(len(mesh.edges))
+    for kind, steps in KINDS.items():
+        is_kind = np.any([(step == each).all(axis=1) for each in steps], axis=0)
+        chosen[is_kind] = values.get(kind, 0.0)
+    return chosen
+
+
+def edges_as_particles(mesh: TetMesh, density: float | NDArray[np.float64]) -> ParticleMesh:
+    """The particles and edges of a solid without its tetrahedra, a quarter of whose masses each gets.
+
+    Args:
+        density: [kg/m^3], one number or one per tetrahedron.
+    """
+    if not isinstance(mesh, TetMesh):
+        raise MeshError(f"mesh must be a TetMesh, got {type(mesh).__name__}")
+    masses = np.repeat(mesh.volumes * np.asarray(density, dtype=float) / 4.0, 4)
+    per_vertex = np.bincount(mesh.tets.ravel(), masses, len(mesh.vertices))
+    return ParticleMesh(mesh.vertices, mesh.edges, per_vertex, surface=mesh.surface)

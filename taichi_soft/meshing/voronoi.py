@@ -1,0 +1,286 @@
+"""Voronoi graph of a Delaunay mesh, clipped by the surface of the body (thesis section 4.1)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.errors import MeshError
+from taichi_soft.meshing.arrays import FloatArray
+from taichi_soft.meshing.delaunay import require_delaunay, scipy_spatial
+from taichi_soft.meshing.polygons import Polygons
+from taichi_soft.meshing.tet_mesh import TetMesh
+from taichi_soft.meshing.topology import LOCAL_FACES
+
+Ints = NDArray[np.int64]
+
+NUDGE = 1e-9
+"""By which part of an edge faces are moved at random: in regular meshes they would lie in the sides of
+tetrahedra, and belong to both or to neither."""
+
+SMALLEST_FACE = 1e-7
+"""Area over the square of the edge below which a face is taken for an effect of `NUDGE`."""
+
+
+@dataclass(frozen=True, eq=False)
+class VoronoiGraph:
+    """Faces between the particles of each edge, and the cells round the particles, inside the body.
+
+    Attributes:
+        areas: (k,) of the face of each edge [m^2]; 0 where it is clipped away, or was none.
+        corner_edge: (c,) the edge of each corner, ascending; corners run round the edge's direction i -> j,
+            the first is repeated at the end.
+        corner_tet: (c,) a tetrahedron that holds the corner at rest.
+        corner_weights: (c, 4) where in it: barycentric coordinates.
+        cell_tet, cell_vertex, cell_volume: (s,) what part of a tetrahedron lies nearest to a vertex [m^3].
+    """
+
+    mesh: TetMesh
+    areas: FloatArray
+    corner_edge: Ints
+    corner_tet: Ints
+    corner_weights: FloatArray
+    cell_tet: Ints
+    cell_vertex: Ints
+    cell_volume: FloatArray
+
+    def masses(self, density: FloatArray) -> FloatArray:
+        """Mass of the cell of each particle, (n,) [kg], for a density per tetrahedron (m,) [kg/m^3]."""
+        parts = self.cell_volume * density[self.cell_tet]
+        return np.bincount(self.cell_vertex, parts, len(self.mesh.vertices)).astype(np.float64)
+
+    def corners(self) -> FloatArray:
+        """Where the corners are at rest, (c, 3) [m]."""
+        tets = self.mesh.vertices[self.mesh.tets[self.corner_tet]]
+        return np.asarray(np.einsum("ci,cia->ca", self.corner_weights, tets))
+
+
+def voronoi_graph(mesh: TetMesh) -> VoronoiGraph:
+    """The clipped Voronoi graph. Raises: MeshError if the mesh is not Delaunay; OptionError without scipy."""
+    if not isinstance(mesh, TetMesh):
+        raise MeshError(f"a Voronoi graph needs tetrahedra: pass a TetMesh, got {type(mesh).__name__}")
+    require_delaunay(mesh)
+    neighbours = _Neighbours(mesh)
+    faces = _faces(mesh, neighbours)
+    pieces, face, tet = _split(mesh, faces)
+    size = np.linalg.norm(pieces.area_vectors(), axis=1)
+    real = size > SMALLEST_FACE**2 * neighbours.length[face] ** 2
+    pieces, face, tet, size = pieces[real], face[real], tet[real], size[real]
+    row = neighbours.edge_rows()
+    areas = np.bincount(face, size, len(neighbours.pairs))
+    areas[areas < SMALLEST_FACE * neighbours.length**2] = 0.0
+    edge_areas = np.zeros(len(mesh.edges))
+    edge_areas[row[row >= 0]] = areas[row >= 0]
+    on_edge = (row[face] >= 0) & (areas[face] > 0)
+    corners = _outlines(mesh, pieces[on_edge], row[face[on_edge]], tet[on_edge], edge_areas)
+    cells = _cells(mesh, neighbours, face, tet, size)
+    return VoronoiGraph(mesh, edge_areas, *corners, *cells)
+
+
+class _Neighbours:
+    """Pairs of vertices whose cells may touch, and per vertex its neighbours."""
+
+    def __init__(self, mesh: TetMesh) -> None:
+        self.mesh = mesh
+        found = scipy_spatial().Delaunay(mesh.vertices)
+        if len(found.coplanar):
+            raise MeshError(f"vertex {found.coplanar[0][0]} almost coincides with another: merge them")
+        start, flat = found.vertex_neighbor_vertices
+        count = np.diff(start)
+        owner = np.repeat(np.arange(len(mesh.vertices)), count)
+        width = int(count.max())
+        self.of = np.full((len(mesh.vertices), width), -1)
+        self.of[owner, np.arange(len(flat)) - start[owner]] = flat
+        both = np.stack([owner, flat], axis=1).astype(np.int64)
+        self.pairs = both[both[:, 0] < both[:, 1]]
+        ends = mesh.vertices[self.pairs]
+        self.length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        # Weights, as in a power diagram: cells stay a partition, and faces perpendicular to their edges.
+        scale = NUDGE * float(self.length.min()) ** 2
+        self.weight = np.random.default_rng(0).uniform(-scale, scale, len(mesh.vertices))
+
+        self._power = (mesh.vertices**2).sum(axis=1) - self.weight
+
+    @property
+    def distance(self) -> FloatArray:
+        """Of the face of each pair from its first vertex [m]."""
+        first, second = self.weight[self.pairs].T
+        return np.asarray(0.5 * (self.length + (first - second) / self.length))
+
+    def edge_rows(self) -> Ints:
+        """Row of `mesh.edges` of each pair, -1 where it is no edge of the mesh."""
+        n = len(self.mesh.vertices)
+        keys = self.mesh.edges[:, 0].astype(np.int64) * n + self.mesh.edges[:, 1]
+        wanted = self.pairs[:, 0] * n + self.pairs[:, 1]
+        place = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
+        return np.where(keys[place] == wanted, place, -1)
+
+    def cut_to_cells(self, polygons: Polygons, vertex: Ints, other: Ints) -> None:
+        """Keep of each polygon what is nearest to its `vertex`; planes against `other` are left out."""
+        x = self.mesh.vertices
+        for column in self.of.T:
+            rival = column[vertex]
+            rows = (rival >= 0) & (rival != other)
+            normal = x[rival] - x[vertex]
+            offset = 0.5 * (self._power[rival] - self._power[vertex])
+            polygons.cut(normal, offset, rival, rows)
+
+
+def _faces(mesh: TetMesh, neighbours: _Neighbours) -> Polygons:
+    """The whole Voronoi face of each pair, right-handed about its direction; sides are labelled by vertex."""
+    ends = mesh.vertices[neighbours.pairs]
+    axis = (ends[:, 1] - ends[:, 0]) / neighbours.length[:, None]
+    helper = np.eye(3)[np.abs(axis).argmin(axis=1)]
+    u = np.cross(axis, helper)
+    u /= np.linalg.norm(u, axis=1, keepdims=True)
+    v = np.cross(axis, u)
+    reach = 2.0 * np.linalg.norm(np.ptp(mesh.vertices, axis=0))
+    center = ends[:, 0] + neighbours.distance[:, None] * axis
+    square = np.stack(
+        [center + reach * (a * u + b * v) for a, b in ((1, 1), (-1, 1), (-1, -1), (1, -1))], axis=1
+    )
+    count = np.full(len(square), 4)
+    faces = Polygons(square, np.full((len(square), 4), len(mesh.vertices)), count)
+    neighbours.cut_to_cells(faces, neighbours.pairs[:, 0], neighbours.pairs[:, 1])
+    return faces
+
+
+def _split(mesh: TetMesh, faces: Polygons) -> tuple[Polygons, Ints, Ints]:
+    """Each face cut up by the tetrahedra: the pieces, their faces and their tetrahedra.
+
+    Sides along the k-th face of a tetrahedron are labelled -1 - k.
+    """
+    boxes = mesh.vertices[mesh.tets]
+    low, high = boxes.min(axis=1), boxes.max(axis=1)
+    there = (np.arange(faces.corners.shape[1]) < faces.count[:, None])[..., None]
+    face_low = np.where(there, faces.corners, np.inf).min(axis=1)
+    face_high = np.where(there, faces.corners, -np.inf).max(axis=1)
+    found = []
+    for start in range(0, len(faces.count), 256):
+        rows = slice(start, start + 256)
+        meets = (face_low[rows, None] <= high).all(axis=2) & (face_high[rows, None] >= low).all(axis=2)
+        face, tet = np.nonzero(meets)
+        found.append(np.stack([face + start, tet]))
+    face, tet = np.concatenate(found, axis=1)
+    pieces = faces[face]
+    everywhere = np.ones(len(face), dtype=bool)
+    for k, corners in enumerate(LOCAL_FACES):
+        a, b, c = (boxes[:, i] for i in corners)
+        normal = np.cross(b - a, c - a)
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        pieces.cut(normal[tet], np.einsum("ma,ma->m", normal, a)[tet], -1 - k, everywhere)
+    left = pieces.count > 0
+    return pieces[left], face[left], tet[left]
+
+
+def _outlines(
+    mesh: TetMesh, pieces: Polygons, edge: Ints, tet: Ints, areas: FloatArray
+) -> tuple[Ints, Ints, FloatArray]:
+    """Corners of the faces of all edges: the pieces put together again, without the sides between them."""
+    outer = _is_surface(mesh)
+    order = np.argsort(edge, kind="stable")
+    bounds = np.searchsorted(edge[order], np.arange(len(mesh.edges) + 1))
+    following = np.take_along_axis(pieces.corners, pieces.next_corner()[..., None], axis=1)
+    corner_edge, corner_tet, points = [], [], []
+    for e in np.flatnonzero(areas > 0):
+        sides: dict[tuple[int, int], list[tuple[FloatArray, FloatArray, int]]] = {}
+        for row in order[bounds[e] : bounds[e + 1]]:
+            t = int(tet[row])
+            for i in range(pieces.count[row]):
+                label = int(pieces.labels[row, i])
+                if label < 0 and not outer[t, -1 - label]:
+                    continue
+                # A side of the whole face runs through several tetrahedra, one on the surface through its
+                # own.
+                key = (label, -1) if label >= 0 else (label, t)
+                sides.setdefault(key, []).append((pieces.corners[row, i], following[row, i], t))
+        path = _closed_path(
+            [part for parts in sides.values() for part in _joined(parts, mesh.edge_lengths[e])]
+        )
+        corner_edge += [e] * len(path)
+        corner_tet += [t for _, t in path]
+        points += [x for x, _ in path]
+    tets = np.asarray(corner_tet, dtype=np.int64)
+    corners = mesh.vertices[mesh.tets[tets]]
+    arms = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
+    inner = np.linalg.solve(arms, (np.asarray(points) - corners[:, 0])[:, :, None])[:, :, 0]
+    weights = np.concatenate([1 - inner.sum(axis=1, keepdims=True), inner], axis=1)
+    return np.asarray(corner_edge, dtype=np.int64), tets, weights
+
+
+Side = tuple[FloatArray, FloatArray, int, int]
+
+
+def _joined(parts: list[tuple[FloatArray, FloatArray, int]], scale: float) -> list[Side]:
+    """Stretches of one straight side, each from one tetrahedron to another, end to end where they touch."""
+    direction = max((b - a for a, b, _ in parts), key=lambda d: float(d @ d))
+    parts = sorted(parts, key=lambda part: float(part[0] @ direction))
+    made: list[Side] = []
+    for a, b, t in parts:
+        if made and np.abs(made[-1][1] - a).max() < 1e-6 * scale:
+            made[-1] = (made[-1][0], b, made[-1][2], t)
+        else:
+            made.append((a, b, t, t))
+    return made
+
+
+def _closed_path(sides: list[Side]) -> list[tuple[FloatArray, int]]:
+    """Corners and their tetrahedra along all sides, each loop closed; further loops are reached by a bridge
+    from the first corner of all and left the same way, so that bridges enclose nothing."""
+    waiting = list(sides)
+    path: list[tuple[FloatArray, int]] = []
+    home = (waiting[0][0], waiting[0][2])
+    while waiting:
+        a, b, t, _ = waiting.pop(0)
+        begin = (a, t)
+        path.append(begin)
+        while waiting:
+            gaps = [float(((side[0] - b) ** 2).sum()) for side in waiting]
+            nearest = int(np.argmin(gaps))
+            if gaps[nearest] > float(((begin[0] - b) ** 2).sum()):
+                break
+            a, b, t, _ = waiting.pop(nearest)
+            path.append((a, t))
+        path.append(begin)
+        if begin[0] is not home[0]:
+            path.append(home)
+    return path
+
+
+def _is_surface(mesh: TetMesh) -> NDArray[np.bool_]:
+    """Which faces of each tetrahedron lie on the surface, (m, 4)."""
+    n = len(mesh.vertices)
+
+    def keys(triangles: NDArray[np.int32]) -> Ints:
+        a, b, c = np.sort(triangles, axis=-1).astype(np.int64).T
+        return np.asarray(((a * n + b) * n + c).T, dtype=np.int64)
+
+    return np.isin(keys(mesh.tets[:, LOCAL_FACES]), keys(mesh.surface))
+
+
+def _cells(
+    mesh: TetMesh, neighbours: _Neighbours, face: Ints, tet: Ints, size: FloatArray
+) -> tuple[Ints, Ints, FloatArray]:
+    """Volume of the part of each tetrahedron that is nearest to each vertex.
+
+    A pyramid from the vertex to each piece of the part's boundary, which is made of Voronoi faces and of the
+    tetrahedron's own.
+    """
+    n = len(mesh.vertices)
+    ends = neighbours.pairs[face]
+    keys = np.unique(np.concatenate([tet * n + ends[:, i] for i in (0, 1)]))
+    cell_tet, cell_vertex = np.divmod(keys, n)
+    volume = np.zeros(len(keys))
+    near = neighbours.distance[face]
+    for i, height in enumerate((near, neighbours.length[face] - near)):
+        pyramid = size * height / 3.0
+        volume += np.bincount(np.searchsorted(keys, tet * n + ends[:, i]), pyramid, len(keys))
+    for corners in LOCAL_FACES:
+        triangles = mesh.vertices[mesh.tets[cell_tet][:, corners]]
+        parts = Polygons(triangles.copy(), np.zeros((len(keys), 3), np.int64), np.full(len(keys), 3))
+        neighbours.cut_to_cells(parts, cell_vertex, np.full(len(keys), -1))
+        arm = triangles[:, 0] - mesh.vertices[cell_vertex]
+        volume += np.einsum("sa,sa->s", parts.area_vectors(), arm) / 3.0
+    return cell_tet, cell_vertex, volume

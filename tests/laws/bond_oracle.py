@@ -1,0 +1,207 @@
+"""Forces of the pairwise laws, edge by edge in NumPy float64 straight from thesis chapters 3 to 5.
+
+Of taichi_soft only a mesh's `vertices`, `tets` and `edges` are used, and for CMPM where the corners of its
+Voronoi faces are (tests/meshing/test_voronoi.py proves those).
+"""
+
+from itertools import permutations
+
+import numpy as np
+
+
+def signed_volume(x):
+    """Of one tetrahedron (4, 3)."""
+    return np.linalg.det(x[1:] - x[0]) / 6
+
+
+def unit(v):
+    """`v` of length 1."""
+    return v / np.linalg.norm(v)
+
+
+def tets_round(mesh, p, q):
+    """(tetrahedron, a, b) of all that share edge p-q; a, b turn right-handed about the direction p -> q."""
+    found = []
+    for t, tet in enumerate(mesh.tets.tolist()):
+        if p in tet and q in tet:
+            a, b = (v for v in tet if v not in (p, q))
+            if signed_volume(mesh.vertices[[p, q, a, b]]) < 0:
+                a, b = b, a
+            found.append((t, a, b))
+    return found
+
+
+def quadrilateral(x, p, q, a, b):
+    """Area vector of the subface of edge p-q: centres of the edge, of its two faces, of the tetrahedron."""
+    edge = (x[p] + x[q]) / 2
+    one, other = (x[p] + x[q] + x[a]) / 3, (x[p] + x[q] + x[b]) / 3
+    middle = (x[p] + x[q] + x[a] + x[b]) / 4
+    return (np.cross(one - edge, middle - edge) + np.cross(middle - edge, other - edge)) / 2
+
+
+def edge_area(mesh, p, q):
+    """Area of all subfaces of an edge at rest."""
+    return sum(np.linalg.norm(quadrilateral(mesh.vertices, p, q, a, b)) for _, a, b in tets_round(mesh, p, q))
+
+
+def mean_over(mesh, p, q, values):
+    """Mean of values per tetrahedron round an edge, by the areas of its subfaces."""
+    rows = [
+        (np.linalg.norm(quadrilateral(mesh.vertices, p, q, a, b)), values[t])
+        for t, a, b in tets_round(mesh, p, q)
+    ]
+    return sum(w * v for w, v in rows) / sum(w for w, _ in rows)
+
+
+def spring(mesh, p, q, x, E, nu):
+    """Eq. 5.2, on p."""
+    r, length = x[q] - x[p], np.linalg.norm(mesh.vertices[q] - mesh.vertices[p])
+    stretch = (np.linalg.norm(r) - length) / length
+    return mean_over(mesh, p, q, E) * edge_area(mesh, p, q) * stretch * unit(r)
+
+
+def volume_spring(mesh, p, q, x, E, nu):
+    """Eq. 5.2 and 5.5, the latter with its sign turned, on p."""
+    force = spring(mesh, p, q, x, E, nu)
+    for t, _, _ in tets_round(mesh, p, q):
+        before, now = signed_volume(mesh.vertices[mesh.tets[t]]), signed_volume(x[mesh.tets[t]])
+        growth = (abs(now) - before) / before
+        force = force + E[t] * edge_area(mesh, p, q) * nu[t] * growth * unit(x[q] - x[p])
+    return force
+
+
+def double_spring(r, n, length, tensile, shear):
+    """Eq. 4.1 to 4.4, on p: strain along n and along m, each times its modulus and the area."""
+    m = r - (n @ r) * n
+    force = tensile * (n @ r - length) / length * n
+    if np.linalg.norm(m) > 0:
+        force = force + shear * (unit(m) @ r) / length * unit(m)
+    return force
+
+
+def cmpm(mesh, p, q, x, E, G, face):
+    """Chapter 4; `face` holds the area at rest and the corners as (tetrahedron, barycentric weights)."""
+    area, corners = face
+    points = np.array([w @ x[mesh.tets[t]] for t, w in corners])
+    center = (x[p] + x[q]) / 2
+    turns = sum(
+        np.cross(points[i] - center, points[(i + 1) % len(points)] - center) for i in range(len(points))
+    )
+    length = np.linalg.norm(mesh.vertices[q] - mesh.vertices[p])
+    tensile, shear = (area * mean_over(mesh, p, q, value) for value in (E, G))
+    return double_spring(x[q] - x[p], unit(turns), length, tensile, shear)
+
+
+def carried(mesh, p, q, x, n0):
+    """Where the tetrahedra round an edge carry the direction n0: mean of F n0 by subface areas."""
+    total, weight = 0.0, 0.0
+    for t, a, b in tets_round(mesh, p, q):
+        rest, now = mesh.vertices[mesh.tets[t]], x[mesh.tets[t]]
+        F = (now[1:] - now[0]).T @ np.linalg.inv((rest[1:] - rest[0]).T)
+        share = np.linalg.norm(quadrilateral(mesh.vertices, p, q, a, b))
+        total, weight = total + share * (F @ n0), weight + share
+    return total / weight
+
+
+def against_carried(mesh, p, q, x, E, G, normal):
+    """Eq. 4.8 to 4.10 with the normal that `normal` makes of the positions, at rest and now."""
+    area = edge_area(mesh, p, q)
+    r = carried(mesh, p, q, x, normal(mesh.vertices))
+    tensile, shear = (area * mean_over(mesh, p, q, value) for value in (E, G))
+    return double_spring(r, normal(x), 1.0, tensile, shear)
+
+
+def cmpm2(mesh, p, q, x, E, G):
+    """4.4.1."""
+    ring = tets_round(mesh, p, q)
+    return against_carried(
+        mesh, p, q, x, E, G, lambda y: unit(sum(quadrilateral(y, p, q, a, b) for _, a, b in ring))
+    )
+
+
+def neighbours(mesh, p, q):
+    """Vertices round an edge, in ascending order."""
+    return sorted({v for _, a, b in tets_round(mesh, p, q) for v in (a, b)})
+
+
+def fitted_normal(points, r):
+    """Normal of the plane of least squares, towards r; of three points by the cross product."""
+    if len(points) == 3:
+        n = unit(np.cross(points[1] - points[0], points[2] - points[0]))
+    else:
+        n = np.linalg.svd(points - points.mean(axis=0))[2][2]
+    return n if n @ r >= 0 else -n
+
+
+def best_fitting_plane(mesh, p, q, x, E, G):
+    """4.4.2."""
+    ring = neighbours(mesh, p, q)
+
+    def normal(y):
+        points = y[ring] if len(ring) > 2 else np.vstack([y[ring], (y[p] + y[q]) / 2])
+        return fitted_normal(points, y[q] - y[p])
+
+    return against_carried(mesh, p, q, x, E, G, normal)
+
+
+def tilt_angles(ring, x, p, q):
+    """Angle of each particle over the plane across the edge in their mean height, and its unit arm."""
+    axis = unit(x[q] - x[p])
+    rise = (x[ring] - x[p]) @ axis
+    arms = x[ring] - x[p] - np.outer(rise, axis)
+    distance = np.linalg.norm(arms, axis=1)
+    return np.arctan2(rise - rise.mean(), distance), arms / distance[:, None], axis
+
+
+def represented_angles(arms, axis):
+    """beta of 4.4.3: half the angle to the next particle on either side."""
+    first = arms[0]
+    angles = np.arctan2(np.cross(axis, first) @ arms.T, arms @ first) % (2 * np.pi)
+    order = np.argsort(angles)
+    gaps = np.diff(np.append(angles[order], angles[order][0] + 2 * np.pi))
+    beta = np.empty(len(arms))
+    beta[order] = (gaps + np.roll(gaps, 1)) / 2
+    return beta
+
+
+def rotated(v, axis, angle):
+    """`v` turned about a unit axis by an angle (Rodrigues)."""
+    return v * np.cos(angle) + np.cross(axis, v) * np.sin(angle) + axis * (axis @ v) * (1 - np.cos(angle))
+
+
+def tilted_plane(mesh, p, q, x, E, G, b=2.0):
+    """4.4.3 with c = b beta / 2 pi (eq. 4.12); b = 1/4 as printed, 2 to tilt by all of a shear."""
+    ring = neighbours(mesh, p, q)
+    rest, arms0, axis0 = tilt_angles(ring, mesh.vertices, p, q)
+    c = b * represented_angles(arms0, axis0) / (2 * np.pi)
+    now, arms, axis = tilt_angles(ring, x, p, q)
+    turn = sum(ci * angle * np.cross(arm, axis) for ci, angle, arm in zip(c, now - rest, arms, strict=True))
+    # A particle that rises lifts the plane on its side, so the normal leans away from it.
+    angle = np.linalg.norm(turn)
+    n = rotated(axis, unit(turn), angle) if angle > 0 else axis
+    length = np.linalg.norm(mesh.vertices[q] - mesh.vertices[p])
+    area = edge_area(mesh, p, q)
+    tensile, shear = (area * mean_over(mesh, p, q, value) for value in (E, G))
+    return double_spring(x[q] - x[p], n, length, tensile, shear)
+
+
+def summed(mesh, force_on_first):
+    """Forces on all vertices, (n, 3), from a function (p, q) of each edge."""
+    total = np.zeros_like(mesh.vertices)
+    for p, q in mesh.edges.tolist():
+        force = force_on_first(p, q)
+        total[p] += force
+        total[q] -= force
+    return total
+
+
+def octahedron():
+    """Four tetrahedra round one inner edge, a little out of shape."""
+    points = np.array([[0, 0, -0.6], [0, 0, 0.7], [1, 0.1, 0.1], [0, 1.2, 0], [-0.9, 0, -0.1], [0.1, -1, 0]])
+    return points, [[0, 1, 2, 3], [0, 1, 3, 4], [0, 1, 4, 5], [0, 1, 5, 2]]
+
+
+def shuffled_tets(tets):
+    """Each tetrahedron with its vertices in another of the twelve orders that keep it upright."""
+    even = [order for order in permutations(range(4)) if np.linalg.det(np.eye(4)[list(order)]) > 0]
+    return [[tet[i] for i in even[(5 * t + 3) % 12]] for t, tet in enumerate(tets)]

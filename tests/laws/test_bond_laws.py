@@ -1,0 +1,277 @@
+"""The pairwise laws of thesis chapters 3 to 5: their forces against NumPy, and what they promise."""
+
+import bond_oracle as oracle
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from taichi_soft import LAWS, Material, ParticleMesh, SpringMaterial, TetMesh, box, internal_forces, sphere
+from taichi_soft.errors import MaterialError, MeshError, OptionError
+from taichi_soft.laws import BondLaw
+from taichi_soft.meshing import voronoi_graph
+
+POINTS, TETS = oracle.octahedron()
+MESHES = {
+    "ring": TetMesh(POINTS, oracle.shuffled_tets(TETS)),
+    "box": box((1.0, 0.7, 1.3), (2, 1, 1)),
+    "ball": sphere(0.7, 1),
+}
+BONDS = [law.name for law in LAWS.values() if isinstance(law, BondLaw)]
+DIRECTIONAL = [name for name in BONDS if LAWS[name].takes_shear]
+
+
+def faces_of(mesh):
+    """Area and corners of the Voronoi face of each edge (i, j); None where there is none."""
+    graph = voronoi_graph(mesh)
+    found = {}
+    for e, edge in enumerate(map(tuple, mesh.edges.tolist())):
+        rows = np.flatnonzero(graph.corner_edge == e)
+        corners = [(graph.corner_tet[row], graph.corner_weights[row]) for row in rows]
+        found[edge] = (graph.areas[e], corners) if graph.areas[e] > 0 else None
+    return found
+
+
+FACES = {name: faces_of(mesh) for name, mesh in MESHES.items()}
+
+
+def expected_forces(law, name, x, E, nu, G):
+    mesh, faces = MESHES[name], FACES[name]
+
+    def on_first(p, q):
+        if law == "springs":
+            return oracle.spring(mesh, p, q, x, E, nu)
+        if law == "volume_springs":
+            return oracle.volume_spring(mesh, p, q, x, E, nu)
+        if law == "cmpm":
+            face = faces[p, q]
+            return np.zeros(3) if face is None else oracle.cmpm(mesh, p, q, x, E, G, face)
+        if law == "cmpm2":
+            return oracle.cmpm2(mesh, p, q, x, E, G)
+        if law == "best_fitting_plane":
+            return oracle.best_fitting_plane(mesh, p, q, x, E, G)
+        return oracle.tilted_plane(mesh, p, q, x, E, G, b=0.25 if law.endswith("printed") else 2.0)
+
+    return oracle.summed(mesh, on_first)
+
+
+@pytest.mark.parametrize("law", BONDS)
+@settings(max_examples=8)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    name=st.sampled_from(list(MESHES)),
+    amount=st.sampled_from([0.02, 0.1, 0.25]),
+)
+def test_forces_equal_the_equations_in_numpy(law, seed, name, amount):
+    """Of a body of many materials, deformed at random and turned, to 1e-10 of the largest."""
+    mesh = MESHES[name]
+    rng = np.random.default_rng(seed)
+    count = len(mesh.tets)
+    E, nu, G = rng.uniform(1e5, 1e6, count), rng.uniform(-0.3, 0.45, count), rng.uniform(1e4, 1e6, count)
+    shear = {"shear_modulus": G} if law in DIRECTIONAL else {}
+    bend = np.eye(3) + amount * rng.normal(size=(3, 3))
+    x = mesh.vertices @ bend.T + 0.2 * amount * rng.normal(size=mesh.vertices.shape)
+    found = internal_forces(mesh, Material(E, nu, 1000.0, **shear), x, law=law)
+    expected = expected_forces(law, name, x, E, nu, G)
+    np.testing.assert_allclose(found, expected, atol=1e-10 * np.abs(expected).max(), rtol=0)
+
+
+@pytest.mark.parametrize("law", BONDS)
+@settings(max_examples=6)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_a_body_at_rest_or_moved_as_a_whole_feels_nothing(law, seed):
+    mesh = MESHES["ball"]
+    rng = np.random.default_rng(seed)
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    turn *= np.sign(np.linalg.det(turn))
+    material = Material(1e6, 0.3, 1000.0)
+    for x in (mesh.vertices, mesh.vertices @ turn.T + rng.normal(size=3)):
+        assert np.abs(internal_forces(mesh, material, x, law=law)).max() < 1e-9 * 1e6
+
+
+@pytest.mark.parametrize("law", BONDS)
+def test_forces_sum_to_zero_and_torques_where_they_act_along_the_edges(law):
+    """Springs push along the line between two particles. CMPM and its variants push across it too, which
+    turns the pair: a sheared body feels a torque, here up to a hundredth of the largest force times an edge.
+    """
+    mesh = MESHES["ball"]
+    rng = np.random.default_rng(3)
+    material = Material(1e6, 0.3, 1000.0)
+    torques = []
+    for amount in (0.01, 0.1):
+        x = mesh.vertices @ (np.eye(3) + amount * np.array([[0, 1, 0], [0, 0, 0], [0, 0, 0]])).T
+        x = x + 0.1 * amount * rng.normal(size=x.shape)
+        forces = internal_forces(mesh, material, x, law=law)
+        largest = np.abs(forces).max()
+        assert np.abs(forces.sum(axis=0)).max() < 1e-11 * largest * len(x)
+        torques.append(np.abs(np.cross(x, forces).sum(axis=0)).max() / largest / mesh.edge_lengths.mean())
+    if law in DIRECTIONAL:
+        # Each pair turns by its shear force times its length; over all directions most of that cancels.
+        assert all(1e-5 < torque < 0.02 for torque in torques)
+        assert torques[1] > 2 * torques[0]
+    else:
+        assert max(torques) < 1e-9
+
+
+@pytest.mark.parametrize("law", BONDS)
+@settings(max_examples=6)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_damping_equals_the_equations_in_numpy(law, seed):
+    """Eq. 3.9 along springs; eq. 4.5 along n and m in the others, found from their elastic forces."""
+    mesh = MESHES["ball"]
+    rng = np.random.default_rng(seed)
+    x = mesh.vertices @ (np.eye(3) + 0.1 * rng.normal(size=(3, 3))).T
+    v = rng.normal(size=x.shape)
+    options = {"law": law}
+    if law not in DIRECTIONAL:
+        damped = Material(1e6, 0.3, 1000.0, 7.0)
+        found = internal_forces(mesh, damped, x, v, **options) - internal_forces(mesh, damped, x, **options)
+
+        def along(p, q):
+            n = oracle.unit(x[q] - x[p])
+            return 7.0 * (n @ (v[q] - v[p])) * n
+
+        expected = oracle.summed(mesh, along)
+        np.testing.assert_allclose(found, expected, atol=1e-8 * np.abs(expected).max() + 1e-9, rtol=0)
+        return
+    # b_n = b_m brakes motion in the plane of n and m alike; and power is only ever taken.
+    tensile = Material(1e6, 0.3, 1000.0, 7.0, shear_damping=0.0)
+    both = Material(1e6, 0.3, 1000.0, 7.0, shear_damping=5.0)
+    elastic = internal_forces(mesh, tensile, x, **options)
+    one = internal_forces(mesh, tensile, x, v, **options) - elastic
+    more = internal_forces(mesh, both, x, v, **options) - elastic
+    assert np.abs(one.sum(axis=0)).max() < 1e-8 * np.abs(one).max()
+    assert np.sum(one * v) < 0
+    assert np.sum(more * v) < np.sum(one * v)
+
+
+def test_cmpm_damping_of_one_bond_is_eq_4_5():
+    """Two particles of a sheared body, all others at rest: b_n along n and b_m along m."""
+    mesh, faces = MESHES["ring"], FACES["ring"]
+    x = mesh.vertices @ np.array([[1, 0.2, 0.1], [0, 1, 0.3], [0, 0, 1.1]]).T
+    material = Material(1e6, 0.3, 1000.0, 7.0, shear_damping=3.0)
+    v = np.random.default_rng(0).normal(size=x.shape)
+    found = internal_forces(mesh, material, x, v, law="cmpm") - internal_forces(mesh, material, x, law="cmpm")
+
+    def braked(p, q):
+        if faces[p, q] is None:
+            return np.zeros(3)
+        points = np.array([w @ x[mesh.tets[t]] for t, w in faces[p, q][1]])
+        c = (x[p] + x[q]) / 2
+        n = oracle.unit(
+            sum(np.cross(a - c, b - c) for a, b in zip(points, np.roll(points, -1, 0), strict=True))
+        )
+        r, dv = x[q] - x[p], v[q] - v[p]
+        m = oracle.unit(r - (n @ r) * n)
+        return 7.0 * (n @ dv) * n + 3.0 * (m @ dv) * m
+
+    expected = oracle.summed(mesh, braked)
+    np.testing.assert_allclose(found, expected, atol=1e-7 * np.abs(expected).max(), rtol=0)
+
+
+def test_a_tilted_plane_follows_all_of_a_shear_and_the_printed_one_an_eighth():
+    """Four particles evenly round an edge along z: a shear of z by 0.001 x."""
+    points = np.array([[0, 0, -1.0], [0, 0, 1], [1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]])
+    mesh = TetMesh(points, TETS)
+    alpha = 1e-3
+    x = points.copy()
+    x[:, 2] += alpha * points[:, 0]
+    for law, part in (("tilted_plane", 1.0), ("tilted_plane_printed", 1 / 8)):
+        material = Material(1e6, 0.0, 1000.0, shear_modulus=1e6)
+        area = oracle.edge_area(mesh, 0, 1)
+        # The edge keeps its direction; m = r - (n.r) n is then part * alpha * l long, against x.
+        others = internal_forces(mesh, material, x, law=law)
+        force = others[1][0] - sum(
+            oracle.tilted_plane(mesh, i, 1, x, np.full(4, 1e6), np.full(4, 1e6), b=2.0 * part)[0] * -1
+            for i in range(2, 6)
+        )
+        assert abs(force) == pytest.approx(part * alpha * 1e6 * area, rel=1e-3)
+
+
+def test_a_grown_tetrahedron_is_pulled_together_by_its_volume():
+    """With eq. 5.5 as printed it would be pushed further apart."""
+    mesh = TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]], [[0, 1, 2, 3]])
+    center = mesh.vertices.mean(axis=0)
+    x = center + 1.1 * (mesh.vertices - center)
+    plain = internal_forces(mesh, Material(1e6, 0.0, 1000.0), x, law="volume_springs")
+    firm = internal_forces(mesh, Material(1e6, 0.4, 1000.0), x, law="volume_springs")
+    inward = center - x
+    assert (np.einsum("na,na->n", firm - plain, inward) > 0).all()
+
+
+class TestGivenSprings:
+    MESH = ParticleMesh([[0, 0, 0], [3, 4, 0], [0, 4, 0.0]], [[0, 1], [1, 2]], 1.0)
+
+    def test_each_spring_has_its_own_constants(self):
+        material = SpringMaterial([10.0, 20.0], [1.0, 2.0], [4.0, 3.0])
+        v = np.array([[0, 0, 0], [1, 0, 0], [0, 0, 0.0]])
+        found = internal_forces(self.MESH, material, self.MESH.vertices, v, law="springs")
+        n = np.array([0.6, 0.8, 0.0])
+        first = (10.0 * (5 - 4) + 1.0 * 0.6) * n
+        second = np.array([20.0 * (3 - 3) + 2.0 * 1.0, 0, 0])  # from vertex 1 towards 2 it is -x
+        np.testing.assert_allclose(found[0], first, atol=1e-12)
+        np.testing.assert_allclose(found[1], -first - second, atol=1e-12)
+        np.testing.assert_allclose(found[2], second, atol=1e-12)
+
+    def test_a_bar_of_springs_is_as_stiff_as_its_cross_section(self):
+        material = SpringMaterial.from_young(2e6, 0.01, self.MESH.edge_lengths)
+        assert material.stiffness.tolist() == [2e6 * 0.01 / 5, 2e6 * 0.01 / 3]
+
+    def test_a_spring_of_no_length_left_has_no_force(self):
+        x = self.MESH.vertices.copy()
+        x[1] = x[0]
+        forces = internal_forces(self.MESH, SpringMaterial(10.0), x, law="springs")
+        assert np.isfinite(forces).all()
+        assert forces[0].tolist() == [0, 0, 0]
+
+    @pytest.mark.parametrize(
+        ("arguments", "text"),
+        [
+            ({"stiffness": 0.0}, "stiffness is 0: it must be above 0 N/m"),
+            ({"stiffness": [1.0, -2.0]}, "stiffness of edge 1 is -2"),
+            ({"stiffness": 1.0, "damping": -1}, "damping is -1"),
+            ({"stiffness": 1.0, "rest_length": 0}, "rest_length is 0"),
+            ({"stiffness": "soft"}, "stiffness must be a number or one number per edge"),
+            ({"stiffness": 1.0, "rest_length": np.nan}, "rest_length is nan"),
+        ],
+    )
+    def test_constants_out_of_range_are_refused(self, arguments, text):
+        with pytest.raises(MaterialError, match=text):
+            SpringMaterial(**arguments)
+
+    def test_what_does_not_fit_together_is_refused(self):
+        solid, springs = MESHES["ball"], SpringMaterial(10.0)
+        x = self.MESH.vertices
+        with pytest.raises(MaterialError, match="stiffness has 3 values for a mesh of 2 edges"):
+            internal_forces(self.MESH, SpringMaterial([1.0, 2, 3]), x, law="springs")
+        with pytest.raises(MeshError, match="law 'virial' needs tetrahedra: pass a TetMesh"):
+            internal_forces(self.MESH, springs, x)
+        with pytest.raises(MeshError, match=r"law 'springs' needs tetrahedra.*SpringMaterial"):
+            internal_forces(self.MESH, Material(1e6, 0.3, 1000.0), x, law="springs")
+        with pytest.raises(MaterialError, match="law 'cmpm' needs a Material, got SpringMaterial"):
+            internal_forces(solid, springs, solid.vertices, law="cmpm")
+        with pytest.raises(MaterialError, match="tells no density"):
+            internal_forces(solid, springs, solid.vertices, law="springs")
+
+
+def test_shear_constants_are_refused_by_laws_without_them():
+    mesh = MESHES["ball"]
+    for law in ("virial", "springs", "neo_hookean"):
+        with pytest.raises(MaterialError, match=f"law '{law}' takes no shear_modulus"):
+            internal_forces(mesh, Material(1e6, 0.3, 1e3, shear_modulus=1e5), mesh.vertices, law=law)
+
+
+@pytest.mark.parametrize(
+    ("option", "value"), [("strain", "linear"), ("flips", "recover"), ("damping_model", "tet_mean")]
+)
+def test_options_of_tetrahedral_laws_are_refused(option, value):
+    with pytest.raises(OptionError, match=f"law 'springs' has no {option}='{value}'"):
+        internal_forces(
+            MESHES["ball"], Material(1e6, 0.3, 1e3), MESHES["ball"].vertices, law="springs", **{option: value}
+        )
+
+
+def test_cmpm_refuses_a_mesh_that_is_not_delaunay():
+    flat = TetMesh([[0, 0, 0], [4, 0, 0], [2, 3, 0], [2, 1, 0.4], [2, 1, -0.4]], [[0, 1, 2, 3], [0, 2, 1, 4]])
+    with pytest.raises(MeshError, match=r"not Delaunay: vertex . lies inside .* delaunay_mesh"):
+        internal_forces(flat, Material(1e6, 0.3, 1e3), flat.vertices, law="cmpm")
