@@ -13,7 +13,7 @@ from taichi_soft.errors import (
     UnstableStepWarning,
     VideoError,
 )
-from taichi_soft.forces import internal_forces
+from taichi_soft.forces import force_gradient, internal_forces
 from taichi_soft.laws import LAWS, element_model
 from taichi_soft.materials import PRESETS, Material, SpringMaterial, preset
 from taichi_soft.meshing import (
@@ -76,6 +76,7 @@ __all__ = [
     "edges_as_particles",
     "element_model",
     "extrude",
+    "force_gradient",
     "init",
     "internal_forces",
     "load_mesh",

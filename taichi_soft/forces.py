@@ -11,6 +11,12 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 from taichi_soft.constants import POSITION_LIMIT
 from taichi_soft.errors import MeshError, OptionError
 from taichi_soft.kernels.evaluate import compute_body_forces
+from taichi_soft.kernels.gradients import (
+    compute_bond_stiffness,
+    compute_system_stiffness,
+    compute_tet_stiffness,
+    compute_volume_pull,
+)
 from taichi_soft.kernels.program import Program
 from taichi_soft.kernels.readout import write_motion
 from taichi_soft.laws import ElementModel, element_model, require_body
@@ -21,6 +27,8 @@ from taichi_soft.runtime import init
 from taichi_soft.scene import BodyDescription, Scene, arrange
 from taichi_soft.state import Capacity, acquire, release
 from taichi_soft.types import DampingModel, Flips, Integrator, Strain
+
+Floats = NDArray[np.float64]
 
 
 def internal_forces(
@@ -56,10 +64,40 @@ def internal_forces(
     return _still_body(mesh, material, model, double=real == np.float64).forces(x, v)
 
 
+def force_gradient(
+    mesh: BodyMesh,
+    material: Material | SpringMaterial,
+    positions: ArrayLike,
+    *,
+    law: str = "virial",
+    strain: str | Strain | None = None,
+    flips: str | Flips | None = None,
+    projected: bool = False,
+) -> NDArray[np.float64]:
+    """How the elastic forces on a deformed mesh change as its vertices move, in float64.
+
+    Laws of chapter 4 hold the normals of their planes (thesis 4.2); "cmpm2" and "best_fitting_plane", which
+    compare directions, take for an edge the matrix that "cmpm" would have with the same normal.
+    Args:
+        mesh, material, positions, law, strain, flips: as in `internal_forces`.
+        projected: as the system of implicit Euler has it, symmetric and negative semi-definite.
+    Returns: df/dx, (n, 3, n, 3) [N/m], all of it: for meshes of some hundred vertices.
+    Raises: as `internal_forces`.
+    """
+    model = element_model(law, strain, flips)
+    require_body(mesh, material, model)
+    x = _rows(positions, mesh, "positions", np.dtype(np.float64))
+    if not isinstance(projected, bool):
+        raise OptionError(f"projected must be True or False, got {projected!r}")
+    still = StillBody(BodyDescription.at_rest(mesh, material, model), double=True, implicit=True)
+    still.forces(x, np.zeros_like(x))
+    return -(still.system_stiffness() if projected else still.exact_stiffness())
+
+
 class StillBody:
     """One body in fields of its own: what a world computes with, without its motion."""
 
-    def __init__(self, body: BodyDescription, *, double: bool) -> None:
+    def __init__(self, body: BodyDescription, *, double: bool, implicit: bool = False) -> None:
         """Put it into fields of float64 (`double`) or float32. Starts Taichi if nobody has."""
         init()
         self.body = body
@@ -67,7 +105,7 @@ class StillBody:
         self._program = Program((body.model,), Integrator.LEAPFROG, has_floor=False, worker_count=1)
         scene = Scene()
         scene.append(self._rows)
-        self._state = acquire(Capacity.of(scene, double=double))
+        self._state = acquire(Capacity.of(scene, double=double, implicit=implicit))
         weakref.finalize(self, release, self._state)
         self._state.load(scene, [0])
 
@@ -77,6 +115,49 @@ class StillBody:
         rows = np.empty_like(positions)
         compute_body_forces(self._state, self._program, 0, rows)
         return np.asarray(rows[self._rows.rank])
+
+    def exact_stiffness(self) -> Floats:
+        """-df/dx where the forces were asked for last, (n, 3, n, 3) [N/m], in the mesh's order."""
+        n, body = len(self._rows.mass), self._rows
+        total = np.zeros((n, n, 3, 3))
+        if not self.body.model.has_bonds:
+            elements = np.zeros((len(body.tet_vertices), 12, 12))
+            compute_tet_stiffness(self._state, self.body.model, elements)
+            _add_blocks(total, body.tet_vertices, elements)
+            return self._in_mesh_order(total)
+        bonds = np.zeros((len(body.edge_vertices), 3, 3))
+        compute_bond_stiffness(self._state, self.body.model.law, bonds)
+        _add_blocks(total, body.edge_vertices, np.block([[bonds, -bonds], [-bonds, bonds]]))
+        if self.body.model.reads_expansion:
+            gradients, pulls = (np.zeros((len(body.tet_vertices), 4, 3)) for _ in range(2))
+            compute_volume_pull(self._state, gradients, pulls)
+            outer = pulls.reshape(-1, 12, 1) * gradients.reshape(-1, 1, 12)
+            _add_blocks(total, body.tet_vertices, outer)
+        return self._in_mesh_order(total)
+
+    def system_stiffness(self) -> Floats:
+        """The same as implicit Euler's system has it: projected, in blocks of particles and edges."""
+        n, (p, q) = len(self._rows.mass), self._rows.edge_vertices.T
+        compute_system_stiffness(self._state, self._program)
+        total = np.zeros((n, n, 3, 3))
+        total[np.arange(n), np.arange(n)] = self._state.particle_block.to_numpy()[:n]
+        blocks = self._state.edge_block.to_numpy()[: len(p)]
+        total[p, q] = blocks
+        total[q, p] = np.swapaxes(blocks, 1, 2)
+        return self._in_mesh_order(total)
+
+    def _in_mesh_order(self, total: Floats) -> Floats:
+        rank = self._rows.rank
+        return np.asarray(total[rank][:, rank].transpose(0, 2, 1, 3))
+
+
+def _add_blocks(total: Floats, owners: NDArray[np.int32], elements: Floats) -> None:
+    """Add elements (m, 3 c, 3 c) to the blocks (n, n, 3, 3) of their c owners (m, c)."""
+    corners = owners.shape[1]
+    blocks = elements.reshape(-1, corners, 3, corners, 3)
+    for i in range(corners):
+        for j in range(corners):
+            np.add.at(total, (owners[:, i], owners[:, j]), blocks[:, i, :, j])
 
 
 _last: dict[bool, StillBody] = {}

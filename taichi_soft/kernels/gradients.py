@@ -1,0 +1,63 @@
+"""Stiffness of a body where it is, element by element or as the blocks that conjugate gradients see."""
+
+from taichi_soft.constants import LANES
+from taichi_soft.kernels.elastic import particles_of, rest_inverse_of
+from taichi_soft.kernels.linear_system import add_stiffness, bond_stiffness, clear_system, volume_pull
+from taichi_soft.laws.stiffness import element_stiffness, stiffness_block
+from taichi_soft.runtime import ti
+
+
+@ti.kernel
+def compute_tet_stiffness(state: ti.template(), model: ti.template(), out: ti.types.ndarray(ndim=3)):
+    """- d f_i / d x_j of every tetrahedron of the first body, exact, (m, 12, 12) [N/m]."""
+    ti.loop_config(serialize=True)
+    for t in range(out.shape[0]):
+        block, lane = t // LANES, t % LANES
+        v = particles_of(state, block, lane)
+        U, g, M, alpha, beta = element_stiffness(
+            model,
+            state.particle_position[v[0]],
+            state.particle_position[v[1]],
+            state.particle_position[v[2]],
+            state.particle_position[v[3]],
+            rest_inverse_of(state, block, lane),
+            state.tet_lame[block * 2 * LANES + lane],
+            state.tet_lame[(block * 2 + 1) * LANES + lane],
+            False,
+        )
+        for i, j in ti.static(ti.ndrange(4, 4)):
+            columns = stiffness_block(U, g[i], g[j], M, alpha, beta)
+            for a, b in ti.static(ti.ndrange(3, 3)):
+                out[t, 3 * i + a, 3 * j + b] = columns[b][a]
+
+
+@ti.kernel
+def compute_bond_stiffness(state: ti.template(), law: ti.template(), out: ti.types.ndarray(ndim=3)):
+    """- d f_p / d p of every edge of the first body with its normal held, exact, (k, 3, 3) [N/m]."""
+    ti.loop_config(serialize=True)
+    for e in range(out.shape[0]):
+        columns = bond_stiffness(state, law, e, False)
+        for a, b in ti.static(ti.ndrange(3, 3)):
+            out[e, a, b] = columns[b][a]
+
+
+@ti.kernel
+def compute_volume_pull(
+    state: ti.template(), gradients: ti.types.ndarray(ndim=3), pulls: ti.types.ndarray(ndim=3)
+):
+    """`volume_pull` of every tetrahedron of the first body, (m, 4, 3) each."""
+    ti.loop_config(serialize=True)
+    for t in range(gradients.shape[0]):
+        g, w = volume_pull(state, t)
+        for i, a in ti.static(ti.ndrange(4, 3)):
+            gradients[t, i, a] = g[i][a]
+            pulls[t, i, a] = w[i][a]
+
+
+@ti.kernel
+def compute_system_stiffness(state: ti.template(), program: ti.template()):
+    """Fill the blocks of the first body with its projected stiffness alone."""
+    ti.loop_config(serialize=True)
+    for _ in range(1):
+        clear_system(state, 0)
+        add_stiffness(state, program, 0, ti.cast(1.0, state.real))

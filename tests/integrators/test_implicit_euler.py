@@ -1,0 +1,278 @@
+"""Implicit Euler: its solve against NumPy, rest shapes as by leapfrog, steps that leapfrog cannot take."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+from taichi_soft import (
+    LAWS,
+    Material,
+    OptionError,
+    ParticleMesh,
+    SolverWarning,
+    SpringMaterial,
+    World,
+    box,
+    cloth,
+    cloth_constants,
+    force_gradient,
+    internal_forces,
+    rope,
+    sphere,
+)
+
+
+def make_world(mesh, material, *, floor=None, integrator="implicit_euler", **options):
+    world = World(floor=floor, integrator=integrator, **options.pop("world", {}))
+    body = world.add_body(mesh, material, **options)
+    world.build()
+    return world, body
+
+
+def test_a_step_of_springs_solves_eq_3_26_with_the_outer_products():
+    """Matrices written here in NumPy float64, springs pressed and stretched, one particle pinned."""
+    points = np.array([[0, 0, 0], [1, 0, 0], [0.2, 0.9, 0.1], [0.3, 0.2, 1.0]])
+    mesh = ParticleMesh(points, [[0, 1], [1, 2], [2, 3], [0, 3], [0, 2]], [1.0, 2.0, 0.5, 1.5])
+    k, b = np.array([10.0, 200, 30, 400, 50]), np.array([0.1, 0.5, 0.2, 0.3, 0.0])
+    rest = mesh.edge_lengths * np.array([0.8, 1.1, 0.9, 1.2, 1.0])
+    v = np.random.default_rng(0).normal(size=points.shape)
+    world, body = make_world(
+        mesh, SpringMaterial(k, b, rest), law="springs", pinned=[1], world={"tolerance": 1e-6}
+    )
+    v[1] = 0
+    body.set_motion(points, v)
+    h = 0.05
+    world.step(h)
+
+    K, D, f = np.zeros((12, 12)), np.zeros((12, 12)), mesh.masses[:, None] * np.array([0, 0, -9.81])
+    for e, (p, q) in enumerate(mesh.edges):
+        r = points[q] - points[p]
+        length = np.linalg.norm(r)
+        n = r / length
+        f[p] += (k[e] * (length - rest[e]) + b[e] * n @ (v[q] - v[p])) * n
+        f[q] -= (k[e] * (length - rest[e]) + b[e] * n @ (v[q] - v[p])) * n
+        nn = np.outer(n, n)
+        stiff = k[e] * (nn + max(0.0, 1 - rest[e] / length) * (np.eye(3) - nn))
+        for matrix, block in ((K, stiff), (D, b[e] * nn)):
+            for i, j, sign in ((p, p, 1), (q, q, 1), (p, q, -1), (q, p, -1)):
+                matrix[3 * i : 3 * i + 3, 3 * j : 3 * j + 3] += sign * block
+    A = np.diag(np.repeat(mesh.masses, 3)) + h * D + h * h * K
+    rhs = h * (f.ravel() - h * K @ v.ravel())
+    free = np.repeat(np.arange(4) != 1, 3)
+    change = np.zeros(12)
+    change[free] = np.linalg.solve(A[np.ix_(free, free)], rhs[free])
+    expected = v + change.reshape(-1, 3)
+    np.testing.assert_allclose(body.velocities(), expected, atol=2e-5)
+    np.testing.assert_allclose(body.positions(), points + h * expected, atol=2e-6)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_a_step_of_every_law_solves_with_its_projected_gradient(law):
+    """Without damping, so that the matrix is M + h^2 K and nothing else."""
+    mesh = sphere(0.7, 1)
+    material = Material(1e5, 0.3, 1000.0)
+    world, body = make_world(mesh, material, law=law, world={"tolerance": 1e-6})
+    rng = np.random.default_rng(1)
+    x = (mesh.vertices + 0.03 * rng.normal(size=mesh.vertices.shape)).astype(np.float32).astype(float)
+    v = rng.normal(size=x.shape).astype(np.float32).astype(float)
+    body.set_motion(x, v)
+    h = 0.02
+    world.step(h)
+    n = x.size
+    K = -force_gradient(mesh, material, x, law=law, projected=True).reshape(n, n)
+    f = internal_forces(mesh, material, x, law=law) + body.masses[:, None] * np.array([0, 0, -9.81])
+    A = np.diag(np.repeat(body.masses, 3)) + h * h * K
+    change = np.linalg.solve(A, h * (f.ravel() - h * K @ v.ravel())).reshape(-1, 3)
+    np.testing.assert_allclose(body.velocities(), v + change, atol=2e-3 * np.abs(change).max())
+
+
+def test_a_pinned_cloth_hangs_in_the_same_shape_as_by_leapfrog():
+    cells = (8, 8)
+    down = [[0, 0, 1], [0, 1, 0], [-1, 0, 0]]  # or it would swing about its pins, which nothing damps
+    mesh = cloth((1.0, 1.0), cells, 0.3)
+    stiffness = cloth_constants(mesh, cells, tensile=200.0, shear=100.0, bend=5.0)
+    material = SpringMaterial(stiffness, 0.3)
+    shapes = {}
+    for integrator, dt, steps in (("leapfrog", 1 / 120, 4000), ("implicit_euler", 1 / 30, 1500)):
+        world, body = make_world(
+            mesh,
+            material,
+            integrator=integrator,
+            law="springs",
+            pinned=[0, 8],
+            position=(0, 0, 2),
+            rotation=down,
+        )
+        for _ in range(steps):
+            world.step(dt)
+        assert np.abs(body.velocities()).max() < 1e-3
+        shapes[integrator] = body.positions()
+    np.testing.assert_allclose(shapes["implicit_euler"], shapes["leapfrog"], atol=1e-3)
+    assert shapes["leapfrog"][:, 2].min() < 1.2  # it does hang down
+
+
+@pytest.mark.parametrize("law", ["virial", "neo_hookean", "springs", "volume_springs", "cmpm", "cmpm2"])
+def test_a_hanging_bar_hangs_in_the_same_shape_as_by_leapfrog(law):
+    mesh = box((0.3, 0.3, 1.2), (1, 1, 4))
+    top = np.flatnonzero(mesh.vertices[:, 2] > mesh.bounds[1, 2] - 1e-6)
+    material = Material(2e5, 0.2, 1000.0, 100.0)
+    shapes = {}
+    for integrator, dt, steps in (("leapfrog", 1 / 100, 1500), ("implicit_euler", 1 / 50, 700)):
+        world, body = make_world(
+            mesh, material, integrator=integrator, law=law, pinned=top, position=(0, 0, 3)
+        )
+        for _ in range(steps):
+            world.step(dt)
+        assert np.abs(body.velocities()).max() < 2e-3
+        shapes[integrator] = body.positions()
+    np.testing.assert_allclose(shapes["implicit_euler"], shapes["leapfrog"], atol=1.2e-3)
+    sag = mesh.vertices[:, 2].min() + 3 - shapes["leapfrog"][:, 2].min()
+    assert sag > 0.01
+
+
+def test_a_stiff_bar_takes_one_implicit_step_a_frame_and_settles():
+    """E = 100 MPa at 60 Hz, where leapfrog would need hundreds of substeps."""
+    mesh = box((1.5, 0.3, 0.3), (6, 2, 2))
+    material = Material(1e8, 0.3, 1000.0, 100.0)
+    world, body = make_world(mesh, material, floor=0.0, position=(0, 0, 1.0))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SolverWarning)
+        for _ in range(300):
+            world.step(1 / 60)
+            assert np.isfinite(body.positions()).all()
+    assert not body.is_frozen
+    assert np.abs(body.velocities()).max() < 0.02
+    assert body.positions()[:, 2].min() == pytest.approx(0.0, abs=1e-4)
+    assert np.ptp(body.positions()[:, 2]) == pytest.approx(0.3, rel=1e-3)
+    explicit, _ = make_world(mesh, material, integrator="leapfrog")
+    assert explicit.stable_substeps(1 / 60) > 50
+
+
+def test_a_body_at_rest_is_carried_by_the_floor():
+    """The floor's push is part of the solve: a block pressed by its own weight only, as by leapfrog."""
+    mesh = box((0.5, 0.5, 0.5), (3, 3, 3))
+    height = {}
+    for integrator, dt in (("leapfrog", 1 / 120), ("implicit_euler", 1 / 60)):
+        world, body = make_world(
+            mesh,
+            Material(1e5, 0.3, 1000.0, 50.0),
+            floor=0.0,
+            integrator=integrator,
+            position=(0, 0, 0.26),
+            world={"friction": 0.0},
+        )
+        for _ in range(900):
+            world.step(dt)
+        assert body.positions()[:, 2].min() == pytest.approx(0.0, abs=1e-6)
+        height[integrator] = body.positions()[:, 2].max()
+    assert height["implicit_euler"] == pytest.approx(height["leapfrog"], abs=5e-4)
+    # Squeezed by half of rho g H^2 / E on the whole.
+    assert height["leapfrog"] == pytest.approx(0.5 - 1000 * 9.81 * 0.5**2 / 2 / 1e5, abs=2e-3)
+
+
+def test_friction_stops_a_sliding_box_after_the_distance_of_coulombs_law():
+    mesh = box((0.5, 0.5, 0.2), (2, 2, 1))
+    world, body = make_world(
+        mesh,
+        Material(1e6, 0.2, 1000.0, 50.0),
+        floor=0.0,
+        position=(0, 0, 0.1),
+        velocity=(2.0, 0, 0),
+        world={"friction": 0.4},
+    )
+    start = body.center_of_mass()[0]
+    for _ in range(300):
+        world.step(1 / 120)
+    expected = 2.0**2 / (2 * 0.4 * 9.81)
+    assert body.center_of_mass()[0] - start == pytest.approx(expected, rel=0.05)
+    assert np.abs(body.velocities()).max() < 0.01
+
+
+def test_momentum_is_kept_in_flight_and_ringing_fades():
+    """By the system as well as by the forces; and implicit Euler takes energy where nothing damps."""
+    mesh = sphere(0.5, 2)
+    world, body = make_world(
+        mesh, Material(1e5, 0.3, 1000.0), world={"gravity": (0, 0, 0), "tolerance": 1e-5}
+    )
+    rng = np.random.default_rng(0)
+    v = rng.normal(size=mesh.vertices.shape)
+    body.set_motion(mesh.vertices, v)
+    before, energy = body.momentum(), body.kinetic_energy()
+    for _ in range(100):
+        world.step(0.01)
+    np.testing.assert_allclose(body.momentum(), before, atol=1e-3 * np.abs(before).max())
+    speed = before / body.masses.sum()
+    drift = 0.5 * body.masses.sum() * speed @ speed
+    assert body.kinetic_energy() - drift < 0.5 * (energy - drift)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_the_same_input_gives_the_same_bits(law):
+    rows = []
+    for _ in range(2):
+        world = World(integrator="implicit_euler")
+        for i in range(2):
+            world.add_body(
+                sphere(0.5, 1), Material(1e5, 0.3, 1000.0, 5.0), law=law, position=(2.0 * i, 0, 0.7)
+            )
+        world.build()
+        for _ in range(30):
+            world.step(1 / 60)
+        rows.append(np.concatenate([body.positions() for body in world.bodies]).tobytes())
+    assert rows[0] == rows[1]
+
+
+def test_a_solve_that_stops_early_is_reported_with_its_residual_and_stays_finite():
+    world, body = make_world(
+        box((1, 1, 1), (4, 4, 4)),
+        Material(1e8, 0.45, 1000.0),
+        floor=0.0,
+        position=(0, 0, 0.6),
+        world={"most_iterations": 2},
+    )
+
+    def fall():
+        for _ in range(40):
+            world.step(1 / 60)
+
+    with pytest.warns(SolverWarning, match=r"body 0 stopped at 2 iterations with a residual of \d+.*0\.001"):
+        fall()
+    assert np.isfinite(body.positions()).all()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        world.step(1 / 60)  # said once
+
+
+def test_a_rope_of_one_spring_falls_into_line_without_substeps():
+    mesh = rope(2.0, 10, 0.5)
+    world, body = make_world(mesh, SpringMaterial(1e5, 1.0), law="springs", pinned=[0], position=(0, 0, 5))
+    for _ in range(900):
+        world.step(1 / 60)
+    x = body.positions()
+    np.testing.assert_allclose(x[0], (0, 0, 5), atol=0)
+    assert x[-1, 2] == pytest.approx(3.0, abs=0.01)
+    assert np.abs(x[:, 0]).max() < 0.1
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({"schedule": "flat"}, "schedule 'flat' has no implicit_euler"),
+        ({"tolerance": 0}, "tolerance must be a number from 1e-06 to 0.5, got 0"),
+        ({"tolerance": 1.0}, "tolerance"),
+        ({"tolerance": "fine"}, "tolerance"),
+        ({"most_iterations": 0}, "most_iterations must be a whole number from 1"),
+        ({"most_iterations": 1.5}, "most_iterations"),
+    ],
+)
+def test_options_out_of_range_are_refused(options, text):
+    with pytest.raises(OptionError, match=text):
+        World(integrator="implicit_euler", **options)
+
+
+def test_one_step_a_frame_is_what_it_needs():
+    world, body = make_world(sphere(0.5, 1), Material(1e9, 0.3, 1000.0))
+    assert world.stable_substeps(1 / 30) == 1
+    world.step(1 / 30)  # warns of nothing
+    assert np.isfinite(body.positions()).all()

@@ -1,0 +1,172 @@
+"""How forces change: exact gradients against differences of the forces, and what conjugate gradients see."""
+
+import bond_oracle as bonds
+import numpy as np
+import pytest
+from force_oracle import MESHES
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from taichi_soft import (
+    LAWS,
+    Material,
+    MeshError,
+    OptionError,
+    ParticleMesh,
+    SpringMaterial,
+    force_gradient,
+    internal_forces,
+    sphere,
+)
+
+SOLID = [
+    (law.name, strain.value if strain else None, flips.value)
+    for law in LAWS.values()
+    if law.flips
+    for strain in (law.strains or (None,))
+    for flips in law.flips
+]
+SOLID_IDS = ["-".join(filter(None, mode)) for mode in SOLID]
+PAIRWISE = ["springs", "volume_springs"]
+FROZEN = ["cmpm", "tilted_plane", "tilted_plane_printed"]
+COMPARED = ["cmpm2", "best_fitting_plane"]
+MATERIAL = Material(1e6, 0.3, 1000.0)
+BALL = sphere(0.7, 1)
+
+
+def differences(mesh, material, x, h, **options):
+    """df/dx by central differences of fourth order, (n, 3, n, 3)."""
+    found = np.zeros((*x.shape, *x.shape))
+    for i in np.ndindex(x.shape):
+        for step, weight in ((1, 2 / 3), (-1, -2 / 3), (2, -1 / 12), (-2, 1 / 12)):
+            moved = x.copy()
+            moved[i] += step * h
+            found[(..., *i)] += weight / h * internal_forces(mesh, material, moved, **options)
+    return found
+
+
+def deformed(mesh, rng, amount):
+    bend = np.eye(3) + amount * rng.normal(size=(3, 3))
+    return mesh.vertices @ bend.T + 0.1 * amount * rng.normal(size=mesh.vertices.shape)
+
+
+@pytest.mark.parametrize(("law", "strain", "flips"), SOLID, ids=SOLID_IDS)
+@settings(max_examples=4)
+@given(seed=st.integers(0, 2**32 - 1), mirrored=st.booleans())
+def test_exact_gradients_of_tetrahedral_laws_equal_differences(law, strain, flips, seed, mirrored):
+    """Of upright tetrahedra and of ones inside out, each deformed by its own."""
+    mesh = MESHES["tet"]
+    rng = np.random.default_rng(seed)
+    x = deformed(mesh, rng, 0.2)
+    if mirrored:
+        x = x * (1, 1, -1)
+    options = {"law": law, "strain": strain, "flips": flips}
+    exact = force_gradient(mesh, MATERIAL, x, **options)
+    expected = differences(mesh, MATERIAL, x, 1e-4, **options)
+    np.testing.assert_allclose(exact, expected, atol=2e-6 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("law", ["virial", "st_venant_kirchhoff", "neo_hookean", *PAIRWISE])
+def test_exact_gradients_of_whole_bodies_equal_differences(law):
+    rng = np.random.default_rng(5)
+    count = len(BALL.tets)
+    material = Material(rng.uniform(1e5, 1e6, count), rng.uniform(0, 0.4, count), 1000.0)
+    x = deformed(BALL, rng, 0.15)
+    exact = force_gradient(BALL, material, x, law=law)
+    expected = differences(BALL, material, x, 1e-4, law=law)
+    np.testing.assert_allclose(exact, expected, atol=1e-6 * np.abs(expected).max())
+
+
+def test_gradients_of_given_springs_equal_differences_also_where_pressed():
+    mesh = ParticleMesh(
+        [[0, 0, 0], [1, 0, 0], [0.2, 0.9, 0.1], [0.3, 0.2, 1]], [[0, 1], [1, 2], [2, 3], [0, 3]], 1.0
+    )
+    material = SpringMaterial([10.0, 20, 30, 40], rest_length=[2.0, 1, 0.5, 1.5])
+    exact = force_gradient(mesh, material, mesh.vertices, law="springs")
+    expected = differences(mesh, material, mesh.vertices, 1e-3, law="springs")
+    np.testing.assert_allclose(exact, expected, atol=1e-8 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("law", FROZEN)
+def test_gradients_with_normals_held_equal_differences_of_eq_4_4(law):
+    """The block of one edge: its axes are n and what lies across; differences of eq. 4.4 along them."""
+    mesh = MESHES["tet"]
+    x = deformed(mesh, np.random.default_rng(1), 0.2)
+    p, q = 0, 1
+    exact = force_gradient(mesh, MATERIAL, x, law=law)
+    block = exact[p, :, q]  # d f_p / d q = a/l (E n n^T + G (I - n n^T))
+    values, axes = np.linalg.eigh(block)
+    shear, tensile = values[0], values[2]
+    assert values[1] == pytest.approx(shear, rel=1e-9)
+    assert tensile / shear == pytest.approx(1e6 / (1e6 / 2.6), rel=1e-9)
+    n = axes[:, 2] * np.sign(axes[:, 2] @ (x[q] - x[p]))
+    length = np.linalg.norm(mesh.vertices[q] - mesh.vertices[p])
+    r, h = x[q] - x[p], 1e-6
+    for axis in np.eye(3):
+        ahead, behind = (
+            bonds.double_spring(r + s * h * axis, n, length, tensile * length, shear * length)
+            for s in (1, -1)
+        )
+        np.testing.assert_allclose(block @ axis, (ahead - behind) / (2 * h), atol=1e-6 * tensile)
+
+
+@pytest.mark.parametrize("law", COMPARED)
+def test_laws_that_compare_directions_take_the_matrix_of_cmpm_for_an_edge(law):
+    mesh = MESHES["tet"]
+    x = deformed(mesh, np.random.default_rng(1), 0.1)
+    block = force_gradient(mesh, MATERIAL, x, law=law)[0, :, 1]
+    values = np.linalg.eigvalsh(block) * np.linalg.norm(x[1] - x[0]) / bonds.edge_area(mesh, 0, 1)
+    np.testing.assert_allclose(values, [1e6 / 2.6, 1e6 / 2.6, 1e6], rtol=1e-9)
+
+
+POSES = {
+    "at rest": lambda x, rng: x,
+    "pressed to half": lambda x, rng: x * (1, 1, 0.5),
+    "shaken": lambda x, rng: x + 0.1 * rng.normal(size=x.shape),
+    "inside out": lambda x, rng: x * (1, 1, -1) + 0.05 * rng.normal(size=x.shape),
+    "flat": lambda x, rng: x * (1, 1, 0),
+    "scrambled": lambda x, rng: rng.normal(size=x.shape),
+    "a point": lambda x, rng: x * 0,
+}
+
+
+@pytest.mark.parametrize("pose", POSES)
+@pytest.mark.parametrize("mode", [*SOLID, *((name, None, None) for name in [*PAIRWISE, *FROZEN, *COMPARED])])
+def test_the_projected_system_is_symmetric_and_never_negative(mode, pose):
+    """So that masses make it positive definite. At rest it is the exact gradient."""
+    law, strain, flips = mode
+    options = {"law": law, "strain": strain, "flips": flips}
+    x = POSES[pose](BALL.vertices, np.random.default_rng(2))
+    size = x.size
+    K = -force_gradient(BALL, MATERIAL, x, **options, projected=True).reshape(size, size)
+    assert np.isfinite(K).all()
+    np.testing.assert_allclose(K, K.T, atol=1e-10 * np.abs(K).max())
+    values = np.linalg.eigvalsh(K)
+    assert values[0] > -1e-9 * values[-1] - 1e-9
+    assert values[-1] > 0 or pose == "a point"
+    if pose == "at rest" and law != "volume_springs":
+        exact = -force_gradient(BALL, MATERIAL, x, **options).reshape(size, size)
+        np.testing.assert_allclose(K, exact, atol=1e-6 * np.abs(K).max())
+
+
+def test_the_stiffness_of_the_thesis_is_not_symmetric_away_from_rest():
+    """18 % at 50 % compression for nu = 0.3, which is why a symmetrised copy goes to conjugate gradients."""
+    x = MESHES["tet"].vertices * (1, 1, 0.5)
+    K = force_gradient(MESHES["tet"], MATERIAL, x).reshape(12, 12)
+    gap = np.linalg.norm(K - K.T) / np.linalg.norm(K + K.T)
+    assert 0.02 < gap < 0.4
+    energy = force_gradient(MESHES["tet"], MATERIAL, x, law="neo_hookean").reshape(12, 12)
+    np.testing.assert_allclose(energy, energy.T, atol=1e-9 * np.abs(energy).max())
+
+
+@pytest.mark.parametrize("value", [1, "yes", None])
+def test_projected_is_yes_or_no(value):
+    with pytest.raises(OptionError, match="projected must be True or False"):
+        force_gradient(BALL, MATERIAL, BALL.vertices, projected=value)
+
+
+def test_what_does_not_fit_is_refused():
+    with pytest.raises(MeshError, match="positions has shape"):
+        force_gradient(BALL, MATERIAL, BALL.vertices[:-1])
+    with pytest.raises(OptionError, match="unknown law"):
+        force_gradient(BALL, MATERIAL, BALL.vertices, law="hope")
