@@ -111,6 +111,18 @@ class BodyArrays:
     bonds: BondArrays | None  # of a pairwise law
     pinned: Ints  # particles that do not move
 
+    @property
+    def tet_pressures(self) -> Floats:
+        """How hard a tetrahedron pulls each of its edges together as it grows, (m, 6) [N]; often zero."""
+        pressures = np.zeros(self.tet_edges.shape)
+        bonds = self.bonds
+        if bonds is not None and bonds.names_tets:
+            tets = bonds.members[:, 0]
+            edges = np.repeat(np.arange(len(bonds.ring)), bonds.ring[:, 1] - bonds.ring[:, 0])
+            corner = (self.tet_edges[tets] == edges[:, None]).argmax(axis=1)
+            pressures[tets, corner] = bonds.weights[:, 0]
+        return pressures
+
 
 @dataclass
 class Ranges:

@@ -82,18 +82,21 @@ class State:
         self.tet_lame = ti.field(real, b * 2 * LANES)  # [Pa]
         self.tet_damping = ti.field(real, b * LANES)  # [N s/m], for damping by the mean velocity
 
-        self.edge_vertices = ti.Vector.field(2, ti.i32, k)
+        self.edge_vertices = ti.Vector.field(2, ti.i32, k, layout=ti.Layout.SOA)
         self.edge_damping = ti.field(real, k)  # [N s/m]
         if capacity.rings:
-            self.edge_bond = ti.Vector.field(4, real, k)  # see `laws.bonds.Bonds`
+            self.edge_bond = ti.Vector.field(4, real, k, layout=ti.Layout.SOA)  # see `laws.bonds.Bonds`
             self.edge_ring = ti.Vector.field(2, ti.i32, k)  # range in the rings
             self.ring_members = ti.Vector.field(
                 4, ti.i32, capacity.rings
             )  # particles, or slots of tetrahedra
             self.ring_weights = ti.Vector.field(4, real, capacity.rings)
             self.tet_expansion = ti.field(real, b * LANES)  # dV / V0
-        if capacity.implicit:
+            self.tet_pressure = ti.field(real, b * 6 * LANES)  # [N] per dV / V0 on each edge, E a nu
+            self.edge_tension = ti.field(real, k)  # [N], what tetrahedra pull an edge with
+        if capacity.rings or capacity.implicit:
             self.tet_edges = ti.field(ti.i32, b * 6 * LANES)
+        if capacity.implicit:
             self.particle_block = ti.Matrix.field(3, 3, real, n)  # of the system, on its diagonal
             self.particle_block_inverse = ti.Matrix.field(3, 3, real, n)
             self.edge_block = ti.Matrix.field(3, 3, real, k)  # row of the first end, column of the second
@@ -158,9 +161,12 @@ class State:
         fill(self.edge_damping, np.concatenate([body.edge_damping for body in bodies]))
         if self.capacity.rings:
             self._load_bonds(bodies, ranges)
-        if self.capacity.implicit:
+        if self.capacity.rings or self.capacity.implicit:
             names = [b.tet_edges + r.edges[0] for b, r in zip(bodies, ranges, strict=True)]
-            fill(self.tet_edges, np.concatenate([blocks_of(rows, 6, 0) for rows in names]))
+            # The lanes that pad a last block pull the body's first edge with no pressure.
+            rows = [blocks_of(rows, 6, r.edges[0]) for rows, r in zip(names, ranges, strict=True)]
+            fill(self.tet_edges, np.concatenate(rows))
+        if self.capacity.implicit:
             fill(self.particle_contact, np.zeros(0))
         if self.capacity.parallel:
             self._load_gather_lists(corners, edges, scene.particle_count)
@@ -191,6 +197,8 @@ class State:
         fill(self.edge_ring, np.concatenate(rings))
         fill(self.ring_members, np.concatenate(members))
         fill(self.ring_weights, np.concatenate(weights))
+        fill(self.tet_pressure, _blocks(bodies, lambda b: b.tet_pressures, 6))
+        fill(self.edge_tension, np.zeros(0))
 
     def _load_gather_lists(self, corners: NDArray[np.int64], edges: NDArray[np.int64], count: int) -> None:
         """For each particle, the corner forces and edge forces that act on it, in a fixed order."""

@@ -217,6 +217,7 @@ class World:
             tuple(models),
             self.settings.integrator,
             self.settings.floor is not None,
+            any(len(body.pinned) for body in self._bodies),
             device.threads,
             self.settings.tolerance,
             self.settings.most_iterations,

@@ -6,18 +6,17 @@ from taichi_soft.laws.best_fitting_plane import plane_normal
 from taichi_soft.laws.bonds import Ring
 from taichi_soft.laws.cmpm import bond_damping, bond_force, direction_of
 from taichi_soft.laws.cmpm2 import subface
-from taichi_soft.laws.damping import edge_damping_force
-from taichi_soft.laws.springs import along, spring_tension
+from taichi_soft.laws.springs import damped_pull, spring_tension
 from taichi_soft.laws.tilted_plane import tilt, tilted_normal
 from taichi_soft.laws.volume_springs import expansion
 from taichi_soft.runtime import ti
 
 
 @ti.func
-def store_lane_expansion(state: ti.template(), block, lane):
-    """Growth of one tetrahedron, for the edges to read."""
+def lane_expansion(state: ti.template(), block, lane):
+    """Growth dV / V0 of one tetrahedron."""
     p0, p1, p2, p3 = particles_of(state, block, lane)
-    state.tet_expansion[block * LANES + lane] = expansion(
+    return expansion(
         state.particle_position[p0],
         state.particle_position[p1],
         state.particle_position[p2],
@@ -28,9 +27,30 @@ def store_lane_expansion(state: ti.template(), block, lane):
 
 @ti.func
 def store_block_expansions(state: ti.template(), number):
-    """Growth of a block's tetrahedra."""
+    """Growth of a block's tetrahedra, for their edges to read."""
+    block = number & BLOCK_BITS
     for lane in range(LANES):
-        store_lane_expansion(state, number & BLOCK_BITS, lane)
+        state.tet_expansion[block * LANES + lane] = lane_expansion(state, block, lane)
+
+
+@ti.func
+def accumulate_tensions(state: ti.template(), body):
+    """Store how a body's tetrahedra grow, and in `edge_tension` what pulls its edges, in one thread."""
+    edges, blocks = state.body_edges[body], state.body_blocks[body]
+    for e in range(edges[0], edges[1]):
+        state.edge_tension[e] = 0.0
+    for number in range(blocks[0], blocks[1]):
+        block = number & BLOCK_BITS
+        growth = ti.Vector.zero(state.real, LANES)
+        for lane in range(LANES):
+            growth[lane] = lane_expansion(state, block, lane)
+        for lane in range(LANES):
+            state.tet_expansion[block * LANES + lane] = growth[lane]
+        for k in ti.static(range(6)):
+            for lane in range(LANES):
+                place = (block * 6 + k) * LANES + lane
+                e = state.tet_edges[place]
+                state.edge_tension[e] = state.edge_tension[e] + state.tet_pressure[place] * growth[lane]
 
 
 @ti.func
@@ -122,44 +142,37 @@ def bond_frame_of(state: ti.template(), law: ti.template(), e):
 
 
 @ti.func
-def tension_of(state: ti.template(), law: ti.template(), e, r):
-    """Pull of a spring on its ends [N], with that of the tetrahedra round it where the law has one."""
-    constants = state.edge_bond[e]
-    tension = spring_tension(r, constants)
-    if ti.static(law.ring == Ring.EXPANSION):
-        ring = state.edge_ring[e]
-        for k in range(ring[0], ring[1]):
-            tension += state.ring_weights[k][0] * state.tet_expansion[state.ring_members[k][0]]
+def spring_force_of(state: ti.template(), e, tension):
+    """Force of a spring and its damping on the first end of edge `e` [N], pulled by `tension` besides."""
+    p, q = state.edge_vertices[e][0], state.edge_vertices[e][1]
+    r = state.particle_position[q] - state.particle_position[p]
+    relative_velocity = state.particle_velocity[q] - state.particle_velocity[p]
+    pull = spring_tension(r, state.edge_bond[e]) + tension
+    return damped_pull(r, relative_velocity, pull, state.edge_damping[e])
+
+
+@ti.func
+def ring_tension(state: ti.template(), e):
+    """Pull of the tetrahedra round an edge on its ends [N], gathered from their growth."""
+    tension = state.edge_damping[e] * 0.0
+    ring = state.edge_ring[e]
+    for k in range(ring[0], ring[1]):
+        tension += state.ring_weights[k][0] * state.tet_expansion[state.ring_members[k][0]]
     return tension
 
 
 @ti.func
 def bond_force_of(state: ti.template(), law: ti.template(), e):
     """Elastic and damping force on the first end of edge `e` [N]; the second feels the opposite."""
-    p, q = state.edge_vertices[e][0], state.edge_vertices[e][1]
-    relative_velocity = state.particle_velocity[q] - state.particle_velocity[p]
-    damping = state.edge_damping[e]
-    if ti.static(law.ring == Ring.NONE or law.ring == Ring.EXPANSION):
-        r = state.particle_position[q] - state.particle_position[p]
-        return along(r, tension_of(state, law, e, r)) + edge_damping_force(r, relative_velocity, damping)
+    if ti.static(law.ring == Ring.NONE):
+        return spring_force_of(state, e, state.edge_damping[e] * 0.0)
+    elif ti.static(law.ring == Ring.EXPANSION):
+        return spring_force_of(state, e, ring_tension(state, e))
     else:
+        p, q = state.edge_vertices[e][0], state.edge_vertices[e][1]
+        relative_velocity = state.particle_velocity[q] - state.particle_velocity[p]
         _, n, compared = bond_frame_of(state, law, e)
         constants = state.edge_bond[e]
         return bond_force(compared, n, constants) + bond_damping(
-            compared, n, relative_velocity, damping, constants.w
+            compared, n, relative_velocity, state.edge_damping[e], constants.w
         )
-
-
-@ti.func
-def accumulate_bond_forces(state: ti.template(), law: ti.template(), body):
-    """Add the forces of all edges of one body to its particles, in one thread."""
-    if ti.static(law.ring == Ring.EXPANSION):
-        blocks = state.body_blocks[body]
-        for number in range(blocks[0], blocks[1]):
-            store_block_expansions(state, number)
-    edges = state.body_edges[body]
-    for e in range(edges[0], edges[1]):
-        p, q = state.edge_vertices[e][0], state.edge_vertices[e][1]
-        force = bond_force_of(state, law, e)
-        state.particle_force[p] = state.particle_force[p] + force
-        state.particle_force[q] = state.particle_force[q] - force

@@ -1,8 +1,8 @@
 """Evaluation without motion: forces on a body where it is, or would be; and what broke a frozen one."""
 
 from taichi_soft.constants import LANES
-from taichi_soft.kernels.bonds import accumulate_bond_forces, bond_force_of
-from taichi_soft.kernels.damping import accumulate_edge_damping
+from taichi_soft.kernels.bonds import accumulate_tensions
+from taichi_soft.kernels.edges import accumulate_edge_forces, edge_force_of
 from taichi_soft.kernels.elastic import lane_forces
 from taichi_soft.kernels.motion import particle_is_sound, restore_particle
 from taichi_soft.kernels.per_body import move_body
@@ -23,20 +23,22 @@ def _add_tet_forces(state: ti.template(), model: ti.template(), body):
             if broken < 0 and (particle_is_sound(state, p) & is_finite(forces[corner])) == 0:
                 broken = t
             state.particle_force[p] = state.particle_force[p] + forces[corner]
-    accumulate_edge_damping(state, body)
+    accumulate_edge_forces(state, model, body)
     return broken
 
 
 @ti.func
-def _add_bond_forces(state: ti.template(), law: ti.template(), body):
+def _add_bond_forces(state: ti.template(), model: ti.template(), body):
     """Returns the first broken edge or -1."""
     broken = -1
-    accumulate_bond_forces(state, law, body)
+    if ti.static(model.reads_expansion):
+        accumulate_tensions(state, body)
+    accumulate_edge_forces(state, model, body)
     edges = state.body_edges[body]
     for e in range(edges[0], edges[1]):
         p, q = state.edge_vertices[e][0], state.edge_vertices[e][1]
         sound = particle_is_sound(state, p) & particle_is_sound(state, q)
-        if broken < 0 and (sound & is_finite(bond_force_of(state, law, e))) == 0:
+        if broken < 0 and (sound & is_finite(edge_force_of(state, model, e))) == 0:
             broken = e
     return broken
 
@@ -52,7 +54,7 @@ def accumulate_forces_one_by_one(state: ti.template(), program: ti.template(), b
     for m, model in ti.static(enumerate(program.models)):
         if state.body_model[body] == m:
             if ti.static(model.has_bonds):
-                broken = _add_bond_forces(state, model.law, body)
+                broken = _add_bond_forces(state, model, body)
             else:
                 broken = _add_tet_forces(state, model, body)
     return broken

@@ -11,8 +11,8 @@ A GPU has no such barrier: there each substep is a launch of its own.
 """
 
 from taichi_soft.constants import LANES
-from taichi_soft.kernels.bonds import bond_force_of, store_block_expansions, store_lane_expansion
-from taichi_soft.kernels.damping import edge_force_of
+from taichi_soft.kernels.bonds import lane_expansion, store_block_expansions
+from taichi_soft.kernels.edges import edge_force_of
 from taichi_soft.kernels.elastic import corner_force_at, store_block_forces, store_lane_forces
 from taichi_soft.kernels.motion import move_particle, particle_is_sound, remember_particle, restore_particle
 from taichi_soft.runtime import ti
@@ -33,16 +33,10 @@ def _block_phase(state: ti.template(), program: ti.template(), block):
 
 @ti.func
 def _edge_phase(state: ti.template(), program: ti.template(), e):
-    if ti.static(program.has_bonds):
-        number = state.body_model[state.particle_body[state.edge_vertices[e][0]]]
-        for m, model in ti.static(enumerate(program.models)):
-            if number == m:
-                if ti.static(model.has_bonds):
-                    state.edge_force[e] = bond_force_of(state, model.law, e)
-                else:
-                    state.edge_force[e] = edge_force_of(state, e)
-    else:
-        state.edge_force[e] = edge_force_of(state, e)
+    body = state.particle_body[state.edge_vertices[e][0]]
+    for m, model in ti.static(enumerate(program.models)):
+        if state.body_model[body] == m:
+            state.edge_force[e] = edge_force_of(state, model, e)
 
 
 @ti.func
@@ -174,7 +168,7 @@ def substep_flat(
                 if ti.static(not model.has_bonds):
                     store_lane_forces(state, model, block, lane)
                 elif ti.static(model.reads_expansion):
-                    store_lane_expansion(state, block, lane)
+                    state.tet_expansion[t] = lane_expansion(state, block, lane)
     for e in range(edge_count):
         _edge_phase(state, program, e)
     for p in range(particle_count):

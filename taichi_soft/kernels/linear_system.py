@@ -6,12 +6,12 @@ edges.
 """
 
 from taichi_soft.constants import LANES
-from taichi_soft.kernels.bonds import bond_frame_of, tension_of
+from taichi_soft.kernels.bonds import bond_frame_of, ring_tension
 from taichi_soft.kernels.elastic import particles_of, rest_inverse_of
 from taichi_soft.laws.bond_stiffness import along_and_across, spring_stiffness
 from taichi_soft.laws.bonds import Ring
 from taichi_soft.laws.cmpm import direction_of, shear_direction
-from taichi_soft.laws.springs import along
+from taichi_soft.laws.springs import along, spring_tension
 from taichi_soft.laws.stiffness import element_stiffness, stiffness_block
 from taichi_soft.laws.volume_springs import expansion_gradients
 from taichi_soft.math.tensors import outer
@@ -79,17 +79,6 @@ def _add_tet_stiffness(state: ti.template(), model: ti.template(), body, scale):
 
 
 @ti.func
-def _pressure_of(state: ti.template(), e, slot):
-    """E a nu [N] with which tetrahedron `slot` pulls edge `e` together."""
-    pressure = state.edge_damping[e] * 0.0
-    ring = state.edge_ring[e]
-    for k in range(ring[0], ring[1]):
-        if state.ring_members[k][0] == slot:
-            pressure = state.ring_weights[k][0]
-    return pressure
-
-
-@ti.func
 def volume_pull(state: ti.template(), t):
     """Gradients of V / V0 by the four corners of a tetrahedron, and by how much each is pulled per V / V0.
 
@@ -99,8 +88,8 @@ def volume_pull(state: ti.template(), t):
     v = particles_of(state, block, lane)
     x = [state.particle_position[v[i]] for i in ti.static(range(4))]
     g = expansion_gradients(x[0], x[1], x[2], x[3], rest_inverse_of(state, block, lane))
-    edges = [state.tet_edges[(block * 6 + k) * LANES + lane] for k in ti.static(range(6))]
-    f = [along(x[j] - x[i], _pressure_of(state, edges[k], t)) for k, i, j in ti.static(EDGES)]
+    pressure = [state.tet_pressure[(block * 6 + k) * LANES + lane] for k in ti.static(range(6))]
+    f = [along(x[j] - x[i], pressure[k]) for k, i, j in ti.static(EDGES)]
     w = -(f[0] + f[1] + f[2]), f[0] - f[3] - f[4], f[1] + f[3] - f[5], f[2] + f[4] + f[5]
     return g, w
 
@@ -139,7 +128,10 @@ def bond_stiffness(state: ti.template(), law: ti.template(), e, projected: ti.te
     r, n, _ = bond_frame_of(state, law, e)
     constants = state.edge_bond[e]
     if ti.static(law.ring == Ring.NONE or law.ring == Ring.EXPANSION):
-        return spring_stiffness(r, tension_of(state, law, e, r), constants, projected)
+        tension = spring_tension(r, constants)
+        if ti.static(law.ring == Ring.EXPANSION):
+            tension += ring_tension(state, e)
+        return spring_stiffness(r, tension, constants, projected)
     else:
         # Laws that compare directions have their constants per length 1.
         per_length = constants.x * 0.0 + 1.0

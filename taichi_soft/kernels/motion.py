@@ -24,7 +24,9 @@ def restore_particle(state: ti.template(), p):
 def move_particle(state: ti.template(), program: ti.template(), p, force, h, kick):
     """One substep of one particle under the internal force on it [N]."""
     inv_mass = state.particle_inv_mass[p]
-    acceleration = force * inv_mass + state.gravity[None] * ti.select(inv_mass > 0.0, 1.0, 0.0)  # 0: pinned
+    acceleration = force * inv_mass + state.gravity[None]
+    if ti.static(program.has_pins):  # whose inverse mass is 0
+        acceleration *= ti.select(inv_mass > 0.0, 1.0, 0.0)
     x, v = program.advance(state.particle_position[p], state.particle_velocity[p], acceleration, h, kick)
     if ti.static(program.has_floor):
         x, v = resolve_floor(x, v, h, state.floor[None])

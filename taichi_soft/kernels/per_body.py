@@ -4,8 +4,8 @@ Nothing waits between substeps and a body stays in one core's cache. The result 
 of threads.
 """
 
-from taichi_soft.kernels.bonds import accumulate_bond_forces
-from taichi_soft.kernels.damping import accumulate_edge_damping
+from taichi_soft.kernels.bonds import accumulate_tensions
+from taichi_soft.kernels.edges import accumulate_edge_forces
 from taichi_soft.kernels.elastic import accumulate_elastic_forces
 from taichi_soft.kernels.implicit_euler import implicit_substep
 from taichi_soft.kernels.motion import move_particle, particle_is_sound, remember_particle, restore_particle
@@ -19,12 +19,12 @@ def accumulate_forces(state: ti.template(), program: ti.template(), body):
     """Add all internal forces of one body to its particles."""
     for m, model in ti.static(enumerate(program.models)):
         if state.body_model[body] == m:
-            if ti.static(model.has_bonds):
-                accumulate_bond_forces(state, model.law, body)
-            else:
+            if ti.static(model.reads_expansion):
+                accumulate_tensions(state, body)
+            if ti.static(not model.has_bonds):
                 accumulate_elastic_forces(state, model, body)
-                if ti.static(model.damping_model == DampingModel.EDGE):
-                    accumulate_edge_damping(state, body)
+            if ti.static(model.damping_model == DampingModel.EDGE):
+                accumulate_edge_forces(state, model, body)
 
 
 @ti.func

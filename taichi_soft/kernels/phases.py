@@ -1,6 +1,6 @@
 """One phase of the substep by itself, many times: for profiles, not for motion."""
 
-from taichi_soft.kernels.damping import accumulate_edge_damping
+from taichi_soft.kernels.edges import accumulate_edge_forces
 from taichi_soft.kernels.elastic import accumulate_elastic_forces
 from taichi_soft.kernels.per_body import move_body
 from taichi_soft.runtime import ti
@@ -26,6 +26,8 @@ def repeat_phase(
                     if state.body_model[body] == m:
                         accumulate_elastic_forces(state, model, body)
             if ti.static(phase == "damping"):
-                accumulate_edge_damping(state, body)
+                for m, model in ti.static(enumerate(program.models)):
+                    if state.body_model[body] == m:
+                        accumulate_edge_forces(state, model, body)
             if ti.static(phase == "motion"):
                 move_body(state, program, body, h, h)

@@ -15,6 +15,7 @@ class Program:
     models: tuple[ElementModel, ...]  # a body names one by its index
     integrator: Integrator
     has_floor: bool
+    has_pins: bool = False
     worker_count: int = 1  # threads that share one flat step
     tolerance: float = 1e-3  # of implicit solves, over their right-hand side
     most_iterations: int = 200  # of an implicit solve
@@ -23,11 +24,6 @@ class Program:
     def advance(self) -> Any:
         """The integrator's ti.func (x, v, a, h, kick) -> (x, v)."""
         return ADVANCE[self.integrator]
-
-    @property
-    def has_bonds(self) -> bool:
-        """Whether any body's forces act along edges."""
-        return any(model.has_bonds for model in self.models)
 
     @property
     def reads_expansion(self) -> bool:

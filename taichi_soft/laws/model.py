@@ -42,6 +42,11 @@ class ElementModel:
         return isinstance(self.law, BondLaw) and self.law.ring is Ring.EXPANSION
 
     @property
+    def has_simple_edges(self) -> bool:
+        """True where the force of an edge asks for nothing but its ends, once tetrahedra have pulled at it."""
+        return not isinstance(self.law, BondLaw) or self.law.ring in (Ring.NONE, Ring.EXPANSION)
+
+    @property
     def repairs_flips(self) -> bool:
         """True where a flipped tetrahedron takes another path than an upright one."""
         return self.flips is Flips.RECOVER and not self.has_energy

@@ -1,5 +1,8 @@
-// The substep of the virial law with edge damping in plain C++: one thread, array of structures, no intrinsics.
+// Substeps of the virial law, of springs and of volume springs with edge damping in plain C++: one thread, array of
+// structures, no intrinsics.
 // What a careful programmer writes first; the yardstick of `taichi-soft profile --baseline`.
+
+#include <cmath>
 
 struct Vec {
     float x, y, z;
@@ -71,10 +74,54 @@ static void move(int particle_count, Vec *x, Vec *v, Vec *force, const float *in
     }
 }
 
+// Thesis eq. 5.4: how much each tetrahedron has grown pulls its six edges together.
+static void add_volume_tension(int tet_count, const Vec *x, const int *vertices, const float *inv_volume6,
+                               const int *edges, const float *pressure, float *tension) {
+    for (int t = 0; t < tet_count; t++) {
+        const int *i = vertices + 4 * t;
+        const Vec b0 = x[i[1]] - x[i[0]], b1 = x[i[2]] - x[i[0]], b2 = x[i[3]] - x[i[0]];
+        const float volume6 = dot(b0, cross(b1, b2));
+        const float growth = (volume6 < 0.0f ? -volume6 : volume6) * inv_volume6[t] - 1.0f;
+        for (int k = 0; k < 6; k++) tension[edges[6 * t + k]] += pressure[6 * t + k] * growth;
+    }
+}
+
+static void add_spring_forces(int edge_count, const Vec *x, const Vec *v, const int *ends, const float *length,
+                              const float *stiffness, const float *damping, float *tension, Vec *force) {
+    for (int e = 0; e < edge_count; e++) {
+        const int p = ends[2 * e], q = ends[2 * e + 1];
+        const Vec r = x[q] - x[p];
+        const float square = dot(r, r), now = std::sqrt(square);
+        const float pull = stiffness[e] * (now - length[e]) + tension[e];
+        const Vec along = (pull / now + damping[e] * dot(r, v[q] - v[p]) / square) * r;
+        tension[e] = 0.0f;
+        force[p] = force[p] + along;
+        force[q] = force[q] - along;
+    }
+}
+
 #ifdef _WIN32
-__declspec(dllexport)
+#define EXPORT extern "C" __declspec(dllexport)
+#else
+#define EXPORT extern "C"
 #endif
-extern "C" void run_substeps(int particle_count, int tet_count, int edge_count, float *x, float *v, float *force,
+
+EXPORT void run_spring_substeps(int particle_count, int tet_count, int edge_count, float *x, float *v, float *force,
+                                const float *inv_mass, const int *vertices, const float *inv_volume6,
+                                const int *edges, const float *pressure, const int *ends, const float *length,
+                                const float *stiffness, const float *damping, float *tension, float h,
+                                float gravity, float floor, int substeps) {
+    Vec *positions = reinterpret_cast<Vec *>(x);
+    Vec *velocities = reinterpret_cast<Vec *>(v);
+    Vec *forces = reinterpret_cast<Vec *>(force);
+    for (int s = 0; s < substeps; s++) {
+        add_volume_tension(tet_count, positions, vertices, inv_volume6, edges, pressure, tension);
+        add_spring_forces(edge_count, positions, velocities, ends, length, stiffness, damping, tension, forces);
+        move(particle_count, positions, velocities, forces, inv_mass, h, gravity, floor);
+    }
+}
+
+EXPORT void run_substeps(int particle_count, int tet_count, int edge_count, float *x, float *v, float *force,
                              const float *inv_mass, const int *vertices, const float *rest_inverse,
                              const float *lame, const int *ends, const float *damping, float h, float gravity,
                              float floor, int substeps) {

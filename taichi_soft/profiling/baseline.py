@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from taichi_soft.constants import GRAVITY_EARTH
 from taichi_soft.errors import DeviceError
-from taichi_soft.scene import BodyArrays
+from taichi_soft.scene import BodyArrays, BondArrays
 
 SOURCE = Path(__file__).with_name("baseline.cpp")
 FLAGS = ("-O3", "-march=native", "-ffast-math", "-shared", "-fPIC", "-std=c++17")
@@ -51,28 +51,49 @@ class Baseline:
     """One body in plain C++."""
 
     def __init__(self, library: ctypes.CDLL, body: BodyArrays) -> None:
-        """Take over the arrays of `body`, in kernel order."""
-        self._run = library.run_substeps
+        """Take over the arrays of `body`, in kernel order: of the virial law, springs or volume springs."""
+        self._run = library.run_substeps if body.bonds is None else library.run_spring_substeps
         self._run.restype = None
         self.positions = body.start_position.astype(np.float32)
         self.velocities = body.start_velocity.astype(np.float32)
+        elements = _tet_arrays(body) if body.bonds is None else _spring_arrays(body, body.bonds)
         self._arrays: list[NDArray[np.generic]] = [
             self.positions,
             self.velocities,
             np.zeros_like(self.positions),
             (1.0 / body.mass).astype(np.float32),
-            np.ascontiguousarray(body.tet_vertices, dtype=np.int32),
-            np.ascontiguousarray(body.rest_inverse, dtype=np.float32),
-            np.ascontiguousarray(body.lame, dtype=np.float32),
-            np.ascontiguousarray(body.edge_vertices, dtype=np.int32),
-            body.edge_damping.astype(np.float32),
+            *elements,
         ]
-        self._counts = [
-            ctypes.c_int(n) for n in (len(body.mass), len(body.tet_vertices), len(body.edge_vertices))
-        ]
+        # Springs that do not look at tetrahedra get none.
+        tets = 0 if body.bonds is not None and not body.bonds.names_tets else len(body.tet_vertices)
+        self._counts = [ctypes.c_int(n) for n in (len(body.mass), tets, len(body.edge_vertices))]
 
     def step(self, substeps: int, h: float) -> None:
         """Make `substeps` substeps of `h` [s], in free fall."""
         pointers = [rows.ctypes.data_as(ctypes.c_void_p) for rows in self._arrays]
         numbers = [ctypes.c_float(x) for x in (h, -GRAVITY_EARTH, NO_FLOOR)]
         self._run(*self._counts, *pointers, *numbers, ctypes.c_int(substeps))
+
+
+def _tet_arrays(body: BodyArrays) -> list[NDArray[np.generic]]:
+    return [
+        np.ascontiguousarray(body.tet_vertices, dtype=np.int32),
+        np.ascontiguousarray(body.rest_inverse, dtype=np.float32),
+        np.ascontiguousarray(body.lame, dtype=np.float32),
+        np.ascontiguousarray(body.edge_vertices, dtype=np.int32),
+        body.edge_damping.astype(np.float32),
+    ]
+
+
+def _spring_arrays(body: BodyArrays, bonds: BondArrays) -> list[NDArray[np.generic]]:
+    return [
+        np.ascontiguousarray(body.tet_vertices, dtype=np.int32),
+        np.linalg.det(body.rest_inverse).astype(np.float32),
+        np.ascontiguousarray(body.tet_edges, dtype=np.int32),
+        body.tet_pressures.astype(np.float32),
+        np.ascontiguousarray(body.edge_vertices, dtype=np.int32),
+        bonds.constants[:, 0].astype(np.float32),
+        bonds.constants[:, 1].astype(np.float32),
+        body.edge_damping.astype(np.float32),
+        np.zeros(len(body.edge_vertices), dtype=np.float32),
+    ]
