@@ -215,6 +215,9 @@ def profile(
     scaling: Annotated[
         bool, typer.Option("--scaling", help="Compare 64 spheres on one thread and on all.")
     ] = False,
+    implicit: Annotated[
+        bool, typer.Option("--implicit", help="Compare implicit Euler with leapfrog and with scipy.")
+    ] = False,
     startup: Annotated[
         bool, typer.Option("--startup", help="Time a new process to its first frame, cold and warm.")
     ] = False,
@@ -240,6 +243,9 @@ def profile(
         if scaling:
             status.update("measuring threads")
             found["scaling"] = profiling.measure_scaling(device.threads, max(3, repeats // 3))
+        if implicit:
+            status.update("measuring implicit steps")
+            found["implicit"] = profiling.measure_implicit(max(3, repeats // 12))
         if startup:
             status.update("starting new processes")
             found["startup"] = [profiling.measure_startup(device.arch, device.threads)]

@@ -204,8 +204,9 @@ def arrange(description: BodyDescription) -> BodyArrays:
     tets = tet_order(mesh.tets, order) if len(mesh.tets) else np.zeros(0, dtype=np.int32)
     new_index = renumbered(order)
     edges = new_index[mesh.edges]
-    low, high = np.sort(edges, axis=1).T
-    edge_order = np.lexsort((high, low)).astype(np.int64)
+    if description.model.has_simple_edges:  # whose ends are alike; others have a direction from i to j
+        edges = np.sort(edges, axis=1)
+    edge_order = np.lexsort((edges[:, 1], edges[:, 0])).astype(np.int64)
     lame = np.stack([description.per_tet("lame_lambda"), description.per_tet("lame_mu")], axis=1)
     return BodyArrays(
         order=order,

@@ -83,6 +83,7 @@ class State:
         self.tet_damping = ti.field(real, b * LANES)  # [N s/m], for damping by the mean velocity
 
         self.edge_vertices = ti.Vector.field(2, ti.i32, k, layout=ti.Layout.SOA)
+        self.edges_from = ti.Vector.field(2, ti.i32, n)  # range of those with this first end
         self.edge_damping = ti.field(real, k)  # [N s/m]
         if capacity.rings:
             self.edge_bond = ti.Vector.field(4, real, k, layout=ti.Layout.SOA)  # see `laws.bonds.Bonds`
@@ -158,6 +159,7 @@ class State:
             [b.edge_vertices + r.particles[0] for b, r in zip(bodies, ranges, strict=True)]
         )
         fill(self.edge_vertices, edges)
+        fill(self.edges_from, _row_ranges(edges[:, 0], scene.particle_count))
         fill(self.edge_damping, np.concatenate([body.edge_damping for body in bodies]))
         if self.capacity.rings:
             self._load_bonds(bodies, ranges)

@@ -6,7 +6,6 @@ from taichi_soft.laws.best_fitting_plane import plane_normal
 from taichi_soft.laws.bonds import Ring
 from taichi_soft.laws.cmpm import bond_damping, bond_force, direction_of
 from taichi_soft.laws.cmpm2 import subface
-from taichi_soft.laws.springs import damped_pull, spring_tension
 from taichi_soft.laws.tilted_plane import tilt, tilted_normal
 from taichi_soft.laws.volume_springs import expansion
 from taichi_soft.runtime import ti
@@ -142,16 +141,6 @@ def bond_frame_of(state: ti.template(), law: ti.template(), e):
 
 
 @ti.func
-def spring_force_of(state: ti.template(), e, tension):
-    """Force of a spring and its damping on the first end of edge `e` [N], pulled by `tension` besides."""
-    p, q = state.edge_vertices[e][0], state.edge_vertices[e][1]
-    r = state.particle_position[q] - state.particle_position[p]
-    relative_velocity = state.particle_velocity[q] - state.particle_velocity[p]
-    pull = spring_tension(r, state.edge_bond[e]) + tension
-    return damped_pull(r, relative_velocity, pull, state.edge_damping[e])
-
-
-@ti.func
 def ring_tension(state: ti.template(), e):
     """Pull of the tetrahedra round an edge on its ends [N], gathered from their growth."""
     tension = state.edge_damping[e] * 0.0
@@ -163,16 +152,11 @@ def ring_tension(state: ti.template(), e):
 
 @ti.func
 def bond_force_of(state: ti.template(), law: ti.template(), e):
-    """Elastic and damping force on the first end of edge `e` [N]; the second feels the opposite."""
-    if ti.static(law.ring == Ring.NONE):
-        return spring_force_of(state, e, state.edge_damping[e] * 0.0)
-    elif ti.static(law.ring == Ring.EXPANSION):
-        return spring_force_of(state, e, ring_tension(state, e))
-    else:
-        p, q = state.edge_vertices[e][0], state.edge_vertices[e][1]
-        relative_velocity = state.particle_velocity[q] - state.particle_velocity[p]
-        _, n, compared = bond_frame_of(state, law, e)
-        constants = state.edge_bond[e]
-        return bond_force(compared, n, constants) + bond_damping(
-            compared, n, relative_velocity, state.edge_damping[e], constants.w
-        )
+    """Elastic and damping force on the first end of an edge that looks round it [N]."""
+    p, q = state.edge_vertices[e][0], state.edge_vertices[e][1]
+    relative_velocity = state.particle_velocity[q] - state.particle_velocity[p]
+    _, n, compared = bond_frame_of(state, law, e)
+    constants = state.edge_bond[e]
+    return bond_force(compared, n, constants) + bond_damping(
+        compared, n, relative_velocity, state.edge_damping[e], constants.w
+    )

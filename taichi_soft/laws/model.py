@@ -43,7 +43,7 @@ class ElementModel:
 
     @property
     def has_simple_edges(self) -> bool:
-        """True where the force of an edge asks for nothing but its ends, once tetrahedra have pulled at it."""
+        """True where an edge asks for its two ends only, and for what tetrahedra pull it with."""
         return not isinstance(self.law, BondLaw) or self.law.ring in (Ring.NONE, Ring.EXPANSION)
 
     @property

@@ -4,6 +4,7 @@ from taichi_soft.profiling.baseline import Baseline, compile_baseline, find_comp
 from taichi_soft.profiling.budget import Budget, measure_budget
 from taichi_soft.profiling.comparison import Comparison, compare_with_baseline
 from taichi_soft.profiling.crossover import Crossover, measure_crossover
+from taichi_soft.profiling.implicit import ImplicitGain, measure_implicit
 from taichi_soft.profiling.law_costs import LawCost, measure_laws
 from taichi_soft.profiling.phases import Phases, measure_phases
 from taichi_soft.profiling.scaling import Scaling, measure_scaling
@@ -15,6 +16,7 @@ __all__ = [
     "Budget",
     "Comparison",
     "Crossover",
+    "ImplicitGain",
     "LawCost",
     "Phases",
     "Scaling",
@@ -25,6 +27,7 @@ __all__ = [
     "find_compiler",
     "measure_budget",
     "measure_crossover",
+    "measure_implicit",
     "measure_laws",
     "measure_phases",
     "measure_scaling",

@@ -29,7 +29,7 @@ class LawCost:
     ratio: Spread  # over that of "virial" with the linear strain, pair by pair
 
 
-def measure_laws(repeats: int = 21) -> list[LawCost]:
+def measure_laws(repeats: int = 11) -> list[LawCost]:
     """Measure every law with every strain, on one body and so on one thread."""
     usual = _falling("virial", None)
     found = []

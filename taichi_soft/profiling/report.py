@@ -42,6 +42,14 @@ def tables(found: dict[str, Any]) -> Iterator[tuple[str, Table]]:
             gains = [f"{x:.2f}" for x in (row.speedup.least, row.speedup.median, row.speedup.most)]
             table.add_row(str(row.substeps), str(row.threads), *times, *gains)
         yield "64 spheres on several threads [ms]", table
+    if "implicit" in found:
+        table = _table("", "step [ms]", "other's", "ms per s", "other's", "gain least", "median", "most")
+        for row in found["implicit"]:
+            steps = f"{row.step * 1e3:.3g}", f"{row.other_step * 1e3:.3g}"
+            times = f"{row.implicit.median:.0f}", f"{row.other.median:.0f}"
+            gains = [f"{x:.1f}" for x in (row.gain.least, row.gain.median, row.gain.most)]
+            table.add_row(row.name, *steps, *times, *gains)
+        yield "Implicit Euler, time to simulate one second", table
     if "startup" in found:
         table = _table("kernel cache", "time")
         table.add_row("empty", f"{found['startup'][0].cold:.2f}")

@@ -207,7 +207,7 @@ def test_momentum_is_kept_in_flight_and_ringing_fades():
     assert body.kinetic_energy() - drift < 0.5 * (energy - drift)
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", ["virial", "volume_springs", "cmpm"])
 def test_the_same_input_gives_the_same_bits(law):
     rows = []
     for _ in range(2):
