@@ -64,9 +64,15 @@ def _cmpm_against_leapfrog(repeats: int) -> ImplicitGain:
     body = worlds["implicit_euler"].bodies[0]
     sound = not body.is_frozen and body.flipped_count() == 0
     return ImplicitGain(
-        "cmpm sphere, against leapfrog", share / max(1, int(share * steps)), 1.0 / substeps, other, one,
-        ratio, float("nan"), sound,
-    )  # fmt: skip
+        "cmpm sphere, against leapfrog",
+        share / max(1, int(share * steps)),
+        1.0 / substeps,
+        other,
+        one,
+        ratio,
+        None,
+        sound,
+    )
 
 
 def _bar_against_scipy(repeats: int) -> ImplicitGain:

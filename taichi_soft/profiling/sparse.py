@@ -1,4 +1,4 @@
-"""The same implicit steps by scipy: sparse assembly of every tetrahedron's matrix, and its conjugate gradients.
+"""The same implicit steps by scipy: sparse assembly of every tetrahedron, and its conjugate gradients.
 
 Only for the virial law with the linear strain, upright or mirrored, in free fall. Written in numpy from the
 equations in `laws.stiffness`, not from the kernels, so that agreement means something.
@@ -84,7 +84,7 @@ class SparseBody:
         rows = -self.mesh.volumes[:, None, None] * np.einsum("mab,mib->mia", piola, self._gradients)
         total = np.zeros_like(self.positions)
         np.add.at(total, self.mesh.tets, rows)
-        return total
+        return np.asarray(total)
 
     def element_stiffness(self) -> Floats:
         """Projected matrix of every tetrahedron, (m, 12, 12) [N/m]."""

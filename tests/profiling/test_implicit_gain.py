@@ -48,6 +48,7 @@ def test_the_gain_is_measured_for_both_and_shown():
     found = measure_implicit(3)
     assert [row.is_sound for row in found] == [True, True]
     assert found[0].step / found[0].other_step > 90  # the thesis's hundredfold step
+    assert found[0].deviation is None
     assert found[1].deviation < 1e-3
     ((title, table),) = tables({"implicit": found})
     assert "Implicit" in title
