@@ -35,9 +35,7 @@ class ImplicitGain:
     implicit: Spread  # [ms per simulated second]
     other: Spread
     gain: Spread  # other over implicit, pair by pair
-    deviation: (
-        float  # between both, over the size of the body, after the same time; NaN if not the same system
-    )
+    deviation: float | None  # of positions over the body's size; None where the systems differ
     is_sound: bool  # whether the body went through it whole
 
 
