@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.checks import as_array, to_array
 from taichi_soft.errors import MeshError, OptionError
-from taichi_soft.meshing import TetMesh
+from taichi_soft.meshing import BodyMesh, ParticleMesh, TetMesh
 from taichi_soft.render.colors import PALETTE, to_linear
 from taichi_soft.render.creases import split_at_creases
 
@@ -44,10 +44,15 @@ class Surface:
         self.color = color
 
     @classmethod
-    def of(cls, mesh: TetMesh, *, color: ArrayLike = PALETTE[0]) -> Surface:
-        """The surface of a tetrahedral mesh, at rest until its `positions` are set."""
-        if not isinstance(mesh, TetMesh):
-            raise MeshError(f"a surface is made of a TetMesh, got {type(mesh).__name__}")
+    def of(cls, mesh: BodyMesh, *, color: ArrayLike = PALETTE[0]) -> Surface:
+        """The surface of a mesh, at rest until its `positions` are set.
+
+        Raises: MeshError for a `ParticleMesh` without triangles, such as a rope.
+        """
+        if not isinstance(mesh, (TetMesh, ParticleMesh)):
+            raise MeshError(f"a surface is made of a TetMesh or a ParticleMesh, got {type(mesh).__name__}")
+        if len(mesh.surface) == 0:
+            raise MeshError(f"{mesh!r} has no triangles to draw: give it some with surface=")
         return cls(mesh.vertices, mesh.surface, color=color)
 
     @property

@@ -80,6 +80,14 @@ def test_a_sphere_under_every_law_lands_and_stays_whole():
     assert all(0.5 < z < 2.5 for z in height.values())
 
 
+def test_a_cloth_hangs_from_its_pins_without_tearing_apart():
+    stretch, stage = run("cloth", 2.0)
+    assert 1.0 < stretch < 1.5
+    rows = stage.actors[0].body.positions()
+    assert rows[0].tolist() == pytest.approx([0, -1, 2.4])
+    assert rows[:, 2].min() < 1.2
+
+
 @pytest.mark.parametrize("name", demo_names())
 def test_every_demo_can_be_filmed(name, tmp_path):
     stage = load_demo(name).stage()
@@ -88,8 +96,8 @@ def test_every_demo_can_be_filmed(name, tmp_path):
     assert stage.world.step_count >= 1
 
 
-def test_there_are_the_six_demos_of_the_readme():
-    assert demo_names() == ["bars", "bounce", "compare", "density", "dents", "many"]
+def test_there_are_the_seven_demos_of_the_readme():
+    assert demo_names() == ["bars", "bounce", "cloth", "compare", "density", "dents", "many"]
 
 
 def test_an_unknown_demo_is_refused_with_the_names_there_are():

@@ -1,0 +1,137 @@
+"""Bodies of particles and springs in a world, beside solid ones; and pins."""
+
+import numpy as np
+import pytest
+
+from taichi_soft import (
+    LAWS,
+    FrozenBodyWarning,
+    Material,
+    MeshError,
+    OptionError,
+    ParticleMesh,
+    SpringMaterial,
+    World,
+    box,
+    rope,
+    sphere,
+)
+
+
+@pytest.mark.parametrize("schedule", ["per_body", "flat"])
+def test_a_weight_on_a_spring_swings_as_the_pendulum_formula_says(schedule):
+    """x'' = g - k/m x from rest: x = (m g / k)(1 - cos(w t))."""
+    mesh = ParticleMesh([[0, 0, 0], [0, 0, -1.0]], [[0, 1]], [1.0, 2.0])
+    world = World(floor=None, schedule=schedule)
+    body = world.add_body(mesh, SpringMaterial(500.0), law="springs", pinned=[0])
+    world.build()
+    w = np.sqrt(500.0 / 2.0)
+    for step in range(1, 41):
+        world.step(0.01, 20)
+        sag = -1.0 - body.positions()[1, 2]
+        assert sag == pytest.approx(2.0 * 9.81 / 500.0 * (1 - np.cos(w * 0.01 * step)), abs=2e-4)
+    assert body.positions()[0].tolist() == [0, 0, 0]
+
+
+def test_an_undamped_lattice_keeps_its_energy_in_flight():
+    mesh = rope(1.0, 6, 1.0)
+    world = World(floor=None, gravity=(0, 0, 0))
+    body = world.add_body(mesh, SpringMaterial(100.0), law="springs")
+    world.build()
+    body.set_motion(mesh.vertices, np.random.default_rng(0).normal(size=mesh.vertices.shape))
+    start = body.kinetic_energy() + body.elastic_energy()
+    for _ in range(50):
+        world.step(0.02, 40)
+        assert body.kinetic_energy() + body.elastic_energy() == pytest.approx(start, rel=0.01)
+
+
+@pytest.mark.parametrize("schedule", ["per_body", "flat"])
+def test_ropes_and_solids_of_every_law_share_a_world(schedule):
+    """Each moves as it does alone."""
+    ball, material = sphere(0.4, 1), Material(2e5, 0.2, 1000.0, 10.0)
+    together, alone = World(schedule=schedule), []
+    for i, law in enumerate(LAWS):
+        place = (2.0 * i, 0, 0.7)
+        together.add_body(ball, material, law=law, position=place)
+        alone.append(World(schedule=schedule))
+        alone[-1].add_body(ball, material, law=law, position=place)
+    chain, springs = rope(1.0, 5, 0.2), SpringMaterial(50.0, 0.1)
+    for world in (together, World(schedule=schedule)):
+        world.add_body(chain, springs, law="springs", pinned=[0], position=(0, 3, 2))
+        alone.append(world)
+    alone.remove(together)
+    for world in (together, *alone):
+        world.build()
+        for _ in range(30):
+            world.step(1 / 60, 8)
+    for body, world in zip(together.bodies, alone, strict=True):
+        np.testing.assert_allclose(body.positions(), world.bodies[0].positions(), atol=1e-5)
+
+
+@pytest.mark.parametrize("schedule", ["per_body", "flat"])
+@pytest.mark.parametrize("law", ["virial", "springs", "cmpm2"])
+def test_pinned_vertices_stay_and_hold_the_body(schedule, law):
+    mesh = box((0.5, 0.5, 1.0), (1, 1, 2))
+    top = np.flatnonzero(mesh.vertices[:, 2] > mesh.bounds[1, 2] - 1e-6)
+    world = World(schedule=schedule)
+    body = world.add_body(mesh, Material(2e5, 0.2, 1000.0, 30.0), law=law, pinned=top, position=(0, 0, 2))
+    world.build()
+    before = body.positions()[top].tobytes()
+    for _ in range(100):
+        world.step(1 / 60)
+    assert body.positions()[top].tobytes() == before
+    assert np.abs(body.velocities()[top]).max() == 0
+    assert body.center_of_mass()[2] == pytest.approx(2 + mesh.vertices[:, 2].mean(), abs=0.1)
+    assert body.pinned.tolist() == top.tolist()
+
+
+@pytest.mark.parametrize(
+    ("pinned", "text"),
+    [
+        ([99], "pinned names vertex 99: there are 8, from 0 to 7"),
+        ([-1], "pinned names vertex -1"),
+        ([0.5], "pinned must be a list of vertex numbers"),
+        ("all", "pinned must be a list"),
+        ([[0, 1]], "pinned must be a list"),
+    ],
+)
+def test_pins_that_are_no_vertices_are_refused(pinned, text):
+    world = World()
+    with pytest.raises(OptionError, match=text):
+        world.add_body(box((1, 1, 1), (1, 1, 1)), Material(1e5, 0.3, 1e3), position=(0, 0, 1), pinned=pinned)
+    assert world.bodies == ()
+
+
+def test_a_spring_that_breaks_the_body_is_named_and_the_rest_goes_on():
+    chain = rope(1.0, 4, 0.2)
+    world = World(floor=None)
+    bad = world.add_body(chain, SpringMaterial([10.0, 10.0, 1e9, 10.0]), law="springs")
+    good = world.add_body(chain, SpringMaterial(10.0), law="springs", position=(0, 2, 0))
+    world.build()
+    bad.set_motion(chain.vertices * 1.5, np.zeros_like(chain.vertices))
+    with pytest.warns(FrozenBodyWarning, match="body 0 went non-finite"):
+        world.step(1.0, 20)
+    assert bad.is_frozen
+    assert bad.failure.tetrahedron is None
+    assert bad.failure.edge in [(1, 2), (2, 3), (3, 4)]
+    assert not good.is_frozen
+    assert np.isfinite(good.positions()).all()
+
+
+def test_what_needs_tetrahedra_says_so():
+    world = World(floor=None)
+    body = world.add_body(rope(1.0, 4, 0.2), SpringMaterial(10.0), law="springs")
+    world.build()
+    assert repr(body) == "Body(0, 5 vertices, 4 edges, active)"
+    assert body.flipped_count() == 0
+    assert body.volume() == 0
+    for ask in (body.deformations, body.strains, body.vertex_stress):
+        with pytest.raises(MeshError, match="body 0 has no tetrahedra"):
+            ask()
+
+
+def test_a_particle_mesh_takes_springs_only():
+    world = World()
+    with pytest.raises(MeshError, match="law 'virial' needs tetrahedra: pass a TetMesh, got ParticleMesh"):
+        world.add_body(rope(1.0, 4, 0.2), SpringMaterial(10.0), position=(0, 0, 1))
+    assert world.bodies == ()
