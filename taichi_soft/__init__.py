@@ -15,6 +15,7 @@ from taichi_soft.errors import (
 )
 from taichi_soft.forces import force_gradient, internal_forces
 from taichi_soft.laws import LAWS, element_model
+from taichi_soft.laws.planes import plane_angles
 from taichi_soft.materials import PRESETS, Material, SpringMaterial, preset
 from taichi_soft.meshing import (
     MeshQuality,
@@ -80,6 +81,7 @@ __all__ = [
     "init",
     "internal_forces",
     "load_mesh",
+    "plane_angles",
     "preset",
     "rope",
     "save_mesh",
