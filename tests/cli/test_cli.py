@@ -37,7 +37,7 @@ def test_demo_without_a_name_lists_the_demos_with_a_summary_each():
     done = run("demo")
     assert done.returncode == 0
     lines = done.stdout.splitlines()
-    assert [line.split()[0] for line in lines if not line.startswith(" ")][:6] == sorted(
+    assert [line.split()[0] for line in lines if not line.startswith(" ")][:7] == sorted(
         ["bars", "bounce", "cloth", "compare", "density", "dents", "many"]
     )
 
