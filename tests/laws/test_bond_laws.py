@@ -56,7 +56,7 @@ def expected_forces(law, name, x, E, nu, G):
 
 
 @pytest.mark.parametrize("law", BONDS)
-@settings(max_examples=8)
+@settings(max_examples=4)
 @given(
     seed=st.integers(0, 2**32 - 1),
     name=st.sampled_from(list(MESHES)),
@@ -77,7 +77,7 @@ def test_forces_equal_the_equations_in_numpy(law, seed, name, amount):
 
 
 @pytest.mark.parametrize("law", BONDS)
-@settings(max_examples=6)
+@settings(max_examples=3)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_a_body_at_rest_or_moved_as_a_whole_feels_nothing(law, seed):
     mesh = MESHES["ball"]
@@ -114,7 +114,7 @@ def test_forces_sum_to_zero_and_torques_where_they_act_along_the_edges(law):
 
 
 @pytest.mark.parametrize("law", BONDS)
-@settings(max_examples=6)
+@settings(max_examples=3)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_damping_equals_the_equations_in_numpy(law, seed):
     """Eq. 3.9 along springs; eq. 4.5 along n and m in the others, found from their elastic forces."""
