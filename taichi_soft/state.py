@@ -107,7 +107,7 @@ class State:
             self.image = ti.Vector.field(3, real, n)
             self.particle_contact = ti.field(ti.i32, n)  # 1 where the floor holds it from below
             self.body_residual = ti.field(real, bodies)  # largest of the last step, over the right-hand side
-            self.body_iterations = ti.field(ti.i32, bodies)  # of the last step
+            self.solver = ti.Vector.field(2, real, ())  # tolerance, most iterations
         if capacity.parallel:
             self.corner_force = ti.field(real, b * CORNER_ROWS * LANES)  # [N]
             self.edge_force = ti.Vector.field(3, real, k)

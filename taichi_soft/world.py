@@ -219,8 +219,6 @@ class World:
             self.settings.floor is not None,
             any(len(body.pinned) for body in self._bodies),
             device.threads,
-            self.settings.tolerance,
-            self.settings.most_iterations,
         )
         if self.settings.integrator is Integrator.EXPLICIT_EULER:
             warnings.warn(
@@ -235,6 +233,8 @@ class World:
         chosen = self._settings = replace(self._settings, schedule=schedule)
         state.gravity[None] = chosen.gravity.tolist()
         state.floor[None] = [chosen.floor or 0.0, chosen.restitution, chosen.friction]
+        if self._is_implicit:
+            state.solver[None] = [chosen.tolerance, chosen.most_iterations]
         self._read = np.empty((self._scene.particle_count, 3), dtype=np.float32)
         self._program, self._state = program, state
         self._launch = make_launch(schedule, state, program, self._scene, device)
@@ -281,14 +281,14 @@ class World:
             self._checked_step = asked
         seconds, count, h = self._step_values
         self._read_alpha = None
-        failed = self._launch(count, h)  # type: ignore[misc]
-        reports = self._note_failures(count, h) if failed else []
+        troubled = self._launch(count, h)  # type: ignore[misc]
+        reports = self._note_failures(count, h) if troubled else []
         self._step_count += 1
         self._time += seconds
         self._last_dt = seconds
         if reports:
             warnings.warn("; ".join(reports), FrozenBodyWarning, stacklevel=2)
-        if self._is_implicit:
+        if troubled and self._is_implicit:
             self._check_solves()
 
     def _check_step(self, dt: float, substeps: int | None) -> tuple[float, int, float]:

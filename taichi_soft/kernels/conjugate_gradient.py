@@ -31,8 +31,8 @@ def invert_blocks(state: ti.template(), body):
 
 
 @ti.func
-def solve_system(state: ti.template(), body, tolerance, most_iterations):
-    """Solve blocks times solution = residual. Returns the residual left, over the first, and the iterations.
+def solve_system(state: ti.template(), body):
+    """Solve blocks times solution = residual, as `solver` asks. Returns the residual left, over the first.
 
     Both are measured in the norm of the preconditioner. `residual` holds the right-hand side and is used up.
     """
@@ -46,6 +46,7 @@ def solve_system(state: ti.template(), body, tolerance, most_iterations):
         state.solution[p] = d * 0.0
         first += _dot(r, d)
     left = first
+    tolerance, most_iterations = state.solver[None][0], ti.cast(state.solver[None][1], ti.i32)
     count = 0
     while count < most_iterations and left > tolerance * tolerance * first:
         multiply_system(state, body, state.direction, state.image)
@@ -70,4 +71,4 @@ def solve_system(state: ti.template(), body, tolerance, most_iterations):
             count += 1
         else:
             count = most_iterations  # rounding has left nothing to go along
-    return ti.sqrt(ti.cast(left / ti.max(first, 1e-300), state.real)), count
+    return ti.sqrt(ti.cast(left / ti.max(first, 1e-300), state.real))

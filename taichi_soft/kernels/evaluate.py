@@ -5,7 +5,7 @@ from taichi_soft.kernels.bonds import accumulate_tensions
 from taichi_soft.kernels.edges import accumulate_edge_forces, edge_force_of
 from taichi_soft.kernels.elastic import lane_forces
 from taichi_soft.kernels.motion import particle_is_sound, restore_particle
-from taichi_soft.kernels.per_body import move_body
+from taichi_soft.kernels.per_body import advance_body
 from taichi_soft.math.finite import is_finite
 from taichi_soft.runtime import ti
 
@@ -102,7 +102,7 @@ def find_failure(
                     found[1] = s
                     is_open = 0
                 else:
-                    move_body(state, program, body, h, kick)
+                    advance_body(state, program, body, h, kick, int(s == 0))
                     kick = h
         particles = state.body_particles[body]
         for p in range(particles[0], particles[1]):

@@ -1,9 +1,14 @@
 """Stiffness of a body where it is, element by element or as the blocks that conjugate gradients see."""
 
 from taichi_soft.constants import LANES
-from taichi_soft.kernels.elastic import particles_of, rest_inverse_of
-from taichi_soft.kernels.linear_system import add_stiffness, bond_stiffness, clear_system, volume_pull
-from taichi_soft.laws.stiffness import element_stiffness, stiffness_block
+from taichi_soft.kernels.linear_system import (
+    add_stiffness,
+    bond_stiffness,
+    clear_system,
+    tet_stiffness,
+    volume_pull,
+)
+from taichi_soft.laws.stiffness import stiffness_block
 from taichi_soft.runtime import ti
 
 
@@ -13,18 +18,7 @@ def compute_tet_stiffness(state: ti.template(), model: ti.template(), out: ti.ty
     ti.loop_config(serialize=True)
     for t in range(out.shape[0]):
         block, lane = t // LANES, t % LANES
-        v = particles_of(state, block, lane)
-        U, g, M, alpha, beta = element_stiffness(
-            model,
-            state.particle_position[v[0]],
-            state.particle_position[v[1]],
-            state.particle_position[v[2]],
-            state.particle_position[v[3]],
-            rest_inverse_of(state, block, lane),
-            state.tet_lame[block * 2 * LANES + lane],
-            state.tet_lame[(block * 2 + 1) * LANES + lane],
-            False,
-        )
+        U, g, M, alpha, beta = tet_stiffness(state, model, block, lane, False)
         for i, j in ti.static(ti.ndrange(4, 4)):
             columns = stiffness_block(U, g[i], g[j], M, alpha, beta)
             for a, b in ti.static(ti.ndrange(3, 3)):

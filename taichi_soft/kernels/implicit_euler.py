@@ -65,14 +65,12 @@ def _move(state: ti.template(), program: ti.template(), p, h):
 def implicit_substep(state: ti.template(), program: ti.template(), body, h, is_first):
     """One substep of one body whose forces are in `particle_force`."""
     assemble(state, program, body, h)
-    residual, iterations = solve_system(state, body, program.tolerance, program.most_iterations)
+    residual = solve_system(state, body)
     multiply_system(state, body, state.solution, state.image)
     particles = state.body_particles[body]
     for p in range(particles[0], particles[1]):
         _move(state, program, p, h)
     if is_first == 1:
         state.body_residual[body] = residual
-        state.body_iterations[body] = iterations
     else:
         state.body_residual[body] = ti.max(state.body_residual[body], residual)
-        state.body_iterations[body] += iterations

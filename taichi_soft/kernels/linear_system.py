@@ -52,22 +52,29 @@ def _add_corner_pair(state: ti.template(), e, first, columns):
 
 
 @ti.func
+def tet_stiffness(state: ti.template(), model: ti.template(), block, lane, projected: ti.template()):
+    """`element_stiffness` of one tetrahedron where it is."""
+    v = particles_of(state, block, lane)
+    return element_stiffness(
+        model,
+        state.particle_position[v[0]],
+        state.particle_position[v[1]],
+        state.particle_position[v[2]],
+        state.particle_position[v[3]],
+        rest_inverse_of(state, block, lane),
+        state.tet_lame[block * 2 * LANES + lane],
+        state.tet_lame[(block * 2 + 1) * LANES + lane],
+        projected,
+    )
+
+
+@ti.func
 def _add_tet_stiffness(state: ti.template(), model: ti.template(), body, scale):
     blocks = state.body_blocks[body]
     for t in range(blocks[0] * LANES, blocks[1] * LANES):
         block, lane = t // LANES, t % LANES
         vertices = particles_of(state, block, lane)
-        U, g, M, alpha, beta = element_stiffness(
-            model,
-            state.particle_position[vertices[0]],
-            state.particle_position[vertices[1]],
-            state.particle_position[vertices[2]],
-            state.particle_position[vertices[3]],
-            rest_inverse_of(state, block, lane),
-            state.tet_lame[block * 2 * LANES + lane],
-            state.tet_lame[(block * 2 + 1) * LANES + lane],
-            True,
-        )
+        U, g, M, alpha, beta = tet_stiffness(state, model, block, lane, True)
         for i in ti.static(range(4)):
             c0, c1, c2 = stiffness_block(U, g[i], g[i], M, alpha, beta)
             p = vertices[i]

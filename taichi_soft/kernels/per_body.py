@@ -37,6 +37,15 @@ def move_body(state: ti.template(), program: ti.template(), body, h, kick):
 
 
 @ti.func
+def advance_body(state: ti.template(), program: ti.template(), body, h, kick, is_first):
+    """One substep of one body under the forces on its particles."""
+    if ti.static(program.integrator == Integrator.IMPLICIT_EULER):
+        implicit_substep(state, program, body, h, is_first)
+    else:
+        move_body(state, program, body, h, kick)
+
+
+@ti.func
 def _settle_body(state: ti.template(), body):
     """Freeze a body that went non-finite in its last sound state. Returns 1 where that happened."""
     particles = state.body_particles[body]
@@ -53,7 +62,7 @@ def _settle_body(state: ti.template(), body):
 
 @ti.func
 def _step_body(state: ti.template(), program: ti.template(), body, substeps, h):
-    """One fixed step of one body. Returns 1 where it failed."""
+    """One fixed step of one body. Returns 1 where it failed, or was not solved as exactly as asked."""
     particles = state.body_particles[body]
     for p in range(particles[0], particles[1]):
         remember_particle(state, p)
@@ -62,14 +71,13 @@ def _step_body(state: ti.template(), program: ti.template(), body, substeps, h):
         kick = 0.5 * (state.body_velocity_lag[body] + h)
         for s in range(substeps):
             accumulate_forces(state, program, body)
-            if ti.static(program.integrator == Integrator.IMPLICIT_EULER):
-                implicit_substep(state, program, body, h, int(s == 0))
-            else:
-                move_body(state, program, body, h, kick)
-                kick = h
+            advance_body(state, program, body, h, kick, int(s == 0))
+            kick = h
         failed = _settle_body(state, body)
         if failed == 0:
             state.body_velocity_lag[body] = h
+            if ti.static(program.integrator == Integrator.IMPLICIT_EULER):
+                failed = int(state.body_residual[body] > state.solver[None][0])
     return failed
 
 
@@ -77,7 +85,7 @@ def _step_body(state: ti.template(), program: ti.template(), body, substeps, h):
 def step_per_body(
     state: ti.template(), program: ti.template(), body_count: ti.i32, substeps: ti.i32, h: ti.f32
 ) -> ti.i32:
-    """One fixed step of every active body, side by side. Returns how many failed in it."""
+    """One fixed step of every active body, side by side. Returns how many had trouble in it."""
     failed = 0
     ti.loop_config(block_dim=1)
     for body in range(body_count):

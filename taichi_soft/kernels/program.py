@@ -17,8 +17,6 @@ class Program:
     has_floor: bool
     has_pins: bool = False
     worker_count: int = 1  # threads that share one flat step
-    tolerance: float = 1e-3  # of implicit solves, over their right-hand side
-    most_iterations: int = 200  # of an implicit solve
 
     @property
     def advance(self) -> Any:

@@ -7,6 +7,7 @@ import pytest
 
 from taichi_soft import (
     LAWS,
+    FrozenBodyWarning,
     Material,
     OptionError,
     ParticleMesh,
@@ -242,6 +243,17 @@ def test_a_solve_that_stops_early_is_reported_with_its_residual_and_stays_finite
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         world.step(1 / 60)  # said once
+
+
+def test_a_body_that_fails_under_it_is_frozen_and_can_be_asked_why():
+    """One that gravity takes past the highest speed that counts as sound."""
+    world, body = make_world(sphere(0.5, 1), Material(1e5, 0.3, 1000.0))
+    body.set_motion(body.mesh.vertices, np.tile((0.0, 0.0, -19_999.0), (body.vertex_count, 1)))
+    with pytest.warns(FrozenBodyWarning, match="body 0 went non-finite"):
+        world.step(0.5)
+    assert body.is_frozen
+    assert body.failure.substep in (None, 1)
+    assert np.isfinite(body.positions()).all()
 
 
 def test_a_rope_of_one_spring_falls_into_line_without_substeps():
