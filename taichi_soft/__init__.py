@@ -16,7 +16,15 @@ from taichi_soft.errors import (
 from taichi_soft.forces import force_gradient, internal_forces
 from taichi_soft.laws import LAWS, element_model
 from taichi_soft.laws.planes import plane_angles
-from taichi_soft.materials import PRESETS, Material, SpringMaterial, preset
+from taichi_soft.materials import (
+    PRESETS,
+    AnisotropicMaterial,
+    Material,
+    SpringMaterial,
+    Stiffness,
+    frames_along,
+    preset,
+)
 from taichi_soft.meshing import (
     MeshQuality,
     ParticleMesh,
@@ -46,6 +54,7 @@ from taichi_soft.world import World
 __all__ = [
     "LAWS",
     "PRESETS",
+    "AnisotropicMaterial",
     "Body",
     "Device",
     "DeviceError",
@@ -62,6 +71,7 @@ __all__ = [
     "SpringMaterial",
     "StableStep",
     "StateError",
+    "Stiffness",
     "TaichiSoftError",
     "TetMesh",
     "UnstableStepWarning",
@@ -78,6 +88,7 @@ __all__ = [
     "element_model",
     "extrude",
     "force_gradient",
+    "frames_along",
     "init",
     "internal_forces",
     "load_mesh",

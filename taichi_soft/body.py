@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from taichi_soft.checks import as_array
 from taichi_soft.errors import MeshError, OptionError, StateError
 from taichi_soft.laws.law import EnergyLaw
+from taichi_soft.materials import voigt_stress
 from taichi_soft.scene import BodyDescription, rest_inverses
 from taichi_soft.stability import StableStep
 
@@ -203,21 +204,24 @@ class Body:
         energy. Their stress is not the derivative of any energy (except of another one at poisson = 1/4), so
         the total may drift without damping.
         """
-        count = len(self.tets)
-        law, bonds = self._description.model.law, self._description.bonds
+        model, bonds = self._description.model, self._description.bonds
+        law = model.law
         if bonds is not None and law.name == "springs":
             ends = self.positions().astype(np.float64)[self.mesh.edges]
             growth = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) - bonds.constants[:, 0]
             return float(0.5 * bonds.constants[:, 1] @ growth**2)
-        if isinstance(law, EnergyLaw):
+        if isinstance(law, EnergyLaw) and not model.is_anisotropic:
+            count = len(self.tets)
             constants = (self.material.per_tet(name, count) for name in ("lame_lambda", "lame_mu"))
             return float(law.energy_density(self.deformations(), *constants) @ self.mesh.volumes)
-        strain = self.strains()
-        trace = np.einsum("maa->m", strain)
-        lame_lambda = self.material.per_tet("lame_lambda", count)
-        lame_mu = self.material.per_tet("lame_mu", count)
-        density = 0.5 * lame_lambda * trace**2 + lame_mu * np.einsum("mab,mab->m", strain, strain)
-        return float(density @ self.mesh.volumes)
+        strain, stress = self._green_strain_and_stress()
+        return float(0.5 * np.einsum("mab,mab->m", strain, stress) @ self.mesh.volumes)
+
+    def _green_strain_and_stress(self) -> tuple[Floats, Floats]:
+        """1/2 (F^T F - I), and Hooke's stress of it [Pa], in the axes of the rest shape, (m, 3, 3) each."""
+        F = self.deformations()
+        strain = 0.5 * (np.swapaxes(F, 1, 2) @ F - np.eye(3))
+        return strain, voigt_stress(self.material.stiffness_matrices(len(self.tets)), strain)
 
     def deformations(self) -> Floats:
         """Deformation gradient F = B A^-1 of each tetrahedron (thesis eq. 6.3), (m, 3, 3)."""
@@ -232,10 +236,9 @@ class Body:
 
     def vertex_stress(self) -> Floats:
         """Von Mises stress by Hooke's law and linear strain, averaged by volume, (n,) [Pa]: for colours."""
-        strain = self.strains()
-        deviator = strain - np.einsum("maa->m", strain)[:, None, None] / 3.0 * np.eye(3)
-        mu = self.material.per_tet("lame_mu", len(self.tets))
-        mises = 2 * mu * np.sqrt(1.5 * np.einsum("mab,mab->m", deviator, deviator))
+        _, stress = self._green_strain_and_stress()
+        deviator = stress - np.einsum("maa->m", stress)[:, None, None] / 3.0 * np.eye(3)
+        mises = np.sqrt(1.5 * np.einsum("mab,mab->m", deviator, deviator))
         volumes = self.mesh.volumes
         flat = self.tets.ravel()
         total = np.bincount(flat, np.repeat(mises * volumes, 4), minlength=self.vertex_count)

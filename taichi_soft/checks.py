@@ -114,19 +114,48 @@ def as_rotation(value: Any) -> Floats:
     if value is None:
         return np.eye(3)
     if hasattr(value, "__len__") and getattr(value, "ndim", 1) == 1 and len(value) == 4:
-        q = as_array(value, "rotation", (4,), "quaternion x, y, z, w")
-        length = float(np.linalg.norm(q))
-        if abs(length - 1.0) > 1e-3:
-            raise OptionError(f"rotation is a quaternion of length {length:g}: normalise it")
-        x, y, z, w = q / length
-        return np.array(
-            [
-                [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-                [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-                [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-            ]
-        )
+        quaternion = as_array(value, "rotation", (4,), "quaternion x, y, z, w")
+        return np.asarray(_from_quaternions(quaternion[None], "rotation")[0])
     matrix = as_array(value, "rotation", (3, 3), "or quaternion of shape (4,)")
-    if np.abs(matrix @ matrix.T - np.eye(3)).max() > 1e-5 or np.linalg.det(matrix) < 0:
-        raise OptionError("rotation must be an orthonormal matrix with determinant +1")
-    return matrix
+    return np.asarray(_rotations(matrix[None], "rotation")[0])
+
+
+def as_rotations(value: Any, name: str) -> Floats:
+    """Rotation matrices (m, 3, 3) from such matrices, or from quaternions (m, 4) of x, y, z, w.
+
+    Raises: OptionError with the first that is no rotation.
+    """
+    if to_array(value, name).ndim == 2:
+        return _from_quaternions(as_array(value, name, (None, 4), "quaternions x, y, z, w"), name)
+    return _rotations(as_array(value, name, (None, 3, 3), "or quaternions of shape (n, 4)"), name)
+
+
+def _rotations(matrices: Floats, name: str) -> Floats:
+    gap = np.abs(matrices @ np.swapaxes(matrices, 1, 2) - np.eye(3)).max(axis=(1, 2))
+    bad = (gap > 1e-5) | (np.linalg.det(matrices) < 0)
+    if bad.any():
+        raise OptionError(
+            f"{name}{_which(bad)} must be an orthonormal matrix with determinant +1, "
+            f"got {matrices[bad.argmax()].round(6).tolist()}"
+        )
+    return matrices
+
+
+def _from_quaternions(quaternions: Floats, name: str) -> Floats:
+    lengths = np.linalg.norm(quaternions, axis=1)
+    bad = np.abs(lengths - 1.0) > 1e-3
+    if bad.any():
+        raise OptionError(
+            f"{name}{_which(bad)} is a quaternion of length {lengths[bad.argmax()]:g}: normalise it"
+        )
+    x, y, z, w = (quaternions / lengths[:, None]).T
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), 2, 0)
+
+
+def _which(bad: NDArray[np.bool_]) -> str:
+    return f" {int(bad.argmax())}" if len(bad) > 1 else ""

@@ -19,8 +19,8 @@ from taichi_soft.kernels.gradients import (
 )
 from taichi_soft.kernels.program import Program
 from taichi_soft.kernels.readout import write_motion
-from taichi_soft.laws import ElementModel, element_model, require_body
-from taichi_soft.materials import Material, SpringMaterial
+from taichi_soft.laws import ElementModel, element_model, fit_model
+from taichi_soft.materials import AnyMaterial
 from taichi_soft.meshing import BodyMesh
 from taichi_soft.meshing.arrays import LARGEST_COORDINATE
 from taichi_soft.runtime import init
@@ -33,7 +33,7 @@ Floats = NDArray[np.float64]
 
 def internal_forces(
     mesh: BodyMesh,
-    material: Material | SpringMaterial,
+    material: AnyMaterial,
     positions: ArrayLike,
     velocities: ArrayLike | None = None,
     *,
@@ -56,8 +56,7 @@ def internal_forces(
     Returns: (n, 3) of `dtype`.
     Raises: OptionError for a name or dtype that is not known; MeshError for arrays that do not fit.
     """
-    model = element_model(law, strain, flips, damping_model)
-    require_body(mesh, material, model)
+    model = fit_model(element_model(law, strain, flips, damping_model), mesh, material)
     real = _real(dtype)
     x = _rows(positions, mesh, "positions", real)
     v = np.zeros_like(x) if velocities is None else _rows(velocities, mesh, "velocities", real)
@@ -66,7 +65,7 @@ def internal_forces(
 
 def force_gradient(
     mesh: BodyMesh,
-    material: Material | SpringMaterial,
+    material: AnyMaterial,
     positions: ArrayLike,
     *,
     law: str = "virial",
@@ -84,8 +83,8 @@ def force_gradient(
     Returns: df/dx, (n, 3, n, 3) [N/m], all of it: for meshes of some hundred vertices.
     Raises: as `internal_forces`.
     """
-    model = element_model(law, strain, flips)
-    require_body(mesh, material, model)
+    model = fit_model(element_model(law, strain, flips), mesh, material)
+    model.require_integrator(Integrator.IMPLICIT_EULER)
     x = _rows(positions, mesh, "positions", np.dtype(np.float64))
     if not isinstance(projected, bool):
         raise OptionError(f"projected must be True or False, got {projected!r}")
@@ -163,9 +162,7 @@ def _add_blocks(total: Floats, owners: NDArray[np.int32], elements: Floats) -> N
 _last: dict[bool, StillBody] = {}
 
 
-def _still_body(
-    mesh: BodyMesh, material: Material | SpringMaterial, model: ElementModel, *, double: bool
-) -> StillBody:
+def _still_body(mesh: BodyMesh, material: AnyMaterial, model: ElementModel, *, double: bool) -> StillBody:
     """The body of the last call in this precision if it is the same, for loops over deformations."""
     last = _last.get(double)
     if last is not None:

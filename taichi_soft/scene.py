@@ -12,7 +12,7 @@ from taichi_soft.constants import LANES
 from taichi_soft.errors import MeshError
 from taichi_soft.laws import BondLaw, ElementModel
 from taichi_soft.laws.bonds import Bonds, Ring
-from taichi_soft.materials import Material, SpringMaterial
+from taichi_soft.materials import AnisotropicMaterial, AnyMaterial, Material, SpringMaterial
 from taichi_soft.meshing import BodyMesh, ParticleMesh, TetMesh, renumbered, spatial_order, tet_order
 from taichi_soft.types import DampingModel
 
@@ -28,7 +28,7 @@ class BodyDescription:
     """One body as the user added it."""
 
     mesh: BodyMesh
-    material: Material | SpringMaterial
+    material: AnyMaterial
     model: ElementModel
     position: Floats  # (3,) [m], where the mesh's origin goes
     rotation: Floats  # (3, 3)
@@ -36,9 +36,7 @@ class BodyDescription:
     pinned: Ints  # vertices that stay where they are
 
     @classmethod
-    def at_rest(
-        cls, mesh: BodyMesh, material: Material | SpringMaterial, model: ElementModel
-    ) -> BodyDescription:
+    def at_rest(cls, mesh: BodyMesh, material: AnyMaterial, model: ElementModel) -> BodyDescription:
         """A body where its mesh is."""
         origin = np.zeros(3)
         return cls(mesh, material, model, origin, np.eye(3), origin, np.zeros(0, dtype=np.int32))
@@ -68,6 +66,22 @@ class BodyDescription:
         if isinstance(self.material, SpringMaterial):
             return np.zeros(0)
         return self.material.per_tet(name, len(self.mesh.tets))
+
+    @property
+    def lame(self) -> Floats:
+        """Lame's lambda and mu of each tetrahedron, (m, 2) [Pa]; zero for an anisotropic material."""
+        if not isinstance(self.material, Material):
+            return np.zeros((len(self.mesh.tets), 2))
+        return np.stack([self.per_tet("lame_lambda"), self.per_tet("lame_mu")], axis=1)
+
+    @property
+    def stiffness(self) -> Floats:
+        """The 21 constants of each tetrahedron of an anisotropic material, (m, 21) [Pa]; zero for others."""
+        count = len(self.mesh.tets)
+        if not isinstance(self.material, AnisotropicMaterial):
+            return np.zeros((count, 21))
+        rows, columns = np.triu_indices(6)
+        return self.material.stiffness_matrices(count)[:, rows, columns]
 
     @cached_property
     def edge_damping(self) -> Floats:
@@ -103,7 +117,8 @@ class BodyArrays:
     tet_vertices: Ints  # (m, 4) into the particles of this body
     tet_order: Ints  # (m,) caller's index of each tetrahedron
     rest_inverse: Floats  # (m, 3, 3) [1/m]
-    lame: Floats  # (m, 2) lambda, mu [Pa]
+    lame: Floats  # (m, 2) lambda, mu [Pa]; zero where the stiffness tells all
+    stiffness: Floats  # (m, 21) [Pa], upper triangle of an anisotropic one; zero of others
     tet_damping: Floats  # (m,) [N s/m]
     tet_edges: Ints  # (m, 6) edges of each, in the order of `LOCAL_EDGES`
     edge_vertices: Ints  # (k, 2)
@@ -207,7 +222,6 @@ def arrange(description: BodyDescription) -> BodyArrays:
     if description.model.has_simple_edges:  # whose ends are alike; others have a direction from i to j
         edges = np.sort(edges, axis=1)
     edge_order = np.lexsort((edges[:, 1], edges[:, 0])).astype(np.int64)
-    lame = np.stack([description.per_tet("lame_lambda"), description.per_tet("lame_mu")], axis=1)
     return BodyArrays(
         order=order,
         rank=new_index,
@@ -217,7 +231,8 @@ def arrange(description: BodyDescription) -> BodyArrays:
         tet_vertices=new_index[mesh.tets[tets]],
         tet_order=tets,
         rest_inverse=rest_inverses(mesh)[tets],
-        lame=lame[tets],
+        lame=description.lame[tets],
+        stiffness=description.stiffness[tets],
         tet_damping=description.per_tet("damping")[tets],
         tet_edges=_arrange_tet_edges(mesh, tets, edge_order),
         edge_vertices=edges[edge_order],

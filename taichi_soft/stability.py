@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from taichi_soft.errors import OptionError
 from taichi_soft.forces import StillBody
-from taichi_soft.laws import ElementModel, require_body
+from taichi_soft.laws import ElementModel, fit_model
 from taichi_soft.laws.bonds import Bonds
-from taichi_soft.materials import Material, SpringMaterial
+from taichi_soft.materials import AnisotropicMaterial, AnyMaterial, Material, voigt_stress
 from taichi_soft.meshing import BodyMesh, TetMesh
 from taichi_soft.scene import BodyDescription, edge_damping, rest_inverses, vertex_masses
 from taichi_soft.types import DampingModel
@@ -56,7 +56,7 @@ class StableStep:
         return MARGIN * self.limit
 
 
-def stable_step(mesh: BodyMesh, material: Material | SpringMaterial, model: ElementModel) -> StableStep:
+def stable_step(mesh: BodyMesh, material: AnyMaterial, model: ElementModel) -> StableStep:
     """Estimate the largest stable substep of a body under leapfrog; explicit Euler has none.
 
     It holds for motion about the rest shape. A body under strong compression is stiffer and a flattened
@@ -65,12 +65,12 @@ def stable_step(mesh: BodyMesh, material: Material | SpringMaterial, model: Elem
     """
     if not isinstance(model, ElementModel):
         raise OptionError(f"model must come from element_model(...), got {model!r}")
-    require_body(mesh, material, model)
+    model = fit_model(model, mesh, material)
     description = BodyDescription.at_rest(mesh, material, model)
     if description.bonds is not None:
         return _stable_bond_step(description, description.bonds)
     assert isinstance(mesh, TetMesh)
-    assert isinstance(material, Material)
+    assert isinstance(material, Material | AnisotropicMaterial)
     count = len(mesh.tets)
     mass = vertex_masses(mesh, material.per_tet("density", count))
     elastic = _ElasticOperator(mesh, material, mass)
@@ -127,37 +127,34 @@ def _stable_bond_step(body: BodyDescription, bonds: Bonds) -> StableStep:
 class _ElasticOperator:
     """M^-1 K of a body at rest, applied tetrahedron by tetrahedron."""
 
-    def __init__(self, mesh: TetMesh, material: Material, mass: Floats) -> None:
+    def __init__(self, mesh: TetMesh, material: Material | AnisotropicMaterial, mass: Floats) -> None:
         count = len(mesh.tets)
         self.tets = mesh.tets
         self.root_mass = np.sqrt(mass)[:, None]
         inverse = rest_inverses(mesh)
         self.gradients = np.concatenate([-inverse.sum(axis=1, keepdims=True), inverse], axis=1)  # (m, 4, 3)
         self.volumes = mesh.volumes
-        self.lame_lambda = material.per_tet("lame_lambda", count)
-        self.lame_mu = material.per_tet("lame_mu", count)
+        self.stiffness = material.stiffness_matrices(count)
         self.density = material.per_tet("density", count)
 
     def element_bounds(self) -> Floats:
         """Largest w^2 of every tetrahedron on its own quarter masses, (m,) [1/s^2].
 
-        K_e = V sum (lambda g_i g_j + mu (g_j g_i + g_i.g_j I)) has the spectrum of a 6x6 matrix
-        C^1/2 (b b^T) C^1/2, where b maps displacements to strain (Mandel order).
+        K_e = V b^T C b, where b maps displacements to strain in Voigt's order, has the spectrum of the 6x6
+        matrix L^T (b b^T) L with L L^T = C.
         """
         g = self.gradients
         b = np.zeros((len(g), 6, 4, 3))
         for axis in range(3):
             b[:, axis, :, axis] = g[:, :, axis]
         for row, (p, q) in enumerate(((1, 2), (0, 2), (0, 1)), start=3):
-            b[:, row, :, p] = g[:, :, q] / np.sqrt(2)
-            b[:, row, :, q] = g[:, :, p] / np.sqrt(2)
+            b[:, row, :, p] = g[:, :, q]
+            b[:, row, :, q] = g[:, :, p]
         rows = b.reshape(len(g), 6, 12)
-        shear = np.sqrt(2 * self.lame_mu)
-        bulk = np.sqrt(3 * self.lame_lambda + 2 * self.lame_mu)
-        hydrostatic = np.zeros((6, 6))
-        hydrostatic[:3, :3] = 1 / 3
-        root = shear[:, None, None] * np.eye(6) + (bulk - shear)[:, None, None] * hydrostatic
-        gram = root @ (rows @ np.swapaxes(rows, 1, 2)) @ root
+        # Nothing beside the largest entry, but it keeps ratios near -1 and 1/2 from failing by round-off.
+        floor = 1e-12 * np.abs(self.stiffness).max(axis=(1, 2))
+        root = np.linalg.cholesky(self.stiffness + floor[:, None, None] * np.eye(6))
+        gram = np.swapaxes(root, 1, 2) @ (rows @ np.swapaxes(rows, 1, 2)) @ root
         return np.asarray(np.linalg.eigvalsh(gram)[:, -1] * 4.0 / self.density)
 
     def apply(self, u: Floats) -> Floats:
@@ -165,15 +162,13 @@ class _ElasticOperator:
         displaced = (u / self.root_mass)[self.tets]
         gradient = np.einsum("mia,mib->mab", displaced, self.gradients)
         strain = (gradient + np.swapaxes(gradient, 1, 2)) / 2
-        trace = np.einsum("maa->m", strain)
-        stress = 2 * self.lame_mu[:, None, None] * strain
-        stress += (self.lame_lambda * trace)[:, None, None] * np.eye(3)
+        stress = voigt_stress(self.stiffness, strain)
         forces = np.einsum("mab,mib->mia", stress * self.volumes[:, None, None], self.gradients)
         return _summed(self.tets, forces, len(u)) / self.root_mass
 
 
 def _damping_operator(
-    mesh: TetMesh, material: Material, model: ElementModel, mass: Floats
+    mesh: TetMesh, material: Material | AnisotropicMaterial, model: ElementModel, mass: Floats
 ) -> Operator | None:
     """M^-1/2 C M^-1/2, or None where nothing damps."""
     tet_damping = material.per_tet("damping", len(mesh.tets))

@@ -31,6 +31,7 @@ class Capacity:
     parallel: bool  # room for the force of every corner and edge at once, as the flat schedule needs
     rings: int = 0  # rows of what lies round edges, and whether edges carry force at all
     implicit: bool = False  # room for the linear system of implicit integration
+    anisotropic: bool = False  # room for 21 elastic constants per tetrahedron
     double: bool = False  # float64 instead of float32: to evaluate forces, not to move
 
     @classmethod
@@ -46,6 +47,7 @@ class Capacity:
             parallel,
             _power_of_two(scene.ring_count, 512) if scene.has_bonds else 0,
             implicit,
+            any(body.stiffness.any() for body in scene.bodies),
             double,
         )
 
@@ -80,6 +82,8 @@ class State:
         self.tet_vertices = ti.field(ti.i32, b * 4 * LANES)
         self.tet_rest_inverse = ti.field(real, b * 9 * LANES)  # [1/m], column by column
         self.tet_lame = ti.field(real, b * 2 * LANES)  # [Pa]
+        if capacity.anisotropic:
+            self.tet_stiffness = ti.field(real, b * 21 * LANES)  # [Pa], upper triangle row by row
         self.tet_damping = ti.field(real, b * LANES)  # [N s/m], for damping by the mean velocity
 
         self.edge_vertices = ti.Vector.field(2, ti.i32, k, layout=ti.Layout.SOA)
@@ -153,6 +157,8 @@ class State:
         fill(self.tet_vertices, vertices)
         fill(self.tet_rest_inverse, _blocks(bodies, lambda b: np.swapaxes(b.rest_inverse, 1, 2), 9))
         fill(self.tet_lame, _blocks(bodies, lambda b: b.lame, 2))
+        if self.capacity.anisotropic:
+            fill(self.tet_stiffness, _blocks(bodies, lambda b: b.stiffness, 21))
         fill(self.tet_damping, _blocks(bodies, lambda b: b.tet_damping, 1))
 
         edges = np.concatenate(

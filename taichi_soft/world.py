@@ -20,8 +20,8 @@ from taichi_soft.kernels.evaluate import compute_body_forces, find_failure
 from taichi_soft.kernels.program import Program
 from taichi_soft.kernels.readout import read_positions, read_velocities, write_motion
 from taichi_soft.kernels.schedules import Launch, choose_schedule, make_launch
-from taichi_soft.laws import ElementModel, element_model, require_body
-from taichi_soft.materials import Material, SpringMaterial
+from taichi_soft.laws import ElementModel, element_model, fit_model
+from taichi_soft.materials import AnyMaterial
 from taichi_soft.meshing import BodyMesh
 from taichi_soft.runtime import init
 from taichi_soft.scene import BodyDescription, Scene, arrange, require_size
@@ -134,7 +134,7 @@ class World:
     def add_body(
         self,
         mesh: BodyMesh,
-        material: Material | SpringMaterial,
+        material: AnyMaterial,
         *,
         law: str = "virial",
         strain: str | Strain | None = None,
@@ -166,8 +166,8 @@ class World:
         """
         if self.is_built:
             raise StateError("the world is already built: add bodies first, then call build() once")
-        model = element_model(law, strain, flips, damping_model)
-        require_body(mesh, material, model)
+        model = fit_model(element_model(law, strain, flips, damping_model), mesh, material)
+        model.require_integrator(self.settings.integrator)
         description = BodyDescription(
             mesh,
             material,

@@ -36,14 +36,38 @@ def rest_inverse_of(state: ti.template(), block, lane):
 
 
 @ti.func
+def stiffness_of(state: ti.template(), block, lane):
+    """The 21 constants of a tetrahedron as `anisotropic_stress` takes them."""
+    base = block * 21 * LANES + lane
+    c = [state.tet_stiffness[base + k * LANES] for k in ti.static(range(21))]
+    return (
+        (ti.Vector([c[0], c[1], c[2]]), ti.Vector([c[1], c[6], c[7]]), ti.Vector([c[2], c[7], c[11]])),
+        (ti.Vector([c[3], c[8], c[12]]), ti.Vector([c[4], c[9], c[13]]), ti.Vector([c[5], c[10], c[14]])),
+        (
+            ti.Vector([c[15], c[16], c[17]]),
+            ti.Vector([c[16], c[18], c[19]]),
+            ti.Vector([c[17], c[19], c[20]]),
+        ),
+    )
+
+
+@ti.func
+def elasticity_of(state: ti.template(), model: ti.template(), block, lane):
+    """What turns the strain of a tetrahedron into stress: lambda and mu, or its stiffness [Pa]."""
+    if ti.static(model.is_anisotropic):
+        return stiffness_of(state, block, lane)
+    else:
+        return state.tet_lame[block * 2 * LANES + lane], state.tet_lame[(block * 2 + 1) * LANES + lane]
+
+
+@ti.func
 def _upright_forces_of(state: ti.template(), model: ti.template(), block, lane):
     p0, p1, p2, p3 = particles_of(state, block, lane)
     x0, x1 = state.particle_position[p0], state.particle_position[p1]
     x2, x3 = state.particle_position[p2], state.particle_position[p3]
     inverse = rest_inverse_of(state, block, lane)
-    lame_lambda = state.tet_lame[block * 2 * LANES + lane]
-    lame_mu = state.tet_lame[(block * 2 + 1) * LANES + lane]
-    f0, f1, f2, f3, volume6 = upright_forces(model, x0, x1, x2, x3, inverse, lame_lambda, lame_mu)
+    elasticity = elasticity_of(state, model, block, lane)
+    f0, f1, f2, f3, volume6 = upright_forces(model, x0, x1, x2, x3, inverse, elasticity)
     if ti.static(model.damping_model == DampingModel.TET_MEAN):
         d0, d1, d2, d3 = tet_mean_damping_forces(
             state.particle_velocity[p0],
@@ -66,8 +90,7 @@ def _flipped_forces_of(state: ti.template(), model: ti.template(), block, lane):
         state.particle_position[p2],
         state.particle_position[p3],
         rest_inverse_of(state, block, lane),
-        state.tet_lame[block * 2 * LANES + lane],
-        state.tet_lame[(block * 2 + 1) * LANES + lane],
+        elasticity_of(state, model, block, lane),
     )
 
 

@@ -5,10 +5,10 @@ from taichi_soft.kernels.linear_system import (
     add_stiffness,
     bond_stiffness,
     clear_system,
+    corner_stiffness,
     tet_stiffness,
     volume_pull,
 )
-from taichi_soft.laws.stiffness import stiffness_block
 from taichi_soft.runtime import ti
 
 
@@ -18,9 +18,9 @@ def compute_tet_stiffness(state: ti.template(), model: ti.template(), out: ti.ty
     ti.loop_config(serialize=True)
     for t in range(out.shape[0]):
         block, lane = t // LANES, t % LANES
-        U, g, M, alpha, beta = tet_stiffness(state, model, block, lane, False)
+        g, element = tet_stiffness(state, model, block, lane, False)
         for i, j in ti.static(ti.ndrange(4, 4)):
-            columns = stiffness_block(U, g[i], g[j], M, alpha, beta)
+            columns = corner_stiffness(model, g[i], g[j], element)
             for a, b in ti.static(ti.ndrange(3, 3)):
                 out[t, 3 * i + a, 3 * j + b] = columns[b][a]
 

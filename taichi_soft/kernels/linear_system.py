@@ -7,14 +7,16 @@ edges.
 
 from taichi_soft.constants import LANES
 from taichi_soft.kernels.bonds import bond_frame_of, ring_tension
-from taichi_soft.kernels.elastic import particles_of, rest_inverse_of
+from taichi_soft.kernels.elastic import elasticity_of, particles_of, rest_inverse_of
+from taichi_soft.laws.anisotropy import green_stress, pair_stiffness
 from taichi_soft.laws.bond_stiffness import along_and_across, spring_stiffness
 from taichi_soft.laws.bonds import Ring
 from taichi_soft.laws.cmpm import direction_of, shear_direction
 from taichi_soft.laws.springs import along, spring_tension
-from taichi_soft.laws.stiffness import element_stiffness, stiffness_block
+from taichi_soft.laws.stiffness import element_stiffness, positive_part, stiffness_block, weighed_rows
 from taichi_soft.laws.volume_springs import expansion_gradients
-from taichi_soft.math.tensors import outer
+from taichi_soft.math.tensors import outer, product
+from taichi_soft.math.tetrahedron import shape
 from taichi_soft.runtime import ti
 from taichi_soft.types import DampingModel
 
@@ -53,19 +55,32 @@ def _add_corner_pair(state: ti.template(), e, first, columns):
 
 @ti.func
 def tet_stiffness(state: ti.template(), model: ti.template(), block, lane, projected: ti.template()):
-    """`element_stiffness` of one tetrahedron where it is."""
+    """What `corner_stiffness` needs of one tetrahedron where it is: rows for its corners, and the rest.
+
+    Args:
+        projected: make it symmetric and positive semi-definite.
+    """
     v = particles_of(state, block, lane)
-    return element_stiffness(
-        model,
-        state.particle_position[v[0]],
-        state.particle_position[v[1]],
-        state.particle_position[v[2]],
-        state.particle_position[v[3]],
-        rest_inverse_of(state, block, lane),
-        state.tet_lame[block * 2 * LANES + lane],
-        state.tet_lame[(block * 2 + 1) * LANES + lane],
-        projected,
-    )
+    x = [state.particle_position[v[i]] for i in ti.static(range(4))]
+    inverse = rest_inverse_of(state, block, lane)
+    F = product(shape(x[0], x[1], x[2], x[3]), inverse)
+    elasticity = elasticity_of(state, model, block, lane)
+    if ti.static(model.is_anisotropic):
+        a, b, c = green_stress(F, elasticity)
+        if ti.static(projected):
+            a, b, c = positive_part((a, b, c))
+        return weighed_rows(inverse), (F, (a, b, c), elasticity)
+    else:
+        return element_stiffness(model, F, weighed_rows(inverse), elasticity, projected)
+
+
+@ti.func
+def corner_stiffness(model: ti.template(), gi, gj, element):
+    """- d f_i / d x_j of two corners [N/m], as columns, by their rows and the rest of `tet_stiffness`."""
+    if ti.static(model.is_anisotropic):
+        return pair_stiffness(element[0], gi, gj, element[1], element[2])
+    else:
+        return stiffness_block(element[0], gi, gj, element[1], element[2], element[3])
 
 
 @ti.func
@@ -74,13 +89,13 @@ def _add_tet_stiffness(state: ti.template(), model: ti.template(), body, scale):
     for t in range(blocks[0] * LANES, blocks[1] * LANES):
         block, lane = t // LANES, t % LANES
         vertices = particles_of(state, block, lane)
-        U, g, M, alpha, beta = tet_stiffness(state, model, block, lane, True)
+        g, element = tet_stiffness(state, model, block, lane, True)
         for i in ti.static(range(4)):
-            c0, c1, c2 = stiffness_block(U, g[i], g[i], M, alpha, beta)
+            c0, c1, c2 = corner_stiffness(model, g[i], g[i], element)
             p = vertices[i]
             state.particle_block[p] = state.particle_block[p] + ti.Matrix.cols([c0, c1, c2]) * scale
         for k, i, j in ti.static(EDGES):
-            c0, c1, c2 = stiffness_block(U, g[i], g[j], M, alpha, beta)
+            c0, c1, c2 = corner_stiffness(model, g[i], g[j], element)
             e = state.tet_edges[(block * 6 + k) * LANES + lane]
             _add_corner_pair(state, e, vertices[i], (c0 * scale, c1 * scale, c2 * scale))
 

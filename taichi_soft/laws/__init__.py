@@ -1,5 +1,6 @@
 """Force laws by name. A new law is one file with its functions and one line here."""
 
+from dataclasses import replace
 from functools import partial
 
 from taichi_soft.errors import MaterialError, MeshError, OptionError
@@ -8,7 +9,7 @@ from taichi_soft.laws.bonds import Ring
 from taichi_soft.laws.cmpm import cmpm_bonds
 from taichi_soft.laws.cmpm2 import cmpm2_bonds
 from taichi_soft.laws.face import face_forces
-from taichi_soft.laws.law import SOLID, BondLaw, EnergyLaw, Law, StressLaw
+from taichi_soft.laws.law import SOLID, SOLID_OR_ANISOTROPIC, BondLaw, EnergyLaw, Law, StressLaw
 from taichi_soft.laws.model import ElementModel
 from taichi_soft.laws.neo_hookean import neo_hookean_energy, neo_hookean_piola, neo_hookean_principal
 from taichi_soft.laws.springs import spring_bonds
@@ -20,7 +21,7 @@ from taichi_soft.laws.st_venant_kirchhoff import (
 from taichi_soft.laws.tilted_plane import PRINTED, tilted_plane_bonds
 from taichi_soft.laws.virial import virial_forces
 from taichi_soft.laws.volume_springs import volume_spring_bonds
-from taichi_soft.materials import CONSTANTS, Material, SpringMaterial
+from taichi_soft.materials import CONSTANTS, AnisotropicMaterial, AnyMaterial, SpringMaterial
 from taichi_soft.meshing import BodyMesh, ParticleMesh, TetMesh
 from taichi_soft.types import ChoiceT, DampingModel, Flips, Strain
 
@@ -32,7 +33,7 @@ __all__ = [
     "Law",
     "StressLaw",
     "element_model",
-    "require_body",
+    "fit_model",
 ]
 
 LAWS: dict[str, Law] = {
@@ -49,6 +50,8 @@ LAWS: dict[str, Law] = {
             st_venant_kirchhoff_energy,
             (Strain.LINEAR,),
             (Flips.TOLERANT,),
+            SOLID_OR_ANISOTROPIC,
+            takes_anisotropy=True,
         ),
         EnergyLaw(
             "neo_hookean",
@@ -140,30 +143,44 @@ def element_model(
     )
 
 
-def require_body(mesh: BodyMesh, material: Material | SpringMaterial, model: ElementModel) -> None:
-    """Raises: MeshError or MaterialError where a law cannot be made of this mesh and this material."""
+def fit_model(model: ElementModel, mesh: BodyMesh, material: AnyMaterial) -> ElementModel:
+    """The model that this mesh and this material need.
+
+    Raises: MeshError or MaterialError where a law cannot be made of them.
+    """
     law = model.law
     if not isinstance(mesh, BodyMesh):
         raise MeshError(f"mesh must be a TetMesh or a ParticleMesh, got {type(mesh).__name__}")
-    if not isinstance(material, (Material, SpringMaterial)):
+    if not isinstance(material, AnyMaterial):
         raise MaterialError(f"material must be a taichi_soft.Material, got {type(material).__name__}")
-    if law.name != "springs" or isinstance(material, Material):
-        if not isinstance(mesh, TetMesh):
-            raise MeshError(
-                f"law {law.name!r} needs tetrahedra: pass a TetMesh, got {type(mesh).__name__}"
-                + (" (which takes a SpringMaterial)" if law.name == "springs" else "")
-            )
-        if not isinstance(material, Material):
-            raise MaterialError(f"law {law.name!r} needs a Material, got {type(material).__name__}")
-    elif not isinstance(mesh, ParticleMesh):
-        raise MaterialError("a SpringMaterial tells no density: turn the mesh into a ParticleMesh first")
-    if isinstance(material, Material):
-        for name in CONSTANTS:
-            if getattr(material, name) is not None:
-                material.per_tet(name, len(mesh.tets))
-        given = material.shear_modulus is not None or material.shear_damping is not None
-        if given and not (isinstance(law, BondLaw) and law.takes_shear):
-            raise MaterialError(f"law {law.name!r} takes no shear_modulus or shear_damping of its own")
+    if isinstance(material, SpringMaterial) and law.name == "springs":
+        if not isinstance(mesh, ParticleMesh):
+            raise MaterialError("a SpringMaterial tells no density: turn the mesh into a ParticleMesh first")
+        return model
+    if not isinstance(mesh, TetMesh):
+        raise MeshError(
+            f"law {law.name!r} needs tetrahedra: pass a TetMesh, got {type(mesh).__name__}"
+            + (" (which takes a SpringMaterial)" if law.name == "springs" else "")
+        )
+    if isinstance(material, SpringMaterial):
+        raise MaterialError(f"law {law.name!r} needs a Material, got {type(material).__name__}")
+    if isinstance(material, AnisotropicMaterial):
+        return _fit_anisotropic(model, len(mesh.tets), material)
+    for name in CONSTANTS:
+        if getattr(material, name) is not None:
+            material.per_tet(name, len(mesh.tets))
+    given = material.shear_modulus is not None or material.shear_damping is not None
+    if given and not (isinstance(law, BondLaw) and law.takes_shear):
+        raise MaterialError(f"law {law.name!r} takes no shear_modulus or shear_damping of its own")
+    return replace(model, is_anisotropic=False)
+
+
+def _fit_anisotropic(model: ElementModel, tet_count: int, material: AnisotropicMaterial) -> ElementModel:
+    if not model.law.takes_anisotropy:
+        takers = ", ".join(repr(law.name) for law in LAWS.values() if law.takes_anisotropy)
+        raise MaterialError(f"law {model.law.name!r} takes no AnisotropicMaterial: {takers} do")
+    material.require_count(tet_count)
+    return replace(model, is_anisotropic=True)
 
 
 def _one_of(law: Law, option: str, asked: ChoiceT | None, taken: tuple[ChoiceT, ...]) -> ChoiceT | None:

@@ -8,6 +8,7 @@ from taichi_soft.laws.bonds import Bonds, Ring
 from taichi_soft.types import Flips, Integrator, Strain
 
 SOLID = ("young", "poisson", "density", "damping")
+SOLID_OR_ANISOTROPIC = (*SOLID[:3], "damping; or stiffness", "frame", "density", "damping")
 
 
 @dataclass(frozen=True)
@@ -20,9 +21,10 @@ class StressLaw:
     forces: Any  # ti.func (shape columns, Cauchy stress columns) -> four vec3 [N]
     strains: tuple[Strain, ...] = (Strain.LINEAR, Strain.EXACT)  # that it takes, its default first
     flips: tuple[Flips, ...] = (Flips.TOLERANT, Flips.RECOVER, Flips.OFF)
-    parameters: tuple[str, ...] = SOLID  # of its material
+    parameters: tuple[str, ...] = SOLID_OR_ANISOTROPIC  # of its material
     integrators: tuple[Integrator, ...] = tuple(Integrator)
     keeps_energy: bool = False
+    takes_anisotropy: bool = True  # 21 elastic constants instead of 2
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,7 @@ class EnergyLaw:
     parameters: tuple[str, ...] = SOLID
     integrators: tuple[Integrator, ...] = tuple(Integrator)
     keeps_energy: bool = True
+    takes_anisotropy: bool = False
 
 
 @dataclass(frozen=True)
@@ -54,6 +57,7 @@ class BondLaw:
     parameters: tuple[str, ...] = (*SOLID, "shear_modulus", "shear_damping")
     keeps_energy: bool = False
     integrators: tuple[Integrator, ...] = tuple(Integrator)
+    takes_anisotropy: bool = False
     strains: tuple[Strain, ...] = ()
     flips: tuple[Flips, ...] = ()
 

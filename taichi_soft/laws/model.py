@@ -5,7 +5,9 @@ A model holds choices, never numbers, so that one compiled kernel serves every m
 
 from dataclasses import dataclass
 
+from taichi_soft.errors import OptionError
 from taichi_soft.laws import strain as strains
+from taichi_soft.laws.anisotropy import green_stress, recovered_stress, turned_stress
 from taichi_soft.laws.bonds import Ring
 from taichi_soft.laws.energy import energy_forces
 from taichi_soft.laws.hooke import hooke_stress
@@ -14,7 +16,7 @@ from taichi_soft.laws.recovery import recovering_stress
 from taichi_soft.math.tensors import determinant, product
 from taichi_soft.math.tetrahedron import shape
 from taichi_soft.runtime import ti
-from taichi_soft.types import DampingModel, Flips, Strain
+from taichi_soft.types import DampingModel, Flips, Integrator, Strain
 
 
 @dataclass(frozen=True)
@@ -25,6 +27,22 @@ class ElementModel:
     strain: Strain | None  # None where the law has no strain to choose
     flips: Flips | None  # None where the law does not look at tetrahedra
     damping_model: DampingModel
+    is_anisotropic: bool = False  # its material has 21 constants instead of 2
+
+    @property
+    def integrators(self) -> tuple[Integrator, ...]:
+        """Those that the law takes with this material."""
+        if self.is_anisotropic and not self.has_energy:  # how R turns with the vertices has not been derived
+            return tuple(each for each in self.law.integrators if each is not Integrator.IMPLICIT_EULER)
+        return self.law.integrators
+
+    def require_integrator(self, integrator: Integrator) -> None:
+        """Raises: OptionError where the integrator needs gradients that this law has not for its material."""
+        if integrator not in self.integrators:
+            raise OptionError(
+                f"law {self.law.name!r} has no gradients for an AnisotropicMaterial, which "
+                f"{integrator.value!r} needs: take law 'st_venant_kirchhoff', or integrator 'leapfrog'"
+            )
 
     @property
     def has_energy(self) -> bool:
@@ -65,26 +83,36 @@ def hooke_stress_of(model: ti.template(), F, lame_lambda, lame_mu):
 
 
 @ti.func
-def elastic_forces(model: ti.template(), B, F, rest_inverse, lame_lambda, lame_mu):
-    """Forces on four vertices [N] by the model's law."""
+def elastic_forces(model: ti.template(), B, F, rest_inverse, elasticity):
+    """Forces on four vertices [N] by the model's law.
+
+    Args:
+        elasticity: lambda and mu [Pa], or a stiffness as `anisotropic_stress` takes it.
+    """
     if ti.static(model.has_energy):
-        return energy_forces(model.law.piola(F, lame_lambda, lame_mu), rest_inverse)
+        if ti.static(model.is_anisotropic):
+            return energy_forces(product(F, green_stress(F, elasticity)), rest_inverse)
+        else:
+            return energy_forces(model.law.piola(F, elasticity[0], elasticity[1]), rest_inverse)
+    elif ti.static(model.is_anisotropic):
+        return model.law.forces(B, turned_stress(model, F, elasticity))
     else:
-        return model.law.forces(B, hooke_stress_of(model, F, lame_lambda, lame_mu))
+        return model.law.forces(B, hooke_stress_of(model, F, elasticity[0], elasticity[1]))
 
 
 @ti.func
-def upright_forces(model: ti.template(), x0, x1, x2, x3, rest_inverse, lame_lambda, lame_mu):
+def upright_forces(model: ti.template(), x0, x1, x2, x3, rest_inverse, elasticity):
     """Elastic forces on four vertices [N], and six times the signed volume [m^3].
 
     Valid for every pose unless `model.repairs_flips`: then only where the volume is not negative.
     Args:
         x0, x1, x2, x3: deformed vertices, vec3 [m].
         rest_inverse: A^-1 of thesis eq. 6.1, as columns [1/m].
+        elasticity: as in `elastic_forces`.
     """
     B = shape(x0, x1, x2, x3)
     F = product(B, rest_inverse)
-    f0, f1, f2, f3 = elastic_forces(model, B, F, rest_inverse, lame_lambda, lame_mu)
+    f0, f1, f2, f3 = elastic_forces(model, B, F, rest_inverse, elasticity)
     volume6 = determinant(B)
     if ti.static(model.mirrors_forces):
         # The mirrored shape is at rest too: take the area vectors as a right-handed tetrahedron would.
@@ -94,8 +122,11 @@ def upright_forces(model: ti.template(), x0, x1, x2, x3, rest_inverse, lame_lamb
 
 
 @ti.func
-def flipped_forces(model: ti.template(), x0, x1, x2, x3, rest_inverse, lame_lambda, lame_mu):
+def flipped_forces(model: ti.template(), x0, x1, x2, x3, rest_inverse, elasticity):
     """Forces of `flips="recover"` on a tetrahedron whose volume is negative [N]."""
     B = shape(x0, x1, x2, x3)
     F = product(B, rest_inverse)
-    return model.law.forces(B, recovering_stress(model.strain, F, lame_lambda, lame_mu))
+    if ti.static(model.is_anisotropic):
+        return model.law.forces(B, recovered_stress(model, F, elasticity))
+    else:
+        return model.law.forces(B, recovering_stress(model.strain, F, elasticity[0], elasticity[1]))

@@ -11,8 +11,7 @@ definite for every pose, which conjugate gradients need.
 from taichi_soft.laws.principal import hooke_principal
 from taichi_soft.math.eigen import symmetric_eigen
 from taichi_soft.math.svd import signed_svd
-from taichi_soft.math.tensors import determinant, product
-from taichi_soft.math.tetrahedron import shape
+from taichi_soft.math.tensors import determinant, symmetric_part, transposed
 from taichi_soft.runtime import ti
 
 CLOSE = 1.0e-3
@@ -31,11 +30,7 @@ def principal(model: ti.template(), s, lame_lambda, lame_mu):
 @ti.func
 def positive_part(columns):
     """The nearest positive semi-definite matrix to the symmetric part, as columns."""
-    a, b, c = columns[0], columns[1], columns[2]
-    xy, xz, yz = 0.5 * (b.x + a.y), 0.5 * (c.x + a.z), 0.5 * (c.y + b.z)
-    values, axes = symmetric_eigen(
-        (ti.Vector([a.x, xy, xz]), ti.Vector([xy, b.y, yz]), ti.Vector([xz, yz, c.z]))
-    )
+    values, axes = symmetric_eigen(symmetric_part(columns))
     x, y, z = ti.max(values.x, 0.0), ti.max(values.y, 0.0), ti.max(values.z, 0.0)
     u, v, w = axes[0], axes[1], axes[2]
     return (
@@ -65,15 +60,26 @@ def shear_and_rotation(sa, sb, pa, pb, along, largest, projected: ti.template())
 
 
 @ti.func
-def element_stiffness(
-    model: ti.template(), x0, x1, x2, x3, rest_inverse, lame_lambda, lame_mu, projected: ti.template()
-):
-    """What `stiffness_block` needs: U and the rows of A^-1 V (four, weighed), dp/ds, alpha and beta.
+def weighed_rows(rest_inverse):
+    """Rows of A^-1 that take a move of each vertex to F (four vec3), times the root of the volume at rest.
+
+    Zero for the lanes that pad a block, which have no volume.
+    """
+    inverse_volume6 = determinant(rest_inverse)
+    root = ti.select(inverse_volume6 > 0.0, 1.0 / ti.sqrt(6.0 * ti.max(inverse_volume6, 1e-37)), 0.0)
+    rows = transposed(rest_inverse)
+    g1, g2, g3 = rows[0] * root, rows[1] * root, rows[2] * root
+    return -(g1 + g2 + g3), g1, g2, g3
+
+
+@ti.func
+def element_stiffness(model: ti.template(), F, rows, elasticity, projected: ti.template()):
+    """What `stiffness_block` needs: the `weighed_rows` in the axes of V; and U, dp/ds, alpha and beta.
 
     Args:
         projected: make it symmetric and positive semi-definite.
     """
-    F = product(shape(x0, x1, x2, x3), rest_inverse)
+    lame_lambda, lame_mu = elasticity[0], elasticity[1]
     U, s, V = signed_svd(F)
     p, M = principal(model, s, lame_lambda, lame_mu)
     largest = 10.0 * (2.0 * lame_mu + ti.abs(lame_lambda))
@@ -86,15 +92,8 @@ def element_stiffness(
     m0, m1, m2 = M[0], M[1], M[2]
     if ti.static(projected):
         m0, m1, m2 = positive_part((m0, m1, m2))
-    inverse_volume6 = determinant(rest_inverse)
-    # Both gradients of a block carry a root of the volume; those that pad a block have none.
-    root = ti.select(inverse_volume6 > 0.0, 1.0 / ti.sqrt(6.0 * ti.max(inverse_volume6, 1e-37)), 0.0)
-    a, b, c = rest_inverse[0], rest_inverse[1], rest_inverse[2]
-    g1 = _in_axes(V, ti.Vector([a.x, b.x, c.x]) * root)
-    g2 = _in_axes(V, ti.Vector([a.y, b.y, c.y]) * root)
-    g3 = _in_axes(V, ti.Vector([a.z, b.z, c.z]) * root)
-    g0 = -(g1 + g2 + g3)
-    return U, (g0, g1, g2, g3), (m0, m1, m2), ti.Vector([ax, ay, az]), ti.Vector([bx, by, bz])
+    turned = _in_axes(V, rows[0]), _in_axes(V, rows[1]), _in_axes(V, rows[2]), _in_axes(V, rows[3])
+    return turned, (U, (m0, m1, m2), ti.Vector([ax, ay, az]), ti.Vector([bx, by, bz]))
 
 
 @ti.func
@@ -107,7 +106,7 @@ def stiffness_block(U, gi, gj, M, alpha, beta):
     """- d f_i / d x_j of two vertices of a tetrahedron [N/m], as columns.
 
     Args:
-        gi, gj: their gradients from `element_stiffness`.
+        gi, gj: their rows from `element_stiffness`.
     """
     both = gi * gj
     shear = alpha.x * ti.Vector([0.0, both.z, both.y])

@@ -5,7 +5,15 @@ F as columns and return a symmetric 3x3 strain as columns.
 """
 
 from taichi_soft.math.eigen import symmetric_eigen
-from taichi_soft.math.tensors import determinant, outer_square, scaled_plus_identity
+from taichi_soft.math.polar import orthogonal_factor
+from taichi_soft.math.tensors import (
+    determinant,
+    outer_square,
+    product,
+    scaled_plus_identity,
+    symmetric_part,
+    transposed,
+)
 from taichi_soft.runtime import ti
 
 
@@ -17,10 +25,8 @@ def linear_strain(F):
 
 @ti.func
 def exact_strain(F):
-    """U - I with U = sqrt(F F^T), the root that thesis chapter 7 leaves open. Blind to flips."""
-    stretch, axes = principal_stretches(F)
-    stretch.z = ti.abs(stretch.z)
-    return from_axes(stretch - 1.0, axes)
+    """U - I with U = sqrt(F F^T) = F R^T, the root that thesis chapter 7 leaves open. Blind to flips."""
+    return scaled_plus_identity(symmetric_part(product(F, transposed(orthogonal_factor(F)))), 1.0, -1.0)
 
 
 @ti.func

@@ -1,8 +1,23 @@
 """What bodies are made of: numbers only, no Taichi."""
 
-from taichi_soft.materials.material import CONSTANTS, Material, require_material
+from taichi_soft.materials.anisotropic import AnisotropicMaterial, frames_along
+from taichi_soft.materials.material import CONSTANTS, Material
 from taichi_soft.materials.presets import PRESETS, preset
 from taichi_soft.materials.springs import SpringMaterial
-from taichi_soft.materials.stiffness import Stiffness
+from taichi_soft.materials.stiffness import Stiffness, voigt_stress
 
-__all__ = ["CONSTANTS", "PRESETS", "Material", "SpringMaterial", "Stiffness", "preset", "require_material"]
+AnyMaterial = Material | AnisotropicMaterial | SpringMaterial
+"""What a body can be made of."""
+
+__all__ = [
+    "CONSTANTS",
+    "PRESETS",
+    "AnisotropicMaterial",
+    "AnyMaterial",
+    "Material",
+    "SpringMaterial",
+    "Stiffness",
+    "frames_along",
+    "preset",
+    "voigt_stress",
+]

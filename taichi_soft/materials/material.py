@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from taichi_soft.checks import as_count
 from taichi_soft.errors import MaterialError
@@ -90,9 +89,10 @@ class Material:
         tet_count = as_count(tet_count, "tet_count", high=2**31 - 1)
         return spread(getattr(self, name), name, "tetrahedra", tet_count)
 
-
-def require_material(value: ArrayLike | Material) -> Material:
-    """`value` if it is a Material. Raises: MaterialError otherwise."""
-    if not isinstance(value, Material):
-        raise MaterialError(f"material must be a taichi_soft.Material, got {type(value).__name__}")
-    return value
+    def stiffness_matrices(self, tet_count: int) -> Array:
+        """Stiffness of each tetrahedron, (m, 6, 6) [Pa], as `Stiffness.matrix`."""
+        lame_lambda, lame_mu = (self.per_tet(name, tet_count) for name in ("lame_lambda", "lame_mu"))
+        matrices = np.zeros((tet_count, 6, 6))
+        matrices[:, :3, :3] = lame_lambda[:, None, None]
+        matrices[:, range(6), range(6)] += lame_mu[:, None] * np.array([2.0, 2, 2, 1, 1, 1])
+        return matrices

@@ -25,6 +25,28 @@ THESIS_ORDER = (0, 1, 2, 5, 4, 3)
 """Where Voigt's components stand in the thesis: its fourth is xy, its sixth yz."""
 
 
+def turned(matrix: Floats, rotations: Floats) -> Floats:
+    """A stiffness (6, 6) in the axes of materials that are turned by `rotations` (m, 3, 3), (m, 6, 6).
+
+    With K, which turns stress in Voigt's order, it is K C K^T (Bond 1943).
+    """
+    first, second = np.array(PAIRS).T
+    R = rotations
+    # Stress turns as R s R^T, and components off the diagonal stand in it twice.
+    K = R[:, first[:, None], first] * R[:, second[:, None], second]
+    K[:, :, 3:] += (R[:, first[:, None], second] * R[:, second[:, None], first])[:, :, 3:]
+    return np.asarray(K @ matrix @ np.swapaxes(K, 1, 2))
+
+
+def voigt_stress(matrices: Floats, strain: Floats) -> Floats:
+    """Stress (m, 3, 3) [Pa] of strain (m, 3, 3) by stiffness (m, 6, 6) in Voigt's order."""
+    first, second = np.array(PAIRS).T
+    rows = strain[:, first, second] * np.array([1, 1, 1, 2, 2, 2])
+    stress = np.empty_like(strain)
+    stress[:, first, second] = stress[:, second, first] = np.einsum("mab,mb->ma", matrices, rows)
+    return stress
+
+
 @dataclass(frozen=True, eq=False)
 class Stiffness:
     """A symmetric, positive definite stiffness in the axes of its material.
@@ -133,10 +155,7 @@ class Stiffness:
 
     def rotated(self, rotation: ArrayLike) -> Stiffness:
         """The stiffness of the material turned by a matrix (3, 3) or a quaternion (x, y, z, w)."""
-        R = as_rotation(rotation)
-        turned = np.einsum("ai,bj,ck,dl,ijkl->abcd", R, R, R, R, self.tensor)
-        first, second = np.array(PAIRS).T
-        return Stiffness(turned[first[:, None], second[:, None], first, second])
+        return Stiffness(turned(self.matrix, as_rotation(rotation)[None])[0])
 
     def young_along(self, direction: ArrayLike) -> float:
         """Young's modulus of a bar cut out along `direction` (3,) [Pa]."""

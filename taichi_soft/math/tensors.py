@@ -55,6 +55,21 @@ def scaled_plus_identity(columns, factor, diagonal):
 
 
 @ti.func
+def transposed(columns):
+    """M^T, as columns."""
+    a, b, c = columns[0], columns[1], columns[2]
+    return ti.Vector([a.x, b.x, c.x]), ti.Vector([a.y, b.y, c.y]), ti.Vector([a.z, b.z, c.z])
+
+
+@ti.func
+def symmetric_part(columns):
+    """1/2 (M + M^T), as columns."""
+    a, b, c = columns[0], columns[1], columns[2]
+    xy, xz, yz = 0.5 * (b.x + a.y), 0.5 * (c.x + a.z), 0.5 * (c.y + b.z)
+    return ti.Vector([a.x, xy, xz]), ti.Vector([xy, b.y, yz]), ti.Vector([xz, yz, c.z])
+
+
+@ti.func
 def trace(columns):
     """Sum of the diagonal."""
     return columns[0].x + columns[1].y + columns[2].z
