@@ -13,7 +13,15 @@ from taichi_soft.errors import MeshError
 from taichi_soft.laws import BondLaw, ElementModel
 from taichi_soft.laws.bonds import Bonds, Ring
 from taichi_soft.materials import AnisotropicMaterial, AnyMaterial, Material, SpringMaterial
-from taichi_soft.meshing import BodyMesh, ParticleMesh, TetMesh, renumbered, spatial_order, tet_order
+from taichi_soft.meshing import (
+    BodyMesh,
+    ParticleMesh,
+    TetMesh,
+    edge_owners,
+    renumbered,
+    spatial_order,
+    tet_order,
+)
 from taichi_soft.types import DampingModel
 
 SHORTEST_EDGE = 1e-6
@@ -102,7 +110,7 @@ class BondArrays:
     ring: Ints  # (k, 2) rows of each edge in the arrays below
     members: Ints  # (r, 4) particles or tetrahedra of this body
     weights: Floats  # (r, 4)
-    names_tets: bool  # whether the members are tetrahedra
+    expansion_modulus: Floats | None  # (m,) [Pa], where the members are tetrahedra
 
 
 @dataclass(frozen=True)
@@ -122,21 +130,17 @@ class BodyArrays:
     tet_damping: Floats  # (m,) [N s/m]
     tet_edges: Ints  # (m, 6) edges of each, in the order of `LOCAL_EDGES`
     edge_vertices: Ints  # (k, 2)
+    edge_blocks: Ints  # (c, 2) first row and number, at most `LANES`, of edges with the same first end
     edge_damping: Floats  # (k,) [N s/m]
     bonds: BondArrays | None  # of a pairwise law
     pinned: Ints  # particles that do not move
 
     @property
-    def tet_pressures(self) -> Floats:
-        """How hard a tetrahedron pulls each of its edges together as it grows, (m, 6) [N]; often zero."""
-        pressures = np.zeros(self.tet_edges.shape)
-        bonds = self.bonds
-        if bonds is not None and bonds.names_tets:
-            tets = bonds.members[:, 0]
-            edges = np.repeat(np.arange(len(bonds.ring)), bonds.ring[:, 1] - bonds.ring[:, 0])
-            corner = (self.tet_edges[tets] == edges[:, None]).argmax(axis=1)
-            pressures[tets, corner] = bonds.weights[:, 0]
-        return pressures
+    def expansion_modulus(self) -> Floats:
+        """Pressure of each tetrahedron on its edges per dV / V0, (m,) [Pa]; zero for laws without one."""
+        if self.bonds is None or self.bonds.expansion_modulus is None:
+            return np.zeros(len(self.tet_vertices))
+        return self.bonds.expansion_modulus
 
 
 @dataclass
@@ -145,18 +149,24 @@ class Ranges:
 
     particles: tuple[int, int] = (0, 0)
     edges: tuple[int, int] = (0, 0)
+    edge_blocks: tuple[int, int] = (0, 0)
     blocks: tuple[int, int] = (0, 0)
     rings: tuple[int, int] = (0, 0)
 
 
 @dataclass
 class Scene:
-    """All bodies, one behind the other."""
+    """All bodies, one behind the other.
+
+    Behind the edges of each come `LANES` spare rows: the last block of edges is read in full, and must not
+    reach into another body, which another thread may be moving.
+    """
 
     bodies: list[BodyArrays] = field(default_factory=list)
     ranges: list[Ranges] = field(default_factory=list)
     particle_count: int = 0
-    edge_count: int = 0
+    edge_count: int = 0  # with the spare rows
+    edge_block_count: int = 0
     block_count: int = 0
     ring_count: int = 0
 
@@ -173,13 +183,15 @@ class Scene:
             Ranges(
                 (self.particle_count, self.particle_count + len(body.mass)),
                 (self.edge_count, self.edge_count + len(body.edge_vertices)),
+                (self.edge_block_count, self.edge_block_count + len(body.edge_blocks)),
                 (self.block_count, self.block_count + blocks),
                 (self.ring_count, self.ring_count + rings),
             )
         )
         self.bodies.append(body)
         self.particle_count += len(body.mass)
-        self.edge_count += len(body.edge_vertices)
+        self.edge_count += len(body.edge_vertices) + LANES
+        self.edge_block_count += len(body.edge_blocks)
         self.block_count += blocks
         self.ring_count += rings
 
@@ -220,7 +232,7 @@ def arrange(description: BodyDescription) -> BodyArrays:
     new_index = renumbered(order)
     edges = new_index[mesh.edges]
     if description.model.has_simple_edges:  # whose ends are alike; others have a direction from i to j
-        edges = np.sort(edges, axis=1)
+        edges = _led_by_owners(np.sort(edges, axis=1), len(order))
     edge_order = np.lexsort((edges[:, 1], edges[:, 0])).astype(np.int64)
     return BodyArrays(
         order=order,
@@ -236,10 +248,31 @@ def arrange(description: BodyDescription) -> BodyArrays:
         tet_damping=description.per_tet("damping")[tets],
         tet_edges=_arrange_tet_edges(mesh, tets, edge_order),
         edge_vertices=edges[edge_order],
+        edge_blocks=_edge_blocks(edges[edge_order, 0]),
         edge_damping=description.edge_damping[edge_order],
         bonds=_arrange_bonds(description.bonds, description.model, edge_order, new_index, renumbered(tets)),
         pinned=new_index[description.pinned],
     )
+
+
+def _led_by_owners(edges: Ints, particle_count: int) -> Ints:
+    """The same edges, turned so that most particles come first in a multiple of `LANES` of them."""
+    in_order = edges[np.lexsort((edges[:, 1], edges[:, 0]))]
+    keys = in_order[:, 0].astype(np.int64) * particle_count + in_order[:, 1]
+    owner = edge_owners(in_order, particle_count, LANES)
+    own = owner[np.searchsorted(keys, edges[:, 0].astype(np.int64) * particle_count + edges[:, 1])]
+    return np.asarray(np.where(edges[:, :1] == own[:, None], edges, edges[:, ::-1]))
+
+
+def _edge_blocks(first_ends: Ints) -> Ints:
+    """First row and number of edges, at most `LANES`, that share their first end; rows come ordered by it."""
+    starts = np.flatnonzero(np.r_[True, first_ends[1:] != first_ends[:-1]])
+    counts = np.diff(np.r_[starts, len(first_ends)])
+    blocks = -(-counts // LANES)
+    number = np.arange(blocks.sum()) - np.repeat(np.cumsum(blocks) - blocks, blocks)  # within its first end
+    rows = np.repeat(starts, blocks) + number * LANES
+    left = np.repeat(counts, blocks) - number * LANES
+    return np.stack([rows, np.minimum(left, LANES)], axis=1).astype(np.int32)
 
 
 def _arrange_tet_edges(mesh: BodyMesh, tets: Ints, edge_order: NDArray[np.int64]) -> Ints:
@@ -264,12 +297,13 @@ def _arrange_bonds(
     rows = np.repeat(start[edge_order] - ring[:, 0], count[edge_order]) + np.arange(len(bonds.ring_edge))
     members = bonds.ring_members[rows]
     renamed = (new_tet if names_tets else new_vertex)[np.maximum(members, 0)] if len(members) else members
+    modulus = bonds.expansion_modulus
     return BondArrays(
         bonds.constants[edge_order],
         ring.astype(np.int32),
         np.where(members >= 0, renamed, 0).astype(np.int32),
         bonds.ring_weights[rows],
-        names_tets,
+        None if modulus is None else modulus[np.argsort(new_tet)],
     )
 
 

@@ -115,7 +115,8 @@ def _stable_bond_step(body: BodyDescription, bonds: Bonds) -> StableStep:
     damping = np.maximum(body.edge_damping, bonds.constants[:, 3] * bonds.is_bond)
     braking = float((np.bincount(edges.ravel(), np.repeat(2 * damping, 2), len(mass)) / mass).max())
     limit = (np.sqrt(braking**2 + 4 * frequency2) - braking) / frequency2
-    worst = int((bonds.constants[:, 1:3].max(axis=1) * per_mass).argmax())
+    along_and_across = bonds.constants[:, 1:2] if body.model.has_simple_edges else bonds.constants[:, 1:3]
+    worst = int((along_and_across.max(axis=1) * per_mass).argmax())
     return StableStep(
         float(limit),
         None,

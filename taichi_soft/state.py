@@ -6,6 +6,7 @@ capacity takes it over with its kernels compiled.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +14,6 @@ from numpy.typing import NDArray
 from taichi_soft.constants import LANES
 from taichi_soft.runtime import ti
 from taichi_soft.scene import BodyArrays, Ranges, Scene, blocks_of
-
-CORNER_ROWS = 12
-"""Rows per block of corner forces: x, y, z of four vertices."""
 
 ACTIVE, FROZEN = 0, 1
 
@@ -72,7 +70,8 @@ class State:
         real = self.real = ti.f64 if capacity.double else ti.f32
         self.particle_position = ti.Vector.field(3, real, n)  # [m]
         self.particle_velocity = ti.Vector.field(3, real, n)  # [m/s], see body_velocity_lag
-        self.particle_force = ti.Vector.field(3, real, n)  # [N], zero between steps
+        # [N], zero between steps; with a fourth component, because four floats load and store in one piece.
+        self.particle_force = ti.Vector.field(4, real, n)
         self.particle_inv_mass = ti.field(real, n)  # [1/kg]
         self.particle_body = ti.field(ti.i32, n)
         self.particle_of_vertex = ti.field(ti.i32, n)  # where the caller's next vertex lies
@@ -87,7 +86,7 @@ class State:
         self.tet_damping = ti.field(real, b * LANES)  # [N s/m], for damping by the mean velocity
 
         self.edge_vertices = ti.Vector.field(2, ti.i32, k, layout=ti.Layout.SOA)
-        self.edges_from = ti.Vector.field(2, ti.i32, n)  # range of those with this first end
+        self.edge_blocks = ti.Vector.field(2, ti.i32, k)  # first row and number of edges from one particle
         self.edge_damping = ti.field(real, k)  # [N s/m]
         if capacity.rings:
             self.edge_bond = ti.Vector.field(4, real, k, layout=ti.Layout.SOA)  # see `laws.bonds.Bonds`
@@ -96,9 +95,10 @@ class State:
                 4, ti.i32, capacity.rings
             )  # particles, or slots of tetrahedra
             self.ring_weights = ti.Vector.field(4, real, capacity.rings)
-            self.tet_expansion = ti.field(real, b * LANES)  # dV / V0
-            self.tet_pressure = ti.field(real, b * 6 * LANES)  # [N] per dV / V0 on each edge, E a nu
-            self.edge_tension = ti.field(real, k)  # [N], what tetrahedra pull an edge with
+            self.tet_inverse_volume6 = ti.field(real, b * LANES)  # 1 / (6 V0) [1/m^3]
+            self.tet_expansion_modulus = ti.field(real, b * LANES)  # E nu [Pa]
+            self.tet_pressure = ti.field(real, b * LANES)  # E nu dV / V0 [Pa]
+            self.edge_pressure = ti.field(real, k)  # [Pa], of all tetrahedra round an edge
         if capacity.rings or capacity.implicit:
             self.tet_edges = ti.field(ti.i32, b * 6 * LANES)
         if capacity.implicit:
@@ -113,16 +113,17 @@ class State:
             self.body_residual = ti.field(real, bodies)  # largest of the last step, over the right-hand side
             self.solver = ti.Vector.field(2, real, ())  # tolerance, most iterations
         if capacity.parallel:
-            self.corner_force = ti.field(real, b * CORNER_ROWS * LANES)  # [N]
+            self.corner_force = ti.Vector.field(4, real, b * 4 * LANES)  # [N], corner by corner in each block
             self.edge_force = ti.Vector.field(3, real, k)
             self.particle_corners = ti.Vector.field(2, ti.i32, n)  # range in corner_slot
-            self.corner_slot = ti.field(ti.i32, b * 4 * LANES)  # where a corner's x lies in corner_force
+            self.corner_slot = ti.field(ti.i32, b * 4 * LANES)  # where a corner lies in corner_force
             self.particle_edges = ti.Vector.field(2, ti.i32, n)  # range in incident_edge
             self.incident_edge = ti.field(ti.i32, 2 * k)  # e as first end, -1 - e as second
             self.barrier = ti.field(ti.i32, 1)
 
         self.body_particles = ti.Vector.field(2, ti.i32, bodies)  # range
         self.body_edges = ti.Vector.field(2, ti.i32, bodies)
+        self.body_edge_blocks = ti.Vector.field(2, ti.i32, bodies)
         self.body_blocks = ti.Vector.field(2, ti.i32, bodies)
         self.body_model = ti.field(ti.i32, bodies)
         self.body_status = ti.field(ti.i32, bodies)
@@ -143,7 +144,7 @@ class State:
         fill(self.prev_position, position)
         fill(self.particle_velocity, velocity)
         fill(self.prev_velocity, velocity)
-        fill(self.particle_force, np.zeros((0, 3)))
+        fill(self.particle_force, np.zeros((0, 4)))
         inv_mass = 1.0 / mass
         for body, place in zip(bodies, ranges, strict=True):
             inv_mass[body.pinned + place.particles[0]] = 0.0
@@ -162,11 +163,11 @@ class State:
         fill(self.tet_damping, _blocks(bodies, lambda b: b.tet_damping, 1))
 
         edges = np.concatenate(
-            [b.edge_vertices + r.particles[0] for b, r in zip(bodies, ranges, strict=True)]
+            [_with_spare_rows(b.edge_vertices) + r.particles[0] for b, r in zip(bodies, ranges, strict=True)]
         )
         fill(self.edge_vertices, edges)
-        fill(self.edges_from, _row_ranges(edges[:, 0], scene.particle_count))
-        fill(self.edge_damping, np.concatenate([body.edge_damping for body in bodies]))
+        fill(self.edge_blocks, _edge_blocks(bodies, ranges))
+        fill(self.edge_damping, np.concatenate([_with_spare_rows(body.edge_damping) for body in bodies]))
         if self.capacity.rings:
             self._load_bonds(bodies, ranges)
         if self.capacity.rings or self.capacity.implicit:
@@ -181,6 +182,7 @@ class State:
 
         fill(self.body_particles, np.array([r.particles for r in ranges]))
         fill(self.body_edges, np.array([r.edges for r in ranges]))
+        fill(self.body_edge_blocks, np.array([r.edge_blocks for r in ranges]))
         fill(self.body_blocks, np.array([r.blocks for r in ranges]))
         fill(self.body_model, np.array(models))
         fill(self.body_status, np.zeros(0))
@@ -193,31 +195,45 @@ class State:
         for body, place in zip(bodies, ranges, strict=True):
             bonds = body.bonds
             if bonds is None:
-                constants.append(np.zeros((len(body.edge_vertices), 4)))
-                rings.append(np.zeros((len(body.edge_vertices), 2), dtype=np.int32))
+                constants.append(np.zeros((len(body.edge_vertices) + LANES, 4)))
+                rings.append(np.zeros((len(body.edge_vertices) + LANES, 2), dtype=np.int32))
                 continue
-            first = place.blocks[0] * LANES if bonds.names_tets else place.particles[0]
-            constants.append(bonds.constants)
-            rings.append(bonds.ring + place.rings[0])
+            names_tets = bonds.expansion_modulus is not None
+            first = place.blocks[0] * LANES if names_tets else place.particles[0]
+            constants.append(_with_spare_rows(bonds.constants))
+            rings.append(_with_spare_rows(bonds.ring + place.rings[0]))
             members.append(bonds.members + first)
             weights.append(bonds.weights)
         fill(self.edge_bond, np.concatenate(constants))
         fill(self.edge_ring, np.concatenate(rings))
         fill(self.ring_members, np.concatenate(members))
         fill(self.ring_weights, np.concatenate(weights))
-        fill(self.tet_pressure, _blocks(bodies, lambda b: b.tet_pressures, 6))
-        fill(self.edge_tension, np.zeros(0))
+        fill(self.tet_inverse_volume6, _blocks(bodies, lambda b: np.linalg.det(b.rest_inverse), 1))
+        fill(self.tet_expansion_modulus, _blocks(bodies, lambda b: b.expansion_modulus, 1))
+        fill(self.edge_pressure, np.zeros(0))
 
     def _load_gather_lists(self, corners: NDArray[np.int64], edges: NDArray[np.int64], count: int) -> None:
         """For each particle, the corner forces and edge forces that act on it, in a fixed order."""
         order = np.argsort(corners[:, 0], kind="stable")
         fill(self.corner_slot, corners[order, 1])
         fill(self.particle_corners, _row_ranges(corners[:, 0], count))
-        ends = edges.T.reshape(-1)
-        numbers = np.arange(len(edges))
+        numbers = np.flatnonzero(edges[:, 0] != edges[:, 1])  # without the spare rows
+        ends = edges[numbers].T.reshape(-1)
         incident = np.concatenate([numbers, -1 - numbers])
         fill(self.incident_edge, incident[np.argsort(ends, kind="stable")])
         fill(self.particle_edges, _row_ranges(ends, count))
+
+
+def _with_spare_rows(rows: NDArray[Any]) -> NDArray[Any]:
+    """A body's edges and `LANES` rows of zeros behind them, which lead from its first particle to itself."""
+    return np.concatenate([rows, np.zeros((LANES, *rows.shape[1:]), dtype=rows.dtype)])
+
+
+def _edge_blocks(bodies: list[BodyArrays], ranges: list[Ranges]) -> NDArray[np.int32]:
+    blocks = [body.edge_blocks.copy() for body in bodies]
+    for rows, place in zip(blocks, ranges, strict=True):
+        rows[:, 0] += place.edges[0]
+    return np.concatenate(blocks)
 
 
 def _row_ranges(owner: NDArray[np.int64], count: int) -> NDArray[np.int64]:
@@ -244,7 +260,7 @@ def _tet_blocks(
             continue
         block, lane = np.divmod(np.arange(len(rows)), LANES)
         for corner in range(4):
-            slot = ((block + place.blocks[0]) * CORNER_ROWS + 3 * corner) * LANES + lane
+            slot = ((block + place.blocks[0]) * 4 + corner) * LANES + lane
             corners.append(np.stack([rows[:, corner], slot], axis=1))
     none = np.zeros((0, 2), dtype=np.int64)
     return np.concatenate(blocks), np.concatenate([none, *corners]).astype(np.int64)

@@ -1,7 +1,7 @@
 """Forces along and across edges: loads values, calls the law, stores forces."""
 
 from taichi_soft.constants import LANES
-from taichi_soft.kernels.elastic import BLOCK_BITS, particles_of, rest_inverse_of
+from taichi_soft.kernels.elastic import BLOCK_BITS, particles_of
 from taichi_soft.laws.best_fitting_plane import plane_normal
 from taichi_soft.laws.bonds import Ring
 from taichi_soft.laws.cmpm import bond_damping, bond_force, direction_of
@@ -12,44 +12,45 @@ from taichi_soft.runtime import ti
 
 
 @ti.func
-def lane_expansion(state: ti.template(), block, lane):
-    """Growth dV / V0 of one tetrahedron."""
+def lane_pressure(state: ti.template(), block, lane):
+    """Pressure E nu dV / V0 of one tetrahedron on its edges [Pa]."""
     p0, p1, p2, p3 = particles_of(state, block, lane)
-    return expansion(
+    growth = expansion(
         state.particle_position[p0],
         state.particle_position[p1],
         state.particle_position[p2],
         state.particle_position[p3],
-        rest_inverse_of(state, block, lane),
+        state.tet_inverse_volume6[block * LANES + lane],
     )
+    return growth * state.tet_expansion_modulus[block * LANES + lane]
 
 
 @ti.func
-def store_block_expansions(state: ti.template(), number):
-    """Growth of a block's tetrahedra, for their edges to read."""
+def store_block_pressures(state: ti.template(), number):
+    """Pressures of a block's tetrahedra, for their edges to read."""
     block = number & BLOCK_BITS
+    pressure = ti.Vector.zero(state.real, LANES)
     for lane in range(LANES):
-        state.tet_expansion[block * LANES + lane] = lane_expansion(state, block, lane)
+        pressure[lane] = lane_pressure(state, block, lane)
+    for lane in range(LANES):
+        state.tet_pressure[block * LANES + lane] = pressure[lane]
 
 
 @ti.func
-def accumulate_tensions(state: ti.template(), body):
-    """Store how a body's tetrahedra grow, and in `edge_tension` what pulls its edges, in one thread."""
+def accumulate_pressures(state: ti.template(), body):
+    """Store the pressures of a body's tetrahedra, and in `edge_pressure` their sums, in one thread."""
     edges, blocks = state.body_edges[body], state.body_blocks[body]
     for e in range(edges[0], edges[1]):
-        state.edge_tension[e] = 0.0
+        state.edge_pressure[e] = 0.0
+    for number in range(blocks[0], blocks[1]):
+        store_block_pressures(state, number)
     for number in range(blocks[0], blocks[1]):
         block = number & BLOCK_BITS
-        growth = ti.Vector.zero(state.real, LANES)
         for lane in range(LANES):
-            growth[lane] = lane_expansion(state, block, lane)
-        for lane in range(LANES):
-            state.tet_expansion[block * LANES + lane] = growth[lane]
-        for k in ti.static(range(6)):
-            for lane in range(LANES):
-                place = (block * 6 + k) * LANES + lane
-                e = state.tet_edges[place]
-                state.edge_tension[e] = state.edge_tension[e] + state.tet_pressure[place] * growth[lane]
+            pressure = state.tet_pressure[block * LANES + lane]
+            for k in ti.static(range(6)):
+                e = state.tet_edges[(block * 6 + k) * LANES + lane]
+                state.edge_pressure[e] = state.edge_pressure[e] + pressure
 
 
 @ti.func
@@ -142,12 +143,12 @@ def bond_frame_of(state: ti.template(), law: ti.template(), e):
 
 @ti.func
 def ring_tension(state: ti.template(), e):
-    """Pull of the tetrahedra round an edge on its ends [N], gathered from their growth."""
-    tension = state.edge_damping[e] * 0.0
+    """Pull of the tetrahedra round an edge on its ends [N], gathered from their pressures."""
+    pressure = state.edge_damping[e] * 0.0
     ring = state.edge_ring[e]
     for k in range(ring[0], ring[1]):
-        tension += state.ring_weights[k][0] * state.tet_expansion[state.ring_members[k][0]]
-    return tension
+        pressure += state.tet_pressure[state.ring_members[k][0]]
+    return pressure * state.edge_bond[e].z
 
 
 @ti.func

@@ -1,9 +1,14 @@
 """Forces between the two ends of each edge, of pairwise laws or of damping alone: loads, calls, stores."""
 
+from taichi_soft.constants import LANES
 from taichi_soft.kernels.bonds import bond_force_of, ring_tension
 from taichi_soft.laws.damping import edge_damping_force
 from taichi_soft.laws.springs import damped_pull, spring_tension
+from taichi_soft.math.tensors import widened
 from taichi_soft.runtime import ti
+
+EDGE_BITS = (1 << 28) - 1
+"""Mask that leaves every row unchanged, and shows that adding a lane does not overflow."""
 
 
 @ti.func
@@ -37,35 +42,48 @@ def edge_force_of(state: ti.template(), model: ti.template(), e):
 
 
 @ti.func
-def _accumulate_by_first_end(state: ti.template(), model: ti.template(), body):
-    """Edges come ordered by their first end, whose position and force stay in registers meanwhile."""
-    particles = state.body_particles[body]
-    for p in range(particles[0], particles[1]):
-        edges = state.edges_from[p]
-        x, v = state.particle_position[p], state.particle_velocity[p]
-        total = x * 0.0
-        for e in range(edges[0], edges[1]):
-            q = state.edge_vertices[e][1]
-            tension = state.edge_damping[e] * 0.0
-            if ti.static(model.reads_expansion):
-                tension = state.edge_tension[e]
-            r, relative_velocity = state.particle_position[q] - x, state.particle_velocity[q] - v
-            force = _simple_force(state, model, e, r, relative_velocity, tension)
-            total += force
-            # Not `+=`, which Taichi makes atomic: one thread owns the body.
-            state.particle_force[q] = state.particle_force[q] - force
-        state.particle_force[p] = state.particle_force[p] + total
+def _accumulate_block(state: ti.template(), model: ti.template(), first, count):
+    """Up to `LANES` edges that share their first end, side by side as the tetrahedra in `elastic`.
+
+    What lies behind them is computed too, and counts nothing: other edges of the same body, or its spare
+    rows.
+    """
+    p = state.edge_vertices[first][0]
+    x, v = state.particle_position[p], state.particle_velocity[p]
+    forces = ti.Matrix.zero(state.real, LANES, 4)
+    for lane in range(LANES):
+        e = first + lane
+        q = state.edge_vertices[e][1]
+        tension = state.edge_damping[e] * 0.0
+        if ti.static(model.reads_expansion):
+            tension = state.edge_pressure[e] * state.edge_bond[e].z
+        r, relative_velocity = state.particle_position[q] - x, state.particle_velocity[q] - v
+        force = _simple_force(state, model, e, r, relative_velocity, tension)
+        for i in ti.static(range(3)):
+            forces[lane, i] = ti.select(lane < count, force[i], 0.0)
+        forces[lane, 3] = 0.0  # written as well, or the rows would have gaps, which no vector store leaves
+    total = ti.Vector.zero(state.real, 4)
+    for lane in range(LANES):
+        q = state.edge_vertices[first + lane][1]
+        force = ti.Vector([forces[lane, i] for i in ti.static(range(4))])
+        total += force
+        # Not `+=`, which Taichi makes atomic: one thread owns the body.
+        state.particle_force[q] = state.particle_force[q] - force
+    state.particle_force[p] = state.particle_force[p] + total
 
 
 @ti.func
 def accumulate_edge_forces(state: ti.template(), model: ti.template(), body):
     """Add the forces of all edges of one body to its particles, in one thread."""
     if ti.static(model.has_simple_edges):
-        _accumulate_by_first_end(state, model, body)
+        blocks = state.body_edge_blocks[body]
+        for block in range(blocks[0], blocks[1]):
+            first = state.edge_blocks[block][0] & EDGE_BITS
+            _accumulate_block(state, model, first, state.edge_blocks[block][1])
     else:
         edges = state.body_edges[body]
         for e in range(edges[0], edges[1]):
             p, q = state.edge_vertices[e][0], state.edge_vertices[e][1]
-            force = bond_force_of(state, model.law, e)
+            force = widened(bond_force_of(state, model.law, e))
             state.particle_force[p] = state.particle_force[p] + force
             state.particle_force[q] = state.particle_force[q] - force

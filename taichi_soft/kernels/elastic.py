@@ -9,8 +9,8 @@ the next lane reads), and index arithmetic must be seen not to overflow, which m
 from taichi_soft.constants import LANES
 from taichi_soft.laws.damping import tet_mean_damping_forces
 from taichi_soft.laws.model import flipped_forces, upright_forces
+from taichi_soft.math.tensors import widened
 from taichi_soft.runtime import ti
-from taichi_soft.state import CORNER_ROWS
 from taichi_soft.types import DampingModel
 
 BLOCK_BITS = (1 << 22) - 1
@@ -106,19 +106,24 @@ def lane_forces(state: ti.template(), model: ti.template(), block, lane):
 
 @ti.func
 def block_forces(state: ti.template(), model: ti.template(), block):
-    """Forces of a block's tetrahedra on their corners [N]: four matrices (3, LANES)."""
-    g0 = ti.Matrix.zero(state.real, 3, LANES)
-    g1 = ti.Matrix.zero(state.real, 3, LANES)
-    g2 = ti.Matrix.zero(state.real, 3, LANES)
-    g3 = ti.Matrix.zero(state.real, 3, LANES)
+    """Forces of a block's tetrahedra on their corners [N]: four matrices (LANES, 4), the last column zero."""
+    g0 = ti.Matrix.zero(state.real, LANES, 4)
+    g1 = ti.Matrix.zero(state.real, LANES, 4)
+    g2 = ti.Matrix.zero(state.real, LANES, 4)
+    g3 = ti.Matrix.zero(state.real, LANES, 4)
     volumes = ti.Vector.zero(state.real, LANES)
     for lane in range(LANES):
         f0, f1, f2, f3, volume6 = _upright_forces_of(state, model, block, lane)
         for i in ti.static(range(3)):
-            g0[i, lane] = f0[i]
-            g1[i, lane] = f1[i]
-            g2[i, lane] = f2[i]
-            g3[i, lane] = f3[i]
+            g0[lane, i] = f0[i]
+            g1[lane, i] = f1[i]
+            g2[lane, i] = f2[i]
+            g3[lane, i] = f3[i]
+        # Written as well, or the rows would have gaps, which no vector store leaves.
+        g0[lane, 3] = 0.0
+        g1[lane, 3] = 0.0
+        g2[lane, 3] = 0.0
+        g3[lane, 3] = 0.0
         if ti.static(model.repairs_flips):
             volumes[lane] = volume6
     if ti.static(model.repairs_flips):
@@ -127,10 +132,10 @@ def block_forces(state: ti.template(), model: ti.template(), block):
             if volumes[lane] < 0.0:
                 f0, f1, f2, f3 = _flipped_forces_of(state, model, block, lane)
                 for i in ti.static(range(3)):
-                    g0[i, lane] = f0[i]
-                    g1[i, lane] = f1[i]
-                    g2[i, lane] = f2[i]
-                    g3[i, lane] = f3[i]
+                    g0[lane, i] = f0[i]
+                    g1[lane, i] = f1[i]
+                    g2[lane, i] = f2[i]
+                    g3[lane, i] = f3[i]
     return g0, g1, g2, g3
 
 
@@ -146,7 +151,7 @@ def accumulate_elastic_forces(state: ti.template(), model: ti.template(), body):
                 p = state.tet_vertices[(block * 4 + corner) * LANES + lane]
                 # `forces[corner]` has no name of its own: Taichi would copy it onto the stack for every lane,
                 # and a copy that happens to lie across two pages there took twice as long as all the rest.
-                force = ti.Vector([forces[corner][i, lane] for i in ti.static(range(3))])
+                force = ti.Vector([forces[corner][lane, i] for i in ti.static(range(4))])
                 # Not `+=`, which Taichi makes atomic: one thread owns the body.
                 state.particle_force[p] = state.particle_force[p] + force
 
@@ -158,9 +163,8 @@ def store_block_forces(state: ti.template(), model: ti.template(), number):
     forces = block_forces(state, model, block)
     for corner in ti.static(range(4)):
         for lane in range(LANES):
-            for i in ti.static(range(3)):
-                place = (block * CORNER_ROWS + 3 * corner + i) * LANES + lane
-                state.corner_force[place] = forces[corner][i, lane]
+            force = ti.Vector([forces[corner][lane, i] for i in ti.static(range(4))])
+            state.corner_force[(block * 4 + corner) * LANES + lane] = force
 
 
 @ti.func
@@ -168,14 +172,4 @@ def store_lane_forces(state: ti.template(), model: ti.template(), block, lane):
     """As `store_block_forces` for one lane: for processors that run one tetrahedron per thread."""
     forces = lane_forces(state, model, block, lane)
     for corner in ti.static(range(4)):
-        for i in ti.static(range(3)):
-            place = (block * CORNER_ROWS + 3 * corner + i) * LANES + lane
-            state.corner_force[place] = forces[corner][i]
-
-
-@ti.func
-def corner_force_at(state: ti.template(), slot):
-    """The force whose x component lies at index `slot`."""
-    return ti.Vector(
-        [state.corner_force[slot], state.corner_force[slot + LANES], state.corner_force[slot + 2 * LANES]]
-    )
+        state.corner_force[(block * 4 + corner) * LANES + lane] = widened(forces[corner])

@@ -1,12 +1,13 @@
 """Evaluation without motion: forces on a body where it is, or would be; and what broke a frozen one."""
 
 from taichi_soft.constants import LANES
-from taichi_soft.kernels.bonds import accumulate_tensions
+from taichi_soft.kernels.bonds import accumulate_pressures
 from taichi_soft.kernels.edges import accumulate_edge_forces, edge_force_of
 from taichi_soft.kernels.elastic import lane_forces
 from taichi_soft.kernels.motion import particle_is_sound, restore_particle
 from taichi_soft.kernels.per_body import advance_body
 from taichi_soft.math.finite import is_finite
+from taichi_soft.math.tensors import widened
 from taichi_soft.runtime import ti
 
 
@@ -22,7 +23,7 @@ def _add_tet_forces(state: ti.template(), model: ti.template(), body):
             p = state.tet_vertices[(block * 4 + corner) * LANES + lane]
             if broken < 0 and (particle_is_sound(state, p) & is_finite(forces[corner])) == 0:
                 broken = t
-            state.particle_force[p] = state.particle_force[p] + forces[corner]
+            state.particle_force[p] = state.particle_force[p] + widened(forces[corner])
     accumulate_edge_forces(state, model, body)
     return broken
 
@@ -32,7 +33,7 @@ def _add_bond_forces(state: ti.template(), model: ti.template(), body):
     """Returns the first broken edge or -1."""
     broken = -1
     if ti.static(model.reads_expansion):
-        accumulate_tensions(state, body)
+        accumulate_pressures(state, body)
     accumulate_edge_forces(state, model, body)
     edges = state.body_edges[body]
     for e in range(edges[0], edges[1]):
@@ -72,7 +73,7 @@ def compute_body_forces(
         for p in range(particles[0], particles[1]):
             for i in ti.static(range(3)):
                 out[p - particles[0], i] = state.particle_force[p][i]
-            state.particle_force[p] = ti.Vector.zero(state.real, 3)
+            state.particle_force[p] = ti.Vector.zero(state.real, 4)
 
 
 @ti.kernel
@@ -107,4 +108,4 @@ def find_failure(
         particles = state.body_particles[body]
         for p in range(particles[0], particles[1]):
             restore_particle(state, p)
-            state.particle_force[p] = ti.Vector.zero(state.real, 3)
+            state.particle_force[p] = ti.Vector.zero(state.real, 4)

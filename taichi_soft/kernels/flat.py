@@ -11,9 +11,9 @@ A GPU has no such barrier: there each substep is a launch of its own.
 """
 
 from taichi_soft.constants import LANES
-from taichi_soft.kernels.bonds import lane_expansion, store_block_expansions
+from taichi_soft.kernels.bonds import lane_pressure, store_block_pressures
 from taichi_soft.kernels.edges import edge_force_of
-from taichi_soft.kernels.elastic import corner_force_at, store_block_forces, store_lane_forces
+from taichi_soft.kernels.elastic import store_block_forces, store_lane_forces
 from taichi_soft.kernels.motion import move_particle, particle_is_sound, remember_particle, restore_particle
 from taichi_soft.runtime import ti
 from taichi_soft.state import ACTIVE, FROZEN
@@ -28,7 +28,7 @@ def _block_phase(state: ti.template(), program: ti.template(), block):
             if ti.static(not model.has_bonds):
                 store_block_forces(state, model, block)
             elif ti.static(model.reads_expansion):
-                store_block_expansions(state, block)
+                store_block_pressures(state, block)
 
 
 @ti.func
@@ -42,10 +42,11 @@ def _edge_phase(state: ti.template(), program: ti.template(), e):
 @ti.func
 def gathered_force(state: ti.template(), p):
     """Internal force on one particle [N]: its corners' forces, then its edges'."""
-    force = ti.Vector.zero(state.real, 3)
+    total = ti.Vector.zero(state.real, 4)
     corners = state.particle_corners[p]  # none in bodies whose law looks at edges
     for k in range(corners[0], corners[1]):
-        force += corner_force_at(state, state.corner_slot[k])
+        total += state.corner_force[state.corner_slot[k]]
+    force = total.xyz
     edges = state.particle_edges[p]
     for k in range(edges[0], edges[1]):
         e = state.incident_edge[k]
@@ -168,7 +169,7 @@ def substep_flat(
                 if ti.static(not model.has_bonds):
                     store_lane_forces(state, model, block, lane)
                 elif ti.static(model.reads_expansion):
-                    state.tet_expansion[t] = lane_expansion(state, block, lane)
+                    state.tet_pressure[t] = lane_pressure(state, block, lane)
     for e in range(edge_count):
         _edge_phase(state, program, e)
     for p in range(particle_count):

@@ -14,6 +14,7 @@ from taichi_soft.kernels.linear_system import (
     clear_system,
     multiply_system,
 )
+from taichi_soft.math.tensors import widened
 from taichi_soft.runtime import ti
 
 
@@ -27,9 +28,9 @@ def assemble(state: ti.template(), program: ti.template(), body, h):
     for p in range(particles[0], particles[1]):
         inv_mass = state.particle_inv_mass[p]
         weight = state.gravity[None] / ti.max(inv_mass, 1e-30) * ti.select(inv_mass > 0.0, 1.0, 0.0)
-        rhs = h * (state.particle_force[p] + weight) - state.image[p]
+        rhs = h * (state.particle_force[p].xyz + weight) - state.image[p]
         state.residual[p] = rhs
-        state.particle_force[p] = rhs
+        state.particle_force[p] = widened(rhs)
     add_damping(state, program, body, h)
     add_masses(state, body)
     invert_blocks(state, body)
@@ -43,7 +44,7 @@ def _move(state: ti.template(), program: ti.template(), p, h):
         x = state.particle_position[p] + h * v
         if ti.static(program.has_floor):
             if state.particle_contact[p] == 1:
-                push = state.image[p] - state.particle_force[p]  # impulse of the floor [N s]
+                push = state.image[p] - state.particle_force[p].xyz  # impulse of the floor [N s]
                 slide = ti.sqrt(v.x * v.x + v.y * v.y)
                 brake = state.floor[None].z * ti.max(push.z, 0.0) * state.particle_inv_mass[p]
                 keep = ti.select(slide > brake, 1.0 - brake / ti.max(slide, 1e-30), 0.0)
@@ -58,7 +59,7 @@ def _move(state: ti.template(), program: ti.template(), p, h):
                     state.particle_contact[p] = 1
         state.particle_position[p] = x
         state.particle_velocity[p] = v
-    state.particle_force[p] = ti.Vector.zero(state.real, 3)
+    state.particle_force[p] = ti.Vector.zero(state.real, 4)
 
 
 @ti.func

@@ -109,9 +109,9 @@ def volume_pull(state: ti.template(), t):
     block, lane = t // LANES, t % LANES
     v = particles_of(state, block, lane)
     x = [state.particle_position[v[i]] for i in ti.static(range(4))]
-    g = expansion_gradients(x[0], x[1], x[2], x[3], rest_inverse_of(state, block, lane))
-    pressure = [state.tet_pressure[(block * 6 + k) * LANES + lane] for k in ti.static(range(6))]
-    f = [along(x[j] - x[i], pressure[k]) for k, i, j in ti.static(EDGES)]
+    g = expansion_gradients(x[0], x[1], x[2], x[3], state.tet_inverse_volume6[t])
+    area = [state.edge_bond[state.tet_edges[(block * 6 + k) * LANES + lane]].z for k in ti.static(range(6))]
+    f = [along(x[j] - x[i], state.tet_expansion_modulus[t] * area[k]) for k, i, j in ti.static(EDGES)]
     w = -(f[0] + f[1] + f[2]), f[0] - f[3] - f[4], f[1] + f[3] - f[5], f[2] + f[4] + f[5]
     return g, w
 

@@ -4,7 +4,7 @@ Nothing waits between substeps and a body stays in one core's cache. The result 
 of threads.
 """
 
-from taichi_soft.kernels.bonds import accumulate_tensions
+from taichi_soft.kernels.bonds import accumulate_pressures
 from taichi_soft.kernels.edges import accumulate_edge_forces
 from taichi_soft.kernels.elastic import accumulate_elastic_forces
 from taichi_soft.kernels.implicit_euler import implicit_substep
@@ -20,7 +20,7 @@ def accumulate_forces(state: ti.template(), program: ti.template(), body):
     for m, model in ti.static(enumerate(program.models)):
         if state.body_model[body] == m:
             if ti.static(model.reads_expansion):
-                accumulate_tensions(state, body)
+                accumulate_pressures(state, body)
             if ti.static(not model.has_bonds):
                 accumulate_elastic_forces(state, model, body)
             if ti.static(model.damping_model == DampingModel.EDGE):
@@ -32,8 +32,8 @@ def move_body(state: ti.template(), program: ti.template(), body, h, kick):
     """Move all particles of one body and clear their forces."""
     particles = state.body_particles[body]
     for p in range(particles[0], particles[1]):
-        move_particle(state, program, p, state.particle_force[p], h, kick)
-        state.particle_force[p] = ti.Vector.zero(state.real, 3)
+        move_particle(state, program, p, state.particle_force[p].xyz, h, kick)
+        state.particle_force[p] = ti.Vector.zero(state.real, 4)
 
 
 @ti.func
@@ -55,7 +55,7 @@ def _settle_body(state: ti.template(), body):
     if sound == 0:
         for p in range(particles[0], particles[1]):
             restore_particle(state, p)
-            state.particle_force[p] = ti.Vector.zero(state.real, 3)
+            state.particle_force[p] = ti.Vector.zero(state.real, 4)
         state.body_status[body] = FROZEN
     return 1 - sound
 

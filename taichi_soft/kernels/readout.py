@@ -44,7 +44,7 @@ def write_motion(
         state.particle_position[p] = x
         state.prev_position[p] = x
         state.particle_velocity[p] = ti.Vector([velocities[i, 0], velocities[i, 1], velocities[i, 2]])
-        state.particle_force[p] = ti.Vector.zero(state.real, 3)
+        state.particle_force[p] = ti.Vector.zero(state.real, 4)
         if ti.static(state.capacity.implicit):
             state.particle_contact[p] = 0
     state.body_velocity_lag[body] = 0.0

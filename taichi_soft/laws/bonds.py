@@ -29,12 +29,14 @@ class Bonds:
 
     Attributes:
         constants: (k, 4): length at rest [m], stiffness along and across it [N/m], damping across it
-            [N s/m]. Zero where an edge is no bond. Laws that compare directions take length 1 and [N].
+            [N s/m]. Zero where an edge is no bond. Laws that compare directions take length 1 and [N]; those
+            that look at expansion have the area of the edge [m^2] in the third column.
         ring_edge: (r,) the edge of each row of the rings, ascending.
         ring_members: (r, 4) vertices, or tetrahedra in the first column; -1 where a law needs fewer.
         ring_weights: (r, 4), see the law.
         normals: (k, 3) unit normal at rest of the plane that tells tension from shear; NaN where none.
         masses: (n,) [kg], where the law distributes mass its own way.
+        expansion_modulus: (m,) [Pa], pressure of a tetrahedron on its edges per dV / V0, where a law has it.
     """
 
     constants: Floats
@@ -43,6 +45,7 @@ class Bonds:
     ring_weights: Floats = field(default_factory=lambda: np.zeros((0, 4)))
     normals: Floats | None = None
     masses: Floats | None = None
+    expansion_modulus: Floats | None = None
 
     @property
     def is_bond(self) -> NDArray[np.bool_]:

@@ -15,7 +15,7 @@ def edge_damping_force(r, relative_velocity, damping):
         damping: b [N s/m].
     """
     # (n.dv) n with n = r / |r| needs no root: the two lengths meet in one quotient.
-    return r * (damping * r.dot(relative_velocity) / ti.max(r.dot(r), 1e-30))
+    return r * (damping * r.dot(relative_velocity) / (r.dot(r) + 1e-30))
 
 
 @ti.func

@@ -1,8 +1,8 @@
 """Springs that keep the volume of their tetrahedra (thesis chapter 5).
 
-Each tetrahedron that has grown by dV pulls the ends of its six edges together with E a nu dV / V0, besides
-the springs (eq. 5.5 with its sign turned: as printed a grown one pushes them apart, and its volume runs
-away). The area a is that of the whole edge.
+Each tetrahedron that has grown by dV pulls the ends of its six edges together with the pressure E nu dV / V0
+times the area a of the whole edge, besides the springs (eq. 5.5 with its sign turned: as printed a grown one
+pushes them apart, and its volume runs away).
 """
 
 from __future__ import annotations
@@ -18,39 +18,40 @@ from taichi_soft.runtime import ti
 
 
 @ti.func
-def expansion(x0, x1, x2, x3, rest_inverse):
+def expansion(x0, x1, x2, x3, inverse_volume6):
     """Growth dV / V0 of a tetrahedron (eq. 5.4).
 
     Turned inside out it has a volume too, and is at rest as its own mirror image: by its signed volume it
     would push its edges apart, have less of it still, and run away.
 
     Args:
-        rest_inverse: A^-1 of eq. 6.1 as columns, whose determinant is 1 / (6 V0).
+        inverse_volume6: 1 / (6 V0) [1/m^3].
     """
-    return ti.abs(determinant(shape(x0, x1, x2, x3))) * determinant(rest_inverse) - 1.0
+    return ti.abs(determinant(shape(x0, x1, x2, x3))) * inverse_volume6 - 1.0
 
 
 @ti.func
-def expansion_gradients(x0, x1, x2, x3, rest_inverse):
+def expansion_gradients(x0, x1, x2, x3, inverse_volume6):
     """How V / V0 changes as each of the four vertices moves, four vec3 [1/m]."""
     B = shape(x0, x1, x2, x3)
     C = cofactor(B)
-    scale = determinant(rest_inverse) * ti.select(determinant(B) < 0.0, -1.0, 1.0)
+    scale = inverse_volume6 * ti.select(determinant(B) < 0.0, -1.0, 1.0)
     g1, g2, g3 = C[0] * scale, C[1] * scale, C[2] * scale
     return -(g1 + g2 + g3), g1, g2, g3
 
 
 def volume_spring_bonds(mesh: TetMesh, material: Material) -> Bonds:
-    """Springs of eq. 5.2; ring rows: a tetrahedron, and E a nu [N] in the first weight."""
+    """Springs of eq. 5.2, with the area a of the edge; ring rows name a tetrahedron each."""
     if not isinstance(mesh, TetMesh) or not isinstance(material, Material):
         raise MeshError("law 'volume_springs' needs tetrahedra and a Material")
     rings = EdgeRings.of(mesh)
     young, poisson = (material.per_tet(name, len(mesh.tets)) for name in ("young", "poisson"))
-    pressure = (young * poisson)[rings.tet] * rings.edge_areas[rings.edge]
-    rows = len(rings.edge)
+    constants = spring_bonds(mesh, material).constants
+    constants[:, 2] = rings.edge_areas
     return Bonds(
-        spring_bonds(mesh, material).constants,
+        constants,
         rings.edge,
-        member_columns(rings.tet, count=rows),
-        columns(pressure, count=rows),
+        member_columns(rings.tet, count=len(rings.edge)),
+        columns(count=len(rings.edge)),
+        expansion_modulus=young * poisson,
     )

@@ -8,6 +8,12 @@ from taichi_soft.runtime import ti
 
 
 @ti.func
+def widened(v):
+    """A vec3 with a zero behind: four numbers are loaded and stored in one piece."""
+    return ti.Vector([v.x, v.y, v.z, v.x * 0.0])
+
+
+@ti.func
 def times(columns, v):
     """Matrix times vector."""
     return columns[0] * v.x + columns[1] * v.y + columns[2] * v.z

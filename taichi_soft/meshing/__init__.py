@@ -4,7 +4,7 @@ from taichi_soft.meshing.body_mesh import BodyMesh
 from taichi_soft.meshing.delaunay import delaunay_mesh
 from taichi_soft.meshing.io import load_mesh, save_mesh
 from taichi_soft.meshing.lattices import cloth, cloth_constants, edges_as_particles, rope
-from taichi_soft.meshing.ordering import renumbered, spatial_order, tet_order
+from taichi_soft.meshing.ordering import edge_owners, renumbered, spatial_order, tet_order
 from taichi_soft.meshing.particle_mesh import ParticleMesh
 from taichi_soft.meshing.quality import MeshQuality
 from taichi_soft.meshing.rings import EdgeRings
@@ -26,6 +26,7 @@ __all__ = [
     "cloth_constants",
     "cylinder",
     "delaunay_mesh",
+    "edge_owners",
     "edges_as_particles",
     "extrude",
     "load_mesh",

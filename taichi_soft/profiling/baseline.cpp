@@ -75,26 +75,27 @@ static void move(int particle_count, Vec *x, Vec *v, Vec *force, const float *in
 }
 
 // Thesis eq. 5.4: how much each tetrahedron has grown pulls its six edges together.
-static void add_volume_tension(int tet_count, const Vec *x, const int *vertices, const float *inv_volume6,
-                               const int *edges, const float *pressure, float *tension) {
+static void add_volume_pressure(int tet_count, const Vec *x, const int *vertices, const float *inv_volume6,
+                                const float *modulus, const int *edges, float *pressure) {
     for (int t = 0; t < tet_count; t++) {
         const int *i = vertices + 4 * t;
         const Vec b0 = x[i[1]] - x[i[0]], b1 = x[i[2]] - x[i[0]], b2 = x[i[3]] - x[i[0]];
         const float volume6 = dot(b0, cross(b1, b2));
-        const float growth = (volume6 < 0.0f ? -volume6 : volume6) * inv_volume6[t] - 1.0f;
-        for (int k = 0; k < 6; k++) tension[edges[6 * t + k]] += pressure[6 * t + k] * growth;
+        const float push = modulus[t] * ((volume6 < 0.0f ? -volume6 : volume6) * inv_volume6[t] - 1.0f);
+        for (int k = 0; k < 6; k++) pressure[edges[6 * t + k]] += push;
     }
 }
 
 static void add_spring_forces(int edge_count, const Vec *x, const Vec *v, const int *ends, const float *length,
-                              const float *stiffness, const float *damping, float *tension, Vec *force) {
+                              const float *stiffness, const float *area, const float *damping, float *pressure,
+                              Vec *force) {
     for (int e = 0; e < edge_count; e++) {
         const int p = ends[2 * e], q = ends[2 * e + 1];
         const Vec r = x[q] - x[p];
         const float square = dot(r, r), now = std::sqrt(square);
-        const float pull = stiffness[e] * (now - length[e]) + tension[e];
+        const float pull = stiffness[e] * (now - length[e]) + area[e] * pressure[e];
         const Vec along = (pull / now + damping[e] * dot(r, v[q] - v[p]) / square) * r;
-        tension[e] = 0.0f;
+        pressure[e] = 0.0f;
         force[p] = force[p] + along;
         force[q] = force[q] - along;
     }
@@ -108,15 +109,15 @@ static void add_spring_forces(int edge_count, const Vec *x, const Vec *v, const 
 
 EXPORT void run_spring_substeps(int particle_count, int tet_count, int edge_count, float *x, float *v, float *force,
                                 const float *inv_mass, const int *vertices, const float *inv_volume6,
-                                const int *edges, const float *pressure, const int *ends, const float *length,
-                                const float *stiffness, const float *damping, float *tension, float h,
-                                float gravity, float floor, int substeps) {
+                                const float *modulus, const int *edges, const int *ends, const float *length,
+                                const float *stiffness, const float *area, const float *damping, float *pressure,
+                                float h, float gravity, float floor, int substeps) {
     Vec *positions = reinterpret_cast<Vec *>(x);
     Vec *velocities = reinterpret_cast<Vec *>(v);
     Vec *forces = reinterpret_cast<Vec *>(force);
     for (int s = 0; s < substeps; s++) {
-        add_volume_tension(tet_count, positions, vertices, inv_volume6, edges, pressure, tension);
-        add_spring_forces(edge_count, positions, velocities, ends, length, stiffness, damping, tension, forces);
+        add_volume_pressure(tet_count, positions, vertices, inv_volume6, modulus, edges, pressure);
+        add_spring_forces(edge_count, positions, velocities, ends, length, stiffness, area, damping, pressure, forces);
         move(particle_count, positions, velocities, forces, inv_mass, h, gravity, floor);
     }
 }

@@ -65,7 +65,8 @@ class Baseline:
             *elements,
         ]
         # Springs that do not look at tetrahedra get none.
-        tets = 0 if body.bonds is not None and not body.bonds.names_tets else len(body.tet_vertices)
+        looks_at_tets = body.bonds is None or body.bonds.expansion_modulus is not None
+        tets = len(body.tet_vertices) if looks_at_tets else 0
         self._counts = [ctypes.c_int(n) for n in (len(body.mass), tets, len(body.edge_vertices))]
 
     def step(self, substeps: int, h: float) -> None:
@@ -89,11 +90,12 @@ def _spring_arrays(body: BodyArrays, bonds: BondArrays) -> list[NDArray[np.gener
     return [
         np.ascontiguousarray(body.tet_vertices, dtype=np.int32),
         np.linalg.det(body.rest_inverse).astype(np.float32),
+        body.expansion_modulus.astype(np.float32),
         np.ascontiguousarray(body.tet_edges, dtype=np.int32),
-        body.tet_pressures.astype(np.float32),
         np.ascontiguousarray(body.edge_vertices, dtype=np.int32),
         bonds.constants[:, 0].astype(np.float32),
         bonds.constants[:, 1].astype(np.float32),
+        bonds.constants[:, 2].astype(np.float32),
         body.edge_damping.astype(np.float32),
         np.zeros(len(body.edge_vertices), dtype=np.float32),
     ]

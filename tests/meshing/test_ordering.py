@@ -7,7 +7,15 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from taichi_soft.errors import MeshError
-from taichi_soft.meshing import TetMesh, renumbered, spatial_order, sphere, tet_order
+from taichi_soft.meshing import (
+    TetMesh,
+    box,
+    edge_owners,
+    renumbered,
+    spatial_order,
+    sphere,
+    tet_order,
+)
 
 POINTS = hnp.arrays(float, st.tuples(st.integers(1, 60), st.just(3)), elements=st.floats(-1e6, 1e6))
 
@@ -80,3 +88,25 @@ def test_bad_input_is_refused():
         spatial_order([[np.nan, 0, 0]])
     with pytest.raises(MeshError, match="tetrahedron 0"):
         tet_order([[0, 1, 2, 9]], np.arange(5))
+
+
+@settings(max_examples=30)
+@given(seed=st.integers(0, 2**32 - 1), group=st.integers(1, 9))
+def test_every_edge_is_owned_by_one_of_its_ends(seed, group):
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(2, 30))
+    pairs = np.array([(p, q) for p in range(count) for q in range(p) if rng.random() < 0.4 or p == 1])
+    owner = edge_owners(pairs, count, group)
+    assert ((owner == pairs[:, 0]) | (owner == pairs[:, 1])).all()
+    assert edge_owners(pairs, count, group).tolist() == owner.tolist()
+
+
+@pytest.mark.parametrize("mesh", [sphere(1.0, 3), box((1, 1, 1), (8, 8, 8))])
+def test_owned_edges_come_in_fuller_groups_than_by_the_lower_number(mesh):
+    """Share of places taken, with groups of 8."""
+
+    def share(owner):
+        counts = np.bincount(owner, minlength=len(mesh.vertices))
+        return len(mesh.edges) / (np.ceil(counts / 8) * 8).sum()
+
+    assert share(edge_owners(mesh.edges, len(mesh.vertices), 8)) > 0.7 > share(mesh.edges.min(axis=1))
