@@ -18,7 +18,7 @@ SOFT = Material(young=6.0e5, poisson=0.2, density=1000.0, damping=30.0)
 HEIGHT = 2.2  # of the centres [m]
 STEP = FixedStep(dt=1 / 50, substeps=10)
 PER_ROW = 4
-PITCH, DEPTH = 4.6, 4.4  # between spheres, across and away from the eye [m]
+PITCH, DEPTH = 6.0, 5.6  # between spheres, across and away from the eye [m]
 
 
 def stage() -> Stage:
@@ -36,7 +36,7 @@ def stage() -> Stage:
     rows = -(-len(LAWS) // PER_ROW)
     edge = PITCH * PER_ROW / 2
     camera = Camera.framing(
-        (-edge, -DEPTH * (rows - 1), 0), (edge, 0, 2), aspect=16 / 9, azimuth=-90, elevation=40, margin=1.15
+        (-edge, -DEPTH * (rows - 1), 0), (edge, 0, 2), aspect=16 / 9, azimuth=-90, elevation=42, margin=1.02
     )
     return Stage("one sphere, every law", world, actors, camera, STEP, seconds=6.0)
 

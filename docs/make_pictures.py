@@ -1,4 +1,4 @@
-"""Makes the pictures of the README: `python docs/make_pictures.py`, in about a minute."""
+"""Makes the pictures of the README: `python docs/make_pictures.py`, in about two minutes."""
 
 import tempfile
 from pathlib import Path
@@ -10,22 +10,24 @@ from taichi_soft.film import film
 from taichi_soft.stages import load_demo
 
 FOLDER = Path(__file__).parent / "pictures"
-MOMENTS = {"dents": 2.0, "bars": 1.36, "density": 1.0, "many": 0.8}  # that show what each demo is about [s]
+# That show what each demo is about [s].
+MOMENTS = {"bounce": 1.26, "dents": 2.0, "bars": 1.36, "density": 1.0, "many": 0.8, "cloth": 1.2}
 
 
-def still(name: str, moment: float) -> np.ndarray:
+def still(name: str, moment: float, size: tuple[int, int] = (520, 292)) -> np.ndarray:
     """The picture of a demo at a moment, uint8 (height, width, 3)."""
     with tempfile.TemporaryDirectory() as folder:
-        film(load_demo(name).stage(), Path(folder) / "f.png", seconds=moment + 0.04, size=(520, 292))
+        film(load_demo(name).stage(), Path(folder) / "f.png", seconds=moment + 0.04, size=size)
         return cv2.imread(str(sorted(Path(folder).iterdir())[-1]))
 
 
 def main() -> None:
-    """Write both pictures."""
+    """Write all pictures."""
     film(load_demo("bounce").stage(), FOLDER / "bounce.gif", fps=50 / 3, size=(400, 224), seconds=3.8)
     stills = [still(name, moment) for name, moment in MOMENTS.items()]
-    rows = [np.hstack(stills[i : i + 2]) for i in (0, 2)]
+    rows = [np.hstack(stills[i : i + 2]) for i in range(0, len(stills), 2)]
     cv2.imwrite(str(FOLDER / "demos.png"), np.vstack(rows))
+    cv2.imwrite(str(FOLDER / "laws.png"), still("compare", 0.72, (1040, 585)))
 
 
 if __name__ == "__main__":

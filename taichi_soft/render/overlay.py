@@ -16,6 +16,7 @@ Picture = NDArray[np.uint8]
 
 FONT = cv2.FONT_HERSHEY_SIMPLEX
 LINE = 1 / 32  # height of a line of text [shorter side of the picture]
+CAPTION = 0.8  # of that, for captions: there may be many
 SMALLEST_LINE = 11.0  # pixels; below it letters cannot be read
 LETTER = 22.0  # height of a line of this font at scale 1 [pixels]
 GAP = 0.45  # between lines, and round the words [line heights]
@@ -73,7 +74,7 @@ def draw_labels(picture: Picture, labels: Sequence[str], places: ArrayLike) -> P
     for lines, (u, v) in zip(captions, pixels[:, :2], strict=True):
         if not (np.isfinite(u) and np.isfinite(v)):
             continue
-        line = _line_height(lines, width, height, min(height, width))
+        line = _line_height(lines, width, height, CAPTION * min(height, width))
         pad, wide, high = _panel_size(lines, line)
         left = int(np.clip(u - wide / 2, 0, width - wide))
         top = int(np.clip(v + pad, 0, height - high))
@@ -106,7 +107,7 @@ def _stroke(line: float) -> int:
     return max(1, round(line / 18.0))
 
 
-def _line_height(lines: Sequence[str], width: int, height: int, side: int) -> float:
+def _line_height(lines: Sequence[str], width: int, height: int, side: float) -> float:
     """The line height at which everything fits, at most the usual one."""
     line = max(LINE * side, SMALLEST_LINE)
     while line > 2.0:
