@@ -1,6 +1,6 @@
 """Real-time soft bodies from real material parameters."""
 
-from taichi_soft.body import Body, Failure
+from taichi_soft.body import Body
 from taichi_soft.errors import (
     DeviceError,
     FrozenBodyWarning,
@@ -13,6 +13,7 @@ from taichi_soft.errors import (
     UnstableStepWarning,
     VideoError,
 )
+from taichi_soft.failures import Failure
 from taichi_soft.forces import force_gradient, internal_forces
 from taichi_soft.laws import LAWS, element_model
 from taichi_soft.laws.planes import plane_angles

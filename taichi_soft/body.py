@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import weakref
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -12,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.checks import as_array
 from taichi_soft.errors import MeshError, OptionError, StateError
+from taichi_soft.failures import FailedStep, Failure
 from taichi_soft.laws.law import EnergyLaw
 from taichi_soft.materials import voigt_stress
 from taichi_soft.scene import BodyDescription, rest_inverses
@@ -22,28 +22,6 @@ if TYPE_CHECKING:
 
 Floats32 = NDArray[np.float32]
 Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Failure:
-    """Why a body was frozen."""
-
-    body: int
-    tetrahedron: int | None  # that broke first, in the caller's order; None if it cannot be told
-    step: int  # of the world, counted from 0, which was undone for this body
-    substep: int | None  # within that step
-    time: float  # [s], of the last sound state, in which the body now rests
-    edge: tuple[int, int] | None = None  # instead of a tetrahedron where forces act along edges
-
-
-@dataclass(frozen=True)
-class FailedStep:
-    """The fixed step in which a body went non-finite."""
-
-    step: int
-    time: float  # [s], before it
-    substeps: int
-    h: float  # [s]
 
 
 class Body:

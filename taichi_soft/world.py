@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.body import Body, FailedStep, Failure, Floats32, require_buffer, require_built
+from taichi_soft.body import Body, Floats32, require_buffer, require_built
 from taichi_soft.checks import as_count, as_indices, as_number, as_rotation, as_vector
-from taichi_soft.constants import GRAVITY_EARTH, LANES, POSITION_LIMIT, VELOCITY_LIMIT
+from taichi_soft.constants import GRAVITY_EARTH, POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.errors import FrozenBodyWarning, OptionError, SolverWarning, StateError, UnstableStepWarning
-from taichi_soft.kernels.evaluate import compute_body_forces, find_failure
+from taichi_soft.failures import FailedStep, Failure, find_failure
+from taichi_soft.kernels.evaluate import compute_body_forces
 from taichi_soft.kernels.program import Program
 from taichi_soft.kernels.readout import read_positions, read_velocities, write_motion
 from taichi_soft.kernels.schedules import Launch, choose_schedule, make_launch
@@ -343,19 +344,9 @@ class World:
         return reports
 
     def _find_failure(self, body: Body, failed: FailedStep) -> Failure:
-        """Make the step that froze a body again and see where it breaks; the body stays as it is."""
-        found = np.full(2, -1, dtype=np.int32)
-        find_failure(self._state, self._program, body.index, failed.substeps, failed.h, found)
-        if found[0] < 0:
-            return Failure(body.index, None, failed.step, None, failed.time)
-        place, arrays = self._scene.ranges[body.index], self._scene.bodies[body.index]
-        if arrays.bonds is not None:
-            p, q = arrays.order[arrays.edge_vertices[int(found[0]) - place.edges[0]]].tolist()
-            return Failure(body.index, None, failed.step, int(found[1]), failed.time, edge=(p, q))
-        first_slot = place.blocks[0] * LANES
-        row = min(int(found[0]) - first_slot, len(body.tets) - 1)
-        tet = int(arrays.tet_order[row])
-        return Failure(body.index, tet, failed.step, int(found[1]), failed.time)
+        assert self._state is not None
+        assert self._program is not None
+        return find_failure(self._state, self._program, self._scene, body.index, failed)
 
     def read_positions(self, body: Body, alpha: float, out: Floats32 | None = None) -> Floats32:
         """Positions of a body between the previous step (alpha 0) and the last one (alpha 1), (n, 3) [m].

@@ -20,7 +20,7 @@ LAYERS = """
     state  integrators
     kernels
     forces
-    stability
+    stability  failures
     body
     world
     taichi_soft

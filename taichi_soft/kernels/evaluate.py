@@ -77,7 +77,7 @@ def compute_body_forces(
 
 
 @ti.kernel
-def find_failure(
+def find_broken_element(
     state: ti.template(),
     program: ti.template(),
     body: ti.i32,
