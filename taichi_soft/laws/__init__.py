@@ -9,7 +9,7 @@ from taichi_soft.laws.bonds import Ring
 from taichi_soft.laws.cmpm import cmpm_bonds
 from taichi_soft.laws.cmpm2 import cmpm2_bonds
 from taichi_soft.laws.face import face_forces
-from taichi_soft.laws.law import SOLID, SOLID_OR_ANISOTROPIC, BondLaw, EnergyLaw, Law, StressLaw
+from taichi_soft.laws.law import SOLID, BondLaw, EnergyLaw, Law, StressLaw
 from taichi_soft.laws.model import ElementModel
 from taichi_soft.laws.neo_hookean import neo_hookean_energy, neo_hookean_piola, neo_hookean_principal
 from taichi_soft.laws.springs import spring_bonds
@@ -50,7 +50,6 @@ LAWS: dict[str, Law] = {
             st_venant_kirchhoff_energy,
             (Strain.LINEAR,),
             (Flips.TOLERANT,),
-            SOLID_OR_ANISOTROPIC,
             takes_anisotropy=True,
         ),
         EnergyLaw(

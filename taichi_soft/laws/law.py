@@ -8,7 +8,7 @@ from taichi_soft.laws.bonds import Bonds, Ring
 from taichi_soft.types import Flips, Integrator, Strain
 
 SOLID = ("young", "poisson", "density", "damping")
-SOLID_OR_ANISOTROPIC = (*SOLID[:3], "damping; or stiffness", "frame", "density", "damping")
+ANISOTROPIC = ("stiffness", "frame", "density", "damping")
 
 
 @dataclass(frozen=True)
@@ -21,10 +21,10 @@ class StressLaw:
     forces: Any  # ti.func (shape columns, Cauchy stress columns) -> four vec3 [N]
     strains: tuple[Strain, ...] = (Strain.LINEAR, Strain.EXACT)  # that it takes, its default first
     flips: tuple[Flips, ...] = (Flips.TOLERANT, Flips.RECOVER, Flips.OFF)
-    parameters: tuple[str, ...] = SOLID_OR_ANISOTROPIC  # of its material
+    parameters: tuple[str, ...] = SOLID  # of its material
     integrators: tuple[Integrator, ...] = tuple(Integrator)
     keeps_energy: bool = False
-    takes_anisotropy: bool = True  # 21 elastic constants instead of 2
+    takes_anisotropy: bool = True  # also a material with the parameters `ANISOTROPIC`
 
 
 @dataclass(frozen=True)

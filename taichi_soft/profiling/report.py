@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 from rich.table import Table
 
-from taichi_soft.laws import LAWS
+from taichi_soft.laws import LAWS, element_model
+from taichi_soft.laws.law import ANISOTROPIC
 from taichi_soft.profiling.budget import Budget
 from taichi_soft.profiling.law_costs import LawCost
 from taichi_soft.profiling.phases import Phases
@@ -61,17 +63,18 @@ def law_table(costs: list[LawCost]) -> Table:
     """Every law: what it takes, whether it keeps energy, where it comes from, and what it costs."""
     table = Table()
     for name in ("law", "source", "parameters", "strain", "flips", "integrators", "energy", "element", "ns"):
-        table.add_column(name)
+        table.add_column(name, no_wrap=name == "law")
     table.add_column("of virial", justify="right")
     for each in costs:
         law = LAWS[each.law]
+        integrators = replace(element_model(each.law), is_anisotropic=each.is_anisotropic).integrators
         table.add_row(
             law.name,
             law.source,
-            ", ".join(law.parameters),
+            ", ".join(ANISOTROPIC if each.is_anisotropic else law.parameters),
             each.strain or "-",
             ", ".join(choice.value for choice in law.flips) or "-",
-            "all" if set(law.integrators) == set(Integrator) else ", ".join(law.integrators),
+            "all" if len(integrators) == len(Integrator) else "all but implicit_euler",
             "kept" if law.keeps_energy else "drifts",
             each.element,
             f"{each.cost.median:.1f}",

@@ -98,24 +98,25 @@ def test_info_says_which_device_and_versions():
 
 def test_info_lists_every_law_with_its_cost():
     costs = json.loads(run("info", "--laws", "--json").stdout)
-    assert [(cost["law"], cost["strain"]) for cost in costs] == [
-        ("virial", "linear"),
-        ("virial", "exact"),
-        ("face", "linear"),
-        ("face", "exact"),
-        ("st_venant_kirchhoff", "linear"),
-        ("neo_hookean", None),
-        *((name, None) for name in list(LAWS)[4:]),
+    assert [(cost["law"], cost["strain"], cost["is_anisotropic"]) for cost in costs] == [
+        ("virial", "linear", False),
+        ("virial", "exact", False),
+        ("virial", "linear", True),
+        ("face", "linear", False),
+        ("face", "exact", False),
+        ("face", "linear", True),
+        ("st_venant_kirchhoff", "linear", False),
+        ("st_venant_kirchhoff", "linear", True),
+        ("neo_hookean", None, False),
+        *((name, None, False) for name in list(LAWS)[4:]),
     ]
     assert all(cost["ratio"]["least"] > 0 for cost in costs)
     assert {cost["element"] for cost in costs} == {"tetrahedron", "edge"}
-    table = law_table(
-        [LawCost(cost["law"], cost["strain"], cost["element"], SPREAD, SPREAD) for cost in costs]
-    )
+    table = law_table([LawCost(**{**cost, "cost": SPREAD, "ratio": SPREAD}) for cost in costs])
     assert table.row_count == len(costs)
     cells = {column.header: list(column.cells) for column in table.columns}
     assert all("young" in text or "stiffness" in text for text in cells["parameters"])
-    assert set(cells["integrators"]) == {"all"}
+    assert set(cells["integrators"]) == {"all", "all but implicit_euler"}
 
 
 def test_profile_prints_phases_and_budgets_as_json():
