@@ -112,6 +112,11 @@ class Body:
             self._failure = self._world._find_failure(self, self._frozen_in)
         return self._failure
 
+    @property
+    def solve_residual(self) -> float | None:
+        """Largest residual of the last step's implicit solves, over their right-hand sides; None before."""
+        return self._world._solve_residual(self)
+
     def positions(self, out: Floats32 | None = None) -> Floats32:
         """Vertex positions after the last step, float32 (n, 3) [m].
 

@@ -110,6 +110,7 @@ class State:
             self.direction = ti.Vector.field(3, real, n)
             self.image = ti.Vector.field(3, real, n)
             self.particle_contact = ti.field(ti.i32, n)  # 1 where the floor holds it from below
+            self.prev_contact = ti.field(ti.i32, n)  # before a piece of a step that may be taken back
             self.body_residual = ti.field(real, bodies)  # largest of the last step, over the right-hand side
             self.solver = ti.Vector.field(2, real, ())  # tolerance, most iterations
         if capacity.parallel:

@@ -48,7 +48,8 @@ class World:
             vertex back by itself, so a damped body may well bounce lower with it than without.
         friction: Coulomb coefficient of the floor, 0 or more.
         integrator: "leapfrog", "lazy_leapfrog", "explicit_euler", or "implicit_euler": stable for every step,
-            at the price of a linear solve in each and of damping that grows with its length.
+            at the price of a linear solve in each and of damping that grows with its length. A step in which
+            edges would change by more than half their length is made in 2 to 32 pieces.
         tolerance: of implicit solves, residual over right-hand side: 1e-6 to 0.5.
         most_iterations: of an implicit solve; one that needs more goes on as far as it came and is reported
             by a `SolverWarning`.
@@ -320,8 +321,8 @@ class World:
                 continue
             self._warned_solves.add(int(index))
             warnings.warn(
-                f"the implicit solve of body {index} stopped at {self.settings.most_iterations} iterations "
-                f"with a residual of {residuals[index]:.2g} (asked for {self.settings.tolerance:g}): raise "
+                f"the implicit solve of body {index} ended with a residual of {residuals[index]:.2g} instead "
+                f"of {self.settings.tolerance:g} within {self.settings.most_iterations} iterations: raise "
                 "most_iterations or tolerance, or use more substeps",
                 SolverWarning,
                 stacklevel=3,
@@ -368,6 +369,11 @@ class World:
         begin, end = self._scene.ranges[body.index].particles
         rows[:] = self._read[begin:end]
         return rows
+
+    def _solve_residual(self, body: Body) -> float | None:
+        require_built(self.is_built)
+        assert self._state is not None
+        return float(self._state.body_residual[body.index]) if self._is_implicit and self.step_count else None
 
     def _read_velocities(self, body: Body) -> Floats32:
         """Velocities at the time of the positions, (n, 3) [m/s]. Raises: StateError before `build`."""

@@ -4,6 +4,7 @@ from taichi_soft.constants import LANES
 from taichi_soft.kernels.bonds import accumulate_pressures
 from taichi_soft.kernels.edges import accumulate_edge_forces, edge_force_of
 from taichi_soft.kernels.elastic import lane_forces
+from taichi_soft.kernels.internal_forces import clear_forces
 from taichi_soft.kernels.motion import particle_is_sound, restore_particle
 from taichi_soft.kernels.per_body import advance_body
 from taichi_soft.math.finite import is_finite
@@ -103,9 +104,10 @@ def find_broken_element(
                     found[1] = s
                     is_open = 0
                 else:
+                    clear_forces(state, body)
                     advance_body(state, program, body, h, kick, int(s == 0))
                     kick = h
         particles = state.body_particles[body]
         for p in range(particles[0], particles[1]):
             restore_particle(state, p)
-            state.particle_force[p] = ti.Vector.zero(state.real, 4)
+        clear_forces(state, body)

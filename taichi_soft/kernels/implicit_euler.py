@@ -1,12 +1,13 @@
 """Implicit Euler (thesis section 3.5.3, eq. 3.26) of one body: one linear solve per substep.
 
-(M + h D + h^2 K) dv = h (f + m g - h K v): forces of the old positions, and how they change on the way.
-Particles that lie on the floor are held at its height within the solve, until it would have to pull them
-down.
+(M + h D + h^2 K) dv = h (f + m g - h K v): forces of the old positions, and how they change on the way. Where
+that is too far a way for them to change evenly, the step is made in pieces. Particles that lie on the floor
+are held at its height within the solve, until it would have to pull them down.
 """
 
 from taichi_soft.collision.floor import resolve_floor
 from taichi_soft.kernels.conjugate_gradient import invert_blocks, solve_system
+from taichi_soft.kernels.internal_forces import accumulate_forces
 from taichi_soft.kernels.linear_system import (
     add_damping,
     add_masses,
@@ -16,6 +17,15 @@ from taichi_soft.kernels.linear_system import (
 )
 from taichi_soft.math.tensors import widened
 from taichi_soft.runtime import ti
+
+FARTHEST = 0.5
+"""Change of an edge in one piece of a step, over its length, beyond which the piece is halved."""
+
+LEAST_LENGTH = 0.1
+"""Of the mean length of edges: shorter ones count as that long."""
+
+MOST_PIECES = 32
+"""Of one step, so that it ends."""
 
 
 @ti.func
@@ -63,15 +73,67 @@ def _move(state: ti.template(), program: ti.template(), p, h):
 
 
 @ti.func
-def implicit_substep(state: ti.template(), program: ti.template(), body, h, is_first):
-    """One substep of one body whose forces are in `particle_force`."""
-    assemble(state, program, body, h)
-    residual = solve_system(state, body)
-    multiply_system(state, body, state.solution, state.image)
+def _remember(state: ti.template(), body):
+    """Keep where the particles are, in fields that the solver has done with."""
     particles = state.body_particles[body]
     for p in range(particles[0], particles[1]):
-        _move(state, program, p, h)
+        state.direction[p] = state.particle_position[p]
+        state.residual[p] = state.particle_velocity[p]
+        state.prev_contact[p] = state.particle_contact[p]
+
+
+@ti.func
+def _take_back(state: ti.template(), body):
+    particles = state.body_particles[body]
+    for p in range(particles[0], particles[1]):
+        state.particle_position[p] = state.direction[p]
+        state.particle_velocity[p] = state.residual[p]
+        state.particle_contact[p] = state.prev_contact[p]
+
+
+@ti.func
+def _reach(state: ti.template(), body):
+    """Largest change of an edge against where it was remembered, over its length then, squared."""
+    edges = state.body_edges[body]
+    mean = state.particle_position[0].x * 0.0
+    for e in range(edges[0], edges[1]):
+        r = state.direction[state.edge_vertices[e][1]] - state.direction[state.edge_vertices[e][0]]
+        mean += r.dot(r)
+    least = LEAST_LENGTH * LEAST_LENGTH * mean / (edges[1] - edges[0]) + 1e-30
+    worst = mean * 0.0
+    for e in range(edges[0], edges[1]):
+        p, q = state.edge_vertices[e][0], state.edge_vertices[e][1]
+        r = state.direction[q] - state.direction[p]
+        change = state.particle_position[q] - state.particle_position[p] - r
+        worst = ti.max(worst, change.dot(change) / ti.max(r.dot(r), least))
+    return worst
+
+
+@ti.func
+def implicit_substep(state: ti.template(), program: ti.template(), body, h, is_first):
+    """One substep of one body: in one piece, or in more where its edges would change too much at once.
+
+    The solve takes the forces as linear. What goes far beyond that, such as a fall that ends within the step,
+    would be thrown anywhere.
+    """
+    piece, left = h, 1
+    largest = ti.cast(0.0, state.real)
+    while left > 0:
+        accumulate_forces(state, program, body)
+        assemble(state, program, body, piece)
+        residual = solve_system(state, body)
+        multiply_system(state, body, state.solution, state.image)
+        _remember(state, body)
+        particles = state.body_particles[body]
+        for p in range(particles[0], particles[1]):
+            _move(state, program, p, piece)
+        if _reach(state, body) > FARTHEST * FARTHEST and left < MOST_PIECES and piece > h / MOST_PIECES:
+            _take_back(state, body)
+            piece, left = 0.5 * piece, 2 * left
+        else:
+            largest = ti.max(largest, residual)
+            left -= 1
     if is_first == 1:
-        state.body_residual[body] = residual
+        state.body_residual[body] = largest
     else:
-        state.body_residual[body] = ti.max(state.body_residual[body], residual)
+        state.body_residual[body] = ti.max(state.body_residual[body], largest)

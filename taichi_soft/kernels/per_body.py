@@ -4,27 +4,12 @@ Nothing waits between substeps and a body stays in one core's cache. The result 
 of threads.
 """
 
-from taichi_soft.kernels.bonds import accumulate_pressures
-from taichi_soft.kernels.edges import accumulate_edge_forces
-from taichi_soft.kernels.elastic import accumulate_elastic_forces
 from taichi_soft.kernels.implicit_euler import implicit_substep
+from taichi_soft.kernels.internal_forces import accumulate_forces, clear_forces
 from taichi_soft.kernels.motion import move_particle, particle_is_sound, remember_particle, restore_particle
 from taichi_soft.runtime import ti
 from taichi_soft.state import ACTIVE, FROZEN
-from taichi_soft.types import DampingModel, Integrator
-
-
-@ti.func
-def accumulate_forces(state: ti.template(), program: ti.template(), body):
-    """Add all internal forces of one body to its particles."""
-    for m, model in ti.static(enumerate(program.models)):
-        if state.body_model[body] == m:
-            if ti.static(model.reads_expansion):
-                accumulate_pressures(state, body)
-            if ti.static(not model.has_bonds):
-                accumulate_elastic_forces(state, model, body)
-            if ti.static(model.damping_model == DampingModel.EDGE):
-                accumulate_edge_forces(state, model, body)
+from taichi_soft.types import Integrator
 
 
 @ti.func
@@ -38,10 +23,11 @@ def move_body(state: ti.template(), program: ti.template(), body, h, kick):
 
 @ti.func
 def advance_body(state: ti.template(), program: ti.template(), body, h, kick, is_first):
-    """One substep of one body under the forces on its particles."""
+    """One substep of one body."""
     if ti.static(program.integrator == Integrator.IMPLICIT_EULER):
         implicit_substep(state, program, body, h, is_first)
     else:
+        accumulate_forces(state, program, body)
         move_body(state, program, body, h, kick)
 
 
@@ -55,7 +41,7 @@ def _settle_body(state: ti.template(), body):
     if sound == 0:
         for p in range(particles[0], particles[1]):
             restore_particle(state, p)
-            state.particle_force[p] = ti.Vector.zero(state.real, 4)
+        clear_forces(state, body)
         state.body_status[body] = FROZEN
     return 1 - sound
 
@@ -70,7 +56,6 @@ def _step_body(state: ti.template(), program: ti.template(), body, substeps, h):
     if state.body_status[body] == ACTIVE:
         kick = 0.5 * (state.body_velocity_lag[body] + h)
         for s in range(substeps):
-            accumulate_forces(state, program, body)
             advance_body(state, program, body, h, kick, int(s == 0))
             kick = h
         failed = _settle_body(state, body)

@@ -79,7 +79,16 @@ def double_spring(r, n, length, tensile, shear):
     return force
 
 
-def cmpm(mesh, p, q, x, E, G, face):
+def braked(r, n, relative_velocity, along, across):
+    """Eq. 4.5, on p: b_n along n and b_m along m."""
+    m = r - (n @ r) * n
+    force = along * (n @ relative_velocity) * n
+    if np.linalg.norm(m) > 0:
+        force = force + across * (unit(m) @ relative_velocity) * unit(m)
+    return force
+
+
+def cmpm(mesh, p, q, x, face):
     """Chapter 4; `face` holds the area at rest and the corners as (tetrahedron, barycentric weights)."""
     area, corners = face
     points = np.array([w @ x[mesh.tets[t]] for t, w in corners])
@@ -87,9 +96,12 @@ def cmpm(mesh, p, q, x, E, G, face):
     turns = sum(
         np.cross(points[i] - center, points[(i + 1) % len(points)] - center) for i in range(len(points))
     )
-    length = np.linalg.norm(mesh.vertices[q] - mesh.vertices[p])
-    tensile, shear = (area * mean_over(mesh, p, q, value) for value in (E, G))
-    return double_spring(x[q] - x[p], unit(turns), length, tensile, shear)
+    return x[q] - x[p], unit(turns), rest_length(mesh, p, q), area
+
+
+def rest_length(mesh, p, q):
+    """Of an edge."""
+    return np.linalg.norm(mesh.vertices[q] - mesh.vertices[p])
 
 
 def carried(mesh, p, q, x, n0):
@@ -103,19 +115,16 @@ def carried(mesh, p, q, x, n0):
     return total / weight
 
 
-def against_carried(mesh, p, q, x, E, G, normal):
+def against_carried(mesh, p, q, x, normal):
     """Eq. 4.8 to 4.10 with the normal that `normal` makes of the positions, at rest and now."""
-    area = edge_area(mesh, p, q)
-    r = carried(mesh, p, q, x, normal(mesh.vertices))
-    tensile, shear = (area * mean_over(mesh, p, q, value) for value in (E, G))
-    return double_spring(r, normal(x), 1.0, tensile, shear)
+    return carried(mesh, p, q, x, normal(mesh.vertices)), normal(x), 1.0, edge_area(mesh, p, q)
 
 
-def cmpm2(mesh, p, q, x, E, G):
+def cmpm2(mesh, p, q, x):
     """4.4.1."""
     ring = tets_round(mesh, p, q)
     return against_carried(
-        mesh, p, q, x, E, G, lambda y: unit(sum(quadrilateral(y, p, q, a, b) for _, a, b in ring))
+        mesh, p, q, x, lambda y: unit(sum(quadrilateral(y, p, q, a, b) for _, a, b in ring))
     )
 
 
@@ -133,7 +142,7 @@ def fitted_normal(points, r):
     return n if n @ r >= 0 else -n
 
 
-def best_fitting_plane(mesh, p, q, x, E, G):
+def best_fitting_plane(mesh, p, q, x):
     """4.4.2."""
     ring = neighbours(mesh, p, q)
 
@@ -141,7 +150,7 @@ def best_fitting_plane(mesh, p, q, x, E, G):
         points = y[ring] if len(ring) > 2 else np.vstack([y[ring], (y[p] + y[q]) / 2])
         return fitted_normal(points, y[q] - y[p])
 
-    return against_carried(mesh, p, q, x, E, G, normal)
+    return against_carried(mesh, p, q, x, normal)
 
 
 def tilt_angles(ring, x, p, q):
@@ -169,7 +178,7 @@ def rotated(v, axis, angle):
     return v * np.cos(angle) + np.cross(axis, v) * np.sin(angle) + axis * (axis @ v) * (1 - np.cos(angle))
 
 
-def tilted_plane(mesh, p, q, x, E, G, b=2.0):
+def tilted_plane(mesh, p, q, x, b=2.0):
     """4.4.3 with c = b beta / 2 pi (eq. 4.12); b = 1/4 as printed, 2 to tilt by all of a shear."""
     ring = neighbours(mesh, p, q)
     rest, arms0, axis0 = tilt_angles(ring, mesh.vertices, p, q)
@@ -179,10 +188,29 @@ def tilted_plane(mesh, p, q, x, E, G, b=2.0):
     # A particle that rises lifts the plane on its side, so the normal leans away from it.
     angle = np.linalg.norm(turn)
     n = rotated(axis, unit(turn), angle) if angle > 0 else axis
-    length = np.linalg.norm(mesh.vertices[q] - mesh.vertices[p])
-    area = edge_area(mesh, p, q)
+    return x[q] - x[p], n, rest_length(mesh, p, q), edge_area(mesh, p, q)
+
+
+def frame(law, mesh, p, q, x, face):
+    """What a law of chapter 4 compares on an edge: r, n, the length at rest (1 for directions) and the area.
+
+    None where the law makes no bond of it; `face` is that of `cmpm`.
+    """
+    if law == "cmpm":
+        return None if face is None else cmpm(mesh, p, q, x, face)
+    if law.startswith("tilted_plane"):
+        return tilted_plane(mesh, p, q, x, b=0.25 if law.endswith("printed") else 2.0)
+    return {"cmpm2": cmpm2, "best_fitting_plane": best_fitting_plane}[law](mesh, p, q, x)
+
+
+def bond(law, mesh, p, q, x, E, G, face):
+    """Elastic force of a law of chapter 4 on p."""
+    found = frame(law, mesh, p, q, x, face)
+    if found is None:
+        return np.zeros(3)
+    r, n, length, area = found
     tensile, shear = (area * mean_over(mesh, p, q, value) for value in (E, G))
-    return double_spring(x[q] - x[p], n, length, tensile, shear)
+    return double_spring(r, n, length, tensile, shear)
 
 
 def summed(mesh, force_on_first):
