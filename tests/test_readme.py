@@ -51,6 +51,18 @@ def test_the_force_example_pulls_a_stretched_box_together():
     assert force == pytest.approx(-2.0e7 * strain, rel=1e-9)  # cork: nu = 0, so the area stays 1 m^2
 
 
+def test_the_fibres_of_the_example_spread_and_its_cloth_hangs():
+    names = run_blocks(3)
+    frames = names["world"].bodies[0].material.frame
+    assert frames.shape[1:] == (3, 3)
+    assert np.ptp(frames[:, 1, 0]) > 0
+    names = run_blocks(4)
+    z = names["flag"].positions()[:, 2]
+    assert z.max() == pytest.approx(2.0, abs=0.01)
+    assert z.min() < 1.9
+    assert len(BLOCKS) == 5  # or another one runs nowhere
+
+
 @pytest.mark.parametrize("names", [LAWS, PRESETS, demo_names()])
 def test_every_name_there_is_stands_in_the_readme(names):
     for name in names:

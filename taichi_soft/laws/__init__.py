@@ -158,8 +158,8 @@ def fit_model(model: ElementModel, mesh: BodyMesh, material: AnyMaterial) -> Ele
         return model
     if not isinstance(mesh, TetMesh):
         raise MeshError(
-            f"law {law.name!r} needs tetrahedra: pass a TetMesh, got {type(mesh).__name__}"
-            + (" (which takes a SpringMaterial)" if law.name == "springs" else "")
+            f"law {law.name!r} needs tetrahedra: pass a TetMesh, or law='springs' and a SpringMaterial for a "
+            "ParticleMesh"
         )
     if isinstance(material, SpringMaterial):
         raise MaterialError(f"law {law.name!r} needs a Material, got {type(material).__name__}")

@@ -40,6 +40,10 @@ class SpringMaterial:
         self._check("damping", is_damping, f"0 N s/m or more and below {LARGEST:g}")
         if self.rest_length is not None:
             self._check("rest_length", is_positive, f"above 0 m, {POSITIVE}")
+        given = {"stiffness": self.stiffness, "damping": self.damping, "rest_length": self.rest_length}
+        lengths = {name: len(value) for name, value in given.items() if isinstance(value, np.ndarray)}
+        if len(set(lengths.values())) > 1:
+            raise MaterialError(f"arrays of different lengths {lengths}: give one value per edge in each")
 
     def _check(self, name: str, is_valid: Any, range_text: str) -> None:
         object.__setattr__(self, name, as_constant(getattr(self, name), name, "edge", is_valid, range_text))
@@ -57,11 +61,20 @@ class SpringMaterial:
             damping: b [N s/m].
         Raises: MaterialError if a number is not positive or lengths do not fit.
         """
-        try:
-            stiffness = np.asarray(young * np.asarray(area, dtype=float) / np.asarray(lengths, dtype=float))
-        except (TypeError, ValueError) as error:
-            raise MaterialError(f"young, area and lengths must be numbers that fit ({error})") from None
-        return cls(stiffness if stiffness.ndim else float(stiffness), damping, np.array(lengths, dtype=float))
+        E, a, l = (  # noqa: E741
+            np.asarray(as_constant(value, name, "edge", is_positive, f"above 0 {unit}, {POSITIVE}"))
+            for value, name, unit in (
+                (young, "young", "Pa"),
+                (area, "area", "m^2"),
+                (lengths, "lengths", "m"),
+            )
+        )
+        if a.ndim and l.ndim and len(a) != len(l):
+            raise MaterialError(
+                f"area has {len(a)} values and lengths has {len(l)}: give one per edge in each"
+            )
+        stiffness = E * a / l
+        return cls(stiffness if stiffness.ndim else float(stiffness), damping, l if l.ndim else float(l))
 
     def per_edge(self, name: str, edge_count: int, default: Array | None = None) -> Array:
         """One value of a constant for each of `edge_count` edges; `default` where it is None.

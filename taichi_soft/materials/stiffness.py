@@ -13,16 +13,25 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.checks import as_array, as_rotation
+from taichi_soft.checks import as_array, as_number, as_positive, as_rotation
 from taichi_soft.errors import MaterialError
+from taichi_soft.materials.constants import LARGEST, SMALLEST
 
 Floats = NDArray[np.float64]
 
 PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
 """Axes of each of Voigt's six components."""
 
+ONE_PLANE = tuple((i, j) for i in range(6) for j in range(i, 6) if (i in (3, 4)) == (j in (3, 4)))
+"""Entries that one plane of symmetry leaves: it mirrors yz and xz, which act on each other only."""
+
 THESIS_ORDER = (0, 1, 2, 5, 4, 3)
 """Where Voigt's components stand in the thesis: its fourth is xy, its sixth yz."""
+
+
+def _as_ratio(value: float, name: str, high: float = 0.5) -> float:
+    """Poisson's ratio, strictly between -1 and `high`. Raises: OptionError."""
+    return as_number(value, name, np.nextafter(-1, 0), np.nextafter(high, 0), f"above -1 and below {high:g}")
 
 
 def turned(matrix: Floats, rotations: Floats) -> Floats:
@@ -69,19 +78,26 @@ class Stiffness:
                 f"({column}, {row}) is {matrix[column, row]:g}"
             )
         matrix = (matrix + matrix.T) / 2
-        lowest = float(np.linalg.eigvalsh(matrix)[0])
-        if lowest <= 1e-12 * np.abs(matrix).max():
+        lowest, highest = np.linalg.eigvalsh(matrix)[[0, -1]].tolist()
+        if lowest <= 0:
             raise MaterialError(
                 f"stiffness has the eigenvalue {lowest:g} Pa: a material that resists every strain has none "
                 "of 0 or below"
+            )
+        if not (lowest > 1e-9 * highest and lowest >= SMALLEST and highest < LARGEST):
+            raise MaterialError(
+                f"stiffness has eigenvalues from {lowest:g} to {highest:g} Pa: they must lie from "
+                f"{SMALLEST:g} to {LARGEST:g}, and within a factor of 1e9"
             )
         matrix.flags.writeable = False
         object.__setattr__(self, "matrix", matrix)
 
     @classmethod
     def isotropic(cls, young: float, poisson: float) -> Stiffness:
-        """The same in all directions: 2 constants (thesis eq. 2.35). young [Pa]."""
-        return cls.orthotropic((young,) * 3, (poisson,) * 3, (young / (2 * (1 + poisson)),) * 3)
+        """The same in all directions: 2 constants (thesis eq. 2.35). young [Pa], poisson from -1 to 0.5."""
+        nu = _as_ratio(poisson, "poisson")
+        E = as_positive(young, "young", "Pa")
+        return cls.orthotropic((E,) * 3, (nu,) * 3, (E / (2 * (1 + nu)),) * 3)
 
     @classmethod
     def one_axis(
@@ -100,7 +116,9 @@ class Stiffness:
             poisson_across: contraction across x when pulled across x, at right angles.
             shear_along: shear modulus of planes through x [Pa]. The other follows: E / (2 (1 + nu)) across.
         """
-        shear_across = young_across / (2 * (1 + poisson_across))
+        shear_across = as_positive(young_across, "young_across", "Pa") / (
+            2 * (1 + _as_ratio(poisson_across, "poisson_across", 1.0))
+        )
         return cls.orthotropic(
             (young_along, young_across, young_across),
             (poisson_across, poisson_along, poisson_along),
@@ -131,6 +149,21 @@ class Stiffness:
             return cls(np.asarray(np.linalg.inv(compliance), dtype=np.float64))
         except np.linalg.LinAlgError:
             raise MaterialError(f"poisson is {ratios.tolist()}: no material has such ratios") from None
+
+    @classmethod
+    def one_plane(cls, constants: Sequence[float]) -> Stiffness:
+        """One plane of symmetry, that of x and y: 13 constants (thesis 2.4.1).
+
+        Args:
+            constants: [Pa], the entries of the matrix that need not vanish, row by row from the diagonal on:
+            c11,
+                c12, c13, c16, c22, c23, c26, c33, c36, c44, c45, c55, c66.
+        """
+        values = as_array(constants, "constants", (13,), "Pa")
+        matrix = np.zeros((6, 6))
+        rows, columns = np.array(ONE_PLANE).T
+        matrix[rows, columns] = matrix[columns, rows] = values
+        return cls(matrix)
 
     @classmethod
     def from_thesis(cls, matrix: ArrayLike) -> Stiffness:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.checks import as_array, as_count, as_positive
+from taichi_soft.checks import as_array, as_count, as_number, as_positive, to_array
 from taichi_soft.errors import MeshError, OptionError
 from taichi_soft.meshing.arrays import FloatArray
 from taichi_soft.meshing.particle_mesh import ParticleMesh
@@ -48,10 +50,8 @@ def cloth(
     width, height = as_array(size, "size", (2,), "m")
     for value in (width, height):
         as_positive(value, "size", "m")
-    if not isinstance(cells, (tuple, list)) or len(cells) != 2:
-        raise OptionError(f"cells must be two whole numbers, got {cells!r}")
-    nx, ny = (as_count(value, "cells") for value in cells)
-    if isinstance(springs, str) or not set(springs) <= set(KINDS) or not springs:
+    nx, ny = _as_cells(cells)
+    if not isinstance(springs, (tuple, list)) or not set(springs) <= set(KINDS) or not springs:
         raise OptionError(f"springs must be some of {', '.join(map(repr, KINDS))}, got {springs!r}")
     i, j = (grid.ravel() for grid in np.meshgrid(np.arange(nx + 1), np.arange(ny + 1), indexing="ij"))
     vertices = np.stack([i * (width / nx), j * (height / ny), np.zeros(len(i))], axis=1)
@@ -76,24 +76,48 @@ def cloth_constants(mesh: ParticleMesh, cells: tuple[int, int], **values: float)
     Args:
         mesh: made by `cloth`.
         cells: as given to it.
-        values: tensile=, shear= and bend=; a kind that the cloth has and that is not given is 0.
-    Raises: OptionError for an unknown kind; MeshError for a mesh of other cells.
+        values: tensile=, shear= and bend=, each of the kinds that the cloth has.
+    Raises: OptionError for an unknown kind or one that is missing; MeshError for a mesh of other cells.
     """
     unknown = set(values) - set(KINDS)
     if unknown:
         raise OptionError(f"unknown spring kind {min(unknown)!r}: choose of {', '.join(map(repr, KINDS))}")
-    rows = cells[1] + 1
-    if len(mesh.vertices) != (cells[0] + 1) * rows:
-        raise MeshError(
-            f"a cloth of {cells} cells has {(cells[0] + 1) * rows} vertices, not {len(mesh.vertices)}"
-        )
-    i, j = np.divmod(mesh.edges, rows)
-    step = np.stack([i[:, 1] - i[:, 0], j[:, 1] - j[:, 0]], axis=1)
+    nx, ny = _as_cells(cells)
+    kind = _kinds(mesh, nx, ny)
     chosen = np.zeros(len(mesh.edges))
-    for kind, steps in KINDS.items():
-        is_kind = np.any([(step == each).all(axis=1) for each in steps], axis=0)
-        chosen[is_kind] = values.get(kind, 0.0)
+    for number, name in enumerate(KINDS):
+        if (kind == number).any():
+            if name not in values:
+                raise OptionError(f"the cloth has {name} springs: give {name}= as well, 0 for none")
+            chosen[kind == number] = as_number(values[name], name, 0.0, np.inf, "a number of 0 or more")
     return chosen
+
+
+def _as_cells(cells: Any) -> tuple[int, int]:
+    if not isinstance(cells, (tuple, list)) or len(cells) != 2:
+        raise OptionError(f"cells must be two whole numbers, got {cells!r}")
+    return as_count(cells[0], "cells"), as_count(cells[1], "cells")
+
+
+def _kinds(mesh: ParticleMesh, nx: int, ny: int) -> NDArray[np.int64]:
+    """Which of `KINDS` each spring of a cloth is, (k,). Raises: MeshError if it is a cloth of other cells."""
+    if not isinstance(mesh, ParticleMesh):
+        raise MeshError(f"mesh must be a ParticleMesh made by cloth, got {type(mesh).__name__}")
+    if len(mesh.vertices) != (nx + 1) * (ny + 1):
+        raise MeshError(
+            f"a cloth of ({nx}, {ny}) cells has {(nx + 1) * (ny + 1)} vertices, not {len(mesh.vertices)}"
+        )
+    i, j = np.divmod(mesh.edges, ny + 1)
+    step = np.stack([i[:, 1] - i[:, 0], j[:, 1] - j[:, 0]], axis=1)
+    kind = np.full(len(step), -1)
+    for number, steps in enumerate(KINDS.values()):
+        kind[np.any([(step == each).all(axis=1) for each in steps], axis=0)] = number
+    if kind.min() < 0:
+        row = int(kind.argmin())
+        raise MeshError(
+            f"edge {row} is no spring of a cloth of ({nx}, {ny}) cells: give the cells it was made with"
+        )
+    return kind
 
 
 def edges_as_particles(mesh: TetMesh, density: float | NDArray[np.float64]) -> ParticleMesh:
@@ -101,9 +125,14 @@ def edges_as_particles(mesh: TetMesh, density: float | NDArray[np.float64]) -> P
 
     Args:
         density: [kg/m^3], one number or one per tetrahedron.
+    Raises: MeshError for what is no TetMesh; OptionError for a density that is not positive or does not fit.
     """
     if not isinstance(mesh, TetMesh):
         raise MeshError(f"mesh must be a TetMesh, got {type(mesh).__name__}")
-    masses = np.repeat(mesh.volumes * np.asarray(density, dtype=float) / 4.0, 4)
+    given = density if np.ndim(to_array(density, "density")) else np.full(len(mesh.tets), density)
+    rho = as_array(given, "density", (len(mesh.tets),), "kg/m^3")
+    if not (rho > 0).all():
+        raise OptionError(f"density must be above 0 kg/m^3, got {rho.min():g}")
+    masses = np.repeat(mesh.volumes * rho / 4.0, 4)
     per_vertex = np.bincount(mesh.tets.ravel(), masses, len(mesh.vertices))
     return ParticleMesh(mesh.vertices, mesh.edges, per_vertex, surface=mesh.surface)

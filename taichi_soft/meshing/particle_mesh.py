@@ -25,8 +25,8 @@ class ParticleMesh(BodyMesh):
 
     Args:
         vertices: (n, 3) positions at rest [m].
-        edges: (k, 2) integer vertex indices, in any order and direction; they are stored with i < j and
-            with the rows in ascending order, so values per edge belong to `mesh.edges`, not to the input.
+        edges: (k, 2) integer vertex indices, in any order and direction. They keep their order, in which
+            a `SpringMaterial` takes values per edge, and are stored with i < j.
         masses: (n,) mass of each particle [kg], all positive; one number serves for all.
         surface: (f, 3) triangles to draw, none by default. Triangles are seen from one side, so a sheet has
             each twice.
@@ -68,7 +68,7 @@ class ParticleMesh(BodyMesh):
             raise MeshError(
                 f"vertex {int(np.argmax(alone))} belongs to no edge: remove it, or join it to another"
             )
-        super().__init__(points, in_order, np.zeros((0, 4), dtype=np.int32))
+        super().__init__(points, pairs, np.zeros((0, 4), dtype=np.int32))
         mass = masses if hasattr(masses, "__len__") else np.full(len(points), masses)
         kilograms = as_real(mass, "masses", (len(points),), "mass")
         if not (kilograms > 0).all():

@@ -140,6 +140,24 @@ def test_a_grown_tetrahedron_is_pulled_together_by_its_volume():
     assert (np.einsum("na,na->n", firm - plain, inward) > 0).all()
 
 
+def test_constants_per_edge_belong_to_the_edges_as_they_were_given():
+    """Against each edge alone, for edges in no order at all."""
+    rng = np.random.default_rng(9)
+    points = rng.normal(size=(6, 3))
+    pairs = np.array([(p, q) for p in range(6) for q in range(6) if p < q])[rng.permutation(15)]
+    pairs[::2] = pairs[::2, ::-1]
+    k, length = rng.uniform(1, 9, 15), rng.uniform(0.5, 2, 15)
+    mesh = ParticleMesh(points, pairs, 1.0)
+    found = internal_forces(mesh, SpringMaterial(k, 0.0, length), points, law="springs")
+    expected = np.zeros_like(points)
+    for e, (p, q) in enumerate(pairs):
+        r = points[q] - points[p]
+        force = k[e] * (np.linalg.norm(r) - length[e]) * oracle.unit(r)
+        expected[p] += force
+        expected[q] -= force
+    np.testing.assert_allclose(found, expected, atol=1e-12 * np.abs(expected).max())
+
+
 class TestGivenSprings:
     MESH = ParticleMesh([[0, 0, 0], [3, 4, 0], [0, 4, 0.0]], [[0, 1], [1, 2]], 1.0)
 
@@ -174,6 +192,7 @@ class TestGivenSprings:
             ({"stiffness": 1.0, "rest_length": 0}, "rest_length is 0"),
             ({"stiffness": "soft"}, "stiffness must be a number or one number per edge"),
             ({"stiffness": 1.0, "rest_length": np.nan}, "rest_length is nan"),
+            ({"stiffness": [1.0, 2.0], "damping": [1.0, 2.0, 3.0]}, "arrays of different lengths"),
         ],
     )
     def test_constants_out_of_range_are_refused(self, arguments, text):

@@ -183,6 +183,38 @@ def test_a_class_has_as_many_constants_as_the_book_says(name):
     assert np.linalg.matrix_rank(np.array(rows), tol=1e-3) == CONSTANTS[name]
 
 
+def test_thirteen_constants_make_one_plane_of_symmetry():
+    """Entry by entry; and the plane is that of x and y: half a turn about z changes nothing."""
+    values = [30, 5, 6, 2, 20, 7, 3, 25, 1, 9, 4, 8, 11]
+    found = Stiffness.one_plane(values)
+    upper = [(i, j) for i in range(6) for j in range(i, 6) if found.matrix[i, j] != 0]
+    assert [found.matrix[i, j] for i, j in upper] == values
+    assert found.symmetry() == "one plane"
+    np.testing.assert_allclose(found.rotated([0, 0, 1, 0]).matrix, found.matrix, atol=1e-12)
+    with pytest.raises(OptionError, match=r"constants must have shape \(13,\)"):
+        Stiffness.one_plane(values[:9])
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: Stiffness.isotropic(1e6, -1),
+        lambda: Stiffness.isotropic(1e6, 0.5),
+        lambda: Stiffness.isotropic("1e6", 0.3),
+        lambda: Stiffness.isotropic(0, 0.3),
+        lambda: Stiffness.isotropic(1e6, None),
+        lambda: Stiffness.one_axis(1e6, 1e6, 0.3, -1, 1e6),
+        lambda: Stiffness.one_axis(1e6, "soft", 0.3, 0.2, 1e6),
+        lambda: Stiffness.isotropic(1e30, 0.3),
+        lambda: Stiffness.isotropic(1e-30, 0.3),
+        lambda: Stiffness.isotropic(1e6, 0.5 - 1e-13),
+    ],
+)
+def test_constants_out_of_range_are_refused_in_one_line(make):
+    with pytest.raises((MaterialError, OptionError), match=r"must be|must lie"):
+        make()
+
+
 def test_the_matrix_cannot_be_changed_behind_its_back():
     given = np.eye(6)
     stiffness = Stiffness(given)

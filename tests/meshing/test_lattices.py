@@ -64,7 +64,9 @@ def test_each_kind_of_spring_gets_its_own_constant():
     lengths = mesh.edge_lengths.round(6)
     expected = {1.0: 1.0, round(2**0.5, 6): 2.0, 2.0: 3.0}
     assert constants.tolist() == [expected[length] for length in lengths]
-    assert (cloth_constants(mesh, cells, shear=2.0) > 0).sum() == 12
+    assert (cloth_constants(mesh, cells, tensile=0, shear=2.0, bend=0) > 0).sum() == 12
+    threads = cloth((3.0, 2.0), cells, 6.0, springs=("tensile",))
+    assert set(cloth_constants(threads, cells, tensile=4.0)) == {4.0}
 
 
 def test_the_edges_of_a_solid_keep_its_mass_and_its_skin():
@@ -102,6 +104,26 @@ REFUSED = {
         MeshError,
         "has 12 vertices, not 9",
     ),
+    "cells the other way round": (
+        lambda: cloth_constants(cloth((1, 1), (3, 2), 1.0), (2, 3), tensile=1.0, shear=1.0, bend=1.0),
+        MeshError,
+        r"no spring of a cloth of \(2, 3\) cells",
+    ),
+    "missing": (
+        lambda: cloth_constants(cloth((1, 1), (2, 2), 1.0), (2, 2), tensile=1.0, shear=1.0),
+        OptionError,
+        "the cloth has bend springs: give bend=",
+    ),
+    "constant": (
+        lambda: cloth_constants(cloth((1, 1), (2, 2), 1.0), (2, 2), tensile="1", shear=1, bend=1),
+        OptionError,
+        "tensile must be a number",
+    ),
+    "cells of constants": (lambda: cloth_constants(cloth((1, 1), (2, 2), 1.0), 3), OptionError, "two whole"),
+    "no list of kinds": (lambda: cloth((1.0, 1.0), (2, 2), 1.0, springs=None), OptionError, "some of"),
+    "density": (lambda: edges_as_particles(box((1, 1, 1), (1, 1, 1)), 0.0), OptionError, "above 0"),
+    "densities": (lambda: edges_as_particles(box((1, 1, 1), (1, 1, 1)), [1, 2]), OptionError, "shape"),
+    "words": (lambda: edges_as_particles(box((1, 1, 1), (1, 1, 1)), "x"), OptionError, "density"),
     "no solid": (lambda: edges_as_particles(rope(1.0, 2, 1.0), 1.0), MeshError, "must be a TetMesh"),
     "alone": (
         lambda: ParticleMesh(np.eye(3), [[0, 1]], 1.0),

@@ -214,3 +214,16 @@ def test_without_scipy_it_says_what_to_install(monkeypatch):
 def test_what_is_no_mesh_is_refused(call):
     with pytest.raises(MeshError, match="TetMesh"):
         call("ball")
+
+
+def test_far_from_the_origin_nothing_is_lost():
+    mesh = box((1, 1, 1), (2, 2, 2))
+    near, far = voronoi_graph(mesh), voronoi_graph(mesh.translated((1e5, 0, 0)))
+    np.testing.assert_allclose(far.areas, near.areas, atol=1e-8)
+    assert far.cell_volume.sum() == pytest.approx(mesh.volume, rel=1e-9)
+
+
+def test_a_mesh_has_one_graph():
+    mesh = box((1, 1, 1), (2, 2, 2))
+    assert voronoi_graph(mesh) is voronoi_graph(mesh)
+    assert voronoi_graph(mesh) is not voronoi_graph(box((1, 1, 1), (2, 2, 2)))
