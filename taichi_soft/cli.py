@@ -174,12 +174,12 @@ def info(
 
 def _say_laws(as_json: bool) -> None:
     from taichi_soft.profiling import measure_laws
-    from taichi_soft.profiling.report import law_table
+    from taichi_soft.profiling.report import law_rows, law_table
 
     with errors.status("compiling and measuring every law"):
         costs = measure_laws()
     if as_json:
-        print(json.dumps([asdict(cost) for cost in costs], indent=2))
+        print(json.dumps(law_rows(costs), indent=2))
         return
     _say(escape("Median substep on one thread [ns per element], and over that of virial on the same body"))
     Console(width=max(console.width, 150)).print(law_table(costs))

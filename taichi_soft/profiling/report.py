@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any
 
 from rich.table import Table
@@ -59,26 +59,47 @@ def tables(found: dict[str, Any]) -> Iterator[tuple[str, Table]]:
         yield "A new process to its first frame [s]", table
 
 
-def law_table(costs: list[LawCost]) -> Table:
+def law_rows(costs: list[LawCost]) -> list[dict[str, Any]]:
     """Every law: what it takes, whether it keeps energy, where it comes from, and what it costs."""
+    rows = []
+    for each in costs:
+        law = LAWS[each.law]
+        integrators = replace(element_model(each.law), is_anisotropic=each.is_anisotropic).integrators
+        rows.append(
+            {
+                "law": law.name,
+                "source": law.source,
+                "parameters": ANISOTROPIC if each.is_anisotropic else law.parameters,
+                "strain": each.strain,
+                "flips": [choice.value for choice in law.flips],
+                "integrators": [integrator.value for integrator in integrators],
+                "keeps_energy": law.keeps_energy,
+                "element": each.element,
+                "cost": asdict(each.cost),
+                "ratio": asdict(each.ratio),
+            }
+        )
+    return rows
+
+
+def law_table(costs: list[LawCost]) -> Table:
+    """`law_rows` for people: the medians of their costs."""
     table = Table()
     for name in ("law", "source", "parameters", "strain", "flips", "integrators", "energy", "element", "ns"):
         table.add_column(name, no_wrap=name == "law")
     table.add_column("of virial", justify="right")
-    for each in costs:
-        law = LAWS[each.law]
-        integrators = replace(element_model(each.law), is_anisotropic=each.is_anisotropic).integrators
+    for row in law_rows(costs):
         table.add_row(
-            law.name,
-            law.source,
-            ", ".join(ANISOTROPIC if each.is_anisotropic else law.parameters),
-            each.strain or "-",
-            ", ".join(choice.value for choice in law.flips) or "-",
-            "all" if len(integrators) == len(Integrator) else "all but implicit_euler",
-            "kept" if law.keeps_energy else "drifts",
-            each.element,
-            f"{each.cost.median:.1f}",
-            f"{each.ratio.median:.2f}",
+            row["law"],
+            row["source"],
+            ", ".join(row["parameters"]),
+            row["strain"] or "-",
+            ", ".join(row["flips"]) or "-",
+            "all" if len(row["integrators"]) == len(Integrator) else "all but implicit_euler",
+            "kept" if row["keeps_energy"] else "drifts",
+            row["element"],
+            f"{row['cost']['median']:.1f}",
+            f"{row['ratio']['median']:.2f}",
         )
     return table
 
