@@ -61,8 +61,8 @@ def edge_owners(edges: ArrayLike, vertex_count: int, group: int) -> IntArray:
     """For each edge the end that shall own it, so that most vertices own a multiple of `group` edges.
 
     Greedy: first every vertex takes as many whole groups as its edges allow, then the one with most edges
-    left takes them all, again and again. Groups come out 70 to 80 % full; by the lower number they would be
-    half.
+    left takes them all, again and again; then groups that others have room for are handed over. Groups come
+    out 65 to 90 % full; if the lower number owned every edge, they would be half.
     Args:
         edges: (k, 2) vertex indices.
     Returns: int32 (k,).
@@ -93,7 +93,33 @@ def edge_owners(edges: ArrayLike, vertex_count: int, group: int) -> IntArray:
             take(vertex, left[vertex])
         elif left[vertex] > 0:
             heapq.heappush(waiting, (-left[vertex], vertex))
+    _hand_over(ends, incident, owner, group)
     return np.array(owner, dtype=np.int32)
+
+
+def _hand_over(ends: list[list[int]], incident: list[list[int]], owner: list[int], group: int) -> None:
+    """Empty the groups that are least full into free places of their edges' other ends."""
+    counts = np.bincount(owner, minlength=len(incident)).tolist()
+    for _ in range(4):
+        before = list(owner)
+        for vertex in sorted(range(len(incident)), key=lambda v: counts[v] % group):
+            rest = counts[vertex] % group
+            moves: list[tuple[int, int]] = []
+            room: dict[int, int] = {}
+            for number in incident[vertex]:
+                if owner[number] == vertex and len(moves) < rest:
+                    other = sum(ends[number]) - vertex
+                    free = room.setdefault(other, -counts[other] % group)
+                    if free > 0:
+                        room[other] = free - 1
+                        moves.append((number, other))
+            if len(moves) == rest:
+                counts[vertex] -= rest
+                for number, other in moves:
+                    owner[number] = other
+                    counts[other] += 1
+        if owner == before:
+            break
 
 
 def renumbered(order: ArrayLike) -> IntArray:

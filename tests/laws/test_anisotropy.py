@@ -22,7 +22,8 @@ from taichi_soft import (
 from taichi_soft.laws import element_model
 
 STVK = ("st_venant_kirchhoff", None, None)
-MODES = [*oracle.MODES, STVK]
+# "face" makes the same forces of a stress as "virial" (test_stress_to_forces), so one of it will do.
+MODES = [*(mode for mode in oracle.MODES if mode[0] == "virial"), ("face", "exact", "recover"), STVK]
 EACH_MODE = pytest.mark.parametrize(
     ("law", "strain", "flips"), MODES, ids=["-".join(filter(None, m)) for m in MODES]
 )

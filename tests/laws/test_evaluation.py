@@ -14,8 +14,16 @@ BALL = MESHES["sphere"]
 MATERIAL = Material(1e6, 0.3, 1000.0, 50.0)
 
 
-@pytest.mark.parametrize(("law", "strain", "flips"), oracle.MODES, ids=oracle.MODE_IDS)
-@settings(max_examples=6)
+@pytest.mark.parametrize(
+    ("law", "strain", "flips"),
+    [
+        ("virial", "linear", "tolerant"),
+        ("virial", "exact", "off"),
+        ("face", "linear", "recover"),
+        ("face", "exact", "recover"),
+    ],
+)
+@settings(max_examples=8)
 @given(
     seed=st.integers(0, 2**32 - 1),
     name=st.sampled_from(list(MESHES)),
@@ -124,7 +132,7 @@ def test_what_is_no_mesh_is_refused(value):
 
 def test_a_mesh_without_tetrahedra_is_refused():
     rod = ParticleMesh([[0, 0, 0], [1, 0, 0]], [[0, 1]], [1.0, 1.0])
-    with pytest.raises(MeshError, match="law 'virial' needs tetrahedra: pass a TetMesh, got ParticleMesh"):
+    with pytest.raises(MeshError, match=r"law 'virial' needs tetrahedra: .* law='springs'"):
         internal_forces(rod, MATERIAL, rod.vertices)
 
 
