@@ -6,6 +6,7 @@ from taichi_soft.kernels.linear_system import (
     bond_stiffness,
     clear_system,
     corner_stiffness,
+    row_of,
     tet_stiffness,
     volume_pull,
 )
@@ -19,10 +20,12 @@ def compute_tet_stiffness(state: ti.template(), model: ti.template(), out: ti.ty
     for t in range(out.shape[0]):
         block, lane = t // LANES, t % LANES
         g, element = tet_stiffness(state, model, block, lane, False)
-        for i, j in ti.static(ti.ndrange(4, 4)):
-            columns = corner_stiffness(model, g[i], g[j], element)
-            for a, b in ti.static(ti.ndrange(3, 3)):
-                out[t, 3 * i + a, 3 * j + b] = columns[b][a]
+        rows = ti.Matrix.rows([g[0], g[1], g[2], g[3]])
+        for i in range(4):
+            for j in range(4):
+                columns = corner_stiffness(model, row_of(rows, i), row_of(rows, j), element)
+                for a, b in ti.static(ti.ndrange(3, 3)):
+                    out[t, 3 * i + a, 3 * j + b] = columns[b][a]
 
 
 @ti.kernel

@@ -84,20 +84,29 @@ def corner_stiffness(model: ti.template(), gi, gj, element):
 
 
 @ti.func
+def row_of(rows, i):
+    """Row i of a matrix (4, 3) as a vec3, i known at run time only."""
+    return ti.Vector([rows[i, 0], rows[i, 1], rows[i, 2]])
+
+
+@ti.func
 def _add_tet_stiffness(state: ti.template(), model: ti.template(), body, scale):
     blocks = state.body_blocks[body]
     for t in range(blocks[0] * LANES, blocks[1] * LANES):
         block, lane = t // LANES, t % LANES
-        vertices = particles_of(state, block, lane)
         g, element = tet_stiffness(state, model, block, lane, True)
-        for i in ti.static(range(4)):
-            c0, c1, c2 = corner_stiffness(model, g[i], g[i], element)
-            p = vertices[i]
-            state.particle_block[p] = state.particle_block[p] + ti.Matrix.cols([c0, c1, c2]) * scale
-        for k, i, j in ti.static(EDGES):
-            c0, c1, c2 = corner_stiffness(model, g[i], g[j], element)
-            e = state.tet_edges[(block * 6 + k) * LANES + lane]
-            _add_corner_pair(state, e, vertices[i], (c0 * scale, c1 * scale, c2 * scale))
+        # Pairs of corners in a loop, not side by side: ten copies of a block took most of the compile time.
+        rows = ti.Matrix.rows([g[0], g[1], g[2], g[3]])
+        for i in range(4):
+            p = state.tet_vertices[(block * 4 + i) * LANES + lane]
+            for j in range(i, 4):
+                c0, c1, c2 = corner_stiffness(model, row_of(rows, i), row_of(rows, j), element)
+                if i == j:
+                    state.particle_block[p] = state.particle_block[p] + ti.Matrix.cols([c0, c1, c2]) * scale
+                else:
+                    k = i * (5 - i) // 2 + j - 1  # of the edge in `EDGES`
+                    e = state.tet_edges[(block * 6 + k) * LANES + lane]
+                    _add_corner_pair(state, e, p, (c0 * scale, c1 * scale, c2 * scale))
 
 
 @ti.func

@@ -95,7 +95,7 @@ def test_forces_equal_those_of_the_equations_in_numpy(law, strain, flips, seed, 
     forces = internal_forces(mesh, material, x, law=law, strain=strain, flips=flips)
     expected = forces_by_numpy(mesh, material, x, law, strain, flips)
     scale = np.abs(expected).max()
-    np.testing.assert_allclose(forces, expected, rtol=0, atol=1e-9 * scale)
+    np.testing.assert_allclose(forces, expected, rtol=0, atol=1e-10 * scale)
     np.testing.assert_allclose(forces.sum(axis=0), 0, atol=1e-10 * scale * len(x))
     np.testing.assert_allclose(
         np.cross(x, forces).sum(axis=0), 0, atol=1e-9 * scale * np.abs(x).max() * len(x)

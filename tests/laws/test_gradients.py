@@ -152,11 +152,11 @@ def test_the_projected_system_is_symmetric_and_never_negative(mode, pose):
 
 
 def test_the_stiffness_of_the_thesis_is_not_symmetric_away_from_rest():
-    """18 % at 50 % compression for nu = 0.3, which is why a symmetrised copy goes to conjugate gradients."""
+    """By 7 % at half the height for nu = 0.3, which is why conjugate gradients get a symmetrised copy."""
     x = MESHES["tet"].vertices * (1, 1, 0.5)
     K = force_gradient(MESHES["tet"], MATERIAL, x).reshape(12, 12)
     gap = np.linalg.norm(K - K.T) / np.linalg.norm(K + K.T)
-    assert 0.02 < gap < 0.4
+    assert gap == pytest.approx(0.07, abs=0.005)
     energy = force_gradient(MESHES["tet"], MATERIAL, x, law="neo_hookean").reshape(12, 12)
     np.testing.assert_allclose(energy, energy.T, atol=1e-9 * np.abs(energy).max())
 
