@@ -285,6 +285,21 @@ def test_only_the_law_with_an_energy_keeps_that_of_a_ringing_body_without_dampin
     assert spreads["virial"] > 0.1
 
 
+@pytest.mark.parametrize(("law", "is_lost"), [("virial", True), ("st_venant_kirchhoff", False)])
+@pytest.mark.filterwarnings("ignore::taichi_soft.FrozenBodyWarning")
+def test_stretched_by_a_third_and_undamped_only_the_law_with_an_energy_holds(law, is_lost):
+    """The README says so among the limits; the lost body is put back and frozen."""
+    mesh = sphere(0.5, 2)
+    world = World(gravity=(0, 0, 0), floor=None)
+    body = world.add_body(mesh, AnisotropicMaterial(WOOD, 500.0), law=law)
+    world.build()
+    body.set_motion(mesh.vertices * (1.3, 1, 0.7), np.zeros_like(mesh.vertices))
+    for _ in range(300):
+        world.step(1 / 120, 40)
+    assert body.is_frozen == is_lost
+    assert np.isfinite(body.positions()).all()
+
+
 def test_elastic_energy_and_stress_are_those_of_the_material():
     mesh = box((1, 1, 1), (2, 2, 2))
     stretch = np.diag([1.02, 0.99, 1.01])
