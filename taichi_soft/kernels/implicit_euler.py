@@ -95,12 +95,12 @@ def _take_back(state: ti.template(), body):
 def _reach(state: ti.template(), body):
     """Largest change of an edge against where it was remembered, over its length then, squared."""
     edges = state.body_edges[body]
-    mean = state.particle_position[0].x * 0.0
+    mean = ti.cast(0.0, state.real)
     for e in range(edges[0], edges[1]):
         r = state.direction[state.edge_vertices[e][1]] - state.direction[state.edge_vertices[e][0]]
         mean += r.dot(r)
     least = LEAST_LENGTH * LEAST_LENGTH * mean / (edges[1] - edges[0]) + 1e-30
-    worst = mean * 0.0
+    worst = ti.cast(0.0, state.real)
     for e in range(edges[0], edges[1]):
         p, q = state.edge_vertices[e][0], state.edge_vertices[e][1]
         r = state.direction[q] - state.direction[p]
@@ -127,7 +127,7 @@ def implicit_substep(state: ti.template(), program: ti.template(), body, h, is_f
         particles = state.body_particles[body]
         for p in range(particles[0], particles[1]):
             _move(state, program, p, piece)
-        if _reach(state, body) > FARTHEST * FARTHEST and left < MOST_PIECES and piece > h / MOST_PIECES:
+        if _reach(state, body) > FARTHEST * FARTHEST and piece > h / MOST_PIECES:
             _take_back(state, body)
             piece, left = 0.5 * piece, 2 * left
         else:

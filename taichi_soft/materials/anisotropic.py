@@ -30,10 +30,9 @@ class AnisotropicMaterial:
         stiffness: in the material's own axes.
         density: mass per volume [kg/m^3], above 0: a number, or one per tetrahedron.
         damping: b of thesis eq. 3.9 [N s/m], 0 or more: a number, or one per tetrahedron.
-        frame: the material's axes in the mesh, as columns: a rotation matrix (3, 3) or a quaternion (x, y, z,
-        w)
-            for the whole body, or one per tetrahedron, (m, 3, 3) or (m, 4), such as `frames_along` gives.
-            None: those of the mesh.
+        frame: the material's axes in the mesh, as columns: a rotation matrix (3, 3) or a quaternion
+            (x, y, z, w) for the whole body, or one per tetrahedron, (m, 3, 3) or (m, 4), such as
+            `frames_along` gives. None: those of the mesh.
     Raises: MaterialError or OptionError with the first value out of range.
     """
 

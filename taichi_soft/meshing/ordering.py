@@ -62,7 +62,7 @@ def edge_owners(edges: ArrayLike, vertex_count: int, group: int) -> IntArray:
 
     Greedy: first every vertex takes as many whole groups as its edges allow, then the one with most edges
     left takes them all, again and again; then groups that others have room for are handed over. Groups come
-    out 65 to 90 % full; if the lower number owned every edge, they would be half.
+    out much fuller than if the lower number owned every edge.
     Args:
         edges: (k, 2) vertex indices.
     Returns: int32 (k,).
