@@ -17,6 +17,7 @@ from taichi_soft.materials.constants import (
     as_constant,
     is_damping,
     is_positive,
+    require_one_length,
     spread,
 )
 from taichi_soft.materials.stiffness import Stiffness, turned
@@ -56,17 +57,8 @@ class AnisotropicMaterial:
         object.__setattr__(self, "density", density)
         object.__setattr__(self, "damping", damping)
         object.__setattr__(self, "frame", _frame(self.frame))
-        self._require_one_length()
-
-    def _require_one_length(self) -> None:
-        given = {"density": self.density, "damping": self.damping}
-        if np.ndim(self.frame) == 3:
-            given["frame"] = self.frame
-        lengths = {name: len(value) for name, value in given.items() if isinstance(value, np.ndarray)}
-        if len(set(lengths.values())) > 1:
-            raise MaterialError(
-                f"arrays of different lengths {lengths}: give one value per tetrahedron in each"
-            )
+        frames = self.frame if np.ndim(self.frame) == 3 else None
+        require_one_length({"density": density, "damping": damping, "frame": frames}, "tetrahedron")
 
     def per_tet(self, name: str, tet_count: int) -> Array:
         """`density` or `damping` of each of `tet_count` tetrahedra.

@@ -57,3 +57,10 @@ def spread(given: float | Array, name: str, elements: str, count: int) -> Array:
             f"{name} has {values.shape[0]} values for a mesh of {count} {elements}: give one each"
         )
     return np.ascontiguousarray(np.broadcast_to(values, (count,)))
+
+
+def require_one_length(given: dict[str, Any], element: str) -> None:
+    """Raises: MaterialError where constants are given for different numbers of elements."""
+    lengths = {name: len(value) for name, value in given.items() if isinstance(value, np.ndarray)}
+    if len(set(lengths.values())) > 1:
+        raise MaterialError(f"arrays of different lengths {lengths}: give one value per {element} in each")

@@ -16,6 +16,7 @@ from taichi_soft.materials.constants import (
     as_constant,
     is_damping,
     is_positive,
+    require_one_length,
     spread,
 )
 
@@ -54,13 +55,7 @@ class Material:
             self._check("shear_modulus", is_positive, f"above 0 Pa, {POSITIVE}")
         if self.shear_damping is not None:
             self._check("shear_damping", is_damping, f"0 N s/m or more and below {LARGEST:g}")
-        lengths = {
-            name: value.size for name in CONSTANTS if isinstance(value := getattr(self, name), np.ndarray)
-        }
-        if len(set(lengths.values())) > 1:
-            raise MaterialError(
-                f"arrays of different lengths {lengths}: give one value per tetrahedron in each"
-            )
+        require_one_length({name: getattr(self, name) for name in CONSTANTS}, "tetrahedron")
         stiffest = float(np.max([np.max(np.abs(self.lame_lambda)), np.max(self.lame_mu)]))
         if stiffest >= LARGEST:
             raise MaterialError(

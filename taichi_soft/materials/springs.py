@@ -16,6 +16,7 @@ from taichi_soft.materials.constants import (
     as_constant,
     is_damping,
     is_positive,
+    require_one_length,
     spread,
 )
 
@@ -41,9 +42,7 @@ class SpringMaterial:
         if self.rest_length is not None:
             self._check("rest_length", is_positive, f"above 0 m, {POSITIVE}")
         given = {"stiffness": self.stiffness, "damping": self.damping, "rest_length": self.rest_length}
-        lengths = {name: len(value) for name, value in given.items() if isinstance(value, np.ndarray)}
-        if len(set(lengths.values())) > 1:
-            raise MaterialError(f"arrays of different lengths {lengths}: give one value per edge in each")
+        require_one_length(given, "edge")
 
     def _check(self, name: str, is_valid: Any, range_text: str) -> None:
         object.__setattr__(self, name, as_constant(getattr(self, name), name, "edge", is_valid, range_text))
