@@ -25,9 +25,8 @@ def anisotropic_stress(strain, stiffness):
 
     Args:
         strain: symmetric, as columns.
-        stiffness: C in Voigt's order and with engineering shear, as three matrices in columns: normal stress
-        by
-            normal strain, normal stress by shear strain, shear stress by shear strain.
+        stiffness: C in Voigt's order and with engineering shear, as three matrices in columns: normal
+            stress by normal strain, normal stress by shear strain, shear stress by shear strain.
     """
     normal, mixed, shear = stiffness[0], stiffness[1], stiffness[2]
     e = ti.Vector([strain[0].x, strain[1].y, strain[2].z])

@@ -155,9 +155,8 @@ class Stiffness:
         """One plane of symmetry, that of x and y: 13 constants (thesis 2.4.1).
 
         Args:
-            constants: [Pa], the entries of the matrix that need not vanish, row by row from the diagonal on:
-            c11,
-                c12, c13, c16, c22, c23, c26, c33, c36, c44, c45, c55, c66.
+            constants: [Pa], the entries of the matrix that need not vanish, row by row from the diagonal
+                on: c11, c12, c13, c16, c22, c23, c26, c33, c36, c44, c45, c55, c66.
         """
         values = as_array(constants, "constants", (13,), "Pa")
         matrix = np.zeros((6, 6))
