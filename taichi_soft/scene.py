@@ -134,6 +134,8 @@ class BodyArrays:
     edge_damping: Floats  # (k,) [N s/m]
     bonds: BondArrays | None  # of a pairwise law
     pinned: Ints  # particles that do not move
+    triangles: Ints  # (f, 3) of the surface, in the caller's order
+    outer: Ints  # particles that can touch something: those of the surface, or all where there is no inside
 
     @property
     def expansion_modulus(self) -> Floats:
@@ -152,6 +154,8 @@ class Ranges:
     edge_blocks: tuple[int, int] = (0, 0)
     blocks: tuple[int, int] = (0, 0)
     rings: tuple[int, int] = (0, 0)
+    triangles: tuple[int, int] = (0, 0)
+    outer: tuple[int, int] = (0, 0)
 
 
 @dataclass
@@ -169,6 +173,8 @@ class Scene:
     edge_block_count: int = 0
     block_count: int = 0
     ring_count: int = 0
+    triangle_count: int = 0
+    outer_count: int = 0
 
     @property
     def has_bonds(self) -> bool:
@@ -186,6 +192,8 @@ class Scene:
                 (self.edge_block_count, self.edge_block_count + len(body.edge_blocks)),
                 (self.block_count, self.block_count + blocks),
                 (self.ring_count, self.ring_count + rings),
+                (self.triangle_count, self.triangle_count + len(body.triangles)),
+                (self.outer_count, self.outer_count + len(body.outer)),
             )
         )
         self.bodies.append(body)
@@ -194,6 +202,15 @@ class Scene:
         self.edge_block_count += len(body.edge_blocks)
         self.block_count += blocks
         self.ring_count += rings
+        self.triangle_count += len(body.triangles)
+        self.outer_count += len(body.outer)
+
+
+def outer_vertices(mesh: BodyMesh) -> Ints:
+    """Vertices of the surface; of a `ParticleMesh`, which has no inside, all."""
+    if isinstance(mesh, TetMesh):
+        return mesh.surface_vertices
+    return np.arange(len(mesh.vertices), dtype=np.int32)
 
 
 def edge_damping(mesh: TetMesh, tet_damping: Floats) -> Floats:
@@ -252,6 +269,8 @@ def arrange(description: BodyDescription) -> BodyArrays:
         edge_damping=description.edge_damping[edge_order],
         bonds=_arrange_bonds(description.bonds, description.model, edge_order, new_index, renumbered(tets)),
         pinned=new_index[description.pinned],
+        triangles=new_index[mesh.surface],
+        outer=np.sort(new_index[outer_vertices(mesh)]),
     )
 
 

@@ -26,6 +26,8 @@ class Capacity:
     edges: int
     blocks: int
     bodies: int
+    triangles: int
+    outer: int
     parallel: bool  # room for the force of every corner and edge at once, as the flat schedule needs
     rings: int = 0  # rows of what lies round edges, and whether edges carry force at all
     implicit: bool = False  # room for the linear system of implicit integration
@@ -42,6 +44,8 @@ class Capacity:
             _power_of_two(scene.edge_count, 2048),
             _power_of_two(scene.block_count, 128),
             _power_of_two(len(scene.bodies), 8),
+            _power_of_two(scene.triangle_count, 512),
+            _power_of_two(scene.outer_count, 512),
             parallel,
             _power_of_two(scene.ring_count, 512) if scene.has_bonds else 0,
             implicit,
@@ -122,7 +126,12 @@ class State:
             self.incident_edge = ti.field(ti.i32, 2 * k)  # e as first end, -1 - e as second
             self.barrier = ti.field(ti.i32, 1)
 
+        self.triangle_vertices = ti.Vector.field(3, ti.i32, capacity.triangles)  # outward
+        self.outer_particle = ti.field(ti.i32, capacity.outer)  # of the surface, body by body
+
         self.body_particles = ti.Vector.field(2, ti.i32, bodies)  # range
+        self.body_triangles = ti.Vector.field(2, ti.i32, bodies)
+        self.body_outer = ti.Vector.field(2, ti.i32, bodies)
         self.body_edges = ti.Vector.field(2, ti.i32, bodies)
         self.body_edge_blocks = ti.Vector.field(2, ti.i32, bodies)
         self.body_blocks = ti.Vector.field(2, ti.i32, bodies)
@@ -181,7 +190,12 @@ class State:
         if self.capacity.parallel:
             self._load_gather_lists(corners, edges, scene.particle_count)
 
+        pairs = list(zip(bodies, ranges, strict=True))
+        fill(self.triangle_vertices, np.concatenate([b.triangles + r.particles[0] for b, r in pairs]))
+        fill(self.outer_particle, np.concatenate([b.outer + r.particles[0] for b, r in pairs]))
         fill(self.body_particles, np.array([r.particles for r in ranges]))
+        fill(self.body_triangles, np.array([r.triangles for r in ranges]))
+        fill(self.body_outer, np.array([r.outer for r in ranges]))
         fill(self.body_edges, np.array([r.edges for r in ranges]))
         fill(self.body_edge_blocks, np.array([r.edge_blocks for r in ranges]))
         fill(self.body_blocks, np.array([r.blocks for r in ranges]))

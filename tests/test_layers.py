@@ -19,9 +19,9 @@ LAYERS = """
     scene
     state  integrators
     kernels
-    forces
-    stability  failures
-    body
+    forces  shapes
+    stability  failures  colliders  control  queries  events  snapshot
+    body  assets
     world
     taichi_soft
     render

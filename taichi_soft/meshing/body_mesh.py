@@ -24,11 +24,13 @@ class BodyMesh(ABC):
         vertices: float64 (n, 3), positions at rest [m].
         edges: int32 (k, 2), each row i < j, rows in ascending order.
         tets: int32 (m, 4), vertex indices of the tetrahedra; m = 0 for a `ParticleMesh`.
+        surface: int32 (f, 3), triangles of the surface; f = 0 for a rope.
     """
 
     vertices: FloatArray
     edges: IntArray
     tets: IntArray
+    surface: IntArray
 
     def __init__(self, vertices: FloatArray, edges: IntArray, tets: IntArray) -> None:
         # Through __dict__, past the lock below; cached_property stores its value the same way.
