@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.body import Body, Floats32, require_buffer, require_built
-from taichi_soft.checks import as_count, as_indices, as_number, as_rotation, as_vector
-from taichi_soft.constants import GRAVITY_EARTH, POSITION_LIMIT, VELOCITY_LIMIT
+from taichi_soft.checks import as_count, as_flag, as_indices, as_number, as_rotation, as_vector
+from taichi_soft.colliders import Collider, Colliders
+from taichi_soft.constants import ALL_GROUPS, GRAVITY_EARTH, POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.errors import FrozenBodyWarning, OptionError, SolverWarning, StateError, UnstableStepWarning
 from taichi_soft.failures import FailedStep, Failure, find_failure
 from taichi_soft.kernels.evaluate import compute_body_forces
@@ -27,6 +28,7 @@ from taichi_soft.meshing import BodyMesh
 from taichi_soft.runtime import init
 from taichi_soft.scene import BodyDescription, Scene, arrange, require_size
 from taichi_soft.settings import Settings
+from taichi_soft.shapes import PlaneShape, Shape
 from taichi_soft.stability import StableStep, stable_step
 from taichi_soft.state import FROZEN, Capacity, State, acquire, release
 from taichi_soft.types import DampingModel, Flips, Integrator, Schedule, Strain
@@ -54,6 +56,8 @@ class World:
         most_iterations: of an implicit solve; one that needs more goes on as far as it came and is reported
             by a `SolverWarning`.
         schedule: "auto", "per_body" or "flat": in which loops the work runs; no effect on the physics.
+        soft_contact: whether bodies touch each other.
+        collider_room: colliders that may be added after `build`, beside those added before.
     Raises: OptionError for a value out of range or a name that is not known.
     """
 
@@ -68,6 +72,8 @@ class World:
         tolerance: float = 1e-3,
         most_iterations: int = 200,
         schedule: str | Schedule = Schedule.AUTO,
+        soft_contact: bool = False,
+        collider_room: int = 0,
     ) -> None:
         downwards = as_vector(gravity, "gravity", "m/s^2")
         downwards.flags.writeable = False
@@ -83,6 +89,10 @@ class World:
         )
         if self._is_implicit and self.settings.schedule is Schedule.FLAT:
             raise OptionError("schedule 'flat' has no implicit_euler: it takes 'per_body' or 'auto'")
+        self._colliders = Colliders()
+        self._collider_room = as_count(collider_room, "collider_room", 0)
+        self._soft_contact = as_flag(soft_contact, "soft_contact")
+        self._floor_collider: Collider | None = None
         self._step_count = 0
         self._time = 0.0
         self._last_dt = 0.0
@@ -107,6 +117,10 @@ class World:
     @property
     def _is_implicit(self) -> bool:
         return self.settings.integrator is Integrator.IMPLICIT_EULER
+
+    @property
+    def _has_contact(self) -> bool:
+        return self._program is not None and self._program.has_contact
 
     @property
     def step_count(self) -> int:
@@ -202,6 +216,58 @@ class World:
                 "puts it on the floor, World(floor=None) has none"
             )
 
+    @property
+    def colliders(self) -> Sequence[Collider]:
+        """All colliders; from `build` on the floor is among them."""
+        return self._colliders.handles
+
+    @property
+    def floor_collider(self) -> Collider | None:
+        """The floor where there are colliders, from `build` on: to read what bodies do to it."""
+        return self._floor_collider
+
+    def add_collider(
+        self,
+        shape: Shape,
+        *,
+        position: ArrayLike = (0.0, 0.0, 0.0),
+        rotation: ArrayLike | None = None,
+        friction: float = 0.5,
+        restitution: float = 0.0,
+        thickness: float = 0.0,
+        group: int = 1,
+        mask: int = ALL_GROUPS,
+    ) -> Collider:
+        """Add something solid that bodies hit: after `build` where `collider_room` was left for it.
+
+        Vertices of bodies touch it; what is smaller than a body's triangles may slip between them.
+        Args:
+            shape: `PlaneShape`, `SphereShape`, `BoxShape`, `CapsuleShape`, `HeightFieldShape` or `MeshShape`.
+            position: of its origin, (3,) [m].
+            rotation: matrix (3, 3) or quaternion (x, y, z, w).
+            friction: Coulomb coefficient, 0 or more.
+            restitution: 0 to 1, of each vertex that hits it.
+            thickness: of a skin on it [m].
+            group, mask: bits. A body and a collider touch where each one's mask has a bit of the other's group.
+        Returns: a handle, to move it and to read the impulse on it.
+        Raises: OptionError for bad values; StateError where there is no room left.
+        """
+        if self.is_built and self._floor_collider is None and not self._colliders.handles:
+            raise StateError(
+                "the world was built without colliders: add one before build(), or make the world with "
+                "collider_room"
+            )
+        return self._colliders.add(
+            shape,
+            position=position,
+            rotation=rotation,
+            friction=friction,
+            restitution=restitution,
+            thickness=thickness,
+            group=group,
+            mask=mask,
+        )
+
     def build(self) -> None:
         """Move all bodies into Taichi fields and fix the kernels. Starts Taichi if nobody has.
 
@@ -213,13 +279,27 @@ class World:
             raise StateError("the world is empty: call add_body before build")
         device = init()
         models = list(dict.fromkeys(body._description.model for body in self._bodies))
-        schedule = choose_schedule(self.settings.schedule, self._scene, device, self.settings.integrator)
-        capacity = Capacity.of(self._scene, parallel=schedule is Schedule.FLAT, implicit=self._is_implicit)
+        has_contact = self._soft_contact or len(self._colliders.handles) + self._collider_room > 0
+        if has_contact:
+            self._require_contact()
+        schedule = choose_schedule(
+            self.settings.schedule, self._scene, device, needs_bodies=self._is_implicit or has_contact
+        )
+        capacity = Capacity.of(
+            self._scene,
+            parallel=schedule is Schedule.FLAT,
+            implicit=self._is_implicit,
+            contact=self._colliders.capacity(self._collider_room, soft=self._soft_contact)
+            if has_contact
+            else ContactCapacity(),
+        )
         program = Program(
             tuple(models),
             self.settings.integrator,
-            self.settings.floor is not None,
+            self.settings.floor is not None and not has_contact,
             any(len(body.pinned) for body in self._bodies),
+            has_contact,
+            self._soft_contact,
             device.threads,
         )
         if self.settings.integrator is Integrator.EXPLICIT_EULER:
@@ -237,9 +317,32 @@ class World:
         state.floor[None] = [chosen.floor or 0.0, chosen.restitution, chosen.friction]
         if self._is_implicit:
             state.solver[None] = [chosen.tolerance, chosen.most_iterations]
+        if has_contact:
+            self._colliders.load(state.contact, len(self._bodies))
+        if self._soft_contact:
+            surfaces = [contact_surface(body) for body in self._scene.bodies]
+            fill(state.soft.body_surface, np.array(surfaces))
         self._read = np.empty((self._scene.particle_count, 3), dtype=np.float32)
         self._program, self._state = program, state
         self._launch = make_launch(schedule, state, program, self._scene, device)
+
+    def _require_contact(self) -> None:
+        """Make the floor one of the colliders. Raises: OptionError for what takes no colliders."""
+        chosen = self.settings
+        if chosen.schedule is Schedule.FLAT:
+            raise OptionError("schedule 'flat' has no colliders: it takes 'per_body' or 'auto'")
+        if chosen.integrator in (Integrator.EXPLICIT_EULER, Integrator.IMPLICIT_EULER):
+            raise OptionError(
+                f"integrator {chosen.integrator.value!r} takes no colliders: it takes 'leapfrog' or "
+                "'lazy_leapfrog'"
+            )
+        if chosen.floor is not None:
+            self._floor_collider = self.add_collider(
+                PlaneShape(),
+                position=(0.0, 0.0, chosen.floor),
+                friction=chosen.friction,
+                restitution=chosen.restitution,
+            )
 
     def stable_step(self, body: Body) -> StableStep:
         """Estimate of the largest stable substep of a body; copies of one body share it.
@@ -283,7 +386,11 @@ class World:
             self._checked_step = asked
         seconds, count, h = self._step_values
         self._read_alpha = None
+        if self._has_contact:
+            self._colliders.prepare(seconds)
         troubled = self._launch(count, h)  # type: ignore[misc]
+        if self._has_contact:
+            self._colliders.finish(seconds)
         reports = self._note_failures(count, h) if troubled else []
         self._step_count += 1
         self._time += seconds
