@@ -49,6 +49,7 @@ from taichi_soft.meshing import (
 )
 from taichi_soft.runtime import Device, device, init
 from taichi_soft.settings import Settings
+from taichi_soft.shapes import BoxShape, CapsuleShape, PlaneShape, Shape, SphereShape
 from taichi_soft.stability import StableStep, stable_step
 from taichi_soft.world import World
 
@@ -57,6 +58,8 @@ __all__ = [
     "PRESETS",
     "AnisotropicMaterial",
     "Body",
+    "BoxShape",
+    "CapsuleShape",
     "Device",
     "DeviceError",
     "Failure",
@@ -67,8 +70,11 @@ __all__ = [
     "MeshQuality",
     "OptionError",
     "ParticleMesh",
+    "PlaneShape",
     "Settings",
+    "Shape",
     "SolverWarning",
+    "SphereShape",
     "SpringMaterial",
     "StableStep",
     "StateError",
