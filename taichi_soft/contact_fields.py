@@ -76,7 +76,9 @@ class SoftContactFields:
         self.body_touches_itself = ti.field(ti.i32, bodies)
         self.sweep_order = ti.field(ti.i32, bodies)  # bodies by their lower x
         self.parent = ti.field(ti.i32, bodies)  # in the forest of islands
-        self.island_table = ti.Vector.field(3, ti.i32, bodies)  # first cell, cells (a power of two), first item
+        self.island_table = ti.Vector.field(
+            3, ti.i32, bodies
+        )  # first cell, cells (a power of two), first item
         self.island_cell = ti.field(ti.f32, bodies)  # edge of a cell [m]
         self.cell_first = ti.field(ti.i32, 4 * outer + bodies)
         self.cell_item = ti.field(ti.i32, outer)  # rows of `outer_particle`

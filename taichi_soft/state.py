@@ -16,7 +16,7 @@ from taichi_soft.contact_fields import ContactCapacity, ContactFields, SoftConta
 from taichi_soft.runtime import ti
 from taichi_soft.scene import BodyArrays, Ranges, Scene, blocks_of
 
-ACTIVE, FROZEN = 0, 1
+ACTIVE, FROZEN, ASLEEP, ABSENT = 0, 1, 2, 3
 
 _NO_CONTACT = ContactCapacity()
 

@@ -16,6 +16,7 @@ from taichi_soft.body import Body, Floats32, require_buffer, require_built
 from taichi_soft.checks import as_count, as_flag, as_indices, as_number, as_rotation, as_vector
 from taichi_soft.colliders import Collider, Colliders
 from taichi_soft.constants import ALL_GROUPS, GRAVITY_EARTH, POSITION_LIMIT, VELOCITY_LIMIT
+from taichi_soft.contact_fields import ContactCapacity
 from taichi_soft.errors import FrozenBodyWarning, OptionError, SolverWarning, StateError, UnstableStepWarning
 from taichi_soft.failures import FailedStep, Failure, find_failure
 from taichi_soft.kernels.evaluate import compute_body_forces
@@ -26,11 +27,11 @@ from taichi_soft.laws import ElementModel, element_model, fit_model
 from taichi_soft.materials import AnyMaterial
 from taichi_soft.meshing import BodyMesh
 from taichi_soft.runtime import init
-from taichi_soft.scene import BodyDescription, Scene, arrange, require_size
+from taichi_soft.scene import BodyDescription, Scene, arrange, contact_surface, require_size
 from taichi_soft.settings import Settings
 from taichi_soft.shapes import PlaneShape, Shape
 from taichi_soft.stability import StableStep, stable_step
-from taichi_soft.state import FROZEN, Capacity, State, acquire, release
+from taichi_soft.state import FROZEN, Capacity, State, acquire, fill, release
 from taichi_soft.types import DampingModel, Flips, Integrator, Schedule, Strain
 
 SHORTEST_STEP, LONGEST_STEP = 1e-9, 1e4

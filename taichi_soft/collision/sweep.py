@@ -14,9 +14,11 @@ NEVER = 2.0
 
 
 @ti.func
-def first_touch(contact: ti.template(), c, start, end):
+def first_touch(contact: ti.template(), c, start, end, slack):
     """How a path meets a collider. All in the collider's frame [m].
 
+    Args:
+        slack: how far beyond the surface the path may end without touching it.
     Returns:
         part: of the way, 0 to 1, at which it touches, or `NEVER`.
         distance: from the surface there, negative where the path starts inside [m].
@@ -39,7 +41,7 @@ def first_touch(contact: ti.template(), c, start, end):
         step = distance
         if distance <= TOUCHING or marches == MOST_MARCHES:
             beyond = distance + (1.0 - part) * way.dot(direction)
-            if beyond < 0.0:
+            if beyond < -slack:
                 normal = direction
                 is_open = 0
             step = ti.abs(distance) + TOUCHING  # it leaves this part of the surface, and may meet another

@@ -1,7 +1,7 @@
 """Particles of one body against the colliders, in one thread."""
 
 from taichi_soft.collision.response import resolved_velocity
-from taichi_soft.collision.sweep import NEVER, first_touch
+from taichi_soft.collision.sweep import NEVER, TOUCHING, first_touch
 from taichi_soft.contact_fields import NO_COLLIDER
 from taichi_soft.math.quaternion import spun, turned, turned_back
 from taichi_soft.runtime import ti
@@ -13,7 +13,6 @@ MOST_TOUCHES = 4
 @ti.func
 def find_near_colliders(state: ti.template(), body, reach):
     """List the colliders that come within `reach` [m] of a body's particles in this step."""
-    contact = ti.static(state.contact)
     outer = state.body_outer[body]
     first = state.particle_position[state.outer_particle[outer[0]]]
     lower, upper = first, first
@@ -21,32 +20,31 @@ def find_near_colliders(state: ti.template(), body, reach):
         x = state.particle_position[state.outer_particle[k]]
         lower, upper = ti.min(lower, x), ti.max(upper, x)
     lower, upper = lower - reach, upper + reach
-    row = body * contact.capacity.colliders
-    mine = contact.body_filter[body]
+    row = body * state.contact.capacity.colliders
+    mine = state.contact.body_filter[body]
     count = 0
-    for c in range(contact.collider_count[None]):
-        theirs = contact.collider_filter[c]
+    for c in range(state.contact.collider_count[None]):
+        theirs = state.contact.collider_filter[c]
         wanted = (mine[0] & theirs[1]) != 0 and (theirs[0] & mine[1]) != 0
-        if contact.collider_kind[c] != NO_COLLIDER and wanted:
-            low, high = contact.collider_lower[c], contact.collider_upper[c]
+        if state.contact.collider_kind[c] != NO_COLLIDER and wanted:
+            low, high = state.contact.collider_lower[c], state.contact.collider_upper[c]
             apart = 0
             for i in ti.static(range(3)):
                 apart = apart | int(low[i] > upper[i]) | int(high[i] < lower[i])
             if apart == 0:
-                contact.near[row + count] = c
+                state.contact.near[row + count] = c
                 count += 1
-    contact.near_count[body] = count
-    contact.reach[body] = reach
+    state.contact.near_count[body] = count
+    state.contact.reach[body] = reach
 
 
 @ti.func
 def forget_contacts(state: ti.template(), body):
     """Start a step: no impulses yet, and nobody knows which colliders are near."""
-    contact = ti.static(state.contact)
-    for row in range(body * contact.capacity.colliders, (body + 1) * contact.capacity.colliders):
-        contact.impulse[row] = ti.Vector.zero(ti.f32, 3)
-        contact.angular_impulse[row] = ti.Vector.zero(ti.f32, 3)
-    contact.reach[body] = -1.0
+    for row in range(body * state.contact.capacity.colliders, (body + 1) * state.contact.capacity.colliders):
+        state.contact.impulse[row] = ti.Vector.zero(ti.f32, 3)
+        state.contact.angular_impulse[row] = ti.Vector.zero(ti.f32, 3)
+    state.contact.reach[body] = -1.0
 
 
 @ti.func
@@ -59,36 +57,37 @@ def collided(state: ti.template(), body, p, start, way_velocity, h, since):
         h: substep [s].
         since: time since the start of the fixed step [s], to which the colliders' poses belong.
     """
-    contact = ti.static(state.contact)
     x0, v = start, way_velocity
     x1 = start + h * v
-    row = body * contact.capacity.colliders
+    row = body * state.contact.capacity.colliders
     left = ti.cast(1.0, ti.f32)  # part of the substep still to go
     touches, is_open = 0, 1
     while is_open == 1:
         earliest, which = ti.cast(NEVER, ti.f32), -1
         distance, beyond, normal = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32), ti.Vector.zero(ti.f32, 3)
-        for k in range(contact.near_count[body]):
-            c = contact.near[row + k]
-            x, q = contact.collider_position[c], contact.collider_rotation[c]
-            u, spin = contact.collider_velocity[c], contact.collider_spin[c]
+        # After a touch the path lies in the surface to rounding, which is no second touch.
+        slack = ti.select(touches == 0, 0.0, TOUCHING)
+        for k in range(state.contact.near_count[body]):
+            c = state.contact.near[row + k]
+            x, q = state.contact.collider_position[c], state.contact.collider_rotation[c]
+            u, spin = state.contact.collider_velocity[c], state.contact.collider_spin[c]
             before, after = since + (1.0 - left) * h, since + h
             a = turned_back(spun(q, spin * before), x0 - x - u * before)
             b = turned_back(spun(q, spin * after), x1 - x - u * after)
-            part, near, far, n = first_touch(contact, c, a, b)
+            part, near, far, n = first_touch(state.contact, c, a, b, slack)
             if part < earliest:
                 earliest, which, distance, beyond, normal = part, k, near, far, n
         if which < 0:
             is_open = 0
         else:
-            c = contact.near[row + which]
+            c = state.contact.near[row + which]
             after = since + h
-            centre = contact.collider_position[c] + contact.collider_velocity[c] * after
-            spin = contact.collider_spin[c]
-            n = turned(spun(contact.collider_rotation[c], spin * after), normal)
+            centre = state.contact.collider_position[c] + state.contact.collider_velocity[c] * after
+            spin = state.contact.collider_spin[c]
+            n = turned(spun(state.contact.collider_rotation[c], spin * after), normal)
             place = x1 - beyond * n
-            surface_velocity = contact.collider_velocity[c] + spin.cross(place - centre)
-            surface = contact.collider_surface[c]
+            surface_velocity = state.contact.collider_velocity[c] + spin.cross(place - centre)
+            surface = state.contact.collider_surface[c]
             v_out = resolved_velocity(v, n, surface_velocity, surface.x, surface.y)
             push = v_out - v
             left = left * (1.0 - earliest)
@@ -98,11 +97,11 @@ def collided(state: ti.template(), body, p, start, way_velocity, h, since):
             x1 = place + left * h * (push - n * push.dot(n))
             v = v_out
             impulse = -push / ti.max(state.particle_inv_mass[p], 1e-30)
-            contact.impulse[row + c] = contact.impulse[row + c] + impulse
-            contact.angular_impulse[row + c] = contact.angular_impulse[row + c] + (place - centre).cross(
-                impulse
-            )
-            contact.particle_touches[p] = 1
+            state.contact.impulse[row + c] = state.contact.impulse[row + c] + impulse
+            state.contact.angular_impulse[row + c] = state.contact.angular_impulse[row + c] + (
+                place - centre
+            ).cross(impulse)
+            state.contact.particle_touches[p] = 1
             touches += 1
             if touches == MOST_TOUCHES:
                 x1 = x0

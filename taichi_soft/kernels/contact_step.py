@@ -44,13 +44,12 @@ def _kick_body(state: ti.template(), program: ti.template(), body, kick):
 @ti.func
 def _drift_body(state: ti.template(), body, h, since):
     """New positions, and what colliders in the way make of velocities."""
-    contact = ti.static(state.contact)
     particles = state.body_particles[body]
-    among = contact.near_count[body] > 0
+    among = state.contact.near_count[body] > 0
     for p in range(particles[0], particles[1]):
         x, v = state.particle_position[p], state.particle_velocity[p]
-        if among and contact.particle_is_outer[p] == 1 and state.particle_inv_mass[p] > 0.0:
-            contact.particle_touches[p] = 0
+        if among and state.contact.particle_is_outer[p] == 1 and state.particle_inv_mass[p] > 0.0:
+            state.contact.particle_touches[p] = 0
             x_new, v_new = collided(state, body, p, x, v, h, since)
             state.particle_position[p] = x_new
             state.particle_velocity[p] = v_new
@@ -64,15 +63,14 @@ def _touch_each_other(state: ti.template(), island, reach, fastest, h):
 
     Returns: the way [m] that bodies may still go until then.
     """
-    contact, soft = ti.static(state.contact, state.soft)
-    first, last = contact.island_first[island], contact.island_first[island + 1]
+    first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
     way = 2.0 * fastest * h
     rest = reach
-    if last - first > 1 or soft.body_touches_itself[contact.island_body[first]] == 1:
+    if last - first > 1 or state.soft.body_touches_itself[state.contact.island_body[first]] == 1:
         if rest < way:
             allowance, thickness = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32)
             for i in range(first, last):
-                surface = soft.body_surface[contact.island_body[i]]
+                surface = state.soft.body_surface[state.contact.island_body[i]]
                 allowance = ti.max(allowance, search_margin(surface))
                 thickness = ti.max(thickness, surface.y)
             rest = ti.max(way, allowance)
@@ -85,15 +83,14 @@ def _touch_each_other(state: ti.template(), island, reach, fastest, h):
 @ti.func
 def _step_island(state: ti.template(), program: ti.template(), island, substeps, h):
     """One fixed step of one island. Returns how many of its bodies failed."""
-    contact = ti.static(state.contact)
-    first, last = contact.island_first[island], contact.island_first[island + 1]
+    first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
     for i in range(first, last):
-        _begin_body(state, contact.island_body[i])
+        _begin_body(state, state.contact.island_body[i])
     reach = ti.cast(-1.0, ti.f32)
     for s in range(substeps):
         fastest = ti.cast(0.0, ti.f32)
         for i in range(first, last):
-            body = contact.island_body[i]
+            body = state.contact.island_body[i]
             if state.body_status[body] == ACTIVE:
                 accumulate_forces(state, program, body)
                 kick = h
@@ -104,16 +101,16 @@ def _step_island(state: ti.template(), program: ti.template(), island, substeps,
         if ti.static(program.has_soft_contact):
             reach = _touch_each_other(state, island, reach, fastest, h)
         for i in range(first, last):
-            body = contact.island_body[i]
+            body = state.contact.island_body[i]
             if state.body_status[body] == ACTIVE:
-                if not (contact.reach[body] >= fastest * h):
+                if not (state.contact.reach[body] >= fastest * h):
                     # A quarter more than the rest of the step needs at this speed.
                     find_near_colliders(state, body, 1.25 * fastest * h * (substeps - s) + 1e-3)
-                contact.reach[body] = contact.reach[body] - fastest * h
+                state.contact.reach[body] = state.contact.reach[body] - fastest * h
                 _drift_body(state, body, h, s * h)
     failed = 0
     for i in range(first, last):
-        body = contact.island_body[i]
+        body = state.contact.island_body[i]
         if state.body_status[body] == ACTIVE:
             has_failed = settle_body(state, body)
             failed += has_failed

@@ -11,7 +11,6 @@ from taichi_soft.state import ABSENT
 @ti.func
 def _find_boxes(state: ti.template(), body_count, dt):
     """Box of each body's surface and of where it may get within `dt` [m]."""
-    soft = ti.static(state.soft)
     fall = state.gravity[None].norm() * dt * dt
     for body in range(body_count):
         outer = state.body_outer[body]
@@ -22,10 +21,10 @@ def _find_boxes(state: ti.template(), body_count, dt):
             x, v = state.particle_position[p], state.particle_velocity[p]
             lower, upper = ti.min(lower, x), ti.max(upper, x)
             fastest = ti.max(fastest, v.dot(v))
-        surface = soft.body_surface[body]
+        surface = state.soft.body_surface[body]
         reach = 1.25 * ti.sqrt(fastest) * dt + fall + surface.y + search_margin(surface)
-        soft.body_lower[body] = lower - reach
-        soft.body_upper[body] = upper + reach
+        state.soft.body_lower[body] = lower - reach
+        state.soft.body_upper[body] = upper + reach
 
 
 @ti.func
@@ -37,15 +36,14 @@ def search_margin(surface):
 @ti.func
 def _sort_by_lower_x(state: ti.template(), body_count):
     """Insertion sort: bodies keep nearly the order they had a step ago."""
-    soft = ti.static(state.soft)
     for i in range(1, body_count):
-        body = soft.sweep_order[i]
-        x = soft.body_lower[body].x
+        body = state.soft.sweep_order[i]
+        x = state.soft.body_lower[body].x
         j = i - 1
-        while j >= 0 and soft.body_lower[soft.sweep_order[ti.max(j, 0)]].x > x:
-            soft.sweep_order[j + 1] = soft.sweep_order[j]
+        while j >= 0 and state.soft.body_lower[state.soft.sweep_order[ti.max(j, 0)]].x > x:
+            state.soft.sweep_order[j + 1] = state.soft.sweep_order[j]
             j -= 1
-        soft.sweep_order[j + 1] = body
+        state.soft.sweep_order[j + 1] = body
 
 
 @ti.func
@@ -65,63 +63,60 @@ def may_touch(state: ti.template(), a, b):
 
 @ti.func
 def _join_overlapping(state: ti.template(), body_count):
-    soft = ti.static(state.soft)
     for i in range(body_count):
-        a = soft.sweep_order[i]
+        a = state.soft.sweep_order[i]
         j = i + 1
         is_open = int(state.body_status[a] != ABSENT)
         while is_open == 1 and j < body_count:
-            b = soft.sweep_order[j]
+            b = state.soft.sweep_order[j]
             j += 1
-            if soft.body_lower[b].x > soft.body_upper[a].x:
+            if state.soft.body_lower[b].x > state.soft.body_upper[a].x:
                 is_open = 0
             elif state.body_status[b] != ABSENT and may_touch(state, a, b):
                 apart = 0
                 for k in ti.static(range(1, 3)):
-                    apart = apart | int(soft.body_lower[a][k] > soft.body_upper[b][k])
-                    apart = apart | int(soft.body_lower[b][k] > soft.body_upper[a][k])
+                    apart = apart | int(state.soft.body_lower[a][k] > state.soft.body_upper[b][k])
+                    apart = apart | int(state.soft.body_lower[b][k] > state.soft.body_upper[a][k])
                 if apart == 0:
-                    p, q = _root(soft, a), _root(soft, b)
-                    soft.parent[ti.max(p, q)] = ti.min(p, q)
+                    p, q = _root(state.soft, a), _root(state.soft, b)
+                    state.soft.parent[ti.max(p, q)] = ti.min(p, q)
 
 
 @ti.func
 def _list_islands(state: ti.template(), body_count):
     """Bodies island by island, both in ascending order, and a piece of the hash for each island."""
-    soft, contact = ti.static(state.soft, state.contact)
     islands, rows, cells, items = 0, 0, 0, 0
     for first in range(body_count):
-        if soft.parent[first] == first and state.body_status[first] != ABSENT:
-            contact.island_first[islands] = rows
+        if state.soft.parent[first] == first and state.body_status[first] != ABSENT:
+            state.contact.island_first[islands] = rows
             count, widest, edges, members = 0, ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32), 0
             for body in range(first, body_count):
-                if state.body_status[body] != ABSENT and _root(soft, body) == first:
-                    contact.island_body[rows] = body
+                if state.body_status[body] != ABSENT and _root(state.soft, body) == first:
+                    state.contact.island_body[rows] = body
                     rows += 1
                     members += 1
                     outer = state.body_outer[body]
                     count += outer[1] - outer[0]
-                    edge = soft.body_surface[body].z
+                    edge = state.soft.body_surface[body].z
                     widest, edges = ti.max(widest, edge), edges + edge
             size = 1
             while size < 2 * count:
                 size *= 2
-            soft.island_table[islands] = ti.Vector([cells, size, items])
+            state.soft.island_table[islands] = ti.Vector([cells, size, items])
             # No finer than an eighth of the longest triangles, or each would cover hundreds of cells.
-            soft.island_cell[islands] = ti.max(edges / members, widest / 8.0, 1e-6)
+            state.soft.island_cell[islands] = ti.max(edges / members, widest / 8.0, 1e-6)
             cells += size + 1
             items += count
             islands += 1
-    contact.island_first[islands] = rows
-    contact.island_count[None] = islands
+    state.contact.island_first[islands] = rows
+    state.contact.island_count[None] = islands
 
 
 @ti.func
 def find_islands(state: ti.template(), body_count, dt):
     """Find which bodies may touch within a step of `dt` [s], and list them."""
-    soft = ti.static(state.soft)
     for body in range(body_count):
-        soft.parent[body] = body
+        state.soft.parent[body] = body
     _find_boxes(state, body_count, dt)
     _sort_by_lower_x(state, body_count)
     _join_overlapping(state, body_count)

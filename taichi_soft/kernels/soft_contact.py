@@ -92,17 +92,16 @@ def _push_pair(state: ti.template(), p, corners, distance, normal, weights, thic
 @ti.func
 def _solve_vertex(state: ti.template(), k, h):
     """One vertex against its candidates: those in front of it, and the one it is least deep behind."""
-    soft = ti.static(state.soft)
     p = state.outer_particle[k]
-    mine = soft.body_surface[state.particle_body[p]]
+    mine = state.soft.body_surface[state.particle_body[p]]
     shallowest, slot_behind = ti.cast(-1e30, ti.f32), -1
-    slot, last = k * SLOTS, k * SLOTS + soft.slot_count[k]
+    slot, last = k * SLOTS, k * SLOTS + state.soft.slot_count[k]
     is_second = 0
     while slot < last:
-        corners = state.triangle_vertices[soft.slot_triangle[slot]]
+        corners = state.triangle_vertices[state.soft.slot_triangle[slot]]
         other = state.particle_body[corners[0]]
         distance, normal, weights, can_touch = _gap(state, p, corners)
-        theirs = soft.body_surface[other]
+        theirs = state.soft.body_surface[other]
         thickness = 0.5 * (mine.y + theirs.y)
         if can_touch == 1:
             if is_second == 1 or distance >= 0.0:
@@ -120,9 +119,8 @@ def _solve_vertex(state: ti.template(), k, h):
 @ti.func
 def solve_island(state: ti.template(), island, h):
     """Take from the velocities of an island what would bring its bodies too near within `h` [s]."""
-    contact = ti.static(state.contact)
-    for i in range(contact.island_first[island], contact.island_first[island + 1]):
-        outer = state.body_outer[contact.island_body[i]]
+    for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
+        outer = state.body_outer[state.contact.island_body[i]]
         for k in range(outer[0], outer[1]):
             if state.soft.slot_count[k] > 0:
                 _solve_vertex(state, k, h)

@@ -27,28 +27,27 @@ def _bucket(cell, size):
 @ti.func
 def _fill_table(state: ti.template(), island):
     """Counting sort of the island's outer vertices by the bucket of their cell."""
-    soft, contact = ti.static(state.soft, state.contact)
-    table, cell = soft.island_table[island], soft.island_cell[island]
+    table, cell = state.soft.island_table[island], state.soft.island_cell[island]
     for row in range(table[0], table[0] + table[1] + 1):
-        soft.cell_first[row] = 0
+        state.soft.cell_first[row] = 0
     for pass_number in range(2):
-        for i in range(contact.island_first[island], contact.island_first[island + 1]):
-            outer = state.body_outer[contact.island_body[i]]
+        for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
+            outer = state.body_outer[state.contact.island_body[i]]
             for k in range(outer[0], outer[1]):
                 x = state.particle_position[state.outer_particle[k]]
                 row = table[0] + _bucket(_cell_of(x, cell), table[1])
                 if pass_number == 0:
-                    soft.cell_first[row] = soft.cell_first[row] + 1
-                    soft.slot_count[k] = 0
+                    state.soft.cell_first[row] = state.soft.cell_first[row] + 1
+                    state.soft.slot_count[k] = 0
                 else:
-                    at = soft.cell_first[row] - 1
-                    soft.cell_first[row] = at
-                    soft.cell_item[at] = k
+                    at = state.soft.cell_first[row] - 1
+                    state.soft.cell_first[row] = at
+                    state.soft.cell_item[at] = k
         if pass_number == 0:
             total = table[2]
             for row in range(table[0], table[0] + table[1] + 1):
-                total += soft.cell_first[row]
-                soft.cell_first[row] = total
+                total += state.soft.cell_first[row]
+                state.soft.cell_first[row] = total
 
 
 @ti.func
@@ -72,9 +71,12 @@ def _keep(soft: ti.template(), k, triangle, distance):
 @ti.func
 def _is_self_neighbour(state: ti.template(), p, corners, edge):
     """Whether a vertex and a triangle of one body are near each other at rest."""
-    soft = ti.static(state.soft)
-    a, b, c = soft.rest_position[corners[0]], soft.rest_position[corners[1]], soft.rest_position[corners[2]]
-    x = soft.rest_position[p]
+    a, b, c = (
+        state.soft.rest_position[corners[0]],
+        state.soft.rest_position[corners[1]],
+        state.soft.rest_position[corners[2]],
+    )
+    x = state.soft.rest_position[p]
     weights = closest_point_on_triangle(x, a, b, c)
     gap = x - weights.x * a - weights.y * b - weights.z * c
     return gap.norm() < SELF_DISTANCE * edge
@@ -83,19 +85,18 @@ def _is_self_neighbour(state: ti.template(), p, corners, edge):
 @ti.func
 def _search_triangle(state: ti.template(), island, body, triangle, margin):
     """Give a triangle to the vertices within `margin` [m] of it."""
-    soft = ti.static(state.soft)
     corners = state.triangle_vertices[triangle]
     a = state.particle_position[corners[0]]
     b = state.particle_position[corners[1]]
     c = state.particle_position[corners[2]]
     lower, upper = ti.min(a, b, c) - margin, ti.max(a, b, c) + margin
-    table, cell = soft.island_table[island], soft.island_cell[island]
+    table, cell = state.soft.island_table[island], state.soft.island_cell[island]
     low, high = _cell_of(lower, cell), _cell_of(upper, cell)
     for cx, cy, cz in ti.ndrange((low.x, high.x + 1), (low.y, high.y + 1), (low.z, high.z + 1)):
         here = ti.Vector([cx, cy, cz])
         row = table[0] + _bucket(here, table[1])
-        for item in range(soft.cell_first[row], soft.cell_first[row + 1]):
-            k = soft.cell_item[item]
+        for item in range(state.soft.cell_first[row], state.soft.cell_first[row + 1]):
+            k = state.soft.cell_item[item]
             p = state.outer_particle[k]
             x = state.particle_position[p]
             other = state.particle_body[p]
@@ -103,22 +104,21 @@ def _search_triangle(state: ti.template(), island, body, triangle, margin):
             # Two cells may share a bucket: each vertex counts in its own cell only.
             if within and (_cell_of(x, cell) == here).all():
                 wanted = other != body and may_touch(state, body, other)
-                if other == body and soft.body_touches_itself[body] == 1:
-                    wanted = not _is_self_neighbour(state, p, corners, soft.body_surface[body].z)
+                if other == body and state.soft.body_touches_itself[body] == 1:
+                    wanted = not _is_self_neighbour(state, p, corners, state.soft.body_surface[body].z)
                 if wanted:
                     weights = closest_point_on_triangle(x, a, b, c)
                     gap = (x - weights.x * a - weights.y * b - weights.z * c).norm()
                     if gap < margin:
-                        _keep(soft, k, triangle, gap)
+                        _keep(state.soft, k, triangle, gap)
 
 
 @ti.func
 def search_island(state: ti.template(), island, margin):
     """Find the candidates of all vertices of an island, within `margin` [m] beyond the thickness."""
-    soft, contact = ti.static(state.soft, state.contact)
     _fill_table(state, island)
-    for i in range(contact.island_first[island], contact.island_first[island + 1]):
-        body = contact.island_body[i]
+    for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
+        body = state.contact.island_body[i]
         triangles = state.body_triangles[body]
         for t in range(triangles[0], triangles[1]):
             _search_triangle(state, island, body, t, margin)
