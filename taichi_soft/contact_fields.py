@@ -10,6 +10,9 @@ NO_COLLIDER = -1
 SLOTS = 6
 """Triangles that one vertex may touch at once: where three bodies meet, and their triangles beside."""
 
+NO_CONTACT = 1e30
+"""Gap of a candidate that is out of reach."""
+
 
 @dataclass(frozen=True)
 class ContactCapacity:
@@ -85,4 +88,9 @@ class SoftContactFields:
         self.slot_count = ti.field(ti.i32, outer)
         self.slot_triangle = ti.field(ti.i32, outer * SLOTS)
         self.slot_distance = ti.field(ti.f32, outer * SLOTS)  # [m], at the search
+        self.slot_gap = ti.field(ti.f32, outer * SLOTS)  # [m], beyond the thickness; NO_CONTACT where idle
+        self.slot_weights = ti.Vector.field(3, ti.f32, outer * SLOTS)  # barycentric, of the nearest point
+        self.slot_normal = ti.Vector.field(3, ti.f32, outer * SLOTS)  # from the triangle to the vertex
+        self.slot_press = ti.field(ti.f32, outer * SLOTS)  # impulse along it in this substep [N s]
+        self.slot_rub = ti.Vector.field(3, ti.f32, outer * SLOTS)  # friction on the vertex [N s]
         self.rest_position = ti.Vector.field(3, ti.f32, particles)  # [m]

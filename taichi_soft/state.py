@@ -323,7 +323,8 @@ def fill(target, rows: NDArray[np.generic]) -> None:  # type: ignore[no-untyped-
     """Write `rows` to the front of a field and zeros behind them."""
     shape = tuple(target.shape) + ((target.n,) if hasattr(target, "n") else ())
     whole = np.zeros(shape, dtype=_NUMPY[target.dtype])
-    whole[: len(rows)] = rows
+    if len(rows):
+        whole[: len(rows)] = rows
     target.from_numpy(whole)
 
 

@@ -496,12 +496,21 @@ class World:
             by_vertex = forces[self._scene.bodies[body.index].rank]
             acceleration = by_vertex / body.masses[:, None] + self.settings.gravity
             acceleration[body.pinned] = 0.0
-            floor = self.settings.floor
-            if floor is not None:
-                # What lies on the floor is carried by it: its velocity already is that after contact.
-                acceleration[body.positions()[:, 2] <= floor] = 0.0
+            acceleration[self._is_carried(body)] = 0.0  # its velocity already is that after contact
             rows += (0.5 * lag * acceleration).astype(np.float32)
         return rows
+
+    def _is_carried(self, body: Body) -> NDArray[np.bool_]:
+        """Which vertices of a body touched something in the last substep, (n,)."""
+        assert self._state is not None
+        if self._has_contact:
+            begin, end = self._scene.ranges[body.index].particles
+            touches = self._state.contact.particle_touches.to_numpy()[begin:end]
+            return np.asarray(touches[self._scene.bodies[body.index].rank] == 1)
+        floor = self.settings.floor
+        if floor is None:
+            return np.zeros(body.vertex_count, dtype=np.bool_)
+        return np.asarray(body.positions()[:, 2] <= floor)
 
     def _write_motion(self, body: Body, positions: NDArray[Any], velocities: NDArray[Any]) -> None:
         """Put a body somewhere else. Raises: StateError before `build`."""

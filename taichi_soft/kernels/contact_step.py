@@ -36,6 +36,7 @@ def _kick_body(state: ti.template(), program: ti.template(), body, kick):
             state.particle_position[p], state.particle_velocity[p], acceleration, 0.0, kick
         )
         state.particle_velocity[p] = v
+        state.contact.particle_touches[p] = 0
         state.particle_force[p] = ti.Vector.zero(state.real, 4)
         highest = ti.max(highest, v.dot(v))
     return ti.sqrt(highest)
@@ -49,7 +50,6 @@ def _drift_body(state: ti.template(), body, h, since):
     for p in range(particles[0], particles[1]):
         x, v = state.particle_position[p], state.particle_velocity[p]
         if among and state.contact.particle_is_outer[p] == 1 and state.particle_inv_mass[p] > 0.0:
-            state.contact.particle_touches[p] = 0
             x_new, v_new = collided(state, body, p, x, v, h, since)
             state.particle_position[p] = x_new
             state.particle_velocity[p] = v_new

@@ -65,6 +65,8 @@ def _keep(soft: ti.template(), k, triangle, distance):
         soft.slot_count[k] = count + 1
     if at < SLOTS:
         soft.slot_triangle[k * SLOTS + at] = triangle
+        soft.slot_press[k * SLOTS + at] = 0.0
+        soft.slot_rub[k * SLOTS + at] = ti.Vector.zero(ti.f32, 3)
         soft.slot_distance[k * SLOTS + at] = distance
 
 
