@@ -1,0 +1,93 @@
+"""Geometry of one triangle against linear systems solved in float64."""
+
+import numpy as np
+import pytest
+
+from taichi_soft.math.triangle import closest_point_on_triangle
+from taichi_soft.runtime import init, ti
+
+
+@ti.kernel
+def run_closest(points: ti.types.ndarray(ndim=3), weights: ti.types.ndarray(ndim=2)):
+    ti.loop_config(serialize=True)
+    for i in range(points.shape[0]):
+        x, a, b, c = [ti.Vector([points[i, j, k] for k in range(3)]) for j in ti.static(range(4))]
+        w = closest_point_on_triangle(x, a, b, c)
+        for k in ti.static(range(3)):
+            weights[i, k] = w[k]
+
+
+def closest_weights(points):
+    init()
+    weights = np.full((len(points), 3), np.nan, dtype=points.dtype)
+    run_closest(points, weights)
+    return weights.astype(float)
+
+
+def nearest_on_segment(x, a, b):
+    length = (b - a) @ (b - a)
+    t = 0.0 if length == 0 else min(max((x - a) @ (b - a) / length, 0), 1)
+    return np.linalg.norm(x - (1 - t) * a - t * b)
+
+
+def nearest_distance(x, a, b, c):
+    """Least squares in the plane if the foot falls inside, otherwise the nearest of the three segments."""
+    foot, _, rank, _ = np.linalg.lstsq(np.array([b - a, c - a]).T, x - a, rcond=1e-9)
+    if rank == 2 and foot.min() >= 0 and foot.sum() <= 1:
+        return np.linalg.norm(a + foot[0] * (b - a) + foot[1] * (c - a) - x)
+    return min(nearest_on_segment(x, *ends) for ends in ((a, b), (b, c), (c, a)))
+
+
+def reached(points, weights):
+    """Distance of each x from the point that the weights name."""
+    corners = points[:, 1:].astype(float)
+    return np.linalg.norm(np.einsum("ij,ijk->ik", weights, corners) - points[:, 0].astype(float), axis=1)
+
+
+def cases(kind, count=400):
+    """A point and a triangle in each row, (count, 4, 3)."""
+    random = np.random.default_rng(1)
+    rows = random.normal(size=(count, 4, 3))
+    if kind == "slivers":
+        rows[:, 3] = 0.5 * (rows[:, 1] + rows[:, 2]) + 1e-6 * rows[:, 3]
+    elif kind == "segments":
+        rows[:, 3] = rows[:, 1] + random.uniform(-2, 3, (count, 1)) * (rows[:, 2] - rows[:, 1])
+    elif kind == "needles":
+        rows[:, 3] = rows[:, 2]
+    elif kind == "points":
+        rows[:, 2:] = rows[:, 1:2]
+    elif kind == "small":
+        rows[:, 1:] *= 1e-5
+    elif kind == "far":
+        rows[:, 0] *= 1e4
+    elif kind == "on the triangle":
+        weights = random.dirichlet((1, 1, 1), count)
+        rows[:, 0] = np.einsum("ij,ijk->ik", weights, rows[:, 1:])
+    elif kind == "at a corner":
+        rows[:, 0] = rows[np.arange(count), 1 + np.arange(count) % 3]
+    return rows
+
+
+@pytest.mark.parametrize(("dtype", "precision"), [(np.float32, 3e-7), (np.float64, 1e-14)])
+@pytest.mark.parametrize(
+    "kind",
+    ["any", "slivers", "segments", "needles", "points", "small", "far", "on the triangle", "at a corner"],
+)
+def test_no_point_of_the_triangle_is_nearer(kind, dtype, precision):
+    points = cases(kind).astype(dtype)
+    weights = closest_weights(points)
+    assert weights.min() >= 0
+    np.testing.assert_allclose(weights.sum(axis=1), 1, atol=4 * precision)
+    expected = np.array([nearest_distance(*row) for row in points.astype(float)])
+    np.testing.assert_allclose(reached(points, weights), expected, atol=precision * np.abs(points).max())
+
+
+@pytest.mark.parametrize("shift", [0.0, 1e-9, 1e5, 1e7])
+def test_a_triangle_of_no_size_is_its_corner(shift):
+    """Also where squares of lengths leave float32's range."""
+    points = np.full((3, 4, 3), shift, dtype=np.float32)
+    points[1, 0] += 1e7
+    points[2, 1] += 1e-22
+    weights = closest_weights(points)
+    assert weights.min() >= 0
+    np.testing.assert_allclose(weights.sum(axis=1), 1)
