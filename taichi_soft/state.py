@@ -15,7 +15,7 @@ from taichi_soft.constants import LANES
 from taichi_soft.runtime import ti
 from taichi_soft.scene import BodyArrays, Ranges, Scene, blocks_of
 
-ACTIVE, FROZEN = 0, 1
+ACTIVE, FROZEN, ASLEEP, ABSENT = 0, 1, 2, 3
 
 
 @dataclass(frozen=True)
@@ -138,6 +138,8 @@ class State:
         self.body_model = ti.field(ti.i32, bodies)
         self.body_status = ti.field(ti.i32, bodies)
         self.body_velocity_lag = ti.field(real, bodies)  # substep [s] by half of which leapfrog lags
+        self.body_lower = ti.Vector.field(3, real, bodies)  # [m], box at the last query that needed it
+        self.body_upper = ti.Vector.field(3, real, bodies)
         self.block_model = ti.field(ti.i32, b)
 
         self.gravity = ti.Vector.field(3, real, ())  # [m/s^2]
