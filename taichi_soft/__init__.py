@@ -47,6 +47,7 @@ from taichi_soft.meshing import (
     voronoi_graph,
     voxels,
 )
+from taichi_soft.queries import ClosestPoint, Overlap, Pose, RayHit, RayHits
 from taichi_soft.runtime import Device, device, init
 from taichi_soft.settings import Settings
 from taichi_soft.stability import StableStep, stable_step
@@ -57,6 +58,7 @@ __all__ = [
     "PRESETS",
     "AnisotropicMaterial",
     "Body",
+    "ClosestPoint",
     "Device",
     "DeviceError",
     "Failure",
@@ -66,7 +68,11 @@ __all__ = [
     "MeshError",
     "MeshQuality",
     "OptionError",
+    "Overlap",
     "ParticleMesh",
+    "Pose",
+    "RayHit",
+    "RayHits",
     "Settings",
     "SolverWarning",
     "SpringMaterial",

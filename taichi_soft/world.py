@@ -443,20 +443,21 @@ class World:
         return find_closest_point(self._built, self._bodies, point, max_distance, bodies)
 
     def overlap_sphere(self, center: ArrayLike, radius: float) -> tuple[Overlap, ...]:
-        """Bodies that touch a sphere, lie in it or enclose it; of a body without triangles its vertices count.
+        """Bodies that touch a sphere or enclose it; of a body without triangles its vertices count.
 
         Args:
             center: (3,) [m].
             radius: above 0 [m].
         Returns: the bodies, in the world's order, each with its vertices in the sphere.
-        Raises: OptionError for numbers that are not finite or a radius not above 0; StateError before `build`.
+        Raises: OptionError for numbers that are not finite or a radius not above 0; StateError before
+            `build`.
         """
         return find_in_sphere(self._built, self._bodies, center, radius)
 
     def overlap_box(
         self, center: ArrayLike, size: ArrayLike, rotation: ArrayLike | None = None
     ) -> tuple[Overlap, ...]:
-        """Bodies that touch a box, lie in it or enclose it; of a body without triangles its vertices count.
+        """Bodies that touch a box or enclose it; of a body without triangles its vertices count.
 
         Args:
             center: (3,) [m].

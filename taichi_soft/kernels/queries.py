@@ -1,98 +1,13 @@
 """What the surfaces of bodies are asked between steps: rays, nearest points, overlaps. Nothing is changed.
 
-Bodies are asked in ascending order and only a nearer answer replaces one, so of equals the first body's first
-triangle wins, whatever the number of threads. A body without triangles takes part with its vertices, each a
-triangle of no size, which no ray can hit.
+Bodies are asked in ascending order and only a nearer answer replaces one: of equals the first body's first
+face counts, whatever the number of threads.
 """
 
-from taichi_soft.math.triangle import (
-    closest_point_on_triangle,
-    pierce_triangle,
-    solid_angle,
-    triangle_touches_box,
-)
+from taichi_soft.kernels.faces import box_around, face_corners, face_count, is_inside, write_place
+from taichi_soft.math.triangle import closest_point_on_triangle, pierce_triangle, triangle_touches_box
 from taichi_soft.runtime import ti
 from taichi_soft.state import ABSENT
-
-INSIDE = 6.283
-"""Solid angle [sr] from which on a point counts as inside: half of the 4 pi that a whole surface fills."""
-
-
-@ti.func
-def face_count(state: ti.template(), body):
-    """Triangles of a body, or vertices where it has none; 0 for a body that is not there."""
-    triangles, particles = state.body_triangles[body], state.body_particles[body]
-    count = triangles[1] - triangles[0]
-    if count == 0:
-        count = particles[1] - particles[0]
-    if state.body_status[body] == ABSENT:
-        count = 0
-    return count
-
-
-@ti.func
-def face_particles(state: ti.template(), body, face):
-    """Particles of a triangle, or three times that of a vertex."""
-    triangles = state.body_triangles[body]
-    particles = ti.Vector.one(ti.i32, 3)
-    if triangles[1] > triangles[0]:
-        particles = state.triangle_vertices[triangles[0] + face]
-    else:
-        particles *= state.particle_of_vertex[state.body_particles[body][0] + face]
-    return particles
-
-
-@ti.func
-def face_corners(state: ti.template(), body, face, origin):
-    """Corners of a face as seen from `origin` [m]."""
-    v = face_particles(state, body, face)
-    x = ti.static(state.particle_position)
-    return x[v[0]] - origin, x[v[1]] - origin, x[v[2]] - origin
-
-
-@ti.func
-def box_around(state: ti.template(), body):
-    """Least and greatest coordinates of a body [m]."""
-    outer = state.body_outer[body]
-    lower = ti.Vector([1e30, 1e30, 1e30])
-    upper = -lower
-    for i in range(outer[0], outer[1]):
-        x = state.particle_position[state.outer_particle[i]]
-        lower, upper = ti.min(lower, x), ti.max(upper, x)
-    return lower, upper
-
-
-@ti.func
-def is_inside(state: ti.template(), body, x):
-    """Whether a body's surface goes round a point more than half, mirrored surfaces too."""
-    total = x.x * 0.0
-    for face in range(face_count(state, body)):
-        a, b, c = face_corners(state, body, face, x)
-        total += solid_angle(a, b, c)
-    return ti.abs(total) > INSIDE
-
-
-@ti.func
-def write_place(state: ti.template(), row, out: ti.template(), body, face, weights, distance, away):
-    """Distance, weights, point, unit normal (`away` where the face has none), body and face of an answer.
-
-    As float32 all of them: 16 million faces are counted exactly.
-    """
-    v = face_particles(state, body, face)
-    x = ti.static(state.particle_position)
-    a, b, c = x[v[0]], x[v[1]] - x[v[0]], x[v[2]] - x[v[0]]
-    point = a + b * weights[1] + c * weights[2]
-    normal = b.cross(c)
-    if normal.norm() < 1e-30:
-        normal = away
-    normal /= ti.max(normal.norm(), 1e-30)
-    for k in ti.static(range(3)):
-        out[row, 1 + k] = weights[k]
-        out[row, 4 + k] = point[k]
-        out[row, 7 + k] = normal[k]
-    out[row, 0] = distance
-    out[row, 10] = body
-    out[row, 11] = face
 
 
 @ti.func
@@ -106,7 +21,7 @@ def axes_across(d):
 
 @ti.func
 def entry_of(lower, upper, inv_direction):
-    """How far along a ray from the origin a box begins [m], or more than any ray reaches where it is missed."""
+    """How far along a ray from the origin a box begins [m]; farther than any ray goes where it is missed."""
     slack = 2e-6 * ti.max(ti.abs(lower).max(), ti.abs(upper).max())
     one, other = (lower - slack) * inv_direction, (upper + slack) * inv_direction
     near, far = ti.min(one, other).max(), ti.max(one, other).min()
@@ -137,7 +52,7 @@ def find_hits(
         origin = ti.Vector([rays[r, 0], rays[r, 1], rays[r, 2]])
         d = ti.Vector([rays[r, 3], rays[r, 4], rays[r, 5]])
         right, up = axes_across(d)
-        inv = 1.0 / ti.select(ti.abs(d) < 1e-12, 1e-12, d)  # an axis at right angles divides by next to nothing
+        inv = 1.0 / ti.select(ti.abs(d) < 1e-12, 1e-12, d)
         best, best_body, best_face = rays[r, 6], -1, -1
         weights = ti.Vector.zero(state.real, 3)
         for i in range(bodies.shape[0]):
@@ -152,7 +67,7 @@ def find_hits(
                     )
                     distance = d.dot(a * w[0] + b * w[1] + c * w[2])
                     is_seen = side < 0 or (side > 0 and rays[r, 7] == 0.0)
-                    if is_seen and 0.0 <= distance and distance < best:
+                    if is_seen and distance >= 0.0 and distance < best:
                         best, best_body, best_face, weights = distance, body, face, w
         if best_body >= 0:
             write_place(state, r, hits, best_body, best_face, weights, best, d)
@@ -177,6 +92,7 @@ def find_closest(
         x = ti.Vector([asked[0], asked[1], asked[2]])
         best, best_body, best_face = asked[3], -1, -1
         weights, away = ti.Vector.zero(state.real, 3), ti.Vector.zero(state.real, 3)
+        is_in_box = False
         for i in range(bodies.shape[0]):
             body = bodies[i]
             lower, upper = box_around(state, body)
@@ -188,9 +104,12 @@ def find_closest(
                     gap = a * w[0] + b * w[1] + c * w[2]
                     if gap.dot(gap) < best:
                         best, best_body, best_face, weights, away = gap.dot(gap), body, face, w, -gap
+                        is_in_box = beyond.max() == 0.0
         if best_body >= 0:
             write_place(state, 0, found, best_body, best_face, weights, ti.sqrt(best), away)
-            found[0, 12] = ti.cast(is_inside(state, best_body, x), ti.f32)
+            found[0, 12] = 0.0
+            if is_in_box and is_inside(state, best_body, x):
+                found[0, 12] = 1.0
 
 
 @ti.func
@@ -236,26 +155,22 @@ def find_overlaps(
         center = ti.Vector([shape[0, k] for k in range(3)])
         axes = ti.Matrix([[shape[1 + j, k] for k in range(3)] for j in range(3)])
         size = ti.Vector([shape[4, k] for k in range(3)])
-        reach = ti.select(is_box, 0.5, 1.0) * size
-        lower = ti.Vector([1e30, 1e30, 1e30])
-        upper = -lower
+        reach = ti.abs(axes.transpose()) @ (ti.select(is_box, 0.5, 1.0) * size)
+        lower, upper = box_around(state, body)
+        is_near = ti.min(upper - center + reach, reach - lower + center).min() >= 0.0
         touches = 0
-        particles = state.body_particles[body]
-        if state.body_status[body] != ABSENT:
+        if is_near and state.body_status[body] != ABSENT:
+            particles = state.body_particles[body]
             for i in range(particles[0], particles[1]):
                 x = axes @ (state.particle_position[state.particle_of_vertex[i]] - center)
-                lower, upper = ti.min(lower, x), ti.max(upper, x)
                 if shape_contains(size, is_box, x):
                     inside[i] = 1
                     touches = 1
-        if ti.min(upper + reach, reach - lower).min() >= 0.0:
             for face in range(face_count(state, body)):
                 if touches == 0:
                     a, b, c = face_corners(state, body, face, center)
-                    if shape_touches(size, is_box, axes @ a, axes @ b, axes @ c):
-                        touches = 1
-            if touches == 0:
-                if is_inside(state, body, center):
-                    touches = 1
-        if touches == 1:
-            first_vertex[body] = particles[0]
+                    touches = int(shape_touches(size, is_box, axes @ a, axes @ b, axes @ c))
+            if touches == 0 and ti.min(upper - center, center - lower).min() >= 0.0:
+                touches = int(is_inside(state, body, center))
+            if touches == 1:
+                first_vertex[body] = particles[0]

@@ -83,7 +83,7 @@ def triangle_touches_box(a, b, c, half):
     touches = spans_meet(a, b, c, half) and ti.abs(normal.dot(a)) <= ti.abs(normal).dot(half)
     for edge in ti.static((b - a, c - b, a - c)):
         e = ti.abs(edge)
-        reach = ti.Vector([e.y * half.z + e.z * half.y, e.z * half.x + e.x * half.z, e.x * half.y + e.y * half.x])
+        reach = e.yzx * half.zxy + e.zxy * half.yzx
         touches = touches and spans_meet(edge.cross(a), edge.cross(b), edge.cross(c), reach)
     return touches
 
