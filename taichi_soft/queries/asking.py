@@ -31,9 +31,9 @@ def as_reach(max_distance: float) -> float:
     return reach
 
 
-def just_beyond(limit: float) -> np.float32:
+def just_beyond(limit: float) -> float:
     """The least float32 above: kernels take what is nearer, and the limit itself still counts."""
-    return np.float32(np.nextafter(np.float32(min(limit, _ENDLESS)), np.float32(np.inf)))
+    return float(np.nextafter(np.float32(min(limit, _ENDLESS)), np.float32(np.inf)))
 
 
 def as_chosen(bodies: Iterable[Body] | None, handles: Sequence[Body]) -> NDArray[np.int32]:

@@ -30,7 +30,7 @@ class ClosestPoint:
     barycentrics: Floats  # (3,) weights of these vertices; their sum is 1
     distance: float  # [m], never negative
     point: Floats  # (3,) [m]
-    normal: Floats  # (3,) of the triangle, unit length, outward; without a triangle, towards the given point
+    normal: Floats  # (3,) of the triangle, unit length, outward; of one without area, towards the given point
     is_inside: bool  # whether the given point lies inside this body
 
 
@@ -54,8 +54,9 @@ def find_closest_point(
     if index < 0:
         return None
     body = handles[index]
-    is_inside = bool(found[0, 12])
-    if len(body.surface) == 0:
-        vertices = np.full(3, face, dtype=np.int32)
-        return ClosestPoint(body, None, vertices, weights, distance, nearest, normal, is_inside)
-    return ClosestPoint(body, face, body.surface[face], weights, distance, nearest, normal, is_inside)
+    triangle, vertices = (
+        (face, body.surface[face]) if len(body.surface) else (None, np.full(3, face, np.int32))
+    )
+    return ClosestPoint(
+        body, triangle, vertices, weights, distance, nearest, normal, is_inside=bool(found[0, 12])
+    )
