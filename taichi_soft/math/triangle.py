@@ -54,7 +54,7 @@ def pierce_triangle(a, b, c):
     slack = 1e-6 * across * ti.max(across, ti.abs(a.z), ti.abs(b.z), ti.abs(c.z))
     side = ti.select(areas.sum() < 0.0, -1, 1)
     areas = areas * side
-    if ti.min(areas.sum() - 2.0 * slack, areas.min()) < -slack:
+    if areas.sum() <= slack or areas.min() < -slack:
         side = 0
     areas = ti.max(areas, 0.0)
     return side, areas / ti.max(areas.sum(), _TINY)
