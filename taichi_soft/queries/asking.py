@@ -40,13 +40,15 @@ def as_chosen(bodies: Iterable[Body] | None, handles: Sequence[Body]) -> NDArray
     """Indices of the bodies asked, ascending; all for None. Raises: OptionError."""
     if bodies is None:
         return np.arange(len(handles), dtype=np.int32)
-    if isinstance(bodies, (str, bytes)) or not isinstance(bodies, Iterable):
-        raise OptionError(f"bodies must be a list of this world's bodies or None, got {bodies!r}")
+    try:
+        asked = list(bodies)
+    except TypeError:
+        raise OptionError(f"bodies must be a list of this world's bodies or None, got {bodies!r}") from None
     chosen = set()
-    for body in bodies:
+    for body in asked:
         index = getattr(body, "index", None)
         if not isinstance(index, int) or not 0 <= index < len(handles) or handles[index] is not body:
-            raise OptionError(f"bodies must be bodies of this world, got {body!r}")
+            raise OptionError(f"bodies must be a list of this world's bodies or None, but one is {body!r}")
         chosen.add(index)
     return np.array(sorted(chosen), dtype=np.int32)
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 _LEANING = 1e-10
-"""Weight of turning as little as possible: it decides only what the shape leaves open, about the axis of a
-straight rope."""
+"""Weight of turning as little as possible: it decides only what the shape leaves open, as a straight rope does
+about its axis, and a body shrunk to a point altogether."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,8 +32,10 @@ def best_fitting_pose(rest: Floats, positions: Floats, masses: Floats) -> Pose:
     """
     shares = masses / masses.sum()
     rest_center, center = shares @ rest, shares @ positions
-    moment = ((positions - center) * shares[:, None]).T @ (rest - rest_center)
-    U, _, Vt = np.linalg.svd(moment + _LEANING * np.linalg.norm(moment) * np.eye(3))
+    arms = rest - rest_center
+    moment = ((positions - center) * shares[:, None]).T @ arms
+    spread = shares @ (arms**2).sum(axis=1)
+    U, _, Vt = np.linalg.svd(moment + _LEANING * spread * np.eye(3))
     U[:, 2] *= np.sign(np.linalg.det(U @ Vt))
     rotation = U @ Vt
     return Pose(rotation, center - rotation @ rest_center)
