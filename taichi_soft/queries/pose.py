@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 _LEANING = 1e-10
-"""Weight of turning as little as possible: it decides only what the shape leaves open, as a straight rope does
-about its axis, and a body shrunk to a point altogether."""
+"""Weight of turning as little as possible: it decides only what the shape leaves open, as a straight rope
+does about its axis, and a body shrunk to a point altogether."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -37,10 +37,12 @@ class RayHit:
 
 @dataclass(frozen=True, eq=False)
 class RayHits:
-    """Where each of n rays meets a surface first; a ray that hits nothing has body and triangle -1,
-    distance infinity and NaN in the rest."""
+    """Where each of n rays meets a surface first.
 
-    body: NDArray[np.int32]  # (n,) index in world.bodies
+    A ray that hits nothing has body and triangle -1, distance infinity and NaN in the rest.
+    """
+
+    body: NDArray[np.int32]  # (n,) body.index
     triangle: NDArray[np.int32]  # (n,) row of that body's surface
     barycentrics: Floats  # (n, 3)
     distance: Floats  # (n,) [m]

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from taichi_soft.math.triangle import closest_point_on_triangle
+from taichi_soft import box
+from taichi_soft.math.triangle import closest_point_on_triangle, solid_angle
 from taichi_soft.runtime import init, ti
 
 
@@ -91,3 +92,26 @@ def test_a_triangle_of_no_size_is_its_corner(shift):
     weights = closest_weights(points)
     assert weights.min() >= 0
     np.testing.assert_allclose(weights.sum(axis=1), 1)
+
+
+@ti.kernel
+def run_solid_angle(corners: ti.types.ndarray(ndim=3)) -> ti.f32:
+    total = 0.0
+    ti.loop_config(serialize=True)
+    for i in range(corners.shape[0]):
+        a, b, c = [ti.Vector([corners[i, j, k] for k in range(3)]) for j in ti.static(range(3))]
+        total += solid_angle(a, b, c)
+    return total
+
+
+@pytest.mark.parametrize(("shift", "turns"), [((0, 0, 0), 1), ((0.4, -0.4, 0.3), 1), ((2, 0, 0.1), 0)])
+def test_a_closed_surface_fills_the_view_from_inside_and_none_of_it_from_outside(shift, turns):
+    """A cube's face alone fills a sixth from the middle; turned inside out it counts the other way."""
+    init()
+    mesh = box(cells=(2, 2, 2))
+    corners = (mesh.vertices + np.array(shift))[mesh.surface].astype(np.float32)
+    assert run_solid_angle(corners) == pytest.approx(turns * 4 * np.pi, abs=1e-5)
+    assert run_solid_angle(corners[:, ::-1].copy()) == pytest.approx(-turns * 4 * np.pi, abs=1e-5)
+    if shift == (0, 0, 0):
+        top = corners[(corners[:, :, 2] == 0.5).all(axis=1)]
+        assert run_solid_angle(top) == pytest.approx(4 * np.pi / 6, abs=1e-5)
