@@ -80,11 +80,13 @@ def triangle_touches_box(a, b, c, half):
     (Akenine-Moeller 2001). A flat triangle leaves the axes of a segment or a point.
     """
     normal = (b - a).cross(c - a)
-    touches = spans_meet(a, b, c, half) and ti.abs(normal.dot(a)) <= ti.abs(normal).dot(half)
+    heights = ti.Vector([normal.dot(a), normal.dot(b), normal.dot(c)])  # equal, unless the triangle is flat
+    reach = ti.abs(normal).dot(half)
+    touches = spans_meet(a, b, c, half) and heights.max() >= -reach and heights.min() <= reach
     for edge in ti.static((b - a, c - b, a - c)):
         e = ti.abs(edge)
-        reach = e.yzx * half.zxy + e.zxy * half.yzx
-        touches = touches and spans_meet(edge.cross(a), edge.cross(b), edge.cross(c), reach)
+        reaches = e.yzx * half.zxy + e.zxy * half.yzx
+        touches = touches and spans_meet(edge.cross(a), edge.cross(b), edge.cross(c), reaches)
     return touches
 
 

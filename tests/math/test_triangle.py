@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import linprog
 
 from taichi_soft import box
-from taichi_soft.math.triangle import closest_point_on_triangle, solid_angle
+from taichi_soft.math.triangle import closest_point_on_triangle, solid_angle, triangle_touches_box
 from taichi_soft.runtime import init, ti
 
 
@@ -115,3 +116,40 @@ def test_a_closed_surface_fills_the_view_from_inside_and_none_of_it_from_outside
     if shift == (0, 0, 0):
         top = corners[(corners[:, :, 2] == 0.5).all(axis=1)]
         assert run_solid_angle(top) == pytest.approx(4 * np.pi / 6, abs=1e-5)
+
+
+@ti.kernel
+def run_touches_box(
+    corners: ti.types.ndarray(ndim=3), half: ti.types.ndarray(ndim=1), found: ti.types.ndarray()
+):
+    ti.loop_config(serialize=True)
+    for i in range(corners.shape[0]):
+        a, b, c = [ti.Vector([corners[i, j, k] for k in range(3)]) for j in ti.static(range(3))]
+        found[i] = int(triangle_touches_box(a, b, c, ti.Vector([half[0], half[1], half[2]])))
+
+
+def depth_in_box(corners, half):
+    """How deep a triangle's best point lies in the box, negative outside: a linear program of its weights."""
+    above = np.concatenate([corners, -corners], axis=1).T  # (6, 3) on the weights
+    rows = np.concatenate([above, np.ones((6, 1))], axis=1)
+    result = linprog(
+        [0, 0, 0, -1], rows, np.tile(half, 2), [[1, 1, 1, 0]], [1], [(0, 1)] * 3 + [(None, None)]
+    )
+    return -result.fun
+
+
+def test_a_triangle_touches_a_box_where_a_mixture_of_its_corners_lies_in_it():
+    """Large triangles that pass by faces, edges and corners, and flat ones."""
+    init()
+    random = np.random.default_rng(9)
+    corners = random.normal(0, 1.0, (400, 3, 3))
+    corners[::4] += 0.7 * random.normal(size=(100, 1, 3))
+    corners[1::8, 2] = corners[1::8, 1]
+    corners[3::8, 2] = 2 * corners[3::8, 1] - corners[3::8, 0]
+    corners, half = corners.astype(np.float32), np.array([0.5, 0.25, 0.4], dtype=np.float32)
+    found = np.zeros(len(corners), dtype=np.int32)
+    run_touches_box(corners, half, found)
+    depths = np.array([depth_in_box(rows.astype(float), half) for rows in corners])
+    clear = np.abs(depths) > 1e-6
+    np.testing.assert_array_equal(found[clear] == 1, depths[clear] > 0)
+    assert 50 < (depths > 0).sum() < 350
