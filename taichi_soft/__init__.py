@@ -47,6 +47,7 @@ from taichi_soft.meshing import (
     voronoi_graph,
     voxels,
 )
+from taichi_soft.queries import ClosestPoint, Overlap, Pose, RayHit, RayHits
 from taichi_soft.runtime import Device, device, init
 from taichi_soft.settings import Settings
 from taichi_soft.shapes import BoxShape, CapsuleShape, PlaneShape, Shape, SphereShape
@@ -58,8 +59,12 @@ __all__ = [
     "PRESETS",
     "AnisotropicMaterial",
     "Body",
+<<<<<<< HEAD
     "BoxShape",
     "CapsuleShape",
+=======
+    "ClosestPoint",
+>>>>>>> queries
     "Device",
     "DeviceError",
     "Failure",
@@ -69,8 +74,15 @@ __all__ = [
     "MeshError",
     "MeshQuality",
     "OptionError",
+    "Overlap",
     "ParticleMesh",
+<<<<<<< HEAD
     "PlaneShape",
+=======
+    "Pose",
+    "RayHit",
+    "RayHits",
+>>>>>>> queries
     "Settings",
     "Shape",
     "SolverWarning",

@@ -149,6 +149,8 @@ class State:
         self.body_model = ti.field(ti.i32, bodies)
         self.body_status = ti.field(ti.i32, bodies)
         self.body_velocity_lag = ti.field(real, bodies)  # substep [s] by half of which leapfrog lags
+        self.body_lower = ti.Vector.field(3, real, bodies)  # [m], box at the last query that needed it
+        self.body_upper = ti.Vector.field(3, real, bodies)
         self.block_model = ti.field(ti.i32, b)
 
         if capacity.contact != _NO_CONTACT:
