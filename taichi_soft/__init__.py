@@ -59,12 +59,9 @@ __all__ = [
     "PRESETS",
     "AnisotropicMaterial",
     "Body",
-<<<<<<< HEAD
     "BoxShape",
     "CapsuleShape",
-=======
     "ClosestPoint",
->>>>>>> queries
     "Device",
     "DeviceError",
     "Failure",
@@ -76,13 +73,10 @@ __all__ = [
     "OptionError",
     "Overlap",
     "ParticleMesh",
-<<<<<<< HEAD
     "PlaneShape",
-=======
     "Pose",
     "RayHit",
     "RayHits",
->>>>>>> queries
     "Settings",
     "Shape",
     "SolverWarning",

@@ -47,10 +47,7 @@ def first_touch(contact: ti.template(), c, start, end, slack):
             step = ti.abs(distance) + TOUCHING  # it leaves this part of the surface, and may meet another
         if is_open == 1:
             part += step / ti.max(length, 1e-30)
-            if not (part <= 1.0):
-                part = NEVER
-                is_open = 0
-            elif marches >= MOST_MARCHES:
+            if not (part <= 1.0) or marches >= MOST_MARCHES:
                 part = NEVER
                 is_open = 0
     return part, distance, beyond, normal

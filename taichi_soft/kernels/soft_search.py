@@ -7,7 +7,6 @@ from taichi_soft.contact_fields import SLOTS
 from taichi_soft.kernels.islands import may_touch
 from taichi_soft.math.triangle import closest_point_on_triangle
 from taichi_soft.runtime import ti
-from taichi_soft.state import ABSENT
 
 SELF_DISTANCE = 1.5
 """Mean edges: what is nearer at rest belongs together, and is no contact of a body with itself."""
