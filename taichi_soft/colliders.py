@@ -300,18 +300,19 @@ class Colliders:
         return self._impulses.copy()
 
 
-def _way(row: _Row, dt: float) -> tuple[Floats, Floats]:
-    """Lower and upper corner of a box round everywhere the collider gets to within `dt` [m]."""
+def _way(row: _Row, dt: float) -> tuple[Floats, Floats, Floats]:
+    """Corners of a box round everywhere the collider gets to within `dt` [m]; its highest speed, (1,) [m/s]."""
     lower, upper = row.shape.bounds
+    speed, spin = float(np.linalg.norm(row.velocity)), float(np.linalg.norm(row.spin))
     if not np.isfinite([lower, upper]).all():
         far = np.full(3, 1e30)
-        return -far, far
+        return -far, far, np.array([speed if spin == 0.0 else 1e30])
     corners = np.array([[(lower, upper)[i >> k & 1][k] for k in range(3)] for i in range(8)])
-    if row.spin.any():
-        radius = float(np.linalg.norm(corners, axis=1).max()) * np.ones((1, 3))
-        places = np.concatenate([-radius, radius])
-    else:
-        places = corners @ matrix_of(row.rotation).T
+    radius = float(np.linalg.norm(corners, axis=1).max())
+    places = corners @ matrix_of(row.rotation).T
+    if spin > 0.0:
+        places = radius * np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]])
     start, end = row.position + places, row.position + dt * row.velocity + places
     both = np.concatenate([start, end])
-    return both.min(axis=0) - row.thickness, both.max(axis=0) + row.thickness
+    fastest = np.array([speed + spin * (radius + row.thickness)])
+    return both.min(axis=0) - row.thickness, both.max(axis=0) + row.thickness, fastest

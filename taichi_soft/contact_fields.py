@@ -48,15 +48,17 @@ class ContactFields:
         self.collider_filter = ti.Vector.field(2, ti.i32, c)  # group, mask
         self.collider_lower = ti.Vector.field(3, ti.f32, c)  # box round its way through the step [m]
         self.collider_upper = ti.Vector.field(3, ti.f32, c)
+        self.collider_speed = ti.field(ti.f32, c)  # of its fastest point [m/s], at most
         self.samples = ti.field(ti.f32, max(capacity.samples, 1))
 
         self.near = ti.field(ti.i32, bodies * c)  # colliders within reach of a body, packed to the front
         self.near_count = ti.field(ti.i32, bodies)
-        self.reach = ti.field(ti.f32, bodies)  # way left [m] until others may have come within reach
+        self.reach = ti.field(ti.f32, bodies)  # way [m] after which other colliders may be near
+        self.gone = ti.field(ti.f32, bodies)  # way [m] since it was looked which are near, at most
         self.impulse = ti.Vector.field(3, ti.f32, bodies * c)  # on the collider in this step [N s]
         self.angular_impulse = ti.Vector.field(3, ti.f32, bodies * c)  # about its position [N m s]
         self.body_filter = ti.Vector.field(2, ti.i32, bodies)  # group, mask
-        self.particle_is_outer = ti.field(ti.i32, particles)
+        self.particle_clearance = ti.field(ti.f32, particles)  # [m] from all that is near, at that time
         self.particle_touches = ti.field(ti.i32, particles)  # 1 where something held it in the last substep
 
         self.island_count = ti.field(ti.i32, ())

@@ -226,10 +226,9 @@ class State:
 
     def _load_contact(self, scene: Scene) -> None:
         pairs = list(zip(scene.bodies, scene.ranges, strict=True))
-        is_outer = np.zeros(scene.particle_count, dtype=np.int32)
-        is_outer[np.concatenate([b.outer + r.particles[0] for b, r in pairs])] = 1
         contact, count = self.contact, len(pairs)
-        fill(contact.particle_is_outer, is_outer)
+        # What lies inside a body is never near anything.
+        fill(contact.particle_clearance, np.full(scene.particle_count, np.inf))
         fill(contact.particle_touches, np.zeros(0))
         fill(contact.body_filter, np.tile((1, ALL_GROUPS), (count, 1)))
         contact.island_count[None] = count

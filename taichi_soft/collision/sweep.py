@@ -14,6 +14,15 @@ NEVER = 2.0
 
 
 @ti.func
+def distance_from(contact: ti.template(), c, x):
+    """Distance of a point in a collider's frame from its skin [m], negative inside; no more than that."""
+    kind, parameters = contact.collider_kind[c], contact.collider_parameters[c]
+    resolution, offset = contact.collider_resolution[c], contact.collider_offset[c]
+    distance, _ = signed_distance(contact.samples, kind, parameters, resolution, offset, x)
+    return distance - contact.collider_surface[c].z
+
+
+@ti.func
 def first_touch(contact: ti.template(), c, start, end, slack):
     """How a path meets a collider. All in the collider's frame [m].
 

@@ -1,7 +1,7 @@
 """Particles of one body against the colliders, in one thread."""
 
 from taichi_soft.collision.response import resolved_velocity
-from taichi_soft.collision.sweep import NEVER, TOUCHING, first_touch
+from taichi_soft.collision.sweep import NEVER, TOUCHING, distance_from, first_touch
 from taichi_soft.contact_fields import NO_COLLIDER
 from taichi_soft.math.quaternion import spun, turned, turned_back
 from taichi_soft.runtime import ti
@@ -11,8 +11,19 @@ MOST_TOUCHES = 4
 
 
 @ti.func
-def find_near_colliders(state: ti.template(), body, reach):
-    """List the colliders that come within `reach` [m] of a body's particles in this step."""
+def _in_frame(contact: ti.template(), c, x, time):
+    """A point in the frame that a collider has `time` [s] after the start of the step."""
+    position = contact.collider_position[c] + contact.collider_velocity[c] * time
+    return turned_back(spun(contact.collider_rotation[c], contact.collider_spin[c] * time), x - position)
+
+
+@ti.func
+def find_near_colliders(state: ti.template(), body, reach, since, left):
+    """List the colliders that come within `reach` [m] of a body's particles, and how clear of them each is.
+
+    Args:
+        since, left: time since the start of the step, and until its end [s].
+    """
     outer = state.body_outer[body]
     first = state.particle_position[state.outer_particle[outer[0]]]
     lower, upper = first, first
@@ -36,6 +47,16 @@ def find_near_colliders(state: ti.template(), body, reach):
                 count += 1
     state.contact.near_count[body] = count
     state.contact.reach[body] = reach
+    state.contact.gone[body] = 0.0
+    for k in range(outer[0], outer[1]):
+        p = state.outer_particle[k]
+        x = state.particle_position[p]
+        clearance = reach
+        for i in range(count):
+            c = state.contact.near[row + i]
+            distance = distance_from(state.contact, c, _in_frame(state.contact, c, x, since))
+            clearance = ti.min(clearance, distance - state.contact.collider_speed[c] * left)
+        state.contact.particle_clearance[p] = clearance
 
 
 @ti.func
@@ -45,6 +66,7 @@ def forget_contacts(state: ti.template(), body):
         state.contact.impulse[row] = ti.Vector.zero(ti.f32, 3)
         state.contact.angular_impulse[row] = ti.Vector.zero(ti.f32, 3)
     state.contact.reach[body] = -1.0
+    state.contact.gone[body] = 0.0
 
 
 @ti.func
@@ -69,11 +91,8 @@ def collided(state: ti.template(), body, p, start, way_velocity, h, since):
         slack = ti.select(touches == 0, 0.0, TOUCHING)
         for k in range(state.contact.near_count[body]):
             c = state.contact.near[row + k]
-            x, q = state.contact.collider_position[c], state.contact.collider_rotation[c]
-            u, spin = state.contact.collider_velocity[c], state.contact.collider_spin[c]
-            before, after = since + (1.0 - left) * h, since + h
-            a = turned_back(spun(q, spin * before), x0 - x - u * before)
-            b = turned_back(spun(q, spin * after), x1 - x - u * after)
+            a = _in_frame(state.contact, c, x0, since + (1.0 - left) * h)
+            b = _in_frame(state.contact, c, x1, since + h)
             part, near, far, n = first_touch(state.contact, c, a, b, slack)
             if part < earliest:
                 earliest, which, distance, beyond, normal = part, k, near, far, n

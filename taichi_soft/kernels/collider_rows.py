@@ -2,8 +2,8 @@
 
 from taichi_soft.runtime import ti
 
-MOTION_WIDTH = 19
-"""Position, quaternion, velocity, spin, and the lower and upper corner of the box round the way."""
+MOTION_WIDTH = 20
+"""Position, quaternion, velocity, spin, the lower and upper corner of the box round the way, highest speed."""
 
 
 @ti.func
@@ -22,6 +22,7 @@ def write_collider_motion(contact: ti.template(), rows: ti.types.ndarray(dtype=t
         contact.collider_spin[c] = _vector(rows, c, 10)
         contact.collider_lower[c] = _vector(rows, c, 13)
         contact.collider_upper[c] = _vector(rows, c, 16)
+        contact.collider_speed[c] = rows[c, 19]
 
 
 @ti.kernel

@@ -46,10 +46,10 @@ def _kick_body(state: ti.template(), program: ti.template(), body, kick):
 def _drift_body(state: ti.template(), body, h, since):
     """New positions, and what colliders in the way make of velocities."""
     particles = state.body_particles[body]
-    among = state.contact.near_count[body] > 0
+    gone = state.contact.gone[body]
     for p in range(particles[0], particles[1]):
         x, v = state.particle_position[p], state.particle_velocity[p]
-        if among and state.contact.particle_is_outer[p] == 1 and state.particle_inv_mass[p] > 0.0:
+        if state.contact.particle_clearance[p] <= gone and state.particle_inv_mass[p] > 0.0:
             x_new, v_new = collided(state, body, p, x, v, h, since)
             state.particle_position[p] = x_new
             state.particle_velocity[p] = v_new
@@ -58,26 +58,25 @@ def _drift_body(state: ti.template(), body, h, since):
 
 
 @ti.func
-def _touch_each_other(state: ti.template(), island, reach, fastest, h):
+def _touch_each_other(state: ti.template(), island, reach, gone, fastest, h):
     """Contact between bodies of one island in a substep; looks for candidates again where they have aged.
 
-    Returns: the way [m] that bodies may still go until then.
+    Returns: the way [m] for which the candidates hold, and how much of it may be gone.
     """
     first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
     way = 2.0 * fastest * h
-    rest = reach
+    holds, used = reach, gone + way
     if last - first > 1 or state.soft.body_touches_itself[state.contact.island_body[first]] == 1:
-        if rest < way:
-            allowance, thickness = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32)
+        if not (used <= holds):
+            thickness = ti.cast(0.0, ti.f32)
+            holds, used = way, way
             for i in range(first, last):
                 surface = state.soft.body_surface[state.contact.island_body[i]]
-                allowance = ti.max(allowance, search_margin(surface))
+                holds = ti.max(holds, search_margin(surface))
                 thickness = ti.max(thickness, surface.y)
-            rest = ti.max(way, allowance)
-            search_island(state, island, thickness + rest)
-        rest -= way
-        solve_island(state, island, h)
-    return rest
+            search_island(state, island, thickness + holds)
+        solve_island(state, island, h, used)
+    return holds, used
 
 
 @ti.func
@@ -86,7 +85,7 @@ def _step_island(state: ti.template(), program: ti.template(), island, substeps,
     first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
     for i in range(first, last):
         _begin_body(state, state.contact.island_body[i])
-    reach = ti.cast(-1.0, ti.f32)
+    reach, gone = ti.cast(-1.0, ti.f32), ti.cast(0.0, ti.f32)
     for s in range(substeps):
         fastest = ti.cast(0.0, ti.f32)
         for i in range(first, last):
@@ -99,14 +98,17 @@ def _step_island(state: ti.template(), program: ti.template(), island, substeps,
                 speed = _kick_body(state, program, body, kick)
                 fastest = ti.max(fastest, speed)
         if ti.static(program.has_soft_contact):
-            reach = _touch_each_other(state, island, reach, fastest, h)
+            reach, gone = _touch_each_other(state, island, reach, gone, fastest, h)
         for i in range(first, last):
             body = state.contact.island_body[i]
             if state.body_status[body] == ACTIVE:
-                if not (state.contact.reach[body] >= fastest * h):
+                way = state.contact.gone[body] + fastest * h
+                if not (state.contact.reach[body] >= way):
                     # A quarter more than the rest of the step needs at this speed.
-                    find_near_colliders(state, body, 1.25 * fastest * h * (substeps - s) + 1e-3)
-                state.contact.reach[body] = state.contact.reach[body] - fastest * h
+                    left = h * (substeps - s)
+                    find_near_colliders(state, body, 1.25 * fastest * left + 1e-3, s * h, left)
+                    way = fastest * h
+                state.contact.gone[body] = way
                 _drift_body(state, body, h, s * h)
     failed = 0
     for i in range(first, last):

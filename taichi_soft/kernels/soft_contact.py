@@ -60,26 +60,29 @@ def _gap(state: ti.template(), p, corners):
 
 
 @ti.func
-def _find_gaps(state: ti.template(), k):
-    """Which candidates of a vertex count: those in front of it, and the one it is least deep behind."""
+def _find_gaps(state: ti.template(), k, gone):
+    """Which candidates of a vertex count: those in front of it, and the one it is least deep behind.
+
+    `gone`: way [m] that any pair may have come nearer since the search.
+    """
     p = state.outer_particle[k]
     mine = state.soft.body_surface[state.particle_body[p]]
     shallowest, behind = ti.cast(-1e30, ti.f32), -1
     for slot in range(k * SLOTS, k * SLOTS + state.soft.slot_count[k]):
         corners = state.triangle_vertices[state.soft.slot_triangle[slot]]
         other = state.particle_body[corners[0]]
-        distance, normal, weights, can_touch = _gap(state, p, corners)
-        gap = distance - 0.5 * (mine.y + state.soft.body_surface[other].y)
-        state.soft.slot_normal[slot] = normal
-        state.soft.slot_weights[slot] = weights
+        thickness = 0.5 * (mine.y + state.soft.body_surface[other].y)
         state.soft.slot_gap[slot] = NO_CONTACT
-        if can_touch == 1:
-            if distance >= 0.0:
-                state.soft.slot_gap[slot] = gap
-            elif other != state.particle_body[p] and distance > shallowest:
+        if state.soft.slot_distance[slot] - gone < thickness:
+            distance, normal, weights, can_touch = _gap(state, p, corners)
+            state.soft.slot_normal[slot] = normal
+            state.soft.slot_weights[slot] = weights
+            if can_touch == 1 and distance >= 0.0:
+                state.soft.slot_gap[slot] = distance - thickness
+            elif can_touch == 1 and other != state.particle_body[p] and distance > shallowest:
                 if behind >= 0:
                     state.soft.slot_gap[behind] = NO_CONTACT
-                state.soft.slot_gap[slot] = gap
+                state.soft.slot_gap[slot] = distance - thickness
                 shallowest, behind = distance, slot
 
 
@@ -197,8 +200,11 @@ def _solve_vertex(state: ti.template(), k, h, sweep):
 
 
 @ti.func
-def solve_island(state: ti.template(), island, h):
-    """Take from the velocities of an island what would bring its bodies too near within `h` [s]."""
+def solve_island(state: ti.template(), island, h, gone):
+    """Take from the velocities of an island what would bring its bodies too near within `h` [s].
+
+    `gone`: way [m] that any pair may come nearer from the search to the end of this substep.
+    """
     first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
     for sweep in range(-1, SWEEPS + 1):
         for i in range(first, last):
@@ -206,6 +212,6 @@ def solve_island(state: ti.template(), island, h):
             for k in range(outer[0], outer[1]):
                 if state.soft.slot_count[k] > 0:
                     if sweep < 0:
-                        _find_gaps(state, k)
+                        _find_gaps(state, k, gone)
                     else:
                         _solve_vertex(state, k, h, sweep)
