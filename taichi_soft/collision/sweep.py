@@ -1,13 +1,19 @@
-"""Where a particle on its way first touches a collider: sphere tracing along its path (Hart 1996)."""
+"""Where a particle on its way first touches a collider: sphere tracing along its path (Hart 1996).
+
+A convex solid lies behind the tangent plane at its nearest point. There the path may go on to that plane, and
+is clear of the solid if it ends in front of it.
+"""
 
 from taichi_soft.collision.distance import signed_distance
+from taichi_soft.collision.kinds import ShapeKind
 from taichi_soft.runtime import ti
 
 TOUCHING = 1e-5
 """Distance [m] within which a particle counts as on the surface: some steps of float32 at ten metres."""
 
-MOST_MARCHES = 32
-"""Steps along one path. One that needs more grazes the surface, and is stopped where it is."""
+MOST_MARCHES = 16
+"""Steps along one path: none is shorter than this part of it, so that one along the surface ends too. At 30 m/s
+and 240 substeps per second that is 8 mm."""
 
 NEVER = 2.0
 """Part of the way at which what is not touched is touched."""
@@ -35,28 +41,30 @@ def first_touch(contact: ti.template(), c, start, end, slack):
         normal: of the surface there.
     """
     way = end - start
-    length = way.norm()
+    length = ti.max(way.norm(), 1e-30)
     kind, parameters = contact.collider_kind[c], contact.collider_parameters[c]
     resolution, offset = contact.collider_resolution[c], contact.collider_offset[c]
     thickness = contact.collider_surface[c].z
+    is_convex = kind <= ShapeKind.CAPSULE
     part, distance, beyond, normal = 0.0, 0.0, 0.0, ti.Vector([0.0, 0.0, 1.0])
-    marches, is_open = 0, 1
+    is_open = 1
     while is_open == 1:
-        to_shape, direction = signed_distance(
+        to_shape, normal = signed_distance(
             contact.samples, kind, parameters, resolution, offset, start + part * way
         )
         distance = to_shape - thickness
-        marches += 1
-        step = distance
-        if distance <= TOUCHING or marches == MOST_MARCHES:
-            beyond = distance + (1.0 - part) * way.dot(direction)
-            if beyond < -slack:
-                normal = direction
-                is_open = 0
-            step = ti.abs(distance) + TOUCHING  # it leaves this part of the surface, and may meet another
-        if is_open == 1:
-            part += step / ti.max(length, 1e-30)
-            if not (part <= 1.0) or marches >= MOST_MARCHES:
-                part = NEVER
-                is_open = 0
+        climb = way.dot(normal)
+        beyond = distance + (1.0 - part) * climb
+        is_clear = beyond >= -slack
+        if distance <= TOUCHING and not is_clear:
+            is_open = 0
+        elif is_clear and is_convex:
+            part, is_open = NEVER, 0
+        else:
+            step = ti.max(ti.abs(distance) / length, 1.0 / MOST_MARCHES)
+            if is_convex:
+                step = ti.max(distance / ti.max(-climb, 1e-30), 1e-6)
+            part += step
+            if not (part <= 1.0):
+                part, is_open = NEVER, 0
     return part, distance, beyond, normal
