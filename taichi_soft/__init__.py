@@ -49,7 +49,7 @@ from taichi_soft.meshing import (
 )
 from taichi_soft.runtime import Device, device, init
 from taichi_soft.settings import Settings
-from taichi_soft.shapes import BoxShape, CapsuleShape, PlaneShape, Shape, SphereShape
+from taichi_soft.shapes import BoxShape, CapsuleShape, HeightFieldShape, PlaneShape, Shape, SphereShape
 from taichi_soft.stability import StableStep, stable_step
 from taichi_soft.world import World
 
@@ -64,6 +64,7 @@ __all__ = [
     "DeviceError",
     "Failure",
     "FrozenBodyWarning",
+    "HeightFieldShape",
     "Material",
     "MaterialError",
     "MeshError",
