@@ -55,9 +55,15 @@ def _way_from_ground(samples: ti.template(), resolution, offset, i, j, spacing, 
     """
     way = ti.Vector([0.0, 0.0, longest])
     base = _height(samples, resolution, offset, i, j)
+    own_a, own_b = i - int(p[0] < 0.0), j - int(p[1] < 0.0)
     for k in range(8):
-        a, b, is_upper = i - 1 + k // 4, j - 1 + k // 2 % 2, k % 2
-        if a >= 0 and b >= 0 and a < resolution[0] - 1 and b < resolution[1] - 1:
+        # First the cell that p is over; the others only where they may hold something nearer.
+        turn_a, turn_b, is_upper = k // 4, k // 2 % 2, k % 2
+        a = own_a + turn_a * (2 * (i - own_a) - 1)
+        b = own_b + turn_b * (2 * (j - own_b) - 1)
+        beside = ti.Vector([turn_a * p[0], turn_b * p[1]])
+        is_cell = a >= 0 and b >= 0 and a < resolution[0] - 1 and b < resolution[1] - 1
+        if is_cell and beside.norm_sqr() < way.norm_sqr():
             c, d = a + 1 - is_upper, b + is_upper  # the corner beside the diagonal
             first = ti.Vector([(a - i) * spacing, (b - j) * spacing, 0.0])
             side = ti.Vector([(c - i) * spacing, (d - j) * spacing, 0.0])
