@@ -49,7 +49,15 @@ from taichi_soft.meshing import (
 )
 from taichi_soft.runtime import Device, device, init
 from taichi_soft.settings import Settings
-from taichi_soft.shapes import BoxShape, CapsuleShape, HeightFieldShape, PlaneShape, Shape, SphereShape
+from taichi_soft.shapes import (
+    BoxShape,
+    CapsuleShape,
+    HeightFieldShape,
+    MeshShape,
+    PlaneShape,
+    Shape,
+    SphereShape,
+)
 from taichi_soft.stability import StableStep, stable_step
 from taichi_soft.world import World
 
@@ -69,6 +77,7 @@ __all__ = [
     "MaterialError",
     "MeshError",
     "MeshQuality",
+    "MeshShape",
     "OptionError",
     "ParticleMesh",
     "PlaneShape",
