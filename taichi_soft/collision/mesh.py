@@ -3,6 +3,9 @@
 from taichi_soft.collision.direction import length_and_direction
 from taichi_soft.runtime import ti
 
+MARGIN = 2
+"""Cells between the box of the mesh and the border of its grid, at least."""
+
 FLATTEST = 1e-3
 """Slope of the distance below which it has no direction: at the middle of a solid."""
 
@@ -37,9 +40,10 @@ def _interpolated(samples: ti.template(), resolution, offset, u):
 def mesh_distance(samples: ti.template(), parameters, resolution, offset, x):
     """Signed distance [m] and normal, to a fraction of a cell.
 
-    Between nodes an interpolated distance may rise faster than the way: there it is divided by its slope.
-    Outside the grid, all of which the solid's box lies well within, the way to the grid and the distance
-    from there are two sides of a triangle with no sharp angle between them.
+    Between nodes an interpolated distance may rise faster than the way: its last cell to the surface, where
+    a ray would go too far, is divided by its slope.
+    Outside the grid the way to it and the distance from there are two sides of a triangle with no sharp angle
+    between them; and the solid's box lies `MARGIN` cells within.
     Parameters: first node of the grid (3), cell [m].
     """
     cell = parameters[3]
@@ -51,9 +55,11 @@ def mesh_distance(samples: ti.template(), parameters, resolution, offset, x):
     normal = ti.Vector([0.0, 0.0, 1.0])
     if slope > FLATTEST:
         normal = gradient / (slope * cell)
-    distance = value / ti.max(1.0, slope)
+    last_cell = ti.max(-cell, ti.min(cell, value))
+    distance = value - last_cell * (1.0 - 1.0 / ti.max(1.0, slope))
     beside = x - inside
     if beside.norm_sqr() > 0.0:
         normal = length_and_direction(beside + distance * normal, normal)[1]
-        distance = ti.sqrt(beside.norm_sqr() + distance * distance)
+        solid_gap = ti.max(low + MARGIN * cell - x, x - high + MARGIN * cell, 0.0)
+        distance = ti.max(ti.sqrt(beside.norm_sqr() + distance * distance), solid_gap.norm())
     return distance, normal

@@ -9,15 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from taichi_soft.collision.mesh import MARGIN
 from taichi_soft.errors import MeshError
 from taichi_soft.kernels.distance_grid import STEPS, accumulate_crossings, compute_grid_distances
 from taichi_soft.runtime import init
 from taichi_soft.shapes.closed_mesh import ClosedMesh
 from taichi_soft.shapes.shape import as_length
 from taichi_soft.shapes.triangle_tree import triangle_tree
-
-MARGIN = 2
-"""Cells between the box of the mesh and the border of its grid, at least."""
 
 USUAL_CELLS = 64
 """Along the longest side of the mesh, where nobody says."""
@@ -29,7 +27,7 @@ DEEP = 0.1
 """Cells inside the solid, from where on a node stands for it in the grid."""
 
 MOST_LOST = 0.1
-"""Share of the surface that may have no such node near it. Sharp edges lose their outermost cells on any grid."""
+"""Share of the surface that may have no such node near it. Sharp edges lose their outer cells on any grid."""
 
 
 @dataclass(frozen=True, eq=False)
