@@ -23,11 +23,19 @@ USUAL_CELLS = 64
 MOST_NODES = 2_000_000
 """Of a grid: 8 MB, and some seconds to fill."""
 
-DEEP = 0.1
-"""Cells inside the solid, from where on a node stands for it in the grid."""
-
 MOST_LOST = 0.1
-"""Share of the surface that may have no such node near it. Sharp edges lose their outer cells on any grid."""
+"""Share of the surface behind which the grid may show no solid: sharp edges lose their outer cells on any."""
+
+DEPTHS = (0.5, 1.0)
+"""Cells behind the surface where the solid is looked for."""
+
+SHALLOWEST = 0.05
+"""Cells inside, less than which is no solid to rely on."""
+
+# Of ten points spread evenly over a triangle.
+SHARES: NDArray[np.float64] = (
+    np.array([[i + 1 / 3, j + 1 / 3, 10 / 3 - i - j] for i in range(4) for j in range(4 - i)]) / 4
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,17 +95,31 @@ def _place(windings: NDArray[np.int32], grid: Grid) -> list[float]:
 
 
 def _require_thickness(corners: NDArray[np.float64], distances: NDArray[np.float32], grid: Grid) -> None:
-    """Raises: MeshError where too much of the surface has no inside on the grid."""
-    deep = distances < -DEEP
-    base = np.floor(corners.mean(axis=1)).astype(np.int64) - (MARGIN - 1)
-    held = np.zeros(len(base), dtype=bool)
-    for step in product(range(2 * MARGIN), repeat=3):
-        held |= deep[tuple((base + step).T)]
-    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    lost = float(areas[~held].sum() / areas.sum())
-    if lost > MOST_LOST:
-        place = (grid.origin + grid.cell * corners.mean(axis=1)[(~held).argmax()]).round(6).tolist()
+    """Raises: MeshError where behind too much of the surface the grid shows no solid."""
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    areas = np.linalg.norm(normals, axis=1)
+    corners, normals, areas = corners[areas > 0], normals[areas > 0], areas[areas > 0]
+    inwards = -normals / areas[:, None]
+    lost = np.ones((len(corners), len(SHARES)), dtype=bool)
+    for column, shares in enumerate(SHARES):
+        places = shares @ corners
+        for depth in DEPTHS:
+            lost[:, column] &= _interpolated(distances, places + depth * inwards) > -SHALLOWEST
+    share = float((lost.mean(axis=1) * areas).sum() / areas.sum())
+    if share > MOST_LOST:
+        worst = corners[lost.mean(axis=1).argmax()].mean(axis=0)
+        place = (grid.origin + grid.cell * worst).round(6).tolist()
         raise MeshError(
-            f"{lost:.0%} of the mesh is too thin for cell={grid.cell:.3g} m, such as at {place} m: pass a "
+            f"{share:.0%} of the mesh is too thin for cell={grid.cell:.3g} m, such as at {place} m: pass a "
             f"smaller one, such as cell={grid.cell / 2:.3g} (a wall needs 2 cells), or make it thicker"
         )
+
+
+def _interpolated(distances: NDArray[np.float32], places: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Trilinear, at places within the grid (n, 3) in cells."""
+    base = np.floor(places).astype(np.int64)
+    value = np.zeros(len(places))
+    for corner in product((0, 1), repeat=3):
+        shares = np.where(corner, places - base, base + 1 - places).prod(axis=1)
+        value += shares * distances[tuple((base + corner).T)]
+    return value

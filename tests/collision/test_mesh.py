@@ -185,3 +185,27 @@ def test_a_ray_that_goes_on_by_the_distance_passes_no_wall(case, measure):
     depth = -signed_distance_to(mesh, passed.reshape(-1, 3)).reshape(25, -1) / shape.cell
     assert depth.max() < 0.5
     assert depth[-1, stopped].min() > -0.5
+
+
+@pytest.mark.parametrize("cells", [1.2, 1.5, 2.0, 3.0])
+@pytest.mark.parametrize("turn", [(0.0, 0.0, 0.0), (0.2, 0.3, 0.1), (0.8, 0.1, 0.6)])
+def test_no_ray_passes_a_plate_that_is_thick_enough_to_be_taken(cells, turn, measure):
+    """Across it at any angle, by the closed form of a box: both ends outside, on opposite sides."""
+    cell = 1 / 64
+    mesh = trimesh.creation.box((1, 1, cells * cell))
+    matrix = trimesh.transformations.euler_matrix(*turn)
+    mesh.apply_transform(matrix)
+    shape = MeshShape(mesh, cell=cell, cache=False)
+    rng = np.random.default_rng(9)
+    middle = np.zeros((2000, 3))
+    middle[:, :2] = rng.uniform(-0.45, 0.45, (2000, 2))
+    way = rng.normal(size=(2000, 3)) * (1, 1, 0.5)
+    way *= (0.3 / np.linalg.norm(way, axis=1))[:, None]
+    steep = np.abs(way[:, 2]) > 0.6 * cells * cell
+    start, way = (middle - way)[steep] @ matrix[:3, :3].T, 2 * way[steep] @ matrix[:3, :3].T
+    gone = np.zeros(len(start))
+    for _ in range(100):
+        distance, _ = measure(shape, start + gone[:, None] * way)
+        gone = np.minimum(gone + np.maximum(distance, 0) / 0.6, 1.0)
+    assert len(start) > 1000
+    assert (gone < 0.6).all()
