@@ -121,6 +121,58 @@ def test_a_fine_ball_has_the_distance_of_a_ball(measure):
     np.testing.assert_allclose(normal, x / radius[:, None], atol=0.05)
 
 
+def star():
+    """A ball with twelve long spikes."""
+    mesh = trimesh.creation.icosphere(subdivisions=1, radius=0.2)
+    vertices = np.array(mesh.vertices)
+    vertices[:12] *= 4
+    return trimesh.Trimesh(vertices, mesh.faces)
+
+
+def hollow():
+    """A box with a cavity whose corners point outwards."""
+    cavity = trimesh.creation.icosphere(subdivisions=0, radius=0.4)
+    cavity.invert()
+    return trimesh.util.concatenate([trimesh.creation.box((1, 1, 1)), cavity])
+
+
+@pytest.mark.parametrize("make", [star, hollow])
+def test_a_step_by_the_distance_ends_outside(make, measure):
+    """In whatever direction, to a tenth of a cell; from anywhere near the corners of the mesh and its edges."""
+    mesh = make()
+    shape = MeshShape(mesh, cache=False)
+    rng = np.random.default_rng(10)
+    x = mesh.triangles[rng.integers(0, len(mesh.faces), 30000)]
+    x = np.einsum("nij,ni->nj", x, rng.dirichlet((0.3, 0.3, 0.3), len(x)))
+    x += rng.uniform(-4, 4, x.shape) * shape.cell
+    distance, _ = measure(shape, x)
+    x, distance = x[distance > 0], distance[distance > 0]
+    assert len(x) > 5000
+    for _ in range(10):
+        way = rng.normal(size=x.shape)
+        way /= np.linalg.norm(way, axis=1)[:, None]
+        assert (measure(shape, x + distance[:, None] * way)[0] > -0.1 * shape.cell).all()
+
+
+def test_in_the_middle_of_a_solid_the_normal_is_up(measure):
+    """There no way out is shorter than another, and the slope is 0: eight nodes lie round it alike."""
+    shape = MeshShape(trimesh.creation.box((1, 1, 1)), cell=1 / 9, cache=False)
+    distance, normal = measure(shape, [[0.0, 0.0, 0.0]])
+    assert distance[0] == pytest.approx(-4 / 9, abs=1e-6)
+    np.testing.assert_allclose(normal[0], [0, 0, 1], atol=1e-6)
+
+
+def test_beyond_the_grid_the_faces_of_a_box_are_as_far_as_they_are(measure):
+    mesh = MESHES["box along the axes"]
+    shape = MeshShape(mesh, cell=1 / 60, cache=False)
+    away = np.geomspace(0.05, 100, 40)
+    for axis in range(3):
+        x = np.tile([0.1, -0.2, 0.15], (40, 1))
+        x[:, axis] = mesh.extents[axis] / 2 + away
+        distance, _ = measure(shape, x)
+        np.testing.assert_allclose(distance, away, rtol=1e-5)
+
+
 def test_normals_are_the_direction_in_which_the_distance_rises(case, measure):
     """By central differences within one cell, where the interpolation is smooth."""
     mesh, shape = case
