@@ -52,15 +52,23 @@ def grid_round(mesh: ClosedMesh, cell: Any) -> Grid:
     low, high = mesh.bounds
     longest = float((high - low).max())
     size = longest / USUAL_CELLS if cell is None else as_length(cell, "cell")
-    counts = np.ceil(np.round((high - low) / size, 6)) + 1 + 2 * MARGIN
+    counts = _node_counts(high - low, size)
     if counts.prod() > MOST_NODES:
-        finest = size * (counts.prod() / MOST_NODES) ** (1 / 3)
+        larger = size
+        while _node_counts(high - low, larger).prod() > MOST_NODES:
+            larger *= 1.02
         raise MeshError(
             f"cell={size:g} m makes {counts.prod():,.0f} nodes over {longest:g} m, more than {MOST_NODES:,}: "
-            f"take cell={finest * 1.05:.3g} or cut the mesh into several shapes"
+            f"take cell={1.01 * larger:.3g} or cut the mesh into several shapes"
         )
     x, y, z = (int(count) for count in counts)
     return Grid((low + high) / 2 - size * (counts - 1) / 2, size, (x, y, z))
+
+
+def _node_counts(size: NDArray[np.float64], cell: float) -> NDArray[np.float64]:
+    # A side of a whole number of cells but for rounding has just as many.
+    counts: NDArray[np.float64] = np.ceil(np.round(size / cell, 6)) + 1 + 2 * MARGIN
+    return counts
 
 
 def distance_grid(mesh: ClosedMesh, grid: Grid) -> NDArray[np.float32]:

@@ -138,7 +138,7 @@ def hollow():
 
 @pytest.mark.parametrize("make", [star, hollow])
 def test_a_step_by_the_distance_ends_outside(make, measure):
-    """In whatever direction, to a tenth of a cell; from anywhere near the corners of the mesh and its edges."""
+    """In whatever direction, to a tenth of a cell; from near the corners of the mesh and its edges."""
     mesh = make()
     shape = MeshShape(mesh, cache=False)
     rng = np.random.default_rng(10)

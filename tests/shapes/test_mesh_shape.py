@@ -147,11 +147,13 @@ def test_cells_out_of_range(cell):
         MeshShape(CUBE, cell=cell)
 
 
-def test_a_cell_that_is_too_fine_is_refused_with_one_that_is_not():
+@pytest.mark.parametrize("size", [(1, 1, 1), (1, 0.01, 0.01)])
+def test_a_cell_that_is_too_fine_is_refused_with_one_that_is_not(size):
+    mesh = trimesh.creation.box(size)
     with pytest.raises(MeshError, match="2,000,000") as caught:
-        MeshShape(CUBE, cell=0.001)
+        MeshShape(mesh, cell=1e-4)
     offer = float(str(caught.value).split("take cell=")[1].split()[0])
-    assert 500_000 < len(MeshShape(CUBE, cell=offer).samples) <= 2_000_000
+    assert 1_500_000 < len(MeshShape(mesh, cell=offer).samples) <= 2_000_000
 
 
 def test_a_thin_plate_is_taken_with_the_cells_it_needs():
