@@ -50,7 +50,15 @@ from taichi_soft.meshing import (
 from taichi_soft.queries import ClosestPoint, Overlap, Pose, RayHit, RayHits
 from taichi_soft.runtime import Device, device, init
 from taichi_soft.settings import Settings
-from taichi_soft.shapes import BoxShape, CapsuleShape, PlaneShape, Shape, SphereShape
+from taichi_soft.shapes import (
+    BoxShape,
+    CapsuleShape,
+    HeightFieldShape,
+    MeshShape,
+    PlaneShape,
+    Shape,
+    SphereShape,
+)
 from taichi_soft.stability import StableStep, stable_step
 from taichi_soft.world import World
 
@@ -66,10 +74,12 @@ __all__ = [
     "DeviceError",
     "Failure",
     "FrozenBodyWarning",
+    "HeightFieldShape",
     "Material",
     "MaterialError",
     "MeshError",
     "MeshQuality",
+    "MeshShape",
     "OptionError",
     "Overlap",
     "ParticleMesh",

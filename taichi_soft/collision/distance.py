@@ -2,7 +2,9 @@
 
 from taichi_soft.collision.box import box_distance
 from taichi_soft.collision.capsule import capsule_distance
+from taichi_soft.collision.height_field import height_field_distance
 from taichi_soft.collision.kinds import ShapeKind
+from taichi_soft.collision.mesh import mesh_distance
 from taichi_soft.collision.plane import plane_distance
 from taichi_soft.collision.sphere import sphere_distance
 from taichi_soft.runtime import ti
@@ -30,4 +32,8 @@ def signed_distance(samples: ti.template(), kind, parameters, resolution, offset
         distance, normal = box_distance(parameters, x)
     elif kind == ShapeKind.CAPSULE:
         distance, normal = capsule_distance(parameters, x)
+    elif kind == ShapeKind.HEIGHT_FIELD:
+        distance, normal = height_field_distance(samples, parameters, resolution, offset, x)
+    elif kind == ShapeKind.MESH:
+        distance, normal = mesh_distance(samples, parameters, resolution, offset, x)
     return distance, normal
