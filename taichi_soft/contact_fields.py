@@ -10,6 +10,9 @@ NO_COLLIDER = -1
 SLOTS = 6
 """Triangles that one vertex may touch at once: where three bodies meet, and their triangles beside."""
 
+NEIGHBOURS = 16
+"""Bodies beside one that are told apart: twelve of its size fit round a ball."""
+
 NO_CONTACT = 1e30
 """Gap of a candidate that is out of reach."""
 
@@ -75,10 +78,13 @@ class SoftContactFields:
 
     def __init__(self, particles: int, bodies: int, outer: int) -> None:
         """Allocate; contents are zero."""
-        self.body_lower = ti.Vector.field(3, ti.f32, bodies)  # [m], of where it gets to in this step
+        # Corners of a box [m]: of the way through a step for islands, of the search within them.
+        self.body_lower = ti.Vector.field(3, ti.f32, bodies)
         self.body_upper = ti.Vector.field(3, ti.f32, bodies)
         self.body_surface = ti.Vector.field(3, ti.f32, bodies)  # friction, thickness [m], mean edge [m]
         self.body_touches_itself = ti.field(ti.i32, bodies)
+        self.neighbour = ti.field(ti.i32, bodies * NEIGHBOURS)  # bodies whose boxes overlap, packed to the front
+        self.neighbour_count = ti.field(ti.i32, bodies)  # NEIGHBOURS + 1 where there are more: all may be near
         self.sweep_order = ti.field(ti.i32, bodies)  # bodies by their lower x
         self.parent = ti.field(ti.i32, bodies)  # in the forest of islands
         self.island_table = ti.Vector.field(

@@ -24,10 +24,13 @@ def _begin_body(state: ti.template(), body):
 
 
 @ti.func
-def _kick_body(state: ti.template(), program: ti.template(), body, kick):
-    """New velocities from the forces, which are cleared. Returns the highest speed [m/s]."""
+def _kick_body(state: ti.template(), program: ti.template(), body, kick, common):
+    """New velocities from the forces, which are cleared.
+
+    Returns: the highest speed [m/s], and the highest beside the `common` velocity.
+    """
     particles = state.body_particles[body]
-    highest = ti.cast(0.0, state.real)
+    highest, highest_beside = ti.cast(0.0, state.real), ti.cast(0.0, state.real)
     for p in range(particles[0], particles[1]):
         inv_mass = state.particle_inv_mass[p]
         acceleration = state.particle_force[p].xyz * inv_mass + state.gravity[None]
@@ -39,7 +42,9 @@ def _kick_body(state: ti.template(), program: ti.template(), body, kick):
         state.contact.particle_touches[p] = 0
         state.particle_force[p] = ti.Vector.zero(state.real, 4)
         highest = ti.max(highest, v.dot(v))
-    return ti.sqrt(highest)
+        beside = v - common
+        highest_beside = ti.max(highest_beside, beside.dot(beside))
+    return ti.sqrt(highest), ti.sqrt(highest_beside)
 
 
 @ti.func
@@ -80,14 +85,30 @@ def _touch_each_other(state: ti.template(), island, reach, gone, fastest, h):
 
 
 @ti.func
+def _common_velocity(state: ti.template(), island):
+    """Mean velocity of the particles of an island [m/s]: what its bodies share brings none nearer."""
+    total, count = ti.Vector.zero(ti.f32, 3), 0
+    for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
+        particles = state.body_particles[state.contact.island_body[i]]
+        for p in range(particles[0], particles[1]):
+            total += state.particle_velocity[p]
+        count += particles[1] - particles[0]
+    return total / count
+
+
+@ti.func
 def _step_island(state: ti.template(), program: ti.template(), island, substeps, h):
     """One fixed step of one island. Returns how many of its bodies failed."""
     first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
     for i in range(first, last):
         _begin_body(state, state.contact.island_body[i])
     reach, gone = ti.cast(-1.0, ti.f32), ti.cast(0.0, ti.f32)
+    common = ti.Vector.zero(ti.f32, 3)
+    if ti.static(program.has_soft_contact):
+        common = _common_velocity(state, island)
     for s in range(substeps):
-        fastest = ti.cast(0.0, ti.f32)
+        fastest, fastest_beside = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32)
+        common += h * state.gravity[None]
         for i in range(first, last):
             body = state.contact.island_body[i]
             if state.body_status[body] == ACTIVE:
@@ -95,10 +116,11 @@ def _step_island(state: ti.template(), program: ti.template(), island, substeps,
                 kick = h
                 if s == 0:
                     kick = 0.5 * (state.body_velocity_lag[body] + h)
-                speed = _kick_body(state, program, body, kick)
+                speed, speed_beside = _kick_body(state, program, body, kick, common)
                 fastest = ti.max(fastest, speed)
+                fastest_beside = ti.max(fastest_beside, speed_beside)
         if ti.static(program.has_soft_contact):
-            reach, gone = _touch_each_other(state, island, reach, gone, fastest, h)
+            reach, gone = _touch_each_other(state, island, reach, gone, fastest_beside, h)
         for i in range(first, last):
             body = state.contact.island_body[i]
             if state.body_status[body] == ACTIVE:

@@ -10,19 +10,21 @@ from taichi_soft.state import ABSENT
 
 @ti.func
 def _find_boxes(state: ti.template(), body_count, dt):
-    """Box of each body's surface and of where it may get within `dt` [m]."""
+    """Box round each body's surface and its way through a step of `dt` [s]."""
     fall = state.gravity[None].norm() * dt * dt
     for body in range(body_count):
         outer = state.body_outer[body]
-        first = state.particle_position[state.outer_particle[outer[0]]]
-        lower, upper, fastest = first, first, ti.cast(0.0, state.real)
+        p = state.outer_particle[outer[0]]
+        lower, upper = state.particle_position[p], state.particle_position[p]
+        slow, fast = state.particle_velocity[p], state.particle_velocity[p]
         for k in range(outer[0], outer[1]):
             p = state.outer_particle[k]
             x, v = state.particle_position[p], state.particle_velocity[p]
-            lower, upper = ti.min(lower, x), ti.max(upper, x)
-            fastest = ti.max(fastest, v.dot(v))
+            lower, upper = ti.min(lower, x, x + dt * v), ti.max(upper, x, x + dt * v)
+            slow, fast = ti.min(slow, v), ti.max(fast, v)
         surface = state.soft.body_surface[body]
-        reach = 1.25 * ti.sqrt(fastest) * dt + fall + surface.y + search_margin(surface)
+        # What its parts do beside each other, they may do otherwise before the step is over.
+        reach = 0.5 * (fast - slow) * dt + fall + surface.y + search_margin(surface)
         state.soft.body_lower[body] = lower - reach
         state.soft.body_upper[body] = upper + reach
 
@@ -104,7 +106,7 @@ def _list_islands(state: ti.template(), body_count):
                 size *= 2
             state.soft.island_table[islands] = ti.Vector([cells, size, items])
             # No finer than an eighth of the longest triangles, or each would cover hundreds of cells.
-            state.soft.island_cell[islands] = ti.max(edges / members, widest / 8.0, 1e-6)
+            state.soft.island_cell[islands] = ti.max(1.5 * edges / members, widest / 8.0, 1e-6)
             cells += size + 1
             items += count
             islands += 1

@@ -3,7 +3,7 @@
 The candidates hold until bodies have moved by the margin with which they were looked for.
 """
 
-from taichi_soft.contact_fields import SLOTS
+from taichi_soft.contact_fields import NEIGHBOURS, SLOTS
 from taichi_soft.kernels.islands import may_touch
 from taichi_soft.math.triangle import closest_point_on_triangle
 from taichi_soft.runtime import ti
@@ -24,24 +24,73 @@ def _bucket(cell, size):
 
 
 @ti.func
-def _fill_table(state: ti.template(), island):
-    """Counting sort of the island's outer vertices by the bucket of their cell."""
+def _boxes_overlap(soft: ti.template(), a, b):
+    below = (soft.body_lower[b] - soft.body_upper[a]).max() <= 0.0
+    return below and (soft.body_lower[a] - soft.body_upper[b]).max() <= 0.0
+
+
+@ti.func
+def _find_neighbours(state: ti.template(), island, margin):
+    """For each body of an island those whose boxes, half the `margin` [m] wider, overlap its own."""
+    first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
+    for i in range(first, last):
+        body = state.contact.island_body[i]
+        outer = state.body_outer[body]
+        lower = state.particle_position[state.outer_particle[outer[0]]]
+        upper = lower
+        for k in range(outer[0], outer[1]):
+            x = state.particle_position[state.outer_particle[k]]
+            lower, upper = ti.min(lower, x), ti.max(upper, x)
+        state.soft.body_lower[body] = lower - 0.5 * margin
+        state.soft.body_upper[body] = upper + 0.5 * margin
+    for i in range(first, last):
+        body = state.contact.island_body[i]
+        count = 0
+        for j in range(first, last):
+            other = state.contact.island_body[j]
+            if j != i and count <= NEIGHBOURS:
+                if _boxes_overlap(state.soft, body, other) and may_touch(state, body, other):
+                    if count < NEIGHBOURS:
+                        state.soft.neighbour[body * NEIGHBOURS + count] = other
+                    count += 1
+        if state.soft.body_touches_itself[body] == 1:
+            count = NEIGHBOURS + 1
+        state.soft.neighbour_count[body] = count
+
+
+@ti.func
+def _is_near_others(soft: ti.template(), body, lower, upper):
+    """Whether a box reaches into that of a neighbour of its body."""
+    count = soft.neighbour_count[body]
+    near = count > NEIGHBOURS
+    if not near:
+        for i in range(count):
+            other = soft.neighbour[body * NEIGHBOURS + i]
+            below = (soft.body_lower[other] - upper).max() <= 0.0
+            near = near or (below and (lower - soft.body_upper[other]).max() <= 0.0)
+    return near
+
+
+@ti.func
+def _fill_table(state: ti.template(), island, margin):
+    """Counting sort, by the bucket of their cell, of the vertices that may be near another body."""
     table, cell = state.soft.island_table[island], state.soft.island_cell[island]
     for row in range(table[0], table[0] + table[1] + 1):
         state.soft.cell_first[row] = 0
     for pass_number in range(2):
         for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
-            outer = state.body_outer[state.contact.island_body[i]]
+            body = state.contact.island_body[i]
+            outer = state.body_outer[body]
             for k in range(outer[0], outer[1]):
                 x = state.particle_position[state.outer_particle[k]]
-                row = table[0] + _bucket(_cell_of(x, cell), table[1])
                 if pass_number == 0:
-                    state.soft.cell_first[row] = state.soft.cell_first[row] + 1
                     state.soft.slot_count[k] = 0
-                else:
-                    at = state.soft.cell_first[row] - 1
+                if _is_near_others(state.soft, body, x - 0.5 * margin, x + 0.5 * margin):
+                    row = table[0] + _bucket(_cell_of(x, cell), table[1])
+                    at = state.soft.cell_first[row] - 2 * pass_number + 1
                     state.soft.cell_first[row] = at
-                    state.soft.cell_item[at] = k
+                    if pass_number == 1:
+                        state.soft.cell_item[at] = k
         if pass_number == 0:
             total = table[2]
             for row in range(table[0], table[0] + table[1] + 1):
@@ -90,9 +139,13 @@ def _search_triangle(state: ti.template(), island, body, triangle, margin):
     a = state.particle_position[corners[0]]
     b = state.particle_position[corners[1]]
     c = state.particle_position[corners[2]]
+    half = 0.5 * margin
+    is_near = _is_near_others(state.soft, body, ti.min(a, b, c) - half, ti.max(a, b, c) + half)
     lower, upper = ti.min(a, b, c) - margin, ti.max(a, b, c) + margin
     table, cell = state.soft.island_table[island], state.soft.island_cell[island]
     low, high = _cell_of(lower, cell), _cell_of(upper, cell)
+    if not is_near:
+        high = low - 1
     for cx, cy, cz in ti.ndrange((low.x, high.x + 1), (low.y, high.y + 1), (low.z, high.z + 1)):
         here = ti.Vector([cx, cy, cz])
         row = table[0] + _bucket(here, table[1])
@@ -117,7 +170,8 @@ def _search_triangle(state: ti.template(), island, body, triangle, margin):
 @ti.func
 def search_island(state: ti.template(), island, margin):
     """Find the candidates of all vertices of an island, within `margin` [m] beyond the thickness."""
-    _fill_table(state, island)
+    _find_neighbours(state, island, margin)
+    _fill_table(state, island, margin)
     for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
         body = state.contact.island_body[i]
         triangles = state.body_triangles[body]
