@@ -10,9 +10,6 @@ NO_COLLIDER = -1
 SLOTS = 6
 """Triangles that one vertex may touch at once: where three bodies meet, and their triangles beside."""
 
-NEIGHBOURS = 16
-"""Bodies beside one that are told apart: twelve of its size fit round a ball."""
-
 NO_CONTACT = 1e30
 """Gap of a candidate that is out of reach."""
 
@@ -71,9 +68,9 @@ class ContactFields:
 
 @ti.data_oriented
 class SoftContactFields:
-    """What bodies need to touch each other: their boxes, a hash of their vertices, and candidates.
+    """What bodies need to touch each other: their boxes, a hash of vertices, and candidates.
 
-    The hash of an island is `island_table`: rows of `cell_first`, and the first row of `cell_item`.
+    An island has a piece of the hash, `island_table`, in which it looks at two bodies after the other.
     """
 
     def __init__(self, particles: int, bodies: int, outer: int) -> None:
@@ -83,16 +80,12 @@ class SoftContactFields:
         self.body_upper = ti.Vector.field(3, ti.f32, bodies)
         self.body_surface = ti.Vector.field(3, ti.f32, bodies)  # friction, thickness [m], mean edge [m]
         self.body_touches_itself = ti.field(ti.i32, bodies)
-        self.neighbour = ti.field(ti.i32, bodies * NEIGHBOURS)  # bodies whose boxes overlap, packed to the front
-        self.neighbour_count = ti.field(ti.i32, bodies)  # NEIGHBOURS + 1 where there are more: all may be near
         self.sweep_order = ti.field(ti.i32, bodies)  # bodies by their lower x
         self.parent = ti.field(ti.i32, bodies)  # in the forest of islands
-        self.island_table = ti.Vector.field(
-            3, ti.i32, bodies
-        )  # first cell, cells (a power of two), first item
-        self.island_cell = ti.field(ti.f32, bodies)  # edge of a cell [m]
+        self.island_table = ti.Vector.field(2, ti.i32, bodies)  # first row of `cell_first` and of the items
         self.cell_first = ti.field(ti.i32, 4 * outer + bodies)
-        self.cell_item = ti.field(ti.i32, outer)  # rows of `outer_particle`
+        self.item = ti.field(ti.i32, outer)  # rows of `outer_particle` that may be near the other body
+        self.cell_item = ti.field(ti.i32, outer)  # the same, cell by cell
         self.slot_count = ti.field(ti.i32, outer)
         self.slot_triangle = ti.field(ti.i32, outer * SLOTS)
         self.slot_distance = ti.field(ti.f32, outer * SLOTS)  # [m], at the search

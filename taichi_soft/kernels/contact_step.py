@@ -80,7 +80,7 @@ def _touch_each_other(state: ti.template(), island, reach, gone, fastest, h):
                 holds = ti.max(holds, search_margin(surface))
                 thickness = ti.max(thickness, surface.y)
             search_island(state, island, thickness + holds)
-        solve_island(state, island, h, used)
+        solve_island(state, island, h, used, way)
     return holds, used
 
 

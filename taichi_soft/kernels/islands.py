@@ -91,23 +91,15 @@ def _list_islands(state: ti.template(), body_count):
     for first in range(body_count):
         if state.soft.parent[first] == first and state.body_status[first] != ABSENT:
             state.contact.island_first[islands] = rows
-            count, widest, edges, members = 0, ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32), 0
+            count = 0
             for body in range(first, body_count):
                 if state.body_status[body] != ABSENT and _root(state.soft, body) == first:
                     state.contact.island_body[rows] = body
                     rows += 1
-                    members += 1
                     outer = state.body_outer[body]
                     count += outer[1] - outer[0]
-                    edge = state.soft.body_surface[body].z
-                    widest, edges = ti.max(widest, edge), edges + edge
-            size = 1
-            while size < 2 * count:
-                size *= 2
-            state.soft.island_table[islands] = ti.Vector([cells, size, items])
-            # No finer than an eighth of the longest triangles, or each would cover hundreds of cells.
-            state.soft.island_cell[islands] = ti.max(1.5 * edges / members, widest / 8.0, 1e-6)
-            cells += size + 1
+            state.soft.island_table[islands] = ti.Vector([cells, items])
+            cells += 4 * count + 1  # for a power of two of rows, of which a quarter to a half is in use
             items += count
             islands += 1
     state.contact.island_first[islands] = rows

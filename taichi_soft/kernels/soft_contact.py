@@ -60,10 +60,12 @@ def _gap(state: ti.template(), p, corners):
 
 
 @ti.func
-def _find_gaps(state: ti.template(), k, gone):
+def _find_gaps(state: ti.template(), k, gone, way):
     """Which candidates of a vertex count: those in front of it, and the one it is least deep behind.
 
-    `gone`: way [m] that any pair may have come nearer since the search.
+    Args:
+        gone: way [m] by which a pair may come nearer from the search to the end of this substep.
+        way: the same within this substep.
     """
     p = state.outer_particle[k]
     mine = state.soft.body_surface[state.particle_body[p]]
@@ -77,6 +79,8 @@ def _find_gaps(state: ti.template(), k, gone):
             distance, normal, weights, can_touch = _gap(state, p, corners)
             state.soft.slot_normal[slot] = normal
             state.soft.slot_weights[slot] = weights
+            if distance > thickness + way:
+                can_touch = 0
             if can_touch == 1 and distance >= 0.0:
                 state.soft.slot_gap[slot] = distance - thickness
             elif can_touch == 1 and other != state.particle_body[p] and distance > shallowest:
@@ -200,10 +204,10 @@ def _solve_vertex(state: ti.template(), k, h, sweep):
 
 
 @ti.func
-def solve_island(state: ti.template(), island, h, gone):
+def solve_island(state: ti.template(), island, h, gone, way):
     """Take from the velocities of an island what would bring its bodies too near within `h` [s].
 
-    `gone`: way [m] that any pair may come nearer from the search to the end of this substep.
+    `gone` and `way` as in `_find_gaps`.
     """
     first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
     for sweep in range(-1, SWEEPS + 1):
@@ -212,6 +216,6 @@ def solve_island(state: ti.template(), island, h, gone):
             for k in range(outer[0], outer[1]):
                 if state.soft.slot_count[k] > 0:
                     if sweep < 0:
-                        _find_gaps(state, k, gone)
+                        _find_gaps(state, k, gone, way)
                     else:
                         _solve_vertex(state, k, h, sweep)

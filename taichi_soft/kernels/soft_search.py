@@ -1,15 +1,21 @@
-"""Which vertices of an island are near which triangles: a spatial hash of the vertices, asked by the triangles.
+"""Which vertices of an island are near which triangles of other bodies, or of their own.
 
-The candidates hold until bodies have moved by the margin with which they were looked for.
+For two bodies whose boxes overlap, the vertices of one that may be near the other go into a spatial hash, and the
+triangles of the other look round in it. What is found holds until bodies have moved by the margin with which it
+was looked for.
 """
 
-from taichi_soft.contact_fields import NEIGHBOURS, SLOTS
+from taichi_soft.contact_fields import SLOTS
 from taichi_soft.kernels.islands import may_touch
 from taichi_soft.math.triangle import closest_point_on_triangle
 from taichi_soft.runtime import ti
 
 SELF_DISTANCE = 1.5
 """Mean edges: what is nearer at rest belongs together, and is no contact of a body with itself."""
+
+CELL = 3.0
+"""Edge of a cell of the hash over the mean edge of the triangles that look round in it: they then need to look
+into few cells. Half of it and twice of it were slower."""
 
 
 @ti.func
@@ -24,16 +30,14 @@ def _bucket(cell, size):
 
 
 @ti.func
-def _boxes_overlap(soft: ti.template(), a, b):
-    below = (soft.body_lower[b] - soft.body_upper[a]).max() <= 0.0
-    return below and (soft.body_lower[a] - soft.body_upper[b]).max() <= 0.0
+def _boxes_overlap(lower, upper, other_lower, other_upper):
+    return ti.max(other_lower - upper, lower - other_upper).max() <= 0.0
 
 
 @ti.func
-def _find_neighbours(state: ti.template(), island, margin):
-    """For each body of an island those whose boxes, half the `margin` [m] wider, overlap its own."""
-    first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
-    for i in range(first, last):
+def _find_boxes(state: ti.template(), island):
+    """Box round the surface of each body as it is now."""
+    for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
         body = state.contact.island_body[i]
         outer = state.body_outer[body]
         lower = state.particle_position[state.outer_particle[outer[0]]]
@@ -41,61 +45,47 @@ def _find_neighbours(state: ti.template(), island, margin):
         for k in range(outer[0], outer[1]):
             x = state.particle_position[state.outer_particle[k]]
             lower, upper = ti.min(lower, x), ti.max(upper, x)
-        state.soft.body_lower[body] = lower - 0.5 * margin
-        state.soft.body_upper[body] = upper + 0.5 * margin
-    for i in range(first, last):
-        body = state.contact.island_body[i]
-        count = 0
-        for j in range(first, last):
-            other = state.contact.island_body[j]
-            if j != i and count <= NEIGHBOURS:
-                if _boxes_overlap(state.soft, body, other) and may_touch(state, body, other):
-                    if count < NEIGHBOURS:
-                        state.soft.neighbour[body * NEIGHBOURS + count] = other
-                    count += 1
-        if state.soft.body_touches_itself[body] == 1:
-            count = NEIGHBOURS + 1
-        state.soft.neighbour_count[body] = count
+            state.soft.slot_count[k] = 0
+        state.soft.body_lower[body] = lower
+        state.soft.body_upper[body] = upper
 
 
 @ti.func
-def _is_near_others(soft: ti.template(), body, lower, upper):
-    """Whether a box reaches into that of a neighbour of its body."""
-    count = soft.neighbour_count[body]
-    near = count > NEIGHBOURS
-    if not near:
-        for i in range(count):
-            other = soft.neighbour[body * NEIGHBOURS + i]
-            below = (soft.body_lower[other] - upper).max() <= 0.0
-            near = near or (below and (lower - soft.body_upper[other]).max() <= 0.0)
-    return near
+def _fill_table(state: ti.template(), table, body, other, cell, margin):
+    """Put the vertices of a body that are within `margin` [m] of another's box into the hash.
 
-
-@ti.func
-def _fill_table(state: ti.template(), island, margin):
-    """Counting sort, by the bucket of their cell, of the vertices that may be near another body."""
-    table, cell = state.soft.island_table[island], state.soft.island_cell[island]
-    for row in range(table[0], table[0] + table[1] + 1):
-        state.soft.cell_first[row] = 0
-    for pass_number in range(2):
-        for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
-            body = state.contact.island_body[i]
-            outer = state.body_outer[body]
-            for k in range(outer[0], outer[1]):
+    Returns: the rows of the hash, a power of two; 0 where there is no such vertex.
+    """
+    lower, upper = state.soft.body_lower[other] - margin, state.soft.body_upper[other] + margin
+    outer = state.body_outer[body]
+    count = 0
+    for k in range(outer[0], outer[1]):
+        x = state.particle_position[state.outer_particle[k]]
+        if ti.max(lower - x, x - upper).max() <= 0.0:
+            state.soft.item[table[1] + count] = k
+            count += 1
+    size = 0
+    if count > 0:
+        size = 1
+        while size < 2 * count:
+            size *= 2
+        for row in range(table[0], table[0] + size + 1):
+            state.soft.cell_first[row] = 0
+        for pass_number in range(2):
+            for i in range(table[1], table[1] + count):
+                k = state.soft.item[i]
                 x = state.particle_position[state.outer_particle[k]]
-                if pass_number == 0:
-                    state.soft.slot_count[k] = 0
-                if _is_near_others(state.soft, body, x - 0.5 * margin, x + 0.5 * margin):
-                    row = table[0] + _bucket(_cell_of(x, cell), table[1])
-                    at = state.soft.cell_first[row] - 2 * pass_number + 1
-                    state.soft.cell_first[row] = at
-                    if pass_number == 1:
-                        state.soft.cell_item[at] = k
-        if pass_number == 0:
-            total = table[2]
-            for row in range(table[0], table[0] + table[1] + 1):
-                total += state.soft.cell_first[row]
-                state.soft.cell_first[row] = total
+                row = table[0] + _bucket(_cell_of(x, cell), size)
+                at = state.soft.cell_first[row] + 1 - 2 * pass_number  # counts up, and down again to the first
+                state.soft.cell_first[row] = at
+                if pass_number == 1:
+                    state.soft.cell_item[at] = k
+            if pass_number == 0:
+                total = table[1]
+                for row in range(table[0], table[0] + size + 1):
+                    total += state.soft.cell_first[row]
+                    state.soft.cell_first[row] = total
+    return size
 
 
 @ti.func
@@ -113,67 +103,80 @@ def _keep(soft: ti.template(), k, triangle, distance):
         soft.slot_count[k] = count + 1
     if at < SLOTS:
         soft.slot_triangle[k * SLOTS + at] = triangle
+        soft.slot_distance[k * SLOTS + at] = distance
         soft.slot_press[k * SLOTS + at] = 0.0
         soft.slot_rub[k * SLOTS + at] = ti.Vector.zero(ti.f32, 3)
-        soft.slot_distance[k * SLOTS + at] = distance
 
 
 @ti.func
 def _is_self_neighbour(state: ti.template(), p, corners, edge):
     """Whether a vertex and a triangle of one body are near each other at rest."""
-    a, b, c = (
-        state.soft.rest_position[corners[0]],
-        state.soft.rest_position[corners[1]],
-        state.soft.rest_position[corners[2]],
-    )
+    a = state.soft.rest_position[corners[0]]
+    b = state.soft.rest_position[corners[1]]
+    c = state.soft.rest_position[corners[2]]
     x = state.soft.rest_position[p]
     weights = closest_point_on_triangle(x, a, b, c)
-    gap = x - weights.x * a - weights.y * b - weights.z * c
-    return gap.norm() < SELF_DISTANCE * edge
+    return (x - weights.x * a - weights.y * b - weights.z * c).norm() < SELF_DISTANCE * edge
 
 
 @ti.func
-def _search_triangle(state: ti.template(), island, body, triangle, margin):
-    """Give a triangle to the vertices within `margin` [m] of it."""
+def _search_triangle(state: ti.template(), table, size, body, other, triangle, cell, margin):
+    """Give a triangle of `other` to the vertices of `body` within `margin` [m] of it."""
     corners = state.triangle_vertices[triangle]
     a = state.particle_position[corners[0]]
     b = state.particle_position[corners[1]]
     c = state.particle_position[corners[2]]
-    half = 0.5 * margin
-    is_near = _is_near_others(state.soft, body, ti.min(a, b, c) - half, ti.max(a, b, c) + half)
     lower, upper = ti.min(a, b, c) - margin, ti.max(a, b, c) + margin
-    table, cell = state.soft.island_table[island], state.soft.island_cell[island]
-    low, high = _cell_of(lower, cell), _cell_of(upper, cell)
-    if not is_near:
-        high = low - 1
-    for cx, cy, cz in ti.ndrange((low.x, high.x + 1), (low.y, high.y + 1), (low.z, high.z + 1)):
-        here = ti.Vector([cx, cy, cz])
-        row = table[0] + _bucket(here, table[1])
-        for item in range(state.soft.cell_first[row], state.soft.cell_first[row + 1]):
-            k = state.soft.cell_item[item]
-            p = state.outer_particle[k]
-            x = state.particle_position[p]
-            other = state.particle_body[p]
-            within = (x - lower).min() >= 0.0 and (upper - x).min() >= 0.0
-            # Two cells may share a bucket: each vertex counts in its own cell only.
-            if within and (_cell_of(x, cell) == here).all():
-                wanted = other != body and may_touch(state, body, other)
-                if other == body and state.soft.body_touches_itself[body] == 1:
-                    wanted = not _is_self_neighbour(state, p, corners, state.soft.body_surface[body].z)
-                if wanted:
-                    weights = closest_point_on_triangle(x, a, b, c)
-                    gap = (x - weights.x * a - weights.y * b - weights.z * c).norm()
-                    if gap < margin:
-                        _keep(state.soft, k, triangle, gap)
+    # Only as far as the box of the body whose vertices these are.
+    lower = ti.max(lower, state.soft.body_lower[body])
+    upper = ti.min(upper, state.soft.body_upper[body])
+    if (upper - lower).min() >= 0.0:
+        low, high = _cell_of(lower, cell), _cell_of(upper, cell)
+        for cx in range(low.x, high.x + 1):
+            for cy in range(low.y, high.y + 1):
+                for cz in range(low.z, high.z + 1):
+                    here = ti.Vector([cx, cy, cz])
+                    row = table[0] + _bucket(here, size)
+                    for item in range(state.soft.cell_first[row], state.soft.cell_first[row + 1]):
+                        k = state.soft.cell_item[item]
+                        p = state.outer_particle[k]
+                        x = state.particle_position[p]
+                        # Cells may share a bucket: each vertex counts in its own cell only.
+                        wanted = ti.max(lower - x, x - upper).max() <= 0.0 and (_cell_of(x, cell) == here).all()
+                        if wanted and other == body:
+                            wanted = not _is_self_neighbour(state, p, corners, cell / CELL)
+                        if wanted:
+                            weights = closest_point_on_triangle(x, a, b, c)
+                            gap = (x - weights.x * a - weights.y * b - weights.z * c).norm()
+                            if gap < margin:
+                                _keep(state.soft, k, triangle, gap)
+
+
+@ti.func
+def _search_pair(state: ti.template(), table, body, other, margin):
+    """Vertices of `body` near triangles of `other`, within `margin` [m]."""
+    cell = ti.max(4.0 * state.soft.body_surface[other].z, 1e-6)
+    size = _fill_table(state, table, body, other, cell, margin)
+    if size > 0:
+        triangles = state.body_triangles[other]
+        for t in range(triangles[0], triangles[1]):
+            _search_triangle(state, table, size, body, other, t, cell, margin)
 
 
 @ti.func
 def search_island(state: ti.template(), island, margin):
-    """Find the candidates of all vertices of an island, within `margin` [m] beyond the thickness."""
-    _find_neighbours(state, island, margin)
-    _fill_table(state, island, margin)
-    for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
+    """Find the candidates of all vertices of an island, within `margin` [m]."""
+    first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
+    _find_boxes(state, island)
+    for i in range(first, last):
         body = state.contact.island_body[i]
-        triangles = state.body_triangles[body]
-        for t in range(triangles[0], triangles[1]):
-            _search_triangle(state, island, body, t, margin)
+        lower, upper = state.soft.body_lower[body] - margin, state.soft.body_upper[body] + margin
+        for j in range(first, last):
+            other = state.contact.island_body[j]
+            wanted = state.soft.body_touches_itself[body] == 1
+            if i != j:
+                wanted = may_touch(state, body, other) and _boxes_overlap(
+                    lower, upper, state.soft.body_lower[other], state.soft.body_upper[other]
+                )
+            if wanted:
+                _search_pair(state, state.soft.island_table[island], body, other, margin)
