@@ -15,7 +15,8 @@ from taichi_soft.constants import LANES
 from taichi_soft.runtime import ti
 from taichi_soft.scene import BodyArrays, Ranges, Scene, blocks_of
 
-ACTIVE, FROZEN = 0, 1
+ACTIVE, FROZEN, ABSENT = 0, 1, 3
+"""Status of a body: it moves, it went non-finite and rests, its slot is empty."""
 
 
 @dataclass(frozen=True)
@@ -144,16 +145,18 @@ class State:
         self.floor = ti.Vector.field(3, real, ())  # height [m], restitution, friction
 
     def load(self, scene: Scene, models: list[int]) -> None:
-        """Fill every field from `scene`; `models[i]` is the number of body i's force model."""
+        """Fill every field from `scene`; `models[i]` is the number of body i's force model.
+
+        All bodies are absent, and their particles where their meshes are, until `spawn_body` places them.
+        """
         ranges = scene.ranges
         bodies = scene.bodies
         mass = np.concatenate([body.mass for body in bodies])
-        position = np.concatenate([body.start_position for body in bodies])
-        velocity = np.concatenate([body.start_velocity for body in bodies])
+        position = np.concatenate([body.rest_position for body in bodies])
         fill(self.particle_position, position)
         fill(self.prev_position, position)
-        fill(self.particle_velocity, velocity)
-        fill(self.prev_velocity, velocity)
+        fill(self.particle_velocity, np.zeros((0, 3)))
+        fill(self.prev_velocity, np.zeros((0, 3)))
         fill(self.particle_force, np.zeros((0, 4)))
         inv_mass = 1.0 / mass
         for body, place in zip(bodies, ranges, strict=True):
@@ -200,7 +203,7 @@ class State:
         fill(self.body_edge_blocks, np.array([r.edge_blocks for r in ranges]))
         fill(self.body_blocks, np.array([r.blocks for r in ranges]))
         fill(self.body_model, np.array(models))
-        fill(self.body_status, np.zeros(0))
+        fill(self.body_status, np.full(len(bodies), ABSENT))
         fill(self.body_velocity_lag, np.zeros(0))
         fill(self.block_model, np.repeat(models, [r.blocks[1] - r.blocks[0] for r in ranges]))
 
