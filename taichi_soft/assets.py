@@ -106,12 +106,14 @@ class SoftBodyAsset:
         drift = as_vector(velocity, "velocity", "m/s", VELOCITY_LIMIT)
         spin = as_vector(angular_velocity, "angular_velocity", "rad/s")
         x = self.mesh.vertices @ turn.T + origin
-        _require_place(x, origin, floor)
+        self._require_place(x, origin, floor)
         rows: Floats32 = self.rest_rows.copy()
         rows[:, :3] = x
         rows[:, 3:6] = drift
         if spin.any():
-            rows[:, 3:6] += np.cross(spin, x - (turn @ self._center_of_mass + origin))
+            a, b, c = spin
+            turning = np.array([[0, -c, b], [c, 0, -a], [-b, a, 0]])  # spin x r = turning @ r
+            rows[:, 3:6] += (x - (turn @ self._center_of_mass + origin)) @ turning.T
             fastest = float(np.abs(rows[:, 3:6]).max())
             if not fastest < VELOCITY_LIMIT:
                 raise OptionError(
@@ -121,14 +123,13 @@ class SoftBodyAsset:
         rows[self.description.pinned, 3:6] = 0.0
         return rows
 
-
-def _require_place(x: Floats, origin: Floats, floor: float | None) -> None:
-    lower, upper = x.min(axis=0), x.max(axis=0)
-    if not max(-lower.min(), upper.max()) < POSITION_LIMIT:
-        raise OptionError(f"position puts the body beyond {POSITION_LIMIT:g} m: stay nearer the origin")
-    if floor is not None and lower[2] < floor - 1e-3 * (upper[2] - lower[2]):
-        depth = floor - lower[2]
-        raise OptionError(
-            f"the body starts {depth:.4g} m below the floor: position=({origin[0]:g}, {origin[1]:g}, "
-            f"{origin[2] + depth:.6g}) puts it on the floor, World(floor=None) has none"
-        )
+    def _require_place(self, x: Floats, origin: Floats, floor: float | None) -> None:
+        if not np.abs(x).max() < POSITION_LIMIT:
+            raise OptionError(f"position puts the body beyond {POSITION_LIMIT:g} m: stay nearer the origin")
+        lowest, highest = float(x[:, 2].min()), float(x[:, 2].max())
+        if floor is not None and lowest < floor - 1e-3 * (highest - lowest):
+            depth = floor - lowest
+            raise OptionError(
+                f"the body starts {depth:.4g} m below the floor: position=({origin[0]:g}, {origin[1]:g}, "
+                f"{origin[2] + depth:.6g}) puts it on the floor, World(floor=None) has none"
+            )

@@ -22,7 +22,7 @@ from taichi_soft.kernels.evaluate import compute_body_forces
 from taichi_soft.kernels.program import Program
 from taichi_soft.kernels.readout import read_positions, read_velocities, write_motion
 from taichi_soft.kernels.schedules import Launch, choose_schedule, make_launch
-from taichi_soft.kernels.spawn import despawn_body, spawn_body
+from taichi_soft.kernels.spawn import spawn_body
 from taichi_soft.materials import AnyMaterial
 from taichi_soft.meshing import BodyMesh
 from taichi_soft.pools import Pools
@@ -30,7 +30,7 @@ from taichi_soft.runtime import init
 from taichi_soft.scene import Scene
 from taichi_soft.settings import Settings
 from taichi_soft.stability import StableStep
-from taichi_soft.state import FROZEN, Capacity, State, acquire, release
+from taichi_soft.state import ABSENT, FROZEN, Capacity, State, acquire, release
 from taichi_soft.types import DampingModel, Flips, Integrator, Schedule, Strain
 
 SHORTEST_STEP, LONGEST_STEP = 1e-9, 1e4
@@ -238,7 +238,7 @@ class World:
         if self._state is None:
             del self._starts[body.index]
         else:
-            despawn_body(self._state, body.index)
+            self._state.body_status[body.index] = ABSENT
 
     def _require_open(self) -> None:
         if self.is_built:
@@ -312,8 +312,9 @@ class World:
 
     def _warm_up(self, state: State) -> None:
         """A body that comes and goes, so that nothing compiles where the first does in the game."""
-        spawn_body(state, 0, self._pools.assets[0].rest_rows)
-        despawn_body(state, 0)
+        for asset in self._pools.kinds:
+            spawn_body(state, self._pools.assets.index(asset), asset.rest_rows)
+            state.body_status[self._pools.assets.index(asset)] = ABSENT
 
     def stable_step(self, body: Body) -> StableStep:
         """Estimate of the largest stable substep of a body; bodies of one asset share it.

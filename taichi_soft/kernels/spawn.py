@@ -1,7 +1,7 @@
-"""Bodies come and go: one slot is written, the rest of the world is left alone."""
+"""A body comes into a world: one slot is written, the rest is left alone."""
 
 from taichi_soft.runtime import ti
-from taichi_soft.state import ABSENT, ACTIVE
+from taichi_soft.state import ACTIVE
 
 
 @ti.kernel
@@ -30,9 +30,3 @@ def spawn_body(state: ti.template(), body: ti.i32, rows: ti.types.ndarray(dtype=
         if ti.static(state.capacity.implicit):
             state.body_residual[body] = 0.0
         state.body_status[body] = ACTIVE
-
-
-@ti.kernel
-def despawn_body(state: ti.template(), body: ti.i32):
-    """Empty a slot. Its particles stay where they are, finite, and nobody moves or reads them."""
-    state.body_status[body] = ABSENT
