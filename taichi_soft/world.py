@@ -274,7 +274,7 @@ class World:
         if self.is_built:
             raise StateError("the world is already built")
         if not self._pools.slots:
-            raise StateError("the world is empty: call add_body before build")
+            raise StateError("the world is empty: call add_body or reserve before build")
         device = init()
         kinds = self._pools.kinds
         models = list(dict.fromkeys(asset.description.model for asset in kinds))
@@ -332,7 +332,7 @@ class World:
         motion of the others changes where one comes or goes. 1 for implicit Euler, which needs none.
         """
         if not self._pools.slots:
-            raise StateError("the world is empty: call add_body first")
+            raise StateError("the world is empty: call add_body or reserve first")
         if self._is_implicit:
             _as_step(dt)
             return 1
