@@ -48,8 +48,18 @@ from taichi_soft.meshing import (
     voronoi_graph,
     voxels,
 )
+from taichi_soft.queries import ClosestPoint, Overlap, Pose, RayHit, RayHits
 from taichi_soft.runtime import Device, device, init
 from taichi_soft.settings import Settings
+from taichi_soft.shapes import (
+    BoxShape,
+    CapsuleShape,
+    HeightFieldShape,
+    MeshShape,
+    PlaneShape,
+    Shape,
+    SphereShape,
+)
 from taichi_soft.stability import StableStep, stable_step
 from taichi_soft.world import World
 
@@ -58,19 +68,31 @@ __all__ = [
     "PRESETS",
     "AnisotropicMaterial",
     "Body",
+    "BoxShape",
+    "CapsuleShape",
+    "ClosestPoint",
     "Device",
     "DeviceError",
     "Failure",
     "FrozenBodyWarning",
+    "HeightFieldShape",
     "Material",
     "MaterialError",
     "MeshError",
     "MeshQuality",
+    "MeshShape",
     "OptionError",
+    "Overlap",
     "ParticleMesh",
+    "PlaneShape",
+    "Pose",
+    "RayHit",
+    "RayHits",
     "Settings",
+    "Shape",
     "SoftBodyAsset",
     "SolverWarning",
+    "SphereShape",
     "SpringMaterial",
     "StableStep",
     "StateError",

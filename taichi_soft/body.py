@@ -14,6 +14,7 @@ from taichi_soft.errors import MeshError, OptionError, StateError
 from taichi_soft.failures import FailedStep, Failure
 from taichi_soft.laws.law import EnergyLaw
 from taichi_soft.materials import voigt_stress
+from taichi_soft.queries import Pose, best_fitting_pose
 from taichi_soft.scene import rest_inverses
 from taichi_soft.stability import StableStep
 
@@ -183,7 +184,25 @@ class Body:
 
     def flipped_count(self) -> int:
         """Number of tetrahedra that are inside out."""
-        return int((self.volumes() < 0).sum())
+        return len(self.flipped_tets())
+
+    def flipped_tets(self) -> NDArray[np.int64]:
+        """Tetrahedra that are inside out, ascending."""
+        return np.flatnonzero(self.volumes() < 0)
+
+    def aabb(self) -> tuple[Floats, Floats]:
+        """Least and greatest coordinates of the vertices, (3,) each [m]."""
+        positions = self.positions().astype(np.float64)
+        return positions.min(axis=0), positions.max(axis=0)
+
+    def pose(self) -> Pose:
+        """The rigid motion of the rest shape that comes nearest to the body, weighted by mass.
+
+        `mesh.vertices @ pose.rotation.T + pose.position` fits the positions best. The rotation never mirrors,
+        also where the body is flat or inside out; about the axis of a straight rope it turns as little as
+        possible.
+        """
+        return best_fitting_pose(self.mesh.vertices, self.positions().astype(np.float64), self.masses)
 
     def center_of_mass(self) -> Floats:
         """(3,) [m]."""
@@ -243,15 +262,34 @@ class Body:
         F = self.deformations()
         return np.asarray(0.5 * (F @ np.swapaxes(F, 1, 2) - np.eye(3)))
 
+    def tet_stress(self) -> Floats:
+        """Von Mises stress of each tetrahedron by Hooke's law and linear strain, (m,) [Pa]."""
+        return np.asarray(np.sqrt(1.5) * _deviator_norms(self._green_strain_and_stress()[1]))
+
+    def tet_strain(self) -> Floats:
+        """Equivalent (von Mises) strain sqrt(2/3 e:e) of each tetrahedron, (m,), e the deviator of `strains`.
+
+        The strain of a pull that keeps the volume; a change of volume alone has none.
+        """
+        return np.asarray(np.sqrt(2.0 / 3.0) * _deviator_norms(self.strains()))
+
     def vertex_stress(self) -> Floats:
-        """Von Mises stress by Hooke's law and linear strain, averaged by volume, (n,) [Pa]: for colours."""
-        _, stress = self._green_strain_and_stress()
-        deviator = stress - np.einsum("maa->m", stress)[:, None, None] / 3.0 * np.eye(3)
-        mises = np.sqrt(1.5 * np.einsum("mab,mab->m", deviator, deviator))
-        volumes = self.mesh.volumes
-        flat = self.tets.ravel()
-        total = np.bincount(flat, np.repeat(mises * volumes, 4), minlength=self.vertex_count)
-        return np.asarray(total / np.bincount(flat, np.repeat(volumes, 4), minlength=self.vertex_count))
+        """`tet_stress` averaged by volume over the tetrahedra round each vertex, (n,) [Pa]."""
+        return self._vertex_means(self.tet_stress())
+
+    def vertex_strain(self) -> Floats:
+        """`tet_strain` averaged by volume over the tetrahedra round each vertex, (n,)."""
+        return self._vertex_means(self.tet_strain())
+
+    def _vertex_means(self, values: Floats) -> Floats:
+        flat, shares = self.tets.ravel(), np.repeat(values * self.mesh.volumes / 4.0, 4)
+        return np.asarray(np.bincount(flat, shares, minlength=self.vertex_count) / self.mesh.vertex_volumes)
+
+
+def _deviator_norms(tensors: Floats) -> Floats:
+    """sqrt(e:e) of the part e of each tensor (m, 3, 3) that changes shape."""
+    deviators = tensors - np.einsum("maa->m", tensors)[:, None, None] / 3.0 * np.eye(3)
+    return np.asarray(np.linalg.norm(deviators, axis=(1, 2)))
 
 
 def require_buffer(out: Floats32 | None, count: int) -> Floats32:

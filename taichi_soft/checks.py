@@ -48,6 +48,13 @@ def as_count(value: Any, name: str, low: int = 1, high: int = LARGEST_COUNT) -> 
     return int(value)
 
 
+def as_flag(value: Any, name: str) -> bool:
+    """`value` if it is True or False. Raises: OptionError."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise OptionError(f"{name} must be True or False, got {value!r}")
+    return bool(value)
+
+
 def _is_plain(value: Any) -> bool:
     return type(value) is float or type(value) is int
 

@@ -16,3 +16,6 @@ POSITION_LIMIT = 1.0e7
 VELOCITY_LIMIT = 2.0e4
 """Highest velocity [m/s] that still counts as sound: twice what leaves the Earth. A lower bound stops an
 explosion while the body is still somewhere near its shape."""
+
+ALL_GROUPS = 0x7FFFFFFF
+"""A mask that meets every group of colliders and bodies."""

@@ -11,12 +11,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.constants import LANES
+from taichi_soft.constants import ALL_GROUPS, LANES
+from taichi_soft.contact_fields import ContactCapacity, ContactFields, SoftContactFields
 from taichi_soft.runtime import ti
 from taichi_soft.scene import BodyArrays, Ranges, Scene, blocks_of
 
-ACTIVE, FROZEN, ABSENT = 0, 1, 3
-"""Status of a body: it moves, it went non-finite and rests, its slot is empty."""
+ACTIVE, FROZEN, ASLEEP, ABSENT = 0, 1, 2, 3
+"""Status of a body: it moves, it went non-finite and rests, it sleeps, its slot is empty."""
+
+_NO_CONTACT = ContactCapacity()
 
 
 @dataclass(frozen=True)
@@ -33,11 +36,18 @@ class Capacity:
     rings: int = 0  # rows of what lies round edges, and whether edges carry force at all
     implicit: bool = False  # room for the linear system of implicit integration
     anisotropic: bool = False  # room for 21 elastic constants per tetrahedron
+    contact: ContactCapacity = _NO_CONTACT
     double: bool = False  # float64 instead of float32: to evaluate forces, not to move
 
     @classmethod
     def of(
-        cls, scene: Scene, *, parallel: bool = False, implicit: bool = False, double: bool = False
+        cls,
+        scene: Scene,
+        *,
+        parallel: bool = False,
+        implicit: bool = False,
+        contact: ContactCapacity = _NO_CONTACT,
+        double: bool = False,
     ) -> "Capacity":
         """Room for `scene`."""
         return cls(
@@ -51,6 +61,7 @@ class Capacity:
             _power_of_two(scene.ring_count, 512) if scene.has_bonds else 0,
             implicit,
             any(body.stiffness.any() for body in scene.bodies),
+            contact,
             double,
         )
 
@@ -139,7 +150,14 @@ class State:
         self.body_model = ti.field(ti.i32, bodies)
         self.body_status = ti.field(ti.i32, bodies)
         self.body_velocity_lag = ti.field(real, bodies)  # substep [s] by half of which leapfrog lags
+        self.body_lower = ti.Vector.field(3, real, bodies)  # [m], box at the last query that needed it
+        self.body_upper = ti.Vector.field(3, real, bodies)
         self.block_model = ti.field(ti.i32, b)
+
+        if capacity.contact != _NO_CONTACT:
+            self.contact = ContactFields(capacity.contact, n, bodies)
+        if capacity.contact.soft:
+            self.soft = SoftContactFields(n, bodies, capacity.outer)
 
         self.gravity = ti.Vector.field(3, real, ())  # [m/s^2]
         self.floor = ti.Vector.field(3, real, ())  # height [m], restitution, friction
@@ -202,10 +220,28 @@ class State:
         fill(self.body_edges, np.array([r.edges for r in ranges]))
         fill(self.body_edge_blocks, np.array([r.edge_blocks for r in ranges]))
         fill(self.body_blocks, np.array([r.blocks for r in ranges]))
+        if self.capacity.contact != _NO_CONTACT:
+            self._load_contact(scene)
         fill(self.body_model, np.array(models))
         fill(self.body_status, np.full(len(bodies), ABSENT))
         fill(self.body_velocity_lag, np.zeros(0))
         fill(self.block_model, np.repeat(models, [r.blocks[1] - r.blocks[0] for r in ranges]))
+
+    def _load_contact(self, scene: Scene) -> None:
+        pairs = list(zip(scene.bodies, scene.ranges, strict=True))
+        contact, count = self.contact, len(pairs)
+        # What lies inside a body is never near anything.
+        fill(contact.particle_clearance, np.full(scene.particle_count, np.inf))
+        fill(contact.particle_touches, np.zeros(0))
+        fill(contact.body_filter, np.tile((1, ALL_GROUPS), (count, 1)))
+        contact.island_count[None] = count
+        fill(contact.island_first, np.arange(count + 1))
+        fill(contact.island_body, np.arange(count))
+        if self.capacity.contact.soft:
+            fill(self.soft.sweep_order, np.arange(count))
+            fill(self.soft.slot_count, np.zeros(0))
+            fill(self.soft.body_touches_itself, np.zeros(0))
+            fill(self.soft.rest_position, np.concatenate([b.rest_position for b, _ in pairs]))
 
     def _load_bonds(self, bodies: list[BodyArrays], ranges: list[Ranges]) -> None:
         """What the pairwise laws know of their edges; zeros for the edges of other bodies."""
@@ -291,7 +327,8 @@ def fill(target, rows: NDArray[np.generic]) -> None:  # type: ignore[no-untyped-
     """Write `rows` to the front of a field and zeros behind them."""
     shape = tuple(target.shape) + ((target.n,) if hasattr(target, "n") else ())
     whole = np.zeros(shape, dtype=_NUMPY[target.dtype])
-    whole[: len(rows)] = rows
+    if len(rows):
+        whole[: len(rows)] = rows
     target.from_numpy(whole)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 import weakref
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -14,23 +14,37 @@ from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.assets import SoftBodyAsset
 from taichi_soft.body import Body, Floats32, require_buffer, require_built
-from taichi_soft.checks import as_count, as_number, as_vector
-from taichi_soft.constants import GRAVITY_EARTH, POSITION_LIMIT, VELOCITY_LIMIT
+from taichi_soft.checks import as_count, as_flag, as_number, as_vector
+from taichi_soft.colliders import Collider, Colliders
+from taichi_soft.constants import ALL_GROUPS, GRAVITY_EARTH, POSITION_LIMIT, VELOCITY_LIMIT
+from taichi_soft.contact_fields import ContactCapacity
 from taichi_soft.errors import FrozenBodyWarning, OptionError, SolverWarning, StateError, UnstableStepWarning
 from taichi_soft.failures import FailedStep, Failure, find_failure
 from taichi_soft.kernels.evaluate import compute_body_forces
 from taichi_soft.kernels.program import Program
 from taichi_soft.kernels.readout import read_positions, read_velocities, write_motion
 from taichi_soft.kernels.schedules import Launch, choose_schedule, make_launch
-from taichi_soft.kernels.spawn import spawn_body
+from taichi_soft.kernels.spawn import despawn_body, spawn_body
 from taichi_soft.materials import AnyMaterial
 from taichi_soft.meshing import BodyMesh
 from taichi_soft.pools import Pools
+from taichi_soft.queries import (
+    ClosestPoint,
+    Overlap,
+    RayHit,
+    RayHits,
+    cast_ray,
+    cast_rays,
+    find_closest_point,
+    find_in_box,
+    find_in_sphere,
+)
 from taichi_soft.runtime import init
-from taichi_soft.scene import Scene
+from taichi_soft.scene import Scene, contact_surface
 from taichi_soft.settings import Settings
+from taichi_soft.shapes import PlaneShape, Shape
 from taichi_soft.stability import StableStep
-from taichi_soft.state import ABSENT, FROZEN, Capacity, State, acquire, release
+from taichi_soft.state import FROZEN, Capacity, State, acquire, fill, release
 from taichi_soft.types import DampingModel, Flips, Integrator, Schedule, Strain
 
 SHORTEST_STEP, LONGEST_STEP = 1e-9, 1e4
@@ -59,6 +73,8 @@ class World:
         most_iterations: of an implicit solve; one that needs more goes on as far as it came and is reported
             by a `SolverWarning`.
         schedule: "auto", "per_body" or "flat": in which loops the work runs; no effect on the physics.
+        soft_contact: whether bodies touch each other.
+        collider_room: colliders that may be added after `build`, beside those added before.
     Raises: OptionError for a value out of range or a name that is not known.
     """
 
@@ -73,6 +89,8 @@ class World:
         tolerance: float = 1e-3,
         most_iterations: int = 200,
         schedule: str | Schedule = Schedule.AUTO,
+        soft_contact: bool = False,
+        collider_room: int = 0,
     ) -> None:
         downwards = as_vector(gravity, "gravity", "m/s^2")
         downwards.flags.writeable = False
@@ -88,6 +106,10 @@ class World:
         )
         if self._is_implicit and self.settings.schedule is Schedule.FLAT:
             raise OptionError("schedule 'flat' has no implicit_euler: it takes 'per_body' or 'auto'")
+        self._colliders = Colliders()
+        self._collider_room = as_count(collider_room, "collider_room", 0)
+        self._soft_contact = as_flag(soft_contact, "soft_contact")
+        self._floor_collider: Collider | None = None
         self._step_count = 0
         self._time = 0.0
         self._last_dt = 0.0
@@ -113,6 +135,10 @@ class World:
     @property
     def _is_implicit(self) -> bool:
         return self.settings.integrator is Integrator.IMPLICIT_EULER
+
+    @property
+    def _has_contact(self) -> bool:
+        return self._program is not None and self._program.has_contact
 
     @property
     def step_count(self) -> int:
@@ -238,7 +264,7 @@ class World:
         if self._state is None:
             del self._starts[body.index]
         else:
-            self._state.body_status[body.index] = ABSENT
+            despawn_body(self._state, body.index)
 
     def _require_open(self) -> None:
         if self.is_built:
@@ -266,6 +292,58 @@ class World:
         self._pools.enter(body)
         return body
 
+    @property
+    def colliders(self) -> Sequence[Collider]:
+        """All colliders; from `build` on the floor is among them."""
+        return self._colliders.handles
+
+    @property
+    def floor_collider(self) -> Collider | None:
+        """The floor where there are colliders, from `build` on: to read what bodies do to it."""
+        return self._floor_collider
+
+    def add_collider(
+        self,
+        shape: Shape,
+        *,
+        position: ArrayLike = (0.0, 0.0, 0.0),
+        rotation: ArrayLike | None = None,
+        friction: float = 0.5,
+        restitution: float = 0.0,
+        thickness: float = 0.0,
+        group: int = 1,
+        mask: int = ALL_GROUPS,
+    ) -> Collider:
+        """Add something solid that bodies hit: after `build` where `collider_room` was left for it.
+
+        Vertices of bodies touch it; what is smaller than a body's triangles may slip between them.
+        Args:
+            shape: `PlaneShape`, `SphereShape`, `BoxShape`, `CapsuleShape`, `HeightFieldShape` or `MeshShape`.
+            position: of its origin, (3,) [m].
+            rotation: matrix (3, 3) or quaternion (x, y, z, w).
+            friction: Coulomb coefficient, 0 or more.
+            restitution: 0 to 1, of each vertex that hits it.
+            thickness: of a skin on it [m].
+            group, mask: bits. A body and a collider touch where each one's mask has a bit of the other's group.
+        Returns: a handle, to move it and to read the impulse on it.
+        Raises: OptionError for bad values; StateError where there is no room left.
+        """
+        if self.is_built and self._floor_collider is None and not self._colliders.handles:
+            raise StateError(
+                "the world was built without colliders: add one before build(), or make the world with "
+                "collider_room"
+            )
+        return self._colliders.add(
+            shape,
+            position=position,
+            rotation=rotation,
+            friction=friction,
+            restitution=restitution,
+            thickness=thickness,
+            group=group,
+            mask=mask,
+        )
+
     def build(self) -> None:
         """Move all bodies into Taichi fields and fix the kernels. Starts Taichi if nobody has.
 
@@ -278,13 +356,27 @@ class World:
         device = init()
         kinds = self._pools.kinds
         models = list(dict.fromkeys(asset.description.model for asset in kinds))
-        schedule = choose_schedule(self.settings.schedule, self._scene, device, self.settings.integrator)
-        capacity = Capacity.of(self._scene, parallel=schedule is Schedule.FLAT, implicit=self._is_implicit)
+        has_contact = self._soft_contact or len(self._colliders.handles) + self._collider_room > 0
+        if has_contact:
+            self._require_contact()
+        schedule = choose_schedule(
+            self.settings.schedule, self._scene, device, needs_bodies=self._is_implicit or has_contact
+        )
+        capacity = Capacity.of(
+            self._scene,
+            parallel=schedule is Schedule.FLAT,
+            implicit=self._is_implicit,
+            contact=self._colliders.capacity(self._collider_room, soft=self._soft_contact)
+            if has_contact
+            else ContactCapacity(),
+        )
         program = Program(
             tuple(models),
             self.settings.integrator,
-            self.settings.floor is not None,
+            self.settings.floor is not None and not has_contact,
             any(len(asset.description.pinned) for asset in kinds),
+            has_contact,
+            self._soft_contact,
             device.threads,
         )
         if self.settings.integrator is Integrator.EXPLICIT_EULER:
@@ -306,6 +398,11 @@ class World:
         state.floor[None] = [chosen.floor or 0.0, chosen.restitution, chosen.friction]
         if self._is_implicit:
             state.solver[None] = [chosen.tolerance, chosen.most_iterations]
+        if has_contact:
+            self._colliders.load(state.contact, len(self._pools.slots))
+        if self._soft_contact:
+            surfaces = [contact_surface(body) for body in self._scene.bodies]
+            fill(state.soft.body_surface, np.array(surfaces))
         self._read = np.empty((self._scene.particle_count, 3), dtype=np.float32)
         self._program, self._state = program, state
         self._launch = make_launch(schedule, state, program, self._scene, device)
@@ -313,8 +410,27 @@ class World:
     def _warm_up(self, state: State) -> None:
         """A body that comes and goes, so that nothing compiles where the first does in the game."""
         for asset in self._pools.kinds:
-            spawn_body(state, self._pools.assets.index(asset), asset.rest_rows)
-            state.body_status[self._pools.assets.index(asset)] = ABSENT
+            slot = self._pools.assets.index(asset)
+            spawn_body(state, slot, asset.rest_rows)
+            despawn_body(state, slot)
+
+    def _require_contact(self) -> None:
+        """Make the floor one of the colliders. Raises: OptionError for what takes no colliders."""
+        chosen = self.settings
+        if chosen.schedule is Schedule.FLAT:
+            raise OptionError("schedule 'flat' has no colliders: it takes 'per_body' or 'auto'")
+        if chosen.integrator in (Integrator.EXPLICIT_EULER, Integrator.IMPLICIT_EULER):
+            raise OptionError(
+                f"integrator {chosen.integrator.value!r} takes no colliders: it takes 'leapfrog' or "
+                "'lazy_leapfrog'"
+            )
+        if chosen.floor is not None:
+            self._floor_collider = self.add_collider(
+                PlaneShape(),
+                position=(0.0, 0.0, chosen.floor),
+                friction=chosen.friction,
+                restitution=chosen.restitution,
+            )
 
     def stable_step(self, body: Body) -> StableStep:
         """Estimate of the largest stable substep of a body; bodies of one asset share it.
@@ -355,7 +471,11 @@ class World:
             self._checked_step = asked
         seconds, count, h = self._step_values
         self._read_alpha = None
+        if self._has_contact:
+            self._colliders.prepare(seconds)
         troubled = self._launch(count, h)  # type: ignore[misc]
+        if self._has_contact:
+            self._colliders.finish(seconds)
         reports = self._note_failures(count, h) if troubled else []
         self._step_count += 1
         self._time += seconds
@@ -443,6 +563,101 @@ class World:
         rows[:] = self._read[begin:end]
         return rows
 
+    def raycast(
+        self,
+        origin: ArrayLike,
+        direction: ArrayLike,
+        *,
+        max_distance: float = math.inf,
+        bodies: Iterable[Body] | None = None,
+        cull_back: bool = True,
+    ) -> RayHit | None:
+        """The first hit of a ray on the deformed surfaces, as they are after the last step.
+
+        Ropes and other bodies without triangles cannot be hit. Of equally near triangles the one of the first
+        body, and there the first, counts. Frozen bodies are asked too; this goes for all queries.
+        Args:
+            origin: (3,) [m].
+            direction: (3,), of any length but zero.
+            max_distance: a hit farther than this [m] is none; infinity for no limit.
+            bodies: that can be hit; None for all.
+            cull_back: pass through triangles seen from behind, so that a ray from inside a body leaves it
+                unhindered.
+        Returns: the hit, or None.
+        Raises: OptionError for numbers that are not finite, a direction or max_distance of zero, a negative
+            max_distance or a body of another world; StateError before `build`.
+        """
+        return cast_ray(self._built, self._pools.slots, origin, direction, max_distance, bodies, cull_back)
+
+    def raycasts(
+        self,
+        origins: ArrayLike,
+        directions: ArrayLike,
+        *,
+        max_distance: float = math.inf,
+        bodies: Iterable[Body] | None = None,
+        cull_back: bool = True,
+    ) -> RayHits:
+        """The first hits of many rays in one go, on all threads.
+
+        Args:
+            origins, directions: (n, 3) each.
+            max_distance, bodies, cull_back: as in `raycast`, for all rays.
+        Returns: arrays with a row for each ray, the same as `raycast` finds.
+        Raises: as `raycast`.
+        """
+        return cast_rays(self._built, self._pools.slots, origins, directions, max_distance, bodies, cull_back)
+
+    def closest_point(
+        self, point: ArrayLike, *, max_distance: float = math.inf, bodies: Iterable[Body] | None = None
+    ) -> ClosestPoint | None:
+        """The point of all surfaces that is nearest to `point`, from outside or from inside.
+
+        Of a body without triangles (a rope) its vertices are asked.
+        Args:
+            point: (3,) [m].
+            max_distance: what is farther [m] does not count; infinity for no limit.
+            bodies: to ask; None for all.
+        Returns: the nearest point, or None where nothing is near enough.
+        Raises: OptionError for numbers that are not finite, a max_distance that is not above 0 or a body of
+            another world; StateError before `build`.
+        """
+        return find_closest_point(self._built, self._pools.slots, point, max_distance, bodies)
+
+    def overlap_sphere(self, center: ArrayLike, radius: float) -> tuple[Overlap, ...]:
+        """Bodies that touch a sphere or enclose it; of a body without triangles its vertices count.
+
+        Args:
+            center: (3,) [m].
+            radius: above 0 [m].
+        Returns: the bodies, in the world's order, each with its vertices in the sphere.
+        Raises: OptionError for numbers that are not finite or a radius not above 0; StateError before
+            `build`.
+        """
+        return find_in_sphere(self._built, self._pools.slots, center, radius)
+
+    def overlap_box(
+        self, center: ArrayLike, size: ArrayLike, rotation: ArrayLike | None = None
+    ) -> tuple[Overlap, ...]:
+        """Bodies that touch a box or enclose it; of a body without triangles its vertices count.
+
+        Args:
+            center: (3,) [m].
+            size: (3,) lengths of its edges, above 0 [m].
+            rotation: about its centre, matrix (3, 3) or quaternion (x, y, z, w).
+        Returns: the bodies, in the world's order, each with its vertices in the box.
+        Raises: OptionError for numbers that are not finite, a size not above 0 or what is no rotation;
+            StateError before `build`.
+        """
+        return find_in_box(self._built, self._pools.slots, center, size, rotation)
+
+    @property
+    def _built(self) -> State:
+        """Raises: StateError before `build`."""
+        require_built(self._state is not None)
+        assert self._state is not None
+        return self._state
+
     def _solve_residual(self, body: Body) -> float | None:
         require_built(self.is_built)
         assert self._state is not None
@@ -462,12 +677,21 @@ class World:
             by_vertex = forces[self._scene.bodies[body.index].rank]
             acceleration = by_vertex / body.masses[:, None] + self.settings.gravity
             acceleration[body.pinned] = 0.0
-            floor = self.settings.floor
-            if floor is not None:
-                # What lies on the floor is carried by it: its velocity already is that after contact.
-                acceleration[body.positions()[:, 2] <= floor] = 0.0
+            acceleration[self._is_carried(body)] = 0.0  # its velocity already is that after contact
             rows += (0.5 * lag * acceleration).astype(np.float32)
         return rows
+
+    def _is_carried(self, body: Body) -> NDArray[np.bool_]:
+        """Which vertices of a body touched something in the last substep, (n,)."""
+        assert self._state is not None
+        if self._has_contact:
+            begin, end = self._scene.ranges[body.index].particles
+            touches = self._state.contact.particle_touches.to_numpy()[begin:end]
+            return np.asarray(touches[self._scene.bodies[body.index].rank] == 1)
+        floor = self.settings.floor
+        if floor is None:
+            return np.zeros(body.vertex_count, dtype=np.bool_)
+        return np.asarray(body.positions()[:, 2] <= floor)
 
     def _write_motion(self, body: Body, positions: NDArray[Any], velocities: NDArray[Any]) -> None:
         """Put a body somewhere else. Raises: StateError before `build`."""

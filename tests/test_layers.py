@@ -16,7 +16,7 @@ LAYERS = """
     math
     materials  meshing  settings
     laws  collision
-    scene
+    scene  contact_fields
     state  integrators
     kernels
     forces  shapes

@@ -1,1 +1,1 @@
-"""What bodies hit."""
+"""What bodies hit: signed distances of points from solids."""

@@ -32,7 +32,7 @@ def advance_body(state: ti.template(), program: ti.template(), body, h, kick, is
 
 
 @ti.func
-def _settle_body(state: ti.template(), body):
+def settle_body(state: ti.template(), body):
     """Freeze a body that went non-finite in its last sound state. Returns 1 where that happened."""
     particles = state.body_particles[body]
     sound = 1
@@ -59,7 +59,7 @@ def _step_body(state: ti.template(), program: ti.template(), body, substeps, h):
         for s in range(substeps):
             advance_body(state, program, body, h, kick, int(s == 0))
             kick = h
-        failed = _settle_body(state, body)
+        failed = settle_body(state, body)
         if failed == 0:
             state.body_velocity_lag[body] = h
             if ti.static(program.integrator == Integrator.IMPLICIT_EULER):

@@ -16,6 +16,8 @@ class Program:
     integrator: Integrator
     has_floor: bool
     has_pins: bool = False
+    has_contact: bool = False  # with colliders, of which the floor then is one
+    has_soft_contact: bool = False  # bodies with each other
     worker_count: int = 1  # threads that share one flat step
 
     @property

@@ -2,13 +2,14 @@
 
 from collections.abc import Callable
 
+from taichi_soft.kernels.contact_step import step_islands
 from taichi_soft.kernels.flat import begin_flat, end_flat, step_flat_cpu, substep_flat
 from taichi_soft.kernels.per_body import step_in_turn, step_per_body
 from taichi_soft.kernels.program import Program
 from taichi_soft.runtime import Device
 from taichi_soft.scene import Scene
 from taichi_soft.state import State
-from taichi_soft.types import Integrator, Schedule
+from taichi_soft.types import Schedule
 
 FLAT_FROM_TETS = 100_000
 """Tetrahedra in a world's largest body from which the threads share it rather than leave it to one of them.
@@ -20,15 +21,17 @@ off its core stands still for milliseconds: with a third process at work, bodies
 Launch = Callable[[int, float], int]
 
 
-def choose_schedule(asked: Schedule, scene: Scene, device: Device, integrator: Integrator) -> Schedule:
-    """The schedule to use where `asked` leaves it open; implicit solves run in one thread per body only.
+def choose_schedule(asked: Schedule, scene: Scene, device: Device, *, needs_bodies: bool) -> Schedule:
+    """The schedule to use where `asked` leaves it open.
+
+    `needs_bodies`: implicit solves and contact run in one thread per body only.
 
     A GPU needs one thread per tetrahedron. On a CPU, bodies run side by side as long as there are enough
     of them to keep the threads busy, or too few tetrahedra to be worth sharing.
     """
     if asked is not Schedule.AUTO:
         return asked
-    if integrator is Integrator.IMPLICIT_EULER:
+    if needs_bodies:
         return Schedule.PER_BODY
     if device.is_gpu:
         return Schedule.FLAT
@@ -46,6 +49,8 @@ def make_launch(schedule: Schedule, state: State, program: Program, scene: Scene
     blocks, edges = scene.block_count, scene.edge_count
 
     step_bodies = step_in_turn if bodies == 1 or device.threads == 1 else step_per_body
+    if program.has_contact:
+        step_bodies = step_islands
 
     def per_body(substeps: int, h: float) -> int:
         return int(step_bodies(state, program, bodies, substeps, h))

@@ -1,7 +1,8 @@
-"""A body comes into a world: one slot is written, the rest is left alone."""
+"""Bodies come and go: one slot is written, the rest of the world is left alone."""
 
+from taichi_soft.kernels.collide import forget_contacts
 from taichi_soft.runtime import ti
-from taichi_soft.state import ACTIVE
+from taichi_soft.state import ABSENT, ACTIVE
 
 
 @ti.kernel
@@ -30,3 +31,11 @@ def spawn_body(state: ti.template(), body: ti.i32, rows: ti.types.ndarray(dtype=
         if ti.static(state.capacity.implicit):
             state.body_residual[body] = 0.0
         state.body_status[body] = ACTIVE
+
+
+@ti.kernel
+def despawn_body(state: ti.template(), body: ti.i32):
+    """Empty a slot. Its particles stay where they are, finite, and nobody moves or reads them."""
+    if ti.static(state.capacity.contact.colliders > 0):
+        forget_contacts(state, body)  # or colliders would be told of its last impulse in every step
+    state.body_status[body] = ABSENT

@@ -1,0 +1,318 @@
+"""What bodies hit: solid shapes that stand still, or move as the engine says."""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taichi_soft.checks import as_count, as_number, as_rotation, as_vector
+from taichi_soft.constants import ALL_GROUPS, VELOCITY_LIMIT
+from taichi_soft.contact_fields import NO_COLLIDER, ContactCapacity, ContactFields
+from taichi_soft.errors import OptionError, StateError
+from taichi_soft.kernels.collider_rows import MOTION_WIDTH, sum_collider_impulses, write_collider_motion
+from taichi_soft.math.rotations import matrix_of, quaternion_of, rotation_vector, turned_by
+from taichi_soft.shapes import Shape
+from taichi_soft.state import fill
+
+Floats = NDArray[np.float64]
+
+_FASTEST_SPIN = 1e4  # [rad/s]
+
+
+@dataclass
+class _Row:
+    """One collider: what it is, where it is, and how it moves through the next step."""
+
+    shape: Shape
+    friction: float
+    restitution: float
+    thickness: float
+    group: int
+    mask: int
+    position: Floats
+    rotation: Floats  # quaternion
+    velocity: Floats
+    spin: Floats
+    offset: int  # of its samples
+    target: tuple[Floats, Floats] | None = None  # pose at the end of the next step
+    is_alive: bool = True
+
+
+class Collider:
+    """A handle to one collider. What it does to bodies it does through its surface: friction, restitution."""
+
+    def __init__(self, colliders: Colliders, index: int, row: _Row) -> None:
+        """Made by `World.add_collider`."""
+        self._set = weakref.ref(colliders)
+        self._row = row
+        self.index = index
+
+    def __repr__(self) -> str:
+        return f"Collider({self.index}, {self.shape!r}{'' if self.is_alive else ', removed'})"
+
+    def _colliders(self) -> Colliders:
+        """The set it belongs to. Raises: StateError where it, or its world, is gone."""
+        colliders = self._set()
+        if colliders is None:
+            raise StateError(f"the world of collider {self.index} is gone: keep a reference to it")
+        if not self.is_alive:
+            raise StateError(f"collider {self.index} was removed: add another")
+        return colliders
+
+    @property
+    def is_alive(self) -> bool:
+        """False once it was removed."""
+        return self._row.is_alive
+
+    @property
+    def shape(self) -> Shape:
+        """What it is."""
+        return self._row.shape
+
+    @property
+    def position(self) -> Floats:
+        """Of its origin, (3,) [m]."""
+        return self._row.position.copy()
+
+    @property
+    def rotation(self) -> Floats:
+        """Its axes as columns, (3, 3)."""
+        return matrix_of(self._row.rotation)
+
+    @property
+    def impulse(self) -> Floats:
+        """What bodies gave it in the last step, (3,) [N s]: apply it to the engine's rigid body."""
+        return self._colliders().impulses()[self.index, :3]
+
+    @property
+    def angular_impulse(self) -> Floats:
+        """The same about its position, (3,) [N m s]."""
+        return self._colliders().impulses()[self.index, 3:]
+
+    def move_to(self, position: ArrayLike, rotation: ArrayLike | None = None) -> None:
+        """Be there at the end of the next step, on a straight way and an even turn; then stand still.
+
+        Bodies in the way are pushed with the velocity that this takes.
+        Args:
+            position: (3,) [m].
+            rotation: matrix (3, 3) or quaternion (x, y, z, w); None keeps the present one.
+        Raises: OptionError for bad values.
+        """
+        colliders = self._colliders()
+        self._row.target = self._pose(position, rotation)
+        colliders.moved(self._row)
+
+    def set_velocity(self, linear: ArrayLike, angular: ArrayLike = (0.0, 0.0, 0.0)) -> None:
+        """Move on like this until told otherwise: (3,) [m/s] and (3,) [rad/s] about its position."""
+        colliders, row = self._colliders(), self._row
+        velocity = as_vector(linear, "linear", "m/s", VELOCITY_LIMIT)
+        spin = as_vector(angular, "angular", "rad/s", _FASTEST_SPIN)
+        row.velocity, row.spin, row.target = velocity, spin, None
+        colliders.moved(row)
+
+    def teleport(self, position: ArrayLike, rotation: ArrayLike | None = None) -> None:
+        """Be there at once, without pushing anything on the way; what it then covers is pressed out."""
+        colliders, row = self._colliders(), self._row
+        row.position, row.rotation = self._pose(position, rotation)
+        row.target = None
+        colliders.moved(row)
+
+    def _pose(self, position: ArrayLike, rotation: ArrayLike | None) -> tuple[Floats, Floats]:
+        where = as_vector(position, "position", "m")
+        return where, self._row.rotation if rotation is None else quaternion_of(as_rotation(rotation))
+
+    def remove(self) -> None:
+        """Take it out of the world; its place is free for another."""
+        colliders = self._colliders()
+        self._row.is_alive = False
+        colliders.write(self.index)
+
+
+class Colliders:
+    """All colliders of one world: Python's side of `ContactFields`."""
+
+    def __init__(self) -> None:
+        self._rows: list[_Row] = []
+        self._handles: list[Collider] = []
+        self._contact: ContactFields | None = None
+        self._body_count = 0
+        self._impulses: Floats | None = None  # of the last step, once asked for
+        self._sample_count = 0
+        self._is_dirty = False  # whether poses or velocities differ from what the fields hold
+        self._movers: list[_Row] = []  # with a velocity or a target
+
+    @property
+    def handles(self) -> Sequence[Collider]:
+        """Those that are alive."""
+        return tuple(handle for handle, row in zip(self._handles, self._rows, strict=True) if row.is_alive)
+
+    def add(
+        self,
+        shape: Shape,
+        *,
+        position: ArrayLike,
+        rotation: ArrayLike | None,
+        friction: float,
+        restitution: float,
+        thickness: float,
+        group: int,
+        mask: int,
+    ) -> Collider:
+        """See `World.add_collider`."""
+        if not isinstance(shape, Shape):
+            raise OptionError(f"shape must be one of taichi_soft's shapes, such as BoxShape, got {shape!r}")
+        zero = np.zeros(3)
+        row = _Row(
+            shape,
+            as_number(friction, "friction", 0.0, 1e6, "a number from 0 to 1,000,000"),
+            as_number(restitution, "restitution", 0.0, 1.0, "a number from 0 to 1"),
+            as_number(thickness, "thickness", 0.0, 1e3, "a length of 0 to 1000 m"),
+            as_count(group, "group", 0, ALL_GROUPS),
+            as_count(mask, "mask", 0, ALL_GROUPS),
+            as_vector(position, "position", "m"),
+            quaternion_of(as_rotation(rotation)),
+            zero,
+            zero,
+            self._sample_count,
+        )
+        index = self._free_row(shape)
+        if index < len(self._rows):
+            row.offset = self._rows[index].offset
+            self._rows[index] = row
+            self._handles[index] = Collider(self, index, row)
+        else:
+            self._rows.append(row)
+            self._handles.append(Collider(self, index, row))
+            self._sample_count += len(shape.samples)
+        if self._contact is not None:
+            self.write(index)
+        return self._handles[index]
+
+    def _free_row(self, shape: Shape) -> int:
+        """A row for a new collider. Raises: StateError where there is no room for it."""
+        needed = len(shape.samples)
+        for index, row in enumerate(self._rows):
+            if not row.is_alive and len(row.shape.samples) >= needed:
+                return index
+        if self._contact is None:
+            return len(self._rows)
+        room = self._contact.capacity
+        if len(self._rows) >= room.colliders:
+            raise StateError(
+                f"there is room for {room.colliders} colliders and all are in use: remove one, or make the "
+                "world with a larger collider_room"
+            )
+        if self._sample_count + needed > room.samples:
+            raise StateError(
+                f"the grid of {shape!r} takes {needed:,} samples, and {room.samples - self._sample_count:,} "
+                "are left: add it before build()"
+            )
+        return len(self._rows)
+
+    def capacity(self, room: int, *, soft: bool) -> ContactCapacity:
+        """What these colliders and `room` more need, rounded up so that similar worlds share kernels."""
+        count = len(self._rows) + room
+        samples = self._sample_count
+        return ContactCapacity(
+            max(8, 1 << (count - 1).bit_length()) if count else 8,
+            max(1024, 1 << (samples - 1).bit_length()) if samples else 0,
+            soft,
+        )
+
+    def load(self, contact: ContactFields, body_count: int) -> None:
+        """Fill the fields with what was added before `build`."""
+        self._contact, self._body_count = contact, body_count
+        rows = self._rows
+        samples = [np.zeros(0, np.float32), *(row.shape.samples for row in rows)]
+        fill(contact.samples, np.concatenate(samples))
+        fill(contact.near_count, np.zeros(0))
+        self._write_constants()
+        self._is_dirty = True
+
+    def write(self, index: int) -> None:
+        """Bring the fields up to date after row `index` was added or removed."""
+        if self._contact is None:
+            return
+        row = self._rows[index]
+        if row.is_alive and len(row.shape.samples):
+            samples = self._contact.samples.to_numpy()
+            samples[row.offset : row.offset + len(row.shape.samples)] = row.shape.samples
+            self._contact.samples.from_numpy(samples)
+        self._write_constants()
+        self._is_dirty = True
+
+    def _write_constants(self) -> None:
+        contact, rows = self._contact, self._rows
+        assert contact is not None
+        contact.collider_count[None] = len(rows)
+        fill(contact.collider_kind, np.array([r.shape.kind if r.is_alive else NO_COLLIDER for r in rows]))
+        fill(contact.collider_parameters, np.array([r.shape.parameters for r in rows]))
+        fill(contact.collider_resolution, np.array([r.shape.resolution for r in rows]))
+        fill(contact.collider_offset, np.array([r.offset for r in rows]))
+        fill(contact.collider_surface, np.array([(r.friction, r.restitution, r.thickness) for r in rows]))
+        fill(contact.collider_filter, np.array([(r.group, r.mask) for r in rows]))
+
+    def moved(self, row: _Row) -> None:
+        """Note that a collider is elsewhere, or moves differently, from the next step on."""
+        self._is_dirty = True
+        self._movers = [other for other in self._movers if other is not row]
+        if row.target is not None or row.velocity.any() or row.spin.any():
+            self._movers.append(row)
+
+    def prepare(self, dt: float) -> None:
+        """Tell the fields where the colliders are and how they move through the coming step of `dt` [s]."""
+        self._impulses = None
+        if not (self._is_dirty or self._movers):
+            return
+        for row in self._movers:
+            if row.target is not None:
+                position, rotation = row.target
+                row.velocity = (position - row.position) / dt
+                row.spin = rotation_vector(row.rotation, rotation) / dt
+        motion = np.empty((len(self._rows), MOTION_WIDTH), dtype=np.float32)
+        for line, row in zip(motion, self._rows, strict=True):
+            line[:] = np.concatenate([row.position, row.rotation, row.velocity, row.spin, *_way(row, dt)])
+        write_collider_motion(self._contact, motion)
+        self._is_dirty = False
+
+    def finish(self, dt: float) -> None:
+        """Take the colliders to where they are after a step of `dt` [s]."""
+        for row in list(self._movers):
+            if row.target is None:
+                row.position = row.position + dt * row.velocity
+                row.rotation = turned_by(row.rotation, dt * row.spin)
+            else:
+                row.position, row.rotation = row.target
+                row.velocity, row.spin, row.target = np.zeros(3), np.zeros(3), None
+                self.moved(row)
+
+    def impulses(self) -> Floats:
+        """Of the last step on each, (n, 6) [N s, N m s]; zero before the first."""
+        if self._impulses is None:
+            rows = np.zeros((len(self._rows), 6), dtype=np.float32)
+            if self._contact is not None:
+                sum_collider_impulses(self._contact, self._body_count, rows)
+            self._impulses = rows.astype(np.float64)
+        return self._impulses.copy()
+
+
+def _way(row: _Row, dt: float) -> tuple[Floats, Floats, Floats]:
+    """Corners of a box round everywhere the collider gets to within `dt` [m]; its highest speed, (1,) [m/s]."""
+    lower, upper = row.shape.bounds
+    speed, spin = float(np.linalg.norm(row.velocity)), float(np.linalg.norm(row.spin))
+    if not np.isfinite([lower, upper]).all():
+        far = np.full(3, 1e30)
+        return -far, far, np.array([speed if spin == 0.0 else 1e30])
+    corners = np.array([[(lower, upper)[i >> k & 1][k] for k in range(3)] for i in range(8)])
+    radius = float(np.linalg.norm(corners, axis=1).max())
+    places = corners @ matrix_of(row.rotation).T
+    if spin > 0.0:
+        places = radius * np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]])
+    start, end = row.position + places, row.position + dt * row.velocity + places
+    both = np.concatenate([start, end])
+    fastest = np.array([speed + spin * (radius + row.thickness)])
+    return both.min(axis=0) - row.thickness, both.max(axis=0) + row.thickness, fastest

@@ -1,0 +1,98 @@
+"""The Taichi fields of contact: colliders, and what each body has to do with them in the present step."""
+
+from dataclasses import dataclass
+
+from taichi_soft.runtime import ti
+
+NO_COLLIDER = -1
+"""Kind of a row of which the collider was removed."""
+
+SLOTS = 6
+"""Triangles that one vertex may touch at once: where three bodies meet, and their triangles beside."""
+
+NO_CONTACT = 1e30
+"""Gap of a candidate that is out of reach."""
+
+
+@dataclass(frozen=True)
+class ContactCapacity:
+    """Room for contact; all zero in a world without."""
+
+    colliders: int = 0
+    samples: int = 0  # of the grids of height fields and meshes
+    soft: bool = False  # whether bodies touch each other
+
+
+@ti.data_oriented
+class ContactFields:
+    """Colliders as rows of fields, and for each pair of a body and a collider a row of what passes between.
+
+    The row of body b and collider c is b * colliders + c. A collider moves through a fixed step with the
+    velocity and the spin it has here, from the pose it has here.
+    """
+
+    def __init__(self, capacity: ContactCapacity, particles: int, bodies: int) -> None:
+        """Allocate; contents are zero."""
+        c = capacity.colliders
+        self.capacity = capacity
+        self.collider_count = ti.field(ti.i32, ())  # rows in use, removed ones among them
+        self.collider_kind = ti.field(ti.i32, c)  # a `ShapeKind`, or NO_COLLIDER
+        self.collider_parameters = ti.Vector.field(8, ti.f32, c)
+        self.collider_resolution = ti.Vector.field(3, ti.i32, c)
+        self.collider_offset = ti.field(ti.i32, c)  # of its first sample
+        self.collider_position = ti.Vector.field(3, ti.f32, c)  # [m], at the start of the step
+        self.collider_rotation = ti.Vector.field(4, ti.f32, c)  # unit quaternion, at the start of the step
+        self.collider_velocity = ti.Vector.field(3, ti.f32, c)  # [m/s]
+        self.collider_spin = ti.Vector.field(3, ti.f32, c)  # [rad/s]
+        self.collider_surface = ti.Vector.field(3, ti.f32, c)  # friction, restitution, thickness [m]
+        self.collider_filter = ti.Vector.field(2, ti.i32, c)  # group, mask
+        self.collider_lower = ti.Vector.field(3, ti.f32, c)  # box round its way through the step [m]
+        self.collider_upper = ti.Vector.field(3, ti.f32, c)
+        self.collider_speed = ti.field(ti.f32, c)  # of its fastest point [m/s], at most
+        self.samples = ti.field(ti.f32, max(capacity.samples, 1))
+
+        self.near = ti.field(ti.i32, bodies * c)  # colliders within reach of a body, packed to the front
+        self.near_count = ti.field(ti.i32, bodies)
+        self.reach = ti.field(ti.f32, bodies)  # way [m] after which other colliders may be near
+        self.gone = ti.field(ti.f32, bodies)  # way [m] since it was looked which are near, at most
+        self.impulse = ti.Vector.field(3, ti.f32, bodies * c)  # on the collider in this step [N s]
+        self.angular_impulse = ti.Vector.field(3, ti.f32, bodies * c)  # about its position [N m s]
+        self.body_filter = ti.Vector.field(2, ti.i32, bodies)  # group, mask
+        self.particle_clearance = ti.field(ti.f32, particles)  # [m] from all that is near, at that time
+        self.particle_touches = ti.field(ti.i32, particles)  # 1 where something held it in the last substep
+
+        self.island_count = ti.field(ti.i32, ())
+        self.island_first = ti.field(ti.i32, bodies + 1)  # row of its first body
+        self.island_body = ti.field(ti.i32, bodies)  # bodies that may touch, island by island
+
+
+@ti.data_oriented
+class SoftContactFields:
+    """What bodies need to touch each other: their boxes, a hash of their vertices, and candidates.
+
+    The hash of an island is `island_table`: rows of `cell_first`, and the first row of `cell_item`.
+    """
+
+    def __init__(self, particles: int, bodies: int, outer: int) -> None:
+        """Allocate; contents are zero."""
+        self.body_lower = ti.Vector.field(3, ti.f32, bodies)  # [m], of where it gets to in this step
+        self.body_upper = ti.Vector.field(3, ti.f32, bodies)
+        self.body_surface = ti.Vector.field(3, ti.f32, bodies)  # friction, thickness [m], mean edge [m]
+        self.body_touches_itself = ti.field(ti.i32, bodies)
+        self.sweep_order = ti.field(ti.i32, bodies)  # bodies by their lower x
+        self.parent = ti.field(ti.i32, bodies)  # in the forest of islands
+        self.island_table = ti.Vector.field(
+            3, ti.i32, bodies
+        )  # first cell, cells (a power of two), first item
+        self.island_cell = ti.field(ti.f32, bodies)  # edge of a cell [m]
+        self.cell_first = ti.field(ti.i32, 4 * outer + bodies)
+        self.cell_item = ti.field(ti.i32, outer)  # rows of `outer_particle`
+        self.slot_count = ti.field(ti.i32, outer)
+        self.slot_triangle = ti.field(ti.i32, outer * SLOTS)
+        self.slot_distance = ti.field(ti.f32, outer * SLOTS)  # [m], at the search
+        self.slot_gap = ti.field(ti.f32, outer * SLOTS)  # [m], beyond the thickness; NO_CONTACT where idle
+        self.slot_weights = ti.Vector.field(3, ti.f32, outer * SLOTS)  # barycentric, of the nearest point
+        self.slot_normal = ti.Vector.field(3, ti.f32, outer * SLOTS)  # from the triangle to the vertex
+        self.slot_press = ti.field(ti.f32, outer * SLOTS)  # impulse along it in this substep [N s]
+        self.slot_rub = ti.Vector.field(3, ti.f32, outer * SLOTS)  # friction on the vertex [N s]
+        self.rest_position = ti.Vector.field(3, ti.f32, particles)  # [m]

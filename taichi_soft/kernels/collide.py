@@ -1,0 +1,128 @@
+"""Particles of one body against the colliders, in one thread."""
+
+from taichi_soft.collision.response import resolved_velocity
+from taichi_soft.collision.sweep import NEVER, TOUCHING, distance_from, first_touch
+from taichi_soft.contact_fields import NO_COLLIDER
+from taichi_soft.math.quaternion import spun, turned, turned_back
+from taichi_soft.runtime import ti
+
+MOST_TOUCHES = 4
+"""Colliders that one particle may meet, one after the other, within a substep; then it stays where it is."""
+
+
+@ti.func
+def _in_frame(contact: ti.template(), c, x, time):
+    """A point in the frame that a collider has `time` [s] after the start of the step."""
+    position = contact.collider_position[c] + contact.collider_velocity[c] * time
+    return turned_back(spun(contact.collider_rotation[c], contact.collider_spin[c] * time), x - position)
+
+
+@ti.func
+def find_near_colliders(state: ti.template(), body, reach, since, left):
+    """List the colliders that come within `reach` [m] of a body's particles, and how clear of them each is.
+
+    Args:
+        since, left: time since the start of the step, and until its end [s].
+    """
+    outer = state.body_outer[body]
+    first = state.particle_position[state.outer_particle[outer[0]]]
+    lower, upper = first, first
+    for k in range(outer[0], outer[1]):
+        x = state.particle_position[state.outer_particle[k]]
+        lower, upper = ti.min(lower, x), ti.max(upper, x)
+    lower, upper = lower - reach, upper + reach
+    row = body * state.contact.capacity.colliders
+    mine = state.contact.body_filter[body]
+    count = 0
+    for c in range(state.contact.collider_count[None]):
+        theirs = state.contact.collider_filter[c]
+        wanted = (mine[0] & theirs[1]) != 0 and (theirs[0] & mine[1]) != 0
+        if state.contact.collider_kind[c] != NO_COLLIDER and wanted:
+            low, high = state.contact.collider_lower[c], state.contact.collider_upper[c]
+            apart = 0
+            for i in ti.static(range(3)):
+                apart = apart | int(low[i] > upper[i]) | int(high[i] < lower[i])
+            if apart == 0:
+                state.contact.near[row + count] = c
+                count += 1
+    state.contact.near_count[body] = count
+    state.contact.reach[body] = reach
+    state.contact.gone[body] = 0.0
+    for k in range(outer[0], outer[1]):
+        p = state.outer_particle[k]
+        x = state.particle_position[p]
+        clearance = reach
+        for i in range(count):
+            c = state.contact.near[row + i]
+            distance = distance_from(state.contact, c, _in_frame(state.contact, c, x, since))
+            clearance = ti.min(clearance, distance - state.contact.collider_speed[c] * left)
+        state.contact.particle_clearance[p] = clearance
+
+
+@ti.func
+def forget_contacts(state: ti.template(), body):
+    """Start a step: no impulses yet, and nobody knows which colliders are near."""
+    for row in range(body * state.contact.capacity.colliders, (body + 1) * state.contact.capacity.colliders):
+        state.contact.impulse[row] = ti.Vector.zero(ti.f32, 3)
+        state.contact.angular_impulse[row] = ti.Vector.zero(ti.f32, 3)
+    state.contact.reach[body] = -1.0
+    state.contact.gone[body] = 0.0
+
+
+@ti.func
+def collided(state: ti.template(), body, p, start, way_velocity, h, since):
+    """Position and velocity of a particle after a substep among colliders.
+
+    Args:
+        start: where it is [m].
+        way_velocity: with which it would go on [m/s].
+        h: substep [s].
+        since: time since the start of the fixed step [s], to which the colliders' poses belong.
+    """
+    x0, v = start, way_velocity
+    x1 = start + h * v
+    row = body * state.contact.capacity.colliders
+    left = ti.cast(1.0, ti.f32)  # part of the substep still to go
+    touches, is_open = 0, 1
+    while is_open == 1:
+        earliest, which = ti.cast(NEVER, ti.f32), -1
+        distance, beyond, normal = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32), ti.Vector.zero(ti.f32, 3)
+        # After a touch the path lies in the surface to rounding, which is no second touch.
+        slack = ti.select(touches == 0, 0.0, TOUCHING)
+        for k in range(state.contact.near_count[body]):
+            c = state.contact.near[row + k]
+            a = _in_frame(state.contact, c, x0, since + (1.0 - left) * h)
+            b = _in_frame(state.contact, c, x1, since + h)
+            part, near, far, n = first_touch(state.contact, c, a, b, slack)
+            if part < earliest:
+                earliest, which, distance, beyond, normal = part, k, near, far, n
+        if which < 0:
+            is_open = 0
+        else:
+            c = state.contact.near[row + which]
+            after = since + h
+            centre = state.contact.collider_position[c] + state.contact.collider_velocity[c] * after
+            spin = state.contact.collider_spin[c]
+            n = turned(spun(state.contact.collider_rotation[c], spin * after), normal)
+            place = x1 - beyond * n
+            surface_velocity = state.contact.collider_velocity[c] + spin.cross(place - centre)
+            surface = state.contact.collider_surface[c]
+            v_out = resolved_velocity(v, n, surface_velocity, surface.x, surface.y)
+            push = v_out - v
+            left = left * (1.0 - earliest)
+            # What contact takes from the velocity it takes from the way left, or what friction holds
+            # would creep.
+            x0 = x0 + earliest * (x1 - x0) - ti.min(distance, 0.0) * n
+            x1 = place + left * h * (push - n * push.dot(n))
+            v = v_out
+            impulse = -push / ti.max(state.particle_inv_mass[p], 1e-30)
+            state.contact.impulse[row + c] = state.contact.impulse[row + c] + impulse
+            state.contact.angular_impulse[row + c] = state.contact.angular_impulse[row + c] + (
+                place - centre
+            ).cross(impulse)
+            state.contact.particle_touches[p] = 1
+            touches += 1
+            if touches == MOST_TOUCHES:
+                x1 = x0
+                is_open = 0
+    return x1, v

@@ -1,0 +1,138 @@
+"""Schedule `per_body` where bodies touch more than the floor: an island of bodies runs all substeps on one thread.
+
+What is explicit about a substep is done in the order velocity, contact, position: contact takes velocities away
+before they move anything.
+"""
+
+from taichi_soft.kernels.collide import collided, find_near_colliders, forget_contacts
+from taichi_soft.kernels.internal_forces import accumulate_forces
+from taichi_soft.kernels.islands import find_islands, search_margin
+from taichi_soft.kernels.motion import remember_particle
+from taichi_soft.kernels.per_body import settle_body
+from taichi_soft.kernels.soft_contact import solve_island
+from taichi_soft.kernels.soft_search import search_island
+from taichi_soft.runtime import ti
+from taichi_soft.state import ABSENT, ACTIVE
+
+
+@ti.func
+def _begin_body(state: ti.template(), body):
+    if state.body_status[body] != ABSENT:
+        particles = state.body_particles[body]
+        for p in range(particles[0], particles[1]):
+            remember_particle(state, p)
+        forget_contacts(state, body)
+
+
+@ti.func
+def _kick_body(state: ti.template(), program: ti.template(), body, kick):
+    """New velocities from the forces, which are cleared. Returns the highest speed [m/s]."""
+    particles = state.body_particles[body]
+    highest = ti.cast(0.0, state.real)
+    for p in range(particles[0], particles[1]):
+        inv_mass = state.particle_inv_mass[p]
+        acceleration = state.particle_force[p].xyz * inv_mass + state.gravity[None]
+        acceleration *= ti.select(inv_mass > 0.0, 1.0, 0.0)
+        _, v = program.advance(
+            state.particle_position[p], state.particle_velocity[p], acceleration, 0.0, kick
+        )
+        state.particle_velocity[p] = v
+        state.contact.particle_touches[p] = 0
+        state.particle_force[p] = ti.Vector.zero(state.real, 4)
+        highest = ti.max(highest, v.dot(v))
+    return ti.sqrt(highest)
+
+
+@ti.func
+def _drift_body(state: ti.template(), body, h, since):
+    """New positions, and what colliders in the way make of velocities."""
+    particles = state.body_particles[body]
+    gone = state.contact.gone[body]
+    for p in range(particles[0], particles[1]):
+        x, v = state.particle_position[p], state.particle_velocity[p]
+        if state.contact.particle_clearance[p] <= gone and state.particle_inv_mass[p] > 0.0:
+            x_new, v_new = collided(state, body, p, x, v, h, since)
+            state.particle_position[p] = x_new
+            state.particle_velocity[p] = v_new
+        else:
+            state.particle_position[p] = x + h * v
+
+
+@ti.func
+def _touch_each_other(state: ti.template(), island, reach, gone, fastest, h):
+    """Contact between bodies of one island in a substep; looks for candidates again where they have aged.
+
+    Returns: the way [m] for which the candidates hold, and how much of it may be gone.
+    """
+    first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
+    way = 2.0 * fastest * h
+    holds, used = reach, gone + way
+    if last - first > 1 or state.soft.body_touches_itself[state.contact.island_body[first]] == 1:
+        if not (used <= holds):
+            thickness = ti.cast(0.0, ti.f32)
+            holds, used = way, way
+            for i in range(first, last):
+                surface = state.soft.body_surface[state.contact.island_body[i]]
+                holds = ti.max(holds, search_margin(surface))
+                thickness = ti.max(thickness, surface.y)
+            search_island(state, island, thickness + holds)
+        solve_island(state, island, h, used)
+    return holds, used
+
+
+@ti.func
+def _step_island(state: ti.template(), program: ti.template(), island, substeps, h):
+    """One fixed step of one island. Returns how many of its bodies failed."""
+    first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
+    for i in range(first, last):
+        _begin_body(state, state.contact.island_body[i])
+    reach, gone = ti.cast(-1.0, ti.f32), ti.cast(0.0, ti.f32)
+    for s in range(substeps):
+        fastest = ti.cast(0.0, ti.f32)
+        for i in range(first, last):
+            body = state.contact.island_body[i]
+            if state.body_status[body] == ACTIVE:
+                accumulate_forces(state, program, body)
+                kick = h
+                if s == 0:
+                    kick = 0.5 * (state.body_velocity_lag[body] + h)
+                speed = _kick_body(state, program, body, kick)
+                fastest = ti.max(fastest, speed)
+        if ti.static(program.has_soft_contact):
+            reach, gone = _touch_each_other(state, island, reach, gone, fastest, h)
+        for i in range(first, last):
+            body = state.contact.island_body[i]
+            if state.body_status[body] == ACTIVE:
+                way = state.contact.gone[body] + fastest * h
+                if not (state.contact.reach[body] >= way):
+                    # A quarter more than the rest of the step needs at this speed.
+                    left = h * (substeps - s)
+                    find_near_colliders(state, body, 1.25 * fastest * left + 1e-3, s * h, left)
+                    way = fastest * h
+                state.contact.gone[body] = way
+                _drift_body(state, body, h, s * h)
+    failed = 0
+    for i in range(first, last):
+        body = state.contact.island_body[i]
+        if state.body_status[body] == ACTIVE:
+            has_failed = settle_body(state, body)
+            failed += has_failed
+            if has_failed == 0:
+                state.body_velocity_lag[body] = h
+    return failed
+
+
+@ti.kernel
+def step_islands(
+    state: ti.template(), program: ti.template(), body_count: ti.i32, substeps: ti.i32, h: ti.f32
+) -> ti.i32:
+    """One fixed step of every active body. Returns how many failed."""
+    failed = 0
+    if ti.static(program.has_soft_contact):
+        ti.loop_config(serialize=True)
+        for _ in range(1):
+            find_islands(state, body_count, substeps * h)
+    ti.loop_config(block_dim=1)
+    for island in range(state.contact.island_count[None]):
+        failed += _step_island(state, program, island, substeps, h)
+    return failed

@@ -1,0 +1,126 @@
+"""Islands: bodies that may touch each other in a step, directly or through others.
+
+One thread steps an island, so that what passes between its bodies needs no waiting and has one order. A body
+that stays clear of all others is an island of its own.
+"""
+
+from taichi_soft.runtime import ti
+from taichi_soft.state import ABSENT
+
+
+@ti.func
+def _find_boxes(state: ti.template(), body_count, dt):
+    """Box of each body's surface and of where it may get within `dt` [m]; of absent ones far away."""
+    fall = state.gravity[None].norm() * dt * dt
+    for body in range(body_count):
+        if state.body_status[body] == ABSENT:
+            state.soft.body_lower[body] = ti.Vector.one(ti.f32, 3) * 1e30
+            continue
+        outer = state.body_outer[body]
+        first = state.particle_position[state.outer_particle[outer[0]]]
+        lower, upper, fastest = first, first, ti.cast(0.0, state.real)
+        for k in range(outer[0], outer[1]):
+            p = state.outer_particle[k]
+            x, v = state.particle_position[p], state.particle_velocity[p]
+            lower, upper = ti.min(lower, x), ti.max(upper, x)
+            fastest = ti.max(fastest, v.dot(v))
+        surface = state.soft.body_surface[body]
+        reach = 1.25 * ti.sqrt(fastest) * dt + fall + surface.y + search_margin(surface)
+        state.soft.body_lower[body] = lower - reach
+        state.soft.body_upper[body] = upper + reach
+
+
+@ti.func
+def search_margin(surface):
+    """Distance [m] from a body's triangles within which vertices are looked for, at least."""
+    return 0.25 * surface.z
+
+
+@ti.func
+def _sort_by_lower_x(state: ti.template(), body_count):
+    """Insertion sort: bodies keep nearly the order they had a step ago."""
+    for i in range(1, body_count):
+        body = state.soft.sweep_order[i]
+        x = state.soft.body_lower[body].x
+        j = i - 1
+        while j >= 0 and state.soft.body_lower[state.soft.sweep_order[ti.max(j, 0)]].x > x:
+            state.soft.sweep_order[j + 1] = state.soft.sweep_order[j]
+            j -= 1
+        state.soft.sweep_order[j + 1] = body
+
+
+@ti.func
+def _root(soft: ti.template(), body):
+    root = body
+    while soft.parent[root] != root:
+        root = soft.parent[root]
+    return root
+
+
+@ti.func
+def may_touch(state: ti.template(), a, b):
+    """Whether two bodies' groups and masks let them touch."""
+    mine, theirs = state.contact.body_filter[a], state.contact.body_filter[b]
+    return (mine[0] & theirs[1]) != 0 and (theirs[0] & mine[1]) != 0
+
+
+@ti.func
+def _join_overlapping(state: ti.template(), body_count):
+    for i in range(body_count):
+        a = state.soft.sweep_order[i]
+        j = i + 1
+        is_open = int(state.body_status[a] != ABSENT)
+        while is_open == 1 and j < body_count:
+            b = state.soft.sweep_order[j]
+            j += 1
+            if state.soft.body_lower[b].x > state.soft.body_upper[a].x:
+                is_open = 0
+            elif state.body_status[b] != ABSENT and may_touch(state, a, b):
+                apart = 0
+                for k in ti.static(range(1, 3)):
+                    apart = apart | int(state.soft.body_lower[a][k] > state.soft.body_upper[b][k])
+                    apart = apart | int(state.soft.body_lower[b][k] > state.soft.body_upper[a][k])
+                if apart == 0:
+                    p, q = _root(state.soft, a), _root(state.soft, b)
+                    state.soft.parent[ti.max(p, q)] = ti.min(p, q)
+
+
+@ti.func
+def _list_islands(state: ti.template(), body_count):
+    """Bodies island by island, both in ascending order, and a piece of the hash for each island."""
+    islands, rows, cells, items = 0, 0, 0, 0
+    for first in range(body_count):
+        if state.soft.parent[first] == first and state.body_status[first] != ABSENT:
+            state.contact.island_first[islands] = rows
+            count, widest, edges, members = 0, ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32), 0
+            for body in range(first, body_count):
+                if state.body_status[body] != ABSENT and _root(state.soft, body) == first:
+                    state.contact.island_body[rows] = body
+                    rows += 1
+                    members += 1
+                    outer = state.body_outer[body]
+                    count += outer[1] - outer[0]
+                    edge = state.soft.body_surface[body].z
+                    widest, edges = ti.max(widest, edge), edges + edge
+            size = 1
+            while size < 2 * count:
+                size *= 2
+            state.soft.island_table[islands] = ti.Vector([cells, size, items])
+            # No finer than an eighth of the longest triangles, or each would cover hundreds of cells.
+            state.soft.island_cell[islands] = ti.max(edges / members, widest / 8.0, 1e-6)
+            cells += size + 1
+            items += count
+            islands += 1
+    state.contact.island_first[islands] = rows
+    state.contact.island_count[None] = islands
+
+
+@ti.func
+def find_islands(state: ti.template(), body_count, dt):
+    """Find which bodies may touch within a step of `dt` [s], and list them."""
+    for body in range(body_count):
+        state.soft.parent[body] = body
+    _find_boxes(state, body_count, dt)
+    _sort_by_lower_x(state, body_count)
+    _join_overlapping(state, body_count)
+    _list_islands(state, body_count)

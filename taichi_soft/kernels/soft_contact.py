@@ -1,0 +1,217 @@
+"""Bodies of an island against each other: impulses between a vertex and a triangle, pair by pair.
+
+A pair that would come nearer than the thickness within the substep loses just so much of its approach, and with
+it of its sliding (projected Gauss-Seidel over velocities, begun with the impulses of the substep before). All
+impulses are equal and opposite. What is too near already is moved apart without giving it a velocity.
+"""
+
+from taichi_soft.contact_fields import NO_CONTACT, SLOTS
+from taichi_soft.math.finite import is_finite
+from taichi_soft.math.triangle import closest_point_on_triangle
+from taichi_soft.runtime import ti
+from taichi_soft.state import ACTIVE
+
+SWEEPS = 4
+"""Times all pairs are gone through in a substep. What is left over feeds or brakes vibrations of the surface."""
+
+PUSH_OUT = 0.2
+"""Part of a penetration that one substep takes back."""
+
+OUTSIDE = 1e-4
+"""Least barycentric weight at which the nearest point counts as inside the triangle."""
+
+
+@ti.func
+def _mobility(state: ti.template(), p):
+    """Inverse mass [1/kg]; zero where the body does not move."""
+    free = state.body_status[state.particle_body[p]] == ACTIVE
+    return state.particle_inv_mass[p] * ti.select(free, 1.0, 0.0)
+
+
+@ti.func
+def _gap(state: ti.template(), p, corners):
+    """How a vertex lies to a triangle.
+
+    Returns: distance [m], negative behind it; direction from the triangle; weights of the nearest point; whether
+    it may be in contact (1): what is behind an edge belongs to another triangle, or is outside.
+    """
+    a, b, c = (
+        state.particle_position[corners[0]],
+        state.particle_position[corners[1]],
+        state.particle_position[corners[2]],
+    )
+    x = state.particle_position[p]
+    weights = closest_point_on_triangle(x, a, b, c)
+    way = x - weights.x * a - weights.y * b - weights.z * c
+    face = (b - a).cross(c - a)
+    length = face.norm()
+    face = face / ti.max(length, 1e-30)
+    side = way.dot(face)
+    distance = way.norm()
+    normal = face
+    can_touch = int(length > 0.0) & int(is_finite(x)) & int(is_finite(way)) & int(is_finite(face))
+    if weights.min() > OUTSIDE:
+        distance = side
+    elif side < 0.0:
+        can_touch = 0
+    elif distance > 1e-9:
+        normal = way / distance
+    return distance, normal, weights, can_touch
+
+
+@ti.func
+def _find_gaps(state: ti.template(), k, gone):
+    """Which candidates of a vertex count: those in front of it, and the one it is least deep behind.
+
+    `gone`: way [m] that any pair may have come nearer since the search.
+    """
+    p = state.outer_particle[k]
+    mine = state.soft.body_surface[state.particle_body[p]]
+    shallowest, behind = ti.cast(-1e30, ti.f32), -1
+    for slot in range(k * SLOTS, k * SLOTS + state.soft.slot_count[k]):
+        corners = state.triangle_vertices[state.soft.slot_triangle[slot]]
+        other = state.particle_body[corners[0]]
+        thickness = 0.5 * (mine.y + state.soft.body_surface[other].y)
+        state.soft.slot_gap[slot] = NO_CONTACT
+        if state.soft.slot_distance[slot] - gone < thickness:
+            distance, normal, weights, can_touch = _gap(state, p, corners)
+            state.soft.slot_normal[slot] = normal
+            state.soft.slot_weights[slot] = weights
+            if can_touch == 1 and distance >= 0.0:
+                state.soft.slot_gap[slot] = distance - thickness
+            elif can_touch == 1 and other != state.particle_body[p] and distance > shallowest:
+                if behind >= 0:
+                    state.soft.slot_gap[behind] = NO_CONTACT
+                state.soft.slot_gap[slot] = distance - thickness
+                shallowest, behind = distance, slot
+
+
+@ti.func
+def _press(state: ti.template(), p, corners, slot, h, is_first):
+    """Impulse along the normal that leaves no approach which would close the gap within `h` [s]."""
+    normal, weights = state.soft.slot_normal[slot], state.soft.slot_weights[slot]
+    before = state.soft.slot_press[slot]
+    total, approach = _mobility(state, p), state.particle_velocity[p].dot(normal)
+    for i in range(3):
+        total += weights[i] * weights[i] * _mobility(state, corners[i])
+        approach -= weights[i] * state.particle_velocity[corners[i]].dot(normal)
+    change = before
+    if is_first == 0:
+        allowed = -ti.max(state.soft.slot_gap[slot], 0.0) / h
+        change = ti.max(before + (allowed - approach) / ti.max(total, 1e-30), 0.0) - before
+        state.soft.slot_press[slot] = before + change
+    if change != 0.0 and is_finite(change * normal):
+        state.particle_velocity[p] = state.particle_velocity[p] + _mobility(state, p) * change * normal
+        for i in range(3):
+            q = corners[i]
+            pull = weights[i] * _mobility(state, q) * change
+            state.particle_velocity[q] = state.particle_velocity[q] - pull * normal
+
+
+@ti.func
+def _rub(state: ti.template(), p, corners, slot, friction, is_first):
+    """Friction at the vertex, as if the triangle reached up to it.
+
+    With b and g the vertex's barycentric coordinates and their gradients, n the triangle's normal and s the
+    height above it, the triangle's velocity there is sum b v - s sum g (n.v): what a rigid turn gives. Taking
+    the impulse up in the same proportions keeps the angular momentum of the two, whatever lies between them.
+    """
+    a, b, c = (
+        state.particle_position[corners[0]],
+        state.particle_position[corners[1]],
+        state.particle_position[corners[2]],
+    )
+    normal, weights = state.soft.slot_normal[slot], state.soft.slot_weights[slot]
+    face = (b - a).cross(c - a)
+    area2 = ti.max(face.norm(), 1e-30)
+    n = face / area2
+    way = state.particle_position[p] - weights.x * a - weights.y * b - weights.z * c
+    height = way.dot(n)
+    gradients = ti.Matrix.rows([n.cross(c - b) / area2, n.cross(a - c) / area2, n.cross(b - a) / area2])
+    shares = weights + gradients @ way
+    before = state.soft.slot_rub[slot]
+    change = before
+    if is_first == 0:
+        relative = state.particle_velocity[p]
+        for i in ti.static(range(3)):
+            v = state.particle_velocity[corners[i]]
+            gradient = ti.Vector([gradients[i, 0], gradients[i, 1], gradients[i, 2]])
+            relative -= shares[i] * v - height * gradient * n.dot(v)
+        sliding = relative - relative.dot(normal) * normal
+        slide = sliding.norm()
+        tilt = gradients @ (sliding / ti.max(slide, 1e-30))
+        total = _mobility(state, p)
+        for i in ti.static(range(3)):
+            total += _mobility(state, corners[i]) * (
+                shares[i] * shares[i] + height * height * tilt[i] * tilt[i]
+            )
+        wanted = before - sliding / ti.max(total, 1e-30)
+        most = friction * state.soft.slot_press[slot]
+        wanted = wanted * ti.min(1.0, most / ti.max(wanted.norm(), 1e-30))
+        change = wanted - before
+        state.soft.slot_rub[slot] = wanted
+    if is_finite(change):
+        state.particle_velocity[p] = state.particle_velocity[p] + _mobility(state, p) * change
+        tilt = gradients @ change
+        for i in ti.static(range(3)):
+            q = corners[i]
+            impulse = shares[i] * change - height * tilt[i] * n
+            state.particle_velocity[q] = state.particle_velocity[q] - _mobility(state, q) * impulse
+
+
+@ti.func
+def _push_apart(state: ti.template(), p, corners, slot):
+    """Move apart what is nearer than the thickness, by a part, without giving it a velocity."""
+    normal, weights = state.soft.slot_normal[slot], state.soft.slot_weights[slot]
+    total = _mobility(state, p)
+    for i in range(3):
+        total += weights[i] * weights[i] * _mobility(state, corners[i])
+    if total > 0.0:
+        push = -PUSH_OUT * state.soft.slot_gap[slot] / total
+        state.particle_position[p] = state.particle_position[p] + _mobility(state, p) * push * normal
+        for i in range(3):
+            q = corners[i]
+            back = weights[i] * _mobility(state, q) * push
+            state.particle_position[q] = state.particle_position[q] - back * normal
+
+
+@ti.func
+def _solve_vertex(state: ti.template(), k, h, sweep):
+    """One vertex against its candidates. The first sweep repeats the last substep's impulses."""
+    p = state.outer_particle[k]
+    mine = state.soft.body_surface[state.particle_body[p]]
+    for slot in range(k * SLOTS, k * SLOTS + state.soft.slot_count[k]):
+        if state.soft.slot_gap[slot] < NO_CONTACT:
+            corners = state.triangle_vertices[state.soft.slot_triangle[slot]]
+            theirs = state.soft.body_surface[state.particle_body[corners[0]]]
+            _press(state, p, corners, slot, h, int(sweep == 0))
+            if state.soft.slot_press[slot] > 0.0:
+                _rub(state, p, corners, slot, ti.sqrt(mine.x * theirs.x), int(sweep == 0))
+                state.contact.particle_touches[p] = 1
+                for i in ti.static(range(3)):
+                    state.contact.particle_touches[corners[i]] = 1
+            else:
+                state.soft.slot_rub[slot] = ti.Vector.zero(ti.f32, 3)
+            if sweep == SWEEPS and state.soft.slot_gap[slot] < 0.0:
+                _push_apart(state, p, corners, slot)
+        else:
+            state.soft.slot_press[slot] = 0.0
+            state.soft.slot_rub[slot] = ti.Vector.zero(ti.f32, 3)
+
+
+@ti.func
+def solve_island(state: ti.template(), island, h, gone):
+    """Take from the velocities of an island what would bring its bodies too near within `h` [s].
+
+    `gone`: way [m] that any pair may come nearer from the search to the end of this substep.
+    """
+    first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
+    for sweep in range(-1, SWEEPS + 1):
+        for i in range(first, last):
+            outer = state.body_outer[state.contact.island_body[i]]
+            for k in range(outer[0], outer[1]):
+                if state.soft.slot_count[k] > 0:
+                    if sweep < 0:
+                        _find_gaps(state, k, gone)
+                    else:
+                        _solve_vertex(state, k, h, sweep)

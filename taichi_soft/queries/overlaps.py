@@ -1,0 +1,71 @@
+"""Bodies that touch a sphere or a box."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taichi_soft.checks import as_number, as_rotation, as_vector
+from taichi_soft.constants import POSITION_LIMIT
+from taichi_soft.errors import OptionError
+from taichi_soft.kernels.queries import find_overlaps
+from taichi_soft.state import State
+
+if TYPE_CHECKING:
+    from taichi_soft.body import Body
+
+
+@dataclass(frozen=True, eq=False)
+class Overlap:
+    """A body that touches a shape."""
+
+    body: Body
+    vertices: NDArray[np.int32]  # that lie in the shape, ascending; none where a face or the whole body does
+
+
+SMALLEST = 1e-9
+"""Least size of a shape [m]: squares of smaller lengths run out of float32's range."""
+
+
+def find_in_sphere(
+    state: State, handles: Sequence[Body | None], center: ArrayLike, radius: float
+) -> tuple[Overlap, ...]:
+    """Bodies that touch a sphere. Raises: OptionError, see `World.overlap_sphere`."""
+    shape = np.zeros((5, 3), dtype=np.float32)
+    shape[0] = as_vector(center, "center", "m")
+    shape[1:4] = np.eye(3)
+    shape[4] = as_number(radius, "radius", SMALLEST, POSITION_LIMIT, "a length above 0 m")
+    return _overlaps(state, handles, False, shape)
+
+
+def find_in_box(
+    state: State, handles: Sequence[Body | None], center: ArrayLike, size: ArrayLike, rotation: Any
+) -> tuple[Overlap, ...]:
+    """Bodies that touch a box. Raises: OptionError, see `World.overlap_box`."""
+    shape = np.zeros((5, 3), dtype=np.float32)
+    shape[0] = as_vector(center, "center", "m")
+    shape[1:4] = as_rotation(rotation).T
+    lengths = as_vector(size, "size", "m")
+    if not (lengths >= SMALLEST).all():
+        raise OptionError(f"size must be three lengths above 0 m, got {lengths.tolist()}")
+    shape[4] = lengths
+    return _overlaps(state, handles, True, shape)
+
+
+def _overlaps(
+    state: State, handles: Sequence[Body | None], is_box: bool, shape: NDArray[np.float32]
+) -> tuple[Overlap, ...]:
+    first_vertex = np.full(len(handles), -1, dtype=np.int32)
+    inside = np.zeros(state.capacity.particles, dtype=np.int32)
+    find_overlaps(state, is_box, len(handles), shape, first_vertex, inside)
+    overlaps = []
+    for index in np.flatnonzero(first_vertex >= 0).tolist():
+        begin, body = first_vertex[index], handles[index]
+        assert body is not None
+        vertices = np.flatnonzero(inside[begin : begin + body.vertex_count])
+        overlaps.append(Overlap(body, vertices.astype(np.int32)))
+    return tuple(overlaps)

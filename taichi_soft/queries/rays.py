@@ -1,0 +1,130 @@
+"""Rays against the deformed surfaces."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taichi_soft.checks import as_array, as_vector
+from taichi_soft.constants import POSITION_LIMIT
+from taichi_soft.errors import OptionError
+from taichi_soft.kernels.queries import find_hits
+from taichi_soft.queries.asking import as_chosen, as_reach, just_beyond, read_answer
+from taichi_soft.state import State
+
+if TYPE_CHECKING:
+    from taichi_soft.body import Body
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class RayHit:
+    """Where a ray meets a surface first."""
+
+    body: Body
+    triangle: int  # row of body.surface
+    vertices: NDArray[np.int32]  # (3,) of that triangle
+    barycentrics: Floats  # (3,) weights of these vertices; their sum is 1
+    distance: float  # [m] from the ray's origin
+    point: Floats  # (3,) [m]
+    normal: Floats  # (3,) of the triangle, unit length, outward
+
+
+@dataclass(frozen=True, eq=False)
+class RayHits:
+    """Where each of n rays meets a surface first.
+
+    A ray that hits nothing has body and triangle -1, distance infinity and NaN in the rest.
+    """
+
+    body: NDArray[np.int32]  # (n,) body.index
+    triangle: NDArray[np.int32]  # (n,) row of that body's surface
+    barycentrics: Floats  # (n, 3)
+    distance: Floats  # (n,) [m]
+    point: Floats  # (n, 3) [m]
+    normal: Floats  # (n, 3)
+
+
+def cast_ray(
+    state: State,
+    handles: Sequence[Body | None],
+    origin: ArrayLike,
+    direction: ArrayLike,
+    max_distance: float,
+    bodies: Iterable[Body] | None,
+    cull_back: bool,
+) -> RayHit | None:
+    """The first hit of one ray. Raises: OptionError, see `World.raycast`."""
+    rays = np.empty((1, 8), dtype=np.float32)
+    rays[0, :3] = as_vector(origin, "origin", "m")
+    rays[0, 3:6] = _as_directions(as_array(direction, "direction", (3,))[None], "direction")
+    hits = _hits(state, handles, rays, max_distance, bodies, cull_back)
+    body, face, distance, weights, point, normal = read_answer(hits[0])
+    if body < 0:
+        return None
+    hit = handles[body]
+    assert hit is not None
+    return RayHit(hit, face, hit.surface[face], weights, distance, point, normal)
+
+
+def cast_rays(
+    state: State,
+    handles: Sequence[Body | None],
+    origins: ArrayLike,
+    directions: ArrayLike,
+    max_distance: float,
+    bodies: Iterable[Body] | None,
+    cull_back: bool,
+) -> RayHits:
+    """The first hit of each ray. Raises: OptionError, see `World.raycasts`."""
+    starts = as_array(origins, "origins", (None, 3), "m")
+    ways = as_array(directions, "directions", (len(starts), 3))
+    if len(starts) and not np.abs(starts).max() < POSITION_LIMIT:
+        raise OptionError(f"origins must lie within {POSITION_LIMIT:g} m of zero")
+    rays = np.empty((len(starts), 8), dtype=np.float32)
+    rays[:, :3] = starts
+    rays[:, 3:6] = _as_directions(ways, "directions")
+    hits = _hits(state, handles, rays, max_distance, bodies, cull_back).astype(np.float64)
+    missed = hits[:, 10] < 0
+    hits[missed, 0], hits[missed, 1:10] = np.inf, np.nan
+    body, triangle = hits[:, 10].astype(np.int32), hits[:, 11].astype(np.int32)
+    return RayHits(body, triangle, hits[:, 1:4], hits[:, 0], hits[:, 4:7], hits[:, 7:10])
+
+
+def _hits(
+    state: State,
+    handles: Sequence[Body | None],
+    rays: NDArray[np.float32],
+    max_distance: float,
+    bodies: Iterable[Body] | None,
+    cull_back: bool,
+) -> NDArray[np.float32]:
+    """One row for each ray, see `write_place`; body -1 where it hits nothing."""
+    if not isinstance(cull_back, (bool, np.bool_)):
+        raise OptionError(f"cull_back must be True or False, got {cull_back!r}")
+    rays[:, 6] = just_beyond(as_reach(max_distance))
+    rays[:, 7] = cull_back
+    hits = np.full((len(rays), 12), -1.0, dtype=np.float32)
+    chosen = as_chosen(bodies, handles)
+    if len(rays) and len(chosen):
+        find_hits(state, len(rays) < _FEWEST_SHARED, chosen, rays, hits)
+    return hits
+
+
+_FEWEST_SHARED = 32
+"""Rays from which on threads share them: waking them costs as much as some rays."""
+
+
+def _as_directions(rows: Floats, name: str) -> Floats:
+    """Rows of length 1. Raises: OptionError for one of zero length."""
+    largest = np.abs(rows).max(axis=1, initial=0.0)
+    if not largest.all():
+        which = f" {int(largest.argmin())}" if len(rows) > 1 else ""
+        raise OptionError(f"{name}{which} has zero length: a ray needs a direction")
+    scaled = rows / largest[:, None]  # whose squares neither vanish nor overflow
+    return np.asarray(scaled / np.linalg.norm(scaled, axis=1)[:, None])

@@ -1,0 +1,85 @@
+"""Ground given by its height over a grid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taichi_soft.checks import as_array
+from taichi_soft.collision.kinds import ShapeKind
+from taichi_soft.errors import OptionError
+from taichi_soft.meshing.arrays import read_only
+from taichi_soft.shapes.shape import LONGEST, Shape, Triangles, as_length
+
+MOST_NODES = 20_000_000
+"""Of a grid: 80 MB. A square of 4,097 nodes fits."""
+
+
+@dataclass(frozen=True, eq=False)
+class HeightFieldShape(Shape):
+    """Ground over a rectangle centred on the origin, solid from the surface down without end.
+
+    Each cell is two triangles, parted from its node (i, j) to its node (i + 1, j + 1). Beside the rectangle
+    there is nothing: no walls.
+    Args:
+        heights: over node (i, j), the first index along x, (nx, ny) [m].
+        spacing: between neighbouring nodes along both axes [m].
+    Raises: OptionError for fewer than two nodes along an axis, too many of them, or heights that are not
+        finite.
+    """
+
+    kind = ShapeKind.HEIGHT_FIELD
+    heights: ArrayLike
+    spacing: float
+
+    def __post_init__(self) -> None:
+        heights = as_array(self.heights, "heights", (None, None), "m").astype(np.float32)
+        if min(heights.shape) < 2 or heights.size > MOST_NODES:
+            raise OptionError(
+                f"heights must have 2 nodes or more along each axis and at most {MOST_NODES:,} in all, "
+                f"got shape {heights.shape}"
+            )
+        if not np.abs(heights).max() <= LONGEST:
+            raise OptionError(f"heights must lie within {LONGEST:g} m, got up to {np.abs(heights).max():g} m")
+        object.__setattr__(self, "heights", read_only(heights))
+        object.__setattr__(self, "spacing", as_length(self.spacing, "spacing"))
+
+    def _values(self) -> tuple[float, ...]:
+        heights = np.asarray(self.heights, dtype=np.float64)
+        along, across = (np.abs(np.diff(heights, axis=axis)).max() / self.spacing for axis in (0, 1))
+        # No triangle is steeper than the steepest edges along x and y together.
+        cosine = 1.0 / np.sqrt(1.0 + along**2 + across**2)
+        return (self.spacing, heights.min(), heights.max(), cosine)
+
+    @property
+    def resolution(self) -> tuple[int, int, int]:
+        """Nodes along x and y, and 1."""
+        nx, ny = np.shape(self.heights)
+        return (nx, ny, 1)
+
+    @property
+    def samples(self) -> NDArray[np.float32]:
+        """The heights, row by row."""
+        return np.asarray(self.heights).reshape(-1)
+
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """Lower and upper corner, (2, 3) [m]; without end downwards."""
+        half = (np.array(np.shape(self.heights)) - 1) * self.spacing / 2
+        top = float(np.max(self.heights))
+        corners: NDArray[np.float64] = read_only(np.array([[*-half, -np.inf], [*half, top]]))
+        return corners
+
+    def surface(self) -> Triangles:
+        """The ground itself: two triangles for each cell, facing up."""
+        nx, ny, _ = self.resolution
+        i, j = np.indices((nx, ny))
+        low = self.bounds[0]
+        x, y = low[0] + i * self.spacing, low[1] + j * self.spacing
+        vertices = np.stack([x, y, np.asarray(self.heights)], axis=-1).reshape(-1, 3)
+        near = (i * ny + j)[:-1, :-1].reshape(-1)
+        far = near + ny + 1
+        triangles = np.stack([near, near + ny, far, near, far, near + 1], axis=-1).reshape(-1, 3)
+        return vertices, triangles.astype(np.int32)
