@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,7 +39,6 @@ class EngineAdapter:
         self._world = world
         self._fixed_step = fixed_step
         self._accumulator = Accumulator(fixed_step)
-        self._bodies = tuple(world.bodies)
         self._dropped_time = 0.0
         self._total_dropped_time = 0.0
 
@@ -113,12 +111,7 @@ class EngineAdapter:
         Args:
             body: of this adapter's world.
             out: C-contiguous float32 array to fill and return; None makes a new one.
-        Raises: OptionError if `out` does not fit or the body belongs to another world.
+        Raises: OptionError if `out` does not fit or the body belongs to another world; StateError if it was
+            removed.
         """
-        self._require_own(body)
         return self._world.read_positions(body, self._accumulator.alpha, out)
-
-    def _require_own(self, body: Any) -> None:
-        index = body.index if isinstance(body, Body) else len(self._bodies)
-        if index >= len(self._bodies) or self._bodies[index] is not body:
-            raise OptionError(f"body must be one that this adapter's world made, got {body!r}")

@@ -1,5 +1,6 @@
 """Real-time soft bodies from real material parameters."""
 
+from taichi_soft.assets import SoftBodyAsset
 from taichi_soft.body import Body
 from taichi_soft.errors import (
     DeviceError,
@@ -89,6 +90,7 @@ __all__ = [
     "RayHits",
     "Settings",
     "Shape",
+    "SoftBodyAsset",
     "SolverWarning",
     "SphereShape",
     "SpringMaterial",

@@ -15,10 +15,11 @@ from taichi_soft.failures import FailedStep, Failure
 from taichi_soft.laws.law import EnergyLaw
 from taichi_soft.materials import voigt_stress
 from taichi_soft.queries import Pose, best_fitting_pose
-from taichi_soft.scene import BodyDescription, rest_inverses
+from taichi_soft.scene import rest_inverses
 from taichi_soft.stability import StableStep
 
 if TYPE_CHECKING:
+    from taichi_soft.assets import SoftBodyAsset
     from taichi_soft.world import World
 
 Floats32 = NDArray[np.float32]
@@ -31,26 +32,50 @@ class Body:
     Energies, momentum and volume are computed in float64 from the float32 state, at the time of the call.
     """
 
-    def __init__(self, world: World, index: int, description: BodyDescription) -> None:
-        """Made by `World.add_body`."""
+    def __init__(self, world: World, index: int, asset: SoftBodyAsset) -> None:
+        """Made by `World.add_body` and `World.spawn`."""
         # Weak, or a world that is dropped would wait for the garbage collector to give its state back.
         self._world_ref = weakref.ref(world)
-        self._description = description
-        self.index = index
+        self._asset = asset
+        self._description = asset.description
+        self._index = index
+        self._first_step = world.step_count
+        self._removed_in: int | None = None
         self._frozen_in: FailedStep | None = None
         self._failure: Failure | None = None
 
+    def require_alive(self) -> None:
+        """Raises: StateError once the body was removed."""
+        if self._removed_in is not None:
+            raise StateError(f"body {self.index} was removed by despawn in step {self._removed_in}")
+
     @property
     def _world(self) -> World:
+        self.require_alive()
         world = self._world_ref()
         if world is None:
             raise StateError(f"the world of body {self.index} is gone: keep a reference to it")
         return world
 
     def __repr__(self) -> str:
-        state = "frozen" if self.is_frozen else "active"
+        state = "removed" if not self.is_alive else "frozen" if self.is_frozen else "active"
         kind = f"{len(self.tets)} tetrahedra" if len(self.tets) else f"{len(self.mesh.edges)} edges"
         return f"Body({self.index}, {self.vertex_count} vertices, {kind}, {state})"
+
+    @property
+    def asset(self) -> SoftBodyAsset:
+        """What it shares with other bodies of its kind; `World.spawn` takes it."""
+        return self._asset
+
+    @property
+    def index(self) -> int:
+        """Number of its slot in the world, which another body may get after `World.despawn`."""
+        return self._index
+
+    @property
+    def is_alive(self) -> bool:
+        """False once `World.despawn` has removed it: what asks the world then raises StateError."""
+        return self._removed_in is None
 
     @property
     def mesh(self):  # type: ignore[no-untyped-def]
@@ -109,6 +134,7 @@ class Body:
     @property
     def failure(self) -> Failure | None:
         """What broke first, None while the body is sound. Found out when first asked, not within a step."""
+        self.require_alive()
         if self._frozen_in is not None and self._failure is None:
             self._failure = self._world._find_failure(self, self._frozen_in)
         return self._failure

@@ -88,7 +88,7 @@ def force_gradient(
     x = _rows(positions, mesh, "positions", np.dtype(np.float64))
     if not isinstance(projected, bool):
         raise OptionError(f"projected must be True or False, got {projected!r}")
-    still = StillBody(BodyDescription.at_rest(mesh, material, model), double=True, implicit=True)
+    still = StillBody(BodyDescription(mesh, material, model), double=True, implicit=True)
     still.forces(x, np.zeros_like(x))
     return -(still.system_stiffness() if projected else still.exact_stiffness())
 
@@ -170,7 +170,7 @@ def _still_body(mesh: BodyMesh, material: AnyMaterial, model: ElementModel, *, d
         if (body.mesh, body.material, body.model) == (mesh, material, model):  # equal to themselves only
             return last
         del _last[double], last  # their fields serve the next
-    _last[double] = StillBody(BodyDescription.at_rest(mesh, material, model), double=double)
+    _last[double] = StillBody(BodyDescription(mesh, material, model), double=double)
     return _last[double]
 
 

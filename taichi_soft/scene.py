@@ -22,6 +22,7 @@ from taichi_soft.meshing import (
     spatial_order,
     tet_order,
 )
+from taichi_soft.meshing.arrays import read_only
 from taichi_soft.types import DampingModel
 
 SHORTEST_EDGE = 1e-6
@@ -33,26 +34,12 @@ Ints = NDArray[np.int32]
 
 @dataclass(frozen=True)
 class BodyDescription:
-    """One body as the user added it."""
+    """One kind of body, wherever it is."""
 
     mesh: BodyMesh
     material: AnyMaterial
     model: ElementModel
-    position: Floats  # (3,) [m], where the mesh's origin goes
-    rotation: Floats  # (3, 3)
-    velocity: Floats  # (3,) [m/s]
-    pinned: Ints  # vertices that stay where they are
-
-    @classmethod
-    def at_rest(cls, mesh: BodyMesh, material: AnyMaterial, model: ElementModel) -> BodyDescription:
-        """A body where its mesh is."""
-        origin = np.zeros(3)
-        return cls(mesh, material, model, origin, np.eye(3), origin, np.zeros(0, dtype=np.int32))
-
-    @property
-    def start_positions(self) -> Floats:
-        """Vertices in the world, (n, 3) [m], in the caller's order."""
-        return np.asarray(self.mesh.vertices @ self.rotation.T + self.position)
+    pinned: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int32))  # vertices that stay in place
 
     @cached_property
     def bonds(self) -> Bonds | None:
@@ -62,12 +49,12 @@ class BodyDescription:
 
     @cached_property
     def masses(self) -> Floats:
-        """Mass of each vertex, (n,) [kg], in the caller's order."""
+        """Mass of each vertex, (n,) [kg], in the caller's order, read-only."""
         if isinstance(self.mesh, ParticleMesh):
             return self.mesh.masses
         if self.bonds is not None and self.bonds.masses is not None:
-            return self.bonds.masses
-        return vertex_masses(self.mesh, self.per_tet("density"))  # type: ignore[arg-type]
+            return read_only(self.bonds.masses)
+        return read_only(vertex_masses(self.mesh, self.per_tet("density")))  # type: ignore[arg-type]
 
     def per_tet(self, name: str) -> Floats:
         """A constant of the material for each tetrahedron, (m,)."""
@@ -119,8 +106,7 @@ class BodyArrays:
 
     order: Ints  # (n,) caller's index of each particle
     rank: Ints  # (n,) particle of each of the caller's vertices
-    start_position: Floats  # (n, 3) [m]
-    start_velocity: Floats  # (n, 3) [m/s]
+    rest_position: Floats  # (n, 3) [m]
     mass: Floats  # (n,) [kg]
     tet_vertices: Ints  # (m, 4) into the particles of this body
     tet_order: Ints  # (m,) caller's index of each tetrahedron
@@ -215,7 +201,7 @@ def outer_vertices(mesh: BodyMesh) -> Ints:
 
 def contact_surface(body: BodyArrays) -> tuple[float, float, float]:
     """Friction, thickness [m] and mean edge of the surface [m]."""
-    corners = body.start_position[body.triangles if len(body.triangles) else body.edge_vertices]
+    corners = body.rest_position[body.triangles if len(body.triangles) else body.edge_vertices]
     edge = float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean())
     return 0.5, 0.02 * edge, edge
 
@@ -261,8 +247,7 @@ def arrange(description: BodyDescription) -> BodyArrays:
     return BodyArrays(
         order=order,
         rank=new_index,
-        start_position=description.start_positions[order],
-        start_velocity=np.tile(description.velocity, (len(order), 1)),
+        rest_position=mesh.vertices[order],
         mass=description.masses[order],
         tet_vertices=new_index[mesh.tets[tets]],
         tet_order=tets,

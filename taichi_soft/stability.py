@@ -66,7 +66,7 @@ def stable_step(mesh: BodyMesh, material: AnyMaterial, model: ElementModel) -> S
     if not isinstance(model, ElementModel):
         raise OptionError(f"model must come from element_model(...), got {model!r}")
     model = fit_model(model, mesh, material)
-    description = BodyDescription.at_rest(mesh, material, model)
+    description = BodyDescription(mesh, material, model)
     if description.bonds is not None:
         return _stable_bond_step(description, description.bonds)
     assert isinstance(mesh, TetMesh)

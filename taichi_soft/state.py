@@ -17,6 +17,7 @@ from taichi_soft.runtime import ti
 from taichi_soft.scene import BodyArrays, Ranges, Scene, blocks_of
 
 ACTIVE, FROZEN, ASLEEP, ABSENT = 0, 1, 2, 3
+"""Status of a body: it moves, it went non-finite and rests, it sleeps, its slot is empty."""
 
 _NO_CONTACT = ContactCapacity()
 
@@ -162,16 +163,18 @@ class State:
         self.floor = ti.Vector.field(3, real, ())  # height [m], restitution, friction
 
     def load(self, scene: Scene, models: list[int]) -> None:
-        """Fill every field from `scene`; `models[i]` is the number of body i's force model."""
+        """Fill every field from `scene`; `models[i]` is the number of body i's force model.
+
+        All bodies are absent, and their particles where their meshes are, until `spawn_body` places them.
+        """
         ranges = scene.ranges
         bodies = scene.bodies
         mass = np.concatenate([body.mass for body in bodies])
-        position = np.concatenate([body.start_position for body in bodies])
-        velocity = np.concatenate([body.start_velocity for body in bodies])
+        position = np.concatenate([body.rest_position for body in bodies])
         fill(self.particle_position, position)
         fill(self.prev_position, position)
-        fill(self.particle_velocity, velocity)
-        fill(self.prev_velocity, velocity)
+        fill(self.particle_velocity, np.zeros((0, 3)))
+        fill(self.prev_velocity, np.zeros((0, 3)))
         fill(self.particle_force, np.zeros((0, 4)))
         inv_mass = 1.0 / mass
         for body, place in zip(bodies, ranges, strict=True):
@@ -220,7 +223,7 @@ class State:
         if self.capacity.contact != _NO_CONTACT:
             self._load_contact(scene)
         fill(self.body_model, np.array(models))
-        fill(self.body_status, np.zeros(0))
+        fill(self.body_status, np.full(len(bodies), ABSENT))
         fill(self.body_velocity_lag, np.zeros(0))
         fill(self.block_model, np.repeat(models, [r.blocks[1] - r.blocks[0] for r in ranges]))
 
@@ -238,7 +241,7 @@ class State:
             fill(self.soft.sweep_order, np.arange(count))
             fill(self.soft.slot_count, np.zeros(0))
             fill(self.soft.body_touches_itself, np.zeros(0))
-            fill(self.soft.rest_position, np.concatenate([b.start_position for b, _ in pairs]))
+            fill(self.soft.rest_position, np.concatenate([b.rest_position for b, _ in pairs]))
 
     def _load_bonds(self, bodies: list[BodyArrays], ranges: list[Ranges]) -> None:
         """What the pairwise laws know of their edges; zeros for the edges of other bodies."""

@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from taichi_soft.assets import SoftBodyAsset
 from taichi_soft.body import Body, Floats32, require_buffer, require_built
-from taichi_soft.checks import as_count, as_flag, as_indices, as_number, as_rotation, as_vector
+from taichi_soft.checks import as_count, as_flag, as_number, as_vector
 from taichi_soft.colliders import Collider, Colliders
 from taichi_soft.constants import ALL_GROUPS, GRAVITY_EARTH, POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.contact_fields import ContactCapacity
@@ -23,9 +24,10 @@ from taichi_soft.kernels.evaluate import compute_body_forces
 from taichi_soft.kernels.program import Program
 from taichi_soft.kernels.readout import read_positions, read_velocities, write_motion
 from taichi_soft.kernels.schedules import Launch, choose_schedule, make_launch
-from taichi_soft.laws import ElementModel, element_model, fit_model
+from taichi_soft.kernels.spawn import despawn_body, spawn_body
 from taichi_soft.materials import AnyMaterial
 from taichi_soft.meshing import BodyMesh
+from taichi_soft.pools import Pools
 from taichi_soft.queries import (
     ClosestPoint,
     Overlap,
@@ -38,15 +40,18 @@ from taichi_soft.queries import (
     find_in_sphere,
 )
 from taichi_soft.runtime import init
-from taichi_soft.scene import BodyDescription, Scene, arrange, contact_surface, require_size
+from taichi_soft.scene import Scene, contact_surface
 from taichi_soft.settings import Settings
 from taichi_soft.shapes import PlaneShape, Shape
-from taichi_soft.stability import StableStep, stable_step
+from taichi_soft.stability import StableStep
 from taichi_soft.state import FROZEN, Capacity, State, acquire, fill, release
 from taichi_soft.types import DampingModel, Flips, Integrator, Schedule, Strain
 
 SHORTEST_STEP, LONGEST_STEP = 1e-9, 1e4
 """Fixed steps [s]: shorter ones are lost in float32, longer ones would take days of computing."""
+
+MOST_VERTICES = 10_000_000
+"""In a world: the constants of the tetrahedra between more would not be counted in 32 bits."""
 
 _PLAIN = {float, int, np.float64, type(None)}
 """Types whose values can be compared with those of the last step."""
@@ -108,7 +113,9 @@ class World:
         self._step_count = 0
         self._time = 0.0
         self._last_dt = 0.0
-        self._bodies: list[Body] = []
+        self._pools = Pools()
+        self._added: dict[tuple[Any, ...], SoftBodyAsset] = {}  # by add_body: copies share one
+        self._starts: dict[int, Floats32] = {}  # of bodies that came before build, by slot
         self._scene = Scene()
         self._state: State | None = None
         self._program: Program | None = None
@@ -119,7 +126,6 @@ class World:
         self._read_alpha: float | None = None  # of what `_read` holds; None once the world has moved on
         self._warned_steps: set[float] = set()
         self._warned_solves: set[int] = set()
-        self._stable_steps: dict[tuple[int, int, ElementModel], StableStep] = {}
 
     @property
     def settings(self) -> Settings:
@@ -151,8 +157,8 @@ class World:
 
     @property
     def bodies(self) -> Sequence[Body]:
-        """All bodies, in the order in which they were added."""
-        return tuple(self._bodies)
+        """All bodies that live, by the number of their slots: bodies of `add_body` in the order of adding."""
+        return self._pools.living
 
     @property
     def is_built(self) -> bool:
@@ -173,60 +179,118 @@ class World:
         velocity: ArrayLike = (0.0, 0.0, 0.0),
         pinned: ArrayLike = (),
     ) -> Body:
-        """Add a body before `build`.
+        """Add a body before `build`: an asset of its own, one slot for it, and a body in that.
 
+        Copies, of the same mesh and material with the same options, share the asset.
         Args:
-            mesh: rest shape. A `ParticleMesh` (rope, cloth) takes law "springs".
-            material: constants in SI units; a `SpringMaterial` for a `ParticleMesh`.
-            law: one of `LAWS`: "virial" (thesis 6.3), "face" (6.2), "st_venant_kirchhoff", "neo_hookean"; and
-                along edges "springs" (3.4), "volume_springs" (chapter 5), "cmpm", "cmpm2",
-                "best_fitting_plane", "tilted_plane" and "tilted_plane_printed" (chapter 4).
-            strain: "linear" (eq. 6.7) or "exact" (square root of U^2); None takes the law's own.
-            flips: "tolerant" (the thesis: a mirrored tetrahedron is at rest too), "recover" or "off"; None
-                takes the law's own. A law with an energy does what follows from it, and takes no other.
-            damping_model: "edge" (eq. 3.9) or "tet_mean" (which section 6.4 rejects: it stops rotation).
-            position: where the mesh's origin goes, (3,) [m].
-            rotation: about the mesh's origin, matrix (3, 3) or quaternion (x, y, z, w).
-            velocity: of the whole body, (3,) [m/s].
-            pinned: vertices that stay where they are.
+            mesh, material, law, strain, flips, damping_model, pinned: as `SoftBodyAsset` takes them.
+            position, rotation, velocity: as `spawn` takes them.
         Returns: a handle.
         Raises: MeshError, MaterialError or OptionError for bad input; StateError after `build`.
         """
-        if self.is_built:
-            raise StateError("the world is already built: add bodies first, then call build() once")
-        model = fit_model(element_model(law, strain, flips, damping_model), mesh, material)
-        model.require_integrator(self.settings.integrator)
-        description = BodyDescription(
+        self._require_open()
+        asset = SoftBodyAsset(
             mesh,
             material,
-            model,
-            as_vector(position, "position", "m"),
-            as_rotation(rotation),
-            as_vector(velocity, "velocity", "m/s", VELOCITY_LIMIT),
-            as_indices(pinned, "pinned", len(mesh.vertices)),
+            law=law,
+            strain=strain,
+            flips=flips,
+            damping_model=damping_model,
+            pinned=pinned,
         )
-        require_size(mesh)
-        self._require_place(description)
-        arrays = arrange(description)
-        self._scene.append(arrays)
-        body = Body(self, len(self._bodies), description)
-        self._bodies.append(body)
-        return body
+        described = asset.description
+        key = (id(mesh), id(material), described.model, described.pinned.tobytes())
+        asset = self._added.get(key, asset)
+        described.model.require_integrator(self.settings.integrator)
+        rows = asset.placed(position, rotation, velocity, (0.0, 0.0, 0.0), self.settings.floor)
+        self._add_slot(asset)
+        self._added[key] = asset
+        return self._enter(asset, rows)
 
-    def _require_place(self, description: BodyDescription) -> None:
-        """Raises: OptionError where a body starts out of reach, or below the floor, which would crush it."""
-        positions = description.start_positions
-        lower, upper = positions.min(axis=0), positions.max(axis=0)
-        if not max(np.abs(lower).max(), np.abs(upper).max()) < POSITION_LIMIT:
-            raise OptionError(f"position puts the body beyond {POSITION_LIMIT:g} m: stay nearer the origin")
-        floor = self.settings.floor
-        if floor is not None and lower[2] < floor - 1e-3 * (upper[2] - lower[2]):
-            depth = floor - lower[2]
-            x, y, z = description.position
+    def reserve(self, asset: SoftBodyAsset, count: int) -> None:
+        """Make room for `count` more bodies of an asset, before `build`; `spawn` fills it.
+
+        Empty slots take memory, and no time in a step.
+        Raises: OptionError for what is no asset or no count, or an asset that the integrator cannot take;
+            StateError after `build`.
+        """
+        self._require_open()
+        _require_asset(asset)
+        number = as_count(count, "count")
+        asset.description.model.require_integrator(self.settings.integrator)
+        vertices = self._scene.particle_count + number * len(asset.mesh.vertices)
+        if vertices > MOST_VERTICES:
             raise OptionError(
-                f"the body starts {depth:.4g} m below the floor: position=({x:g}, {y:g}, {z + depth:.6g}) "
-                "puts it on the floor, World(floor=None) has none"
+                f"count is {number:,}: the world would hold {vertices:,} vertices, at most {MOST_VERTICES:,}"
             )
+        for _ in range(number):
+            self._add_slot(asset)
+
+    def spawn(
+        self,
+        asset: SoftBodyAsset,
+        *,
+        position: ArrayLike = (0.0, 0.0, 0.0),
+        rotation: ArrayLike | None = None,
+        velocity: ArrayLike = (0.0, 0.0, 0.0),
+        angular_velocity: ArrayLike = (0.0, 0.0, 0.0),
+    ) -> Body:
+        """Put a body into the lowest free slot of its asset, before `build` or between two steps.
+
+        Args:
+            asset: one that `reserve` made room for, or the `asset` of a body that was added.
+            position: where the mesh's origin goes, (3,) [m].
+            rotation: about the mesh's origin, matrix (3, 3) or quaternion (x, y, z, w).
+            velocity: of the centre of mass, (3,) [m/s].
+            angular_velocity: about the centre of mass, (3,) [rad/s]. Pinned vertices rest.
+        Returns: a new handle.
+        Raises: OptionError for a value out of range, or a place out of reach or below the floor; StateError
+            for an asset without a pool in this world, or whose pool is full.
+        """
+        _require_asset(asset)
+        self._pools.next_slot(asset)
+        rows = asset.placed(position, rotation, velocity, angular_velocity, self.settings.floor)
+        return self._enter(asset, rows)
+
+    def despawn(self, body: Body) -> None:
+        """Take a body out of the world: its slot is free, and its handle dead.
+
+        Raises: OptionError for what is no body of this world; StateError for one that was removed before.
+        """
+        self._require_own(body)
+        self._pools.leave(body)
+        body._removed_in = self.step_count
+        self._warned_solves.discard(body.index)
+        if self._state is None:
+            del self._starts[body.index]
+        else:
+            despawn_body(self._state, body.index)
+
+    def _require_open(self) -> None:
+        if self.is_built:
+            raise StateError("the world is already built: add_body and reserve come first, then build() once")
+
+    def _require_own(self, body: Body) -> None:
+        """Raises: OptionError for what is no body of this world; StateError for one that was removed."""
+        if not isinstance(body, Body) or body._world_ref() is not self:
+            raise OptionError(f"body must be one that this world made, got {body!r}")
+        body.require_alive()
+
+    def _add_slot(self, asset: SoftBodyAsset) -> None:
+        self._scene.append(asset.arrays)
+        self._pools.add_slot(asset)
+
+    def _enter(self, asset: SoftBodyAsset, rows: Floats32) -> Body:
+        """A new body in the next free slot, which begins as `rows` say."""
+        slot = self._pools.next_slot(asset)
+        if self._state is None:
+            self._starts[slot] = rows
+        else:
+            spawn_body(self._state, slot, rows)
+            self._read_alpha = None
+        body = Body(self, slot, asset)
+        self._pools.enter(body)
+        return body
 
     @property
     def colliders(self) -> Sequence[Collider]:
@@ -287,10 +351,11 @@ class World:
         """
         if self.is_built:
             raise StateError("the world is already built")
-        if not self._bodies:
-            raise StateError("the world is empty: call add_body before build")
+        if not self._pools.slots:
+            raise StateError("the world is empty: call add_body or reserve before build")
         device = init()
-        models = list(dict.fromkeys(body._description.model for body in self._bodies))
+        kinds = self._pools.kinds
+        models = list(dict.fromkeys(asset.description.model for asset in kinds))
         has_contact = self._soft_contact or len(self._colliders.handles) + self._collider_room > 0
         if has_contact:
             self._require_contact()
@@ -309,7 +374,7 @@ class World:
             tuple(models),
             self.settings.integrator,
             self.settings.floor is not None and not has_contact,
-            any(len(body.pinned) for body in self._bodies),
+            any(len(asset.description.pinned) for asset in kinds),
             has_contact,
             self._soft_contact,
             device.threads,
@@ -323,20 +388,31 @@ class World:
             )
         state = acquire(capacity)
         weakref.finalize(self, release, state)
-        state.load(self._scene, [models.index(body._description.model) for body in self._bodies])
+        state.load(self._scene, [models.index(asset.description.model) for asset in self._pools.assets])
+        self._warm_up(state)
+        for slot, rows in self._starts.items():
+            spawn_body(state, slot, rows)
+        self._starts.clear()
         chosen = self._settings = replace(self._settings, schedule=schedule)
         state.gravity[None] = chosen.gravity.tolist()
         state.floor[None] = [chosen.floor or 0.0, chosen.restitution, chosen.friction]
         if self._is_implicit:
             state.solver[None] = [chosen.tolerance, chosen.most_iterations]
         if has_contact:
-            self._colliders.load(state.contact, len(self._bodies))
+            self._colliders.load(state.contact, len(self._pools.slots))
         if self._soft_contact:
             surfaces = [contact_surface(body) for body in self._scene.bodies]
             fill(state.soft.body_surface, np.array(surfaces))
         self._read = np.empty((self._scene.particle_count, 3), dtype=np.float32)
         self._program, self._state = program, state
         self._launch = make_launch(schedule, state, program, self._scene, device)
+
+    def _warm_up(self, state: State) -> None:
+        """A body that comes and goes, so that nothing compiles where the first does in the game."""
+        for asset in self._pools.kinds:
+            slot = self._pools.assets.index(asset)
+            spawn_body(state, slot, asset.rest_rows)
+            despawn_body(state, slot)
 
     def _require_contact(self) -> None:
         """Make the floor one of the colliders. Raises: OptionError for what takes no colliders."""
@@ -357,29 +433,26 @@ class World:
             )
 
     def stable_step(self, body: Body) -> StableStep:
-        """Estimate of the largest stable substep of a body; copies of one body share it.
+        """Estimate of the largest stable substep of a body; bodies of one asset share it.
 
         Raises: OptionError for what is no body.
         """
         if not isinstance(body, Body):
             raise OptionError(f"body must be one that a world made, got {body!r}")
-        described = body._description
-        key = (id(described.mesh), id(described.material), described.model)
-        if key not in self._stable_steps:
-            self._stable_steps[key] = stable_step(described.mesh, described.material, described.model)
-        return self._stable_steps[key]
+        return body.asset.stable_step
 
     def stable_substeps(self, dt: float) -> int:
-        """Number of substeps that a fixed step of `dt` [s] needs, with a margin, for the stiffest body.
+        """Number of substeps that a fixed step of `dt` [s] needs, with a margin, for the stiffest asset.
 
-        1 for implicit Euler, which needs none.
+        Of all that have slots, whether a body lives there or not: so that neither the time of a frame nor the
+        motion of the others changes where one comes or goes. 1 for implicit Euler, which needs none.
         """
-        if not self._bodies:
-            raise StateError("the world is empty: call add_body first")
+        if not self._pools.slots:
+            raise StateError("the world is empty: call add_body or reserve first")
         if self._is_implicit:
             _as_step(dt)
             return 1
-        longest = min(body.stable_step.recommended for body in self._bodies)
+        longest = min(asset.stable_step.recommended for asset in self._pools.kinds)
         return max(1, math.ceil(_as_step(dt) / longest))
 
     def step(self, dt: float, substeps: int | None = None) -> None:
@@ -418,13 +491,13 @@ class World:
         h = seconds / count
         if self._is_implicit:
             return seconds, count, h
-        stiffest = min(self._bodies, key=lambda body: body.stable_step.limit)
+        stiffest = min(self._pools.kinds, key=lambda asset: asset.stable_step.limit)
         limit = stiffest.stable_step.limit
         if h > limit and h not in self._warned_steps:
             warnings.warn(
                 f"substep {h * 1e3:.4g} ms is longer than the {limit * 1e3:.4g} ms that body "
-                f"{stiffest.index} can take ({stiffest.stable_step.stiffest}): it may explode. Use "
-                f"substeps={self.stable_substeps(seconds)} or leave substeps out",
+                f"{self._pools.assets.index(stiffest)} can take ({stiffest.stable_step.stiffest}): it may "
+                f"explode. Use substeps={self.stable_substeps(seconds)} or leave substeps out",
                 UnstableStepWarning,
                 stacklevel=3,
             )
@@ -434,11 +507,13 @@ class World:
     def _check_solves(self) -> None:
         """Warn of the body whose solve was least exact, once per world and body."""
         assert self._state is not None
-        residuals = self._state.body_residual.to_numpy()[: len(self._bodies)]
-        for index in np.flatnonzero(residuals > self.settings.tolerance):
-            if int(index) in self._warned_solves or self._bodies[index].is_frozen:
+        residuals = self._state.body_residual.to_numpy()
+        for body in self.bodies:
+            index = body.index
+            is_exact = residuals[index] <= self.settings.tolerance
+            if is_exact or index in self._warned_solves or body.is_frozen:
                 continue
-            self._warned_solves.add(int(index))
+            self._warned_solves.add(index)
             warnings.warn(
                 f"the implicit solve of body {index} ended with a residual of {residuals[index]:.2g} instead "
                 f"of {self.settings.tolerance:g} within {self.settings.most_iterations} iterations: raise "
@@ -452,7 +527,7 @@ class World:
         reports = []
         assert self._state is not None
         status = self._state.body_status.to_numpy()
-        for body in self._bodies:
+        for body in self.bodies:
             if status[body.index] != FROZEN or body.is_frozen:
                 continue
             body._frozen_in = FailedStep(self.step_count, self.time, substeps, h)
@@ -477,8 +552,7 @@ class World:
             fit; StateError before `build`.
         """
         require_built(self.is_built)
-        if getattr(body, "_world", None) is not self:
-            raise OptionError(f"body must be one that this world made, got {body!r}")
+        self._require_own(body)
         if type(alpha) is not float or not 0.0 <= alpha <= 1.0:
             alpha = as_number(alpha, "alpha", 0.0, 1.0, "a number from 0 to 1")
         rows = require_buffer(out, body.vertex_count)
@@ -513,7 +587,7 @@ class World:
         Raises: OptionError for numbers that are not finite, a direction or max_distance of zero, a negative
             max_distance or a body of another world; StateError before `build`.
         """
-        return cast_ray(self._built, self._bodies, origin, direction, max_distance, bodies, cull_back)
+        return cast_ray(self._built, self._pools.slots, origin, direction, max_distance, bodies, cull_back)
 
     def raycasts(
         self,
@@ -532,7 +606,7 @@ class World:
         Returns: arrays with a row for each ray, the same as `raycast` finds.
         Raises: as `raycast`.
         """
-        return cast_rays(self._built, self._bodies, origins, directions, max_distance, bodies, cull_back)
+        return cast_rays(self._built, self._pools.slots, origins, directions, max_distance, bodies, cull_back)
 
     def closest_point(
         self, point: ArrayLike, *, max_distance: float = math.inf, bodies: Iterable[Body] | None = None
@@ -548,7 +622,7 @@ class World:
         Raises: OptionError for numbers that are not finite, a max_distance that is not above 0 or a body of
             another world; StateError before `build`.
         """
-        return find_closest_point(self._built, self._bodies, point, max_distance, bodies)
+        return find_closest_point(self._built, self._pools.slots, point, max_distance, bodies)
 
     def overlap_sphere(self, center: ArrayLike, radius: float) -> tuple[Overlap, ...]:
         """Bodies that touch a sphere or enclose it; of a body without triangles its vertices count.
@@ -560,7 +634,7 @@ class World:
         Raises: OptionError for numbers that are not finite or a radius not above 0; StateError before
             `build`.
         """
-        return find_in_sphere(self._built, self._bodies, center, radius)
+        return find_in_sphere(self._built, self._pools.slots, center, radius)
 
     def overlap_box(
         self, center: ArrayLike, size: ArrayLike, rotation: ArrayLike | None = None
@@ -575,7 +649,7 @@ class World:
         Raises: OptionError for numbers that are not finite, a size not above 0 or what is no rotation;
             StateError before `build`.
         """
-        return find_in_box(self._built, self._bodies, center, size, rotation)
+        return find_in_box(self._built, self._pools.slots, center, size, rotation)
 
     @property
     def _built(self) -> State:
@@ -587,7 +661,8 @@ class World:
     def _solve_residual(self, body: Body) -> float | None:
         require_built(self.is_built)
         assert self._state is not None
-        return float(self._state.body_residual[body.index]) if self._is_implicit and self.step_count else None
+        has_solved = self._is_implicit and self.step_count > body._first_step
+        return float(self._state.body_residual[body.index]) if has_solved else None
 
     def _read_velocities(self, body: Body) -> Floats32:
         """Velocities at the time of the positions, (n, 3) [m/s]. Raises: StateError before `build`."""
@@ -627,6 +702,11 @@ class World:
                 raise OptionError(f"{name} must lie within {limit:g} of zero")
         write_motion(self._state, body.index, x, v)
         self._read_alpha = None
+
+
+def _require_asset(asset: SoftBodyAsset) -> None:
+    if not isinstance(asset, SoftBodyAsset):
+        raise OptionError(f"asset must be a SoftBodyAsset, got {asset!r}")
 
 
 def _as_step(dt: float) -> float:

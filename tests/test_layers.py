@@ -21,7 +21,7 @@ LAYERS = """
     kernels
     forces  shapes
     stability  failures  colliders  control  queries  events  snapshot
-    body  assets
+    body  assets  pools
     world
     taichi_soft
     render

@@ -27,6 +27,7 @@ ODD = (
 
 MESH = ts.box(cells=(1, 1, 1))
 JELLY = ts.Material(1e5, 0.2, 1000.0)
+ASSET = ts.SoftBodyAsset(MESH, JELLY)
 POINTS = MESH.vertices
 ZEROS = np.zeros((8, 3))
 CORNER = [[0, 0], [1, 0], [0, 1]]
@@ -40,6 +41,16 @@ def keywords(call, *names):
 
 def add_body(**options):
     ts.World(floor=None).add_body(MESH, JELLY, **options)
+
+
+def asset(**options):
+    ts.SoftBodyAsset(MESH, JELLY, **options)
+
+
+def spawn(**options):
+    world = ts.World(floor=None)
+    world.reserve(ASSET, 1)
+    world.spawn(ASSET, **options)
 
 
 def material(**constants):
@@ -61,6 +72,14 @@ def renderer(**options):
 CALLS = {
     **keywords(ts.World, "gravity", "floor", "restitution", "friction", "integrator", "schedule"),
     **keywords(add_body, "law", "strain", "flips", "damping_model", "position", "rotation", "velocity"),
+    **keywords(asset, "law", "strain", "flips", "damping_model", "pinned"),
+    "asset mesh": lambda v, _: ts.SoftBodyAsset(v, JELLY),
+    "asset material": lambda v, _: ts.SoftBodyAsset(MESH, v),
+    **keywords(spawn, "position", "rotation", "velocity", "angular_velocity"),
+    "spawn asset": lambda v, game: game.world.spawn(v),
+    "despawn": lambda v, game: game.world.despawn(v),
+    "reserve asset": lambda v, _: ts.World().reserve(v, 1),
+    "reserve count": lambda v, _: ts.World().reserve(ASSET, v),
     "add_body mesh": lambda v, _: ts.World(floor=None).add_body(v, JELLY),
     "add_body material": lambda v, _: ts.World(floor=None).add_body(MESH, v),
     **keywords(material, "young", "poisson", "density", "damping"),

@@ -12,15 +12,16 @@ from taichi_soft.kernels.per_body import settle_body
 from taichi_soft.kernels.soft_contact import solve_island
 from taichi_soft.kernels.soft_search import search_island
 from taichi_soft.runtime import ti
-from taichi_soft.state import ACTIVE
+from taichi_soft.state import ABSENT, ACTIVE
 
 
 @ti.func
 def _begin_body(state: ti.template(), body):
-    particles = state.body_particles[body]
-    for p in range(particles[0], particles[1]):
-        remember_particle(state, p)
-    forget_contacts(state, body)
+    if state.body_status[body] != ABSENT:
+        particles = state.body_particles[body]
+        for p in range(particles[0], particles[1]):
+            remember_particle(state, p)
+        forget_contacts(state, body)
 
 
 @ti.func

@@ -16,15 +16,32 @@ from taichi_soft.kernels.edges import edge_force_of
 from taichi_soft.kernels.elastic import store_block_forces, store_lane_forces
 from taichi_soft.kernels.motion import move_particle, particle_is_sound, remember_particle, restore_particle
 from taichi_soft.runtime import ti
-from taichi_soft.state import ACTIVE, FROZEN
+from taichi_soft.state import ABSENT, ACTIVE, FROZEN
 
-_FAILING = 2
+_FAILING = 4  # above the status of any body
+
+
+@ti.func
+def _status_of(state: ti.template(), p):
+    return state.body_status[state.particle_body[p]]
+
+
+@ti.func
+def _block_is_active(state: ti.template(), block):
+    return _status_of(state, state.tet_vertices[block * 4 * LANES]) == ACTIVE
+
+
+@ti.func
+def _remember_phase(state: ti.template(), p):
+    if _status_of(state, p) != ABSENT:
+        remember_particle(state, p)
 
 
 @ti.func
 def _block_phase(state: ti.template(), program: ti.template(), block):
+    is_active = _block_is_active(state, block)
     for m, model in ti.static(enumerate(program.models)):
-        if state.block_model[block] == m:
+        if is_active and state.block_model[block] == m:
             if ti.static(not model.has_bonds):
                 store_block_forces(state, model, block)
             elif ti.static(model.reads_expansion):
@@ -34,8 +51,9 @@ def _block_phase(state: ti.template(), program: ti.template(), block):
 @ti.func
 def _edge_phase(state: ti.template(), program: ti.template(), e):
     body = state.particle_body[state.edge_vertices[e][0]]
+    is_active = state.body_status[body] == ACTIVE
     for m, model in ti.static(enumerate(program.models)):
-        if state.body_model[body] == m:
+        if is_active and state.body_model[body] == m:
             state.edge_force[e] = edge_force_of(state, model, e)
 
 
@@ -69,13 +87,13 @@ def _move_phase(state: ti.template(), program: ti.template(), p, h, is_first):
 
 @ti.func
 def _check_phase(state: ti.template(), p):
-    if particle_is_sound(state, p) == 0:
+    if _status_of(state, p) == ACTIVE and particle_is_sound(state, p) == 0:
         ti.atomic_max(state.body_status[state.particle_body[p]], _FAILING)
 
 
 @ti.func
 def _fall_back_phase(state: ti.template(), p):
-    if state.body_status[state.particle_body[p]] == _FAILING:
+    if _status_of(state, p) == _FAILING:
         restore_particle(state, p)
 
 
@@ -121,7 +139,7 @@ def step_flat_cpu(
         b0, b1 = block_count * worker // workers, block_count * (worker + 1) // workers
         e0, e1 = edge_count * worker // workers, edge_count * (worker + 1) // workers
         for p in range(p0, p1):
-            remember_particle(state, p)
+            _remember_phase(state, p)
         for s in range(substeps):
             for block in range(b0, b1):
                 _block_phase(state, program, block)
@@ -148,7 +166,7 @@ def step_flat_cpu(
 def begin_flat(state: ti.template(), particle_count: ti.i32):
     """Remember where every particle is."""
     for p in range(particle_count):
-        remember_particle(state, p)
+        _remember_phase(state, p)
 
 
 @ti.kernel
@@ -164,8 +182,9 @@ def substep_flat(
     """One substep with one tetrahedron, edge or particle per thread."""
     for t in range(block_count * LANES):
         block, lane = t // LANES, t % LANES
+        is_active = _block_is_active(state, block)
         for m, model in ti.static(enumerate(program.models)):
-            if state.block_model[block] == m:
+            if is_active and state.block_model[block] == m:
                 if ti.static(not model.has_bonds):
                     store_lane_forces(state, model, block, lane)
                 elif ti.static(model.reads_expansion):

@@ -10,9 +10,12 @@ from taichi_soft.state import ABSENT
 
 @ti.func
 def _find_boxes(state: ti.template(), body_count, dt):
-    """Box round each body's surface and its way through a step of `dt` [s]."""
+    """Box round each body's surface and its way through a step of `dt` [s]; of absent ones far away."""
     fall = state.gravity[None].norm() * dt * dt
     for body in range(body_count):
+        if state.body_status[body] == ABSENT:
+            state.soft.body_lower[body] = ti.Vector.one(ti.f32, 3) * 1e30
+            continue
         outer = state.body_outer[body]
         p = state.outer_particle[outer[0]]
         lower, upper = state.particle_position[p], state.particle_position[p]

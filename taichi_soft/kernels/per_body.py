@@ -8,7 +8,7 @@ from taichi_soft.kernels.implicit_euler import implicit_substep
 from taichi_soft.kernels.internal_forces import accumulate_forces, clear_forces
 from taichi_soft.kernels.motion import move_particle, particle_is_sound, remember_particle, restore_particle
 from taichi_soft.runtime import ti
-from taichi_soft.state import ACTIVE, FROZEN
+from taichi_soft.state import ABSENT, ACTIVE, FROZEN
 from taichi_soft.types import Integrator
 
 
@@ -49,9 +49,10 @@ def settle_body(state: ti.template(), body):
 @ti.func
 def _step_body(state: ti.template(), program: ti.template(), body, substeps, h):
     """One fixed step of one body. Returns 1 where it failed, or was not solved as exactly as asked."""
-    particles = state.body_particles[body]
-    for p in range(particles[0], particles[1]):
-        remember_particle(state, p)
+    if state.body_status[body] != ABSENT:
+        particles = state.body_particles[body]
+        for p in range(particles[0], particles[1]):
+            remember_particle(state, p)
     failed = 0
     if state.body_status[body] == ACTIVE:
         kick = 0.5 * (state.body_velocity_lag[body] + h)

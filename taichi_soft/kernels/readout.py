@@ -1,20 +1,27 @@
 """Copies between the fields of a world and the caller's arrays, in the caller's vertex order."""
 
 from taichi_soft.runtime import ti
+from taichi_soft.state import ABSENT, ACTIVE
 
 
 @ti.kernel
 def read_positions(state: ti.template(), alpha: ti.f32, out: ti.types.ndarray(dtype=ti.f32, ndim=2)):
-    """Positions of all bodies [m], `alpha` of the way from the previous step (0) to the last one (1)."""
+    """Positions of all bodies [m], `alpha` of the way from the previous step (0) to the last one (1).
+
+    Rows of absent bodies are left alone.
+    """
     ti.loop_config(serialize=True)
-    for i in range(out.shape[0]):
-        p = state.particle_of_vertex[i]
-        before, after = state.prev_position[p], state.particle_position[p]
-        x = before + alpha * (after - before)
-        if alpha == 1.0:
-            x = after
-        for k in ti.static(range(3)):
-            out[i, k] = x[k]
+    for body in range(state.capacity.bodies):
+        rows = state.body_particles[body]
+        if state.body_status[body] != ABSENT:
+            for i in range(rows[0], rows[1]):
+                p = state.particle_of_vertex[i]
+                before, after = state.prev_position[p], state.particle_position[p]
+                x = before + alpha * (after - before)
+                if alpha == 1.0:
+                    x = after
+                for k in ti.static(range(3)):
+                    out[i, k] = x[k]
 
 
 @ti.kernel
@@ -48,4 +55,4 @@ def write_motion(
         if ti.static(state.capacity.implicit):
             state.particle_contact[p] = 0
     state.body_velocity_lag[body] = 0.0
-    state.body_status[body] = 0
+    state.body_status[body] = ACTIVE

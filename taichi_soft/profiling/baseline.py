@@ -54,8 +54,8 @@ class Baseline:
         """Take over the arrays of `body`, in kernel order: of the virial law, springs or volume springs."""
         self._run = library.run_substeps if body.bonds is None else library.run_spring_substeps
         self._run.restype = None
-        self.positions = body.start_position.astype(np.float32)
-        self.velocities = body.start_velocity.astype(np.float32)
+        self.positions = body.rest_position.astype(np.float32)
+        self.velocities = np.zeros_like(self.positions)
         elements = _tet_arrays(body) if body.bonds is None else _spring_arrays(body, body.bonds)
         self._arrays: list[NDArray[np.generic]] = [
             self.positions,

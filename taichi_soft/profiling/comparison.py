@@ -57,7 +57,7 @@ def _compare(library: ctypes.CDLL, repeats: int, cells: tuple[int, int, int], la
     body = world.add_body(mesh, MATERIAL, law=law, position=(0.0, 0.0, 1.0))
     world.build()
     model = element_model(law)
-    arrays = arrange(BodyDescription.at_rest(mesh, MATERIAL, model))
+    arrays = arrange(BodyDescription(mesh, MATERIAL, model))
     native = Baseline(library, arrays)
     stretched = mesh.vertices * (1.0 + PUSHED_APART) + (0.0, 0.0, 1.0)
     body.set_motion(stretched, np.zeros_like(stretched))

@@ -36,10 +36,13 @@ def just_beyond(limit: float) -> float:
     return float(np.nextafter(np.float32(min(limit, _ENDLESS)), np.float32(np.inf)))
 
 
-def as_chosen(bodies: Iterable[Body] | None, handles: Sequence[Body]) -> NDArray[np.int32]:
-    """Indices of the bodies asked, ascending; all for None. Raises: OptionError."""
+def as_chosen(bodies: Iterable[Body] | None, handles: Sequence[Body | None]) -> NDArray[np.int32]:
+    """Indices of the bodies asked, ascending; all for None. Raises: OptionError.
+
+    `handles`: the body in each slot, None where there is none.
+    """
     if bodies is None:
-        return np.arange(len(handles), dtype=np.int32)
+        return np.array([body.index for body in handles if body is not None], dtype=np.int32)
     try:
         asked = list(bodies)
     except TypeError:

@@ -36,7 +36,7 @@ class ClosestPoint:
 
 def find_closest_point(
     state: State,
-    handles: Sequence[Body],
+    handles: Sequence[Body | None],
     point: ArrayLike,
     max_distance: float,
     bodies: Iterable[Body] | None,
@@ -54,6 +54,7 @@ def find_closest_point(
     if index < 0:
         return None
     body = handles[index]
+    assert body is not None
     triangle, vertices = (
         (face, body.surface[face]) if len(body.surface) else (None, np.full(3, face, np.int32))
     )

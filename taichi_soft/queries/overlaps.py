@@ -32,7 +32,7 @@ SMALLEST = 1e-9
 
 
 def find_in_sphere(
-    state: State, handles: Sequence[Body], center: ArrayLike, radius: float
+    state: State, handles: Sequence[Body | None], center: ArrayLike, radius: float
 ) -> tuple[Overlap, ...]:
     """Bodies that touch a sphere. Raises: OptionError, see `World.overlap_sphere`."""
     shape = np.zeros((5, 3), dtype=np.float32)
@@ -43,7 +43,7 @@ def find_in_sphere(
 
 
 def find_in_box(
-    state: State, handles: Sequence[Body], center: ArrayLike, size: ArrayLike, rotation: Any
+    state: State, handles: Sequence[Body | None], center: ArrayLike, size: ArrayLike, rotation: Any
 ) -> tuple[Overlap, ...]:
     """Bodies that touch a box. Raises: OptionError, see `World.overlap_box`."""
     shape = np.zeros((5, 3), dtype=np.float32)
@@ -57,7 +57,7 @@ def find_in_box(
 
 
 def _overlaps(
-    state: State, handles: Sequence[Body], is_box: bool, shape: NDArray[np.float32]
+    state: State, handles: Sequence[Body | None], is_box: bool, shape: NDArray[np.float32]
 ) -> tuple[Overlap, ...]:
     first_vertex = np.full(len(handles), -1, dtype=np.int32)
     inside = np.zeros(state.capacity.particles, dtype=np.int32)
@@ -65,6 +65,7 @@ def _overlaps(
     overlaps = []
     for index in np.flatnonzero(first_vertex >= 0).tolist():
         begin, body = first_vertex[index], handles[index]
+        assert body is not None
         vertices = np.flatnonzero(inside[begin : begin + body.vertex_count])
         overlaps.append(Overlap(body, vertices.astype(np.int32)))
     return tuple(overlaps)

@@ -52,7 +52,7 @@ class RayHits:
 
 def cast_ray(
     state: State,
-    handles: Sequence[Body],
+    handles: Sequence[Body | None],
     origin: ArrayLike,
     direction: ArrayLike,
     max_distance: float,
@@ -68,12 +68,13 @@ def cast_ray(
     if body < 0:
         return None
     hit = handles[body]
+    assert hit is not None
     return RayHit(hit, face, hit.surface[face], weights, distance, point, normal)
 
 
 def cast_rays(
     state: State,
-    handles: Sequence[Body],
+    handles: Sequence[Body | None],
     origins: ArrayLike,
     directions: ArrayLike,
     max_distance: float,
@@ -97,7 +98,7 @@ def cast_rays(
 
 def _hits(
     state: State,
-    handles: Sequence[Body],
+    handles: Sequence[Body | None],
     rays: NDArray[np.float32],
     max_distance: float,
     bodies: Iterable[Body] | None,

@@ -1,0 +1,135 @@
+"""What all bodies of one kind share: made once, placed many times."""
+
+from __future__ import annotations
+
+from dataclasses import KW_ONLY, dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taichi_soft.checks import as_indices, as_rotation, as_vector
+from taichi_soft.constants import POSITION_LIMIT, VELOCITY_LIMIT
+from taichi_soft.errors import OptionError
+from taichi_soft.laws import element_model, fit_model
+from taichi_soft.materials import AnyMaterial
+from taichi_soft.meshing import BodyMesh
+from taichi_soft.meshing.arrays import read_only
+from taichi_soft.scene import BodyArrays, BodyDescription, arrange, require_size
+from taichi_soft.stability import StableStep, stable_step
+from taichi_soft.types import DampingModel, Flips, Strain
+
+Floats = NDArray[np.float64]
+Floats32 = NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class SoftBodyAsset:
+    """A kind of body, immutable: what the bodies share that worlds make of it.
+
+    Args:
+        mesh: rest shape. A `ParticleMesh` (rope, cloth) takes law "springs".
+        material: constants in SI units; a `SpringMaterial` for a `ParticleMesh`.
+        law: one of `LAWS`: "virial" (thesis 6.3), "face" (6.2), "st_venant_kirchhoff", "neo_hookean"; and
+            along edges "springs" (3.4), "volume_springs" (chapter 5), "cmpm", "cmpm2",
+            "best_fitting_plane", "tilted_plane" and "tilted_plane_printed" (chapter 4).
+        strain: "linear" (eq. 6.7) or "exact" (square root of U^2); None takes the law's own.
+        flips: "tolerant" (the thesis: a mirrored tetrahedron is at rest too), "recover" or "off"; None
+            takes the law's own. A law with an energy does what follows from it, and takes no other.
+        damping_model: "edge" (eq. 3.9) or "tet_mean" (which section 6.4 rejects: it stops rotation).
+        pinned: vertices that stay where they are.
+    Raises: MeshError, MaterialError or OptionError for bad input.
+    """
+
+    mesh: BodyMesh
+    material: AnyMaterial
+    _: KW_ONLY
+    law: str = "virial"
+    strain: str | Strain | None = None
+    flips: str | Flips | None = None
+    damping_model: str | DampingModel = DampingModel.EDGE
+    pinned: ArrayLike = ()
+    description: BodyDescription = field(init=False)
+
+    def __post_init__(self) -> None:
+        model = element_model(self.law, self.strain, self.flips, self.damping_model)
+        model = fit_model(model, self.mesh, self.material)
+        pinned = read_only(as_indices(self.pinned, "pinned", len(self.mesh.vertices)))
+        require_size(self.mesh)
+        description = BodyDescription(self.mesh, self.material, model, pinned)
+        _ = description.bonds  # made now, because a pairwise law may refuse the mesh
+        object.__setattr__(self, "pinned", pinned)
+        object.__setattr__(self, "description", description)
+
+    def __repr__(self) -> str:
+        return f"SoftBodyAsset({self.mesh!r}, {self.law!r})"
+
+    @cached_property
+    def arrays(self) -> BodyArrays:
+        """The body in the order in which the kernels walk it: slow to make, and made once."""
+        return arrange(self.description)
+
+    @cached_property
+    def stable_step(self) -> StableStep:
+        """Estimate of the largest stable substep."""
+        return stable_step(self.mesh, self.material, self.description.model)
+
+    @cached_property
+    def _center_of_mass(self) -> Floats:
+        masses = self.description.masses
+        return np.asarray(masses @ self.mesh.vertices / masses.sum())
+
+    @cached_property
+    def rest_rows(self) -> Floats32:
+        """Position, velocity and inverse mass of each vertex, (n, 7), of a body where its mesh is."""
+        rows = np.zeros((len(self.mesh.vertices), 7), dtype=np.float32)
+        rows[:, :3] = self.mesh.vertices
+        rows[:, 6] = 1.0 / self.description.masses
+        rows[self.description.pinned, 6] = 0.0
+        return rows
+
+    def placed(
+        self,
+        position: ArrayLike,
+        rotation: ArrayLike | None,
+        velocity: ArrayLike,
+        angular_velocity: ArrayLike,
+        floor: float | None,
+    ) -> Floats32:
+        """Position, velocity and inverse mass of each vertex of a body that begins there, float32 (n, 7).
+
+        Args: as `World.spawn` takes them, and the height of the floor [m].
+        Raises: OptionError for bad values, a vertex that is too fast, and a place out of reach or below the
+            floor, which would crush the body.
+        """
+        origin, turn = as_vector(position, "position", "m"), as_rotation(rotation)
+        drift = as_vector(velocity, "velocity", "m/s", VELOCITY_LIMIT)
+        spin = as_vector(angular_velocity, "angular_velocity", "rad/s")
+        x = self.mesh.vertices @ turn.T + origin
+        self._require_place(x, origin, floor)
+        rows: Floats32 = self.rest_rows.copy()
+        rows[:, :3] = x
+        rows[:, 3:6] = drift
+        if spin.any():
+            a, b, c = spin
+            turning = np.array([[0, -c, b], [c, 0, -a], [-b, a, 0]])  # spin x r = turning @ r
+            rows[:, 3:6] += (x - (turn @ self._center_of_mass + origin)) @ turning.T
+            fastest = float(np.abs(rows[:, 3:6]).max())
+            if not fastest < VELOCITY_LIMIT:
+                raise OptionError(
+                    f"angular_velocity {spin.tolist()} rad/s makes a vertex as fast as {fastest:.4g} m/s: "
+                    f"stay below {VELOCITY_LIMIT:g}"
+                )
+        rows[self.description.pinned, 3:6] = 0.0
+        return rows
+
+    def _require_place(self, x: Floats, origin: Floats, floor: float | None) -> None:
+        if not np.abs(x).max() < POSITION_LIMIT:
+            raise OptionError(f"position puts the body beyond {POSITION_LIMIT:g} m: stay nearer the origin")
+        lowest, highest = float(x[:, 2].min()), float(x[:, 2].max())
+        if floor is not None and lowest < floor - 1e-3 * (highest - lowest):
+            depth = floor - lowest
+            raise OptionError(
+                f"the body starts {depth:.4g} m below the floor: position=({origin[0]:g}, {origin[1]:g}, "
+                f"{origin[2] + depth:.6g}) puts it on the floor, World(floor=None) has none"
+            )

@@ -1,0 +1,562 @@
+"""Bodies that come and go at run time, from pools of slots; and their handles, alive and dead."""
+
+import heapq
+import inspect
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from engine_adapter import EngineAdapter, FixedStep
+from taichi_soft import (
+    AnisotropicMaterial,
+    Body,
+    Device,
+    FrozenBodyWarning,
+    Material,
+    MaterialError,
+    MeshError,
+    OptionError,
+    SoftBodyAsset,
+    StateError,
+    Stiffness,
+    World,
+    box,
+    sphere,
+)
+from taichi_soft.kernels.schedules import make_launch
+from taichi_soft.runtime import ti
+from taichi_soft.scene import arrange
+from taichi_soft.types import Schedule
+
+DT = 1 / 60
+JELLY = Material(1e5, 0.2, 1000.0, 20.0)
+MESH, BALL = box(cells=(2, 2, 2)), sphere(0.5, 2)
+TILT = (0.0, np.sin(0.2), 0.0, np.cos(0.2))
+WAY = {"position": (3.0, 1.0, 0.75), "rotation": TILT, "velocity": (0.5, 1.0, -2.0)}
+NOWHERE = {"position": (0.0, -50.0, 0.55), "velocity": (1.0, 0.0, 0.0)}
+
+MODES = {
+    "per_body": {"schedule": "per_body"},
+    "flat": {"schedule": "flat"},
+    "gpu": {"schedule": "flat"},
+    "implicit": {"integrator": "implicit_euler"},
+    "contact": {"soft_contact": True},
+}
+
+
+def cube(**options):
+    return SoftBodyAsset(MESH, JELLY, **options)
+
+
+def ball():
+    return SoftBodyAsset(BALL, JELLY, law="face", flips="recover")
+
+
+def build(world, mode="per_body"):
+    world.build()
+    if mode == "gpu":  # one launch per substep, on the CPU
+        pretended = Device("cuda", 1, "pretended")
+        world._launch = make_launch(Schedule.FLAT, world._state, world._program, world._scene, pretended)
+    return world
+
+
+def bits(body):
+    world = body._world
+    rows = (body.positions(), body.velocities(), world.read_positions(body, 0.3))
+    return b"".join(row.tobytes() for row in rows)
+
+
+def broken(world, asset):
+    """A body that went out of reach."""
+    body = world.spawn(asset, **NOWHERE)
+    rows = np.ones((body.vertex_count, 3))
+    body.set_motion(9.9999e6 * rows, 1.9e4 * rows)
+    with pytest.warns(FrozenBodyWarning, match=f"body {body.index} went"):
+        world.step(DT, 4)
+    assert body.is_frozen
+    return body
+
+
+def told_by_a_world_of_their_own(mode):
+    """Bits of a resident and of a body that is pinned at a corner, from the start to the first contact on."""
+    world = World(**MODES[mode])
+    resident = world.add_body(BALL, JELLY, position=(0, 0, 0.8))
+    pinned = world.add_body(MESH, JELLY, pinned=[3], **WAY)
+    build(world, mode)
+    told = [(bits(resident), bits(pinned))]
+    for _ in range(12):
+        world.step(DT, 4)
+        told.append((bits(resident), bits(pinned)))
+    assert pinned.positions()[:, 2].min() < 0.01
+    return told
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_a_body_that_comes_later_moves_as_one_of_the_start_and_leaves_no_trace_on_others(mode):
+    """Bit for bit: in a slot where one lay on the floor before, and where one broke."""
+    told = told_by_a_world_of_their_own(mode)
+    world = World(**MODES[mode])
+    kind, other = cube(pinned=[3]), SoftBodyAsset(BALL, JELLY)
+    world.reserve(kind, 2)
+    world.reserve(other, 2)
+    resident = world.spawn(other, position=(0, 0, 0.8))
+    build(world, mode)
+    guests = [world.spawn(kind, **NOWHERE)]
+    world.step(DT, 4)
+    guests.append(broken(world, kind))
+    world.step(DT, 4)
+    world.step(DT, 4)
+    assert bits(resident) == told[4][0]
+    for guest in guests:
+        world.despawn(guest)
+    first = world.spawn(kind, **WAY)
+    second = first if mode == "contact" else world.spawn(kind, **WAY)  # they would not lie in each other
+    assert (first.index, second.index) == (0, int(mode != "contact"))
+    assert first.solve_residual is None  # of the one before
+    for step in range(8):
+        assert bits(first) == bits(second) == told[step][1], step
+        assert bits(resident) == told[step + 4][0], step
+        if step == 5:
+            world.spawn(other, **NOWHERE)
+        world.step(DT, 4)
+    assert (first.solve_residual is None) == (mode != "implicit")
+    assert not first.is_frozen
+    assert second.failure is None
+
+
+@pytest.fixture(scope="module")
+def play():
+    """A built world with two pools of three, in which all bodies fall freely."""
+    world = World(floor=None)
+    kinds = (cube(), ball())
+    for kind in kinds:
+        world.reserve(kind, 3)
+    build(world)
+    return world, kinds
+
+
+@pytest.fixture
+def empty(play):
+    """The same without bodies."""
+    world, kinds = play
+    for body in world.bodies:
+        world.despawn(body)
+    return world, kinds
+
+
+def test_a_world_without_bodies_goes_on(empty):
+    world, _ = empty
+    before = world.time
+    world.step(DT)
+    assert world.bodies == ()
+    assert world.time == pytest.approx(before + DT)
+
+
+READABLE = {"asset", "index", "is_alive", "is_frozen", "mesh", "material", "vertex_count", "tets", "surface"}
+READABLE |= {"masses", "pinned"}
+ARGUMENTS = {"set_motion": (np.zeros_like(MESH.vertices), np.zeros_like(MESH.vertices))}
+
+
+def asked(body, name):
+    value = getattr(body, name)
+    if not callable(value):
+        return value
+    needed = [p for p in inspect.signature(value).parameters.values() if p.default is p.empty]
+    assert name in ARGUMENTS or not needed, f"{name} needs a line in ARGUMENTS"
+    return value(*ARGUMENTS.get(name, ()))
+
+
+@pytest.mark.parametrize("name", [name for name in dir(Body) if not name.startswith("_")])
+def test_a_dead_handle_says_so_and_what_it_was_can_still_be_read(empty, name):
+    world, (kind, _) = empty
+    world.spawn(kind)
+    body = world.spawn(kind, position=(5, 0, 0))
+    assert body.is_alive
+    world.despawn(body)
+    again = world.spawn(kind, position=(9, 0, 0))
+    assert (again.index, again.is_alive, body.is_alive) == (1, True, False)
+    before = bits(again)
+    if name in READABLE:
+        asked(body, name)
+    else:
+        with pytest.raises(StateError, match=rf"body 1 was removed by despawn in step {world.step_count}"):
+            asked(body, name)
+    assert repr(body).endswith("removed)")
+    assert repr(again).endswith("active)")
+    assert bits(again) == before
+
+
+def state_of(world):
+    fields = ("particle_position", "particle_velocity", "prev_position", "particle_inv_mass", "body_status")
+    rows = [getattr(world._state, name).to_numpy().tobytes() for name in fields]
+    return rows, world.bodies, world.step_count, world.is_built
+
+
+NAN = float("nan")
+SPAWNS = {
+    "nan": ({"position": (0, 0, NAN)}, "position must be finite"),
+    "shape": ({"position": (0, 0)}, "position must have shape"),
+    "far": ({"position": (9.9999999e6, 0, 0)}, "beyond 1e[+]07 m"),
+    "crooked": ({"rotation": (0, 0, 0, 2)}, "length 2: normalise"),
+    "fast": ({"velocity": (0, 2e4, 0)}, "velocity must lie within"),
+    "whirling": ({"angular_velocity": (0, 5e4, 0)}, "makes a vertex as fast as"),
+    "whirling nan": ({"angular_velocity": (0, NAN, 0)}, "angular_velocity must be finite"),
+    "spinning text": ({"angular_velocity": "fast"}, "angular_velocity must be numbers"),
+}
+
+
+@pytest.mark.parametrize("name", SPAWNS)
+def test_a_body_that_cannot_begin_so_is_refused_and_nothing_changes(empty, name):
+    world, (kind, _) = empty
+    world.spawn(kind)
+    options, message = SPAWNS[name]
+    before = state_of(world)
+    with pytest.raises(OptionError, match=message):
+        world.spawn(kind, **options)
+    assert state_of(world) == before
+    assert world.spawn(kind).index == 1  # the slot is still free
+
+
+@pytest.mark.parametrize("value", [None, MESH, "cube", 0, SoftBodyAsset])
+def test_what_is_no_asset_is_refused(empty, value):
+    world, _ = empty
+    before = state_of(world)
+    with pytest.raises(OptionError, match="asset must be a SoftBodyAsset"):
+        world.spawn(value)
+    with pytest.raises(OptionError, match="asset must be a SoftBodyAsset"):
+        World().reserve(value, 1)
+    assert state_of(world) == before
+
+
+def test_a_full_pool_an_unknown_asset_and_a_late_reserve_are_refused(empty):
+    world, (kind, other) = empty
+    bodies = [world.spawn(kind, position=(3 * i, 0, 0)) for i in range(3)]
+    before = state_of(world)
+    with pytest.raises(
+        StateError, match=r"is full: 3 of 3 bodies live\. Reserve more before build, or despawn"
+    ):
+        world.spawn(kind)
+    with pytest.raises(StateError, match="has no pool in this world: call reserve"):
+        world.spawn(cube())
+    with pytest.raises(StateError, match="already built: add_body and reserve come first"):
+        world.reserve(kind, 1)
+    with pytest.raises(StateError, match="already built"):
+        world.add_body(MESH, JELLY)
+    assert state_of(world) == before
+    world.spawn(other)  # which has a pool of its own
+    world.despawn(bodies[1])
+    assert world.spawn(kind).index == 1
+
+
+def test_only_bodies_that_live_here_can_be_removed(empty):
+    world, (kind, _) = empty
+    elsewhere = World(floor=None)
+    stranger = elsewhere.add_body(MESH, JELLY)
+    body = world.spawn(kind)
+    gone = world.spawn(kind)
+    world.despawn(gone)
+    before = state_of(world)
+    for value in (stranger, None, 0, kind):
+        with pytest.raises(OptionError, match="body must be one that this world made"):
+            world.despawn(value)
+    with pytest.raises(StateError, match="body 1 was removed"):
+        world.despawn(gone)
+    with pytest.raises(StateError, match="body 1 was removed"):
+        world.read_positions(gone, 1.0)
+    assert state_of(world) == before
+    assert (body.is_alive, stranger.is_alive) == (True, True)
+
+
+@pytest.mark.parametrize("count", [0, -1, 1.5, True, None, "3", 10**9])
+def test_a_count_that_is_none_is_refused_before_anything_is_reserved(count):
+    world, kind = World(floor=None), cube()
+    with pytest.raises(OptionError, match="count must be a whole number from 1"):
+        world.reserve(kind, count)
+    with pytest.raises(StateError, match="has no pool in this world"):
+        world.spawn(kind)
+
+
+def test_more_than_fits_into_a_world_is_refused():
+    with pytest.raises(OptionError, match="the world would hold 27,000,000 vertices, at most 10,000,000"):
+        World(floor=None).reserve(cube(), 1_000_000)
+
+
+def test_nothing_is_put_below_the_floor():
+    world, kind = World(floor=1.0), cube()
+    world.reserve(kind, 1)
+    with pytest.raises(
+        OptionError, match=r"1.5 m below the floor: position=\(2, 0, 1.5\) puts it on the floor"
+    ):
+        world.spawn(kind, position=(2, 0, 0))
+    assert world.bodies == ()
+    assert world.spawn(kind, position=(2, 0, 1.5)).index == 0
+
+
+def test_bodies_can_come_and_go_before_the_world_is_built():
+    world, kind = World(floor=None), cube()
+    world.reserve(kind, 3)
+    first, second = (world.spawn(kind, position=(x, 0, 0)) for x in (1, 5))
+    world.despawn(first)
+    with pytest.raises(StateError, match="body 0 was removed by despawn in step 0"):
+        first.positions()
+    build(world)
+    assert world.bodies == (second,)
+    third = world.spawn(kind, position=(9, 0, 0))
+    assert world.bodies == (third, second)
+    assert [body.center_of_mass()[0] for body in world.bodies] == pytest.approx([9, 5], abs=1e-6)
+
+
+def test_a_body_that_was_added_can_go_and_come_again():
+    world = World(floor=None)
+    bodies = [world.add_body(MESH, JELLY, position=(x, 0, 0)) for x in (0, 5)]
+    build(world)
+    kind = bodies[0].asset
+    assert bodies[1].asset is kind
+    with pytest.raises(StateError, match="is full: 2 of 2"):
+        world.spawn(kind)
+    world.despawn(bodies[0])
+    assert world.spawn(kind, position=(7, 0, 0)).center_of_mass() == pytest.approx([7, 0, 0], abs=1e-6)
+
+
+def test_copies_are_arranged_once(monkeypatch):
+    made = []
+
+    def counted(description):
+        made.append(description)
+        return arrange(description)
+
+    monkeypatch.setattr("taichi_soft.assets.arrange", counted)
+    world, kind = World(floor=None), cube()
+    for x in range(4):
+        world.add_body(MESH, JELLY, position=(3 * x, 0, 0))
+    assert len(made) == 1
+    world.add_body(MESH, JELLY, pinned=[0])
+    world.add_body(MESH, JELLY, law="face")
+    assert len(made) == 3
+    for other in (world, World(floor=None)):
+        other.reserve(kind, 5)
+    assert len(made) == 4
+    assert len({body.asset for body in world.bodies}) == 3
+
+
+def test_an_asset_cannot_be_changed_through_anything_it_shares(empty):
+    world, (kind, _) = empty
+    pinned = np.array([4, 2, 2])
+    asset = cube(pinned=pinned)
+    pinned[:] = 0
+    assert asset.pinned.tolist() == [2, 4]
+    body = world.spawn(kind)
+    for name in ("mesh", "law", "pinned", "description"):
+        with pytest.raises(AttributeError):
+            setattr(asset, name, None)
+    for rows in (asset.pinned, body.pinned, body.masses, body.mesh.vertices):
+        with pytest.raises(ValueError, match="read-only"):
+            rows[...] = 0
+
+
+@pytest.mark.parametrize(
+    ("change", "error"),
+    [
+        ({"mesh": None}, MeshError),
+        ({"mesh": MESH.scaled(1e-9)}, MeshError),
+        ({"material": 5}, MaterialError),
+        ({"law": "hope"}, OptionError),
+        ({"law": "neo_hookean", "flips": "off"}, OptionError),
+        ({"strain": 3}, OptionError),
+        ({"damping_model": None}, OptionError),
+        ({"pinned": [27]}, OptionError),
+        ({"pinned": [0.5]}, OptionError),
+    ],
+)
+def test_what_makes_no_body_makes_no_asset(change, error):
+    options = {"mesh": MESH, "material": JELLY, **change}
+    mesh, material = options.pop("mesh"), options.pop("material")
+    with pytest.raises(error):
+        SoftBodyAsset(mesh, material, **options)
+
+
+def test_an_asset_that_the_integrator_cannot_take_is_refused():
+    grain = AnisotropicMaterial(Stiffness.isotropic(1e6, 0.2), density=500.0)
+    world, kind = World(integrator="implicit_euler"), SoftBodyAsset(MESH, grain, law="virial")
+    with pytest.raises(OptionError, match="has no gradients for an AnisotropicMaterial"):
+        world.reserve(kind, 1)
+    with pytest.raises(StateError, match="has no pool in this world"):
+        world.spawn(kind)
+
+
+def test_a_spinning_body_has_the_momentum_and_the_spin_that_were_asked_for(empty):
+    """P = m v and L = I omega about the centre of mass, with the moment of inertia from the masses."""
+    world, (_, kind) = empty
+    spin, speed = np.array([1.0, -2.0, 0.5]), np.array([3.0, 0.0, -1.0])
+    body = world.spawn(kind, position=(4, 5, 6), rotation=TILT, velocity=speed, angular_velocity=spin)
+    m, x = body.masses, body.positions().astype(float)
+    arm = x - m @ x / m.sum()
+    inertia = np.einsum(
+        "n,nij->ij", m, (arm**2).sum(axis=1)[:, None, None] * np.eye(3) - np.einsum("ni,nj->nij", arm, arm)
+    )
+    about = np.cross(arm, m[:, None] * body.velocities()).sum(axis=0)
+    np.testing.assert_allclose(body.momentum(), m.sum() * speed, rtol=1e-5, atol=1e-3)
+    np.testing.assert_allclose(about, inertia @ spin, rtol=1e-5, atol=1e-4)
+
+
+def test_pinned_vertices_stay_where_a_moving_body_was_put(empty):
+    world = World(floor=None)
+    kind = cube(pinned=[0, 1])
+    world.reserve(kind, 1)
+    build(world)
+    body = world.spawn(kind, velocity=(1, 2, 0), angular_velocity=(0, 1, 0))
+    for _ in range(5):
+        world.step(DT)
+    np.testing.assert_array_equal(body.positions()[:2], MESH.vertices[:2].astype(np.float32))
+    assert body.center_of_mass()[1] > 0.01
+
+
+def test_the_number_of_substeps_does_not_depend_on_who_lives(empty):
+    world, kinds = empty
+    needed = max(int(np.ceil(DT / kind.stable_step.recommended)) for kind in kinds)
+    counts = [world.stable_substeps(DT)]
+    for kind in kinds:
+        world.spawn(kind)
+        counts.append(world.stable_substeps(DT))
+    assert counts == [needed] * 3
+
+
+def test_nothing_is_compiled_when_the_first_body_comes(monkeypatch):
+    compiled = []
+    inner = ti.lang.kernel_impl._get_tree_and_ctx
+
+    def noted(kernel, *args, **kwargs):
+        compiled.append(kernel.func.__name__)
+        return inner(kernel, *args, **kwargs)
+
+    monkeypatch.setattr(ti.lang.kernel_impl, "_get_tree_and_ctx", noted)
+    world, kinds = World(), (cube(), SoftBodyAsset(BALL, JELLY))
+    for kind in kinds:
+        world.reserve(kind, 70)  # a capacity of its own: a state that no other test has used
+    resident = world.spawn(kinds[0], position=(0, 0, 3))
+    build(world)
+    assert "spawn_body" in compiled
+    world.step(DT)
+    resident.positions()
+    compiled.clear()
+    guests = [
+        world.spawn(kind, position=(5, 0, 3), rotation=TILT, angular_velocity=(1, 0, 0)) for kind in kinds
+    ]
+    world.step(DT)
+    for guest in guests:
+        guest.positions()
+        world.despawn(guest)
+    world.step(DT)
+    assert compiled == []
+
+
+def test_an_adapter_reads_who_comes_and_refuses_who_went(empty):
+    world, (kind, _) = empty
+    adapter = EngineAdapter(world, FixedStep(dt=DT, substeps=2))
+    adapter.advance(1.5 * DT)
+    resident = world.spawn(kind, position=(3, 0, 0))
+    adapter.positions(resident)  # and with it all bodies, for this alpha
+    body = world.spawn(kind, position=(0, 0, 5))
+    start = (MESH.vertices + np.array([0, 0, 5])).astype(np.float32)
+    np.testing.assert_array_equal(adapter.positions(body), start)
+    adapter.advance(DT)
+    expected = 0.5 * start + 0.5 * body.positions().astype(float)
+    np.testing.assert_allclose(adapter.positions(body), expected, atol=1e-6)
+    out = np.full((27, 3), 7, dtype=np.float32)
+    world.despawn(body)
+    again = world.spawn(kind, position=(0, 0, 8))
+    with pytest.raises(StateError, match="body 1 was removed"):
+        adapter.positions(body, out)
+    assert (out == 7).all()
+    assert adapter.positions(again)[:, 2].min() == pytest.approx(7.5)
+
+
+def test_who_went_gives_colliders_no_impulse_and_no_query_finds_him():
+    world, kind = World(soft_contact=True), cube()
+    world.reserve(kind, 3)
+    build(world)
+    guest = world.spawn(kind, position=(0, 0, 0.5))
+    for _ in range(20):
+        world.step(DT)
+    above = {"origin": (0.1, 0.2, 9), "direction": (0, 0, -1)}
+    assert world.floor_collider.impulse[2] < 0
+    assert world.raycast(**above).body is guest
+    world.despawn(guest)
+    assert world.raycast(**above) is None
+    assert world.closest_point((0, 0, 0.5)) is None
+    assert world.overlap_sphere((0, 0, 0.5), 2.0) == ()
+    world.step(DT)
+    assert world.floor_collider.impulse.tolist() == [0, 0, 0]
+    with pytest.raises(OptionError, match="removed"):
+        world.raycast(**above, bodies=[guest])
+    far, near = (world.spawn(kind, position=(x, 0, 3)) for x in (20, 0))
+    assert (far.index, near.index) == (0, 1)
+    assert world.raycast(**above).body is near
+    assert world.closest_point((20, 0, 3)).body is far
+    assert [overlap.body for overlap in world.overlap_sphere((0, 0, 3), 0.1)] == [near]
+
+
+CENTERS = [
+    kind.description.masses @ kind.mesh.vertices / kind.description.masses.sum() for kind in (cube(), ball())
+]
+"""Of mass, of what is in the pools."""
+
+CALLS = st.lists(
+    st.one_of(
+        st.tuples(st.just("spawn"), st.integers(0, 1)),
+        st.tuples(st.just("despawn"), st.integers(0, 20)),
+        st.tuples(st.just("step"), st.integers(1, 3)),
+    ),
+    max_size=30,
+)
+
+
+@pytest.fixture(scope="module")
+def flat_play():
+    world = World(floor=None, schedule="flat")
+    kinds = (cube(), ball())
+    for kind in kinds:
+        world.reserve(kind, 3)
+    return build(world), kinds
+
+
+@pytest.mark.parametrize("which", ["play", "flat_play"])
+@settings(max_examples=30)
+@given(calls=CALLS)
+def test_whatever_comes_and_goes_those_who_live_fall_freely_and_the_dead_stay_dead(which, request, calls):
+    """Against a list of who lives in which slot, and the parabola of each one's fall."""
+    world, kinds = request.getfixturevalue(which)
+    for body in world.bodies:
+        world.despawn(body)
+    free = [[0, 1, 2], [3, 4, 5]]
+    living, born, dead = {}, {}, []
+    for call, number in calls:
+        if call == "spawn" and free[number]:
+            place = np.array([3.0 * len(dead), 0.0, 3.0 * len(living)])
+            body = world.spawn(kinds[number], position=place, velocity=(0, number, 2))
+            assert body.index == heapq.heappop(free[number])
+            living[body.index] = body
+            born[body] = (place + CENTERS[number], np.array([0, number, 2]), world.time)
+        elif call == "spawn":
+            with pytest.raises(StateError, match="is full: 3 of 3"):
+                world.spawn(kinds[number])
+        elif call == "despawn" and living:
+            body = living.pop(sorted(living)[number % len(living)])
+            world.despawn(body)
+            dead.append(body)
+            heapq.heappush(free[body.index // 3], body.index)
+        elif call == "step":
+            for _ in range(number):
+                world.step(DT, 4)
+        assert world.bodies == tuple(living[slot] for slot in sorted(living))
+    for body in living.values():
+        start, speed, moment = born[body]
+        t = world.time - moment
+        fallen = start + speed * t - np.array([0, 0, 0.5 * 9.81 * t * t])
+        np.testing.assert_allclose(body.center_of_mass(), fallen, atol=2e-4)
+    for body in dead:
+        assert not body.is_alive
+        with pytest.raises(StateError, match="was removed"):
+            body.positions()
