@@ -2,6 +2,8 @@
 
 from taichi_soft.assets import SoftBodyAsset
 from taichi_soft.body import Body
+from taichi_soft.colliders import Collider
+from taichi_soft.contact import Contact
 from taichi_soft.errors import (
     DeviceError,
     FrozenBodyWarning,
@@ -71,6 +73,8 @@ __all__ = [
     "BoxShape",
     "CapsuleShape",
     "ClosestPoint",
+    "Collider",
+    "Contact",
     "Device",
     "DeviceError",
     "Failure",

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.checks import as_indices, as_rotation, as_vector
 from taichi_soft.constants import POSITION_LIMIT, VELOCITY_LIMIT
+from taichi_soft.contact import DEFAULT_CONTACT, THIN, Contact
 from taichi_soft.errors import OptionError
 from taichi_soft.laws import element_model, fit_model
 from taichi_soft.materials import AnyMaterial
@@ -38,6 +39,7 @@ class SoftBodyAsset:
             takes the law's own. A law with an energy does what follows from it, and takes no other.
         damping_model: "edge" (eq. 3.9) or "tet_mean" (which section 6.4 rejects: it stops rotation).
         pinned: vertices that stay where they are.
+        contact: how its surface touches others, in a world with colliders or soft contact.
     Raises: MeshError, MaterialError or OptionError for bad input.
     """
 
@@ -49,11 +51,14 @@ class SoftBodyAsset:
     flips: str | Flips | None = None
     damping_model: str | DampingModel = DampingModel.EDGE
     pinned: ArrayLike = ()
+    contact: Contact = DEFAULT_CONTACT
     description: BodyDescription = field(init=False)
 
     def __post_init__(self) -> None:
         model = element_model(self.law, self.strain, self.flips, self.damping_model)
         model = fit_model(model, self.mesh, self.material)
+        if not isinstance(self.contact, Contact):
+            raise OptionError(f"contact must be a Contact, got {self.contact!r}")
         pinned = read_only(as_indices(self.pinned, "pinned", len(self.mesh.vertices)))
         require_size(self.mesh)
         description = BodyDescription(self.mesh, self.material, model, pinned)
@@ -73,6 +78,15 @@ class SoftBodyAsset:
     def stable_step(self) -> StableStep:
         """Estimate of the largest stable substep."""
         return stable_step(self.mesh, self.material, self.description.model)
+
+    @cached_property
+    def surface_row(self) -> tuple[float, float, float]:
+        """Friction, thickness [m] and mean edge [m] of the surface; of all edges where it has no triangles."""
+        corners = self.mesh.surface if len(self.mesh.surface) else self.mesh.edges
+        ends = self.mesh.vertices[np.concatenate([corners[:, :2], corners[:, -2:]])]
+        edge = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).mean())
+        thickness = self.contact.thickness
+        return self.contact.friction, THIN * edge if thickness is None else thickness, edge
 
     @cached_property
     def _center_of_mass(self) -> Floats:

@@ -81,7 +81,7 @@ class Collider:
     @property
     def rotation(self) -> Floats:
         """Its axes as columns, (3, 3)."""
-        return matrix_of(self._row.rotation)
+        return np.asarray(matrix_of(self._row.rotation))
 
     @property
     def impulse(self) -> Floats:
@@ -301,7 +301,7 @@ class Colliders:
 
 
 def _way(row: _Row, dt: float) -> tuple[Floats, Floats, Floats]:
-    """Corners of a box round everywhere the collider gets to within `dt` [m]; its highest speed, (1,) [m/s]."""
+    """Corners of a box round its way through `dt` [s], (3,) [m] each; its highest speed, (1,) [m/s]."""
     lower, upper = row.shape.bounds
     speed, spin = float(np.linalg.norm(row.velocity)), float(np.linalg.norm(row.spin))
     if not np.isfinite([lower, upper]).all():
@@ -315,4 +315,6 @@ def _way(row: _Row, dt: float) -> tuple[Floats, Floats, Floats]:
     start, end = row.position + places, row.position + dt * row.velocity + places
     both = np.concatenate([start, end])
     fastest = np.array([speed + spin * (radius + row.thickness)])
-    return both.min(axis=0) - row.thickness, both.max(axis=0) + row.thickness, fastest
+    lowest: Floats = both.min(axis=0) - row.thickness
+    highest: Floats = both.max(axis=0) + row.thickness
+    return lowest, highest, fastest

@@ -40,3 +40,6 @@ class Contact:
         as_flag(self.itself, "itself")
         as_count(self.group, "group", 0, ALL_GROUPS)
         as_count(self.mask, "mask", 0, ALL_GROUPS)
+
+
+DEFAULT_CONTACT = Contact()

@@ -199,13 +199,6 @@ def outer_vertices(mesh: BodyMesh) -> Ints:
     return np.arange(len(mesh.vertices), dtype=np.int32)
 
 
-def contact_surface(body: BodyArrays) -> tuple[float, float, float]:
-    """Friction, thickness [m] and mean edge of the surface [m]."""
-    corners = body.rest_position[body.triangles if len(body.triangles) else body.edge_vertices]
-    edge = float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean())
-    return 0.5, 0.02 * edge, edge
-
-
 def edge_damping(mesh: TetMesh, tet_damping: Floats) -> Floats:
     """Damping of each edge: the mean over the tetrahedra that share it, (k,) [N s/m]."""
     total = np.bincount(mesh.tet_edges.ravel(), np.repeat(tet_damping, 6), minlength=len(mesh.edges))

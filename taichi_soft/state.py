@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.constants import ALL_GROUPS, LANES
+from taichi_soft.constants import LANES
 from taichi_soft.contact_fields import ContactCapacity, ContactFields, SoftContactFields
 from taichi_soft.runtime import ti
 from taichi_soft.scene import BodyArrays, Ranges, Scene, blocks_of
@@ -233,14 +233,12 @@ class State:
         # What lies inside a body is never near anything.
         fill(contact.particle_clearance, np.full(scene.particle_count, np.inf))
         fill(contact.particle_touches, np.zeros(0))
-        fill(contact.body_filter, np.tile((1, ALL_GROUPS), (count, 1)))
         contact.island_count[None] = count
         fill(contact.island_first, np.arange(count + 1))
         fill(contact.island_body, np.arange(count))
         if self.capacity.contact.soft:
             fill(self.soft.sweep_order, np.arange(count))
             fill(self.soft.slot_count, np.zeros(0))
-            fill(self.soft.body_touches_itself, np.zeros(0))
             fill(self.soft.rest_position, np.concatenate([b.rest_position for b, _ in pairs]))
 
     def _load_bonds(self, bodies: list[BodyArrays], ranges: list[Ranges]) -> None:

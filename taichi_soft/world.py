@@ -17,6 +17,7 @@ from taichi_soft.body import Body, Floats32, require_buffer, require_built
 from taichi_soft.checks import as_count, as_flag, as_number, as_vector
 from taichi_soft.colliders import Collider, Colliders
 from taichi_soft.constants import ALL_GROUPS, GRAVITY_EARTH, POSITION_LIMIT, VELOCITY_LIMIT
+from taichi_soft.contact import DEFAULT_CONTACT, Contact
 from taichi_soft.contact_fields import ContactCapacity
 from taichi_soft.errors import FrozenBodyWarning, OptionError, SolverWarning, StateError, UnstableStepWarning
 from taichi_soft.failures import FailedStep, Failure, find_failure
@@ -40,7 +41,7 @@ from taichi_soft.queries import (
     find_in_sphere,
 )
 from taichi_soft.runtime import init
-from taichi_soft.scene import Scene, contact_surface
+from taichi_soft.scene import Scene
 from taichi_soft.settings import Settings
 from taichi_soft.shapes import PlaneShape, Shape
 from taichi_soft.stability import StableStep
@@ -178,12 +179,13 @@ class World:
         rotation: ArrayLike | None = None,
         velocity: ArrayLike = (0.0, 0.0, 0.0),
         pinned: ArrayLike = (),
+        contact: Contact = DEFAULT_CONTACT,
     ) -> Body:
         """Add a body before `build`: an asset of its own, one slot for it, and a body in that.
 
         Copies, of the same mesh and material with the same options, share the asset.
         Args:
-            mesh, material, law, strain, flips, damping_model, pinned: as `SoftBodyAsset` takes them.
+            mesh, material, law, strain, flips, damping_model, pinned, contact: as `SoftBodyAsset` takes them.
             position, rotation, velocity: as `spawn` takes them.
         Returns: a handle.
         Raises: MeshError, MaterialError or OptionError for bad input; StateError after `build`.
@@ -197,9 +199,10 @@ class World:
             flips=flips,
             damping_model=damping_model,
             pinned=pinned,
+            contact=contact,
         )
         described = asset.description
-        key = (id(mesh), id(material), described.model, described.pinned.tobytes())
+        key = (id(mesh), id(material), described.model, described.pinned.tobytes(), contact)
         asset = self._added.get(key, asset)
         described.model.require_integrator(self.settings.integrator)
         rows = asset.placed(position, rotation, velocity, (0.0, 0.0, 0.0), self.settings.floor)
@@ -324,7 +327,8 @@ class World:
             friction: Coulomb coefficient, 0 or more.
             restitution: 0 to 1, of each vertex that hits it.
             thickness: of a skin on it [m].
-            group, mask: bits. A body and a collider touch where each one's mask has a bit of the other's group.
+            group, mask: bits. A body and a collider touch where each one's mask has a bit of the other's
+                group.
         Returns: a handle, to move it and to read the impulse on it.
         Raises: OptionError for bad values; StateError where there is no room left.
         """
@@ -400,9 +404,11 @@ class World:
             state.solver[None] = [chosen.tolerance, chosen.most_iterations]
         if has_contact:
             self._colliders.load(state.contact, len(self._pools.slots))
+            filters = [(asset.contact.group, asset.contact.mask) for asset in self._pools.assets]
+            fill(state.contact.body_filter, np.array(filters))
         if self._soft_contact:
-            surfaces = [contact_surface(body) for body in self._scene.bodies]
-            fill(state.soft.body_surface, np.array(surfaces))
+            fill(state.soft.body_surface, np.array([asset.surface_row for asset in self._pools.assets]))
+            fill(state.soft.body_touches_itself, np.array([a.contact.itself for a in self._pools.assets]))
         self._read = np.empty((self._scene.particle_count, 3), dtype=np.float32)
         self._program, self._state = program, state
         self._launch = make_launch(schedule, state, program, self._scene, device)

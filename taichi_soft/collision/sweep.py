@@ -12,8 +12,8 @@ TOUCHING = 1e-5
 """Distance [m] within which a particle counts as on the surface: some steps of float32 at ten metres."""
 
 MOST_MARCHES = 16
-"""Steps along one path: none is shorter than this part of it, so that one along the surface ends too. At 30 m/s
-and 240 substeps per second that is 8 mm."""
+"""Steps along one path: none is shorter than this part of it, so that one along the surface ends too. At
+30 m/s and 240 substeps per second that is 8 mm."""
 
 NEVER = 2.0
 """Part of the way at which what is not touched is touched."""

@@ -3,7 +3,7 @@
 from taichi_soft.runtime import ti
 
 MOTION_WIDTH = 20
-"""Position, quaternion, velocity, spin, the lower and upper corner of the box round the way, highest speed."""
+"""Position, quaternion, velocity, spin, both corners of the box round the way, highest speed."""
 
 
 @ti.func

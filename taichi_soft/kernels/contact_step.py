@@ -1,7 +1,7 @@
-"""Schedule `per_body` where bodies touch more than the floor: an island of bodies runs all substeps on one thread.
+"""Schedule `per_body` where bodies touch more than the floor: one thread makes all substeps of an island.
 
-What is explicit about a substep is done in the order velocity, contact, position: contact takes velocities away
-before they move anything.
+A substep goes in the order velocity, contact, position: contact takes velocities away before they move
+anything.
 """
 
 from taichi_soft.kernels.collide import collided, find_near_colliders, forget_contacts

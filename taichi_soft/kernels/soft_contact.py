@@ -1,8 +1,8 @@
 """Bodies of an island against each other: impulses between a vertex and a triangle, pair by pair.
 
-A pair that would come nearer than the thickness within the substep loses just so much of its approach, and with
-it of its sliding (projected Gauss-Seidel over velocities, begun with the impulses of the substep before). All
-impulses are equal and opposite. What is too near already is moved apart without giving it a velocity.
+A pair that would come nearer than the thickness within the substep loses just so much of its approach, and
+with it of its sliding: projected Gauss-Seidel over velocities, begun with the impulses of the substep before.
+Impulses are equal and opposite. What is too near already is moved apart without giving it a velocity.
 """
 
 from taichi_soft.contact_fields import NO_CONTACT, SLOTS
@@ -12,7 +12,8 @@ from taichi_soft.runtime import ti
 from taichi_soft.state import ACTIVE
 
 SWEEPS = 4
-"""Times all pairs are gone through in a substep. What is left over feeds or brakes vibrations of the surface."""
+"""Times all pairs are gone through in a substep. What is left over feeds vibrations of the surface; two leave
+visible ones."""
 
 PUSH_OUT = 0.2
 """Part of a penetration that one substep takes back."""
@@ -32,8 +33,8 @@ def _mobility(state: ti.template(), p):
 def _gap(state: ti.template(), p, corners):
     """How a vertex lies to a triangle.
 
-    Returns: distance [m], negative behind it; direction from the triangle; weights of the nearest point; whether
-    it may be in contact (1): what is behind an edge belongs to another triangle, or is outside.
+    Returns: distance [m], negative behind it; direction from the triangle; weights of the nearest point;
+    whether it may be in contact (1): what is behind an edge belongs to another triangle, or is outside.
     """
     a, b, c = (
         state.particle_position[corners[0]],
