@@ -81,7 +81,7 @@ class SoftBodyAsset:
 
     @cached_property
     def surface_row(self) -> tuple[float, float, float]:
-        """Friction, thickness [m] and mean edge [m] of the surface; of all edges where it has no triangles."""
+        """Friction, thickness [m] and mean edge [m] of the surface, or of all where it has no triangles."""
         corners = self.mesh.surface if len(self.mesh.surface) else self.mesh.edges
         ends = self.mesh.vertices[np.concatenate([corners[:, :2], corners[:, -2:]])]
         edge = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).mean())

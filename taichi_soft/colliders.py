@@ -81,7 +81,8 @@ class Collider:
     @property
     def rotation(self) -> Floats:
         """Its axes as columns, (3, 3)."""
-        return np.asarray(matrix_of(self._row.rotation))
+        matrix: Floats = matrix_of(self._row.rotation)
+        return matrix
 
     @property
     def impulse(self) -> Floats:
@@ -297,7 +298,7 @@ class Colliders:
             if self._contact is not None:
                 sum_collider_impulses(self._contact, self._body_count, rows)
             self._impulses = rows.astype(np.float64)
-        return self._impulses.copy()
+        return np.array(self._impulses)
 
 
 def _way(row: _Row, dt: float) -> tuple[Floats, Floats, Floats]:
