@@ -132,6 +132,11 @@ class Body:
         return self._frozen_in is not None
 
     @property
+    def is_asleep(self) -> bool:
+        """True while the body rests and costs nothing (see `World.sleep_speed`)."""
+        return self._world._is_asleep(self)
+
+    @property
     def failure(self) -> Failure | None:
         """What broke first, None while the body is sound. Found out when first asked, not within a step."""
         self.require_alive()

@@ -25,6 +25,7 @@ from taichi_soft.kernels.evaluate import compute_body_forces
 from taichi_soft.kernels.program import Program
 from taichi_soft.kernels.readout import read_positions, read_velocities, write_motion
 from taichi_soft.kernels.schedules import Launch, choose_schedule, make_launch
+from taichi_soft.kernels.sleep import wake_body
 from taichi_soft.kernels.spawn import despawn_body, spawn_body
 from taichi_soft.materials import AnyMaterial
 from taichi_soft.meshing import BodyMesh
@@ -45,7 +46,7 @@ from taichi_soft.scene import Scene
 from taichi_soft.settings import Settings
 from taichi_soft.shapes import PlaneShape, Shape
 from taichi_soft.stability import StableStep
-from taichi_soft.state import FROZEN, Capacity, State, acquire, fill, release
+from taichi_soft.state import ASLEEP, FROZEN, Capacity, State, acquire, fill, release
 from taichi_soft.types import DampingModel, Flips, Integrator, Schedule, Strain
 
 SHORTEST_STEP, LONGEST_STEP = 1e-9, 1e4
@@ -75,6 +76,8 @@ class World:
             by a `SolverWarning`.
         schedule: "auto", "per_body" or "flat": in which loops the work runs; no effect on the physics.
         soft_contact: whether bodies touch each other.
+        sleep_speed: bodies of which no particle was faster [m/s] for half a second, nor any of a body that
+            they may touch, fall asleep, until something comes near or is done to them; 0 for never.
         collider_room: colliders that may be added after `build`, beside those added before.
     Raises: OptionError for a value out of range or a name that is not known.
     """
@@ -91,6 +94,7 @@ class World:
         most_iterations: int = 200,
         schedule: str | Schedule = Schedule.AUTO,
         soft_contact: bool = False,
+        sleep_speed: float = 0.0,
         collider_room: int = 0,
     ) -> None:
         downwards = as_vector(gravity, "gravity", "m/s^2")
@@ -110,6 +114,9 @@ class World:
         self._colliders = Colliders()
         self._collider_room = as_count(collider_room, "collider_room", 0)
         self._soft_contact = as_flag(soft_contact, "soft_contact")
+        self._sleep_speed = as_number(
+            sleep_speed, "sleep_speed", 0.0, VELOCITY_LIMIT, "a speed of 0 m/s or more"
+        )
         self._floor_collider: Collider | None = None
         self._step_count = 0
         self._time = 0.0
@@ -360,7 +367,11 @@ class World:
         device = init()
         kinds = self._pools.kinds
         models = list(dict.fromkeys(asset.description.model for asset in kinds))
-        has_contact = self._soft_contact or len(self._colliders.handles) + self._collider_room > 0
+        has_contact = (
+            self._soft_contact
+            or self._sleep_speed > 0.0
+            or len(self._colliders.handles) + self._collider_room > 0
+        )
         if has_contact:
             self._require_contact()
         schedule = choose_schedule(
@@ -404,6 +415,8 @@ class World:
             state.solver[None] = [chosen.tolerance, chosen.most_iterations]
         if has_contact:
             self._colliders.load(state.contact, len(self._pools.slots))
+            self._colliders.on_jump = self.wake
+            state.contact.sleep_speed[None] = self._sleep_speed
             filters = [(asset.contact.group, asset.contact.mask) for asset in self._pools.assets]
             fill(state.contact.body_filter, np.array(filters))
         if self._soft_contact:
@@ -548,6 +561,14 @@ class World:
         assert self._state is not None
         assert self._program is not None
         return find_failure(self._state, self._program, self._scene, body.index, failed)
+
+    def _is_asleep(self, body: Body) -> bool:
+        return self._state is not None and int(self._state.body_status[body.index]) == ASLEEP
+
+    def wake(self) -> None:
+        """Wake all bodies that sleep."""
+        if self._has_contact:
+            wake_body(self._state, -1)
 
     def read_positions(self, body: Body, alpha: float, out: Floats32 | None = None) -> Floats32:
         """Positions of a body between the previous step (alpha 0) and the last one (alpha 1), (n, 3) [m].

@@ -9,6 +9,7 @@ from taichi_soft.kernels.internal_forces import accumulate_forces
 from taichi_soft.kernels.islands import find_islands, search_margin
 from taichi_soft.kernels.motion import remember_particle
 from taichi_soft.kernels.per_body import settle_body
+from taichi_soft.kernels.sleep import note_motion, settle_island, wake_by_colliders, wake_island
 from taichi_soft.kernels.soft_contact import solve_island
 from taichi_soft.kernels.soft_search import search_island
 from taichi_soft.runtime import ti
@@ -50,17 +51,21 @@ def _kick_body(state: ti.template(), program: ti.template(), body, kick, common)
 
 @ti.func
 def _drift_body(state: ti.template(), body, h, since):
-    """New positions, and what colliders in the way make of velocities."""
+    """New positions, and what colliders in the way make of velocities. Returns the highest speed [m/s]."""
     particles = state.body_particles[body]
     gone = state.contact.gone[body]
+    farthest2 = ti.cast(0.0, state.real)
     for p in range(particles[0], particles[1]):
         x, v = state.particle_position[p], state.particle_velocity[p]
         if state.contact.particle_clearance[p] <= gone and state.particle_inv_mass[p] > 0.0:
             x_new, v_new = collided(state, body, p, x, v, h, since)
             state.particle_position[p] = x_new
             state.particle_velocity[p] = v_new
+            farthest2 = ti.max(farthest2, (x_new - x).dot(x_new - x))
         else:
             state.particle_position[p] = x + h * v
+            farthest2 = ti.max(farthest2, h * h * v.dot(v))
+    return ti.sqrt(farthest2) / h
 
 
 @ti.func
@@ -98,8 +103,8 @@ def _common_velocity(state: ti.template(), island):
 
 
 @ti.func
-def _step_island(state: ti.template(), program: ti.template(), island, substeps, h):
-    """One fixed step of one island. Returns how many of its bodies failed."""
+def _move_island(state: ti.template(), program: ti.template(), island, substeps, h):
+    """All substeps of an island that is awake. Returns how many of its bodies failed."""
     first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
     for i in range(first, last):
         _begin_body(state, state.contact.island_body[i])
@@ -132,7 +137,7 @@ def _step_island(state: ti.template(), program: ti.template(), island, substeps,
                     find_near_colliders(state, body, 1.25 * fastest * left + 1e-3, s * h, left)
                     way = fastest * h
                 state.contact.gone[body] = way
-                _drift_body(state, body, h, s * h)
+                note_motion(state, body, _drift_body(state, body, h, s * h))
     failed = 0
     for i in range(first, last):
         body = state.contact.island_body[i]
@@ -144,15 +149,26 @@ def _step_island(state: ti.template(), program: ti.template(), island, substeps,
     return failed
 
 
+@ti.func
+def _step_island(state: ti.template(), program: ti.template(), island, substeps, h):
+    """One fixed step of one island. Returns how many of its bodies failed."""
+    failed = 0
+    if wake_island(state, island) == 1:
+        failed = _move_island(state, program, island, substeps, h)
+        settle_island(state, island, substeps * h)
+    return failed
+
+
 @ti.kernel
 def step_islands(
     state: ti.template(), program: ti.template(), body_count: ti.i32, substeps: ti.i32, h: ti.f32
 ) -> ti.i32:
     """One fixed step of every active body. Returns how many failed."""
     failed = 0
-    if ti.static(program.has_soft_contact):
-        ti.loop_config(serialize=True)
-        for _ in range(1):
+    ti.loop_config(serialize=True)
+    for _ in range(1):
+        wake_by_colliders(state, body_count)
+        if ti.static(program.has_soft_contact):
             find_islands(state, body_count, substeps * h)
     ti.loop_config(block_dim=1)
     for island in range(state.contact.island_count[None]):

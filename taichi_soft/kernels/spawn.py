@@ -30,6 +30,8 @@ def spawn_body(state: ti.template(), body: ti.i32, rows: ti.types.ndarray(dtype=
         state.body_velocity_lag[body] = 0.0
         if ti.static(state.capacity.implicit):
             state.body_residual[body] = 0.0
+        if ti.static(state.capacity.contact.colliders > 0):
+            state.contact.calm[body] = 0.0
         state.body_status[body] = ACTIVE
 
 
