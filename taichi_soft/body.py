@@ -10,6 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.checks import as_array
+from taichi_soft.control.impulses import apply_impulse, apply_impulse_at_point
+from taichi_soft.control.pins import pin, pinned_vertices, set_targets, unpin
+from taichi_soft.control.placement import set_velocity, teleport
 from taichi_soft.errors import MeshError, OptionError, StateError
 from taichi_soft.failures import FailedStep, Failure
 from taichi_soft.laws.law import EnergyLaw
@@ -88,8 +91,8 @@ class Body:
 
     @property
     def pinned(self) -> NDArray[np.int32]:
-        """Vertices that stay where they are, ascending."""
-        return self._description.pinned
+        """Vertices that are held now, ascending."""
+        return pinned_vertices(self) if self._world.is_built else self._description.pinned
 
     @cached_property
     def _rest_inverses(self) -> Floats:
@@ -145,6 +148,66 @@ class Body:
         x, v = as_array(positions, "positions", shape, "m"), as_array(velocities, "velocities", shape, "m/s")
         self._world._write_motion(self, x, v)
         self._frozen_in = self._failure = None
+
+    def apply_impulse(self, impulse: ArrayLike, particles: ArrayLike | None = None) -> None:
+        """Change the momentum at once; all particles named change their velocity by the same.
+
+        Args:
+            impulse: total, (3,) [N s]. What falls to pinned particles goes to what holds them.
+            particles: that it acts on; None means all.
+        Raises: OptionError for bad numbers or vertices; StateError before `build`. So do all that follow.
+        """
+        apply_impulse(self, impulse, particles)
+
+    def apply_impulse_at_point(self, impulse: ArrayLike, point: ArrayLike, radius: float) -> None:
+        """Change the momentum of the particles near a point, those at the distance r by (1 - (r/radius)^2)^2
+        as much in velocity as one at the point.
+
+        Args:
+            impulse: total, (3,) [N s], however few particles share it.
+            point: (3,) [m].
+            radius: of what is moved [m].
+        Raises: OptionError with the nearest distance where no particle is within reach.
+        """
+        apply_impulse_at_point(self, impulse, point, radius)
+
+    def set_velocity(self, linear: ArrayLike, angular: ArrayLike = (0.0, 0.0, 0.0)) -> None:
+        """Set the velocities of all particles that are not pinned to those of a rigid body.
+
+        Args:
+            linear: velocity of the centre of mass, (3,) [m/s].
+            angular: turn about the centre of mass, (3,) [rad/s].
+        """
+        set_velocity(self, linear, angular)
+
+    def teleport(
+        self, position: ArrayLike, rotation: ArrayLike | None = None, *, keep_velocity: bool = True
+    ) -> None:
+        """Move the whole body, deformed as it is, by a jump; pictures between two steps jump with it.
+
+        Args:
+            position: where its centre of mass goes, (3,) [m].
+            rotation: turn about the centre of mass, from how it lies now: matrix or quaternion (x, y, z, w).
+            keep_velocity: True turns velocities with the body, False stops it.
+        Raises: OptionError where it would lie below the floor.
+        """
+        teleport(self, position, rotation, keep_velocity)
+
+    def pin(self, particles: ArrayLike) -> None:
+        """Hold particles where they are, from now on."""
+        pin(self, particles)
+
+    def unpin(self, particles: ArrayLike | None = None) -> None:
+        """Let pinned particles go, all if None, with the velocity that they were moved with last."""
+        unpin(self, particles)
+
+    def set_targets(self, particles: ArrayLike, positions: ArrayLike) -> None:
+        """Move pinned particles by hand: in the coming step they go straight to `positions`, (n, 3) [m].
+
+        After it they stand still, unless they are given new targets.
+        Raises: OptionError for shapes that do not fit; StateError for a particle that is not pinned.
+        """
+        set_targets(self, particles, positions)
 
     def volumes(self) -> Floats:
         """Signed volume of each tetrahedron, (m,) [m^3]: negative where it is flipped."""

@@ -48,6 +48,13 @@ def as_count(value: Any, name: str, low: int = 1, high: int = LARGEST_COUNT) -> 
     return int(value)
 
 
+def as_flag(value: Any, name: str) -> bool:
+    """`value` as True or False. Raises: OptionError."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise OptionError(f"{name} must be True or False, got {value!r}")
+    return bool(value)
+
+
 def as_vector(value: ArrayLike, name: str, unit: str, limit: float = POSITION_LIMIT) -> Floats:
     """`value` as three numbers nearer to zero than `limit`. Raises: OptionError."""
     vector = as_array(value, name, (3,), unit)

@@ -17,6 +17,9 @@ from taichi_soft.scene import BodyArrays, Ranges, Scene, blocks_of
 
 ACTIVE, FROZEN = 0, 1
 
+MOVES_PINS, FEELS_REACTION = 1, 2
+"""Bits of `body_drives`: some pinned particles have somewhere to go; what they take up is added up."""
+
 
 @dataclass(frozen=True)
 class Capacity:
@@ -76,11 +79,15 @@ class State:
         self.particle_velocity = ti.Vector.field(3, real, n)  # [m/s], see body_velocity_lag
         # [N], zero between steps; with a fourth component, because four floats load and store in one piece.
         self.particle_force = ti.Vector.field(4, real, n)
-        self.particle_inv_mass = ti.field(real, n)  # [1/kg]
+        self.particle_mass = ti.field(real, n)  # [kg]
+        self.particle_inv_mass = ti.field(real, n)  # [1/kg], 0 where pinned
         self.particle_body = ti.field(ti.i32, n)
         self.particle_of_vertex = ti.field(ti.i32, n)  # where the caller's next vertex lies
         self.prev_position = ti.Vector.field(3, real, n)  # before the last fixed step
         self.prev_velocity = ti.Vector.field(3, real, n)
+        self.particle_aim = ti.field(ti.i32, n)  # where a pinned particle goes: see `kernels.pins`
+        self.particle_target = ti.Vector.field(3, real, n)  # there [m], or in the axes of a frame
+        self.particle_reaction = ti.Vector.field(3, real, n)  # [N s] on what holds it, in the last step
 
         self.tet_vertices = ti.field(ti.i32, b * 4 * LANES)
         self.tet_rest_inverse = ti.field(real, b * 9 * LANES)  # [1/m], column by column
@@ -138,6 +145,8 @@ class State:
         self.body_model = ti.field(ti.i32, bodies)
         self.body_status = ti.field(ti.i32, bodies)
         self.body_velocity_lag = ti.field(real, bodies)  # substep [s] by half of which leapfrog lags
+        self.body_drives = ti.field(ti.i32, bodies)  # bits: what a game does to the body
+        self.body_gravity_scale = ti.field(real, bodies)
         self.block_model = ti.field(ti.i32, b)
 
         self.gravity = ti.Vector.field(3, real, ())  # [m/s^2]
@@ -152,13 +161,16 @@ class State:
         velocity = np.concatenate([body.start_velocity for body in bodies])
         fill(self.particle_position, position)
         fill(self.prev_position, position)
-        fill(self.particle_velocity, velocity)
-        fill(self.prev_velocity, velocity)
         fill(self.particle_force, np.zeros((0, 4)))
+        fill(self.particle_mass, mass)
         inv_mass = 1.0 / mass
         for body, place in zip(bodies, ranges, strict=True):
             inv_mass[body.pinned + place.particles[0]] = 0.0
+        velocity[inv_mass == 0.0] = 0.0
+        fill(self.particle_velocity, velocity)
+        fill(self.prev_velocity, velocity)
         fill(self.particle_inv_mass, inv_mass)
+        fill(self.particle_aim, np.zeros(0))
         fill(self.particle_body, np.repeat(np.arange(len(bodies)), [len(body.mass) for body in bodies]))
 
         ranks = [b.rank + r.particles[0] for b, r in zip(bodies, ranges, strict=True)]
@@ -202,6 +214,8 @@ class State:
         fill(self.body_model, np.array(models))
         fill(self.body_status, np.zeros(0))
         fill(self.body_velocity_lag, np.zeros(0))
+        fill(self.body_drives, np.zeros(0))
+        fill(self.body_gravity_scale, np.ones(self.capacity.bodies))
         fill(self.block_model, np.repeat(models, [r.blocks[1] - r.blocks[0] for r in ranges]))
 
     def _load_bonds(self, bodies: list[BodyArrays], ranges: list[Ranges]) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 import weakref
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -15,6 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 from taichi_soft.body import Body, Floats32, require_buffer, require_built
 from taichi_soft.checks import as_count, as_indices, as_number, as_rotation, as_vector
 from taichi_soft.constants import GRAVITY_EARTH, POSITION_LIMIT, VELOCITY_LIMIT
+from taichi_soft.control.frames import Frames
+from taichi_soft.control.impulses import apply_radial_impulse
 from taichi_soft.errors import FrozenBodyWarning, OptionError, SolverWarning, StateError, UnstableStepWarning
 from taichi_soft.failures import FailedStep, Failure, find_failure
 from taichi_soft.kernels.evaluate import compute_body_forces
@@ -91,10 +93,11 @@ class World:
         self._state: State | None = None
         self._program: Program | None = None
         self._launch: Launch | None = None
+        self._frames = Frames()
         self._checked_step: tuple[Any, ...] = ()
         self._step_values = (0.0, 0, 0.0)
-        self._read: Floats32 = np.empty((0, 3), dtype=np.float32)
-        self._read_alpha: float | None = None  # of what `_read` holds; None once the world has moved on
+        self._rows: Floats32 = np.empty((0, 3), dtype=np.float32)
+        self._read_alpha: float | None = None  # of what `_rows` holds; None once the world has moved on
         self._warned_steps: set[float] = set()
         self._warned_solves: set[int] = set()
         self._stable_steps: dict[tuple[int, int, ElementModel], StableStep] = {}
@@ -219,7 +222,6 @@ class World:
             tuple(models),
             self.settings.integrator,
             self.settings.floor is not None,
-            any(len(body.pinned) for body in self._bodies),
             device.threads,
         )
         if self.settings.integrator is Integrator.EXPLICIT_EULER:
@@ -237,7 +239,7 @@ class World:
         state.floor[None] = [chosen.floor or 0.0, chosen.restitution, chosen.friction]
         if self._is_implicit:
             state.solver[None] = [chosen.tolerance, chosen.most_iterations]
-        self._read = np.empty((self._scene.particle_count, 3), dtype=np.float32)
+        self._rows = np.empty((self._scene.particle_count, 3), dtype=np.float32)
         self._program, self._state = program, state
         self._launch = make_launch(schedule, state, program, self._scene, device)
 
@@ -283,6 +285,7 @@ class World:
             self._checked_step = asked
         seconds, count, h = self._step_values
         self._read_alpha = None
+        self._frames.aim(self._state, len(self._bodies), seconds)  # type: ignore[arg-type]
         troubled = self._launch(count, h)  # type: ignore[misc]
         reports = self._note_failures(count, h) if troubled else []
         self._step_count += 1
@@ -349,6 +352,20 @@ class World:
         assert self._program is not None
         return find_failure(self._state, self._program, self._scene, body.index, failed)
 
+    def apply_radial_impulse(self, center: ArrayLike, impulse: float, radius: float) -> None:
+        """Push all bodies away from a point: an explosion.
+
+        A particle of mass m at the distance r takes up impulse m/M (1 - (r/radius)^2)^2, M being the mass of
+        its body: a light body is thrown farther than a heavy one, and one that lies half out of reach is
+        pushed on its near half only.
+        Args:
+            center: (3,) [m].
+            impulse: on a small body near the centre [N s]; negative pulls it there.
+            radius: where nothing is felt any more [m].
+        Raises: OptionError for a number out of range; StateError before `build`.
+        """
+        apply_radial_impulse(self, center, impulse, radius)
+
     def read_positions(self, body: Body, alpha: float, out: Floats32 | None = None) -> Floats32:
         """Positions of a body between the previous step (alpha 0) and the last one (alpha 1), (n, 3) [m].
 
@@ -364,10 +381,10 @@ class World:
             alpha = as_number(alpha, "alpha", 0.0, 1.0, "a number from 0 to 1")
         rows = require_buffer(out, body.vertex_count)
         if self._read_alpha != alpha:
-            read_positions(self._state, alpha, self._read)
+            read_positions(self._state, alpha, self._rows)
             self._read_alpha = alpha
         begin, end = self._scene.ranges[body.index].particles
-        rows[:] = self._read[begin:end]
+        rows[:] = self._rows[begin:end]
         return rows
 
     def _solve_residual(self, body: Body) -> float | None:
@@ -394,6 +411,27 @@ class World:
                 acceleration[body.positions()[:, 2] <= floor] = 0.0
             rows += (0.5 * lag * acceleration).astype(np.float32)
         return rows
+
+    def _rows_of(self, body: Body, vertices: NDArray[np.int32]) -> NDArray[np.int32]:
+        """Where vertices of a body lie in the fields. Raises: StateError before `build`."""
+        require_built(self.is_built)
+        rows: NDArray[np.int32] = self._scene.bodies[body.index].rank[vertices]
+        return (rows + self._scene.ranges[body.index].particles[0]).astype(np.int32)
+
+    def _read(self, body: Body, kernel: Callable[..., Any], *arguments: Any) -> Any:
+        """Call a kernel (state, first particle of `body`, *arguments) that changes nothing."""
+        require_built(self.is_built)
+        return kernel(self._state, self._scene.ranges[body.index].particles[0], *arguments)
+
+    def _change(self, body: Body, kernel: Callable[..., Any], *arguments: Any) -> Any:
+        """Call a kernel (state, *arguments) that changes a body: the way of all control."""
+        return self._change_all(kernel, *arguments)
+
+    def _change_all(self, kernel: Callable[..., Any], *arguments: Any) -> Any:
+        """Call a kernel (state, *arguments) that changes all bodies. Raises: StateError before `build`."""
+        require_built(self.is_built)
+        self._read_alpha = None
+        return kernel(self._state, *arguments)
 
     def _write_motion(self, body: Body, positions: NDArray[Any], velocities: NDArray[Any]) -> None:
         """Put a body somewhere else. Raises: StateError before `build`."""

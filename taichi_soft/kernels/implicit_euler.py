@@ -15,6 +15,7 @@ from taichi_soft.kernels.linear_system import (
     clear_system,
     multiply_system,
 )
+from taichi_soft.kernels.motion import gravity_on
 from taichi_soft.math.tensors import widened
 from taichi_soft.runtime import ti
 
@@ -35,9 +36,10 @@ def assemble(state: ti.template(), program: ti.template(), body, h):
     clear_system(state, body)
     add_stiffness(state, program, body, h * h)
     multiply_system(state, body, state.particle_velocity, state.image)
+    gravity = gravity_on(state, body)
     for p in range(particles[0], particles[1]):
         inv_mass = state.particle_inv_mass[p]
-        weight = state.gravity[None] / ti.max(inv_mass, 1e-30) * ti.select(inv_mass > 0.0, 1.0, 0.0)
+        weight = gravity / ti.max(inv_mass, 1e-30) * ti.select(inv_mass > 0.0, 1.0, 0.0)
         rhs = h * (state.particle_force[p].xyz + weight) - state.image[p]
         state.residual[p] = rhs
         state.particle_force[p] = widened(rhs)
@@ -49,7 +51,9 @@ def assemble(state: ti.template(), program: ti.template(), body, h):
 @ti.func
 def _move(state: ti.template(), program: ti.template(), p, h):
     """Position and velocity of one particle after the solve; what the floor does with it."""
-    if state.particle_inv_mass[p] > 0.0:
+    if state.particle_inv_mass[p] == 0.0:  # pinned: goes on with the velocity that it was given
+        state.particle_position[p] = state.particle_position[p] + h * state.particle_velocity[p]
+    else:
         v = state.particle_velocity[p] + state.solution[p]
         x = state.particle_position[p] + h * v
         if ti.static(program.has_floor):

@@ -6,7 +6,13 @@ of threads.
 
 from taichi_soft.kernels.implicit_euler import implicit_substep
 from taichi_soft.kernels.internal_forces import accumulate_forces, clear_forces
-from taichi_soft.kernels.motion import move_particle, particle_is_sound, remember_particle, restore_particle
+from taichi_soft.kernels.motion import (
+    gravity_on,
+    move_particle,
+    particle_is_sound,
+    remember_particle,
+    restore_particle,
+)
 from taichi_soft.runtime import ti
 from taichi_soft.state import ACTIVE, FROZEN
 from taichi_soft.types import Integrator
@@ -16,8 +22,9 @@ from taichi_soft.types import Integrator
 def move_body(state: ti.template(), program: ti.template(), body, h, kick):
     """Move all particles of one body and clear their forces."""
     particles = state.body_particles[body]
+    gravity = gravity_on(state, body)
     for p in range(particles[0], particles[1]):
-        move_particle(state, program, p, state.particle_force[p].xyz, h, kick)
+        move_particle(state, program, p, state.particle_force[p].xyz, gravity, h, kick)
         state.particle_force[p] = ti.Vector.zero(state.real, 4)
 
 

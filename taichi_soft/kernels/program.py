@@ -15,7 +15,6 @@ class Program:
     models: tuple[ElementModel, ...]  # a body names one by its index
     integrator: Integrator
     has_floor: bool
-    has_pins: bool = False
     worker_count: int = 1  # threads that share one flat step
 
     @property
