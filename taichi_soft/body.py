@@ -10,6 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.checks import as_array
+from taichi_soft.control.drives import (
+    apply_force,
+    set_gravity_scale,
+    set_linear_damping,
+    set_sheltered,
+)
 from taichi_soft.control.impulses import apply_impulse, apply_impulse_at_point
 from taichi_soft.control.pins import pin, pinned_vertices, set_targets, unpin
 from taichi_soft.control.placement import set_velocity, teleport
@@ -149,6 +155,36 @@ class Body:
         self._world._write_motion(self, x, v)
         self._frozen_in = self._failure = None
 
+    def apply_force(self, force: ArrayLike, particles: ArrayLike | None = None) -> None:
+        """Push throughout the coming step, all particles named with the same acceleration. Calls add up.
+
+        Args:
+            force: total, (3,) [N]. What falls to pinned particles goes to what holds them.
+            particles: that it acts on; None means all.
+        Raises: OptionError for bad numbers or vertices; StateError before `build` and under schedule "flat".
+        """
+        apply_force(self, force, particles)
+
+    @property
+    def gravity_scale(self) -> float:
+        """By what the world's gravity is multiplied for this body."""
+        return self._world._gravity_scale(self)
+
+    def set_gravity_scale(self, scale: float) -> None:
+        """Multiply the world's gravity for this body, from now on: 0 floats, -1 rises."""
+        set_gravity_scale(self, scale)
+
+    def set_linear_damping(self, rate: float) -> None:
+        """Let all velocities fade by exp(-rate t), from now on, against the world at rest [1/s].
+
+        Raises: OptionError for a negative rate; StateError before `build` and under schedule "flat".
+        """
+        set_linear_damping(self, rate)
+
+    def set_sheltered(self, is_sheltered: bool) -> None:
+        """True keeps the wind of `World.set_wind` off this body, from now on."""
+        set_sheltered(self, is_sheltered)
+
     def apply_impulse(self, impulse: ArrayLike, particles: ArrayLike | None = None) -> None:
         """Change the momentum at once; all particles named change their velocity by the same.
 
@@ -241,7 +277,8 @@ class Body:
 
     def gravitational_energy(self) -> float:
         """- sum m g.x, zero at the origin [J]."""
-        return float(-(self.masses @ self.positions().astype(np.float64)) @ self._world.settings.gravity)
+        gravity = self._world.settings.gravity * self.gravity_scale
+        return float(-(self.masses @ self.positions().astype(np.float64)) @ gravity)
 
     def elastic_energy(self) -> float:
         """Of springs and the laws "st_venant_kirchhoff" and "neo_hookean": what deforming the body took [J].

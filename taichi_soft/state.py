@@ -17,8 +17,9 @@ from taichi_soft.scene import BodyArrays, Ranges, Scene, blocks_of
 
 ACTIVE, FROZEN = 0, 1
 
-MOVES_PINS, FEELS_REACTION = 1, 2
-"""Bits of `body_drives`: some pinned particles have somewhere to go; what they take up is added up."""
+MOVES_PINS, FEELS_REACTION, PUSHED, DAMPED, SHELTERED = 1, 2, 4, 8, 16
+"""Bits of `body_drives`: some pinned particles have somewhere to go; what they take up is added up;
+`particle_push` counts in the coming step; `body_damping` is not zero; the wind misses the body."""
 
 
 @dataclass(frozen=True)
@@ -87,6 +88,7 @@ class State:
         self.prev_velocity = ti.Vector.field(3, real, n)
         self.particle_aim = ti.field(ti.i32, n)  # where a pinned particle goes: see `kernels.pins`
         self.particle_target = ti.Vector.field(3, real, n)  # there [m], or in the axes of a frame
+        self.particle_push = ti.Vector.field(3, real, n)  # [N], where the body is `PUSHED`
         self.particle_reaction = ti.Vector.field(3, real, n)  # [N s] on what holds it, in the last step
 
         self.tet_vertices = ti.field(ti.i32, b * 4 * LANES)
@@ -147,9 +149,11 @@ class State:
         self.body_velocity_lag = ti.field(real, bodies)  # substep [s] by half of which leapfrog lags
         self.body_drives = ti.field(ti.i32, bodies)  # bits: what a game does to the body
         self.body_gravity_scale = ti.field(real, bodies)
+        self.body_damping = ti.field(real, bodies)  # of velocities against the world [1/s]
         self.block_model = ti.field(ti.i32, b)
 
         self.gravity = ti.Vector.field(3, real, ())  # [m/s^2]
+        self.wind = ti.Vector.field(4, real, ())  # [m/s], density times drag coefficient [kg/m^3]
         self.floor = ti.Vector.field(3, real, ())  # height [m], restitution, friction
 
     def load(self, scene: Scene, models: list[int]) -> None:
@@ -215,6 +219,8 @@ class State:
         fill(self.body_status, np.zeros(0))
         fill(self.body_velocity_lag, np.zeros(0))
         fill(self.body_drives, np.zeros(0))
+        fill(self.body_damping, np.zeros(0))
+        self.wind[None] = [0.0, 0.0, 0.0, 0.0]
         fill(self.body_gravity_scale, np.ones(self.capacity.bodies))
         fill(self.block_model, np.repeat(models, [r.blocks[1] - r.blocks[0] for r in ranges]))
 

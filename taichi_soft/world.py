@@ -15,6 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 from taichi_soft.body import Body, Floats32, require_buffer, require_built
 from taichi_soft.checks import as_count, as_indices, as_number, as_rotation, as_vector
 from taichi_soft.constants import GRAVITY_EARTH, POSITION_LIMIT, VELOCITY_LIMIT
+from taichi_soft.control.access import require_substeps
+from taichi_soft.control.drives import ForceField, push_by_field, require_field, set_wind
 from taichi_soft.control.frames import Frames
 from taichi_soft.control.impulses import apply_radial_impulse
 from taichi_soft.errors import FrozenBodyWarning, OptionError, SolverWarning, StateError, UnstableStepWarning
@@ -94,6 +96,7 @@ class World:
         self._program: Program | None = None
         self._launch: Launch | None = None
         self._frames = Frames()
+        self._force_field: ForceField | None = None
         self._checked_step: tuple[Any, ...] = ()
         self._step_values = (0.0, 0, 0.0)
         self._rows: Floats32 = np.empty((0, 3), dtype=np.float32)
@@ -285,6 +288,8 @@ class World:
             self._checked_step = asked
         seconds, count, h = self._step_values
         self._read_alpha = None
+        if self._force_field is not None:
+            push_by_field(self, self._force_field)
         self._frames.aim(self._state, len(self._bodies), seconds)  # type: ignore[arg-type]
         troubled = self._launch(count, h)  # type: ignore[misc]
         reports = self._note_failures(count, h) if troubled else []
@@ -366,6 +371,35 @@ class World:
         """
         apply_radial_impulse(self, center, impulse, radius)
 
+    def set_wind(self, velocity: ArrayLike | None, *, density: float = 1.2, drag: float = 1.0) -> None:
+        """Let air move over the surfaces of all bodies, from now on.
+
+        A triangle of area A, with the air at v_n past it along its normal n, takes up 1/4 density drag A
+        |v_n| v_n n: half of the drag of a plate, as a closed body, or a sheet whose triangles are listed for
+        each side, has one towards the wind and one away from it. So a box has the drag coefficient `drag`
+        and a sphere half of it. However strong, it takes no vertex beyond its own speed.
+        Args:
+            velocity: of the air, (3,) [m/s]; zero is still air, which brakes; None is no air.
+            density: of the air [kg/m^3].
+            drag: coefficient of a plate across the wind.
+        Raises: OptionError for a number out of range; StateError before `build` and under schedule "flat".
+        """
+        set_wind(self, velocity, density, drag)
+
+    def set_force_field(self, function: ForceField | None) -> None:
+        """Accelerate all bodies by a function of place and time, from now on; None ends it.
+
+        Args:
+            function: (positions float32 (n, 3) [m], time [s]) -> accelerations (n, 3) [m/s^2], called once
+                per step and body that is not frozen; they act throughout the step. If it raises, or returns
+                something else, `step` raises and the step is not made.
+        Raises: OptionError for what cannot be called; StateError under schedule "flat".
+        """
+        field = require_field(function)
+        require_built(self.is_built)
+        require_substeps(self, "force field")
+        self._force_field = field
+
     def read_positions(self, body: Body, alpha: float, out: Floats32 | None = None) -> Floats32:
         """Positions of a body between the previous step (alpha 0) and the last one (alpha 1), (n, 3) [m].
 
@@ -403,7 +437,7 @@ class World:
             forces = np.empty_like(rows)
             compute_body_forces(self._state, self._program, body.index, forces)
             by_vertex = forces[self._scene.bodies[body.index].rank]
-            acceleration = by_vertex / body.masses[:, None] + self.settings.gravity
+            acceleration = by_vertex / body.masses[:, None] + self.settings.gravity * body.gravity_scale
             acceleration[body.pinned] = 0.0
             floor = self.settings.floor
             if floor is not None:
@@ -417,6 +451,9 @@ class World:
         require_built(self.is_built)
         rows: NDArray[np.int32] = self._scene.bodies[body.index].rank[vertices]
         return (rows + self._scene.ranges[body.index].particles[0]).astype(np.int32)
+
+    def _gravity_scale(self, body: Body) -> float:
+        return 1.0 if self._state is None else float(self._state.body_gravity_scale[body.index])
 
     def _read(self, body: Body, kernel: Callable[..., Any], *arguments: Any) -> Any:
         """Call a kernel (state, first particle of `body`, *arguments) that changes nothing."""

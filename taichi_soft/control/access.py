@@ -14,6 +14,7 @@ from taichi_soft.types import Schedule
 
 if TYPE_CHECKING:
     from taichi_soft.body import Body
+    from taichi_soft.world import World
 
 Rows32 = NDArray[np.float32]
 
@@ -46,9 +47,7 @@ def rows_of(body: Body, vertices: NDArray[np.int32]) -> NDArray[np.int32]:
     return body._world._rows_of(body, vertices)
 
 
-def require_substeps(body: Body, what: str) -> None:
+def require_substeps(world: World, what: str) -> None:
     """Raises: StateError where the schedule has no place for `what` within a substep."""
-    if body._world.settings.schedule is Schedule.FLAT:
-        raise StateError(
-            f"schedule 'flat' has no {what}: make the world with schedule='per_body', or use impulses"
-        )
+    if world.settings.schedule is Schedule.FLAT:
+        raise StateError(f"schedule 'flat' has no {what}: make the world with schedule='per_body'")

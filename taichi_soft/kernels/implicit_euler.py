@@ -18,6 +18,7 @@ from taichi_soft.kernels.linear_system import (
 from taichi_soft.kernels.motion import gravity_on
 from taichi_soft.math.tensors import widened
 from taichi_soft.runtime import ti
+from taichi_soft.state import FEELS_REACTION
 
 FARTHEST = 0.5
 """Change of an edge in one piece of a step, over its length, beyond which the piece is halved."""
@@ -53,6 +54,8 @@ def _move(state: ti.template(), program: ti.template(), p, h):
     """Position and velocity of one particle after the solve; what the floor does with it."""
     if state.particle_inv_mass[p] == 0.0:  # pinned: goes on with the velocity that it was given
         state.particle_position[p] = state.particle_position[p] + h * state.particle_velocity[p]
+        # The solve leaves this row open: what it lacks, the particle passes on [N s].
+        state.solution[p] = state.particle_force[p].xyz - state.image[p]
     else:
         v = state.particle_velocity[p] + state.solution[p]
         x = state.particle_position[p] + h * v
@@ -93,6 +96,18 @@ def _take_back(state: ti.template(), body):
         state.particle_position[p] = state.direction[p]
         state.particle_velocity[p] = state.residual[p]
         state.particle_contact[p] = state.prev_contact[p]
+
+
+@ti.func
+def _add_reactions(state: ti.template(), body, h):
+    """Add up what pinned particles took up in a piece of a step [N s]."""
+    if state.body_drives[body] & FEELS_REACTION != 0:
+        gravity = gravity_on(state, body)
+        particles = state.body_particles[body]
+        for p in range(particles[0], particles[1]):
+            if state.particle_inv_mass[p] == 0.0:
+                impulse = state.solution[p] + h * state.particle_mass[p] * gravity
+                state.particle_reaction[p] = state.particle_reaction[p] + impulse
 
 
 @ti.func
@@ -137,6 +152,7 @@ def implicit_substep(state: ti.template(), program: ti.template(), body, h, is_f
         else:
             largest = ti.max(largest, residual)
             left -= 1
+            _add_reactions(state, body, piece)
     if is_first == 1:
         state.body_residual[body] = largest
     else:
