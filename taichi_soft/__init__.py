@@ -1,6 +1,8 @@
 """Real-time soft bodies from real material parameters."""
 
 from taichi_soft.body import Body
+from taichi_soft.control.attachments import Attachment
+from taichi_soft.control.frames import Frame
 from taichi_soft.errors import (
     DeviceError,
     FrozenBodyWarning,
@@ -56,10 +58,12 @@ __all__ = [
     "LAWS",
     "PRESETS",
     "AnisotropicMaterial",
+    "Attachment",
     "Body",
     "Device",
     "DeviceError",
     "Failure",
+    "Frame",
     "FrozenBodyWarning",
     "Material",
     "MaterialError",

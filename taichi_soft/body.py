@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.checks import as_array
+from taichi_soft.control.attachments import Attachment, attach
 from taichi_soft.control.drives import (
     apply_force,
     set_gravity_scale,
@@ -27,6 +28,7 @@ from taichi_soft.scene import BodyDescription, rest_inverses
 from taichi_soft.stability import StableStep
 
 if TYPE_CHECKING:
+    from taichi_soft.control.frames import Frame
     from taichi_soft.world import World
 
 Floats32 = NDArray[np.float32]
@@ -47,6 +49,7 @@ class Body:
         self.index = index
         self._frozen_in: FailedStep | None = None
         self._failure: Failure | None = None
+        self._attachments: list[Attachment] = []
 
     @property
     def _world(self) -> World:
@@ -244,6 +247,18 @@ class Body:
         Raises: OptionError for shapes that do not fit; StateError for a particle that is not pinned.
         """
         set_targets(self, particles, positions)
+
+    def attach(self, particles: ArrayLike, frame: Frame, *, two_way: bool = False) -> Attachment:
+        """Let particles go with a frame from now on, at the places that they have relative to it.
+
+        Args:
+            particles: vertices; pinned ones may be among them.
+            frame: of the same world.
+            two_way: add up what they pull the frame with: `Attachment.force` and `Attachment.torque`.
+        Raises: OptionError for what is no frame of this world; StateError for a particle that is attached
+            already, and for `two_way` under schedule "flat".
+        """
+        return attach(self, particles, frame, two_way)
 
     def volumes(self) -> Floats:
         """Signed volume of each tetrahedron, (m,) [m^3]: negative where it is flipped."""

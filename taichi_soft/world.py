@@ -17,7 +17,7 @@ from taichi_soft.checks import as_count, as_indices, as_number, as_rotation, as_
 from taichi_soft.constants import GRAVITY_EARTH, POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.control.access import require_substeps
 from taichi_soft.control.drives import ForceField, push_by_field, require_field, set_wind
-from taichi_soft.control.frames import Frames
+from taichi_soft.control.frames import Frame, Frames
 from taichi_soft.control.impulses import apply_radial_impulse
 from taichi_soft.errors import FrozenBodyWarning, OptionError, SolverWarning, StateError, UnstableStepWarning
 from taichi_soft.failures import FailedStep, Failure, find_failure
@@ -356,6 +356,16 @@ class World:
         assert self._state is not None
         assert self._program is not None
         return find_failure(self._state, self._program, self._scene, body.index, failed)
+
+    def add_frame(self, position: ArrayLike = (0.0, 0.0, 0.0), rotation: ArrayLike | None = None) -> Frame:
+        """A place that the engine moves, to attach bodies to; at any time.
+
+        Args:
+            position: of its origin, (3,) [m].
+            rotation: matrix (3, 3) or quaternion (x, y, z, w).
+        Raises: OptionError for bad numbers.
+        """
+        return Frame(self._frames, position, rotation)
 
     def apply_radial_impulse(self, center: ArrayLike, impulse: float, radius: float) -> None:
         """Push all bodies away from a point: an explosion.

@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike
 
 from taichi_soft.checks import as_flag, as_rotation, as_vector
 from taichi_soft.constants import POSITION_LIMIT, VELOCITY_LIMIT
-from taichi_soft.control.access import change, numbers
+from taichi_soft.control.access import change, numbers, some_particles
+from taichi_soft.control.attachments import require_unattached
 from taichi_soft.errors import OptionError
 from taichi_soft.kernels.placement import jump, write_rigid_velocity
 
@@ -33,6 +34,7 @@ def teleport(body: Body, position: ArrayLike, rotation: Any, keep_velocity: bool
     """As `Body.teleport`."""
     target, turn = as_vector(position, "position", "m"), as_rotation(rotation)
     keep = as_flag(keep_velocity, "keep_velocity")
+    require_unattached(body, some_particles(body, None))
     floor = body._world.settings.floor
     lowest = -np.inf if floor is None else floor
     found = np.empty(3)

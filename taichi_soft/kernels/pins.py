@@ -6,7 +6,7 @@ any more (`ARRIVED`, with the velocity of the step before still to be taken from
 """
 
 from taichi_soft.runtime import ti
-from taichi_soft.state import FEELS_REACTION, MOVES_PINS
+from taichi_soft.state import FEELS_REACTION, FROZEN, MOVES_PINS
 
 STILL, TO_TARGET, ARRIVED, WITH_FRAME = 0, 1, 2, 3
 
@@ -69,6 +69,57 @@ def write_targets(
 
 
 @ti.kernel
+def attach_particles(
+    state: ti.template(),
+    body: ti.i32,
+    frame: ti.i32,
+    feels: ti.i32,
+    particles: ti.types.ndarray(dtype=ti.i32, ndim=1),
+    places: ti.types.ndarray(dtype=ti.f32, ndim=2),
+):
+    """Let particles of one body go with a frame, at `places` in its axes [m], and feel their load or not."""
+    ti.loop_config(serialize=True)
+    for i in range(particles.shape[0]):
+        p = particles[i]
+        state.particle_inv_mass[p] = 0.0
+        state.particle_aim[p] = WITH_FRAME + frame
+        state.particle_target[p] = ti.Vector([places[i, 0], places[i, 1], places[i, 2]])
+        state.particle_reaction[p] = ti.Vector.zero(state.real, 3)
+        if ti.static(state.capacity.implicit):
+            state.particle_contact[p] = 0
+    bits = MOVES_PINS | ti.select(feels != 0, FEELS_REACTION, 0)
+    state.body_drives[body] = state.body_drives[body] | bits
+
+
+@ti.kernel
+def write_feeling(state: ti.template(), body: ti.i32, feels: ti.i32):
+    """Whether what the pins of one body take up is added up."""
+    bit = ti.select(feels != 0, FEELS_REACTION, 0)
+    state.body_drives[body] = (state.body_drives[body] & ~FEELS_REACTION) | bit
+
+
+@ti.kernel
+def read_reaction(
+    state: ti.template(),
+    begin: ti.i32,
+    particles: ti.types.ndarray(dtype=ti.i32, ndim=1),
+    origin: ti.types.ndarray(dtype=ti.f32, ndim=1),
+    load: ti.types.ndarray(dtype=ti.f64, ndim=1),
+):
+    """Impulse [N s] and its moment about a point [N m s], (6,), that `particles` took up in the last step."""
+    ti.loop_config(serialize=True)
+    for _ in range(1):
+        center = ti.Vector([origin[0], origin[1], origin[2]])
+        impulse, moment = ti.Vector.zero(ti.f64, 3), ti.Vector.zero(ti.f64, 3)
+        for i in range(particles.shape[0]):
+            part = ti.cast(state.particle_reaction[particles[i]], ti.f64)
+            impulse += part
+            moment += ti.cast(state.particle_position[particles[i]] - center, ti.f64).cross(part)
+        for k in ti.static(range(3)):
+            load[k], load[3 + k] = impulse[k], moment[k]
+
+
+@ti.kernel
 def aim_pinned(
     state: ti.template(), body_count: ti.i32, dt: ti.f32, frames: ti.types.ndarray(dtype=ti.f32, ndim=2)
 ) -> ti.i32:
@@ -82,7 +133,9 @@ def aim_pinned(
     ti.loop_config(serialize=True)
     for body in range(body_count):
         drives = state.body_drives[body]
-        if drives & MOVES_PINS != 0:
+        if drives & MOVES_PINS != 0 and state.body_status[body] == FROZEN:
+            waiting += 1
+        elif drives & MOVES_PINS != 0:
             moving = 0
             particles = state.body_particles[body]
             for p in range(particles[0], particles[1]):
