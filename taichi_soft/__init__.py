@@ -3,6 +3,7 @@
 from taichi_soft.body import Body
 from taichi_soft.control.attachments import Attachment
 from taichi_soft.control.frames import Frame
+from taichi_soft.control.grabs import Grab
 from taichi_soft.errors import (
     DeviceError,
     FrozenBodyWarning,
@@ -65,6 +66,7 @@ __all__ = [
     "Failure",
     "Frame",
     "FrozenBodyWarning",
+    "Grab",
     "Material",
     "MaterialError",
     "MeshError",

@@ -17,6 +17,7 @@ from taichi_soft.control.drives import (
     set_linear_damping,
     set_sheltered,
 )
+from taichi_soft.control.grabs import Grab, grab_at
 from taichi_soft.control.impulses import apply_impulse, apply_impulse_at_point
 from taichi_soft.control.pins import pin, pinned_vertices, set_targets, unpin
 from taichi_soft.control.placement import set_velocity, teleport
@@ -259,6 +260,28 @@ class Body:
             already, and for `two_way` under schedule "flat".
         """
         return attach(self, particles, frame, two_way)
+
+    def grab(
+        self,
+        triangle: int,
+        barycentrics: ArrayLike = (1 / 3, 1 / 3, 1 / 3),
+        *,
+        frequency: float = 5.0,
+        max_force: float | None = None,
+    ) -> Grab:
+        """Take hold of the surface: `move` pulls the body by a spring without swing, `release` lets go.
+
+        The spring holds a patch of about a quarter of the body's size. What is more than the patch can bear
+        pulls at the whole body, so that nothing is torn, whatever is asked for.
+        Args:
+            triangle: of `surface`.
+            barycentrics: where on it, (3,).
+            frequency: of the spring with the whole body on it [Hz].
+            max_force: strongest pull [N]; None is ten times the body's weight on Earth.
+        Raises: OptionError for bad numbers; MeshError for a body without surface; StateError before `build`,
+            under schedule "flat", and where the world's 16 grabs are all in use.
+        """
+        return grab_at(self, triangle, barycentrics, None, frequency, max_force)
 
     def volumes(self) -> Floats:
         """Signed volume of each tetrahedron, (m,) [m^3]: negative where it is flipped."""

@@ -17,9 +17,13 @@ from taichi_soft.scene import BodyArrays, Ranges, Scene, blocks_of
 
 ACTIVE, FROZEN = 0, 1
 
-MOVES_PINS, FEELS_REACTION, PUSHED, DAMPED, SHELTERED = 1, 2, 4, 8, 16
+MOVES_PINS, FEELS_REACTION, PUSHED, DAMPED, SHELTERED, GRABBED = 1, 2, 4, 8, 16, 32
 """Bits of `body_drives`: some pinned particles have somewhere to go; what they take up is added up;
-`particle_push` counts in the coming step; `body_damping` is not zero; the wind misses the body."""
+`particle_push` counts in the coming step; `body_damping` is not zero; the wind misses the body; a
+grab pulls at it."""
+
+MOST_GRABS, PATCH_ROWS = 16, 128
+"""Grabs of one world at a time, and particles that one of them holds."""
 
 
 @dataclass(frozen=True)
@@ -152,6 +156,17 @@ class State:
         self.body_damping = ti.field(real, bodies)  # of velocities against the world [1/s]
         self.block_model = ti.field(ti.i32, b)
 
+        self.grab_body = ti.field(ti.i32, MOST_GRABS)  # its number plus 1, 0 where nothing is held
+        self.grab_corners = ti.Vector.field(3, ti.i32, MOST_GRABS)
+        self.grab_weights = ti.Vector.field(3, real, MOST_GRABS)  # of the corners
+        self.grab_target = ti.Vector.field(3, real, MOST_GRABS)  # [m]
+        self.grab_spring = ti.Vector.field(3, real, MOST_GRABS)  # see `write_grab`
+        self.grab_limits = ti.Vector.field(3, real, MOST_GRABS)
+        self.grab_force = ti.Vector.field(3, real, MOST_GRABS)  # [N], in the last substep
+        self.grab_count = ti.field(ti.i32, MOST_GRABS)  # rows of the patch
+        self.patch_particle = ti.field(ti.i32, MOST_GRABS * PATCH_ROWS)
+        self.patch_share = ti.field(real, MOST_GRABS * PATCH_ROWS)
+
         self.gravity = ti.Vector.field(3, real, ())  # [m/s^2]
         self.wind = ti.Vector.field(4, real, ())  # [m/s], density times drag coefficient [kg/m^3]
         self.floor = ti.Vector.field(3, real, ())  # height [m], restitution, friction
@@ -219,6 +234,7 @@ class State:
         fill(self.body_status, np.zeros(0))
         fill(self.body_velocity_lag, np.zeros(0))
         fill(self.body_drives, np.zeros(0))
+        fill(self.grab_body, np.zeros(0))
         fill(self.body_damping, np.zeros(0))
         self.wind[None] = [0.0, 0.0, 0.0, 0.0]
         fill(self.body_gravity_scale, np.ones(self.capacity.bodies))

@@ -18,6 +18,7 @@ from taichi_soft.constants import GRAVITY_EARTH, POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.control.access import require_substeps
 from taichi_soft.control.drives import ForceField, push_by_field, require_field, set_wind
 from taichi_soft.control.frames import Frame, Frames
+from taichi_soft.control.grabs import Grab
 from taichi_soft.control.impulses import apply_radial_impulse
 from taichi_soft.errors import FrozenBodyWarning, OptionError, SolverWarning, StateError, UnstableStepWarning
 from taichi_soft.failures import FailedStep, Failure, find_failure
@@ -96,6 +97,7 @@ class World:
         self._program: Program | None = None
         self._launch: Launch | None = None
         self._frames = Frames()
+        self._grabs: dict[int, Grab] = {}
         self._force_field: ForceField | None = None
         self._checked_step: tuple[Any, ...] = ()
         self._step_values = (0.0, 0, 0.0)
@@ -467,8 +469,12 @@ class World:
 
     def _read(self, body: Body, kernel: Callable[..., Any], *arguments: Any) -> Any:
         """Call a kernel (state, first particle of `body`, *arguments) that changes nothing."""
+        return self._read_all(kernel, self._scene.ranges[body.index].particles[0], *arguments)
+
+    def _read_all(self, kernel: Callable[..., Any], *arguments: Any) -> Any:
+        """Call a kernel (state, *arguments) that changes nothing. Raises: StateError before `build`."""
         require_built(self.is_built)
-        return kernel(self._state, self._scene.ranges[body.index].particles[0], *arguments)
+        return kernel(self._state, *arguments)
 
     def _change(self, body: Body, kernel: Callable[..., Any], *arguments: Any) -> Any:
         """Call a kernel (state, *arguments) that changes a body: the way of all control."""

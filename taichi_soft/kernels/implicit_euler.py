@@ -7,6 +7,7 @@ are held at its height within the solve, until it would have to pull them down.
 
 from taichi_soft.collision.floor import resolve_floor
 from taichi_soft.kernels.conjugate_gradient import invert_blocks, solve_system
+from taichi_soft.kernels.grabs import add_grabs
 from taichi_soft.kernels.internal_forces import accumulate_forces
 from taichi_soft.kernels.linear_system import (
     add_damping,
@@ -44,6 +45,7 @@ def assemble(state: ti.template(), program: ti.template(), body, h):
         rhs = h * (state.particle_force[p].xyz + weight) - state.image[p]
         state.residual[p] = rhs
         state.particle_force[p] = widened(rhs)
+    add_grabs(state, body, h)
     add_damping(state, program, body, h)
     add_masses(state, body)
     invert_blocks(state, body)

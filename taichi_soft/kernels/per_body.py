@@ -5,6 +5,7 @@ of threads.
 """
 
 from taichi_soft.kernels.drives import add_reactions, blow_on, push_particles
+from taichi_soft.kernels.grabs import pull_grabs
 from taichi_soft.kernels.implicit_euler import implicit_substep
 from taichi_soft.kernels.internal_forces import accumulate_forces, clear_forces
 from taichi_soft.kernels.motion import (
@@ -37,8 +38,10 @@ def advance_body(state: ti.template(), program: ti.template(), body, h, kick, is
     if ti.static(program.integrator == Integrator.IMPLICIT_EULER):
         implicit_substep(state, program, body, h, is_first)
     else:
+        lasting = kick if ti.static(program.integrator == Integrator.LEAPFROG) else h
         accumulate_forces(state, program, body)
-        add_reactions(state, body, kick if ti.static(program.integrator == Integrator.LEAPFROG) else h)
+        add_reactions(state, body, lasting)
+        pull_grabs(state, body, h, lasting)
         move_body(state, program, body, h, kick)
 
 
