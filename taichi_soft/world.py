@@ -30,7 +30,7 @@ from taichi_soft.laws import ElementModel, element_model, fit_model
 from taichi_soft.materials import AnyMaterial
 from taichi_soft.meshing import BodyMesh
 from taichi_soft.runtime import init
-from taichi_soft.scene import BodyDescription, Scene, arrange, require_size
+from taichi_soft.scene import BodyArrays, BodyDescription, Ranges, Scene, arrange, require_size
 from taichi_soft.settings import Settings
 from taichi_soft.stability import StableStep, stable_step
 from taichi_soft.state import FROZEN, Capacity, State, acquire, release
@@ -105,7 +105,7 @@ class World:
         self._read_alpha: float | None = None  # of what `_rows` holds; None once the world has moved on
         self._warned_steps: set[float] = set()
         self._warned_solves: set[int] = set()
-        self._stable_steps: dict[tuple[int, int, ElementModel], StableStep] = {}
+        self._stable_steps: dict[tuple[BodyMesh, AnyMaterial, ElementModel], StableStep] = {}
 
     @property
     def settings(self) -> Settings:
@@ -256,7 +256,7 @@ class World:
         if not isinstance(body, Body):
             raise OptionError(f"body must be one that a world made, got {body!r}")
         described = body._description
-        key = (id(described.mesh), id(described.material), described.model)
+        key = (described.mesh, described.material, described.model)
         if key not in self._stable_steps:
             self._stable_steps[key] = stable_step(described.mesh, described.material, described.model)
         return self._stable_steps[key]
@@ -463,6 +463,18 @@ class World:
         require_built(self.is_built)
         rows: NDArray[np.int32] = self._scene.bodies[body.index].rank[vertices]
         return (rows + self._scene.ranges[body.index].particles[0]).astype(np.int32)
+
+    def _redescribe(self, body: Body, description: BodyDescription, arrays: BodyArrays) -> Ranges:
+        """Take note that a body is made of something else. Returns where it lies in the fields."""
+        body._description = description
+        self._scene.bodies[body.index] = arrays
+        used = {each._description.material for each in self._bodies}
+        self._stable_steps = {key: step for key, step in self._stable_steps.items() if key[1] in used}
+        if self._checked_step[1:2] == (
+            None,
+        ):  # whose number of substeps was chosen for what was there before
+            self._checked_step = ()
+        return self._scene.ranges[body.index]
 
     def _gravity_scale(self, body: Body) -> float:
         return 1.0 if self._state is None else float(self._state.body_gravity_scale[body.index])
