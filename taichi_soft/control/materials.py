@@ -12,7 +12,7 @@ from taichi_soft.control.access import change
 from taichi_soft.errors import MaterialError
 from taichi_soft.kernels.constants import write_fours, write_masses, write_numbers
 from taichi_soft.laws import fit_model
-from taichi_soft.scene import BodyArrays, BodyDescription, Ranges, arrange, blocks_of
+from taichi_soft.scene import BodyArrays, BodyDescription, Ranges, blocks_of, rearrange
 
 if TYPE_CHECKING:
     from taichi_soft.body import Body
@@ -39,7 +39,7 @@ def set_damping(body: Body, damping: Any) -> None:
 
 def _write_constants(state: State, body: Body, description: BodyDescription) -> None:
     """Not a kernel, but called like one: what a body is made of lies in several fields."""
-    arrays = arrange(description)
+    arrays = rearrange(body._world._scene.bodies[body.index], description)
     place = body._world._redescribe(body, description, arrays)
     masses = arrays.mass
     write_masses(state, place.particles[0], masses.astype(np.float32), (1.0 / masses).astype(np.float32))

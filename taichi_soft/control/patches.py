@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.materials import SpringMaterial
-from taichi_soft.scene import BodyDescription, rest_inverses
+from taichi_soft.scene import BodyDescription
 from taichi_soft.state import PATCH_ROWS
 
 PATCH_SIZE = 0.25
@@ -59,6 +59,9 @@ def _stiffness(body: BodyDescription, falloff: NDArray[np.float64]) -> float:
         step = falloff[mesh.edges]
         return float(body.bonds.constants[:, 1] @ (step[:, 1] - step[:, 0]) ** 2 / 3)
     corner = falloff[mesh.tets]
-    slope = np.einsum("ma,mab->mb", corner[:, 1:] - corner[:, :1], rest_inverses(mesh))
-    shear = body.material.stiffness_matrices(len(mesh.tets))[:, range(3, 6), range(3, 6)].min(axis=1)
-    return float((mesh.volumes * shear) @ (slope**2).sum(axis=1))
+    near = np.flatnonzero(corner.any(axis=1))
+    ends = mesh.vertices[mesh.tets[near]]
+    rise = (corner[near, 1:] - corner[near, :1])[..., None]
+    slope = np.linalg.solve(ends[:, 1:] - ends[:, :1], rise)[..., 0]
+    shear = body.material.stiffness_matrices(len(mesh.tets))[near][:, range(3, 6), range(3, 6)].min(axis=1)
+    return float((mesh.volumes[near] * shear) @ (slope**2).sum(axis=1))
