@@ -4,6 +4,9 @@ from taichi_soft.assets import SoftBodyAsset
 from taichi_soft.body import Body
 from taichi_soft.colliders import Collider
 from taichi_soft.contact import Contact
+from taichi_soft.control.attachments import Attachment
+from taichi_soft.control.frames import Frame
+from taichi_soft.control.grabs import Grab
 from taichi_soft.errors import (
     DeviceError,
     FrozenBodyWarning,
@@ -69,6 +72,7 @@ __all__ = [
     "LAWS",
     "PRESETS",
     "AnisotropicMaterial",
+    "Attachment",
     "Body",
     "BoxShape",
     "CapsuleShape",
@@ -78,7 +82,9 @@ __all__ = [
     "Device",
     "DeviceError",
     "Failure",
+    "Frame",
     "FrozenBodyWarning",
+    "Grab",
     "HeightFieldShape",
     "Material",
     "MaterialError",

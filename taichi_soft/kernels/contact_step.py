@@ -5,15 +5,18 @@ anything.
 """
 
 from taichi_soft.kernels.collide import collided, find_near_colliders, forget_contacts
+from taichi_soft.kernels.drives import add_reactions, blow_on, push_particles
+from taichi_soft.kernels.grabs import pull_grabs
 from taichi_soft.kernels.internal_forces import accumulate_forces
 from taichi_soft.kernels.islands import find_islands, search_margin
-from taichi_soft.kernels.motion import remember_particle
-from taichi_soft.kernels.per_body import settle_body
+from taichi_soft.kernels.motion import gravity_on, remember_particle
+from taichi_soft.kernels.per_body import before_kick, settle_body
 from taichi_soft.kernels.sleep import note_motion, settle_island, wake_by_colliders, wake_island
 from taichi_soft.kernels.soft_contact import solve_island
 from taichi_soft.kernels.soft_search import search_island
 from taichi_soft.runtime import ti
-from taichi_soft.state import ABSENT, ACTIVE
+from taichi_soft.state import ABSENT, ACTIVE, PUSHED
+from taichi_soft.types import Integrator
 
 
 @ti.func
@@ -32,10 +35,11 @@ def _kick_body(state: ti.template(), program: ti.template(), body, kick, common)
     Returns: the highest speed [m/s], and the highest beside the `common` velocity.
     """
     particles = state.body_particles[body]
+    gravity = gravity_on(state, body)
     highest, highest_beside = ti.cast(0.0, state.real), ti.cast(0.0, state.real)
     for p in range(particles[0], particles[1]):
         inv_mass = state.particle_inv_mass[p]
-        acceleration = state.particle_force[p].xyz * inv_mass + state.gravity[None]
+        acceleration = state.particle_force[p].xyz * inv_mass + gravity
         acceleration *= ti.select(inv_mass > 0.0, 1.0, 0.0)
         _, v = program.advance(
             state.particle_position[p], state.particle_velocity[p], acceleration, 0.0, kick
@@ -118,10 +122,15 @@ def _move_island(state: ti.template(), program: ti.template(), island, substeps,
         for i in range(first, last):
             body = state.contact.island_body[i]
             if state.body_status[body] == ACTIVE:
-                accumulate_forces(state, program, body)
                 kick = h
                 if s == 0:
                     kick = 0.5 * (state.body_velocity_lag[body] + h)
+                lasting = kick if ti.static(program.integrator == Integrator.LEAPFROG) else h
+                blow_on(state, body, h)
+                push_particles(state, body, before_kick(program, h, int(s == 0)))
+                accumulate_forces(state, program, body)
+                add_reactions(state, body, lasting)
+                pull_grabs(state, body, h, lasting)
                 speed, speed_beside = _kick_body(state, program, body, kick, common)
                 fastest = ti.max(fastest, speed)
                 fastest_beside = ti.max(fastest_beside, speed_beside)
@@ -142,10 +151,13 @@ def _move_island(state: ti.template(), program: ti.template(), island, substeps,
     for i in range(first, last):
         body = state.contact.island_body[i]
         if state.body_status[body] == ACTIVE:
+            if ti.static(program.integrator == Integrator.LEAPFROG):
+                push_particles(state, body, 0.5 * h)
             has_failed = settle_body(state, body)
             failed += has_failed
             if has_failed == 0:
                 state.body_velocity_lag[body] = h
+                state.body_drives[body] = state.body_drives[body] & ~PUSHED
     return failed
 
 
