@@ -49,6 +49,7 @@ class Case:
     angular_velocity: Floats
     course: tuple[Solid, ...]
     law: str
+    flips: str | None
     substeps: int  # of a step of 1/60 s
 
     @property
@@ -68,8 +69,8 @@ class Case:
         )
 
 
-def make_case(seed: int, number: int, law: str = "virial") -> Case:
-    """Case `number` of `seed`.
+def make_case(seed: int, number: int, law: str = "virial", flips: str | None = None) -> Case:
+    """Case `number` of `seed`, by a law and its treatment of flips.
 
     Damping b of an edge is a share of 0.1 to 0.5, evenly, of l^2 sqrt(E density), l being the mean edge: about
     that share of critical damping for the fastest vibrations, and for the slowest, of wave length L, l/L of it.
@@ -85,6 +86,7 @@ def make_case(seed: int, number: int, law: str = "virial") -> Case:
     damping = ratio * float(mesh.edge_lengths.mean()) ** 2 * math.sqrt(young * density)
     material = Material(young, float(rng.uniform(0.1, 0.45)), density, damping)
     place = size * np.array([*rng.uniform(1.0 - HALF, HALF - 1.0, 2), rng.uniform(5.0, 6.5)])
+    longest = stable_step(mesh, material, element_model(law, flips=flips)).recommended
     spin = _direction(rng) * rng.uniform(0.0, FASTEST_RIM) / size
     return Case(
         seed,
@@ -100,7 +102,8 @@ def make_case(seed: int, number: int, law: str = "virial") -> Case:
         spin,
         make_course(rng, size),
         law,
-        _rounded(1 / STEPS_PER_SECOND / stable_step(mesh, material, element_model(law)).recommended),
+        flips,
+        _rounded(1 / STEPS_PER_SECOND / longest),
     )
 
 

@@ -112,7 +112,7 @@ def _world_of(batch: list[Case]) -> tuple[World, list[_Run]]:
     bodies = []
     for bit, case in enumerate(batch):
         contact = Contact(group=1 << bit, mask=1 << bit)
-        asset = SoftBodyAsset(case.mesh, case.material, law=case.law, contact=contact)
+        asset = SoftBodyAsset(case.mesh, case.material, law=case.law, flips=case.flips, contact=contact)
         world.reserve(asset, 1)
         bodies.append(
             world.spawn(
@@ -139,12 +139,13 @@ def _world_of(batch: list[Case]) -> tuple[World, list[_Run]]:
     for shape in SHAPES:
         missing = PER_SHAPE - sum(case.shape == shape for case in batch)
         if missing:
-            world.reserve(_filler(shape, batch[0].law), missing)
+            world.reserve(_filler(shape, batch[0].law, batch[0].flips), missing)
     world.build()
     return world, [_Run(case, body) for case, body in zip(batch, bodies, strict=True)]
 
 
 @cache
-def _filler(shape: str, law: str) -> SoftBodyAsset:
+def _filler(shape: str, law: str, flips: str | None) -> SoftBodyAsset:
     """Of slots that stay empty: soft, so that nothing warns of the step."""
-    return SoftBodyAsset(shape_mesh(shape, LARGEST, np.full(2, 0.5)), Material(1.0, 0.3, 1000.0, 0.0), law=law)
+    mesh = shape_mesh(shape, LARGEST, np.full(2, 0.5))
+    return SoftBodyAsset(mesh, Material(1.0, 0.3, 1000.0, 0.0), law=law, flips=flips)
