@@ -27,7 +27,7 @@ LAYERS = """
     render
     engine_adapter
     stages
-    film  profiling
+    film  profiling  drops
     cli
     __main__
     demos
@@ -40,7 +40,7 @@ LEVEL = {name: level for level, line in enumerate(LAYERS.split("\n")) for name i
 NO_TAICHI = ("errors", "constants", "types", "checks", "materials", "meshing", "contact")
 """Parts that are tested in milliseconds: numpy only."""
 
-FACES = ("render", "stages", "film", "profiling", "cli", "__main__")
+FACES = ("render", "stages", "film", "profiling", "drops", "cli", "__main__")
 """Parts of taichi_soft that lie above its public names."""
 
 

@@ -63,8 +63,8 @@ class Case:
         solids = ", ".join(solid.name for solid in self.course if solid.name not in ("wall", "lid"))
         first = self.course[0]
         return (
-            f"{self.shape} {self.size:.3g} m, E {self.material.young:.2g} Pa, {self.material.density:.0f} kg/m^3,"
-            f" nu {self.material.poisson:.2f}, {speed:.1f} m/s (Mach {self.mach:.2f}), friction "
+            f"{self.shape} {self.size:.3g} m, E {self.material.young:.2g} Pa, "
+            f"{self.material.density:.0f} kg/m^3, nu {self.material.poisson:.2f}, {speed:.1f} m/s (Mach {self.mach:.2f}), friction "
             f"{first.friction:.2f}, restitution {first.restitution:.2f}; {solids}"
         )
 
@@ -72,8 +72,9 @@ class Case:
 def make_case(seed: int, number: int, law: str = "virial", flips: str | None = None) -> Case:
     """Case `number` of `seed`, by a law and its treatment of flips.
 
-    Damping b of an edge is a share of 0.1 to 0.5, evenly, of l^2 sqrt(E density), l being the mean edge: about
-    that share of critical damping for the fastest vibrations, and for the slowest, of wave length L, l/L of it.
+    Damping b of an edge is a share of 0.1 to 0.5, evenly, of l^2 sqrt(E density), l being the mean edge:
+    about that share of critical damping for the fastest vibrations; for the slowest, of wave length L, l/L
+    of it.
     """
     rng = np.random.default_rng([seed, number])
     shape = SHAPES[number % len(SHAPES)]

@@ -7,7 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft import BoxShape, CapsuleShape, HeightFieldShape, MeshShape, PlaneShape, Shape, SphereShape, torus
+from taichi_soft import (
+    BoxShape,
+    CapsuleShape,
+    HeightFieldShape,
+    MeshShape,
+    PlaneShape,
+    Shape,
+    SphereShape,
+    torus,
+)
 from taichi_soft.drops import distances
 from taichi_soft.drops.distances import Distance
 from taichi_soft.math.rotations import matrix_of
@@ -62,7 +71,14 @@ def make_course(rng: np.random.Generator, size: float) -> tuple[Solid, ...]:
 
 
 def _solid(  # type: ignore[no-untyped-def]
-    name: str, shape: Shape, distance: Distance, tolerance: float, surface, is_room=False, position=None, turn=None
+    name: str,
+    shape: Shape,
+    distance: Distance,
+    tolerance: float,
+    surface,
+    is_room=False,
+    position=None,
+    turn=None,
 ) -> Solid:
     where = np.zeros(3) if position is None else np.asarray(position, dtype=np.float64)
     return Solid(

@@ -33,6 +33,12 @@ class Outcome:
         )
         return tuple(name for name, is_so in found if is_so)
 
+    def badness(self, fault: str) -> float:
+        """How bad a fault is, to sort by: the earlier, farther, deeper, faster or more."""
+        share = self.flipped / len(self.case.mesh.tets)
+        early = -(self.frozen_at or 0.0)
+        return dict(zip(FAULTS, (early, self.out, self.inside, self.speed, share), strict=True))[fault]
+
     def __str__(self) -> str:
         found = []
         if self.frozen_at is not None:

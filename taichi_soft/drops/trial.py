@@ -23,10 +23,14 @@ MOST_COLLIDERS, MOST_SAMPLES = 512, 1 << 20
 """Of a world, always the same, so that all worlds share kernels."""
 
 CALM_SPEED, CALM_TIME = 0.01, 0.5
-"""At rest is what was slower than this, root mean square over its vertices in sizes per second, this long [s]."""
+"""At rest is what was slower than this (root mean square over vertices, in sizes per second) so long [s]."""
 
 PATIENCE = 20.0
 """Time in which a body must have come to rest [s]."""
+
+FREE_TIME, BRAKE = 5.0, 1.0
+"""After so long [s] all velocities fade at this rate [1/s]: a stiff ball on a plane would roll for minutes.
+What shakes by itself goes on shaking."""
 
 
 def run_cases(cases: Iterable[Case]) -> Iterator[Outcome]:
@@ -88,13 +92,15 @@ class _Run:
         )
 
 
-
 def _run_batch(batch: list[Case]) -> Iterator[Outcome]:
     world, runs = _world_of(batch)
     count = batch[0].substeps
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FrozenBodyWarning)
         while runs:
+            if world.step_count == round(FREE_TIME * STEPS_PER_SECOND):
+                for run in runs:
+                    run.body.set_linear_damping(BRAKE)
             world.step(1 / STEPS_PER_SECOND, count)
             for run in list(runs):
                 run.note_step()

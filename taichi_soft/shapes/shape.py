@@ -21,8 +21,8 @@ SHORTEST, LONGEST = 1e-6, 1e6
 
 
 SEAM = 1e-4
-"""Skin [m] on what has flat faces and edges. Where two of them meet flush, what lies on one is inside the other
-by more than rounding, or it would slip into the seam between them."""
+"""Skin [m] on what has flat faces and edges. Where two of them meet flush, what lies on one is inside the
+other by more than rounding, or it would slip into the seam between them."""
 
 
 class Shape(ABC):

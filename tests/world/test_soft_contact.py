@@ -105,7 +105,7 @@ def test_a_pile_of_five_blocks_stands_without_creeping():
 
 
 def test_a_ball_dropped_on_a_soft_plate_bends_it_and_comes_to_rest_on_it():
-    """The plate is held at two edges; in the end it carries the ball's weight, with its middle below its edges."""
+    """The plate is held at two edges; in the end it carries the ball, with its middle below its edges."""
     plate = box((2.0, 2.0, 0.2), (6, 6, 1))
     held = np.flatnonzero(np.abs(plate.vertices[:, 0]) > 0.99)
     ball = sphere(0.3, 2)
@@ -145,7 +145,9 @@ def folding(itself):
         axis=1,
     )
     arms = np.abs(bend) > 1.5
-    velocity = np.where(arms[:, None] * (np.abs(x)[:, None] > 0.6), np.stack([-np.sign(x), 0 * x, 0 * x], 1), 0.0)
+    velocity = np.where(
+        arms[:, None] * (np.abs(x)[:, None] > 0.6), np.stack([-np.sign(x), 0 * x, 0 * x], 1), 0.0
+    )
     body.set_motion(bent, 3.0 * velocity)
     upper, lower = x > 0.6, x < -0.6
     least = np.inf
@@ -163,7 +165,14 @@ def test_the_halves_of_a_folded_strip_meet_where_contact_with_itself_is_on_and_p
     assert folding(False)[0] < 0.0
 
 
-FILTERS = [((1, 1), (1, 1)), ((1, 2), (2, 1)), ((1, 1), (2, 2)), ((1, 3), (2, 2)), ((1, 0), (1, 1)), ((5, 4), (4, 6))]
+FILTERS = [
+    ((1, 1), (1, 1)),
+    ((1, 2), (2, 1)),
+    ((1, 1), (2, 2)),
+    ((1, 3), (2, 2)),
+    ((1, 0), (1, 1)),
+    ((5, 4), (4, 6)),
+]
 
 
 def test_bodies_touch_where_each_ones_mask_has_the_others_group():
@@ -205,7 +214,9 @@ def test_a_body_of_5_cm_rests_on_one_of_2_m():
 def test_where_a_body_freezes_the_others_go_on_and_lie_on_it():
     cube = box((0.5,) * 3, (2, 2, 2))
     world = world_of(
-        *((cube, SOFT, {"position": (0, 0, 0.26 + 0.55 * i)}) for i in range(3)), floor=0.0, gravity=(0, 0, -9.81)
+        *((cube, SOFT, {"position": (0, 0, 0.26 + 0.55 * i)}) for i in range(3)),
+        floor=0.0,
+        gravity=(0, 0, -9.81),
     )
     middle = world.bodies[1]
     run(world, 0.5)
@@ -234,7 +245,8 @@ for i in range(6):
     mesh = sphere(0.3, 2) if i % 2 else box((0.5, 0.5, 0.5), (2, 2, 2))
     material = Material(2e5, 0.3, 1000.0, 40.0)
     options = {"contact": Contact(itself=i == 0)}
-    world.add_body(mesh, material, position=(0.1 * i + 3.0 * (i > 3), 0.05 * i, 0.4 + 0.6 * (i % 4)), **options)
+    place = (0.1 * i + 3.0 * (i > 3), 0.05 * i, 0.4 + 0.6 * (i % 4))
+    world.add_body(mesh, material, position=place, **options)
 world.build()
 for _ in range(60):
     world.step(1 / 60)
@@ -246,7 +258,9 @@ def test_a_heap_has_the_same_bits_for_one_and_two_threads(tmp_path):
     found = []
     for threads in (1, 2):
         out = tmp_path / f"{threads}.npz"
-        subprocess.run([sys.executable, "-c", SCRIPT, str(threads), str(out)], cwd=ROOT, check=True, timeout=300)
+        subprocess.run(
+            [sys.executable, "-c", SCRIPT, str(threads), str(out)], cwd=ROOT, check=True, timeout=300
+        )
         found.append(dict(np.load(out)))
     assert len(found[0]) == 12
     for name, rows in found[0].items():
