@@ -64,8 +64,9 @@ class Case:
         first = self.course[0]
         return (
             f"{self.shape} {self.size:.3g} m, E {self.material.young:.2g} Pa, "
-            f"{self.material.density:.0f} kg/m^3, nu {self.material.poisson:.2f}, {speed:.1f} m/s (Mach {self.mach:.2f}), friction "
-            f"{first.friction:.2f}, restitution {first.restitution:.2f}; {solids}"
+            f"{self.material.density:.0f} kg/m^3, nu {self.material.poisson:.2f}, "
+            f"{speed:.1f} m/s (Mach {self.mach:.2f}), friction {first.friction:.2f}, "
+            f"restitution {first.restitution:.2f}; {solids}"
         )
 
 
