@@ -59,7 +59,7 @@ def test_nothing_gets_out_of_the_room_or_stays_in_an_obstacle(outcomes):
 
 
 def test_only_what_is_thrown_at_twice_its_speed_of_sound_goes_non_finite(outcomes):
-    """The substep is chosen for small deformation: a body flattened by such an impact is stiffer than that."""
+    """The substep is chosen for small deformation; a body flattened by such an impact is stiffer."""
     for outcome in outcomes.values():
         assert outcome.frozen_at is None or outcome.case.mach > 2.0, outcome
 
