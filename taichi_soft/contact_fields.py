@@ -73,21 +73,23 @@ class ContactFields:
 
 @ti.data_oriented
 class SoftContactFields:
-    """What bodies need to touch each other: their boxes, a hash of vertices, and candidates.
+    """What bodies need to touch each other: a hash of vertices, and candidates.
 
-    An island has a piece of the hash, `island_table`, in which it looks at two bodies after the other.
+    Each body has a piece of the hash, in which it looks at one other body after the next.
     """
 
-    def __init__(self, particles: int, bodies: int, outer: int) -> None:
+    def __init__(self, particles: int, bodies: int, outer: int, triangles: int) -> None:
         """Allocate; contents are zero."""
         self.body_surface = ti.Vector.field(3, ti.f32, bodies)  # friction, thickness [m], mean edge [m]
         self.body_touches_itself = ti.field(ti.i32, bodies)
         self.sweep_order = ti.field(ti.i32, bodies)  # bodies by their lower x
         self.parent = ti.field(ti.i32, bodies)  # in the forest of islands
-        self.island_table = ti.Vector.field(2, ti.i32, bodies)  # first row of `cell_first` and of the items
+        self.body_island = ti.field(ti.i32, bodies)
         self.cell_first = ti.field(ti.i32, 4 * outer + bodies)
         self.item = ti.field(ti.i32, outer)  # rows of `outer_particle` that may be near the other body
         self.cell_item = ti.field(ti.i32, outer)  # the same, cell by cell
+        self.triangle_lower = ti.Vector.field(3, ti.f32, triangles)  # corners of a box [m], at the search
+        self.triangle_upper = ti.Vector.field(3, ti.f32, triangles)
         self.slot_count = ti.field(ti.i32, outer)
         self.slot_triangle = ti.field(ti.i32, outer * SLOTS)
         self.slot_distance = ti.field(ti.f32, outer * SLOTS)  # [m], at the search

@@ -184,7 +184,7 @@ class State:
         if capacity.contact != _NO_CONTACT:
             self.contact = ContactFields(capacity.contact, n, bodies)
         if capacity.contact.soft:
-            self.soft = SoftContactFields(n, bodies, capacity.outer)
+            self.soft = SoftContactFields(n, bodies, capacity.outer, capacity.triangles)
 
         self.gravity = ti.Vector.field(3, real, ())  # [m/s^2]
         self.wind = ti.Vector.field(4, real, ())  # [m/s], density times drag coefficient [kg/m^3]
