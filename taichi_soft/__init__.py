@@ -6,6 +6,7 @@ from taichi_soft.colliders import Collider
 from taichi_soft.contact import Contact
 from taichi_soft.errors import (
     DeviceError,
+    DroppedEventsWarning,
     FrozenBodyWarning,
     MaterialError,
     MeshError,
@@ -15,6 +16,17 @@ from taichi_soft.errors import (
     TaichiSoftError,
     UnstableStepWarning,
     VideoError,
+)
+from taichi_soft.events import (
+    ContactBegan,
+    ContactEnded,
+    Event,
+    FellAsleep,
+    Froze,
+    Listener,
+    StressExceeded,
+    TearCandidates,
+    Woke,
 )
 from taichi_soft.failures import Failure
 from taichi_soft.forces import force_gradient, internal_forces
@@ -75,11 +87,18 @@ __all__ = [
     "ClosestPoint",
     "Collider",
     "Contact",
+    "ContactBegan",
+    "ContactEnded",
     "Device",
     "DeviceError",
+    "DroppedEventsWarning",
+    "Event",
     "Failure",
+    "FellAsleep",
+    "Froze",
     "FrozenBodyWarning",
     "HeightFieldShape",
+    "Listener",
     "Material",
     "MaterialError",
     "MeshError",
@@ -101,10 +120,13 @@ __all__ = [
     "StableStep",
     "StateError",
     "Stiffness",
+    "StressExceeded",
     "TaichiSoftError",
+    "TearCandidates",
     "TetMesh",
     "UnstableStepWarning",
     "VideoError",
+    "Woke",
     "World",
     "beam",
     "box",

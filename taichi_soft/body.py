@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.checks import as_array
-from taichi_soft.errors import MeshError, OptionError, StateError
+from taichi_soft.checks import as_array, as_positive
+from taichi_soft.errors import MaterialError, MeshError, OptionError, StateError
+from taichi_soft.events import Event, StressExceeded, TearCandidates
 from taichi_soft.failures import FailedStep, Failure
 from taichi_soft.laws.law import EnergyLaw
-from taichi_soft.materials import voigt_stress
+from taichi_soft.materials import SpringMaterial, voigt_stress
 from taichi_soft.queries import Pose, best_fitting_pose
 from taichi_soft.scene import rest_inverses
 from taichi_soft.stability import StableStep
@@ -265,6 +266,33 @@ class Body:
     def tet_stress(self) -> Floats:
         """Von Mises stress of each tetrahedron by Hooke's law and linear strain, (m,) [Pa]."""
         return np.asarray(np.sqrt(1.5) * _deviator_norms(self._green_strain_and_stress()[1]))
+
+    def watch_stress(self, threshold: float | None) -> None:
+        """Record a `StressExceeded` in every step in which tetrahedra come over a stress.
+
+        One that stays over it, or has not been below 0.9 of it since, is not named again.
+        Args:
+            threshold: of `tet_stress` [Pa]; None for no longer.
+        Raises: OptionError if it is not above 0; MeshError for a body without tetrahedra; MaterialError for
+            springs, which have no stress; StateError before `build`. The same for `watch_tearing`.
+        """
+        self._watch(StressExceeded, threshold, "threshold")
+
+    def watch_tearing(self, tear_stress: float | None) -> None:
+        """Record a `TearCandidates` in every step in which tetrahedra are pulled harder than they can bear.
+
+        Args:
+            tear_stress: of the largest principal stress, which pulls; by Hooke's law and linear strain [Pa].
+                None for no longer.
+        """
+        self._watch(TearCandidates, tear_stress, "tear_stress")
+
+    def _watch(self, kind: type[Event], threshold: float | None, name: str) -> None:
+        self._require_tets()
+        if isinstance(self.material, SpringMaterial):
+            raise MaterialError(f"body {self.index} is made of springs, which have no stress to watch")
+        limit = None if threshold is None else as_positive(threshold, name, "Pa")
+        self._world._event_log.watch(kind, self, limit)
 
     def tet_strain(self) -> Floats:
         """Equivalent (von Mises) strain sqrt(2/3 e:e) of each tetrahedron, (m,), e the deviator of `strains`.

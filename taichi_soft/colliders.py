@@ -76,7 +76,7 @@ class Collider:
     @property
     def position(self) -> Floats:
         """Of its origin, (3,) [m]."""
-        return self._row.position.copy()
+        return np.array(self._row.position)
 
     @property
     def rotation(self) -> Floats:
@@ -150,6 +150,10 @@ class Colliders:
     def handles(self) -> Sequence[Collider]:
         """Those that are alive."""
         return tuple(handle for handle, row in zip(self._handles, self._rows, strict=True) if row.is_alive)
+
+    def handle(self, index: int) -> Collider:
+        """The latest that had that row."""
+        return self._handles[index]
 
     def add(
         self,

@@ -11,6 +11,7 @@ from taichi_soft.kernels.motion import remember_particle
 from taichi_soft.kernels.per_body import settle_body
 from taichi_soft.kernels.soft_contact import solve_island
 from taichi_soft.kernels.soft_search import search_island
+from taichi_soft.kernels.touches import add_touches
 from taichi_soft.runtime import ti
 from taichi_soft.state import ABSENT, ACTIVE
 
@@ -82,6 +83,8 @@ def _touch_each_other(state: ti.template(), island, reach, gone, fastest, h):
                 thickness = ti.max(thickness, surface.y)
             search_island(state, island, thickness + holds)
         solve_island(state, island, h, used, way)
+        if state.soft.records_touches[None] == 1:
+            add_touches(state, island)
     return holds, used
 
 
