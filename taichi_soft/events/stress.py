@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from taichi_soft.constants import LANES
 from taichi_soft.events.kinds import Event, StressExceeded, TearCandidates
-from taichi_soft.kernels.stress import read_stress
+from taichi_soft.kernels.stress import NO_LIMIT, read_stress
 from taichi_soft.scene import Scene
 from taichi_soft.state import State
 
@@ -51,6 +51,7 @@ class StressWatches:
         self._watches: dict[tuple[type[Event], Body], _Watch] = {}
         self._places: dict[Body, slice] = {}  # of each one's tetrahedra in what is read
         self._blocks = np.zeros(0, dtype=np.int32)
+        self._limits = np.zeros(0, dtype=np.float32)  # of each block, for tears [Pa]
         self._read = np.zeros((0, 5), dtype=np.float32)
 
     def set(self, kind: type[Event], body: Body, threshold: float | None) -> None:
@@ -73,11 +74,13 @@ class StressWatches:
             start += (last - first) * LANES
         rows = [np.arange(*place, dtype=np.int32) for place in ranges]
         self._blocks = np.concatenate([np.zeros(0, dtype=np.int32), *rows])
+        pulls = [self._watches.get((TearCandidates, body)) for body in bodies]
+        limits = [NO_LIMIT if watch is None else watch.threshold for watch in pulls]
+        self._limits = np.repeat(limits, [len(blocks) for blocks in rows]).astype(np.float32)
         self._read = np.zeros((start, 5), dtype=np.float32)
 
     def _evaluate(self) -> None:
-        wants_axes = any(kind is TearCandidates for kind, _ in self._watches)
-        read_stress(self._state, int(wants_axes), self._blocks, self._read)
+        read_stress(self._state, self._blocks, self._limits, self._read)
 
     def events(self, kind: type[Event], step: int, time: float) -> Iterator[Event]:
         """Of one kind, in the order of bodies, of what `look` has seen."""
