@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.checks import as_array, as_positive
-from taichi_soft.errors import MaterialError, MeshError, OptionError, StateError
+from taichi_soft.errors import MeshError, OptionError, StateError
 from taichi_soft.events import Event, StressExceeded, TearCandidates
 from taichi_soft.failures import FailedStep, Failure
 from taichi_soft.laws.law import EnergyLaw
-from taichi_soft.materials import SpringMaterial, voigt_stress
+from taichi_soft.materials import voigt_stress
 from taichi_soft.queries import Pose, best_fitting_pose
 from taichi_soft.scene import rest_inverses
 from taichi_soft.stability import StableStep
@@ -273,8 +273,8 @@ class Body:
         One that stays over it, or has not been below 0.9 of it since, is not named again.
         Args:
             threshold: of `tet_stress` [Pa]; None for no longer.
-        Raises: OptionError if it is not above 0; MeshError for a body without tetrahedra; MaterialError for
-            springs, which have no stress; StateError before `build`. The same for `watch_tearing`.
+        Raises: OptionError if it is not above 0; MeshError for a body without tetrahedra; StateError before
+            `build`. The same for `watch_tearing`.
         """
         self._watch(StressExceeded, threshold, "threshold")
 
@@ -288,11 +288,10 @@ class Body:
         self._watch(TearCandidates, tear_stress, "tear_stress")
 
     def _watch(self, kind: type[Event], threshold: float | None, name: str) -> None:
+        log = self._world._event_log
         self._require_tets()
-        if isinstance(self.material, SpringMaterial):
-            raise MaterialError(f"body {self.index} is made of springs, which have no stress to watch")
         limit = None if threshold is None else as_positive(threshold, name, "Pa")
-        self._world._event_log.watch(kind, self, limit)
+        log.watch(kind, self, limit)
 
     def tet_strain(self) -> Floats:
         """Equivalent (von Mises) strain sqrt(2/3 e:e) of each tetrahedron, (m,), e the deviator of `strains`.

@@ -2,7 +2,7 @@
 
 from taichi_soft.constants import LANES
 from taichi_soft.kernels.elastic import BLOCK_BITS, particles_of, rest_inverse_of, stiffness_of
-from taichi_soft.laws.anisotropy import green_stress
+from taichi_soft.laws.anisotropy import anisotropic_stress
 from taichi_soft.laws.hooke import hooke_stress
 from taichi_soft.math.eigen import symmetric_eigen
 from taichi_soft.math.tensors import (
@@ -31,11 +31,13 @@ def _deformation_of(state: ti.template(), block, lane):
 @ti.func
 def _stress_of(state: ti.template(), F, block, lane):
     """Hooke's stress of 1/2 (F^T F - I) [Pa], as columns, in the axes of the rest shape."""
-    constants = state.tet_lame[block * 2 * LANES + lane], state.tet_lame[(block * 2 + 1) * LANES + lane]
-    stress = hooke_stress(scaled_plus_identity(inner_square(F), 0.5, -0.5), constants[0], constants[1])
+    strain = scaled_plus_identity(inner_square(F), 0.5, -0.5)
+    base = block * 2 * LANES + lane
+    isotropic = hooke_stress(strain, state.tet_lame[base], state.tet_lame[base + LANES])
     if ti.static(state.capacity.anisotropic):  # one of the two has no constants but zeros
-        stress = plus(stress, 1.0, green_stress(F, stiffness_of(state, block, lane)), 1.0)
-    return stress
+        return plus(isotropic, 1.0, anisotropic_stress(strain, stiffness_of(state, block, lane)), 1.0)
+    else:
+        return isotropic
 
 
 @ti.func
@@ -57,7 +59,7 @@ def read_stress(
     limits: ti.types.ndarray(dtype=ti.f32, ndim=1),
     out: ti.types.ndarray(dtype=ti.f32, ndim=2),
 ):
-    """Von Mises stress of the tetrahedra in `blocks`; and how hard they are pulled, and along which direction.
+    """Von Mises stress of the tetrahedra in `blocks`; and how hard they are pulled, and in which direction.
 
     Args:
         limits: for each block, from which pull on the direction is wanted [Pa]; `NO_LIMIT` asks for no pull.
