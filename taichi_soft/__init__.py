@@ -4,6 +4,9 @@ from taichi_soft.assets import SoftBodyAsset
 from taichi_soft.body import Body
 from taichi_soft.colliders import Collider
 from taichi_soft.contact import Contact
+from taichi_soft.control.attachments import Attachment
+from taichi_soft.control.frames import Frame
+from taichi_soft.control.grabs import Grab
 from taichi_soft.errors import (
     DeviceError,
     DroppedEventsWarning,
@@ -81,6 +84,7 @@ __all__ = [
     "LAWS",
     "PRESETS",
     "AnisotropicMaterial",
+    "Attachment",
     "Body",
     "BoxShape",
     "CapsuleShape",
@@ -95,8 +99,10 @@ __all__ = [
     "Event",
     "Failure",
     "FellAsleep",
+    "Frame",
     "Froze",
     "FrozenBodyWarning",
+    "Grab",
     "HeightFieldShape",
     "Listener",
     "Material",

@@ -61,6 +61,11 @@ class ContactFields:
         self.gone = ti.field(ti.f32, bodies)  # way [m] since it was looked which are near, at most
         self.impulse = ti.Vector.field(3, ti.f32, bodies * c)  # on the collider in this step [N s]
         self.angular_impulse = ti.Vector.field(3, ti.f32, bodies * c)  # about its position [N m s]
+        # Corners of a box [m]: of the way through a step, of the search in an island, or where a body sleeps.
+        self.body_lower = ti.Vector.field(3, ti.f32, bodies)
+        self.body_upper = ti.Vector.field(3, ti.f32, bodies)
+        self.sleep_speed = ti.field(ti.f32, ())  # [m/s] below which bodies fall asleep; 0 for never
+        self.calm = ti.field(ti.f32, bodies)  # time since a body was faster [s]
         self.body_filter = ti.Vector.field(2, ti.i32, bodies)  # group, mask
         self.particle_clearance = ti.field(ti.f32, particles)  # [m] from all that is near, at that time
         self.particle_touches = ti.field(ti.i32, particles)  # 1 where something held it in the last substep
@@ -79,9 +84,6 @@ class SoftContactFields:
 
     def __init__(self, particles: int, bodies: int, outer: int) -> None:
         """Allocate; contents are zero."""
-        # Corners of a box [m]: of the way through a step for islands, of the search within them.
-        self.body_lower = ti.Vector.field(3, ti.f32, bodies)
-        self.body_upper = ti.Vector.field(3, ti.f32, bodies)
         self.body_surface = ti.Vector.field(3, ti.f32, bodies)  # friction, thickness [m], mean edge [m]
         self.body_touches_itself = ti.field(ti.i32, bodies)
         self.sweep_order = ti.field(ti.i32, bodies)  # bodies by their lower x

@@ -5,15 +5,19 @@ anything.
 """
 
 from taichi_soft.kernels.collide import collided, find_near_colliders, forget_contacts
+from taichi_soft.kernels.drives import add_reactions, blow_on, push_particles
+from taichi_soft.kernels.grabs import pull_grabs
 from taichi_soft.kernels.internal_forces import accumulate_forces
 from taichi_soft.kernels.islands import find_islands, search_margin
-from taichi_soft.kernels.motion import remember_particle
-from taichi_soft.kernels.per_body import settle_body
+from taichi_soft.kernels.motion import gravity_on, remember_particle
+from taichi_soft.kernels.per_body import before_kick, settle_body
+from taichi_soft.kernels.sleep import note_motion, settle_island, wake_by_colliders, wake_island
 from taichi_soft.kernels.soft_contact import solve_island
 from taichi_soft.kernels.soft_search import search_island
 from taichi_soft.kernels.touches import add_touches
 from taichi_soft.runtime import ti
-from taichi_soft.state import ABSENT, ACTIVE
+from taichi_soft.state import ABSENT, ACTIVE, PUSHED
+from taichi_soft.types import Integrator
 
 
 @ti.func
@@ -32,10 +36,11 @@ def _kick_body(state: ti.template(), program: ti.template(), body, kick, common)
     Returns: the highest speed [m/s], and the highest beside the `common` velocity.
     """
     particles = state.body_particles[body]
+    gravity = gravity_on(state, body)
     highest, highest_beside = ti.cast(0.0, state.real), ti.cast(0.0, state.real)
     for p in range(particles[0], particles[1]):
         inv_mass = state.particle_inv_mass[p]
-        acceleration = state.particle_force[p].xyz * inv_mass + state.gravity[None]
+        acceleration = state.particle_force[p].xyz * inv_mass + gravity
         acceleration *= ti.select(inv_mass > 0.0, 1.0, 0.0)
         _, v = program.advance(
             state.particle_position[p], state.particle_velocity[p], acceleration, 0.0, kick
@@ -51,17 +56,21 @@ def _kick_body(state: ti.template(), program: ti.template(), body, kick, common)
 
 @ti.func
 def _drift_body(state: ti.template(), body, h, since):
-    """New positions, and what colliders in the way make of velocities."""
+    """New positions, and what colliders in the way make of velocities. Returns the highest speed [m/s]."""
     particles = state.body_particles[body]
     gone = state.contact.gone[body]
+    farthest2 = ti.cast(0.0, state.real)
     for p in range(particles[0], particles[1]):
         x, v = state.particle_position[p], state.particle_velocity[p]
         if state.contact.particle_clearance[p] <= gone and state.particle_inv_mass[p] > 0.0:
             x_new, v_new = collided(state, body, p, x, v, h, since)
             state.particle_position[p] = x_new
             state.particle_velocity[p] = v_new
+            farthest2 = ti.max(farthest2, (x_new - x).dot(x_new - x))
         else:
             state.particle_position[p] = x + h * v
+            farthest2 = ti.max(farthest2, h * h * v.dot(v))
+    return ti.sqrt(farthest2) / h
 
 
 @ti.func
@@ -101,8 +110,8 @@ def _common_velocity(state: ti.template(), island):
 
 
 @ti.func
-def _step_island(state: ti.template(), program: ti.template(), island, substeps, h):
-    """One fixed step of one island. Returns how many of its bodies failed."""
+def _move_island(state: ti.template(), program: ti.template(), island, substeps, h):
+    """All substeps of an island that is awake. Returns how many of its bodies failed."""
     first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
     for i in range(first, last):
         _begin_body(state, state.contact.island_body[i])
@@ -116,10 +125,15 @@ def _step_island(state: ti.template(), program: ti.template(), island, substeps,
         for i in range(first, last):
             body = state.contact.island_body[i]
             if state.body_status[body] == ACTIVE:
-                accumulate_forces(state, program, body)
                 kick = h
                 if s == 0:
                     kick = 0.5 * (state.body_velocity_lag[body] + h)
+                lasting = kick if ti.static(program.integrator == Integrator.LEAPFROG) else h
+                blow_on(state, body, h)
+                push_particles(state, body, before_kick(program, h, int(s == 0)))
+                accumulate_forces(state, program, body)
+                add_reactions(state, body, lasting)
+                pull_grabs(state, body, h, lasting)
                 speed, speed_beside = _kick_body(state, program, body, kick, common)
                 fastest = ti.max(fastest, speed)
                 fastest_beside = ti.max(fastest_beside, speed_beside)
@@ -135,15 +149,28 @@ def _step_island(state: ti.template(), program: ti.template(), island, substeps,
                     find_near_colliders(state, body, 1.25 * fastest * left + 1e-3, s * h, left)
                     way = fastest * h
                 state.contact.gone[body] = way
-                _drift_body(state, body, h, s * h)
+                note_motion(state, body, _drift_body(state, body, h, s * h))
     failed = 0
     for i in range(first, last):
         body = state.contact.island_body[i]
         if state.body_status[body] == ACTIVE:
+            if ti.static(program.integrator == Integrator.LEAPFROG):
+                push_particles(state, body, 0.5 * h)
             has_failed = settle_body(state, body)
             failed += has_failed
             if has_failed == 0:
                 state.body_velocity_lag[body] = h
+                state.body_drives[body] = state.body_drives[body] & ~PUSHED
+    return failed
+
+
+@ti.func
+def _step_island(state: ti.template(), program: ti.template(), island, substeps, h):
+    """One fixed step of one island. Returns how many of its bodies failed."""
+    failed = 0
+    if wake_island(state, island) == 1:
+        failed = _move_island(state, program, island, substeps, h)
+        settle_island(state, island, substeps * h)
     return failed
 
 
@@ -153,9 +180,10 @@ def step_islands(
 ) -> ti.i32:
     """One fixed step of every active body. Returns how many failed."""
     failed = 0
-    if ti.static(program.has_soft_contact):
-        ti.loop_config(serialize=True)
-        for _ in range(1):
+    ti.loop_config(serialize=True)
+    for _ in range(1):
+        wake_by_colliders(state, body_count)
+        if ti.static(program.has_soft_contact):
             find_islands(state, body_count, substeps * h)
     ti.loop_config(block_dim=1)
     for island in range(state.contact.island_count[None]):

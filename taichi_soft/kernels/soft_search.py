@@ -46,8 +46,8 @@ def _find_boxes(state: ti.template(), island):
             x = state.particle_position[state.outer_particle[k]]
             lower, upper = ti.min(lower, x), ti.max(upper, x)
             state.soft.slot_count[k] = 0
-        state.soft.body_lower[body] = lower
-        state.soft.body_upper[body] = upper
+        state.contact.body_lower[body] = lower
+        state.contact.body_upper[body] = upper
 
 
 @ti.func
@@ -56,7 +56,7 @@ def _fill_table(state: ti.template(), table, body, other, cell, margin):
 
     Returns: the rows of the hash, a power of two; 0 where there is no such vertex.
     """
-    lower, upper = state.soft.body_lower[other] - margin, state.soft.body_upper[other] + margin
+    lower, upper = state.contact.body_lower[other] - margin, state.contact.body_upper[other] + margin
     outer = state.body_outer[body]
     count = 0
     for k in range(outer[0], outer[1]):
@@ -130,8 +130,8 @@ def _search_triangle(state: ti.template(), table, size, body, other, triangle, c
     c = state.particle_position[corners[2]]
     lower, upper = ti.min(a, b, c) - margin, ti.max(a, b, c) + margin
     # Only as far as the box of the body whose vertices these are.
-    lower = ti.max(lower, state.soft.body_lower[body])
-    upper = ti.min(upper, state.soft.body_upper[body])
+    lower = ti.max(lower, state.contact.body_lower[body])
+    upper = ti.min(upper, state.contact.body_upper[body])
     if (upper - lower).min() >= 0.0:
         low, high = _cell_of(lower, cell), _cell_of(upper, cell)
         for cx in range(low.x, high.x + 1):
@@ -174,13 +174,13 @@ def search_island(state: ti.template(), island, margin):
     _find_boxes(state, island)
     for i in range(first, last):
         body = state.contact.island_body[i]
-        lower, upper = state.soft.body_lower[body] - margin, state.soft.body_upper[body] + margin
+        lower, upper = state.contact.body_lower[body] - margin, state.contact.body_upper[body] + margin
         for j in range(first, last):
             other = state.contact.island_body[j]
             wanted = state.soft.body_touches_itself[body] == 1
             if i != j:
                 wanted = may_touch(state, body, other) and _boxes_overlap(
-                    lower, upper, state.soft.body_lower[other], state.soft.body_upper[other]
+                    lower, upper, state.contact.body_lower[other], state.contact.body_upper[other]
                 )
             if wanted:
                 _search_pair(state, state.soft.island_table[island], body, other, margin)
