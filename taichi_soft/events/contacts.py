@@ -30,8 +30,8 @@ class _Contact:
     a: Body
     b: Collider | Body
     began: float  # [s], start of the first step with an impulse
-    touched: float  # [s], end of the last
-    pause: float = 0.0  # [s] since then, as far as either of them moved
+    touched: float  # [s], end of the last, or of rest
+    pause: float = 0.0  # [s] in which either of them has moved since
     impulse: Vector = (0.0, 0.0, 0.0)  # [N s]
 
     def add(self, impulse: Vector, time: float) -> None:
@@ -39,6 +39,13 @@ class _Contact:
         (x, y, z), (dx, dy, dz) = self.impulse, impulse
         self.impulse = (x + dx, y + dy, z + dz)
         self.touched, self.pause = time, 0.0
+
+    def wait(self, dt: float, time: float, is_moving: bool) -> None:
+        """A step without an impulse: where neither moves, they lie as they lay."""
+        if is_moving:
+            self.pause += dt
+        else:
+            self.touched = time
 
     @property
     def is_over(self) -> bool:
@@ -74,8 +81,8 @@ class Contacts:
         ended = []
         for key in sorted(self._going_on):
             contact = self._going_on[key]
-            if key not in touches and (key[0] in moving or (key[1] == OF_BODY and key[2] in moving)):
-                contact.pause += dt
+            if key not in touches:
+                contact.wait(dt, time, key[0] in moving or (key[1] == OF_BODY and key[2] in moving))
             if contact.is_over:
                 del self._going_on[key]
                 ended.append(contact.end(step, time))

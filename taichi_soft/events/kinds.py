@@ -40,8 +40,8 @@ class ContactEnded(Event):
 
     a: Body
     b: Collider | Body
-    impulse: Floats  # (3,) that `a` gave `b` from beginning to end [N s]
-    duration: float  # [s], from the start of the first step with an impulse to the end of the last
+    impulse: Floats  # (3,) that `a` gave `b` from beginning to end [N s]; what sleeps gives none
+    duration: float  # [s] from the start of the first step with one to the end of the last, or of sleep
 
 
 @dataclass(frozen=True, eq=False)

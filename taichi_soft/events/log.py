@@ -50,9 +50,11 @@ class EventLog:
 
     def record(self, kinds: Iterable[type[Event]]) -> None:
         """See `World.record_events`."""
-        if isinstance(kinds, type) or not isinstance(kinds, Iterable):
-            raise OptionError(f"kinds must be a list of classes of events, got {kinds!r}")
-        chosen: frozenset[type[Event]] = frozenset().union(*[self._parts(kind) for kind in kinds])
+        try:
+            listed = list(kinds)
+        except TypeError:
+            raise OptionError(f"kinds must be a list of classes of events, got {kinds!r}") from None
+        chosen: frozenset[type[Event]] = frozenset().union(*[self._parts(kind) for kind in listed])
         self._record(chosen)
 
     def _parts(self, kind: Any) -> frozenset[type[Event]]:

@@ -7,7 +7,7 @@ by hashing. What is read is cleared, and nothing else writes there.
 from taichi_soft.contact_fields import PAIR_ROWS, SLOTS
 from taichi_soft.math.finite import is_finite
 from taichi_soft.runtime import ti
-from taichi_soft.state import ABSENT, ACTIVE, ASLEEP
+from taichi_soft.state import ACTIVE, ASLEEP
 
 OF_COLLIDER, OF_BODY = 0, 1
 """What the second one of a pair is."""
@@ -70,7 +70,8 @@ def read_touches(
     """Status of all bodies; and which pairs touched in the last step, in no particular but a fixed order.
 
     Args:
-        status: (bodies + 1,), the last one not 0 where the table had no room for all pairs.
+        status: (bodies + 1,), as of the last call, or 0; the last one is not 0 where the table had no room
+            for all pairs.
         who: (rows, 3): a body, `OF_COLLIDER` or `OF_BODY`, and that collider or body.
         impulses: (rows, 3) that the first gave the second [N s].
     Returns: how many rows were written.
@@ -81,10 +82,10 @@ def read_touches(
         count = 0
         status[body_count] = 0
         for body in range(body_count):
-            status[body] = state.body_status[body]
-        if ti.static(state.capacity.contact.colliders > 0):
-            for body in range(body_count):
-                if state.body_status[body] == ACTIVE:
+            before, now = status[body], state.body_status[body]
+            status[body] = now
+            if ti.static(state.capacity.contact.colliders > 0):
+                if now == ACTIVE or (now == ASLEEP and before == ACTIVE):  # others have impulses of old
                     for c in range(state.contact.collider_count[None]):
                         impulse = state.contact.impulse[body * state.contact.capacity.colliders + c]
                         if ti.abs(impulse).max() > 0.0 and is_finite(impulse):
@@ -95,7 +96,7 @@ def read_touches(
                 pair = state.soft.pair_bodies[row]
                 if pair.y > 0:
                     impulse = state.soft.pair_impulse[row]
-                    if _is_at_work(state, pair.x) and _is_at_work(state, pair.y) and is_finite(impulse):
+                    if is_finite(impulse):
                         _write_touch(who, impulses, count, pair.x, OF_BODY, pair.y, impulse)
                         count += 1
                     state.soft.pair_bodies[row] = ti.Vector.zero(ti.i32, 2)
@@ -104,8 +105,3 @@ def read_touches(
             state.soft.pairs_lost[None] = 0
         written += count
     return written
-
-
-@ti.func
-def _is_at_work(state: ti.template(), body):
-    return state.body_status[body] != ABSENT and state.body_status[body] != ASLEEP

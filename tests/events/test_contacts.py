@@ -78,6 +78,7 @@ def test_between_bodies_that_do_not_move_contact_goes_on(game):
     game.moving |= {1}
     ended = [event for _ in range(PAUSE) for event in game.go()[1]]
     assert [(event.a.index, event.b.index) for event in ended] == [(0, 1)]
+    assert ended[0].duration == pytest.approx(21 * DT)
     game.moving |= {0}
     assert game.go(FLOOR) == ([], [])
 

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -29,21 +30,20 @@ from taichi_soft import (
     sphere,
 )
 from taichi_soft.events import log
-from taichi_soft.state import ACTIVE, ASLEEP
 
 ROOT = Path(__file__).parents[2]
 DT = 1 / 60
 STEPS = 4
 PAUSE = 3  # steps without impulse after which a contact is over
-BALL = sphere(0.5, 2)
+BALL, CUBE = sphere(0.5, 2), box(cells=(2, 2, 2))
 RUBBER = Material(3e5, 0.2, 1000.0, 2.0)
-BOUNCY, DULL = SoftBodyAsset(BALL, RUBBER), SoftBodyAsset(BALL, Material(3e5, 0.2, 1000.0, 60.0))
+BOUNCY, DULL = SoftBodyAsset(BALL, RUBBER), SoftBodyAsset(CUBE, Material(3e5, 0.2, 1000.0, 300.0))
 
 
 @pytest.fixture(scope="module")
 def level():
-    """A floor that is a collider, room for an obstacle, two balls that bounce and one that does not."""
-    world = World(collider_room=1)
+    """A floor that is a collider, room for an obstacle, for two balls that bounce and a cube that rests."""
+    world = World(collider_room=1, sleep_speed=0.02)
     world.reserve(BOUNCY, 2)
     world.reserve(DULL, 1)
     world.build()
@@ -107,12 +107,13 @@ def test_a_bouncing_ball_begins_and_ends_one_contact_per_bounce(world):
 
 
 def test_a_resting_body_touches_until_it_is_lifted(world):
-    ball = world.spawn(DULL, position=(0, 0, 0.5))
+    cube = world.spawn(DULL, position=(0, 0, 0.5))
     world.record_events([ContactBegan, ContactEnded])
     advance(world, 240)
     assert [type(event) for event in world.drain_events()] == [ContactBegan]
-    lifted = ball.positions() + np.float32([0, 0, 5])
-    ball.set_motion(lifted, np.zeros_like(lifted))
+    assert cube.is_asleep
+    lifted = cube.positions() + np.float32([0, 0, 5])
+    cube.set_motion(lifted, np.zeros_like(lifted))
     advance(world, PAUSE)
     ended = world.drain_events()
     assert [type(event) for event in ended] == [ContactEnded]
@@ -152,26 +153,39 @@ def test_contacts_of_removed_bodies_and_colliders_end_and_slots_are_not_mixed_up
     assert [(type(e), e.b) for e in events[:2]] == [(ContactEnded, obstacle), (ContactBegan, again)]
 
 
-def test_sleep_and_waking_are_seen_from_the_status_of_bodies_and_end_no_contact(world):
-    one = world.spawn(BOUNCY, position=(0, 0, 0.5))
-    two = world.spawn(BOUNCY, position=(3, 0, 0.5))
-    status = world._state.body_status
+def test_sleep_and_waking_are_told_of_in_their_steps_and_end_no_contact(world):
+    one = world.spawn(DULL, position=(0, 0, 0.5))
+    world.spawn(BOUNCY, position=(30, 0, 3), velocity=(0, 0, 5))
     world.record_events()
-    advance(world, 10)
-    assert {type(event) for event in world.drain_events()} == {ContactBegan}
-    status[one.index] = status[two.index] = ASLEEP
-    advance(world)
-    assert [(type(e), e.body) for e in world.drain_events()] == [(FellAsleep, one), (FellAsleep, two)]
-    advance(world, 3 * PAUSE)
-    assert world.drain_events() == []
-    status[one.index] = ACTIVE
-    world.despawn(two)
-    world.spawn(BOUNCY, position=(3, 0, 3))
-    advance(world)
+    first, was_asleep, seen = world.step_count, False, []
+
+    def go(count):
+        nonlocal was_asleep
+        for _ in range(count):
+            advance(world)
+            if one.is_asleep != was_asleep:
+                was_asleep = one.is_asleep
+                seen.append((world.step_count - 1, FellAsleep if was_asleep else Woke, one))
+
+    go(140)
+    one.apply_impulse((0, 0, 0.1))
+    go(3)
+    assert not one.is_asleep
+    assert [kind for _, kind, _ in seen] == [FellAsleep, Woke]
     events = world.drain_events()
-    assert [(type(e), getattr(e, "body", None)) for e in events] == [(ContactEnded, None), (Woke, one)]
-    assert events[0].a is two
-    advance(world, PAUSE)
+    assert [(e.step, type(e), e.body) for e in events if isinstance(e, (FellAsleep, Woke))] == seen
+    assert [(e.step, type(e)) for e in events if getattr(e, "a", None) is one] == [(first, ContactBegan)]
+
+
+def test_what_sleeps_is_told_of_only_when_it_falls_asleep_and_who_takes_its_slot_does_not_wake(world):
+    one = world.spawn(DULL, position=(0, 0, 0.5))
+    advance(world, 140)
+    assert one.is_asleep
+    world.record_events([FellAsleep, Woke])
+    advance(world)
+    world.despawn(one)
+    assert world.spawn(DULL, position=(0, 0, 3)).index == one.index
+    advance(world)
     assert world.drain_events() == []
 
 
@@ -192,9 +206,10 @@ def test_a_frozen_body_is_told_of_in_the_step_that_was_undone_also_where_warning
     assert events[0].failure == lost.failure
     assert events[0].failure.step == events[0].step
     lost.set_motion(9.9999e6 * rows, 1.9e4 * rows)
-    with pytest.warns(FrozenBodyWarning) as caught:
-        advance(world)
-    assert len(caught) == 1
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(FrozenBodyWarning):
+            advance(world)
     assert [e.body for e in world.drain_events()] == [lost]
     assert not sound.is_frozen
 

@@ -182,6 +182,17 @@ def test_both_are_watched_at_once_body_by_body_until_they_no_longer_are(swinging
     assert (StressExceeded, two) not in [(type(e), e.body) for e in again]
 
 
+def test_who_is_removed_is_no_longer_watched_and_who_comes_is_not(swinging):
+    one, two, _ = swinging.bodies
+    for body in (one, two):
+        body.watch_stress(STRESS / 10)
+    swinging.despawn(one)
+    new = swinging.spawn(one.asset)
+    start(new, 0)
+    swinging.step(DT, 8)
+    assert [event.body for event in swinging.drain_events()] == [two]
+
+
 def test_watching_begins_the_recording_of_its_kind_alone(swinging):
     swinging.record_events([])
     swinging.bodies[0].watch_tearing(PULL / 10)
