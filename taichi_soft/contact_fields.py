@@ -10,6 +10,10 @@ NO_COLLIDER = -1
 SLOTS = 6
 """Triangles that one vertex may touch at once: where three bodies meet, and their triangles beside."""
 
+PAIR_ROWS = 32
+"""Pairs of bodies whose impulses can be recorded, per body of an island: room for all pairs of 65 bodies, and
+for each of more to touch 64 others."""
+
 NO_CONTACT = 1e30
 """Gap of a candidate that is out of reach."""
 
@@ -99,3 +103,8 @@ class SoftContactFields:
         self.slot_press = ti.field(ti.f32, outer * SLOTS)  # impulse along it in this substep [N s]
         self.slot_rub = ti.Vector.field(3, ti.f32, outer * SLOTS)  # friction on the vertex [N s]
         self.rest_position = ti.Vector.field(3, ti.f32, particles)  # [m]
+        self.records_touches = ti.field(ti.i32, ())  # 1 where the rows below are filled
+        # Two bodies, the smaller index first; both 0 in a free row. Island by island, as in `island_body`.
+        self.pair_bodies = ti.Vector.field(2, ti.i32, bodies * PAIR_ROWS)
+        self.pair_impulse = ti.Vector.field(3, ti.f32, bodies * PAIR_ROWS)  # on the second in a step [N s]
+        self.pairs_lost = ti.field(ti.i32, ())  # 1 where some had no row

@@ -274,6 +274,10 @@ class State:
         if self.capacity.contact.soft:
             fill(self.soft.sweep_order, np.arange(count))
             fill(self.soft.slot_count, np.zeros(0))
+            self.soft.records_touches[None] = 0
+            self.soft.pairs_lost[None] = 0
+            fill(self.soft.pair_bodies, np.zeros((0, 2)))
+            fill(self.soft.pair_impulse, np.zeros((0, 3)))
             fill(self.soft.rest_position, np.concatenate([b.rest_position for b, _ in pairs]))
 
     def _load_bonds(self, bodies: list[BodyArrays], ranges: list[Ranges]) -> None:

@@ -14,6 +14,7 @@ from taichi_soft.kernels.per_body import before_kick, settle_body
 from taichi_soft.kernels.sleep import note_motion, settle_island, wake_by_colliders, wake_island
 from taichi_soft.kernels.soft_contact import solve_island
 from taichi_soft.kernels.soft_search import find_box, is_social, island_margin, search_body, search_island
+from taichi_soft.kernels.touches import add_touches
 from taichi_soft.runtime import ti
 from taichi_soft.state import ABSENT, ACTIVE, PUSHED
 from taichi_soft.types import Integrator
@@ -86,6 +87,8 @@ def _touch_each_other(state: ti.template(), island, reach, gone, fastest, h):
             holds, used = ti.max(way, least), way
             search_island(state, island, thickness + holds)
         solve_island(state, island, h, used, way)
+        if state.soft.records_touches[None] == 1:
+            add_touches(state, island)
     return holds, used
 
 

@@ -207,13 +207,14 @@ def _solve_vertex(state: ti.template(), k, h, sweep):
             corners = state.triangle_vertices[state.soft.slot_triangle[slot]]
             theirs = state.soft.body_surface[state.particle_body[corners[0]]]
             _press(state, p, corners, slot, h, int(sweep == 0))
-            if state.soft.slot_press[slot] > 0.0:
+            is_pressed = state.soft.slot_press[slot] > 0.0
+            # Where no press is left, friction takes back what it gave in an earlier sweep.
+            if is_pressed or ti.abs(state.soft.slot_rub[slot]).max() > 0.0:
                 _rub(state, p, corners, slot, ti.sqrt(mine.x * theirs.x), int(sweep == 0))
+            if is_pressed:
                 state.contact.particle_touches[p] = 1
                 for i in ti.static(range(3)):
                     state.contact.particle_touches[corners[i]] = 1
-            else:
-                state.soft.slot_rub[slot] = ti.Vector.zero(ti.f32, 3)
             if sweep == SWEEPS and state.soft.slot_gap[slot] < 0.0:
                 _push_apart(state, p, corners, slot)
         else:
