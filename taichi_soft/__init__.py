@@ -50,6 +50,7 @@ from taichi_soft.meshing import (
     voronoi_graph,
     voxels,
 )
+from taichi_soft.plasticity import Plasticity
 from taichi_soft.queries import ClosestPoint, Overlap, Pose, RayHit, RayHits
 from taichi_soft.runtime import Device, device, init
 from taichi_soft.settings import Settings
@@ -89,6 +90,7 @@ __all__ = [
     "Overlap",
     "ParticleMesh",
     "PlaneShape",
+    "Plasticity",
     "Pose",
     "RayHit",
     "RayHits",

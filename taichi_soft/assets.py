@@ -11,11 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 from taichi_soft.checks import as_indices, as_rotation, as_vector
 from taichi_soft.constants import POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.contact import DEFAULT_CONTACT, THIN, Contact
-from taichi_soft.errors import OptionError
-from taichi_soft.laws import element_model, fit_model
+from taichi_soft.errors import MaterialError, OptionError
+from taichi_soft.laws import ElementModel, element_model, fit_model
 from taichi_soft.materials import AnyMaterial
 from taichi_soft.meshing import BodyMesh
 from taichi_soft.meshing.arrays import read_only
+from taichi_soft.plasticity import Plasticity
 from taichi_soft.scene import BodyArrays, BodyDescription, arrange, require_size
 from taichi_soft.stability import StableStep, stable_step
 from taichi_soft.types import DampingModel, Flips, Strain
@@ -40,6 +41,8 @@ class SoftBodyAsset:
         damping_model: "edge" (eq. 3.9) or "tet_mean" (which section 6.4 rejects: it stops rotation).
         pinned: vertices that stay where they are.
         contact: how its surface touches others, in a world with colliders or soft contact.
+        plasticity: how it is bent for good; None for never. Takes laws that look at tetrahedra, and a
+            `Material`.
     Raises: MeshError, MaterialError or OptionError for bad input.
     """
 
@@ -52,6 +55,7 @@ class SoftBodyAsset:
     damping_model: str | DampingModel = DampingModel.EDGE
     pinned: ArrayLike = ()
     contact: Contact = DEFAULT_CONTACT
+    plasticity: Plasticity | None = None
     description: BodyDescription = field(init=False)
 
     def __post_init__(self) -> None:
@@ -59,12 +63,24 @@ class SoftBodyAsset:
         model = fit_model(model, self.mesh, self.material)
         if not isinstance(self.contact, Contact):
             raise OptionError(f"contact must be a Contact, got {self.contact!r}")
+        if self.plasticity is not None:
+            self._require_flow(model)
         pinned = read_only(as_indices(self.pinned, "pinned", len(self.mesh.vertices)))
         require_size(self.mesh)
         description = BodyDescription(self.mesh, self.material, model, pinned)
         _ = description.bonds  # made now, because a pairwise law may refuse the mesh
         object.__setattr__(self, "pinned", pinned)
         object.__setattr__(self, "description", description)
+
+    def _require_flow(self, model: ElementModel) -> None:
+        if not isinstance(self.plasticity, Plasticity):
+            raise OptionError(f"plasticity must be a Plasticity or None, got {self.plasticity!r}")
+        if model.has_bonds:
+            raise OptionError(
+                f"law {self.law!r} takes no plasticity: it looks at edges, 'virial' at tetrahedra"
+            )
+        if model.is_anisotropic:
+            raise MaterialError("an AnisotropicMaterial takes no plasticity: it does not yield by von Mises")
 
     def __repr__(self) -> str:
         return f"SoftBodyAsset({self.mesh!r}, {self.law!r})"

@@ -118,8 +118,15 @@ class Body:
         return self._description.pinned
 
     @cached_property
-    def _rest_inverses(self) -> Floats:
+    def _first_rest_inverses(self) -> Floats:
         return rest_inverses(self.mesh)
+
+    @property
+    def _rest_inverses(self) -> Floats:
+        """A^-1 of each tetrahedron at rest as it is now, (m, 3, 3) [1/m]."""
+        if self.asset.plasticity is None or not self._world.is_built:
+            return self._first_rest_inverses
+        return self._world._rest_inverses(self)
 
     @property
     def stable_step(self) -> StableStep:
@@ -252,7 +259,11 @@ class Body:
         return strain, voigt_stress(self.material.stiffness_matrices(len(self.tets)), strain)
 
     def deformations(self) -> Floats:
-        """Deformation gradient F = B A^-1 of each tetrahedron (thesis eq. 6.3), (m, 3, 3)."""
+        """Deformation gradient F = B A^-1 of each tetrahedron (thesis eq. 6.3), (m, 3, 3).
+
+        Of a body with plasticity the elastic one, against the rest shape as it is now. So are all strains and
+        stresses.
+        """
         self._require_tets()
         corners = self.positions().astype(np.float64)[self.tets]
         return np.asarray(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2) @ self._rest_inverses)
@@ -261,6 +272,13 @@ class Body:
         """Linear strain 1/2 (F F^T - I) of each tetrahedron (thesis eq. 6.7), (m, 3, 3)."""
         F = self.deformations()
         return np.asarray(0.5 * (F @ np.swapaxes(F, 1, 2) - np.eye(3)))
+
+    def plastic_strains(self) -> Floats:
+        """Equivalent (von Mises) logarithmic strain that each tetrahedron has for good, (m,)."""
+        self._require_tets()
+        flowed = np.linalg.inv(self._rest_inverses) @ self._first_rest_inverses  # Fp
+        stretches = np.linalg.svd(flowed, compute_uv=False)
+        return np.asarray(np.sqrt(2.0 / 3.0) * np.linalg.norm(np.log(stretches), axis=1))
 
     def tet_stress(self) -> Floats:
         """Von Mises stress of each tetrahedron by Hooke's law and linear strain, (m,) [Pa]."""

@@ -37,6 +37,7 @@ class Capacity:
     implicit: bool = False  # room for the linear system of implicit integration
     anisotropic: bool = False  # room for 21 elastic constants per tetrahedron
     contact: ContactCapacity = _NO_CONTACT
+    plastic: bool = False  # room for the first rest shapes of bodies that can be bent for good
     double: bool = False  # float64 instead of float32: to evaluate forces, not to move
 
     @classmethod
@@ -47,6 +48,7 @@ class Capacity:
         parallel: bool = False,
         implicit: bool = False,
         contact: ContactCapacity = _NO_CONTACT,
+        plastic: bool = False,
         double: bool = False,
     ) -> "Capacity":
         """Room for `scene`."""
@@ -62,6 +64,7 @@ class Capacity:
             implicit,
             any(body.stiffness.any() for body in scene.bodies),
             contact,
+            plastic,
             double,
         )
 
@@ -96,6 +99,9 @@ class State:
 
         self.tet_vertices = ti.field(ti.i32, b * 4 * LANES)
         self.tet_rest_inverse = ti.field(real, b * 9 * LANES)  # [1/m], column by column
+        if capacity.plastic:
+            self.tet_original_inverse = ti.field(real, b * 9 * LANES)  # the same before any plastic flow
+            self.body_plasticity = ti.Vector.field(4, real, bodies)  # see `Plasticity.row`
         self.tet_lame = ti.field(real, b * 2 * LANES)  # [Pa]
         if capacity.anisotropic:
             self.tet_stiffness = ti.field(real, b * 21 * LANES)  # [Pa], upper triangle row by row
@@ -187,7 +193,10 @@ class State:
 
         vertices, corners = _tet_blocks(bodies, ranges)
         fill(self.tet_vertices, vertices)
-        fill(self.tet_rest_inverse, _blocks(bodies, lambda b: np.swapaxes(b.rest_inverse, 1, 2), 9))
+        inverses = _blocks(bodies, lambda b: np.swapaxes(b.rest_inverse, 1, 2), 9)
+        fill(self.tet_rest_inverse, inverses)
+        if self.capacity.plastic:
+            fill(self.tet_original_inverse, inverses)
         fill(self.tet_lame, _blocks(bodies, lambda b: b.lame, 2))
         if self.capacity.anisotropic:
             fill(self.tet_stiffness, _blocks(bodies, lambda b: b.stiffness, 21))

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.assets import SoftBodyAsset
-from taichi_soft.body import Body, Floats32, require_buffer, require_built
+from taichi_soft.body import Body, Floats, Floats32, require_buffer, require_built
 from taichi_soft.checks import as_count, as_flag, as_number, as_vector
 from taichi_soft.colliders import Collider, Colliders
 from taichi_soft.constants import ALL_GROUPS, GRAVITY_EARTH, POSITION_LIMIT, VELOCITY_LIMIT
@@ -22,12 +22,14 @@ from taichi_soft.contact_fields import ContactCapacity
 from taichi_soft.errors import FrozenBodyWarning, OptionError, SolverWarning, StateError, UnstableStepWarning
 from taichi_soft.failures import FailedStep, Failure, find_failure
 from taichi_soft.kernels.evaluate import compute_body_forces
+from taichi_soft.kernels.plasticity import read_rest_inverses
 from taichi_soft.kernels.program import Program
 from taichi_soft.kernels.readout import read_positions, read_velocities, write_motion
 from taichi_soft.kernels.schedules import Launch, choose_schedule, make_launch
 from taichi_soft.kernels.spawn import despawn_body, spawn_body
 from taichi_soft.materials import AnyMaterial
 from taichi_soft.meshing import BodyMesh
+from taichi_soft.plasticity import RIGID_ROW, Plasticity
 from taichi_soft.pools import Pools
 from taichi_soft.queries import (
     ClosestPoint,
@@ -180,12 +182,13 @@ class World:
         velocity: ArrayLike = (0.0, 0.0, 0.0),
         pinned: ArrayLike = (),
         contact: Contact = DEFAULT_CONTACT,
+        plasticity: Plasticity | None = None,
     ) -> Body:
         """Add a body before `build`: an asset of its own, one slot for it, and a body in that.
 
         Copies, of the same mesh and material with the same options, share the asset.
         Args:
-            mesh, material, law, strain, flips, damping_model, pinned, contact: as `SoftBodyAsset` takes them.
+            mesh, material, law, strain, flips, damping_model, pinned, contact, plasticity: as `SoftBodyAsset` takes them.
             position, rotation, velocity: as `spawn` takes them.
         Returns: a handle.
         Raises: MeshError, MaterialError or OptionError for bad input; StateError after `build`.
@@ -200,9 +203,10 @@ class World:
             damping_model=damping_model,
             pinned=pinned,
             contact=contact,
+            plasticity=plasticity,
         )
         described = asset.description
-        key = (id(mesh), id(material), described.model, described.pinned.tobytes(), contact)
+        key = (id(mesh), id(material), described.model, described.pinned.tobytes(), contact, plasticity)
         asset = self._added.get(key, asset)
         described.model.require_integrator(self.settings.integrator)
         rows = asset.placed(position, rotation, velocity, (0.0, 0.0, 0.0), self.settings.floor)
@@ -366,6 +370,7 @@ class World:
         schedule = choose_schedule(
             self.settings.schedule, self._scene, device, needs_bodies=self._is_implicit or has_contact
         )
+        is_plastic = any(asset.plasticity is not None for asset in kinds)
         capacity = Capacity.of(
             self._scene,
             parallel=schedule is Schedule.FLAT,
@@ -373,6 +378,7 @@ class World:
             contact=self._colliders.capacity(self._collider_room, soft=self._soft_contact)
             if has_contact
             else ContactCapacity(),
+            plastic=is_plastic,
         )
         program = Program(
             tuple(models),
@@ -381,6 +387,7 @@ class World:
             any(len(asset.description.pinned) for asset in kinds),
             has_contact,
             self._soft_contact,
+            is_plastic,
             device.threads,
         )
         if self.settings.integrator is Integrator.EXPLICIT_EULER:
@@ -393,6 +400,9 @@ class World:
         state = acquire(capacity)
         weakref.finalize(self, release, state)
         state.load(self._scene, [models.index(asset.description.model) for asset in self._pools.assets])
+        if is_plastic:
+            flows = [a.plasticity.row if a.plasticity else RIGID_ROW for a in self._pools.assets]
+            fill(state.body_plasticity, np.array(flows))
         self._warm_up(state)
         for slot, rows in self._starts.items():
             spawn_body(state, slot, rows)
@@ -543,6 +553,14 @@ class World:
                 "softer material"
             )
         return reports
+
+    def _rest_inverses(self, body: Body) -> Floats:
+        """A^-1 of each tetrahedron of a body that may have flowed, (m, 3, 3) [1/m], in the caller's order."""
+        rows = np.empty((len(body.tets), 3, 3), dtype=np.float32)
+        read_rest_inverses(self._state, body.index, rows)
+        inverses = np.empty(rows.shape)
+        inverses[self._scene.bodies[body.index].tet_order] = rows
+        return inverses
 
     def _find_failure(self, body: Body, failed: FailedStep) -> Failure:
         assert self._state is not None

@@ -9,6 +9,7 @@ from taichi_soft.kernels.internal_forces import accumulate_forces
 from taichi_soft.kernels.islands import find_islands, search_margin
 from taichi_soft.kernels.motion import remember_particle
 from taichi_soft.kernels.per_body import settle_body
+from taichi_soft.kernels.plasticity import flow_body
 from taichi_soft.kernels.soft_contact import solve_island
 from taichi_soft.kernels.soft_search import search_island
 from taichi_soft.runtime import ti
@@ -141,6 +142,8 @@ def _step_island(state: ti.template(), program: ti.template(), island, substeps,
             failed += has_failed
             if has_failed == 0:
                 state.body_velocity_lag[body] = h
+                if ti.static(program.has_plasticity):
+                    flow_body(state, body, substeps * h)
     return failed
 
 

@@ -7,6 +7,7 @@ of threads.
 from taichi_soft.kernels.implicit_euler import implicit_substep
 from taichi_soft.kernels.internal_forces import accumulate_forces, clear_forces
 from taichi_soft.kernels.motion import move_particle, particle_is_sound, remember_particle, restore_particle
+from taichi_soft.kernels.plasticity import flow_body
 from taichi_soft.runtime import ti
 from taichi_soft.state import ABSENT, ACTIVE, FROZEN
 from taichi_soft.types import Integrator
@@ -62,6 +63,8 @@ def _step_body(state: ti.template(), program: ti.template(), body, substeps, h):
         failed = settle_body(state, body)
         if failed == 0:
             state.body_velocity_lag[body] = h
+            if ti.static(program.has_plasticity):
+                flow_body(state, body, substeps * h)
             if ti.static(program.integrator == Integrator.IMPLICIT_EULER):
                 failed = int(state.body_residual[body] > state.solver[None][0])
     return failed
