@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.checks import as_indices, as_rotation, as_vector
+from taichi_soft.checks import as_count, as_indices, as_rotation, as_vector
 from taichi_soft.constants import POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.contact import DEFAULT_CONTACT, THIN, Contact
 from taichi_soft.errors import MaterialError, OptionError
@@ -41,6 +41,9 @@ class SoftBodyAsset:
         damping_model: "edge" (eq. 3.9) or "tet_mean" (which section 6.4 rejects: it stops rotation).
         pinned: vertices that stay where they are.
         contact: how its surface touches others, in a world with colliders or soft contact.
+        spare_vertices: how many copies of vertices there is room for where `Body.cut` splits them; 0 for a
+            body that is not cut. Takes laws that look at tetrahedra. A cut through a body of n vertices needs
+            about n^(2/3).
         plasticity: how it is bent for good; None for never. Takes laws that look at tetrahedra, and a
             `Material`.
     Raises: MeshError, MaterialError or OptionError for bad input.
@@ -56,6 +59,7 @@ class SoftBodyAsset:
     pinned: ArrayLike = ()
     contact: Contact = DEFAULT_CONTACT
     plasticity: Plasticity | None = None
+    spare_vertices: int = 0
     description: BodyDescription = field(init=False)
 
     def __post_init__(self) -> None:
@@ -63,6 +67,9 @@ class SoftBodyAsset:
         model = fit_model(model, self.mesh, self.material)
         if not isinstance(self.contact, Contact):
             raise OptionError(f"contact must be a Contact, got {self.contact!r}")
+        as_count(self.spare_vertices, "spare_vertices", 0)
+        if self.spare_vertices and model.has_bonds:
+            raise OptionError(f"law {self.law!r} cannot be cut: it looks at edges, 'virial' at tetrahedra")
         if self.plasticity is not None:
             self._require_flow(model)
         pinned = read_only(as_indices(self.pinned, "pinned", len(self.mesh.vertices)))

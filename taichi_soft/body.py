@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.checks import as_array
+from taichi_soft.cutting import cut
 from taichi_soft.errors import MeshError, OptionError, StateError
 from taichi_soft.failures import FailedStep, Failure
 from taichi_soft.laws.law import EnergyLaw
 from taichi_soft.materials import voigt_stress
 from taichi_soft.queries import Pose, best_fitting_pose
-from taichi_soft.scene import rest_inverses
-from taichi_soft.stability import StableStep
+from taichi_soft.scene import BodyDescription, rest_inverses
+from taichi_soft.stability import StableStep, stable_step
 
 if TYPE_CHECKING:
     from taichi_soft.assets import SoftBodyAsset
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
 Floats32 = NDArray[np.float32]
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 
 class Body:
@@ -43,6 +45,8 @@ class Body:
         self._removed_in: int | None = None
         self._frozen_in: FailedStep | None = None
         self._failure: Failure | None = None
+        self._topology_version = 0
+        self._origins: tuple[Ints, Ints] | None = None  # of vertices and tetrahedra, once it was cut
 
     def require_alive(self) -> None:
         """Raises: StateError once the body was removed."""
@@ -79,7 +83,7 @@ class Body:
 
     @property
     def mesh(self):  # type: ignore[no-untyped-def]
-        """The rest shape, as added."""
+        """The rest shape, as added, or as cuts have left it."""
         return self._description.mesh
 
     @property
@@ -106,6 +110,60 @@ class Body:
         """Raises: MeshError for a body without tetrahedra."""
         if len(self.tets) == 0:
             raise MeshError(f"body {self.index} has no tetrahedra: it is made of particles and edges only")
+
+    @property
+    def topology_version(self) -> int:
+        """How often its vertices and tetrahedra have changed: where this does, read `surface` again."""
+        return self._topology_version
+
+    @property
+    def is_cut(self) -> bool:
+        """Whether it is no longer what its asset says, but what cuts have left."""
+        return self._origins is not None
+
+    @cached_property
+    def _cut_stable_step(self) -> StableStep:
+        return stable_step(self.mesh, self.material, self._description.model)
+
+    @property
+    def vertex_origins(self) -> Ints:
+        """The vertex of the asset's mesh that each vertex is, or is a copy of, (n,)."""
+        return np.arange(self.vertex_count) if self._origins is None else self._origins[0]
+
+    @property
+    def tet_origins(self) -> Ints:
+        """The tetrahedron of the asset's mesh that each one is, (m,)."""
+        return np.arange(len(self.tets)) if self._origins is None else self._origins[1]
+
+    def _become(self, description: BodyDescription, vertex_origins: Ints, tet_origins: Ints) -> None:
+        """Take note of what a cut has left."""
+        self._description = description
+        self._origins = vertex_origins, tet_origins
+        self._topology_version += 1
+        for name in ("_first_rest_inverses", "_cut_stable_step"):
+            self.__dict__.pop(name, None)
+
+    def cut(
+        self,
+        *,
+        plane: tuple[ArrayLike, ArrayLike] | None = None,
+        triangle: ArrayLike | None = None,
+    ) -> tuple[Body, ...]:
+        """Cut the body along the faces of tetrahedra next to a plane or a triangle, as it is now.
+
+        A face opens where the blade passes between the centres of its two tetrahedra. Vertices keep their
+        numbers, copies come behind them; mass, momentum and elastic energy stay. What falls off becomes
+        bodies of the same asset, which take free slots of its pool; the largest part stays this one. In a
+        part, vertices and tetrahedra are counted anew in their order: `vertex_origins` tells what they were.
+        Args:
+            plane: (point (3,) [m], normal (3,)), all through the body.
+            triangle: corners, (3, 3) [m]; the cut ends where it ends.
+        Returns: the bodies that fell off; none where nothing does.
+        Raises: OptionError for a blade without direction or area and for a body whose asset has no
+            `spare_vertices`; StateError where room or slots run out, for a frozen body and before `build`.
+            Nothing is changed then.
+        """
+        return cut(self, plane, triangle)
 
     @property
     def masses(self) -> Floats:

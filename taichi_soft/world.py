@@ -19,6 +19,7 @@ from taichi_soft.colliders import Collider, Colliders
 from taichi_soft.constants import ALL_GROUPS, GRAVITY_EARTH, POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.contact import DEFAULT_CONTACT, Contact
 from taichi_soft.contact_fields import ContactCapacity
+from taichi_soft.cutting import refill_slot, warm_up
 from taichi_soft.errors import FrozenBodyWarning, OptionError, SolverWarning, StateError, UnstableStepWarning
 from taichi_soft.failures import FailedStep, Failure, find_failure
 from taichi_soft.kernels.evaluate import compute_body_forces
@@ -183,12 +184,14 @@ class World:
         pinned: ArrayLike = (),
         contact: Contact = DEFAULT_CONTACT,
         plasticity: Plasticity | None = None,
+        spare_vertices: int = 0,
     ) -> Body:
         """Add a body before `build`: an asset of its own, one slot for it, and a body in that.
 
         Copies, of the same mesh and material with the same options, share the asset.
         Args:
-            mesh, material, law, strain, flips, damping_model, pinned, contact, plasticity: as `SoftBodyAsset` takes them.
+            mesh, material, law, strain, flips, damping_model, pinned, contact, plasticity, spare_vertices: as
+                `SoftBodyAsset` takes them.
             position, rotation, velocity: as `spawn` takes them.
         Returns: a handle.
         Raises: MeshError, MaterialError or OptionError for bad input; StateError after `build`.
@@ -204,9 +207,18 @@ class World:
             pinned=pinned,
             contact=contact,
             plasticity=plasticity,
+            spare_vertices=spare_vertices,
         )
         described = asset.description
-        key = (id(mesh), id(material), described.model, described.pinned.tobytes(), contact, plasticity)
+        key = (
+            id(mesh),
+            id(material),
+            described.model,
+            described.pinned.tobytes(),
+            contact,
+            plasticity,
+            spare_vertices,
+        )
         asset = self._added.get(key, asset)
         described.model.require_integrator(self.settings.integrator)
         rows = asset.placed(position, rotation, velocity, (0.0, 0.0, 0.0), self.settings.floor)
@@ -225,7 +237,7 @@ class World:
         _require_asset(asset)
         number = as_count(count, "count")
         asset.description.model.require_integrator(self.settings.integrator)
-        vertices = self._scene.particle_count + number * len(asset.mesh.vertices)
+        vertices = self._scene.particle_count + number * (len(asset.mesh.vertices) + asset.spare_vertices)
         if vertices > MOST_VERTICES:
             raise OptionError(
                 f"count is {number:,}: the world would hold {vertices:,} vertices, at most {MOST_VERTICES:,}"
@@ -284,7 +296,7 @@ class World:
         body.require_alive()
 
     def _add_slot(self, asset: SoftBodyAsset) -> None:
-        self._scene.append(asset.arrays)
+        self._scene.append(asset.arrays, asset.spare_vertices)
         self._pools.add_slot(asset)
 
     def _enter(self, asset: SoftBodyAsset, rows: Floats32) -> Body:
@@ -293,9 +305,15 @@ class World:
         if self._state is None:
             self._starts[slot] = rows
         else:
+            if self._scene.bodies[slot] is not asset.arrays:
+                refill_slot(self, self._state, slot)
             spawn_body(self._state, slot, rows)
             self._read_alpha = None
-        body = Body(self, slot, asset)
+        return self._take_in(asset)
+
+    def _take_in(self, asset: SoftBodyAsset) -> Body:
+        """A handle to what is in the next free slot of an asset."""
+        body = Body(self, self._pools.next_slot(asset), asset)
         self._pools.enter(body)
         return body
 
@@ -367,8 +385,16 @@ class World:
         has_contact = self._soft_contact or len(self._colliders.handles) + self._collider_room > 0
         if has_contact:
             self._require_contact()
+        is_cut = any(asset.spare_vertices for asset in kinds)
+        if is_cut and self.settings.schedule is Schedule.FLAT:
+            raise OptionError(
+                "schedule 'flat' cuts no bodies: take 'per_body' or 'auto', or no spare_vertices"
+            )
         schedule = choose_schedule(
-            self.settings.schedule, self._scene, device, needs_bodies=self._is_implicit or has_contact
+            self.settings.schedule,
+            self._scene,
+            device,
+            needs_bodies=self._is_implicit or has_contact or is_cut,
         )
         is_plastic = any(asset.plasticity is not None for asset in kinds)
         capacity = Capacity.of(
@@ -427,6 +453,8 @@ class World:
         """A body that comes and goes, so that nothing compiles where the first does in the game."""
         for asset in self._pools.kinds:
             slot = self._pools.assets.index(asset)
+            if asset.spare_vertices:
+                warm_up(self, state, slot)
             spawn_body(state, slot, asset.rest_rows)
             despawn_body(state, slot)
 
@@ -449,19 +477,21 @@ class World:
             )
 
     def stable_step(self, body: Body) -> StableStep:
-        """Estimate of the largest stable substep of a body; bodies of one asset share it.
+        """Estimate of the largest stable substep of a body; bodies of one asset share it until they are cut.
 
         Raises: OptionError for what is no body.
         """
         if not isinstance(body, Body):
             raise OptionError(f"body must be one that a world made, got {body!r}")
-        return body.asset.stable_step
+        return body._cut_stable_step if body.is_cut else body.asset.stable_step
 
     def stable_substeps(self, dt: float) -> int:
         """Number of substeps that a fixed step of `dt` [s] needs, with a margin, for the stiffest asset.
 
         Of all that have slots, whether a body lives there or not: so that neither the time of a frame nor the
-        motion of the others changes where one comes or goes. 1 for implicit Euler, which needs none.
+        motion of the others changes where one comes or goes. Bodies that were cut count too, with an estimate
+        of their own after each cut, which takes some 0.2 s for 5,000 tetrahedra: give substeps where that is
+        too long. 1 for implicit Euler, which needs none.
         """
         if not self._pools.slots:
             raise StateError("the world is empty: call add_body or reserve first")
@@ -469,6 +499,9 @@ class World:
             _as_step(dt)
             return 1
         longest = min(asset.stable_step.recommended for asset in self._pools.kinds)
+        for body in self.bodies:
+            if body.is_cut:
+                longest = min(longest, body._cut_stable_step.recommended)
         return max(1, math.ceil(_as_step(dt) / longest))
 
     def step(self, dt: float, substeps: int | None = None) -> None:
@@ -583,8 +616,8 @@ class World:
         if self._read_alpha != alpha:
             read_positions(self._state, alpha, self._read)
             self._read_alpha = alpha
-        begin, end = self._scene.ranges[body.index].particles
-        rows[:] = self._read[begin:end]
+        begin = self._scene.ranges[body.index].particles[0]
+        rows[:] = self._read[begin : begin + body.vertex_count]
         return rows
 
     def raycast(
@@ -709,8 +742,8 @@ class World:
         """Which vertices of a body touched something in the last substep, (n,)."""
         assert self._state is not None
         if self._has_contact:
-            begin, end = self._scene.ranges[body.index].particles
-            touches = self._state.contact.particle_touches.to_numpy()[begin:end]
+            begin = self._scene.ranges[body.index].particles[0]
+            touches = self._state.contact.particle_touches.to_numpy()[begin : begin + body.vertex_count]
             return np.asarray(touches[self._scene.bodies[body.index].rank] == 1)
         floor = self.settings.floor
         if floor is None:

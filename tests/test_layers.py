@@ -20,7 +20,7 @@ LAYERS = """
     state  integrators
     kernels
     forces  shapes
-    stability  failures  colliders  control  queries  events  snapshot
+    stability  failures  colliders  control  queries  events  snapshot  cutting
     body  assets  pools
     world
     taichi_soft

@@ -61,7 +61,7 @@ def _excess(logarithms, limit):
 
 @ti.func
 def _limited(columns, maximum):
-    """The symmetric matrix of determinant 1 with the stretches of M, none larger than the maximum, as columns.
+    """The symmetric matrix of determinant 1 with the stretches of M, none beyond the maximum, as columns.
 
     M is that matrix and a turn behind it, which means nothing to an isotropic material.
     """
