@@ -64,6 +64,7 @@ from taichi_soft.shapes import (
     SphereShape,
 )
 from taichi_soft.stability import StableStep, stable_step
+from taichi_soft.tearing import Tearing
 from taichi_soft.world import World
 
 __all__ = [
@@ -104,6 +105,7 @@ __all__ = [
     "StateError",
     "Stiffness",
     "TaichiSoftError",
+    "Tearing",
     "TetMesh",
     "UnstableStepWarning",
     "VideoError",

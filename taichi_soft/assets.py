@@ -19,6 +19,7 @@ from taichi_soft.meshing.arrays import read_only
 from taichi_soft.plasticity import Plasticity
 from taichi_soft.scene import BodyArrays, BodyDescription, arrange, require_size
 from taichi_soft.stability import StableStep, stable_step
+from taichi_soft.tearing import Tearing
 from taichi_soft.types import DampingModel, Flips, Strain
 
 Floats = NDArray[np.float64]
@@ -46,6 +47,7 @@ class SoftBodyAsset:
             about n^(2/3).
         plasticity: how it is bent for good; None for never. Takes laws that look at tetrahedra, and a
             `Material`.
+        tearing: where it tears by itself, into its spare vertices; None for nowhere. Takes a `Material`.
     Raises: MeshError, MaterialError or OptionError for bad input.
     """
 
@@ -60,6 +62,7 @@ class SoftBodyAsset:
     contact: Contact = DEFAULT_CONTACT
     plasticity: Plasticity | None = None
     spare_vertices: int = 0
+    tearing: Tearing | None = None
     description: BodyDescription = field(init=False)
 
     def __post_init__(self) -> None:
@@ -70,6 +73,8 @@ class SoftBodyAsset:
         as_count(self.spare_vertices, "spare_vertices", 0)
         if self.spare_vertices and model.has_bonds:
             raise OptionError(f"law {self.law!r} cannot be cut: it looks at edges, 'virial' at tetrahedra")
+        if self.tearing is not None:
+            self._require_tears(model)
         if self.plasticity is not None:
             self._require_flow(model)
         pinned = read_only(as_indices(self.pinned, "pinned", len(self.mesh.vertices)))
@@ -78,6 +83,14 @@ class SoftBodyAsset:
         _ = description.bonds  # made now, because a pairwise law may refuse the mesh
         object.__setattr__(self, "pinned", pinned)
         object.__setattr__(self, "description", description)
+
+    def _require_tears(self, model: ElementModel) -> None:
+        if not isinstance(self.tearing, Tearing):
+            raise OptionError(f"tearing must be a Tearing or None, got {self.tearing!r}")
+        if self.spare_vertices == 0:
+            raise OptionError("tearing takes spare_vertices: a tear makes copies of vertices")
+        if model.is_anisotropic:
+            raise MaterialError("an AnisotropicMaterial takes no tearing: its strength has directions too")
 
     def _require_flow(self, model: ElementModel) -> None:
         if not isinstance(self.plasticity, Plasticity):

@@ -15,6 +15,7 @@ from taichi_soft.errors import MeshError, OptionError, StateError
 from taichi_soft.failures import FailedStep, Failure
 from taichi_soft.laws.law import EnergyLaw
 from taichi_soft.materials import voigt_stress
+from taichi_soft.meshing.splitting import InnerFaces, inner_faces
 from taichi_soft.queries import Pose, best_fitting_pose
 from taichi_soft.scene import BodyDescription, rest_inverses
 from taichi_soft.stability import StableStep, stable_step
@@ -122,6 +123,10 @@ class Body:
         return self._origins is not None
 
     @cached_property
+    def _inner_faces(self) -> InnerFaces:
+        return inner_faces(self.tets)
+
+    @cached_property
     def _cut_stable_step(self) -> StableStep:
         return stable_step(self.mesh, self.material, self._description.model)
 
@@ -140,7 +145,7 @@ class Body:
         self._description = description
         self._origins = vertex_origins, tet_origins
         self._topology_version += 1
-        for name in ("_first_rest_inverses", "_cut_stable_step"):
+        for name in ("_first_rest_inverses", "_cut_stable_step", "_inner_faces"):
             self.__dict__.pop(name, None)
 
     def cut(

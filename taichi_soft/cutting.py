@@ -18,7 +18,7 @@ from taichi_soft.errors import OptionError, StateError
 from taichi_soft.kernels.plasticity import read_rest_inverses
 from taichi_soft.kernels.topology import MOTION_WIDTH, read_motion, write_body
 from taichi_soft.meshing import TetMesh
-from taichi_soft.meshing.splitting import InnerFaces, inner_faces, loose_parts, split_vertices
+from taichi_soft.meshing.splitting import InnerFaces, loose_parts, split_vertices
 from taichi_soft.scene import BodyArrays, BodyDescription, arrange_part, blocks_of
 from taichi_soft.state import ABSENT, ACTIVE, State, with_spare_rows
 
@@ -34,7 +34,7 @@ def cut(body: Body, plane: Any, triangle: Any) -> tuple[Body, ...]:
     corners, normal, is_endless = _blade(plane, triangle)
     require_cuttable(body)
     mesh = body.mesh
-    faces = inner_faces(mesh.tets)
+    faces = body._inner_faces
     centers = body.positions().astype(np.float64)[mesh.tets].mean(axis=1)
     is_cut = _crosses(corners, normal, is_endless, centers[faces.tets[:, 0]], centers[faces.tets[:, 1]])
     return divide(body, faces, is_cut)

@@ -49,6 +49,7 @@ from taichi_soft.settings import Settings
 from taichi_soft.shapes import PlaneShape, Shape
 from taichi_soft.stability import StableStep
 from taichi_soft.state import FROZEN, Capacity, State, acquire, fill, release
+from taichi_soft.tearing import Tearing, Tears
 from taichi_soft.types import DampingModel, Flips, Integrator, Schedule, Strain
 
 SHORTEST_STEP, LONGEST_STEP = 1e-9, 1e4
@@ -123,6 +124,7 @@ class World:
         self._scene = Scene()
         self._state: State | None = None
         self._program: Program | None = None
+        self._tears: Tears | None = None
         self._launch: Launch | None = None
         self._checked_step: tuple[Any, ...] = ()
         self._step_values = (0.0, 0, 0.0)
@@ -185,13 +187,14 @@ class World:
         contact: Contact = DEFAULT_CONTACT,
         plasticity: Plasticity | None = None,
         spare_vertices: int = 0,
+        tearing: Tearing | None = None,
     ) -> Body:
         """Add a body before `build`: an asset of its own, one slot for it, and a body in that.
 
         Copies, of the same mesh and material with the same options, share the asset.
         Args:
-            mesh, material, law, strain, flips, damping_model, pinned, contact, plasticity, spare_vertices: as
-                `SoftBodyAsset` takes them.
+            mesh, material, law, strain, flips, damping_model, pinned, contact, plasticity, spare_vertices,
+                tearing: as `SoftBodyAsset` takes them.
             position, rotation, velocity: as `spawn` takes them.
         Returns: a handle.
         Raises: MeshError, MaterialError or OptionError for bad input; StateError after `build`.
@@ -208,6 +211,7 @@ class World:
             contact=contact,
             plasticity=plasticity,
             spare_vertices=spare_vertices,
+            tearing=tearing,
         )
         described = asset.description
         key = (
@@ -218,6 +222,7 @@ class World:
             contact,
             plasticity,
             spare_vertices,
+            tearing,
         )
         asset = self._added.get(key, asset)
         described.model.require_integrator(self.settings.integrator)
@@ -315,6 +320,8 @@ class World:
         """A handle to what is in the next free slot of an asset."""
         body = Body(self, self._pools.next_slot(asset), asset)
         self._pools.enter(body)
+        if self._tears is not None:
+            self._tears.watch(body)
         return body
 
     @property
@@ -448,6 +455,10 @@ class World:
         self._read = np.empty((self._scene.particle_count, 3), dtype=np.float32)
         self._program, self._state = program, state
         self._launch = make_launch(schedule, state, program, self._scene, device)
+        if any(asset.tearing for asset in kinds):
+            self._tears = Tears(state, len(self._pools.slots))
+            for body in self.bodies:
+                self._tears.watch(body)
 
     def _warm_up(self, state: State) -> None:
         """A body that comes and goes, so that nothing compiles where the first does in the game."""
@@ -529,6 +540,8 @@ class World:
         self._step_count += 1
         self._time += seconds
         self._last_dt = seconds
+        if self._tears is not None:
+            self._tears.tear(self)
         if reports:
             warnings.warn("; ".join(reports), FrozenBodyWarning, stacklevel=2)
         if troubled and self._is_implicit:

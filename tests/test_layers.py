@@ -21,6 +21,7 @@ LAYERS = """
     kernels
     forces  shapes
     stability  failures  colliders  control  queries  events  snapshot  cutting
+    tearing
     body  assets  pools
     world
     taichi_soft
