@@ -163,7 +163,7 @@ class Body:
         Args:
             plane: (point (3,) [m], normal (3,)), all through the body.
             triangle: corners, (3, 3) [m]; the cut ends where it ends.
-        Returns: the bodies that fell off; none where nothing does.
+        Returns: the bodies that fell off, the largest first; none where nothing does.
         Raises: OptionError for a blade without direction or area and for a body whose asset has no
             `spare_vertices`; StateError where room or slots run out, for a frozen body and before `build`.
             Nothing is changed then.

@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
+CRUMB = 0.02
+"""Part of the whole body's volume below which what is torn off takes no slot: those are for larger parts."""
+
 
 def cut(body: Body, plane: Any, triangle: Any) -> tuple[Body, ...]:
     """As `Body.cut`."""
@@ -96,29 +99,32 @@ class _Piece:
 
 
 def divide(
-    body: Body, faces: InnerFaces, is_cut: NDArray[np.bool_], *, keeps_parts: bool = False
+    body: Body, faces: InnerFaces, is_cut: NDArray[np.bool_], *, keeps_crumbs: bool = False
 ) -> tuple[Body, ...]:
-    """Open a body along faces. Returns the bodies that fell off.
+    """Open a body along faces. Returns the bodies that fell off, the largest first.
 
     Args:
-        keeps_parts: where no slot is free, parts that fall off stay in the body, instead of a StateError.
+        keeps_crumbs: small parts stay in the body, and so do those for which there is no slot.
     """
     world, mesh = body._world, body.mesh
     tets, vertices = split_vertices(mesh.tets, len(mesh.vertices), faces, is_cut)
     if len(vertices) == len(mesh.vertices):
         return ()
     part = loose_parts(tets, len(vertices))
-    count = int(part.max()) + 1
-    slots = world._pools.free_slots(body.asset)
-    if count - 1 > len(slots):
-        if not keeps_parts:
-            raise StateError(
-                f"body {body.index} would fall into {count} pieces, and {len(slots)} slots are free for the "
-                f"{count - 1} new ones: reserve more of its asset before build, or despawn bodies"
-            )
-        part, count = np.zeros_like(part), 1
     sizes = np.bincount(part, mesh.volumes)
-    numbers = [int(sizes.argmax()), *(i for i in range(count) if i != sizes.argmax())]
+    numbers = np.argsort(-sizes, kind="stable")  # largest first
+    slots = world._pools.free_slots(body.asset)
+    if keeps_crumbs:
+        own = numbers[1 : 1 + len(slots)]
+        volume = body.asset.mesh.volumes.sum()  # type: ignore[attr-defined]
+        own = own[sizes[own] >= CRUMB * volume]
+        part[~np.isin(part, own)] = numbers[0]
+        numbers = np.r_[numbers[0], own]
+    if len(numbers) > 1 + len(slots):
+        raise StateError(
+            f"body {body.index} would fall into {len(numbers)} pieces, and {len(slots)} slots are free for "
+            f"the {len(numbers) - 1} new ones: reserve more of its asset before build, or despawn bodies"
+        )
     pieces = [_piece(body, tets, vertices, np.flatnonzero(part == number)) for number in numbers]
     for piece in pieces:
         _require_room(body, piece.arrays)
@@ -134,7 +140,7 @@ def _piece(
     used, corners = np.unique(tets[rows], return_inverse=True)
     origins = vertices[used]
     description = BodyDescription(
-        TetMesh(before.mesh.vertices[origins], corners.reshape(-1, 4)),
+        before.mesh.part(origins, corners.reshape(-1, 4).astype(np.int32), rows),
         before.material.of_tets(rows),  # type: ignore[union-attr]
         before.model,
         np.flatnonzero(np.isin(origins, before.pinned)).astype(np.int32),

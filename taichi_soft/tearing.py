@@ -24,6 +24,10 @@ Floats = NDArray[np.float64]
 _WORST = 0.9
 """Of the largest stress: what bears less waits for the next step, in which the tear has shifted the load."""
 
+_TIP = 2.0
+"""Stress at the end of a tear over that of the tetrahedra there, which are too large to resolve its rise: so
+that a tear runs on before another begins."""
+
 
 @dataclass(frozen=True)
 class Tearing:
@@ -32,7 +36,8 @@ class Tearing:
     Looked for after each step. The face between two tetrahedra tears where the largest principal stress of
     their mean, of Hooke's law and linear strain, is above the strength: its vertices are split across the
     pull, along the faces of the tetrahedra round them. A body tears as long as its `spare_vertices` last;
-    what falls off becomes a body where a slot is free, and otherwise stays a loose part of the body.
+    what falls off becomes a body while slots are free, the largest first; the rest, and crumbs of less than
+    2 % of the whole, stay loose in the body.
 
     Args:
         stress: tensile strength [Pa].
@@ -82,7 +87,12 @@ def _tear(body: Body) -> None:
     faces = body._inner_faces
     pulls, axes = np.linalg.eigh(stress[faces.tets].mean(axis=1))
     pull, axis = pulls[:, -1], axes[:, :, -1]
-    chosen = _worst_faces(mesh.vertices, mesh.tets, faces, pull, axis, tearing)
+    is_torn = np.bincount(body.vertex_origins)[body.vertex_origins] > 1
+    over = pull > tearing.stress
+    if not over.any():
+        return
+    pull[is_torn[_corners(mesh.tets, faces)].any(axis=1)] *= _TIP
+    chosen = _worst_faces(mesh.vertices, mesh.tets, faces, np.where(over, pull, 0.0), axis, tearing.most)
     is_cut = np.zeros(len(pull), dtype=np.bool_)
     is_cut[chosen] = True
     centers = mesh.vertices[mesh.tets].mean(axis=1)
@@ -91,8 +101,7 @@ def _tear(body: Body) -> None:
         near = np.flatnonzero(np.isin(corners, corners[face]).any(axis=1))
         side = (centers[faces.tets[near]] - mesh.vertices[corners[face]].mean(axis=0)) @ axis[face] > 0
         is_cut[near[side[:, 0] != side[:, 1]]] = True
-    if chosen:
-        divide(body, faces, is_cut, keeps_parts=True)
+    divide(body, faces, is_cut, keeps_crumbs=True)
 
 
 def _corners(tets: NDArray[np.int32], faces: InnerFaces) -> NDArray[np.int32]:
@@ -106,10 +115,13 @@ def _worst_faces(
     faces: InnerFaces,
     pull: Floats,
     axis: Floats,
-    tearing: Tearing,
+    most: int,
 ) -> list[int]:
-    """Those that tear: of the overloaded ones the worst, most across the pull, without a common vertex."""
-    over = np.flatnonzero((pull > tearing.stress) & (pull >= _WORST * pull.max()))
+    """Those that tear: the worst, most across the pull, without a common vertex.
+
+    `pull`: (f,) [Pa], zero for faces that hold.
+    """
+    over = np.flatnonzero((pull > 0.0) & (pull >= _WORST * pull.max()))
     corners = _corners(tets, faces)
     x = vertices[corners[over]]
     normal = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
@@ -117,7 +129,7 @@ def _worst_faces(
     chosen: list[int] = []
     used: set[int] = set()
     for face in over[np.argsort(-pull[over] * across, kind="stable")].tolist():
-        if len(chosen) < tearing.most and not used & set(corners[face].tolist()):
+        if len(chosen) < most and not used & set(corners[face].tolist()):
             chosen.append(face)
             used |= set(corners[face].tolist())
     return chosen

@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.meshing.arrays import IntArray
-from taichi_soft.meshing.topology import LOCAL_FACES, groups
+from taichi_soft.meshing.topology import groups
+
+_FACES = [(1, 2, 3), (0, 2, 3), (0, 1, 3), (0, 1, 2)]
 
 
 class InnerFaces(NamedTuple):
@@ -22,10 +24,9 @@ class InnerFaces(NamedTuple):
 
 def inner_faces(tets: IntArray) -> InnerFaces:
     """All faces that two tetrahedra share."""
-    vertices = tets[:, LOCAL_FACES]
-    order = np.argsort(vertices, axis=2)
-    corners = np.take_along_axis(np.broadcast_to(LOCAL_FACES, vertices.shape), order, axis=2).reshape(-1, 3)
-    rows, starts, counts = groups(np.take_along_axis(vertices, order, axis=2).reshape(-1, 3))
+    # With the corners of each tetrahedron in ascending order, those of its faces are too.
+    corners = np.argsort(tets, axis=1)[:, _FACES].reshape(-1, 3)
+    rows, starts, counts = groups(tets.repeat(4, axis=0)[np.arange(len(corners))[:, None], corners])
     pairs = np.stack([rows[starts[counts == 2]], rows[starts[counts == 2] + 1]], axis=1)
     return InnerFaces(pairs // 4, corners[pairs])
 
