@@ -4,8 +4,12 @@ from taichi_soft.assets import SoftBodyAsset
 from taichi_soft.body import Body
 from taichi_soft.colliders import Collider
 from taichi_soft.contact import Contact
+from taichi_soft.control.attachments import Attachment
+from taichi_soft.control.frames import Frame
+from taichi_soft.control.grabs import Grab
 from taichi_soft.errors import (
     DeviceError,
+    DroppedEventsWarning,
     FrozenBodyWarning,
     MaterialError,
     MeshError,
@@ -15,6 +19,17 @@ from taichi_soft.errors import (
     TaichiSoftError,
     UnstableStepWarning,
     VideoError,
+)
+from taichi_soft.events import (
+    ContactBegan,
+    ContactEnded,
+    Event,
+    FellAsleep,
+    Froze,
+    Listener,
+    StressExceeded,
+    TearCandidates,
+    Woke,
 )
 from taichi_soft.failures import Failure
 from taichi_soft.forces import force_gradient, internal_forces
@@ -71,17 +86,27 @@ __all__ = [
     "LAWS",
     "PRESETS",
     "AnisotropicMaterial",
+    "Attachment",
     "Body",
     "BoxShape",
     "CapsuleShape",
     "ClosestPoint",
     "Collider",
     "Contact",
+    "ContactBegan",
+    "ContactEnded",
     "Device",
     "DeviceError",
+    "DroppedEventsWarning",
+    "Event",
     "Failure",
+    "FellAsleep",
+    "Frame",
+    "Froze",
     "FrozenBodyWarning",
+    "Grab",
     "HeightFieldShape",
+    "Listener",
     "Material",
     "MaterialError",
     "MeshError",
@@ -104,11 +129,14 @@ __all__ = [
     "StableStep",
     "StateError",
     "Stiffness",
+    "StressExceeded",
     "TaichiSoftError",
+    "TearCandidates",
     "Tearing",
     "TetMesh",
     "UnstableStepWarning",
     "VideoError",
+    "Woke",
     "World",
     "beam",
     "box",

@@ -131,10 +131,11 @@ class SoftBodyAsset:
 
     @cached_property
     def rest_rows(self) -> Floats32:
-        """Position, velocity and inverse mass of each vertex, (n, 7), of a body where its mesh is."""
-        rows = np.zeros((len(self.mesh.vertices), 7), dtype=np.float32)
+        """Position, velocity, inverse mass and mass of each vertex, (n, 8), of a body where its mesh is."""
+        rows = np.zeros((len(self.mesh.vertices), 8), dtype=np.float32)
         rows[:, :3] = self.mesh.vertices
         rows[:, 6] = 1.0 / self.description.masses
+        rows[:, 7] = self.description.masses
         rows[self.description.pinned, 6] = 0.0
         return rows
 
@@ -146,7 +147,7 @@ class SoftBodyAsset:
         angular_velocity: ArrayLike,
         floor: float | None,
     ) -> Floats32:
-        """Position, velocity and inverse mass of each vertex of a body that begins there, float32 (n, 7).
+        """Position, velocity, inverse mass and mass of each vertex of a body that begins there, (n, 8).
 
         Args: as `World.spawn` takes them, and the height of the floor [m].
         Raises: OptionError for bad values, a vertex that is too fast, and a place out of reach or below the

@@ -9,19 +9,33 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.checks import as_array
+from taichi_soft.checks import as_array, as_positive
+from taichi_soft.control.attachments import Attachment, attach
+from taichi_soft.control.drives import (
+    apply_force,
+    set_gravity_scale,
+    set_linear_damping,
+    set_sheltered,
+)
+from taichi_soft.control.grabs import Grab, grab_at
+from taichi_soft.control.impulses import apply_impulse, apply_impulse_at_point
+from taichi_soft.control.materials import set_damping, set_material
+from taichi_soft.control.pins import pin, pinned_vertices, set_targets, unpin
+from taichi_soft.control.placement import set_velocity, teleport
 from taichi_soft.cutting import cut
 from taichi_soft.errors import MeshError, OptionError, StateError
+from taichi_soft.events import Event, StressExceeded, TearCandidates
 from taichi_soft.failures import FailedStep, Failure
 from taichi_soft.laws.law import EnergyLaw
-from taichi_soft.materials import voigt_stress
+from taichi_soft.materials import AnyMaterial, voigt_stress
 from taichi_soft.meshing.splitting import InnerFaces, inner_faces
 from taichi_soft.queries import Pose, best_fitting_pose
-from taichi_soft.scene import BodyDescription, rest_inverses
-from taichi_soft.stability import StableStep, stable_step
+from taichi_soft.scene import rest_inverses
+from taichi_soft.stability import StableStep
 
 if TYPE_CHECKING:
     from taichi_soft.assets import SoftBodyAsset
+    from taichi_soft.control.frames import Frame
     from taichi_soft.world import World
 
 Floats32 = NDArray[np.float32]
@@ -46,6 +60,7 @@ class Body:
         self._removed_in: int | None = None
         self._frozen_in: FailedStep | None = None
         self._failure: Failure | None = None
+        self._attachments: list[Attachment] = []
         self._topology_version = 0
         self._origins: tuple[Ints, Ints] | None = None  # of vertices and tetrahedra, once it was cut
 
@@ -89,7 +104,7 @@ class Body:
 
     @property
     def material(self):  # type: ignore[no-untyped-def]
-        """The material, as added."""
+        """The material, as added or set since."""
         return self._description.material
 
     @property
@@ -113,6 +128,12 @@ class Body:
             raise MeshError(f"body {self.index} has no tetrahedra: it is made of particles and edges only")
 
     @property
+    def is_held(self) -> bool:
+        """Whether it is attached to a frame or grabbed."""
+        grabs = self._world._grabs.values()
+        return bool(self._attachments) or any(grab.body is self for grab in grabs)
+
+    @property
     def topology_version(self) -> int:
         """How often its vertices and tetrahedra have changed: where this does, read `surface` again."""
         return self._topology_version
@@ -126,10 +147,6 @@ class Body:
     def _inner_faces(self) -> InnerFaces:
         return inner_faces(self.tets)
 
-    @cached_property
-    def _cut_stable_step(self) -> StableStep:
-        return stable_step(self.mesh, self.material, self._description.model)
-
     @property
     def vertex_origins(self) -> Ints:
         """The vertex of the asset's mesh that each vertex is, or is a copy of, (n,)."""
@@ -140,12 +157,11 @@ class Body:
         """The tetrahedron of the asset's mesh that each one is, (m,)."""
         return np.arange(len(self.tets)) if self._origins is None else self._origins[1]
 
-    def _become(self, description: BodyDescription, vertex_origins: Ints, tet_origins: Ints) -> None:
-        """Take note of what a cut has left."""
-        self._description = description
+    def _become(self, vertex_origins: Ints, tet_origins: Ints) -> None:
+        """Take note of what a cut has left of the asset's mesh."""
         self._origins = vertex_origins, tet_origins
         self._topology_version += 1
-        for name in ("_first_rest_inverses", "_cut_stable_step", "_inner_faces"):
+        for name in ("_first_rest_inverses", "_inner_faces"):
             self.__dict__.pop(name, None)
 
     def cut(
@@ -165,7 +181,8 @@ class Body:
             triangle: corners, (3, 3) [m]; the cut ends where it ends.
         Returns: the bodies that fell off, the largest first; none where nothing does.
         Raises: OptionError for a blade without direction or area and for a body whose asset has no
-            `spare_vertices`; StateError where room or slots run out, for a frozen body and before `build`.
+            `spare_vertices`; StateError where room or slots run out, for a body that is frozen, grabbed or
+            attached, and before `build`.
             Nothing is changed then.
         """
         return cut(self, plane, triangle)
@@ -177,8 +194,8 @@ class Body:
 
     @property
     def pinned(self) -> NDArray[np.int32]:
-        """Vertices that stay where they are, ascending."""
-        return self._description.pinned
+        """Vertices that are held now, ascending."""
+        return pinned_vertices(self) if self._world.is_built else self._description.pinned
 
     @cached_property
     def _first_rest_inverses(self) -> Floats:
@@ -200,6 +217,20 @@ class Body:
     def is_frozen(self) -> bool:
         """True once the body went non-finite; it stays in its last finite state from then on."""
         return self._frozen_in is not None
+
+    def _let_go(self) -> None:
+        """Give up what is tied to the body, and a material that it was given, before its slot is emptied."""
+        for attachment in list(self._attachments):
+            attachment.release()
+        for grab in [each for each in self._world._grabs.values() if each.body is self]:
+            grab.release()
+        if self._description is not self.asset.description and not self.is_cut:
+            set_material(self, self.asset.material)
+
+    @property
+    def is_asleep(self) -> bool:
+        """True while the body rests and costs nothing (see `World.sleep_speed`)."""
+        return self._world._is_asleep(self)
 
     @property
     def failure(self) -> Failure | None:
@@ -242,6 +273,149 @@ class Body:
         x, v = as_array(positions, "positions", shape, "m"), as_array(velocities, "velocities", shape, "m/s")
         self._world._write_motion(self, x, v)
         self._frozen_in = self._failure = None
+
+    def apply_force(self, force: ArrayLike, particles: ArrayLike | None = None) -> None:
+        """Push throughout the coming step, all particles named with the same acceleration. Calls add up.
+
+        Args:
+            force: total, (3,) [N]. What falls to pinned particles goes to what holds them.
+            particles: that it acts on; None means all.
+        Raises: OptionError for bad numbers or vertices; StateError before `build` and under schedule "flat".
+        """
+        apply_force(self, force, particles)
+
+    @property
+    def gravity_scale(self) -> float:
+        """By what the world's gravity is multiplied for this body."""
+        return self._world._gravity_scale(self)
+
+    def set_gravity_scale(self, scale: float) -> None:
+        """Multiply the world's gravity for this body, from now on: 0 floats, -1 rises."""
+        set_gravity_scale(self, scale)
+
+    def set_linear_damping(self, rate: float) -> None:
+        """Let all velocities fade by exp(-rate t), from now on, against the world at rest [1/s].
+
+        Raises: OptionError for a negative rate; StateError before `build` and under schedule "flat".
+        """
+        set_linear_damping(self, rate)
+
+    def set_sheltered(self, is_sheltered: bool) -> None:
+        """True keeps the wind of `World.set_wind` off this body, from now on."""
+        set_sheltered(self, is_sheltered)
+
+    def apply_impulse(self, impulse: ArrayLike, particles: ArrayLike | None = None) -> None:
+        """Change the momentum at once; all particles named change their velocity by the same.
+
+        Args:
+            impulse: total, (3,) [N s]. What falls to pinned particles goes to what holds them.
+            particles: that it acts on; None means all.
+        Raises: OptionError for bad numbers or vertices; StateError before `build`. So do all that follow.
+        """
+        apply_impulse(self, impulse, particles)
+
+    def apply_impulse_at_point(self, impulse: ArrayLike, point: ArrayLike, radius: float) -> None:
+        """Change the momentum of the particles near a point, those at the distance r by (1 - (r/radius)^2)^2
+        as much in velocity as one at the point.
+
+        Args:
+            impulse: total, (3,) [N s], however few particles share it.
+            point: (3,) [m].
+            radius: of what is moved [m].
+        Raises: OptionError with the nearest distance where no particle is within reach.
+        """
+        apply_impulse_at_point(self, impulse, point, radius)
+
+    def set_velocity(self, linear: ArrayLike, angular: ArrayLike = (0.0, 0.0, 0.0)) -> None:
+        """Set the velocities of all particles that are not pinned to those of a rigid body.
+
+        Args:
+            linear: velocity of the centre of mass, (3,) [m/s].
+            angular: turn about the centre of mass, (3,) [rad/s].
+        """
+        set_velocity(self, linear, angular)
+
+    def teleport(
+        self, position: ArrayLike, rotation: ArrayLike | None = None, *, keep_velocity: bool = True
+    ) -> None:
+        """Move the whole body, deformed as it is, by a jump; pictures between two steps jump with it.
+
+        Args:
+            position: where its centre of mass goes, (3,) [m].
+            rotation: turn about the centre of mass, from how it lies now: matrix or quaternion (x, y, z, w).
+            keep_velocity: True turns velocities with the body, False stops it.
+        Raises: OptionError where it would lie below the floor.
+        """
+        teleport(self, position, rotation, keep_velocity)
+
+    def pin(self, particles: ArrayLike) -> None:
+        """Hold particles where they are, from now on."""
+        pin(self, particles)
+
+    def unpin(self, particles: ArrayLike | None = None) -> None:
+        """Let pinned particles go, all if None, with the velocity that they were moved with last."""
+        unpin(self, particles)
+
+    def set_targets(self, particles: ArrayLike, positions: ArrayLike) -> None:
+        """Move pinned particles by hand: in the coming step they go straight to `positions`, (n, 3) [m].
+
+        After it they stand still, unless they are given new targets.
+        Raises: OptionError for shapes that do not fit; StateError for a particle that is not pinned.
+        """
+        set_targets(self, particles, positions)
+
+    def attach(self, particles: ArrayLike, frame: Frame, *, two_way: bool = False) -> Attachment:
+        """Let particles go with a frame from now on, at the places that they have relative to it.
+
+        Args:
+            particles: vertices; pinned ones may be among them.
+            frame: of the same world.
+            two_way: add up what they pull the frame with: `Attachment.force` and `Attachment.torque`.
+        Raises: OptionError for what is no frame of this world; StateError for a particle that is attached
+            already, and for `two_way` under schedule "flat".
+        """
+        return attach(self, particles, frame, two_way)
+
+    def grab(
+        self,
+        triangle: int,
+        barycentrics: ArrayLike = (1 / 3, 1 / 3, 1 / 3),
+        *,
+        frequency: float = 5.0,
+        max_force: float | None = None,
+    ) -> Grab:
+        """Take hold of the surface: `move` pulls the body by a spring without swing, `release` lets go.
+
+        The spring holds a patch of about a quarter of the body's size. What is more than the patch can bear
+        pulls at the whole body, so that nothing is torn, whatever is asked for.
+        Args:
+            triangle: of `surface`.
+            barycentrics: where on it, (3,).
+            frequency: of the spring with the whole body on it [Hz].
+            max_force: strongest pull [N]; None is ten times the body's weight on Earth.
+        Raises: OptionError for bad numbers; MeshError for a body without surface; StateError before `build`,
+            under schedule "flat", and where the world's 16 grabs are all in use.
+        """
+        return grab_at(self, triangle, barycentrics, None, frequency, max_force)
+
+    def set_material(self, material: AnyMaterial) -> None:
+        """Make the body of another material of the same kind, from now on, as if it had been added with it.
+
+        Positions and velocities stay, so another density changes its momentum. `World.stable_substeps` and
+        steps without given substeps reflect it at once, at the price of a new estimate (some 0.2 s for 5,000
+        tetrahedra); with substeps given nothing is estimated, and nothing warns of too few.
+        Args:
+            material: of the type that the body has, fit for its law and mesh.
+        Raises: MaterialError for another type, or constants that do not fit; StateError before `build`.
+        """
+        set_material(self, material)
+
+    def set_damping(self, damping: float | NDArray[np.float64]) -> None:
+        """Change the material's damping b [N s/m], from now on, one number or one per element.
+
+        Raises: as `set_material`.
+        """
+        set_damping(self, damping)
 
     def volumes(self) -> Floats:
         """Signed volume of each tetrahedron, (m,) [m^3]: negative where it is flipped."""
@@ -293,7 +467,8 @@ class Body:
 
     def gravitational_energy(self) -> float:
         """- sum m g.x, zero at the origin [J]."""
-        return float(-(self.masses @ self.positions().astype(np.float64)) @ self._world.settings.gravity)
+        gravity = self._world.settings.gravity * self.gravity_scale
+        return float(-(self.masses @ self.positions().astype(np.float64)) @ gravity)
 
     def elastic_energy(self) -> float:
         """Of springs and the laws "st_venant_kirchhoff" and "neo_hookean": what deforming the body took [J].
@@ -338,6 +513,7 @@ class Body:
 
     def plastic_strains(self) -> Floats:
         """Equivalent (von Mises) logarithmic strain that each tetrahedron has for good, (m,)."""
+        self.require_alive()
         self._require_tets()
         flowed = np.linalg.inv(self._rest_inverses) @ self._first_rest_inverses  # Fp
         stretches = np.linalg.svd(flowed, compute_uv=False)
@@ -346,6 +522,32 @@ class Body:
     def tet_stress(self) -> Floats:
         """Von Mises stress of each tetrahedron by Hooke's law and linear strain, (m,) [Pa]."""
         return np.asarray(np.sqrt(1.5) * _deviator_norms(self._green_strain_and_stress()[1]))
+
+    def watch_stress(self, threshold: float | None) -> None:
+        """Record a `StressExceeded` in every step in which tetrahedra come over a stress.
+
+        One that stays over it, or has not been below 0.9 of it since, is not named again.
+        Args:
+            threshold: of `tet_stress` [Pa]; None for no longer.
+        Raises: OptionError if it is not above 0; MeshError for a body without tetrahedra; StateError before
+            `build`. The same for `watch_tearing`.
+        """
+        self._watch(StressExceeded, threshold, "threshold")
+
+    def watch_tearing(self, tear_stress: float | None) -> None:
+        """Record a `TearCandidates` in every step in which tetrahedra are pulled harder than they can bear.
+
+        Args:
+            tear_stress: of the largest principal stress, which pulls; by Hooke's law and linear strain [Pa].
+                None for no longer.
+        """
+        self._watch(TearCandidates, tear_stress, "tear_stress")
+
+    def _watch(self, kind: type[Event], threshold: float | None, name: str) -> None:
+        log = self._world._event_log
+        self._require_tets()
+        limit = None if threshold is None else as_positive(threshold, name, "Pa")
+        log.watch(kind, self, limit)
 
     def tet_strain(self) -> Floats:
         """Equivalent (von Mises) strain sqrt(2/3 e:e) of each tetrahedron, (m,), e the deviator of `strains`.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import weakref
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -76,7 +76,7 @@ class Collider:
     @property
     def position(self) -> Floats:
         """Of its origin, (3,) [m]."""
-        return self._row.position.copy()
+        return np.array(self._row.position)
 
     @property
     def rotation(self) -> Floats:
@@ -121,6 +121,7 @@ class Collider:
         row.position, row.rotation = self._pose(position, rotation)
         row.target = None
         colliders.moved(row)
+        colliders.on_jump()
 
     def _pose(self, position: ArrayLike, rotation: ArrayLike | None) -> tuple[Floats, Floats]:
         where = as_vector(position, "position", "m")
@@ -133,6 +134,10 @@ class Collider:
         colliders.write(self.index)
 
 
+def _do_nothing() -> None:
+    pass
+
+
 class Colliders:
     """All colliders of one world: Python's side of `ContactFields`."""
 
@@ -143,6 +148,7 @@ class Colliders:
         self._body_count = 0
         self._impulses: Floats | None = None  # of the last step, once asked for
         self._sample_count = 0
+        self.on_jump: Callable[[], None] = _do_nothing  # told when a collider appears, vanishes or jumps
         self._is_dirty = False  # whether poses or velocities differ from what the fields hold
         self._movers: list[_Row] = []  # with a velocity or a target
 
@@ -150,6 +156,10 @@ class Colliders:
     def handles(self) -> Sequence[Collider]:
         """Those that are alive."""
         return tuple(handle for handle, row in zip(self._handles, self._rows, strict=True) if row.is_alive)
+
+    def handle(self, index: int) -> Collider:
+        """The latest that had that row."""
+        return self._handles[index]
 
     def add(
         self,
@@ -245,6 +255,7 @@ class Colliders:
             self._contact.samples.from_numpy(samples)
         self._write_constants()
         self._is_dirty = True
+        self.on_jump()
 
     def _write_constants(self) -> None:
         contact, rows = self._contact, self._rows

@@ -34,8 +34,8 @@ CRUMB = 0.02
 
 def cut(body: Body, plane: Any, triangle: Any) -> tuple[Body, ...]:
     """As `Body.cut`."""
-    corners, normal, is_endless = _blade(plane, triangle)
     require_cuttable(body)
+    corners, normal, is_endless = _blade(plane, triangle)
     mesh = body.mesh
     faces = body._inner_faces
     centers = body.positions().astype(np.float64)[mesh.tets].mean(axis=1)
@@ -45,12 +45,15 @@ def cut(body: Body, plane: Any, triangle: Any) -> tuple[Body, ...]:
 
 def require_cuttable(body: Body) -> None:
     """Raises: OptionError for a body that was not made to be cut; StateError for one that cannot be now."""
+    world = body._world
     if body.asset.spare_vertices == 0:
         raise OptionError(
             f"body {body.index} has no room for copies of vertices: make its asset with spare_vertices"
         )
-    if not body._world.is_built:
+    if not world.is_built:
         raise StateError("the world is not built: call world.build() first, and cut what moves")
+    if body.is_held:
+        raise StateError(f"body {body.index} is grabbed or attached: release it before it is cut")
     if body.is_frozen:
         raise StateError(f"body {body.index} is frozen: bring it back with set_motion before it is cut")
 
@@ -176,15 +179,19 @@ def _settle(world: World, body: Body, pieces: list[_Piece], slots: list[int]) ->
     for slot, piece in zip([body.index, *slots], pieces, strict=False):
         rows = motion[piece.vertices]
         free = rows[:, 12] > 0.0
-        rows[free, 12] = 1.0 / piece.description.masses[free]
+        masses = piece.description.masses
+        rows[free, 12] = 1.0 / masses[free]
+        rows[:, 20:23] *= (masses / rows[:, 15])[:, None]  # a push is shared like the mass
+        rows[:, 15] = masses
         present = None if inverses is None else inverses[piece.tets][piece.arrays.tet_order]
         _write(state, slot, piece.arrays, rows, ACTIVE, body.index, present)
-        world._scene.bodies[slot] = piece.arrays
     world._read_alpha = None
-    world._checked_step = ()  # the number of substeps was chosen for what was there before
     fallen = tuple(world._take_in(body.asset) for _ in pieces[1:])
-    for each, piece in zip((*fallen, body), (*pieces[1:], pieces[0]), strict=True):
-        each._become(piece.description, body.vertex_origins[piece.vertices], body.tet_origins[piece.tets])
+    vertices, tets = body.vertex_origins, body.tet_origins
+    for each, piece in zip((body, *fallen), pieces, strict=True):
+        world._redescribe(each, piece.description, piece.arrays)
+        each._become(vertices[piece.vertices], tets[piece.tets])
+    world._event_log.renew_watches(body)
     return fallen
 
 

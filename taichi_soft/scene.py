@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -32,7 +32,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class BodyDescription:
     """One kind of body, wherever it is."""
 
@@ -116,6 +116,7 @@ class BodyArrays:
     tet_damping: Floats  # (m,) [N s/m]
     tet_edges: Ints  # (m, 6) edges of each, in the order of `LOCAL_EDGES`
     edge_vertices: Ints  # (k, 2)
+    edge_order: Ints  # (k,) caller's index of each edge
     edge_blocks: Ints  # (c, 2) first row and number, at most `LANES`, of edges with the same first end
     edge_damping: Floats  # (k,) [N s/m]
     bonds: BondArrays | None  # of a pairwise law
@@ -294,7 +295,7 @@ def arrange_part(
 def _in_order(description: BodyDescription, order: Ints, tets: Ints, edges: Ints) -> BodyArrays:
     """A body whose particles and tetrahedra come in these orders, and whose edges are turned as given."""
     mesh, new_index = description.mesh, renumbered(order)
-    edge_order = np.lexsort((edges[:, 1], edges[:, 0])).astype(np.int64)
+    edge_order = np.lexsort((edges[:, 1], edges[:, 0])).astype(np.int32)
     return BodyArrays(
         order=order,
         rank=new_index,
@@ -308,12 +309,27 @@ def _in_order(description: BodyDescription, order: Ints, tets: Ints, edges: Ints
         tet_damping=description.per_tet("damping")[tets],
         tet_edges=_arrange_tet_edges(mesh, tets, edge_order),
         edge_vertices=edges[edge_order],
+        edge_order=edge_order,
         edge_blocks=_edge_blocks(edges[edge_order, 0]),
         edge_damping=description.edge_damping[edge_order],
         bonds=_arrange_bonds(description.bonds, description.model, edge_order, new_index, renumbered(tets)),
         pinned=new_index[description.pinned],
         triangles=new_index[mesh.surface],
         outer=np.sort(new_index[outer_vertices(mesh)]),
+    )
+
+
+def rearrange(arrays: BodyArrays, description: BodyDescription) -> BodyArrays:
+    """The same body of another material, in the order that it has."""
+    tets, bonds = arrays.tet_order, description.bonds
+    return replace(
+        arrays,
+        mass=description.masses[arrays.order],
+        lame=description.lame[tets],
+        stiffness=description.stiffness[tets] if arrays.stiffness.any() else arrays.stiffness,
+        tet_damping=description.per_tet("damping")[tets],
+        edge_damping=description.edge_damping[arrays.edge_order],
+        bonds=_arrange_bonds(bonds, description.model, arrays.edge_order, arrays.rank, renumbered(tets)),
     )
 
 
@@ -337,7 +353,7 @@ def _edge_blocks(first_ends: Ints) -> Ints:
     return np.stack([rows, np.minimum(left, LANES)], axis=1).astype(np.int32)
 
 
-def _arrange_tet_edges(mesh: BodyMesh, tets: Ints, edge_order: NDArray[np.int64]) -> Ints:
+def _arrange_tet_edges(mesh: BodyMesh, tets: Ints, edge_order: Ints) -> Ints:
     if not isinstance(mesh, TetMesh):
         return np.zeros((0, 6), dtype=np.int32)
     new_edge = np.empty(len(edge_order), dtype=np.int32)
@@ -346,7 +362,7 @@ def _arrange_tet_edges(mesh: BodyMesh, tets: Ints, edge_order: NDArray[np.int64]
 
 
 def _arrange_bonds(
-    bonds: Bonds | None, model: ElementModel, edge_order: NDArray[np.int64], new_vertex: Ints, new_tet: Ints
+    bonds: Bonds | None, model: ElementModel, edge_order: Ints, new_vertex: Ints, new_tet: Ints
 ) -> BondArrays | None:
     if bonds is None:
         return None

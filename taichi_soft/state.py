@@ -21,6 +21,14 @@ ACTIVE, FROZEN, ASLEEP, ABSENT = 0, 1, 2, 3
 
 _NO_CONTACT = ContactCapacity()
 
+MOVES_PINS, FEELS_REACTION, PUSHED, DAMPED, SHELTERED, GRABBED = 1, 2, 4, 8, 16, 32
+"""Bits of `body_drives`: some pinned particles have somewhere to go; what they take up is added up;
+`particle_push` counts in the coming step; `body_damping` is not zero; the wind misses the body; a
+grab pulls at it."""
+
+MOST_GRABS, PATCH_ROWS = 16, 128
+"""Grabs of one world at a time, and particles that one of them holds."""
+
 
 @dataclass(frozen=True)
 class Capacity:
@@ -96,11 +104,16 @@ class State:
         self.particle_velocity = ti.Vector.field(3, real, n)  # [m/s], see body_velocity_lag
         # [N], zero between steps; with a fourth component, because four floats load and store in one piece.
         self.particle_force = ti.Vector.field(4, real, n)
-        self.particle_inv_mass = ti.field(real, n)  # [1/kg]
+        self.particle_mass = ti.field(real, n)  # [kg]
+        self.particle_inv_mass = ti.field(real, n)  # [1/kg], 0 where pinned
         self.particle_body = ti.field(ti.i32, n)
         self.particle_of_vertex = ti.field(ti.i32, n)  # where the caller's next vertex lies
         self.prev_position = ti.Vector.field(3, real, n)  # before the last fixed step
         self.prev_velocity = ti.Vector.field(3, real, n)
+        self.particle_aim = ti.field(ti.i32, n)  # where a pinned particle goes: see `kernels.pins`
+        self.particle_target = ti.Vector.field(3, real, n)  # there [m], or in the axes of a frame
+        self.particle_push = ti.Vector.field(3, real, n)  # [N], where the body is `PUSHED`
+        self.particle_reaction = ti.Vector.field(3, real, n)  # [N s] on what holds it, in the last step
 
         self.tet_vertices = ti.field(ti.i32, b * 4 * LANES)
         self.tet_rest_inverse = ti.field(real, b * 9 * LANES)  # [1/m], column by column
@@ -163,14 +176,29 @@ class State:
         self.body_velocity_lag = ti.field(real, bodies)  # substep [s] by half of which leapfrog lags
         self.body_lower = ti.Vector.field(3, real, bodies)  # [m], box at the last query that needed it
         self.body_upper = ti.Vector.field(3, real, bodies)
+        self.body_drives = ti.field(ti.i32, bodies)  # bits: what a game does to the body
+        self.body_gravity_scale = ti.field(real, bodies)
+        self.body_damping = ti.field(real, bodies)  # of velocities against the world [1/s]
         self.block_model = ti.field(ti.i32, b)
+
+        self.grab_body = ti.field(ti.i32, MOST_GRABS)  # its number plus 1, 0 where nothing is held
+        self.grab_corners = ti.Vector.field(3, ti.i32, MOST_GRABS)
+        self.grab_weights = ti.Vector.field(3, real, MOST_GRABS)  # of the corners
+        self.grab_target = ti.Vector.field(3, real, MOST_GRABS)  # [m]
+        self.grab_spring = ti.Vector.field(3, real, MOST_GRABS)  # see `write_grab`
+        self.grab_limits = ti.Vector.field(3, real, MOST_GRABS)
+        self.grab_force = ti.Vector.field(3, real, MOST_GRABS)  # [N], in the last substep
+        self.grab_count = ti.field(ti.i32, MOST_GRABS)  # rows of the patch
+        self.patch_particle = ti.field(ti.i32, MOST_GRABS * PATCH_ROWS)
+        self.patch_share = ti.field(real, MOST_GRABS * PATCH_ROWS)
 
         if capacity.has_contact:
             self.contact = ContactFields(capacity.contact, n, bodies)
         if capacity.contact.soft:
-            self.soft = SoftContactFields(n, bodies, capacity.outer)
+            self.soft = SoftContactFields(n, bodies, capacity.outer, capacity.triangles)
 
         self.gravity = ti.Vector.field(3, real, ())  # [m/s^2]
+        self.wind = ti.Vector.field(4, real, ())  # [m/s], density times drag coefficient [kg/m^3]
         self.floor = ti.Vector.field(3, real, ())  # height [m], restitution, friction
 
     def load(self, scene: Scene, models: list[int]) -> None:
@@ -186,10 +214,12 @@ class State:
         fill(self.particle_velocity, np.zeros((0, 3)))
         fill(self.prev_velocity, np.zeros((0, 3)))
         fill(self.particle_force, np.zeros((0, 4)))
+        fill(self.particle_mass, _laid_out(scene, "particles", lambda b: b.mass))
         inv_mass = _laid_out(scene, "particles", lambda b: 1.0 / b.mass)
         for body, place in zip(bodies, ranges, strict=True):
             inv_mass[body.pinned + place.particles[0]] = 0.0
         fill(self.particle_inv_mass, inv_mass)
+        fill(self.particle_aim, np.zeros(0))
         fill(self.particle_body, np.repeat(np.arange(len(bodies)), [np.diff(r.particles)[0] for r in ranges]))
         fill(self.particle_of_vertex, _laid_out(scene, "particles", lambda b: b.rank, "particles"))
 
@@ -233,6 +263,11 @@ class State:
         fill(self.body_model, np.array(models))
         fill(self.body_status, np.full(len(bodies), ABSENT))
         fill(self.body_velocity_lag, np.zeros(0))
+        fill(self.body_drives, np.zeros(0))
+        fill(self.grab_body, np.zeros(0))
+        fill(self.body_damping, np.zeros(0))
+        self.wind[None] = [0.0, 0.0, 0.0, 0.0]
+        fill(self.body_gravity_scale, np.ones(self.capacity.bodies))
         fill(self.block_model, np.repeat(models, [r.blocks[1] - r.blocks[0] for r in ranges]))
 
     def _load_contact(self, scene: Scene) -> None:
@@ -246,6 +281,10 @@ class State:
         if self.capacity.contact.soft:
             fill(self.soft.sweep_order, np.arange(count))
             fill(self.soft.slot_count, np.zeros(0))
+            self.soft.records_touches[None] = 0
+            self.soft.pairs_lost[None] = 0
+            fill(self.soft.pair_bodies, np.zeros((0, 2)))
+            fill(self.soft.pair_impulse, np.zeros((0, 3)))
             fill(self.soft.rest_position, _laid_out(scene, "particles", lambda b: b.rest_position))
 
     def _load_bonds(self, scene: Scene) -> None:

@@ -37,7 +37,7 @@ class Tearing:
     their mean, of Hooke's law and linear strain, is above the strength: its vertices are split across the
     pull, along the faces of the tetrahedra round them. A body tears as long as its `spare_vertices` last;
     what falls off becomes a body while slots are free, the largest first; the rest, and crumbs of less than
-    2 % of the whole, stay loose in the body.
+    2 % of the whole, stay loose in the body. While it is grabbed or attached, it holds.
 
     Args:
         stress: tensile strength [Pa].
@@ -72,7 +72,7 @@ class Tears:
         find_overloaded(world._built, self._limits, self._found)
         for slot in np.flatnonzero(self._found):
             body = world._pools.slots[slot]
-            if body is None:
+            if body is None or body.is_held:
                 continue
             try:
                 _tear(body)

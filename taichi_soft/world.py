@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 import warnings
 import weakref
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,14 +19,28 @@ from taichi_soft.colliders import Collider, Colliders
 from taichi_soft.constants import ALL_GROUPS, GRAVITY_EARTH, POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.contact import DEFAULT_CONTACT, Contact
 from taichi_soft.contact_fields import ContactCapacity
+from taichi_soft.control.access import require_substeps
+from taichi_soft.control.drives import ForceField, push_by_field, require_field, set_wind
+from taichi_soft.control.frames import Frame, Frames
+from taichi_soft.control.grabs import Grab
+from taichi_soft.control.impulses import apply_radial_impulse
 from taichi_soft.cutting import refill_slot, warm_up
-from taichi_soft.errors import FrozenBodyWarning, OptionError, SolverWarning, StateError, UnstableStepWarning
+from taichi_soft.errors import (
+    DroppedEventsWarning,
+    FrozenBodyWarning,
+    OptionError,
+    SolverWarning,
+    StateError,
+    UnstableStepWarning,
+)
+from taichi_soft.events import Event, EventLog, Listener, Witness
 from taichi_soft.failures import FailedStep, Failure, find_failure
 from taichi_soft.kernels.evaluate import compute_body_forces
 from taichi_soft.kernels.plasticity import read_rest_inverses
 from taichi_soft.kernels.program import Program
 from taichi_soft.kernels.readout import read_positions, read_velocities, write_motion
 from taichi_soft.kernels.schedules import Launch, choose_schedule, make_launch
+from taichi_soft.kernels.sleep import wake_body
 from taichi_soft.kernels.spawn import despawn_body, spawn_body
 from taichi_soft.materials import AnyMaterial
 from taichi_soft.meshing import BodyMesh
@@ -44,11 +58,11 @@ from taichi_soft.queries import (
     find_in_sphere,
 )
 from taichi_soft.runtime import init
-from taichi_soft.scene import Scene
+from taichi_soft.scene import BodyArrays, BodyDescription, Ranges, Scene
 from taichi_soft.settings import Settings
 from taichi_soft.shapes import PlaneShape, Shape
-from taichi_soft.stability import StableStep
-from taichi_soft.state import FROZEN, Capacity, State, acquire, fill, release
+from taichi_soft.stability import StableStep, stable_step
+from taichi_soft.state import ASLEEP, FROZEN, Capacity, State, acquire, fill, release
 from taichi_soft.tearing import Tearing, Tears
 from taichi_soft.types import DampingModel, Flips, Integrator, Schedule, Strain
 
@@ -57,6 +71,8 @@ SHORTEST_STEP, LONGEST_STEP = 1e-9, 1e4
 
 MOST_VERTICES = 10_000_000
 """In a world: the constants of the tetrahedra between more would not be counted in 32 bits."""
+
+Happened = TypeVar("Happened", bound=Event)
 
 _PLAIN = {float, int, np.float64, type(None)}
 """Types whose values can be compared with those of the last step."""
@@ -79,6 +95,8 @@ class World:
             by a `SolverWarning`.
         schedule: "auto", "per_body" or "flat": in which loops the work runs; no effect on the physics.
         soft_contact: whether bodies touch each other.
+        sleep_speed: bodies of which no particle was faster [m/s] for half a second, nor any of a body that
+            they may touch, fall asleep, until something comes near or is done to them; 0 for never.
         collider_room: colliders that may be added after `build`, beside those added before.
     Raises: OptionError for a value out of range or a name that is not known.
     """
@@ -95,6 +113,7 @@ class World:
         most_iterations: int = 200,
         schedule: str | Schedule = Schedule.AUTO,
         soft_contact: bool = False,
+        sleep_speed: float = 0.0,
         collider_room: int = 0,
     ) -> None:
         downwards = as_vector(gravity, "gravity", "m/s^2")
@@ -114,6 +133,9 @@ class World:
         self._colliders = Colliders()
         self._collider_room = as_count(collider_room, "collider_room", 0)
         self._soft_contact = as_flag(soft_contact, "soft_contact")
+        self._sleep_speed = as_number(
+            sleep_speed, "sleep_speed", 0.0, VELOCITY_LIMIT, "a speed of 0 m/s or more"
+        )
         self._floor_collider: Collider | None = None
         self._step_count = 0
         self._time = 0.0
@@ -126,12 +148,17 @@ class World:
         self._program: Program | None = None
         self._tears: Tears | None = None
         self._launch: Launch | None = None
+        self._events: EventLog | None = None
+        self._frames = Frames()
+        self._grabs: dict[int, Grab] = {}
+        self._force_field: ForceField | None = None
         self._checked_step: tuple[Any, ...] = ()
         self._step_values = (0.0, 0, 0.0)
-        self._read: Floats32 = np.empty((0, 3), dtype=np.float32)
-        self._read_alpha: float | None = None  # of what `_read` holds; None once the world has moved on
+        self._rows: Floats32 = np.empty((0, 3), dtype=np.float32)
+        self._read_alpha: float | None = None  # of what `_rows` holds; None once the world has moved on
         self._warned_steps: set[float] = set()
         self._warned_solves: set[int] = set()
+        self._stable_steps: dict[BodyDescription, StableStep] = {}  # of bodies with another material
 
     @property
     def settings(self) -> Settings:
@@ -165,6 +192,11 @@ class World:
     def bodies(self) -> Sequence[Body]:
         """All bodies that live, by the number of their slots: bodies of `add_body` in the order of adding."""
         return self._pools.living
+
+    @property
+    def slot_count(self) -> int:
+        """Slots for bodies, empty ones among them."""
+        return len(self._pools.slots)
 
     @property
     def is_built(self) -> bool:
@@ -282,6 +314,9 @@ class World:
         Raises: OptionError for what is no body of this world; StateError for one that was removed before.
         """
         self._require_own(body)
+        if self._state is not None:
+            body._let_go()
+            self._wake(-1)  # what may have lain on it
         self._pools.leave(body)
         body._removed_in = self.step_count
         self._warned_solves.discard(body.index)
@@ -389,7 +424,11 @@ class World:
         device = init()
         kinds = self._pools.kinds
         models = list(dict.fromkeys(asset.description.model for asset in kinds))
-        has_contact = self._soft_contact or len(self._colliders.handles) + self._collider_room > 0
+        has_contact = (
+            self._soft_contact
+            or self._sleep_speed > 0.0
+            or len(self._colliders.handles) + self._collider_room > 0
+        )
         if has_contact:
             self._require_contact()
         is_cut = any(asset.spare_vertices for asset in kinds)
@@ -417,7 +456,6 @@ class World:
             tuple(models),
             self.settings.integrator,
             self.settings.floor is not None and not has_contact,
-            any(len(asset.description.pinned) for asset in kinds),
             has_contact,
             self._soft_contact,
             is_plastic,
@@ -447,14 +485,19 @@ class World:
             state.solver[None] = [chosen.tolerance, chosen.most_iterations]
         if has_contact:
             self._colliders.load(state.contact, len(self._pools.slots))
+            woken = weakref.WeakMethod(self.wake)  # or the two would keep each other
+            self._colliders.on_jump = lambda: (woken() or _do_nothing)()
+            state.contact.sleep_speed[None] = self._sleep_speed
             filters = [(asset.contact.group, asset.contact.mask) for asset in self._pools.assets]
             fill(state.contact.body_filter, np.array(filters))
         if self._soft_contact:
             fill(state.soft.body_surface, np.array([asset.surface_row for asset in self._pools.assets]))
             fill(state.soft.body_touches_itself, np.array([a.contact.itself for a in self._pools.assets]))
-        self._read = np.empty((self._scene.particle_count, 3), dtype=np.float32)
+        self._rows = np.empty((self._scene.particle_count, 3), dtype=np.float32)
         self._program, self._state = program, state
         self._launch = make_launch(schedule, state, program, self._scene, device)
+        colliders = self._colliders if has_contact else None
+        self._events = EventLog(Witness(state, self._scene, self._pools.slots, colliders))
         if any(asset.tearing for asset in kinds):
             self._tears = Tears(state, len(self._pools.slots))
             for body in self.bodies:
@@ -494,15 +537,20 @@ class World:
         """
         if not isinstance(body, Body):
             raise OptionError(f"body must be one that a world made, got {body!r}")
-        return body._cut_stable_step if body.is_cut else body.asset.stable_step
+        described = body._description
+        if described is body.asset.description:
+            return body.asset.stable_step
+        if described not in self._stable_steps:
+            self._stable_steps[described] = stable_step(described.mesh, described.material, described.model)
+        return self._stable_steps[described]
 
     def stable_substeps(self, dt: float) -> int:
         """Number of substeps that a fixed step of `dt` [s] needs, with a margin, for the stiffest asset.
 
         Of all that have slots, whether a body lives there or not: so that neither the time of a frame nor the
-        motion of the others changes where one comes or goes. Bodies that were cut count too, with an estimate
-        of their own after each cut, which takes some 0.2 s for 5,000 tetrahedra: give substeps where that is
-        too long. 1 for implicit Euler, which needs none.
+        motion of the others changes where one comes or goes. Bodies that were cut, or given another material,
+        count with an estimate of their own after each change, which takes some 0.2 s for 5,000 tetrahedra:
+        give substeps where that is too long. 1 for implicit Euler, which needs none.
         """
         if not self._pools.slots:
             raise StateError("the world is empty: call add_body or reserve first")
@@ -511,8 +559,8 @@ class World:
             return 1
         longest = min(asset.stable_step.recommended for asset in self._pools.kinds)
         for body in self.bodies:
-            if body.is_cut:
-                longest = min(longest, body._cut_stable_step.recommended)
+            if body._description is not body.asset.description:
+                longest = min(longest, self.stable_step(body).recommended)
         return max(1, math.ceil(_as_step(dt) / longest))
 
     def step(self, dt: float, substeps: int | None = None) -> None:
@@ -531,6 +579,9 @@ class World:
             self._checked_step = asked
         seconds, count, h = self._step_values
         self._read_alpha = None
+        if self._force_field is not None:
+            push_by_field(self, self._force_field)
+        self._frames.aim(self._state, len(self._pools.slots), seconds)  # type: ignore[arg-type]
         if self._has_contact:
             self._colliders.prepare(seconds)
         troubled = self._launch(count, h)  # type: ignore[misc]
@@ -540,6 +591,9 @@ class World:
         self._step_count += 1
         self._time += seconds
         self._last_dt = seconds
+        loss = self._event_log.collect(self._step_count - 1, self._time, seconds)
+        if loss:
+            warnings.warn(loss, DroppedEventsWarning, stacklevel=2)
         if self._tears is not None:
             self._tears.tear(self)
         if reports:
@@ -593,6 +647,7 @@ class World:
             if status[body.index] != FROZEN or body.is_frozen:
                 continue
             body._frozen_in = FailedStep(self.step_count, self.time, substeps, h)
+            self._event_log.note_frozen(body)
             reports.append(
                 f"body {body.index} went non-finite in step {self.step_count}: put back to t = "
                 f"{self.time:.4g} s and frozen; body.failure tells where it broke. Use more substeps or a "
@@ -613,6 +668,94 @@ class World:
         assert self._program is not None
         return find_failure(self._state, self._program, self._scene, body.index, failed)
 
+    def _is_asleep(self, body: Body) -> bool:
+        return self._state is not None and int(self._state.body_status[body.index]) == ASLEEP
+
+    def wake(self) -> None:
+        """Wake all bodies that sleep."""
+        self._wake(-1)
+
+    def _wake(self, slot: int) -> None:
+        if self._has_contact and self._sleep_speed > 0.0:
+            wake_body(self._state, slot)
+
+    def add_frame(self, position: ArrayLike = (0.0, 0.0, 0.0), rotation: ArrayLike | None = None) -> Frame:
+        """A place that the engine moves, to attach bodies to; at any time.
+
+        Args:
+            position: of its origin, (3,) [m].
+            rotation: matrix (3, 3) or quaternion (x, y, z, w).
+        Raises: OptionError for bad numbers.
+        """
+        return Frame(self._frames, position, rotation)
+
+    def grab(
+        self,
+        origin: ArrayLike,
+        direction: ArrayLike,
+        *,
+        max_distance: float = math.inf,
+        frequency: float = 5.0,
+        max_force: float | None = None,
+    ) -> Grab | None:
+        """Take hold of the first body that a ray hits: as `raycast`, and `Body.grab` there.
+
+        Args:
+            origin, direction, max_distance: of the ray.
+            frequency: of the spring, critically damped [Hz].
+            max_force: strongest pull [N]; None for ten times the weight of the body on Earth.
+        Returns: a handle to move and release it with, or None where the ray hits nothing.
+        Raises: OptionError for numbers out of range; StateError before `build`, under schedule "flat", or
+            where all grabs are in use.
+        """
+        hit = self.raycast(origin, direction, max_distance=max_distance)
+        if hit is None:
+            return None
+        return hit.body.grab(hit.triangle, hit.barycentrics, frequency=frequency, max_force=max_force)
+
+    def apply_radial_impulse(self, center: ArrayLike, impulse: float, radius: float) -> None:
+        """Push all bodies away from a point: an explosion.
+
+        A particle of mass m at the distance r takes up impulse m/M (1 - (r/radius)^2)^2, M being the mass of
+        its body: a light body is thrown farther than a heavy one, and one that lies half out of reach is
+        pushed on its near half only.
+        Args:
+            center: (3,) [m].
+            impulse: on a small body near the centre [N s]; negative pulls it there.
+            radius: where nothing is felt any more [m].
+        Raises: OptionError for a number out of range; StateError before `build`.
+        """
+        apply_radial_impulse(self, center, impulse, radius)
+
+    def set_wind(self, velocity: ArrayLike | None, *, density: float = 1.2, drag: float = 1.0) -> None:
+        """Let air move over the surfaces of all bodies, from now on.
+
+        A triangle of area A, with the air at v_n past it along its normal n, takes up 1/4 density drag A
+        |v_n| v_n n: half of the drag of a plate, as a closed body, or a sheet whose triangles are listed for
+        each side, has one towards the wind and one away from it. So a box has the drag coefficient `drag`
+        and a sphere half of it. However strong, it takes no vertex beyond its own speed.
+        Args:
+            velocity: of the air, (3,) [m/s]; zero is still air, which brakes; None is no air.
+            density: of the air [kg/m^3].
+            drag: coefficient of a plate across the wind.
+        Raises: OptionError for a number out of range; StateError before `build` and under schedule "flat".
+        """
+        set_wind(self, velocity, density, drag)
+
+    def set_force_field(self, function: ForceField | None) -> None:
+        """Accelerate all bodies by a function of place and time, from now on; None ends it.
+
+        Args:
+            function: (positions float32 (n, 3) [m], time [s]) -> accelerations (n, 3) [m/s^2], called once
+                per step and body that is not frozen; they act throughout the step. If it raises, or returns
+                something else, `step` raises and the step is not made.
+        Raises: OptionError for what cannot be called; StateError under schedule "flat".
+        """
+        field = require_field(function)
+        require_built(self.is_built)
+        require_substeps(self, "force field")
+        self._force_field = field
+
     def read_positions(self, body: Body, alpha: float, out: Floats32 | None = None) -> Floats32:
         """Positions of a body between the previous step (alpha 0) and the last one (alpha 1), (n, 3) [m].
 
@@ -627,11 +770,59 @@ class World:
             alpha = as_number(alpha, "alpha", 0.0, 1.0, "a number from 0 to 1")
         rows = require_buffer(out, body.vertex_count)
         if self._read_alpha != alpha:
-            read_positions(self._state, alpha, self._read)
+            read_positions(self._state, alpha, self._rows)
             self._read_alpha = alpha
         begin = self._scene.ranges[body.index].particles[0]
-        rows[:] = self._read[begin : begin + body.vertex_count]
+        rows[:] = self._rows[begin : begin + body.vertex_count]
         return rows
+
+    def record_events(self, kinds: Iterable[type[Event]] = (Event,)) -> None:
+        """Record events of these kinds, and no others, from the next step on, for `drain_events`.
+
+        What touches already counts as a contact that begins in that step.
+        Args:
+            kinds: classes of events; `Event` stands for all that this world has, an empty list for none.
+        Raises: OptionError for what is no class of events; StateError before `build`, and for contacts in a
+            world without colliders and soft contact.
+        """
+        self._event_log.record(kinds)
+
+    def on(self, kind: type[Happened], function: Callable[[Happened], object]) -> Listener:
+        """Let a function hear of all events of a kind, and record that kind.
+
+        It is called by `drain_events`, never within a step, so it may do what can be done between two steps.
+        Args:
+            kind: a class of events; `Event` for all that this world has.
+            function: takes the event.
+        Returns: what `remove` ends it with.
+        Raises: as `record_events`; OptionError for what cannot be called.
+        """
+        return self._event_log.on(kind, function)
+
+    def drain_events(self) -> list[Event]:
+        """All events since the last call, after those who listen have heard of them.
+
+        They come step by step; within a step by kind (contacts begun and ended, stress, tears, sleep, waking,
+        freezing), then by the indices of bodies. Up to 10,000 wait, then the oldest are dropped, with a
+        `DroppedEventsWarning` in the step.
+
+        An exception of a listener keeps no other from hearing of any event: the first is raised at the end.
+        The next call then returns these events with those that came since, and listeners hear of none twice.
+        Raises: StateError before `build`, before anything is recorded, and from within a listener.
+        """
+        return self._event_log.drain()
+
+    @property
+    def dropped_events(self) -> int:
+        """How many were dropped so far because too many waited."""
+        return self._event_log.dropped
+
+    @property
+    def _event_log(self) -> EventLog:
+        """Raises: StateError before `build`."""
+        require_built(self._events is not None)
+        assert self._events is not None
+        return self._events
 
     def raycast(
         self,
@@ -745,7 +936,7 @@ class World:
             forces = np.empty_like(rows)
             compute_body_forces(self._state, self._program, body.index, forces)
             by_vertex = forces[self._scene.bodies[body.index].rank]
-            acceleration = by_vertex / body.masses[:, None] + self.settings.gravity
+            acceleration = by_vertex / body.masses[:, None] + self.settings.gravity * body.gravity_scale
             acceleration[body.pinned] = 0.0
             acceleration[self._is_carried(body)] = 0.0  # its velocity already is that after contact
             rows += (0.5 * lag * acceleration).astype(np.float32)
@@ -763,6 +954,50 @@ class World:
             return np.zeros(body.vertex_count, dtype=np.bool_)
         return np.asarray(body.positions()[:, 2] <= floor)
 
+    def _rows_of(self, body: Body, vertices: NDArray[np.int32]) -> NDArray[np.int32]:
+        """Where vertices of a body lie in the fields. Raises: StateError before `build`."""
+        require_built(self.is_built)
+        rows: NDArray[np.int32] = self._scene.bodies[body.index].rank[vertices]
+        return (rows + self._scene.ranges[body.index].particles[0]).astype(np.int32)
+
+    def _redescribe(self, body: Body, description: BodyDescription, arrays: BodyArrays) -> Ranges:
+        """Take note that a body is made of something else. Returns where it lies in the fields."""
+        body._description = description
+        self._scene.bodies[body.index] = arrays
+        used = {each._description for each in self.bodies}
+        self._stable_steps = {key: step for key, step in self._stable_steps.items() if key in used}
+        if self._checked_step[1:2] == (
+            None,
+        ):  # whose number of substeps was chosen for what was there before
+            self._checked_step = ()
+        return self._scene.ranges[body.index]
+
+    def _gravity_scale(self, body: Body) -> float:
+        return 1.0 if self._state is None else float(self._state.body_gravity_scale[body.index])
+
+    def _read(self, body: Body, kernel: Callable[..., Any], *arguments: Any) -> Any:
+        """Call a kernel (state, first particle of `body`, *arguments) that changes nothing."""
+        return self._read_all(kernel, self._scene.ranges[body.index].particles[0], *arguments)
+
+    def _read_all(self, kernel: Callable[..., Any], *arguments: Any) -> Any:
+        """Call a kernel (state, *arguments) that changes nothing. Raises: StateError before `build`."""
+        require_built(self.is_built)
+        return kernel(self._state, *arguments)
+
+    def _change(self, body: Body, kernel: Callable[..., Any], *arguments: Any) -> Any:
+        """Call a kernel (state, *arguments) that changes a body: the way of all control."""
+        require_built(self.is_built)
+        self._wake(body.index)
+        self._read_alpha = None
+        return kernel(self._state, *arguments)
+
+    def _change_all(self, kernel: Callable[..., Any], *arguments: Any) -> Any:
+        """Call a kernel (state, *arguments) that changes all bodies. Raises: StateError before `build`."""
+        require_built(self.is_built)
+        self._wake(-1)
+        self._read_alpha = None
+        return kernel(self._state, *arguments)
+
     def _write_motion(self, body: Body, positions: NDArray[Any], velocities: NDArray[Any]) -> None:
         """Put a body somewhere else. Raises: StateError before `build`."""
         require_built(self.is_built)
@@ -772,6 +1007,10 @@ class World:
                 raise OptionError(f"{name} must lie within {limit:g} of zero")
         write_motion(self._state, body.index, x, v)
         self._read_alpha = None
+
+
+def _do_nothing() -> None:
+    pass
 
 
 def _require_asset(asset: SoftBodyAsset) -> None:

@@ -63,7 +63,7 @@ def first_touch(contact: ti.template(), c, start, end, slack):
         else:
             step = ti.max(ti.abs(distance) / length, 1.0 / MOST_MARCHES)
             if is_convex:
-                step = ti.max(distance / ti.max(-climb, 1e-30), 1e-6)
+                step = ti.max(distance / ti.max(-climb, 1e-30), 1.0 / MOST_MARCHES / MOST_MARCHES)
             part += step
             if not (part <= 1.0):
                 part, is_open = NEVER, 0

@@ -5,15 +5,20 @@ anything.
 """
 
 from taichi_soft.kernels.collide import collided, find_near_colliders, forget_contacts
+from taichi_soft.kernels.drives import add_reactions, blow_on, push_particles
+from taichi_soft.kernels.grabs import pull_grabs
 from taichi_soft.kernels.internal_forces import accumulate_forces
-from taichi_soft.kernels.islands import find_islands, search_margin
-from taichi_soft.kernels.motion import remember_particle
-from taichi_soft.kernels.per_body import settle_body
+from taichi_soft.kernels.islands import find_islands
+from taichi_soft.kernels.motion import gravity_on, remember_particle
+from taichi_soft.kernels.per_body import before_kick, settle_body
 from taichi_soft.kernels.plasticity import flow_body
+from taichi_soft.kernels.sleep import note_motion, settle_island, wake_by_colliders, wake_island
 from taichi_soft.kernels.soft_contact import solve_island
-from taichi_soft.kernels.soft_search import search_island
+from taichi_soft.kernels.soft_search import find_box, is_social, island_margin, search_body, search_island
+from taichi_soft.kernels.touches import add_touches
 from taichi_soft.runtime import ti
-from taichi_soft.state import ABSENT, ACTIVE
+from taichi_soft.state import ABSENT, ACTIVE, PUSHED
+from taichi_soft.types import Integrator
 
 
 @ti.func
@@ -32,10 +37,11 @@ def _kick_body(state: ti.template(), program: ti.template(), body, kick, common)
     Returns: the highest speed [m/s], and the highest beside the `common` velocity.
     """
     particles = state.body_particles[body]
+    gravity = gravity_on(state, body)
     highest, highest_beside = ti.cast(0.0, state.real), ti.cast(0.0, state.real)
     for p in range(particles[0], particles[1]):
         inv_mass = state.particle_inv_mass[p]
-        acceleration = state.particle_force[p].xyz * inv_mass + state.gravity[None]
+        acceleration = state.particle_force[p].xyz * inv_mass + gravity
         acceleration *= ti.select(inv_mass > 0.0, 1.0, 0.0)
         _, v = program.advance(
             state.particle_position[p], state.particle_velocity[p], acceleration, 0.0, kick
@@ -51,17 +57,21 @@ def _kick_body(state: ti.template(), program: ti.template(), body, kick, common)
 
 @ti.func
 def _drift_body(state: ti.template(), body, h, since):
-    """New positions, and what colliders in the way make of velocities."""
+    """New positions, and what colliders in the way make of velocities. Returns the highest speed [m/s]."""
     particles = state.body_particles[body]
     gone = state.contact.gone[body]
+    farthest2 = ti.cast(0.0, state.real)
     for p in range(particles[0], particles[1]):
         x, v = state.particle_position[p], state.particle_velocity[p]
         if state.contact.particle_clearance[p] <= gone and state.particle_inv_mass[p] > 0.0:
             x_new, v_new = collided(state, body, p, x, v, h, since)
             state.particle_position[p] = x_new
             state.particle_velocity[p] = v_new
+            farthest2 = ti.max(farthest2, (x_new - x).dot(x_new - x))
         else:
             state.particle_position[p] = x + h * v
+            farthest2 = ti.max(farthest2, h * h * v.dot(v))
+    return ti.sqrt(farthest2) / h
 
 
 @ti.func
@@ -70,19 +80,16 @@ def _touch_each_other(state: ti.template(), island, reach, gone, fastest, h):
 
     Returns: the way [m] for which the candidates hold, and how much of it may be gone.
     """
-    first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
     way = 2.0 * fastest * h
     holds, used = reach, gone + way
-    if last - first > 1 or state.soft.body_touches_itself[state.contact.island_body[first]] == 1:
+    if is_social(state, island) == 1:
         if not (used <= holds):
-            thickness = ti.cast(0.0, ti.f32)
-            holds, used = way, way
-            for i in range(first, last):
-                surface = state.soft.body_surface[state.contact.island_body[i]]
-                holds = ti.max(holds, search_margin(surface))
-                thickness = ti.max(thickness, surface.y)
+            least, thickness = island_margin(state, island)
+            holds, used = ti.max(way, least), way
             search_island(state, island, thickness + holds)
         solve_island(state, island, h, used, way)
+        if state.soft.records_touches[None] == 1:
+            add_touches(state, island)
     return holds, used
 
 
@@ -99,14 +106,15 @@ def _common_velocity(state: ti.template(), island):
 
 
 @ti.func
-def _step_island(state: ti.template(), program: ti.template(), island, substeps, h):
-    """One fixed step of one island. Returns how many of its bodies failed."""
+def _move_island(state: ti.template(), program: ti.template(), island, substeps, h):
+    """All substeps of an island that is awake. Returns how many of its bodies failed."""
     first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
     for i in range(first, last):
         _begin_body(state, state.contact.island_body[i])
-    reach, gone = ti.cast(-1.0, ti.f32), ti.cast(0.0, ti.f32)
+    reach, gone = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32)
     common = ti.Vector.zero(ti.f32, 3)
     if ti.static(program.has_soft_contact):
+        reach, _ = island_margin(state, island)
         common = _common_velocity(state, island)
     for s in range(substeps):
         fastest, fastest_beside = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32)
@@ -114,10 +122,15 @@ def _step_island(state: ti.template(), program: ti.template(), island, substeps,
         for i in range(first, last):
             body = state.contact.island_body[i]
             if state.body_status[body] == ACTIVE:
-                accumulate_forces(state, program, body)
                 kick = h
                 if s == 0:
                     kick = 0.5 * (state.body_velocity_lag[body] + h)
+                lasting = kick if ti.static(program.integrator == Integrator.LEAPFROG) else h
+                blow_on(state, body, h)
+                push_particles(state, body, before_kick(program, h, int(s == 0)))
+                accumulate_forces(state, program, body)
+                add_reactions(state, body, lasting)
+                pull_grabs(state, body, h, lasting)
                 speed, speed_beside = _kick_body(state, program, body, kick, common)
                 fastest = ti.max(fastest, speed)
                 fastest_beside = ti.max(fastest_beside, speed_beside)
@@ -133,18 +146,43 @@ def _step_island(state: ti.template(), program: ti.template(), island, substeps,
                     find_near_colliders(state, body, 1.25 * fastest * left + 1e-3, s * h, left)
                     way = fastest * h
                 state.contact.gone[body] = way
-                _drift_body(state, body, h, s * h)
+                note_motion(state, body, _drift_body(state, body, h, s * h))
     failed = 0
     for i in range(first, last):
         body = state.contact.island_body[i]
         if state.body_status[body] == ACTIVE:
+            if ti.static(program.integrator == Integrator.LEAPFROG):
+                push_particles(state, body, 0.5 * h)
             has_failed = settle_body(state, body)
             failed += has_failed
             if has_failed == 0:
                 state.body_velocity_lag[body] = h
+                state.body_drives[body] = state.body_drives[body] & ~PUSHED
                 if ti.static(program.has_plasticity):
                     flow_body(state, body, substeps * h)
     return failed
+
+
+@ti.func
+def _step_island(state: ti.template(), program: ti.template(), island, substeps, h):
+    """One fixed step of one island. Returns how many of its bodies failed."""
+    failed = 0
+    if wake_island(state, island) == 1:
+        failed = _move_island(state, program, island, substeps, h)
+        settle_island(state, island, substeps * h)
+    return failed
+
+
+@ti.func
+def _is_to_be_searched(state: ti.template(), body):
+    """Whether a body is awake, or will be, and may be touched (1)."""
+    found = 0
+    if state.body_status[body] != ABSENT:
+        island = state.soft.body_island[body]
+        if is_social(state, island) == 1:
+            for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
+                found = found | int(state.body_status[state.contact.island_body[i]] == ACTIVE)
+    return found
 
 
 @ti.kernel
@@ -153,10 +191,23 @@ def step_islands(
 ) -> ti.i32:
     """One fixed step of every active body. Returns how many failed."""
     failed = 0
-    if ti.static(program.has_soft_contact):
-        ti.loop_config(serialize=True)
-        for _ in range(1):
+    ti.loop_config(serialize=True)
+    for _ in range(1):
+        wake_by_colliders(state, body_count)
+        if ti.static(program.has_soft_contact):
             find_islands(state, body_count, substeps * h)
+    if ti.static(program.has_soft_contact):
+        # On all threads, however few islands there are. What comes nearer later is looked for by the island.
+        ti.loop_config(block_dim=1)
+        for body in range(body_count):
+            if _is_to_be_searched(state, body) == 1:
+                find_box(state, body)
+        ti.loop_config(block_dim=1)
+        for body in range(body_count):
+            if _is_to_be_searched(state, body) == 1:
+                island = state.soft.body_island[body]
+                holds, thickness = island_margin(state, island)
+                search_body(state, body, island, holds + thickness)
     ti.loop_config(block_dim=1)
     for island in range(state.contact.island_count[None]):
         failed += _step_island(state, program, island, substeps, h)

@@ -14,7 +14,13 @@ from taichi_soft.constants import LANES
 from taichi_soft.kernels.bonds import lane_pressure, store_block_pressures
 from taichi_soft.kernels.edges import edge_force_of
 from taichi_soft.kernels.elastic import store_block_forces, store_lane_forces
-from taichi_soft.kernels.motion import move_particle, particle_is_sound, remember_particle, restore_particle
+from taichi_soft.kernels.motion import (
+    gravity_on,
+    move_particle,
+    particle_is_sound,
+    remember_particle,
+    restore_particle,
+)
 from taichi_soft.kernels.plasticity import flow_block
 from taichi_soft.runtime import ti
 from taichi_soft.state import ABSENT, ACTIVE, FROZEN
@@ -83,7 +89,7 @@ def _move_phase(state: ti.template(), program: ti.template(), p, h, is_first):
         kick = h
         if is_first:
             kick = 0.5 * (state.body_velocity_lag[body] + h)
-        move_particle(state, program, p, gathered_force(state, p), h, kick)
+        move_particle(state, program, p, gathered_force(state, p), gravity_on(state, body), h, kick)
 
 
 @ti.func

@@ -7,6 +7,7 @@ are held at its height within the solve, until it would have to pull them down.
 
 from taichi_soft.collision.floor import resolve_floor
 from taichi_soft.kernels.conjugate_gradient import invert_blocks, solve_system
+from taichi_soft.kernels.grabs import add_grabs
 from taichi_soft.kernels.internal_forces import accumulate_forces
 from taichi_soft.kernels.linear_system import (
     add_damping,
@@ -15,8 +16,10 @@ from taichi_soft.kernels.linear_system import (
     clear_system,
     multiply_system,
 )
+from taichi_soft.kernels.motion import gravity_on
 from taichi_soft.math.tensors import widened
 from taichi_soft.runtime import ti
+from taichi_soft.state import FEELS_REACTION
 
 FARTHEST = 0.5
 """Change of an edge in one piece of a step, over its length, beyond which the piece is halved."""
@@ -35,12 +38,14 @@ def assemble(state: ti.template(), program: ti.template(), body, h):
     clear_system(state, body)
     add_stiffness(state, program, body, h * h)
     multiply_system(state, body, state.particle_velocity, state.image)
+    gravity = gravity_on(state, body)
     for p in range(particles[0], particles[1]):
         inv_mass = state.particle_inv_mass[p]
-        weight = state.gravity[None] / ti.max(inv_mass, 1e-30) * ti.select(inv_mass > 0.0, 1.0, 0.0)
+        weight = gravity / ti.max(inv_mass, 1e-30) * ti.select(inv_mass > 0.0, 1.0, 0.0)
         rhs = h * (state.particle_force[p].xyz + weight) - state.image[p]
         state.residual[p] = rhs
         state.particle_force[p] = widened(rhs)
+    add_grabs(state, body, h)
     add_damping(state, program, body, h)
     add_masses(state, body)
     invert_blocks(state, body)
@@ -49,7 +54,11 @@ def assemble(state: ti.template(), program: ti.template(), body, h):
 @ti.func
 def _move(state: ti.template(), program: ti.template(), p, h):
     """Position and velocity of one particle after the solve; what the floor does with it."""
-    if state.particle_inv_mass[p] > 0.0:
+    if state.particle_inv_mass[p] == 0.0:  # pinned: goes on with the velocity that it was given
+        state.particle_position[p] = state.particle_position[p] + h * state.particle_velocity[p]
+        # The solve leaves this row open: what it lacks, the particle passes on [N s].
+        state.solution[p] = state.particle_force[p].xyz - state.image[p]
+    else:
         v = state.particle_velocity[p] + state.solution[p]
         x = state.particle_position[p] + h * v
         if ti.static(program.has_floor):
@@ -89,6 +98,18 @@ def _take_back(state: ti.template(), body):
         state.particle_position[p] = state.direction[p]
         state.particle_velocity[p] = state.residual[p]
         state.particle_contact[p] = state.prev_contact[p]
+
+
+@ti.func
+def _add_reactions(state: ti.template(), body, h):
+    """Add up what pinned particles took up in a piece of a step [N s]."""
+    if state.body_drives[body] & FEELS_REACTION != 0:
+        gravity = gravity_on(state, body)
+        particles = state.body_particles[body]
+        for p in range(particles[0], particles[1]):
+            if state.particle_inv_mass[p] == 0.0:
+                impulse = state.solution[p] + h * state.particle_mass[p] * gravity
+                state.particle_reaction[p] = state.particle_reaction[p] + impulse
 
 
 @ti.func
@@ -133,6 +154,7 @@ def implicit_substep(state: ti.template(), program: ti.template(), body, h, is_f
         else:
             largest = ti.max(largest, residual)
             left -= 1
+            _add_reactions(state, body, piece)
     if is_first == 1:
         state.body_residual[body] = largest
     else:

@@ -5,7 +5,7 @@ that stays clear of all others is an island of its own.
 """
 
 from taichi_soft.runtime import ti
-from taichi_soft.state import ABSENT
+from taichi_soft.state import ABSENT, ASLEEP
 
 
 @ti.func
@@ -14,8 +14,10 @@ def _find_boxes(state: ti.template(), body_count, dt):
     fall = state.gravity[None].norm() * dt * dt
     for body in range(body_count):
         if state.body_status[body] == ABSENT:
-            state.soft.body_lower[body] = ti.Vector.one(ti.f32, 3) * 1e30
+            state.contact.body_lower[body] = ti.Vector.one(ti.f32, 3) * 1e30
             continue
+        if state.body_status[body] == ASLEEP:
+            continue  # in the box that it fell asleep in
         outer = state.body_outer[body]
         p = state.outer_particle[outer[0]]
         lower, upper = state.particle_position[p], state.particle_position[p]
@@ -28,8 +30,8 @@ def _find_boxes(state: ti.template(), body_count, dt):
         surface = state.soft.body_surface[body]
         # What its parts do beside each other, they may do otherwise before the step is over.
         reach = 0.5 * (fast - slow) * dt + fall + surface.y + search_margin(surface)
-        state.soft.body_lower[body] = lower - reach
-        state.soft.body_upper[body] = upper + reach
+        state.contact.body_lower[body] = lower - reach
+        state.contact.body_upper[body] = upper + reach
 
 
 @ti.func
@@ -43,9 +45,9 @@ def _sort_by_lower_x(state: ti.template(), body_count):
     """Insertion sort: bodies keep nearly the order they had a step ago."""
     for i in range(1, body_count):
         body = state.soft.sweep_order[i]
-        x = state.soft.body_lower[body].x
+        x = state.contact.body_lower[body].x
         j = i - 1
-        while j >= 0 and state.soft.body_lower[state.soft.sweep_order[ti.max(j, 0)]].x > x:
+        while j >= 0 and state.contact.body_lower[state.soft.sweep_order[ti.max(j, 0)]].x > x:
             state.soft.sweep_order[j + 1] = state.soft.sweep_order[j]
             j -= 1
         state.soft.sweep_order[j + 1] = body
@@ -75,13 +77,13 @@ def _join_overlapping(state: ti.template(), body_count):
         while is_open == 1 and j < body_count:
             b = state.soft.sweep_order[j]
             j += 1
-            if state.soft.body_lower[b].x > state.soft.body_upper[a].x:
+            if state.contact.body_lower[b].x > state.contact.body_upper[a].x:
                 is_open = 0
             elif state.body_status[b] != ABSENT and may_touch(state, a, b):
                 apart = 0
                 for k in ti.static(range(1, 3)):
-                    apart = apart | int(state.soft.body_lower[a][k] > state.soft.body_upper[b][k])
-                    apart = apart | int(state.soft.body_lower[b][k] > state.soft.body_upper[a][k])
+                    apart = apart | int(state.contact.body_lower[a][k] > state.contact.body_upper[b][k])
+                    apart = apart | int(state.contact.body_lower[b][k] > state.contact.body_upper[a][k])
                 if apart == 0:
                     p, q = _root(state.soft, a), _root(state.soft, b)
                     state.soft.parent[ti.max(p, q)] = ti.min(p, q)
@@ -89,21 +91,16 @@ def _join_overlapping(state: ti.template(), body_count):
 
 @ti.func
 def _list_islands(state: ti.template(), body_count):
-    """Bodies island by island, both in ascending order, and a piece of the hash for each island."""
-    islands, rows, cells, items = 0, 0, 0, 0
+    """Bodies island by island, both in ascending order."""
+    islands, rows = 0, 0
     for first in range(body_count):
         if state.soft.parent[first] == first and state.body_status[first] != ABSENT:
             state.contact.island_first[islands] = rows
-            count = 0
             for body in range(first, body_count):
                 if state.body_status[body] != ABSENT and _root(state.soft, body) == first:
                     state.contact.island_body[rows] = body
+                    state.soft.body_island[body] = islands
                     rows += 1
-                    outer = state.body_outer[body]
-                    count += outer[1] - outer[0]
-            state.soft.island_table[islands] = ti.Vector([cells, items])
-            cells += 4 * count + 1  # for a power of two of rows, of which a quarter to a half is in use
-            items += count
             islands += 1
     state.contact.island_first[islands] = rows
     state.contact.island_count[None] = islands

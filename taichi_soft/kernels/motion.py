@@ -21,15 +21,21 @@ def restore_particle(state: ti.template(), p):
 
 
 @ti.func
-def move_particle(state: ti.template(), program: ti.template(), p, force, h, kick):
-    """One substep of one particle under the internal force on it [N]."""
+def gravity_on(state: ti.template(), body):
+    """Gravity as one body feels it [m/s^2]."""
+    return state.gravity[None] * state.body_gravity_scale[body]
+
+
+@ti.func
+def move_particle(state: ti.template(), program: ti.template(), p, force, gravity, h, kick):
+    """One substep of one particle under the internal force on it [N]; a pinned one keeps its velocity."""
     inv_mass = state.particle_inv_mass[p]
-    acceleration = force * inv_mass + state.gravity[None]
-    if ti.static(program.has_pins):  # whose inverse mass is 0
-        acceleration *= ti.select(inv_mass > 0.0, 1.0, 0.0)
+    is_free = inv_mass > 0.0
+    acceleration = (force * inv_mass + gravity) * ti.select(is_free, 1.0, 0.0)
     x, v = program.advance(state.particle_position[p], state.particle_velocity[p], acceleration, h, kick)
     if ti.static(program.has_floor):
-        x, v = resolve_floor(x, v, h, state.floor[None])
+        if is_free:
+            x, v = resolve_floor(x, v, h, state.floor[None])
     state.particle_position[p] = x
     state.particle_velocity[p] = v
 

@@ -4,12 +4,20 @@ Nothing waits between substeps and a body stays in one core's cache. The result 
 of threads.
 """
 
+from taichi_soft.kernels.drives import add_reactions, blow_on, push_particles
+from taichi_soft.kernels.grabs import pull_grabs
 from taichi_soft.kernels.implicit_euler import implicit_substep
 from taichi_soft.kernels.internal_forces import accumulate_forces, clear_forces
-from taichi_soft.kernels.motion import move_particle, particle_is_sound, remember_particle, restore_particle
+from taichi_soft.kernels.motion import (
+    gravity_on,
+    move_particle,
+    particle_is_sound,
+    remember_particle,
+    restore_particle,
+)
 from taichi_soft.kernels.plasticity import flow_body
 from taichi_soft.runtime import ti
-from taichi_soft.state import ABSENT, ACTIVE, FROZEN
+from taichi_soft.state import ABSENT, ACTIVE, FROZEN, PUSHED
 from taichi_soft.types import Integrator
 
 
@@ -17,19 +25,31 @@ from taichi_soft.types import Integrator
 def move_body(state: ti.template(), program: ti.template(), body, h, kick):
     """Move all particles of one body and clear their forces."""
     particles = state.body_particles[body]
+    gravity = gravity_on(state, body)
     for p in range(particles[0], particles[1]):
-        move_particle(state, program, p, state.particle_force[p].xyz, h, kick)
+        move_particle(state, program, p, state.particle_force[p].xyz, gravity, h, kick)
         state.particle_force[p] = ti.Vector.zero(state.real, 4)
 
 
 @ti.func
 def advance_body(state: ti.template(), program: ti.template(), body, h, kick, is_first):
     """One substep of one body."""
+    blow_on(state, body, h)
+    push_particles(state, body, before_kick(program, h, is_first))
     if ti.static(program.integrator == Integrator.IMPLICIT_EULER):
         implicit_substep(state, program, body, h, is_first)
     else:
+        lasting = kick if ti.static(program.integrator == Integrator.LEAPFROG) else h
         accumulate_forces(state, program, body)
+        add_reactions(state, body, lasting)
+        pull_grabs(state, body, h, lasting)
         move_body(state, program, body, h, kick)
+
+
+@ti.func
+def before_kick(program: ti.template(), h, is_first):
+    """For how long drives act before a substep [s]."""
+    return 0.5 * h if ti.static(program.integrator == Integrator.LEAPFROG) and is_first == 1 else h
 
 
 @ti.func
@@ -60,9 +80,12 @@ def _step_body(state: ti.template(), program: ti.template(), body, substeps, h):
         for s in range(substeps):
             advance_body(state, program, body, h, kick, int(s == 0))
             kick = h
+        if ti.static(program.integrator == Integrator.LEAPFROG):
+            push_particles(state, body, 0.5 * h)
         failed = settle_body(state, body)
         if failed == 0:
             state.body_velocity_lag[body] = h
+            state.body_drives[body] = state.body_drives[body] & ~PUSHED
             if ti.static(program.has_plasticity):
                 flow_body(state, body, substeps * h)
             if ti.static(program.integrator == Integrator.IMPLICIT_EULER):

@@ -15,7 +15,6 @@ class Program:
     models: tuple[ElementModel, ...]  # a body names one by its index
     integrator: Integrator
     has_floor: bool
-    has_pins: bool = False
     has_contact: bool = False  # with colliders, of which the floor then is one
     has_soft_contact: bool = False  # bodies with each other
     has_plasticity: bool = False  # of any body

@@ -50,7 +50,8 @@ def write_motion(
         x = ti.Vector([positions[i, 0], positions[i, 1], positions[i, 2]])
         state.particle_position[p] = x
         state.prev_position[p] = x
-        state.particle_velocity[p] = ti.Vector([velocities[i, 0], velocities[i, 1], velocities[i, 2]])
+        v = ti.Vector([velocities[i, 0], velocities[i, 1], velocities[i, 2]])
+        state.particle_velocity[p] = v * ti.select(state.particle_inv_mass[p] > 0.0, 1.0, 0.0)
         state.particle_force[p] = ti.Vector.zero(state.real, 4)
         if ti.static(state.capacity.implicit):
             state.particle_contact[p] = 0

@@ -11,7 +11,8 @@ def spawn_body(state: ti.template(), body: ti.i32, rows: ti.types.ndarray(dtype=
     """Put a body into its slot as if the world began with it.
 
     Args:
-        rows: (n, 7): position [m], velocity [m/s], inverse mass [1/kg] of each vertex in the caller's order.
+        rows: (n, 8): position [m], velocity [m/s], inverse mass [1/kg] and mass [kg] of each vertex in the
+            caller's order.
     """
     ti.loop_config(serialize=True)
     for _ in range(1):
@@ -26,13 +27,20 @@ def spawn_body(state: ti.template(), body: ti.i32, rows: ti.types.ndarray(dtype=
             state.prev_velocity[p] = v
             state.particle_force[p] = ti.Vector.zero(state.real, 4)
             state.particle_inv_mass[p] = rows[i, 6]
+            state.particle_mass[p] = rows[i, 7]
+            state.particle_aim[p] = 0
             if ti.static(state.capacity.implicit):
                 state.particle_contact[p] = 0
         state.body_velocity_lag[body] = 0.0
+        state.body_drives[body] = 0
+        state.body_gravity_scale[body] = 1.0
+        state.body_damping[body] = 0.0
         if ti.static(state.capacity.implicit):
             state.body_residual[body] = 0.0
         if ti.static(state.capacity.plastic):
             restore_shape(state, body)
+        if ti.static(state.capacity.contact.colliders > 0):
+            state.contact.calm[body] = 0.0
         state.body_status[body] = ACTIVE
 
 

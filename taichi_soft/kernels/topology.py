@@ -4,8 +4,9 @@ from taichi_soft.constants import LANES
 from taichi_soft.contact_fields import NO_CONTACT
 from taichi_soft.runtime import ti
 
-MOTION_WIDTH = 15
-"""Of a row of `read_motion`: position, velocity, both before the last step, inverse mass, floor, touch."""
+MOTION_WIDTH = 23
+"""Of a row of `read_motion`: position, velocity, both before the last step, inverse mass, floor, touch, mass,
+aim, target, push."""
 
 
 @ti.func
@@ -25,6 +26,11 @@ def read_motion(state: ti.template(), body: ti.i32, out: ti.types.ndarray(dtype=
             out[i, 6 + k] = state.prev_position[p][k]
             out[i, 9 + k] = state.prev_velocity[p][k]
         out[i, 12] = state.particle_inv_mass[p]
+        out[i, 15] = state.particle_mass[p]
+        out[i, 16] = state.particle_aim[p]
+        for k in range(3):
+            out[i, 17 + k] = state.particle_target[p][k]
+            out[i, 20 + k] = state.particle_push[p][k]
         out[i, 13], out[i, 14] = 0.0, 0.0
         if ti.static(state.capacity.implicit):
             out[i, 13] = state.particle_contact[p]
@@ -56,7 +62,7 @@ def write_body(
     """Write a body into its slot; indices count from the slot's first rows.
 
     Args:
-        model_of: body whose lag and residual it takes over: itself, or the one it fell off.
+        model_of: body whose lag, drives and residual it takes over: itself, or the one it fell off.
         motion: as `read_motion`, of each vertex in the caller's order.
         rest: positions of the particles at rest, in kernel order.
         particles: of each vertex.
@@ -78,6 +84,11 @@ def write_body(
             state.prev_velocity[p] = _three(motion, i, 9)
             state.particle_inv_mass[p] = motion[i, 12]
             state.particle_force[p] = ti.Vector.zero(state.real, 4)
+            state.particle_mass[p] = motion[i, 15]
+            state.particle_aim[p] = int(motion[i, 16])
+            state.particle_target[p] = _three(motion, i, 17)
+            state.particle_push[p] = _three(motion, i, 20)
+            state.particle_reaction[p] = ti.Vector.zero(state.real, 3)
             if ti.static(state.capacity.implicit):
                 state.particle_contact[p] = int(motion[i, 13])
             if ti.static(state.capacity.has_contact):
@@ -118,6 +129,11 @@ def write_body(
         state.body_triangles[body] = ti.Vector([t0, t0 + triangles.shape[0]])
         state.body_outer[body] = ti.Vector([o0, o0 + outer.shape[0]])
         state.body_velocity_lag[body] = state.body_velocity_lag[model_of]
+        state.body_drives[body] = state.body_drives[model_of]
+        state.body_gravity_scale[body] = state.body_gravity_scale[model_of]
+        state.body_damping[body] = state.body_damping[model_of]
+        if ti.static(state.capacity.has_contact):
+            state.contact.calm[body] = 0.0
         if ti.static(state.capacity.implicit):
             state.body_residual[body] = state.body_residual[model_of]
         state.body_status[body] = status

@@ -1,0 +1,53 @@
+"""How all control reaches a body: through `change`, and nowhere else."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taichi_soft.checks import as_indices
+from taichi_soft.errors import OptionError, StateError
+from taichi_soft.types import Schedule
+
+if TYPE_CHECKING:
+    from taichi_soft.body import Body
+    from taichi_soft.world import World
+
+Rows32 = NDArray[np.float32]
+
+
+def change(body: Body, kernel: Callable[..., Any], *arguments: Any) -> Any:
+    """Call a kernel (state, *arguments) that changes `body` between two steps.
+
+    Raises: StateError before `World.build`.
+    """
+    return body._world._change(body, kernel, *arguments)
+
+
+def numbers(*values: Any) -> Rows32:
+    """Numbers and vectors in a row, as kernels take them."""
+    return np.concatenate([np.ravel(value) for value in values]).astype(np.float32)
+
+
+def some_particles(body: Body, particles: ArrayLike | None, name: str = "particles") -> NDArray[np.int32]:
+    """Vertex numbers of a body, ascending; None means all. Raises: OptionError, also for none at all."""
+    if particles is None:
+        return np.arange(body.vertex_count, dtype=np.int32)
+    vertices = as_indices(particles, name, body.vertex_count)
+    if len(vertices) == 0:
+        raise OptionError(f"{name} is empty: name at least one vertex, from 0 to {body.vertex_count - 1}")
+    return vertices
+
+
+def rows_of(body: Body, vertices: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Where vertices of a body lie in the fields. Raises: StateError before `World.build`."""
+    return body._world._rows_of(body, vertices)
+
+
+def require_substeps(world: World, what: str) -> None:
+    """Raises: StateError where the schedule has no place for `what` within a substep."""
+    if world.settings.schedule is Schedule.FLAT:
+        raise StateError(f"schedule 'flat' has no {what}: make the world with schedule='per_body'")

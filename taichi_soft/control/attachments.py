@@ -1,0 +1,108 @@
+"""Particles that go with a frame, and what they pull it with."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taichi_soft.checks import as_flag
+from taichi_soft.control.access import change, require_substeps, rows_of, some_particles
+from taichi_soft.control.frames import Frame
+from taichi_soft.errors import OptionError, StateError
+from taichi_soft.kernels.pins import attach_particles, free_particles, read_reaction, write_feeling
+
+if TYPE_CHECKING:
+    from taichi_soft.body import Body
+
+
+class Attachment:
+    """Particles of a body held by a frame. Made by `Body.attach`."""
+
+    def __init__(self, body: Body, particles: NDArray[np.int32], frame: Frame, *, two_way: bool) -> None:
+        """Made by `Body.attach`."""
+        self.body = body
+        self.particles = particles
+        self.frame = frame
+        self.two_way = two_way
+
+    def __repr__(self) -> str:
+        state = "" if self.is_attached else ", released"
+        return f"Attachment(body {self.body.index}, {len(self.particles)} particles, {self.frame!r}{state})"
+
+    @property
+    def is_attached(self) -> bool:
+        """False once released."""
+        return self in self.body._attachments
+
+    @property
+    def force(self) -> NDArray[np.float64]:
+        """What the body pulled the frame with, mean over the last step, (3,) [N].
+
+        The weight of what is held by it and what it takes to accelerate it included.
+        Raises: StateError once released, or made without `two_way`.
+        """
+        return self._load()[:3]
+
+    @property
+    def torque(self) -> NDArray[np.float64]:
+        """The same force's torque about the frame's origin, (3,) [N m]. Raises: as `force`."""
+        return self._load()[3:]
+
+    def release(self) -> None:
+        """Let the particles go, with the velocity that they had. Raises: StateError if it was done before."""
+        self._require_attached()
+        body = self.body
+        change(body, free_particles, rows_of(body, self.particles))
+        body._attachments.remove(self)
+        if self.two_way and not any(each.two_way for each in body._attachments):
+            change(body, write_feeling, body.index, 0)
+
+    def _require_attached(self) -> None:
+        if not self.is_attached:
+            raise StateError(f"this attachment of body {self.body.index} was released: attach again")
+
+    def _load(self) -> NDArray[np.float64]:
+        self._require_attached()
+        if not self.two_way:
+            raise StateError("this attachment feels nothing: make it with two_way=True")
+        impulses = np.empty(6)
+        world = self.body._world
+        world._read(
+            self.body, read_reaction, rows_of(self.body, self.particles), self.frame.position, impulses
+        )
+        return impulses / max(world.last_dt, 1e-30)
+
+
+def attach(body: Body, particles: ArrayLike, frame: Any, two_way: bool) -> Attachment:
+    """As `Body.attach`."""
+    vertices = some_particles(body, particles)
+    if not isinstance(frame, Frame) or frame._frames is not body._world._frames:
+        raise OptionError(f"frame must come from add_frame of the same world, got {frame!r}")
+    feels = as_flag(two_way, "two_way")
+    require_unattached(body, vertices)
+    rows = rows_of(body, vertices)
+    if feels:
+        require_substeps(body._world, "forces on frames (two_way=True)")
+    offsets = body.positions()[vertices].astype(np.float64) - frame.position
+    local = (offsets @ frame.rotation).astype(np.float32)
+    change(body, attach_particles, body.index, frame._number, int(feels), rows, local)
+    body._world._frames.has_work = True
+    attachment = Attachment(body, vertices, frame, two_way=feels)
+    body._attachments.append(attachment)
+    return attachment
+
+
+def attached_vertices(body: Body) -> NDArray[np.int32]:
+    """All that frames hold, (k,)."""
+    return np.concatenate([np.zeros(0, np.int32), *(each.particles for each in body._attachments)])
+
+
+def require_unattached(body: Body, vertices: NDArray[np.int32]) -> None:
+    """Raises: StateError with the first of `vertices` that a frame holds."""
+    held = np.intersect1d(vertices, attached_vertices(body))
+    if len(held):
+        raise StateError(
+            f"vertex {held[0]} of body {body.index} is attached to a frame: release the attachment first"
+        )

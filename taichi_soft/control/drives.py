@@ -1,0 +1,98 @@
+"""What acts on bodies throughout the coming steps: forces, gravity, air."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taichi_soft.checks import as_array, as_flag, as_number, as_vector
+from taichi_soft.constants import VELOCITY_LIMIT
+from taichi_soft.control.access import change, numbers, require_substeps, rows_of, some_particles
+from taichi_soft.control.impulses import LARGEST_IMPULSE
+from taichi_soft.errors import OptionError
+from taichi_soft.kernels.drives import (
+    add_push,
+    add_pushes,
+    write_gravity_scale,
+    write_linear_damping,
+    write_shelter,
+    write_wind,
+)
+
+if TYPE_CHECKING:
+    from taichi_soft.body import Body
+    from taichi_soft.world import World
+
+ForceField = Callable[[NDArray[np.float32], float], ArrayLike]
+"""(positions (n, 3) [m], time [s]) -> accelerations (n, 3) [m/s^2]."""
+
+LARGEST_PUSH = 1e9
+"""[m/s^2]; within 20 us it throws a particle faster than any that counts as sound."""
+
+
+def apply_force(body: Body, force: ArrayLike, particles: ArrayLike | None) -> None:
+    """As `Body.apply_force`."""
+    total = as_vector(force, "force", "N", LARGEST_IMPULSE)
+    vertices = some_particles(body, particles)
+    acceleration = total / body.masses[vertices].sum()
+    if not np.abs(acceleration).max() < LARGEST_PUSH:
+        raise OptionError(
+            f"force would accelerate vertices by {np.abs(acceleration).max():.4g} m/s^2: "
+            f"keep below {LARGEST_PUSH:g} m/s^2"
+        )
+    require_substeps(body._world, "forces")
+    change(body, add_push, body.index, rows_of(body, vertices), numbers(acceleration))
+
+
+def set_gravity_scale(body: Body, scale: float) -> None:
+    """As `Body.set_gravity_scale`."""
+    change(body, write_gravity_scale, body.index, as_number(scale, "scale", -1e3, 1e3))
+
+
+def set_linear_damping(body: Body, rate: float) -> None:
+    """As `Body.set_linear_damping`."""
+    per_second = as_number(rate, "rate", 0.0, 1e6, "a number from 0 to 1e6 per second")
+    require_substeps(body._world, "linear damping")
+    change(body, write_linear_damping, body.index, per_second)
+
+
+def set_sheltered(body: Body, is_sheltered: bool) -> None:
+    """As `Body.set_sheltered`."""
+    change(body, write_shelter, body.index, int(as_flag(is_sheltered, "is_sheltered")))
+
+
+def set_wind(world: World, velocity: ArrayLike | None, density: float, drag: float) -> None:
+    """As `World.set_wind`."""
+    blows = velocity is not None
+    speed = as_vector(velocity if blows else (0, 0, 0), "velocity", "m/s", VELOCITY_LIMIT)  # type: ignore[arg-type]
+    kilograms = as_number(density, "density", 0.0, 1e5, "a number from 0 to 100,000 kg/m^3")
+    coefficient = as_number(drag, "drag", 0.0, 1e3)
+    require_substeps(world, "wind")
+    world._change_all(write_wind, numbers(speed, kilograms * coefficient * blows))
+
+
+def require_field(field: Any) -> ForceField | None:
+    """`field` if it is a function or None. Raises: OptionError."""
+    if field is not None and not callable(field):
+        raise OptionError(f"function must take (positions, time), or be None, got {field!r}")
+    return field  # type: ignore[no-any-return]
+
+
+def push_by_field(world: World, field: ForceField) -> None:
+    """Ask a force field for every body that moves, then push them all.
+
+    Raises: what the field raises, or OptionError for what it returns; then no body is pushed.
+    """
+    rows = []
+    for body in world.bodies:
+        if not body.is_frozen:
+            given = field(body.positions(), world.time)
+            found = as_array(given, "what the force field returns", (body.vertex_count, 3), "m/s^2")
+            if not np.abs(found).max() < LARGEST_PUSH:
+                raise OptionError(f"the force field must stay below {LARGEST_PUSH:g} m/s^2")
+            rows.append((body, found.astype(np.float32)))
+    for body, accelerations in rows:
+        change(body, add_pushes, body.index, accelerations)

@@ -1,0 +1,112 @@
+"""Taking hold of a body and pulling it about."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taichi_soft.checks import as_array, as_count, as_number, as_vector
+from taichi_soft.constants import GRAVITY_EARTH
+from taichi_soft.control.access import change, numbers, require_substeps, rows_of
+from taichi_soft.control.patches import patch_round
+from taichi_soft.errors import MeshError, OptionError, StateError
+from taichi_soft.kernels.grabs import end_grab, read_grab_force, write_grab, write_grab_target
+from taichi_soft.state import MOST_GRABS
+
+if TYPE_CHECKING:
+    from taichi_soft.body import Body
+
+WEIGHTS = 10.0
+"""Strongest pull in weights of the body on Earth, where nothing else is asked for."""
+
+HIGHEST_SPEED = 50.0
+"""[m/s] at which a grab still pulls the body along: faster than any hand."""
+
+
+class Grab:
+    """A hand on a body. Made by `Body.grab` and `World.grab`."""
+
+    def __init__(self, body: Body, number: int, point: NDArray[np.float64]) -> None:
+        """Made by `Body.grab`."""
+        self.body = body
+        self._number = number
+        self._point = point
+
+    def __repr__(self) -> str:
+        return f"Grab(body {self.body.index}, {'held' if self.is_held else 'released'})"
+
+    @property
+    def is_held(self) -> bool:
+        """False once released."""
+        return self.body._world._grabs.get(self._number) is self
+
+    @property
+    def point(self) -> NDArray[np.float64]:
+        """Where it pulls to, (3,) [m]."""
+        return np.array(self._point)
+
+    @property
+    def force(self) -> NDArray[np.float32]:
+        """With what it pulls the body, in the last substep, (3,) [N]. Raises: StateError once released."""
+        self._require_held()
+        found = np.empty(3, dtype=np.float32)
+        self.body._world._read_all(read_grab_force, self._number, found)
+        return found
+
+    def move(self, point: ArrayLike) -> None:
+        """Pull to `point`, (3,) [m], from now on. Raises: StateError once released."""
+        target = as_vector(point, "point", "m")
+        self._require_held()
+        change(self.body, write_grab_target, self._number, numbers(target))
+        self._point = target
+
+    def release(self) -> None:
+        """Let go. Raises: StateError if it was done before."""
+        self._require_held()
+        change(self.body, end_grab, self._number, self.body.index)
+        del self.body._world._grabs[self._number]
+
+    def _require_held(self) -> None:
+        if not self.is_held:
+            raise StateError(f"this grab of body {self.body.index} was released: grab again")
+
+
+def grab_at(
+    body: Body,
+    triangle: int,
+    barycentrics: ArrayLike,
+    point: ArrayLike | None,
+    frequency: float,
+    max_force: float | None,
+) -> Grab:
+    """As `Body.grab`; `point` is where it pulls to at first, None where the body is."""
+    if len(body.surface) == 0:
+        raise MeshError(f"body {body.index} has no surface to take hold of")
+    number = as_count(triangle, "triangle", 0, len(body.surface) - 1)
+    weights = as_array(barycentrics, "barycentrics", (3,))
+    if weights.min() < -1e-3 or abs(weights.sum() - 1) > 1e-3:
+        raise OptionError(f"barycentrics must be 0 or more and add up to 1, got {weights.tolist()}")
+    weights = np.maximum(weights, 0) / np.maximum(weights, 0).sum()
+    omega = 2 * np.pi * as_number(frequency, "frequency", 1e-3, 1e3, "a number from 0.001 to 1000 Hz")
+    mass = float(body.masses.sum())
+    strongest = WEIGHTS * GRAVITY_EARTH * mass
+    if max_force is not None:
+        strongest = as_number(max_force, "max_force", 0.0, 1e20, "a number of 0 N or more, or None")
+    require_substeps(body._world, "grabs")
+    corners = body.surface[number]
+    target = weights @ body.positions()[corners].astype(np.float64)
+    if point is not None:
+        target = as_vector(point, "point", "m")
+    grabs = body._world._grabs
+    free = next((slot for slot in range(MOST_GRABS) if slot not in grabs), None)
+    if free is None:
+        raise StateError(f"all {MOST_GRABS} grabs of this world are in use: release one first")
+    patch = patch_round(body._description, corners, weights)
+    spring = (mass * omega**2, 2 * mass * omega, 2 * HIGHEST_SPEED / omega)
+    row = numbers(weights, target, *spring, min(strongest, patch.strength), strongest, 1 / mass)
+    rows, shares = rows_of(body, patch.vertices), patch.shares.astype(np.float32)
+    change(body, write_grab, free, body.index, rows_of(body, corners), row, rows, shares)
+    grabs[free] = Grab(body, free, target)
+    return grabs[free]

@@ -1,0 +1,65 @@
+"""Impulses: sudden changes of momentum. Velocities change at once, positions with the next step.
+
+A pinned particle passes its share on to what holds it.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from taichi_soft.checks import as_number, as_vector
+from taichi_soft.constants import VELOCITY_LIMIT
+from taichi_soft.control.access import change, numbers, rows_of, some_particles
+from taichi_soft.errors import OptionError
+from taichi_soft.kernels.impulses import add_impulse_near, add_radial_impulse, add_velocity
+
+if TYPE_CHECKING:
+    from taichi_soft.body import Body
+    from taichi_soft.world import World
+
+LARGEST_IMPULSE = 1e20
+"""[N s], and for forces [N]: beyond, float32 has no room for squares."""
+
+
+def apply_impulse(body: Body, impulse: ArrayLike, particles: ArrayLike | None) -> None:
+    """As `Body.apply_impulse`."""
+    momentum = as_vector(impulse, "impulse", "N s", LARGEST_IMPULSE)
+    vertices = some_particles(body, particles)
+    velocity = momentum / body.masses[vertices].sum()
+    _require_speed(float(np.linalg.norm(velocity)), "impulse")
+    change(body, add_velocity, rows_of(body, vertices), numbers(velocity))
+
+
+def apply_impulse_at_point(body: Body, impulse: ArrayLike, point: ArrayLike, radius: float) -> None:
+    """As `Body.apply_impulse_at_point`."""
+    momentum = as_vector(impulse, "impulse", "N s", LARGEST_IMPULSE)
+    center = as_vector(point, "point", "m")
+    reach = as_number(radius, "radius", 1e-9, 1e9, "a number above 0 m, from 1e-9 to 1e9")
+    found = np.empty(2)
+    change(body, add_impulse_near, body.index, numbers(center, reach, momentum), found)
+    nearest, speed = found.tolist()
+    _require_speed(speed, "impulse")
+    if nearest >= reach:
+        raise OptionError(
+            f"point {center.tolist()} is {nearest:.4g} m from the nearest particle of body {body.index}, "
+            f"beyond radius={reach:g} m: aim at the body, or reach farther"
+        )
+
+
+def apply_radial_impulse(world: World, center: ArrayLike, impulse: float, radius: float) -> None:
+    """As `World.apply_radial_impulse`."""
+    origin = as_vector(center, "center", "m")
+    momentum = as_number(impulse, "impulse", -LARGEST_IMPULSE, LARGEST_IMPULSE)
+    reach = as_number(radius, "radius", 1e-9, 1e9, "a number above 0 m, from 1e-9 to 1e9")
+    row = numbers(origin, reach, momentum)
+    _require_speed(world._change_all(add_radial_impulse, world.slot_count, row), "impulse")
+
+
+def _require_speed(speed: float, name: str) -> None:
+    if not speed < VELOCITY_LIMIT:
+        raise OptionError(
+            f"{name} would change velocities by {speed:.4g} m/s: keep below {VELOCITY_LIMIT:g} m/s"
+        )

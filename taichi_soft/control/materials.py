@@ -1,0 +1,70 @@
+"""What a body is made of, changed while it moves."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from taichi_soft.constants import LANES
+from taichi_soft.control.access import change
+from taichi_soft.errors import MaterialError
+from taichi_soft.kernels.constants import write_fours, write_masses, write_numbers
+from taichi_soft.laws import fit_model
+from taichi_soft.scene import BodyArrays, BodyDescription, Ranges, blocks_of, rearrange
+
+if TYPE_CHECKING:
+    from taichi_soft.body import Body
+    from taichi_soft.state import State
+
+
+def set_material(body: Body, material: Any) -> None:
+    """As `Body.set_material`."""
+    before = body._description
+    if type(material) is not type(before.material):
+        raise MaterialError(
+            f"body {body.index} is made of a {type(before.material).__name__} and stays so: "
+            f"got {type(material).__name__}"
+        )
+    fit_model(before.model, before.mesh, material)
+    description = replace(before, material=material)
+    change(body, _write_constants, body, description)
+
+
+def set_damping(body: Body, damping: Any) -> None:
+    """As `Body.set_damping`."""
+    set_material(body, replace(body.material, damping=damping))
+
+
+def _write_constants(state: State, body: Body, description: BodyDescription) -> None:
+    """Not a kernel, but called like one: what a body is made of lies in several fields."""
+    arrays = rearrange(body._world._scene.bodies[body.index], description)
+    place = body._world._redescribe(body, description, arrays)
+    masses = arrays.mass
+    write_masses(state, place.particles[0], masses.astype(np.float32), (1.0 / masses).astype(np.float32))
+    write_numbers(state.edge_damping, place.edges[0], arrays.edge_damping.astype(np.float32))
+    for field, rows in _tet_constants(state, arrays):
+        numbers = blocks_of(rows, rows.shape[1], 0).astype(np.float32)
+        write_numbers(field, place.blocks[0] * LANES * rows.shape[1], numbers)
+    if arrays.bonds is not None:
+        _write_bonds(state, arrays, place)
+
+
+def _tet_constants(state: State, arrays: BodyArrays) -> list[tuple[Any, Any]]:
+    """Fields of blocks of tetrahedra, with the rows of one body, (m, k)."""
+    if len(arrays.tet_vertices) == 0:
+        return []
+    found = [(state.tet_lame, arrays.lame), (state.tet_damping, arrays.tet_damping[:, None])]
+    if state.capacity.anisotropic:
+        found.append((state.tet_stiffness, arrays.stiffness))
+    if arrays.bonds is not None:
+        found.append((state.tet_expansion_modulus, arrays.expansion_modulus[:, None]))
+    return found
+
+
+def _write_bonds(state: State, arrays: BodyArrays, place: Ranges) -> None:
+    assert arrays.bonds is not None
+    write_fours(state.edge_bond, place.edges[0], arrays.bonds.constants.astype(np.float32))
+    if len(arrays.bonds.weights):
+        write_fours(state.ring_weights, place.rings[0], arrays.bonds.weights.astype(np.float32))

@@ -1,0 +1,67 @@
+"""The part of a body that a hand takes hold of, and how strongly that may be pulled: numpy only."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.materials import SpringMaterial
+from taichi_soft.scene import BodyDescription
+from taichi_soft.state import PATCH_ROWS
+
+PATCH_SIZE = 0.25
+"""Radius of a patch over the diagonal of the body: about the hold of a hand."""
+
+FARTHEST_PULL = 0.5
+"""How far a patch may be pulled out of the body, over its radius, by the estimate below. Measured: elements
+then stretch by a quarter or a third, which the longest stable substeps still bear; at four times that they
+tear."""
+
+
+@dataclass(frozen=True)
+class Patch:
+    """Vertices round a point, with their shares of a pull, which add up to 1."""
+
+    vertices: NDArray[np.int32]
+    shares: NDArray[np.float64]
+    strength: float  # [N] that moves it by `FARTHEST_PULL` of its radius against the rest of the body
+
+
+def patch_round(body: BodyDescription, corners: NDArray[np.int32], weights: NDArray[np.float64]) -> Patch:
+    """The patch round a point of the surface at rest, given in barycentric coordinates of three vertices."""
+    mesh = body.mesh
+    distance = np.linalg.norm(mesh.vertices - weights @ mesh.vertices[corners], axis=1)
+    radius = max(
+        PATCH_SIZE * float(np.linalg.norm(np.ptp(mesh.vertices, axis=0))), 1.2 * distance[corners].max()
+    )
+    if (distance < radius).sum() > PATCH_ROWS:
+        radius = float(np.partition(distance, PATCH_ROWS)[PATCH_ROWS])
+    falloff = np.maximum(1 - (distance / radius) ** 2, 0) ** 2
+    falloff[falloff < 1e-6] = 0
+    vertices = np.flatnonzero(falloff).astype(np.int32)
+    shares = (falloff * body.masses)[vertices]
+    strength = FARTHEST_PULL * radius * _stiffness(body, falloff)
+    return Patch(vertices, shares / shares.sum(), strength)
+
+
+def _stiffness(body: BodyDescription, falloff: NDArray[np.float64]) -> float:
+    """Force per distance [N/m] by which particles moved each by its `falloff` w are held back, at least.
+
+    Twice the energy of that shape per distance squared: sum V mu |grad w|^2 in tetrahedra; in springs
+    sum k (w_i - w_j)^2 / 3, as a third of them lies along any direction.
+    """
+    mesh: Any = body.mesh
+    if isinstance(body.material, SpringMaterial):
+        assert body.bonds is not None
+        step = falloff[mesh.edges]
+        return float(body.bonds.constants[:, 1] @ (step[:, 1] - step[:, 0]) ** 2 / 3)
+    corner = falloff[mesh.tets]
+    near = np.flatnonzero(corner.any(axis=1))
+    ends = mesh.vertices[mesh.tets[near]]
+    rise = (corner[near, 1:] - corner[near, :1])[..., None]
+    slope = np.linalg.solve(ends[:, 1:] - ends[:, :1], rise)[..., 0]
+    shear = body.material.stiffness_matrices(len(mesh.tets))[near][:, range(3, 6), range(3, 6)].min(axis=1)
+    return float((mesh.volumes[near] * shear) @ (slope**2).sum(axis=1))

@@ -1,0 +1,59 @@
+"""Particles that are held, or moved by hand."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taichi_soft.checks import as_array
+from taichi_soft.constants import POSITION_LIMIT
+from taichi_soft.control.access import change, rows_of, some_particles
+from taichi_soft.control.attachments import attached_vertices, require_unattached
+from taichi_soft.errors import OptionError, StateError
+from taichi_soft.kernels.pins import free_particles, pin_particles, read_pinned, write_targets
+
+if TYPE_CHECKING:
+    from taichi_soft.body import Body
+
+
+def pinned_vertices(body: Body) -> NDArray[np.int32]:
+    """As `Body.pinned`, of a built world."""
+    flags = np.empty(body.vertex_count, dtype=np.int32)
+    body._world._read(body, read_pinned, flags)
+    return np.flatnonzero(flags).astype(np.int32)
+
+
+def pin(body: Body, particles: ArrayLike) -> None:
+    """As `Body.pin`."""
+    vertices = some_particles(body, particles)
+    require_unattached(body, vertices)
+    change(body, pin_particles, rows_of(body, vertices))
+
+
+def unpin(body: Body, particles: ArrayLike | None) -> None:
+    """As `Body.unpin`."""
+    if particles is None:
+        vertices = np.setdiff1d(body.pinned, attached_vertices(body))
+    else:
+        vertices = some_particles(body, particles)
+        require_unattached(body, vertices)
+    change(body, free_particles, rows_of(body, vertices))
+
+
+def set_targets(body: Body, particles: ArrayLike, positions: ArrayLike) -> None:
+    """As `Body.set_targets`."""
+    given = np.asarray(particles)
+    vertices = some_particles(body, particles)
+    if len(vertices) != len(given):
+        raise OptionError(f"particles names {len(given) - len(vertices)} vertices twice: name each once")
+    targets = as_array(positions, "positions", (len(given), 3), "m")
+    if not np.abs(targets).max() < POSITION_LIMIT:
+        raise OptionError(f"positions must lie within {POSITION_LIMIT:g} m of zero")
+    require_unattached(body, vertices)
+    order = np.argsort(given, kind="stable")
+    loose = change(body, write_targets, rows_of(body, vertices), targets[order].astype(np.float32))
+    if loose >= 0:
+        raise StateError(f"vertex {vertices[loose]} of body {body.index} is not pinned: call body.pin first")
+    body._world._frames.has_work = True
