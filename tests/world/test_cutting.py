@@ -361,6 +361,41 @@ def test_a_part_keeps_its_pins_its_fibres_and_its_dents():
     np.testing.assert_array_equal(with_pins[0].positions()[with_pins[0].pinned], where[with_pins[0].pinned])
 
 
+def test_what_is_held_is_not_cut_and_what_is_watched_is_watched_on(swinging):
+    world, body = swinging()
+    grab = body.grab(0)
+    with pytest.raises(StateError, match="body 0 is grabbed or attached: release it"):
+        body.cut(plane=ALONG)
+    grab.release()
+    held = body.attach([3], world.add_frame())
+    with pytest.raises(StateError, match="body 0 is grabbed or attached: release it"):
+        body.cut(plane=ALONG)
+    held.release()
+    body.watch_stress(10.0)
+    world.step(DT, 24)
+    world.drain_events()
+    fallen = body.cut(plane=ALONG)
+    world.step(DT, 24)
+    (event,) = world.drain_events()
+    assert event.body is body
+    stress = body.tet_stress()
+    np.testing.assert_allclose(event.stress, stress[event.tetrahedra], rtol=1e-3, atol=1.0)
+    assert len(event.tetrahedra) == (stress > 10.0).sum()
+    assert len(fallen) == 1
+
+
+def test_parts_keep_gravity_scale_and_what_pushes_them(swinging):
+    world, body = swinging()
+    rest = np.zeros_like(BAR.vertices)
+    body.set_motion(BAR.vertices, rest)
+    body.set_gravity_scale(-2.0)
+    body.apply_force((30.0, 0.0, 0.0))
+    parts = (body, *body.cut(plane=ALONG))
+    world.step(DT, 24)
+    assert sum(part.momentum() for part in parts) == pytest.approx([30.0 * DT, 0, 0], abs=1e-4)
+    assert [part.gravity_scale for part in parts] == [-2.0, -2.0]
+
+
 def test_the_stable_step_of_a_part_is_its_own(swinging):
     world, body = swinging()
     whole, substeps = body.stable_step.limit, world.stable_substeps(DT)

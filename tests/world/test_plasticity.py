@@ -31,7 +31,7 @@ MODES = {
     "per_body": {"schedule": "per_body"},
     "flat": {"schedule": "flat"},
     "implicit": {"integrator": "implicit_euler"},
-    "contact": {"soft_contact": True},
+    "colliders": {"collider_room": 1},
 }
 
 
