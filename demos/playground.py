@@ -77,9 +77,9 @@ def _funnel() -> trimesh.Trimesh:
 
 
 def _ground() -> NDArray[np.float64]:
-    """A ring-shaped wall round a hollow, on a square of 7.6 m."""
-    x, y = np.meshgrid(*2 * [np.linspace(-3.8, 3.8, 39)], indexing="ij")
-    away = (np.hypot(x, y) - RIM) / 0.7
+    """A ring-shaped wall round a hollow, on a square of 6.8 m."""
+    x, y = np.meshgrid(*2 * [np.linspace(-3.4, 3.4, 35)], indexing="ij")
+    away = (np.hypot(x, y) - RIM) / 0.6
     return np.asarray(0.03 + 1.0 * np.exp(-(away**2)))
 
 
@@ -101,7 +101,7 @@ def stage() -> Stage:
         body = world.add_body(mesh, MATERIAL, law="neo_hookean", position=place)
         actors.append(Actor(body, PALETTE[i % len(PALETTE)]))
     world.build()
-    camera = Camera.framing((-3.3, -2.4, 0.0), (5.3, 2.0, 6.7), aspect=16 / 9, azimuth=-78, elevation=14)
+    camera = Camera.framing((-3.0, -3.2, 0.0), (5.1, 2.4, 6.7), aspect=16 / 9, azimuth=-74, elevation=24)
     return Stage("a course of colliders", world, actors, camera, STEP, 15.0, act=course)
 
 
