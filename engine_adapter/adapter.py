@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine_adapter.fixed_step import Accumulator, FixedStep
-from taichi_soft import Body, OptionError, StateError, World
+from taichi_soft import Body, Event, OptionError, StateError, World
 from taichi_soft.checks import as_number
 
 
@@ -119,6 +119,10 @@ class EngineAdapter:
             self._dropped_time = dropped + (steps - made) * self._fixed_step.dt
             self._total_dropped_time += self._dropped_time
         return made
+
+    def drain_events(self) -> list[Event]:
+        """What happened in all fixed steps since the last call: see `World.drain_events`."""
+        return self._world.drain_events()
 
     def positions(self, body: Body, out: NDArray[np.float32] | None = None) -> NDArray[np.float32]:
         """Positions of a body to draw, between the previous step and the last one, float32 (n, 3) [m].
