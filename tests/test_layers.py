@@ -27,7 +27,7 @@ LAYERS = """
     taichi_soft
     render
     engine_adapter
-    stages
+    stages  scenery
     film  profiling
     cli
     __main__
@@ -41,7 +41,7 @@ LEVEL = {name: level for level, line in enumerate(LAYERS.split("\n")) for name i
 NO_TAICHI = ("errors", "constants", "types", "checks", "materials", "meshing", "contact", "plasticity")
 """Parts that are tested in milliseconds: numpy only."""
 
-FACES = ("render", "stages", "film", "profiling", "cli", "__main__")
+FACES = ("render", "stages", "scenery", "film", "profiling", "cli", "__main__")
 """Parts of taichi_soft that lie above its public names."""
 
 
