@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from engine_adapter.fixed_step import Accumulator, FixedStep
-from taichi_soft import Body, OptionError, StateError, World
+from taichi_soft import Body, Event, OptionError, StateError, World
 from taichi_soft.checks import as_number
 
 
@@ -25,19 +26,31 @@ class EngineAdapter:
     Args:
         world: built.
         fixed_step: length of a step, its substeps, and how many one frame may make.
-    Raises: StateError if the world is not built; OptionError if `fixed_step` is not a FixedStep.
+        before_step: called with the world before every fixed step: the place to move colliders and frames,
+            to push and to grab, so that it happens at the same moments whatever the frame rate.
+    Raises: StateError if the world is not built; OptionError if `fixed_step` is not a FixedStep, or
+        `before_step` cannot be called.
     """
 
-    def __init__(self, world: World, fixed_step: FixedStep | None = None) -> None:
+    def __init__(
+        self,
+        world: World,
+        fixed_step: FixedStep | None = None,
+        *,
+        before_step: Callable[[World], object] | None = None,
+    ) -> None:
         fixed_step = FixedStep() if fixed_step is None else fixed_step
         if not isinstance(world, World):
             raise OptionError(f"world must be a taichi_soft.World, got {type(world).__name__}")
         if not isinstance(fixed_step, FixedStep):
             raise OptionError(f"fixed_step must be a FixedStep, got {type(fixed_step).__name__}")
+        if not (before_step is None or callable(before_step)):
+            raise OptionError(f"before_step must be a function of the world, got {before_step!r}")
         if not world.is_built:
             raise StateError("the world is not built: call world.build() before EngineAdapter(world)")
         self._world = world
         self._fixed_step = fixed_step
+        self._before_step = before_step
         self._accumulator = Accumulator(fixed_step)
         self._dropped_time = 0.0
         self._total_dropped_time = 0.0
@@ -78,8 +91,10 @@ class EngineAdapter:
     def step(self) -> None:
         """Make exactly one fixed step, past the accumulator: for replays, tests and servers.
 
-        Raises: what `World.step` raises.
+        Raises: what `before_step` and `World.step` raise.
         """
+        if self._before_step is not None:
+            self._before_step(self._world)
         self._world.step(self._fixed_step.dt, self._fixed_step.substeps)
 
     def advance(self, frame_dt: float) -> int:
@@ -90,7 +105,7 @@ class EngineAdapter:
         Returns: how many steps were made, at most `max_steps`. Time for more is dropped, the part of a step
             included (see `dropped_time`).
         Raises: OptionError for a frame_dt that is negative or not finite, with nothing changed; what
-            `World.step` raises: the steps not made then count as dropped.
+            `step` raises: the steps not made then count as dropped.
         """
         seconds = as_number(frame_dt, "frame_dt", 0.0, math.inf, "a number of 0 s or more")
         steps, dropped = self._accumulator.put(seconds)
@@ -104,6 +119,10 @@ class EngineAdapter:
             self._dropped_time = dropped + (steps - made) * self._fixed_step.dt
             self._total_dropped_time += self._dropped_time
         return made
+
+    def drain_events(self) -> list[Event]:
+        """What happened in all fixed steps since the last call: see `World.drain_events`."""
+        return self._world.drain_events()
 
     def positions(self, body: Body, out: NDArray[np.float32] | None = None) -> NDArray[np.float32]:
         """Positions of a body to draw, between the previous step and the last one, float32 (n, 3) [m].

@@ -9,6 +9,7 @@ from taichi_soft.control.frames import Frame
 from taichi_soft.control.grabs import Grab
 from taichi_soft.errors import (
     DeviceError,
+    DroppedEventsWarning,
     FrozenBodyWarning,
     MaterialError,
     MeshError,
@@ -18,6 +19,17 @@ from taichi_soft.errors import (
     TaichiSoftError,
     UnstableStepWarning,
     VideoError,
+)
+from taichi_soft.events import (
+    ContactBegan,
+    ContactEnded,
+    Event,
+    FellAsleep,
+    Froze,
+    Listener,
+    StressExceeded,
+    TearCandidates,
+    Woke,
 )
 from taichi_soft.failures import Failure
 from taichi_soft.forces import force_gradient, internal_forces
@@ -53,6 +65,7 @@ from taichi_soft.meshing import (
     voronoi_graph,
     voxels,
 )
+from taichi_soft.plasticity import Plasticity
 from taichi_soft.queries import ClosestPoint, Overlap, Pose, RayHit, RayHits
 from taichi_soft.runtime import Device, device, init
 from taichi_soft.settings import Settings
@@ -66,6 +79,7 @@ from taichi_soft.shapes import (
     SphereShape,
 )
 from taichi_soft.stability import StableStep, stable_step
+from taichi_soft.tearing import Tearing
 from taichi_soft.world import World
 
 __all__ = [
@@ -79,13 +93,20 @@ __all__ = [
     "ClosestPoint",
     "Collider",
     "Contact",
+    "ContactBegan",
+    "ContactEnded",
     "Device",
     "DeviceError",
+    "DroppedEventsWarning",
+    "Event",
     "Failure",
+    "FellAsleep",
     "Frame",
+    "Froze",
     "FrozenBodyWarning",
     "Grab",
     "HeightFieldShape",
+    "Listener",
     "Material",
     "MaterialError",
     "MeshError",
@@ -95,6 +116,7 @@ __all__ = [
     "Overlap",
     "ParticleMesh",
     "PlaneShape",
+    "Plasticity",
     "Pose",
     "RayHit",
     "RayHits",
@@ -107,10 +129,14 @@ __all__ = [
     "StableStep",
     "StateError",
     "Stiffness",
+    "StressExceeded",
     "TaichiSoftError",
+    "TearCandidates",
+    "Tearing",
     "TetMesh",
     "UnstableStepWarning",
     "VideoError",
+    "Woke",
     "World",
     "beam",
     "box",
