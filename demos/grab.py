@@ -29,6 +29,7 @@ INSIDE, WALL, HEIGHT = 2.2, 0.14, 0.9  # of the crate: width, thickness and heig
 FIRST, EVERY = 0.8, 1.7  # when the hand takes the first body, and another [s]
 LIFT, STEEP = np.array([-0.1, 0.0, 1.3]), 0.8  # way up [m]; how steeply it throws
 LIFTING, PULL = 0.7, 10.0  # how long it lifts [s], and speeds up the throw [m/s^2]
+UP = np.array([0.0, 0.0, 1.0])
 STEP = FixedStep(dt=1 / 50)
 
 
@@ -56,7 +57,7 @@ class Hand:
             self.taken += 1
             return
         way = (CRATE - self.start) * (1, 1, 0)
-        way = way / np.linalg.norm(way) + (0, 0, STEEP)
+        way = way / np.linalg.norm(way) + STEEP * UP
         place = self.start + _smooth(since / LIFTING) * LIFT + PULL / 2 * throwing**2 * way
         self.grab.move(place)
         self.frame.move_to(place)
@@ -64,7 +65,7 @@ class Hand:
     def _reach(self, world: World, since: float) -> None:
         """Go to the top of the next body, and take hold of it when it is time."""
         body = world.bodies[self.taken]
-        over = body.center_of_mass() + (0, 0, 2)
+        over = body.center_of_mass() + 2.0 * UP
         near = world.closest_point(over, bodies=[body])
         assert near is not None
         if since >= 0.0:
@@ -117,7 +118,7 @@ def _add_crate(world: World) -> None:
     reach = (INSIDE + WALL) / 2
     for x, y in ((-1, 0), (1, 0), (0, -1), (0, 1)):
         size = (WALL if x else INSIDE + 2 * WALL, WALL if y else INSIDE, HEIGHT)
-        world.add_collider(BoxShape(size), position=CRATE + (x * reach, y * reach, HEIGHT / 2))
+        world.add_collider(BoxShape(size), position=CRATE + np.array([x * reach, y * reach, HEIGHT / 2]))
 
 
 def proof(stage: Stage) -> float:
