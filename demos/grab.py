@@ -23,9 +23,9 @@ from taichi_soft.film import Actor, Stage
 from taichi_soft.render import PALETTE, Camera
 from taichi_soft.scenery import Prop
 
-MATERIAL = Material(young=3.0e5, poisson=0.3, density=400.0, damping=40.0)
-CRATE = np.array([2.2, 0.0, 0.0])  # middle of its bottom [m]
-INSIDE, WALL, HEIGHT = 2.2, 0.14, 0.9  # of the crate: width, thickness and height of its walls [m]
+MATERIAL = Material(young=2.5e5, poisson=0.3, density=400.0, damping=100.0)
+CRATE = np.array([2.4, 0.0, 0.0])  # middle of its bottom [m]
+INSIDE, WALL, HEIGHT = 2.4, 0.14, 1.2  # of the crate: width, thickness and height of its walls [m]
 FIRST, EVERY = 0.8, 1.7  # when the hand takes the first body, and another [s]
 LIFT, STEEP = np.array([-0.1, 0.0, 1.3]), 0.8  # way up [m]; how steeply it throws
 LIFTING, PULL = 0.7, 10.0  # how long it lifts [s], and speeds up the throw [m/s^2]
@@ -98,8 +98,6 @@ def stage() -> Stage:
         box((0.6, 0.6, 0.6), (4, 4, 4)),
         cylinder(0.34, 0.6, rings=2, layers=4),
         torus(0.34, 0.14, rings=1, segments=18),
-        box((0.9, 0.45, 0.45), (6, 3, 3)),
-        sphere(0.42, 3),
     ]
     actors = []
     for i, mesh in enumerate(meshes):
@@ -109,8 +107,8 @@ def stage() -> Stage:
     world.build()
     frame = world.add_frame((-0.6, 0.0, 2.2))
     props = [Prop(SphereShape(0.09).surface(), frame, color=(0.95, 0.93, 0.88))]
-    camera = Camera.framing((-3.2, -1.3, 0.0), (3.5, 1.3, 3.0), aspect=16 / 9, azimuth=-72, elevation=20)
-    return Stage("picked up and thrown", world, actors, camera, STEP, 13.0, act=Hand(frame), props=props)
+    camera = Camera.framing((-2.2, -1.4, 0.0), (3.8, 1.4, 3.0), aspect=16 / 9, azimuth=-72, elevation=20)
+    return Stage("picked up and thrown", world, actors, camera, STEP, 10.0, act=Hand(frame), props=props)
 
 
 def _add_crate(world: World) -> None:
