@@ -23,12 +23,13 @@ from taichi_soft.film import Actor, Stage
 from taichi_soft.render import PALETTE, Camera
 from taichi_soft.scenery import Prop
 
-MATERIAL = Material(young=3.0e5, poisson=0.3, density=400.0, damping=40.0)
-CRATE = np.array([2.2, 0.0, 0.0])  # middle of its bottom [m]
-INSIDE, WALL, HEIGHT = 2.2, 0.14, 0.9  # of the crate: width, thickness and height of its walls [m]
+MATERIAL = Material(young=2.5e5, poisson=0.3, density=400.0, damping=100.0)
+CRATE = np.array([2.4, 0.0, 0.0])  # middle of its bottom [m]
+INSIDE, WALL, HEIGHT = 2.4, 0.14, 1.2  # of the crate: width, thickness and height of its walls [m]
 FIRST, EVERY = 0.8, 1.7  # when the hand takes the first body, and another [s]
 LIFT, STEEP = np.array([-0.1, 0.0, 1.3]), 0.8  # way up [m]; how steeply it throws
 LIFTING, PULL = 0.7, 10.0  # how long it lifts [s], and speeds up the throw [m/s^2]
+UP = np.array([0.0, 0.0, 1.0])
 STEP = FixedStep(dt=1 / 50)
 
 
@@ -56,7 +57,7 @@ class Hand:
             self.taken += 1
             return
         way = (CRATE - self.start) * (1, 1, 0)
-        way = way / np.linalg.norm(way) + (0, 0, STEEP)
+        way = way / np.linalg.norm(way) + STEEP * UP
         place = self.start + _smooth(since / LIFTING) * LIFT + PULL / 2 * throwing**2 * way
         self.grab.move(place)
         self.frame.move_to(place)
@@ -64,7 +65,7 @@ class Hand:
     def _reach(self, world: World, since: float) -> None:
         """Go to the top of the next body, and take hold of it when it is time."""
         body = world.bodies[self.taken]
-        over = body.center_of_mass() + (0, 0, 2)
+        over = body.center_of_mass() + 2.0 * UP
         near = world.closest_point(over, bodies=[body])
         assert near is not None
         if since >= 0.0:
@@ -97,8 +98,6 @@ def stage() -> Stage:
         box((0.6, 0.6, 0.6), (4, 4, 4)),
         cylinder(0.34, 0.6, rings=2, layers=4),
         torus(0.34, 0.14, rings=1, segments=18),
-        box((0.9, 0.45, 0.45), (6, 3, 3)),
-        sphere(0.42, 3),
     ]
     actors = []
     for i, mesh in enumerate(meshes):
@@ -108,8 +107,8 @@ def stage() -> Stage:
     world.build()
     frame = world.add_frame((-0.6, 0.0, 2.2))
     props = [Prop(SphereShape(0.09).surface(), frame, color=(0.95, 0.93, 0.88))]
-    camera = Camera.framing((-3.2, -1.3, 0.0), (3.5, 1.3, 3.0), aspect=16 / 9, azimuth=-72, elevation=20)
-    return Stage("picked up and thrown", world, actors, camera, STEP, 13.0, act=Hand(frame), props=props)
+    camera = Camera.framing((-2.2, -1.4, 0.0), (3.8, 1.4, 3.0), aspect=16 / 9, azimuth=-72, elevation=20)
+    return Stage("picked up and thrown", world, actors, camera, STEP, 10.0, act=Hand(frame), props=props)
 
 
 def _add_crate(world: World) -> None:
@@ -117,7 +116,7 @@ def _add_crate(world: World) -> None:
     reach = (INSIDE + WALL) / 2
     for x, y in ((-1, 0), (1, 0), (0, -1), (0, 1)):
         size = (WALL if x else INSIDE + 2 * WALL, WALL if y else INSIDE, HEIGHT)
-        world.add_collider(BoxShape(size), position=CRATE + (x * reach, y * reach, HEIGHT / 2))
+        world.add_collider(BoxShape(size), position=CRATE + np.array([x * reach, y * reach, HEIGHT / 2]))
 
 
 def proof(stage: Stage) -> float:

@@ -27,6 +27,7 @@ LAYERS, ROWS, COLUMNS = 2, 2, 4  # of bodies over the ramp
 SLOPE = 0.32  # of the ramp [rad]
 HUB = np.array([1.85, 0.0, 3.6])  # of the wheel [m]
 HOLLOW = np.array([1.7, 0.0, 0.0])  # its middle [m]
+UP = np.array([0.0, 0.0, 1.0])
 RIM = 2.4  # radius of its rim [m]
 STEP = FixedStep(dt=1 / 50)
 
@@ -42,10 +43,10 @@ class Course:
             place = top + tilt @ (0.0, side, 0.15)
             world.add_collider(CapsuleShape(0.14, 3.6), position=place, rotation=_turn(SLOPE + np.pi / 2))
         self.paddles = [world.add_collider(BoxShape((1.2, 2.4, 0.12)), position=HUB) for _ in range(2)]
-        world.add_collider(MeshShape(_funnel()), position=HOLLOW + (0, 0, 1.75), friction=0.1)
+        world.add_collider(MeshShape(_funnel()), position=HOLLOW + 1.75 * UP, friction=0.1)
         lying = _turn(0.0, about_x=np.pi / 2)
         self.bars = [world.add_collider(CapsuleShape(0.13, 2.4), rotation=lying) for _ in range(2)]
-        world.add_collider(SphereShape(0.45), position=HOLLOW + (0, 0, 0.25))
+        world.add_collider(SphereShape(0.45), position=HOLLOW + 0.25 * UP)
         world.add_collider(HeightFieldShape(_ground(), spacing=0.2), position=HOLLOW)
         for i, bar in enumerate(self.bars):
             bar.teleport(self._bar(i, 0.0))
@@ -60,7 +61,7 @@ class Course:
 
     def _bar(self, number: int, time: float) -> NDArray[np.float64]:
         side = 2 * number - 1
-        return HOLLOW + (0.75 * side, 0.0, 1.2 + 0.2 * side * np.sin(2.0 * time))
+        return HOLLOW + np.array([0.75 * side, 0.0, 1.2 + 0.2 * side * np.sin(2.0 * time)])
 
 
 def _turn(about_y: float, about_x: float = 0.0) -> NDArray[np.float64]:
@@ -72,7 +73,7 @@ def _turn(about_y: float, about_x: float = 0.0) -> NDArray[np.float64]:
 def _funnel() -> trimesh.Trimesh:
     """A cone with a hole, its wall 16 cm thick."""
     inner = np.array([(0.78, 0.0), (0.85, 0.15), (2.55, 1.35)])
-    outer = inner + (0.13, -0.1)
+    outer = inner + np.array([0.13, -0.1])
     return trimesh.creation.revolve(np.concatenate([outer, inner[::-1], outer[:1]]), sections=64)
 
 
