@@ -24,6 +24,7 @@ from taichi_soft.control.pins import pin, pinned_vertices, set_targets, unpin
 from taichi_soft.control.placement import set_velocity, teleport
 from taichi_soft.errors import MeshError, OptionError, StateError
 from taichi_soft.failures import FailedStep, Failure
+from taichi_soft.handles import Handle, recorded
 from taichi_soft.laws.law import EnergyLaw
 from taichi_soft.materials import AnyMaterial, voigt_stress
 from taichi_soft.queries import Pose, best_fitting_pose
@@ -39,7 +40,7 @@ Floats32 = NDArray[np.float32]
 Floats = NDArray[np.float64]
 
 
-class Body:
+class Body(Handle):
     """A handle to one body. Positions and velocities come back in the caller's vertex order.
 
     Energies, momentum and volume are computed in float64 from the float32 state, at the time of the call.
@@ -188,6 +189,7 @@ class Body:
         """
         return self._world._read_velocities(self)
 
+    @recorded
     def set_motion(self, positions: ArrayLike, velocities: ArrayLike) -> None:
         """Put the body into a given state between two steps; a frozen body is active again.
 
@@ -201,6 +203,7 @@ class Body:
         self._world._write_motion(self, x, v)
         self._frozen_in = self._failure = None
 
+    @recorded
     def apply_force(self, force: ArrayLike, particles: ArrayLike | None = None) -> None:
         """Push throughout the coming step, all particles named with the same acceleration. Calls add up.
 
@@ -216,10 +219,12 @@ class Body:
         """By what the world's gravity is multiplied for this body."""
         return self._world._gravity_scale(self)
 
+    @recorded
     def set_gravity_scale(self, scale: float) -> None:
         """Multiply the world's gravity for this body, from now on: 0 floats, -1 rises."""
         set_gravity_scale(self, scale)
 
+    @recorded
     def set_linear_damping(self, rate: float) -> None:
         """Let all velocities fade by exp(-rate t), from now on, against the world at rest [1/s].
 
@@ -227,10 +232,12 @@ class Body:
         """
         set_linear_damping(self, rate)
 
+    @recorded
     def set_sheltered(self, is_sheltered: bool) -> None:
         """True keeps the wind of `World.set_wind` off this body, from now on."""
         set_sheltered(self, is_sheltered)
 
+    @recorded
     def apply_impulse(self, impulse: ArrayLike, particles: ArrayLike | None = None) -> None:
         """Change the momentum at once; all particles named change their velocity by the same.
 
@@ -241,6 +248,7 @@ class Body:
         """
         apply_impulse(self, impulse, particles)
 
+    @recorded
     def apply_impulse_at_point(self, impulse: ArrayLike, point: ArrayLike, radius: float) -> None:
         """Change the momentum of the particles near a point, those at the distance r by (1 - (r/radius)^2)^2
         as much in velocity as one at the point.
@@ -253,6 +261,7 @@ class Body:
         """
         apply_impulse_at_point(self, impulse, point, radius)
 
+    @recorded
     def set_velocity(self, linear: ArrayLike, angular: ArrayLike = (0.0, 0.0, 0.0)) -> None:
         """Set the velocities of all particles that are not pinned to those of a rigid body.
 
@@ -262,6 +271,7 @@ class Body:
         """
         set_velocity(self, linear, angular)
 
+    @recorded
     def teleport(
         self, position: ArrayLike, rotation: ArrayLike | None = None, *, keep_velocity: bool = True
     ) -> None:
@@ -275,14 +285,17 @@ class Body:
         """
         teleport(self, position, rotation, keep_velocity)
 
+    @recorded
     def pin(self, particles: ArrayLike) -> None:
         """Hold particles where they are, from now on."""
         pin(self, particles)
 
+    @recorded
     def unpin(self, particles: ArrayLike | None = None) -> None:
         """Let pinned particles go, all if None, with the velocity that they were moved with last."""
         unpin(self, particles)
 
+    @recorded
     def set_targets(self, particles: ArrayLike, positions: ArrayLike) -> None:
         """Move pinned particles by hand: in the coming step they go straight to `positions`, (n, 3) [m].
 
@@ -291,6 +304,7 @@ class Body:
         """
         set_targets(self, particles, positions)
 
+    @recorded
     def attach(self, particles: ArrayLike, frame: Frame, *, two_way: bool = False) -> Attachment:
         """Let particles go with a frame from now on, at the places that they have relative to it.
 
@@ -303,6 +317,7 @@ class Body:
         """
         return attach(self, particles, frame, two_way)
 
+    @recorded
     def grab(
         self,
         triangle: int,
@@ -325,6 +340,7 @@ class Body:
         """
         return grab_at(self, triangle, barycentrics, None, frequency, max_force)
 
+    @recorded
     def set_material(self, material: AnyMaterial) -> None:
         """Make the body of another material of the same kind, from now on, as if it had been added with it.
 
@@ -337,6 +353,7 @@ class Body:
         """
         set_material(self, material)
 
+    @recorded
     def set_damping(self, damping: float | NDArray[np.float64]) -> None:
         """Change the material's damping b [N s/m], from now on, one number or one per element.
 

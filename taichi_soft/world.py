@@ -7,6 +7,7 @@ import warnings
 import weakref
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,7 @@ from taichi_soft.control.grabs import Grab
 from taichi_soft.control.impulses import apply_radial_impulse
 from taichi_soft.errors import FrozenBodyWarning, OptionError, SolverWarning, StateError, UnstableStepWarning
 from taichi_soft.failures import FailedStep, Failure, find_failure
+from taichi_soft.handles import Handle, Handles, recorded
 from taichi_soft.kernels.evaluate import compute_body_forces
 from taichi_soft.kernels.program import Program
 from taichi_soft.kernels.readout import read_positions, read_velocities, write_motion
@@ -50,6 +52,7 @@ from taichi_soft.runtime import init
 from taichi_soft.scene import BodyArrays, BodyDescription, Ranges, Scene
 from taichi_soft.settings import Settings
 from taichi_soft.shapes import PlaneShape, Shape
+from taichi_soft.snapshot import restore_snapshot, state_hash, structure_of, take_snapshot
 from taichi_soft.stability import StableStep, stable_step
 from taichi_soft.state import ASLEEP, FROZEN, Capacity, State, acquire, fill, release
 from taichi_soft.types import DampingModel, Flips, Integrator, Schedule, Strain
@@ -64,7 +67,7 @@ _PLAIN = {float, int, np.float64, type(None)}
 """Types whose values can be compared with those of the last step."""
 
 
-class World:
+class World(Handle):
     """Soft bodies under gravity, above a floor. SI units, z is up.
 
     Args:
@@ -116,6 +119,7 @@ class World:
         )
         if self._is_implicit and self.settings.schedule is Schedule.FLAT:
             raise OptionError("schedule 'flat' has no implicit_euler: it takes 'per_body' or 'auto'")
+        self._handles, self._serial = Handles(), 0
         self._colliders = Colliders()
         self._collider_room = as_count(collider_room, "collider_room", 0)
         self._soft_contact = as_flag(soft_contact, "soft_contact")
@@ -250,6 +254,7 @@ class World:
         for _ in range(number):
             self._add_slot(asset)
 
+    @recorded
     def spawn(
         self,
         asset: SoftBodyAsset,
@@ -276,6 +281,7 @@ class World:
         rows = asset.placed(position, rotation, velocity, angular_velocity, self.settings.floor)
         return self._enter(asset, rows)
 
+    @recorded
     def despawn(self, body: Body) -> None:
         """Take a body out of the world: its slot is free, and its handle dead.
 
@@ -316,6 +322,7 @@ class World:
             spawn_body(self._state, slot, rows)
             self._read_alpha = None
         body = Body(self, slot, asset)
+        self._handles.enlist(body)
         self._pools.enter(body)
         return body
 
@@ -329,6 +336,7 @@ class World:
         """The floor where there are colliders, from `build` on: to read what bodies do to it."""
         return self._floor_collider
 
+    @recorded
     def add_collider(
         self,
         shape: Shape,
@@ -361,7 +369,7 @@ class World:
                 "the world was built without colliders: add one before build(), or make the world with "
                 "collider_room"
             )
-        return self._colliders.add(
+        collider = self._colliders.add(
             shape,
             position=position,
             rotation=rotation,
@@ -371,6 +379,8 @@ class World:
             group=group,
             mask=mask,
         )
+        self._handles.enlist(collider)
+        return collider
 
     def build(self) -> None:
         """Move all bodies into Taichi fields and fix the kernels. Starts Taichi if nobody has.
@@ -590,6 +600,7 @@ class World:
     def _is_asleep(self, body: Body) -> bool:
         return self._state is not None and int(self._state.body_status[body.index]) == ASLEEP
 
+    @recorded
     def wake(self) -> None:
         """Wake all bodies that sleep."""
         self._wake(-1)
@@ -598,6 +609,7 @@ class World:
         if self._has_contact and self._sleep_speed > 0.0:
             wake_body(self._state, slot)
 
+    @recorded
     def add_frame(self, position: ArrayLike = (0.0, 0.0, 0.0), rotation: ArrayLike | None = None) -> Frame:
         """A place that the engine moves, to attach bodies to; at any time.
 
@@ -606,8 +618,11 @@ class World:
             rotation: matrix (3, 3) or quaternion (x, y, z, w).
         Raises: OptionError for bad numbers.
         """
-        return Frame(self._frames, position, rotation)
+        frame = Frame(self._frames, position, rotation)
+        self._handles.enlist(frame)
+        return frame
 
+    @recorded
     def grab(
         self,
         origin: ArrayLike,
@@ -632,6 +647,7 @@ class World:
             return None
         return hit.body.grab(hit.triangle, hit.barycentrics, frequency=frequency, max_force=max_force)
 
+    @recorded
     def apply_radial_impulse(self, center: ArrayLike, impulse: float, radius: float) -> None:
         """Push all bodies away from a point: an explosion.
 
@@ -646,6 +662,7 @@ class World:
         """
         apply_radial_impulse(self, center, impulse, radius)
 
+    @recorded
     def set_wind(self, velocity: ArrayLike | None, *, density: float = 1.2, drag: float = 1.0) -> None:
         """Let air move over the surfaces of all bodies, from now on.
 
@@ -782,6 +799,39 @@ class World:
             StateError before `build`.
         """
         return find_in_box(self._built, self._pools.slots, center, size, rotation)
+
+    def snapshot(self) -> bytes:
+        """The whole state between two steps, to `restore` it here or in a world that was built alike.
+
+        Bodies, colliders, frames, grabs and attachments, the wind, materials that were set, and all that is
+        going to act in the coming step are in it; a force field is not. It holds numbers only, no code.
+        Raises: StateError before `build`.
+        """
+        return take_snapshot(self)
+
+    def restore(self, data: bytes) -> None:
+        """Go back to a state of `snapshot`: what follows is the same, bit for bit, given the same calls.
+
+        Handles of what the state has stay valid, or become so again; handles of what it has not are dead, as
+        if that had been removed. For what it has and nobody holds a handle to, `bodies` and `colliders` have
+        new ones. A force field stays as it is.
+        Raises: SnapshotError for what is damaged, or of a world that was built of other things, with the
+            first that differs; OptionError for what is not bytes; StateError before `build`.
+        """
+        restore_snapshot(self, data)
+
+    def state_hash(self) -> str:
+        """A name of the state, 16 hexadecimal digits: the same in two worlds that are in step.
+
+        Made of step count, positions, velocities, pins, who lives, sleeps or is frozen, colliders, frames and
+        grabs; the same for any number of threads.
+        Raises: StateError before `build`.
+        """
+        return state_hash(self)
+
+    @cached_property
+    def _structure(self) -> bytes:
+        return structure_of(self)
 
     @property
     def _built(self) -> State:

@@ -12,7 +12,7 @@ ROOT = Path(__file__).parents[1]
 # a neighbour on its line. Names without a prefix are parts of taichi_soft. Those not written yet are allowed.
 LAYERS = """
     errors  constants
-    types  runtime  checks
+    types  runtime  checks  handles  sealed
     math
     materials  meshing  settings  contact
     laws  collision
@@ -20,14 +20,16 @@ LAYERS = """
     state  integrators
     kernels
     forces  shapes
-    stability  failures  colliders  control  queries  events  snapshot
+    plain
+    stability  failures  colliders  control  queries  events
     body  assets  pools
+    snapshot  recorder
     world
     taichi_soft
     render
     engine_adapter
     stages
-    film  profiling
+    film  profiling  replay
     cli
     __main__
     demos
@@ -40,7 +42,7 @@ LEVEL = {name: level for level, line in enumerate(LAYERS.split("\n")) for name i
 NO_TAICHI = ("errors", "constants", "types", "checks", "materials", "meshing", "contact")
 """Parts that are tested in milliseconds: numpy only."""
 
-FACES = ("render", "stages", "film", "profiling", "cli", "__main__")
+FACES = ("render", "stages", "film", "profiling", "replay", "cli", "__main__")
 """Parts of taichi_soft that lie above its public names."""
 
 
