@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine_adapter.fixed_step import Accumulator, FixedStep
+from engine_adapter.rollback import Rollback
 from taichi_soft import Body, OptionError, StateError, World
-from taichi_soft.checks import as_number
+from taichi_soft.checks import as_count, as_number
 
 
 class EngineAdapter:
@@ -25,10 +26,11 @@ class EngineAdapter:
     Args:
         world: built.
         fixed_step: length of a step, its substeps, and how many one frame may make.
+        rewind_ticks: steps that `rewind` can go back; 0 keeps nothing.
     Raises: StateError if the world is not built; OptionError if `fixed_step` is not a FixedStep.
     """
 
-    def __init__(self, world: World, fixed_step: FixedStep | None = None) -> None:
+    def __init__(self, world: World, fixed_step: FixedStep | None = None, *, rewind_ticks: int = 0) -> None:
         fixed_step = FixedStep() if fixed_step is None else fixed_step
         if not isinstance(world, World):
             raise OptionError(f"world must be a taichi_soft.World, got {type(world).__name__}")
@@ -39,6 +41,8 @@ class EngineAdapter:
         self._world = world
         self._fixed_step = fixed_step
         self._accumulator = Accumulator(fixed_step)
+        ticks = as_count(rewind_ticks, "rewind_ticks", 0)
+        self._rollback = Rollback(world, ticks) if ticks else None
         self._dropped_time = 0.0
         self._total_dropped_time = 0.0
 
@@ -80,6 +84,8 @@ class EngineAdapter:
 
         Raises: what `World.step` raises.
         """
+        if self._rollback is not None:
+            self._rollback.save()
         self._world.step(self._fixed_step.dt, self._fixed_step.substeps)
 
     def advance(self, frame_dt: float) -> int:
@@ -104,6 +110,20 @@ class EngineAdapter:
             self._dropped_time = dropped + (steps - made) * self._fixed_step.dt
             self._total_dropped_time += self._dropped_time
         return made
+
+    def rewind(self, steps: int) -> None:
+        """Go back to where the world was before that many steps, with the inputs that came before the first.
+
+        `alpha` stays: make the steps again by `step`, with the inputs as they should have been, and the
+        picture goes on where it was.
+        Raises: OptionError for more than `rewind_ticks`, or than were made; StateError without `rewind_ticks`.
+        """
+        if self._rollback is None:
+            raise StateError("this adapter keeps no steps: make it with rewind_ticks")
+        back = as_count(steps, "steps")
+        if back > self._world.step_count:
+            raise OptionError(f"steps is {back}: the world has made {self._world.step_count}")
+        self._rollback.rewind_to(self._world.step_count - back)
 
     def positions(self, body: Body, out: NDArray[np.float32] | None = None) -> NDArray[np.float32]:
         """Positions of a body to draw, between the previous step and the last one, float32 (n, 3) [m].

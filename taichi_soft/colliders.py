@@ -329,7 +329,7 @@ class Colliders:
         sample_count: int,
         handle_of: Callable[[int, ColliderRow], Collider],
     ) -> None:
-        """Put back all rows, with the handles that `handle_of` finds. Constants are written where they differ."""
+        """Put back all rows, with the handles that `handle_of` finds."""
         before, after = [row.constants for row in self._rows], rows
         for handle in self._handles:
             handle._row.is_alive = False
