@@ -43,6 +43,8 @@ class EngineAdapter:
         self._accumulator = Accumulator(fixed_step)
         ticks = as_count(rewind_ticks, "rewind_ticks", 0)
         self._rollback = Rollback(world, ticks) if ticks else None
+        if self._rollback is not None:
+            self._rollback.save()
         self._dropped_time = 0.0
         self._total_dropped_time = 0.0
 
@@ -84,9 +86,9 @@ class EngineAdapter:
 
         Raises: what `World.step` raises.
         """
+        self._world.step(self._fixed_step.dt, self._fixed_step.substeps)
         if self._rollback is not None:
             self._rollback.save()
-        self._world.step(self._fixed_step.dt, self._fixed_step.substeps)
 
     def advance(self, frame_dt: float) -> int:
         """Put in the time of one frame and make the steps that are due.
@@ -112,11 +114,12 @@ class EngineAdapter:
         return made
 
     def rewind(self, steps: int) -> None:
-        """Go back to where the world was before that many steps, with the inputs that came before the first.
+        """Go back by that many steps, to where the world was before the inputs of the first of them.
 
         `alpha` stays: make the steps again by `step`, with the inputs as they should have been, and the
         picture goes on where it was.
-        Raises: OptionError for more than `rewind_ticks`, or than were made; StateError without `rewind_ticks`.
+        Raises: OptionError for more steps than `rewind_ticks`, or than were made; StateError where nothing
+            is kept.
         """
         if self._rollback is None:
             raise StateError("this adapter keeps no steps: make it with rewind_ticks")

@@ -10,12 +10,13 @@ class Rollback:
     """Snapshots of the last steps of a world.
 
         rollback = Rollback(world, ticks=30)
-        ...
-        rollback.save()        # before every step
-        world.step(dt, substeps)
-        ...
-        rollback.rewind_to(step_of_a_late_input)
-        # then the inputs and steps from there on once more
+        while running:
+            if late_input is not None:
+                rollback.rewind_to(late_input.step)
+                # and the inputs and steps from there on once more, up to now
+            rollback.save()
+            apply_inputs()
+            world.step(dt, substeps)
 
     Args:
         world: built.
@@ -38,11 +39,11 @@ class Rollback:
         return tuple(self._snapshots)
 
     def save(self) -> None:
-        """Keep the state as it is now, before the inputs of the coming step or after: as the game needs it."""
+        """Keep the state as it is now: between a step and the inputs of the next."""
         now = self._world.step_count
         self._snapshots.pop(now, None)
         self._snapshots[now] = self._world.snapshot()
-        while len(self._snapshots) > self._ticks:
+        while len(self._snapshots) > self._ticks + 1:  # the present one is not a step back
             del self._snapshots[next(iter(self._snapshots))]
 
     def rewind_to(self, step: int) -> None:

@@ -14,6 +14,10 @@ Kind = TypeVar("Kind", bound="Handle")
 Method = TypeVar("Method", bound=Callable[..., Any])
 
 
+CALLS: dict[str, set[str]] = {}
+"""Names of the methods that are recorded, by class: what a file may ask for."""
+
+
 class Handle:
     """What a caller holds of a world: a body, a collider, a frame, a grab, an attachment; or the world."""
 
@@ -46,6 +50,9 @@ class Handles:
 
 def recorded(method: Method) -> Method:
     """Lets the recorder of a world that has one take note of the calls of a public method that changes it."""
+
+    kind, _, name = method.__qualname__.partition(".")
+    CALLS.setdefault(kind, set()).add(name)
 
     @wraps(method)
     def call(self: Handle, *arguments: Any, **options: Any) -> Any:

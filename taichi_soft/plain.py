@@ -56,6 +56,7 @@ def as_plain(value: Any) -> Any:
         if little.dtype.str in _ARRAYS:
             rows = b64encode(little.tobytes()).decode()
             return {"array": little.dtype.str, "shape": list(value.shape), "rows": rows}
+        return as_plain(value.tolist())
     elif type(value) in FIELDS:
         parts = {name: as_plain(getattr(value, name)) for name in FIELDS[type(value)]}
         return {"kind": type(value).__name__, **parts}

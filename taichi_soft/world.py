@@ -8,6 +8,7 @@ import weakref
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.assets import SoftBodyAsset
 from taichi_soft.body import Body, Floats32, require_buffer, require_built
-from taichi_soft.checks import as_count, as_flag, as_number, as_vector
+from taichi_soft.checks import as_count, as_flag, as_number, as_path, as_vector
 from taichi_soft.colliders import Collider, Colliders
 from taichi_soft.constants import ALL_GROUPS, GRAVITY_EARTH, POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.contact import DEFAULT_CONTACT, Contact
@@ -36,6 +37,7 @@ from taichi_soft.kernels.sleep import wake_body
 from taichi_soft.kernels.spawn import despawn_body, spawn_body
 from taichi_soft.materials import AnyMaterial
 from taichi_soft.meshing import BodyMesh
+from taichi_soft.plain import digest_of
 from taichi_soft.pools import Pools
 from taichi_soft.queries import (
     ClosestPoint,
@@ -48,6 +50,7 @@ from taichi_soft.queries import (
     find_in_box,
     find_in_sphere,
 )
+from taichi_soft.recorder import Recorder, save_recording
 from taichi_soft.runtime import init
 from taichi_soft.scene import BodyArrays, BodyDescription, Ranges, Scene
 from taichi_soft.settings import Settings
@@ -87,6 +90,9 @@ class World(Handle):
         sleep_speed: bodies of which no particle was faster [m/s] for half a second, nor any of a body that
             they may touch, fall asleep, until something comes near or is done to them; 0 for never.
         collider_room: colliders that may be added after `build`, beside those added before.
+        record: steps that a flight recorder keeps, with all calls between them; 0 keeps nothing. See
+            `save_recording`.
+        record_to: file that it writes when a body freezes, the first time that this happens.
     Raises: OptionError for a value out of range or a name that is not known.
     """
 
@@ -104,6 +110,8 @@ class World(Handle):
         soft_contact: bool = False,
         sleep_speed: float = 0.0,
         collider_room: int = 0,
+        record: int = 0,
+        record_to: str | Path = "frozen.recording",
     ) -> None:
         downwards = as_vector(gravity, "gravity", "m/s^2")
         downwards.flags.writeable = False
@@ -120,6 +128,8 @@ class World(Handle):
         if self._is_implicit and self.settings.schedule is Schedule.FLAT:
             raise OptionError("schedule 'flat' has no implicit_euler: it takes 'per_body' or 'auto'")
         self._handles, self._serial = Handles(), 0
+        self._record, self._record_to = as_count(record, "record", 0), as_path(record_to)
+        self._built_with: list[str] = []  # shapes of colliders that came before `build`, by digest
         self._colliders = Colliders()
         self._collider_room = as_count(collider_room, "collider_room", 0)
         self._soft_contact = as_flag(soft_contact, "soft_contact")
@@ -392,6 +402,7 @@ class World(Handle):
         if not self._pools.slots:
             raise StateError("the world is empty: call add_body or reserve before build")
         device = init()
+        self._built_with = [digest_of(handle.shape) for handle in self._colliders.all_handles]
         kinds = self._pools.kinds
         models = list(dict.fromkeys(asset.description.model for asset in kinds))
         has_contact = (
@@ -452,6 +463,8 @@ class World(Handle):
         self._rows = np.empty((self._scene.particle_count, 3), dtype=np.float32)
         self._program, self._state = program, state
         self._launch = make_launch(schedule, state, program, self._scene, device)
+        if self._record:
+            self._handles.recorder = Recorder(self, self._record)
 
     def _warm_up(self, state: State) -> None:
         """A body that comes and goes, so that nothing compiles where the first does in the game."""
@@ -534,6 +547,8 @@ class World(Handle):
         self._step_count += 1
         self._time += seconds
         self._last_dt = seconds
+        if self._handles.recorder is not None:
+            reports += self._handles.recorder.note_step(self, seconds, count, is_broken=bool(reports))
         if reports:
             warnings.warn("; ".join(reports), FrozenBodyWarning, stacklevel=2)
         if troubled and self._is_implicit:
@@ -819,6 +834,8 @@ class World(Handle):
             first that differs; OptionError for what is not bytes; StateError before `build`.
         """
         restore_snapshot(self, data)
+        if self._handles.recorder is not None:
+            self._handles.recorder.begin_again(self)
 
     def state_hash(self) -> str:
         """A name of the state, 16 hexadecimal digits: the same in two worlds that are in step.
@@ -828,6 +845,17 @@ class World(Handle):
         Raises: StateError before `build`.
         """
         return state_hash(self)
+
+    def save_recording(self, path: str | Path) -> Path:
+        """Write what was done in the last `record` steps or more, and the snapshot before them, to a file.
+
+        `taichi-soft replay FILE` makes it again anywhere, bit by bit on a machine like this one. The file
+        holds the assets and shapes as well, and the accelerations that a force field gave, but no code.
+        Returns: the path.
+        Raises: StateError without `record` or before `build`; SnapshotError where the file cannot be written.
+        """
+        require_built(self.is_built)
+        return save_recording(self, path)
 
     @cached_property
     def _structure(self) -> bytes:
