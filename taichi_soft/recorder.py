@@ -183,9 +183,9 @@ def _plain(value: Any) -> Any:
     if isinstance(value, Handle):
         return {"handle": value._serial}
     if isinstance(value, SoftBodyAsset):
-        return {"asset": asset_digest(value)}
+        return {"part": asset_digest(value)}
     if isinstance(value, Shape):
-        return {"shape": digest_of(value)}
+        return {"part": digest_of(value)}
     if isinstance(value, (list, tuple)):
         return [_plain(each) for each in value]
     if isinstance(value, dict):

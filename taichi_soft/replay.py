@@ -106,8 +106,8 @@ def _value(world: World, parts: dict[str, Any], data: Any) -> Any:
         return [_value(world, parts, each) for each in data]
     if isinstance(data, dict) and "handle" in data:
         return world._handles.find(data["handle"], Handle)
-    if isinstance(data, dict) and ("asset" in data or "shape" in data):
-        return parts[data["asset"] if "asset" in data else data["shape"]]
+    if isinstance(data, dict) and "part" in data:
+        return parts[data["part"]]
     return from_plain(data)
 
 
