@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from engine_adapter.fixed_step import Accumulator, FixedStep
 from engine_adapter.rollback import Rollback
-from taichi_soft import Body, OptionError, StateError, World
+from taichi_soft import Body, Event, OptionError, StateError, World
 from taichi_soft.checks import as_count, as_number
 
 
@@ -127,6 +127,10 @@ class EngineAdapter:
         if back > self._world.step_count:
             raise OptionError(f"steps is {back}: the world has made {self._world.step_count}")
         self._rollback.rewind_to(self._world.step_count - back)
+
+    def drain_events(self) -> list[Event]:
+        """What happened in all fixed steps since the last call: see `World.drain_events`."""
+        return self._world.drain_events()
 
     def positions(self, body: Body, out: NDArray[np.float32] | None = None) -> NDArray[np.float32]:
         """Positions of a body to draw, between the previous step and the last one, float32 (n, 3) [m].

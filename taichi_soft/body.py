@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.checks import as_array
+from taichi_soft.checks import as_array, as_positive
 from taichi_soft.control.attachments import Attachment, attach
 from taichi_soft.control.drives import (
     apply_force,
@@ -23,6 +23,7 @@ from taichi_soft.control.materials import set_damping, set_material
 from taichi_soft.control.pins import pin, pinned_vertices, set_targets, unpin
 from taichi_soft.control.placement import set_velocity, teleport
 from taichi_soft.errors import MeshError, OptionError, StateError
+from taichi_soft.events import Event, StressExceeded, TearCandidates
 from taichi_soft.failures import FailedStep, Failure
 from taichi_soft.handles import Handle, recorded
 from taichi_soft.laws.law import EnergyLaw
@@ -454,6 +455,32 @@ class Body(Handle):
     def tet_stress(self) -> Floats:
         """Von Mises stress of each tetrahedron by Hooke's law and linear strain, (m,) [Pa]."""
         return np.asarray(np.sqrt(1.5) * _deviator_norms(self._green_strain_and_stress()[1]))
+
+    def watch_stress(self, threshold: float | None) -> None:
+        """Record a `StressExceeded` in every step in which tetrahedra come over a stress.
+
+        One that stays over it, or has not been below 0.9 of it since, is not named again.
+        Args:
+            threshold: of `tet_stress` [Pa]; None for no longer.
+        Raises: OptionError if it is not above 0; MeshError for a body without tetrahedra; StateError before
+            `build`. The same for `watch_tearing`.
+        """
+        self._watch(StressExceeded, threshold, "threshold")
+
+    def watch_tearing(self, tear_stress: float | None) -> None:
+        """Record a `TearCandidates` in every step in which tetrahedra are pulled harder than they can bear.
+
+        Args:
+            tear_stress: of the largest principal stress, which pulls; by Hooke's law and linear strain [Pa].
+                None for no longer.
+        """
+        self._watch(TearCandidates, tear_stress, "tear_stress")
+
+    def _watch(self, kind: type[Event], threshold: float | None, name: str) -> None:
+        log = self._world._event_log
+        self._require_tets()
+        limit = None if threshold is None else as_positive(threshold, name, "Pa")
+        log.watch(kind, self, limit)
 
     def tet_strain(self) -> Floats:
         """Equivalent (von Mises) strain sqrt(2/3 e:e) of each tetrahedron, (m,), e the deviator of `strains`.

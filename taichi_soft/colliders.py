@@ -171,6 +171,10 @@ class Colliders:
         """Those that are alive."""
         return tuple(handle for handle, row in zip(self._handles, self._rows, strict=True) if row.is_alive)
 
+    def handle(self, index: int) -> Collider:
+        """The latest that had that row."""
+        return self._handles[index]
+
     def add(
         self,
         shape: Shape,

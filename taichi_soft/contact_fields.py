@@ -10,6 +10,10 @@ NO_COLLIDER = -1
 SLOTS = 6
 """Triangles that one vertex may touch at once: where three bodies meet, and their triangles beside."""
 
+PAIR_ROWS = 32
+"""Pairs of bodies whose impulses can be recorded, per body of an island: room for all pairs of 65 bodies, and
+for each of more to touch 64 others."""
+
 NO_CONTACT = 1e30
 """Gap of a candidate that is out of reach."""
 
@@ -73,21 +77,23 @@ class ContactFields:
 
 @ti.data_oriented
 class SoftContactFields:
-    """What bodies need to touch each other: their boxes, a hash of vertices, and candidates.
+    """What bodies need to touch each other: a hash of vertices, and candidates.
 
-    An island has a piece of the hash, `island_table`, in which it looks at two bodies after the other.
+    Each body has a piece of the hash, in which it looks at one other body after the next.
     """
 
-    def __init__(self, particles: int, bodies: int, outer: int) -> None:
+    def __init__(self, particles: int, bodies: int, outer: int, triangles: int) -> None:
         """Allocate; contents are zero."""
         self.body_surface = ti.Vector.field(3, ti.f32, bodies)  # friction, thickness [m], mean edge [m]
         self.body_touches_itself = ti.field(ti.i32, bodies)
         self.sweep_order = ti.field(ti.i32, bodies)  # bodies by their lower x
         self.parent = ti.field(ti.i32, bodies)  # in the forest of islands
-        self.island_table = ti.Vector.field(2, ti.i32, bodies)  # first row of `cell_first` and of the items
+        self.body_island = ti.field(ti.i32, bodies)
         self.cell_first = ti.field(ti.i32, 4 * outer + bodies)
         self.item = ti.field(ti.i32, outer)  # rows of `outer_particle` that may be near the other body
         self.cell_item = ti.field(ti.i32, outer)  # the same, cell by cell
+        self.triangle_lower = ti.Vector.field(3, ti.f32, triangles)  # corners of a box [m], at the search
+        self.triangle_upper = ti.Vector.field(3, ti.f32, triangles)
         self.slot_count = ti.field(ti.i32, outer)
         self.slot_triangle = ti.field(ti.i32, outer * SLOTS)
         self.slot_distance = ti.field(ti.f32, outer * SLOTS)  # [m], at the search
@@ -97,3 +103,8 @@ class SoftContactFields:
         self.slot_press = ti.field(ti.f32, outer * SLOTS)  # impulse along it in this substep [N s]
         self.slot_rub = ti.Vector.field(3, ti.f32, outer * SLOTS)  # friction on the vertex [N s]
         self.rest_position = ti.Vector.field(3, ti.f32, particles)  # [m]
+        self.records_touches = ti.field(ti.i32, ())  # 1 where the rows below are filled
+        # Two bodies, the smaller index first; both 0 in a free row. Island by island, as in `island_body`.
+        self.pair_bodies = ti.Vector.field(2, ti.i32, bodies * PAIR_ROWS)
+        self.pair_impulse = ti.Vector.field(3, ti.f32, bodies * PAIR_ROWS)  # on the second in a step [N s]
+        self.pairs_lost = ti.field(ti.i32, ())  # 1 where some had no row

@@ -44,5 +44,9 @@ class FrozenBodyWarning(UserWarning):
     """A body went non-finite, was put back to its last finite state and frozen."""
 
 
+class DroppedEventsWarning(UserWarning):
+    """More events happened than there is room for, because nobody drained them."""
+
+
 class SolverWarning(UserWarning):
     """An implicit solve stopped before it was as exact as asked for."""

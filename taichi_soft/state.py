@@ -184,7 +184,7 @@ class State:
         if capacity.contact != _NO_CONTACT:
             self.contact = ContactFields(capacity.contact, n, bodies)
         if capacity.contact.soft:
-            self.soft = SoftContactFields(n, bodies, capacity.outer)
+            self.soft = SoftContactFields(n, bodies, capacity.outer, capacity.triangles)
 
         self.gravity = ti.Vector.field(3, real, ())  # [m/s^2]
         self.wind = ti.Vector.field(4, real, ())  # [m/s], density times drag coefficient [kg/m^3]
@@ -274,6 +274,10 @@ class State:
         if self.capacity.contact.soft:
             fill(self.soft.sweep_order, np.arange(count))
             fill(self.soft.slot_count, np.zeros(0))
+            self.soft.records_touches[None] = 0
+            self.soft.pairs_lost[None] = 0
+            fill(self.soft.pair_bodies, np.zeros((0, 2)))
+            fill(self.soft.pair_impulse, np.zeros((0, 3)))
             fill(self.soft.rest_position, np.concatenate([b.rest_position for b, _ in pairs]))
 
     def _load_bonds(self, bodies: list[BodyArrays], ranges: list[Ranges]) -> None:

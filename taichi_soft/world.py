@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,7 +26,15 @@ from taichi_soft.control.drives import ForceField, push_by_field, require_field,
 from taichi_soft.control.frames import Frame, Frames
 from taichi_soft.control.grabs import Grab
 from taichi_soft.control.impulses import apply_radial_impulse
-from taichi_soft.errors import FrozenBodyWarning, OptionError, SolverWarning, StateError, UnstableStepWarning
+from taichi_soft.errors import (
+    DroppedEventsWarning,
+    FrozenBodyWarning,
+    OptionError,
+    SolverWarning,
+    StateError,
+    UnstableStepWarning,
+)
+from taichi_soft.events import Event, EventLog, Listener, Witness
 from taichi_soft.failures import FailedStep, Failure, find_failure
 from taichi_soft.handles import Handle, Handles, recorded
 from taichi_soft.kernels.evaluate import compute_body_forces
@@ -65,6 +73,8 @@ SHORTEST_STEP, LONGEST_STEP = 1e-9, 1e4
 
 MOST_VERTICES = 10_000_000
 """In a world: the constants of the tetrahedra between more would not be counted in 32 bits."""
+
+Happened = TypeVar("Happened", bound=Event)
 
 _PLAIN = {float, int, np.float64, type(None)}
 """Types whose values can be compared with those of the last step."""
@@ -147,6 +157,7 @@ class World(Handle):
         self._state: State | None = None
         self._program: Program | None = None
         self._launch: Launch | None = None
+        self._events: EventLog | None = None
         self._frames = Frames()
         self._grabs: dict[int, Grab] = {}
         self._force_field: ForceField | None = None
@@ -463,6 +474,8 @@ class World(Handle):
         self._rows = np.empty((self._scene.particle_count, 3), dtype=np.float32)
         self._program, self._state = program, state
         self._launch = make_launch(schedule, state, program, self._scene, device)
+        colliders = self._colliders if has_contact else None
+        self._events = EventLog(Witness(state, self._scene, self._pools.slots, colliders))
         if self._record:
             self._handles.recorder = Recorder(self, self._record)
 
@@ -547,6 +560,9 @@ class World(Handle):
         self._step_count += 1
         self._time += seconds
         self._last_dt = seconds
+        loss = self._event_log.collect(self._step_count - 1, self._time, seconds)
+        if loss:
+            warnings.warn(loss, DroppedEventsWarning, stacklevel=2)
         if self._handles.recorder is not None:
             reports += self._handles.recorder.note_step(self, seconds, count, is_broken=bool(reports))
         if reports:
@@ -600,6 +616,7 @@ class World(Handle):
             if status[body.index] != FROZEN or body.is_frozen:
                 continue
             body._frozen_in = FailedStep(self.step_count, self.time, substeps, h)
+            self._event_log.note_frozen(body)
             reports.append(
                 f"body {body.index} went non-finite in step {self.step_count}: put back to t = "
                 f"{self.time:.4g} s and frozen; body.failure tells where it broke. Use more substeps or a "
@@ -726,6 +743,54 @@ class World(Handle):
         begin, end = self._scene.ranges[body.index].particles
         rows[:] = self._rows[begin:end]
         return rows
+
+    def record_events(self, kinds: Iterable[type[Event]] = (Event,)) -> None:
+        """Record events of these kinds, and no others, from the next step on, for `drain_events`.
+
+        What touches already counts as a contact that begins in that step.
+        Args:
+            kinds: classes of events; `Event` stands for all that this world has, an empty list for none.
+        Raises: OptionError for what is no class of events; StateError before `build`, and for contacts in a
+            world without colliders and soft contact.
+        """
+        self._event_log.record(kinds)
+
+    def on(self, kind: type[Happened], function: Callable[[Happened], object]) -> Listener:
+        """Let a function hear of all events of a kind, and record that kind.
+
+        It is called by `drain_events`, never within a step, so it may do what can be done between two steps.
+        Args:
+            kind: a class of events; `Event` for all that this world has.
+            function: takes the event.
+        Returns: what `remove` ends it with.
+        Raises: as `record_events`; OptionError for what cannot be called.
+        """
+        return self._event_log.on(kind, function)
+
+    def drain_events(self) -> list[Event]:
+        """All events since the last call, after those who listen have heard of them.
+
+        They come step by step; within a step by kind (contacts begun and ended, stress, tears, sleep, waking,
+        freezing), then by the indices of bodies. Up to 10,000 wait, then the oldest are dropped, with a
+        `DroppedEventsWarning` in the step.
+
+        An exception of a listener keeps no other from hearing of any event: the first is raised at the end.
+        The next call then returns these events with those that came since, and listeners hear of none twice.
+        Raises: StateError before `build`, before anything is recorded, and from within a listener.
+        """
+        return self._event_log.drain()
+
+    @property
+    def dropped_events(self) -> int:
+        """How many were dropped so far because too many waited."""
+        return self._event_log.dropped
+
+    @property
+    def _event_log(self) -> EventLog:
+        """Raises: StateError before `build`."""
+        require_built(self._events is not None)
+        assert self._events is not None
+        return self._events
 
     def raycast(
         self,

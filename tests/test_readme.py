@@ -35,16 +35,25 @@ def test_the_ten_lines_of_embedding_code_drop_a_ball_onto_the_floor():
     assert -0.01 < names["vertices"][:, 2].min() < 1.2
 
 
+def test_the_level_of_the_example_has_a_shot_a_lift_and_a_hand(capsys):
+    names = run_blocks(1)
+    assert names["world"].step_count == pytest.approx(90, abs=1)
+    assert names["lift"].position[2] == pytest.approx(0.1 + 89 / 60, abs=0.02)
+    assert 0.9 < names["crate"].center_of_mass()[2] < 2.0  # on its way to the hand, two metres up
+    assert names["shot"].center_of_mass()[0] < -0.5  # thrown back by the crate
+    assert any("Body(1" in line and "Body(0" in line for line in capsys.readouterr().out.splitlines())
+
+
 def test_the_surface_example_writes_the_ball_where_it_lies(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    names = run_blocks(0, 1)
+    names = run_blocks(0, 2)
     found = trimesh.load(tmp_path / "ball.glb", force="mesh")
     assert found.volume == pytest.approx(names["ball"].volume(), rel=1e-4)
     assert found.bounds[0, 2] == pytest.approx(names["ball"].positions()[:, 2].min(), abs=1e-5)
 
 
 def test_the_force_example_pulls_a_stretched_box_together():
-    names = run_blocks(2)
+    names = run_blocks(3)
     top = names["mesh"].vertices[:, 2] > names["mesh"].vertices[:, 2].max() - 1e-9
     force = names["forces"][top, 2].sum()
     strain = (1.01**2 - 1) / 2
@@ -52,15 +61,15 @@ def test_the_force_example_pulls_a_stretched_box_together():
 
 
 def test_the_fibres_of_the_example_spread_and_its_cloth_hangs():
-    names = run_blocks(3)
+    names = run_blocks(4)
     frames = names["world"].bodies[0].material.frame
     assert frames.shape[1:] == (3, 3)
     assert np.ptp(frames[:, 1, 0]) > 0
-    names = run_blocks(4)
+    names = run_blocks(5)
     z = names["flag"].positions()[:, 2]
     assert z.max() == pytest.approx(2.0, abs=0.01)
     assert z.min() < 1.9
-    assert len(BLOCKS) == 5  # or another one runs nowhere
+    assert len(BLOCKS) == 6  # or another one runs nowhere
 
 
 @pytest.mark.parametrize("names", [LAWS, PRESETS, demo_names()])

@@ -8,12 +8,13 @@ from taichi_soft.kernels.collide import collided, find_near_colliders, forget_co
 from taichi_soft.kernels.drives import add_reactions, blow_on, push_particles
 from taichi_soft.kernels.grabs import pull_grabs
 from taichi_soft.kernels.internal_forces import accumulate_forces
-from taichi_soft.kernels.islands import find_islands, search_margin
+from taichi_soft.kernels.islands import find_islands
 from taichi_soft.kernels.motion import gravity_on, remember_particle
 from taichi_soft.kernels.per_body import before_kick, settle_body
 from taichi_soft.kernels.sleep import note_motion, settle_island, wake_by_colliders, wake_island
 from taichi_soft.kernels.soft_contact import solve_island
-from taichi_soft.kernels.soft_search import search_island
+from taichi_soft.kernels.soft_search import find_box, is_social, island_margin, search_body, search_island
+from taichi_soft.kernels.touches import add_touches
 from taichi_soft.runtime import ti
 from taichi_soft.state import ABSENT, ACTIVE, PUSHED
 from taichi_soft.types import Integrator
@@ -78,19 +79,16 @@ def _touch_each_other(state: ti.template(), island, reach, gone, fastest, h):
 
     Returns: the way [m] for which the candidates hold, and how much of it may be gone.
     """
-    first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
     way = 2.0 * fastest * h
     holds, used = reach, gone + way
-    if last - first > 1 or state.soft.body_touches_itself[state.contact.island_body[first]] == 1:
+    if is_social(state, island) == 1:
         if not (used <= holds):
-            thickness = ti.cast(0.0, ti.f32)
-            holds, used = way, way
-            for i in range(first, last):
-                surface = state.soft.body_surface[state.contact.island_body[i]]
-                holds = ti.max(holds, search_margin(surface))
-                thickness = ti.max(thickness, surface.y)
+            least, thickness = island_margin(state, island)
+            holds, used = ti.max(way, least), way
             search_island(state, island, thickness + holds)
         solve_island(state, island, h, used, way)
+        if state.soft.records_touches[None] == 1:
+            add_touches(state, island)
     return holds, used
 
 
@@ -112,9 +110,10 @@ def _move_island(state: ti.template(), program: ti.template(), island, substeps,
     first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
     for i in range(first, last):
         _begin_body(state, state.contact.island_body[i])
-    reach, gone = ti.cast(-1.0, ti.f32), ti.cast(0.0, ti.f32)
+    reach, gone = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32)
     common = ti.Vector.zero(ti.f32, 3)
     if ti.static(program.has_soft_contact):
+        reach, _ = island_margin(state, island)
         common = _common_velocity(state, island)
     for s in range(substeps):
         fastest, fastest_beside = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32)
@@ -171,6 +170,18 @@ def _step_island(state: ti.template(), program: ti.template(), island, substeps,
     return failed
 
 
+@ti.func
+def _is_to_be_searched(state: ti.template(), body):
+    """Whether a body is awake, or will be, and may be touched (1)."""
+    found = 0
+    if state.body_status[body] != ABSENT:
+        island = state.soft.body_island[body]
+        if is_social(state, island) == 1:
+            for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
+                found = found | int(state.body_status[state.contact.island_body[i]] == ACTIVE)
+    return found
+
+
 @ti.kernel
 def step_islands(
     state: ti.template(), program: ti.template(), body_count: ti.i32, substeps: ti.i32, h: ti.f32
@@ -182,6 +193,18 @@ def step_islands(
         wake_by_colliders(state, body_count)
         if ti.static(program.has_soft_contact):
             find_islands(state, body_count, substeps * h)
+    if ti.static(program.has_soft_contact):
+        # On all threads, however few islands there are. What comes nearer later is looked for by the island.
+        ti.loop_config(block_dim=1)
+        for body in range(body_count):
+            if _is_to_be_searched(state, body) == 1:
+                find_box(state, body)
+        ti.loop_config(block_dim=1)
+        for body in range(body_count):
+            if _is_to_be_searched(state, body) == 1:
+                island = state.soft.body_island[body]
+                holds, thickness = island_margin(state, island)
+                search_body(state, body, island, holds + thickness)
     ti.loop_config(block_dim=1)
     for island in range(state.contact.island_count[None]):
         failed += _step_island(state, program, island, substeps, h)

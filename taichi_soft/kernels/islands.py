@@ -91,21 +91,16 @@ def _join_overlapping(state: ti.template(), body_count):
 
 @ti.func
 def _list_islands(state: ti.template(), body_count):
-    """Bodies island by island, both in ascending order, and a piece of the hash for each island."""
-    islands, rows, cells, items = 0, 0, 0, 0
+    """Bodies island by island, both in ascending order."""
+    islands, rows = 0, 0
     for first in range(body_count):
         if state.soft.parent[first] == first and state.body_status[first] != ABSENT:
             state.contact.island_first[islands] = rows
-            count = 0
             for body in range(first, body_count):
                 if state.body_status[body] != ABSENT and _root(state.soft, body) == first:
                     state.contact.island_body[rows] = body
+                    state.soft.body_island[body] = islands
                     rows += 1
-                    outer = state.body_outer[body]
-                    count += outer[1] - outer[0]
-            state.soft.island_table[islands] = ti.Vector([cells, items])
-            cells += 4 * count + 1  # for a power of two of rows, of which a quarter to a half is in use
-            items += count
             islands += 1
     state.contact.island_first[islands] = rows
     state.contact.island_count[None] = islands

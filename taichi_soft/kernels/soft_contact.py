@@ -21,6 +21,10 @@ PUSH_OUT = 0.2
 OUTSIDE = 1e-4
 """Least barycentric weight at which the nearest point counts as inside the triangle."""
 
+SAME = 0.7
+"""Cosine between the directions of two contacts of a vertex from which they count as one: a flat surface is
+met once, however it is cut into triangles; a corner twice."""
+
 
 @ti.func
 def _mobility(state: ti.template(), p):
@@ -61,6 +65,18 @@ def _gap(state: ti.template(), p, corners):
 
 
 @ti.func
+def _drop_twins(soft: ti.template(), first, slot):
+    """Of contacts that push a vertex the same way keep the nearest: this one, or one of those before."""
+    for other in range(first, slot):
+        if soft.slot_gap[other] < NO_CONTACT:
+            if soft.slot_normal[other].dot(soft.slot_normal[slot]) > SAME:
+                if soft.slot_gap[other] <= soft.slot_gap[slot]:
+                    soft.slot_gap[slot] = NO_CONTACT
+                else:
+                    soft.slot_gap[other] = NO_CONTACT
+
+
+@ti.func
 def _find_gaps(state: ti.template(), k, gone, way):
     """Which candidates of a vertex count: those in front of it, and the one it is least deep behind.
 
@@ -84,6 +100,7 @@ def _find_gaps(state: ti.template(), k, gone, way):
                 can_touch = 0
             if can_touch == 1 and distance >= 0.0:
                 state.soft.slot_gap[slot] = distance - thickness
+                _drop_twins(state.soft, k * SLOTS, slot)
             elif can_touch == 1 and other != state.particle_body[p] and distance > shallowest:
                 if behind >= 0:
                     state.soft.slot_gap[behind] = NO_CONTACT
@@ -190,13 +207,14 @@ def _solve_vertex(state: ti.template(), k, h, sweep):
             corners = state.triangle_vertices[state.soft.slot_triangle[slot]]
             theirs = state.soft.body_surface[state.particle_body[corners[0]]]
             _press(state, p, corners, slot, h, int(sweep == 0))
-            if state.soft.slot_press[slot] > 0.0:
+            is_pressed = state.soft.slot_press[slot] > 0.0
+            # Where no press is left, friction takes back what it gave in an earlier sweep.
+            if is_pressed or ti.abs(state.soft.slot_rub[slot]).max() > 0.0:
                 _rub(state, p, corners, slot, ti.sqrt(mine.x * theirs.x), int(sweep == 0))
+            if is_pressed:
                 state.contact.particle_touches[p] = 1
                 for i in ti.static(range(3)):
                     state.contact.particle_touches[corners[i]] = 1
-            else:
-                state.soft.slot_rub[slot] = ti.Vector.zero(ti.f32, 3)
             if sweep == SWEEPS and state.soft.slot_gap[slot] < 0.0:
                 _push_apart(state, p, corners, slot)
         else:

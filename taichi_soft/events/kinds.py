@@ -1,0 +1,105 @@
+"""What can happen in a step, by kind."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from taichi_soft.body import Body
+    from taichi_soft.colliders import Collider
+    from taichi_soft.failures import Failure
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Event:
+    """Something that happened in a fixed step."""
+
+    step: int  # of the world, counted from 0
+    time: float  # [s], at the end of that step
+
+
+@dataclass(frozen=True, eq=False)
+class ContactBegan(Event):
+    """A body has begun to touch a collider (the floor is one) or another body."""
+
+    a: Body
+    b: Collider | Body  # of two bodies the one with the larger index
+    impulse: Floats  # (3,) that `a` gave `b` in that step [N s]; a hit may go on in the next one
+
+
+@dataclass(frozen=True, eq=False)
+class ContactEnded(Event):
+    """They have not touched for `CONTACT_PAUSE`, or one of them was removed."""
+
+    a: Body
+    b: Collider | Body
+    impulse: Floats  # (3,) that `a` gave `b` from beginning to end [N s]; what sleeps gives none
+    duration: float  # [s] from the start of the first step with one to the end of the last, or of sleep
+
+
+@dataclass(frozen=True, eq=False)
+class StressExceeded(Event):
+    """Tetrahedra have come over the von Mises stress that `Body.watch_stress` was given."""
+
+    body: Body
+    tetrahedra: Ints  # (k,) those that were not over it before, ascending
+    stress: Floats  # (k,) von Mises [Pa]
+
+
+@dataclass(frozen=True, eq=False)
+class TearCandidates(Event):
+    """Tetrahedra are pulled harder than `Body.watch_tearing` allows: where a tear would begin (Rankine)."""
+
+    body: Body
+    tetrahedra: Ints  # (k,) those that were not before, ascending
+    stress: Floats  # (k,) largest principal stress [Pa]
+    normals: Floats  # (k, 3) its direction, which is the normal of the tear; either sign
+
+
+@dataclass(frozen=True, eq=False)
+class FellAsleep(Event):
+    """A body has come to rest, and is not moved until something wakes it."""
+
+    body: Body
+
+
+@dataclass(frozen=True, eq=False)
+class Woke(Event):
+    """A sleeping body moves again."""
+
+    body: Body
+
+
+@dataclass(frozen=True, eq=False)
+class Froze(Event):
+    """A body went non-finite and was put back to where it was before the step."""
+
+    body: Body
+
+    @property
+    def failure(self) -> Failure | None:
+        """What broke first: `body.failure`, which is found out when first asked, and None once it moves."""
+        return self.body.failure
+
+
+KINDS: tuple[type[Event], ...] = (
+    ContactBegan,
+    ContactEnded,
+    StressExceeded,
+    TearCandidates,
+    FellAsleep,
+    Woke,
+    Froze,
+)
+"""In the order in which the events of one step come."""
+
+CONTACT_KINDS = frozenset((ContactBegan, ContactEnded))
+STRESS_KINDS = frozenset((StressExceeded, TearCandidates))
+SLEEP_KINDS = frozenset((FellAsleep, Woke))

@@ -1,0 +1,111 @@
+"""Watched bodies: which tetrahedra come over a stress in a step."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.constants import LANES
+from taichi_soft.events.kinds import Event, StressExceeded, TearCandidates
+from taichi_soft.kernels.stress import NO_LIMIT, read_stress
+from taichi_soft.scene import Scene
+from taichi_soft.state import State
+
+if TYPE_CHECKING:
+    from taichi_soft.body import Body
+
+BACK_BELOW = 0.9
+"""Part of a threshold below which a tetrahedron has to come before it can come over it again: or one that
+vibrates about it would do so in every other step."""
+
+VON_MISES, PRINCIPAL, AXIS = 0, 1, slice(2, 5)
+"""Columns of `read_stress`."""
+
+
+@dataclass(eq=False)
+class _Watch:
+    body: Body
+    threshold: float  # [Pa]
+    is_over: NDArray[np.bool_]  # (m,) in kernel order
+
+    def newly_over(self, stress: NDArray[np.float32]) -> NDArray[np.int64]:
+        """Rows of those that have come over the threshold, given the stress of all (m,) [Pa]."""
+        over = stress > self.threshold
+        fresh = np.flatnonzero(over & ~self.is_over)
+        self.is_over &= stress >= BACK_BELOW * self.threshold
+        self.is_over |= over
+        return fresh
+
+
+class StressWatches:
+    """The bodies of one world whose stress is looked at after each step."""
+
+    def __init__(self, state: State, scene: Scene) -> None:
+        """Nothing is watched yet."""
+        self._state = state
+        self._scene = scene
+        self._watches: dict[tuple[type[Event], Body], _Watch] = {}
+        self._places: dict[Body, slice] = {}  # of each one's tetrahedra in what is read
+        self._blocks = np.zeros(0, dtype=np.int32)
+        self._limits = np.zeros(0, dtype=np.float32)  # of each block, for tears [Pa]
+        self._read = np.zeros((0, 5), dtype=np.float32)
+
+    def set(self, kind: type[Event], body: Body, threshold: float | None) -> None:
+        """Watch a body for a kind of event from a stress [Pa] on; None for no longer."""
+        self._watches.pop((kind, body), None)
+        if threshold is not None:
+            count = len(self._scene.bodies[body.index].tet_vertices)
+            self._watches[kind, body] = _Watch(body, threshold, np.zeros(count, dtype=np.bool_))
+        self._arrange()
+        if len(self._blocks):
+            self._evaluate()  # so that nothing compiles in the game's next step
+
+    def _arrange(self) -> None:
+        bodies = sorted({body for _, body in self._watches}, key=lambda body: body.index)
+        ranges = [self._scene.ranges[body.index].blocks for body in bodies]
+        self._places, start = {}, 0
+        for body, (first, last) in zip(bodies, ranges, strict=True):
+            count = len(self._scene.bodies[body.index].tet_vertices)
+            self._places[body] = slice(start, start + count)
+            start += (last - first) * LANES
+        rows = [np.arange(*place, dtype=np.int32) for place in ranges]
+        self._blocks = np.concatenate([np.zeros(0, dtype=np.int32), *rows])
+        pulls = [self._watches.get((TearCandidates, body)) for body in bodies]
+        limits = [NO_LIMIT if watch is None else watch.threshold for watch in pulls]
+        self._limits = np.repeat(limits, [len(blocks) for blocks in rows]).astype(np.float32)
+        self._read = np.zeros((start, 5), dtype=np.float32)
+
+    def _evaluate(self) -> None:
+        read_stress(self._state, self._blocks, self._limits, self._read)
+
+    def events(self, kind: type[Event], step: int, time: float) -> Iterator[Event]:
+        """Of one kind, in the order of bodies, of what `look` has seen."""
+        for body, place in self._places.items():
+            watch = self._watches.get((kind, body))
+            if watch is None:
+                continue
+            column = PRINCIPAL if kind is TearCandidates else VON_MISES
+            rows = watch.newly_over(self._read[place, column])
+            if not len(rows):
+                continue
+            names = self._scene.bodies[body.index].tet_order[rows].astype(np.int64)
+            order = np.argsort(names)
+            found = self._read[place][rows[order]].astype(np.float64)
+            if kind is TearCandidates:
+                yield TearCandidates(step, time, body, names[order], found[:, PRINCIPAL], found[:, AXIS])
+            else:
+                yield StressExceeded(step, time, body, names[order], found[:, VON_MISES])
+
+    def look(self) -> None:
+        """Evaluate the stress of all watched bodies that are alive."""
+        gone = [key for key in self._watches if not key[1].is_alive]
+        for key in gone:
+            del self._watches[key]
+        if gone:
+            self._arrange()
+        if len(self._blocks):
+            self._evaluate()

@@ -1,0 +1,124 @@
+"""Who looks at a world after each step and says what has happened in it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from taichi_soft.contact_fields import PAIR_ROWS
+from taichi_soft.events.contacts import Contacts, Key
+from taichi_soft.events.kinds import (
+    CONTACT_KINDS,
+    SLEEP_KINDS,
+    STRESS_KINDS,
+    Event,
+    FellAsleep,
+    Froze,
+    StressExceeded,
+    TearCandidates,
+    Woke,
+)
+from taichi_soft.events.stress import StressWatches
+from taichi_soft.kernels.touches import OF_BODY, read_touches
+from taichi_soft.scene import Scene
+from taichi_soft.state import ACTIVE, ASLEEP, State
+
+if TYPE_CHECKING:
+    from taichi_soft.body import Body
+    from taichi_soft.colliders import Collider, Colliders
+
+
+class Witness:
+    """Compares each step with the one before it."""
+
+    def __init__(
+        self, state: State, scene: Scene, slots: Sequence[Body | None], colliders: Colliders | None
+    ) -> None:
+        """Args: slots: the body in each; colliders: None in a world without contact."""
+        self._state = state
+        self._slots = slots
+        self._colliders = colliders
+        self._contacts = Contacts()
+        self._sleepers: dict[int, Body] = {}
+        self._frozen: list[Body] = []
+        self.stress = StressWatches(state, scene)
+        room = state.capacity.contact
+        rows = len(slots) * (room.colliders + (PAIR_ROWS if room.soft else 0)) + 1
+        self._status = np.zeros(len(slots) + 1, dtype=np.int32)
+        self._who = np.zeros((rows, 3), dtype=np.int32)
+        self._impulses = np.zeros((rows, 3), dtype=np.float32)
+        self._count = 0
+        self.lost_touches = False  # whether in the last step more pairs of bodies touched than have room
+
+    @property
+    def knows_contacts(self) -> bool:
+        """Whether the world was built with colliders or soft contact."""
+        return self._colliders is not None
+
+    def begin(self, kinds: frozenset[type[Event]], before: frozenset[type[Event]]) -> None:
+        """Look for `kinds` from now on, where it was for those `before`."""
+        if self.knows_contacts and self._state.capacity.contact.soft:
+            self._state.soft.records_touches[None] = int(bool(kinds & CONTACT_KINDS))
+        if kinds & (CONTACT_KINDS | SLEEP_KINDS):
+            self._look()
+        if not before & CONTACT_KINDS:
+            self._contacts = Contacts()
+        if not before & SLEEP_KINDS:
+            self._sleepers = self._sleeping()
+
+    def note_frozen(self, body: Body) -> None:
+        """The step that is being made has frozen a body."""
+        self._frozen.append(body)
+
+    def events(self, kinds: frozenset[type[Event]], step: int, time: float, dt: float) -> Iterator[Event]:
+        """What happened in the step that ends at `time` [s], of some kinds, in their order."""
+        if kinds & (CONTACT_KINDS | SLEEP_KINDS):
+            self._look()
+        else:
+            self.lost_touches = False
+        if kinds & CONTACT_KINDS:
+            moving = set(np.flatnonzero(self._status[:-1] == ACTIVE).tolist())
+            touches = dict(
+                zip(
+                    map(tuple, self._who[: self._count].tolist()),
+                    map(tuple, self._impulses[: self._count].tolist()),
+                    strict=True,
+                )
+            )
+            began, ended = self._contacts.follow(touches, self._handles, moving, step, time, dt)
+            yield from began
+            yield from ended
+        if kinds & STRESS_KINDS:
+            self.stress.look()
+            yield from self.stress.events(StressExceeded, step, time)
+            yield from self.stress.events(TearCandidates, step, time)
+        if kinds & SLEEP_KINDS:
+            before, now = self._sleepers, self._sleeping()
+            self._sleepers = now
+            yield from (FellAsleep(step, time, b) for slot, b in now.items() if before.get(slot) is not b)
+            woken = (body for slot, body in before.items() if now.get(slot) is not body)
+            yield from (Woke(step, time, body) for body in woken if body.is_alive)
+        frozen, self._frozen = self._frozen, []
+        for body in frozen:
+            yield Froze(step, time, body)
+
+    def _look(self) -> None:
+        """Read who touched whom in the last step, and who sleeps."""
+        self._count = read_touches(self._state, len(self._slots), self._status, self._who, self._impulses)
+        self.lost_touches = bool(self._status[-1])
+
+    def _handles(self, key: Key) -> tuple[Body, Collider | Body]:
+        a, kind, b = key
+        body = self._slots[a]
+        assert body is not None
+        assert self._colliders is not None
+        other = self._slots[b] if kind == OF_BODY else self._colliders.handle(b)
+        assert other is not None
+        return body, other
+
+    def _sleeping(self) -> dict[int, Body]:
+        """Sleeping bodies by their slots, ascending."""
+        slots = np.flatnonzero(self._status[:-1] == ASLEEP).tolist()
+        return {slot: body for slot in slots if (body := self._slots[slot]) is not None}
