@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,20 +27,33 @@ class EngineAdapter:
     Args:
         world: built.
         fixed_step: length of a step, its substeps, and how many one frame may make.
+        before_step: called with the world before every fixed step: the place to move colliders and frames,
+            to push and to grab, so that it happens at the same moments whatever the frame rate.
         rewind_ticks: steps that `rewind` can go back; 0 keeps nothing.
-    Raises: StateError if the world is not built; OptionError if `fixed_step` is not a FixedStep.
+    Raises: StateError if the world is not built; OptionError if `fixed_step` is not a FixedStep, or
+        `before_step` cannot be called.
     """
 
-    def __init__(self, world: World, fixed_step: FixedStep | None = None, *, rewind_ticks: int = 0) -> None:
+    def __init__(
+        self,
+        world: World,
+        fixed_step: FixedStep | None = None,
+        *,
+        before_step: Callable[[World], object] | None = None,
+        rewind_ticks: int = 0,
+    ) -> None:
         fixed_step = FixedStep() if fixed_step is None else fixed_step
         if not isinstance(world, World):
             raise OptionError(f"world must be a taichi_soft.World, got {type(world).__name__}")
         if not isinstance(fixed_step, FixedStep):
             raise OptionError(f"fixed_step must be a FixedStep, got {type(fixed_step).__name__}")
+        if not (before_step is None or callable(before_step)):
+            raise OptionError(f"before_step must be a function of the world, got {before_step!r}")
         if not world.is_built:
             raise StateError("the world is not built: call world.build() before EngineAdapter(world)")
         self._world = world
         self._fixed_step = fixed_step
+        self._before_step = before_step
         self._accumulator = Accumulator(fixed_step)
         ticks = as_count(rewind_ticks, "rewind_ticks", 0)
         self._rollback = Rollback(world, ticks) if ticks else None
@@ -84,8 +98,10 @@ class EngineAdapter:
     def step(self) -> None:
         """Make exactly one fixed step, past the accumulator: for replays, tests and servers.
 
-        Raises: what `World.step` raises.
+        Raises: what `before_step` and `World.step` raise.
         """
+        if self._before_step is not None:
+            self._before_step(self._world)
         self._world.step(self._fixed_step.dt, self._fixed_step.substeps)
         if self._rollback is not None:
             self._rollback.save()
@@ -98,7 +114,7 @@ class EngineAdapter:
         Returns: how many steps were made, at most `max_steps`. Time for more is dropped, the part of a step
             included (see `dropped_time`).
         Raises: OptionError for a frame_dt that is negative or not finite, with nothing changed; what
-            `World.step` raises: the steps not made then count as dropped.
+            `step` raises: the steps not made then count as dropped.
         """
         seconds = as_number(frame_dt, "frame_dt", 0.0, math.inf, "a number of 0 s or more")
         steps, dropped = self._accumulator.put(seconds)

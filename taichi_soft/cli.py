@@ -92,7 +92,7 @@ def demo(
     if name is None:
         for each in demo_names():
             summary = (load_demo(each).__doc__ or "").strip().splitlines()[0]
-            _say(f"[bold]{each:10}[/]{escape(summary)}")
+            _say(f"[bold]{each:12}[/]{escape(summary)}")
         return
     pixels = _size_of(size)
     module = load_demo(name)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +16,7 @@ from taichi_soft.body import Body
 from taichi_soft.checks import LARGEST_COUNT, as_positive
 from taichi_soft.errors import OptionError
 from taichi_soft.render import PALETTE, Camera, Renderer, Surface, VideoWriter, draw_labels, draw_text
+from taichi_soft.scenery import Prop, Scenery
 from taichi_soft.world import World
 
 Color = tuple[float, float, float]
@@ -38,7 +39,7 @@ class Actor:
 
 @dataclass
 class Stage:
-    """A built world, how it is stepped and how it is seen."""
+    """A built world, how it is stepped and how it is seen. Its colliders are drawn by themselves."""
 
     title: str
     world: World
@@ -46,6 +47,9 @@ class Stage:
     camera: Camera
     step: FixedStep
     seconds: float  # that a film of it shows
+    act: Callable[[World], object] | None = None  # before every fixed step: moves colliders, grabs, throws
+    props: list[Prop] = field(default_factory=list)
+    caption: Callable[[], str] | None = None  # a further line in the corner, after the last step
 
 
 @dataclass(frozen=True)
@@ -102,13 +106,14 @@ def film(
             f"{1.0 / (stage.step.dt * stage.step.max_steps):g} or more"
         )
     start = stage.world.time
-    take = _Take(stage, fps)
+    scenery = Scenery(stage.world, stage.props)
+    take = _Take(stage, scenery, fps)
     with nullcontext() if path is None else VideoWriter(path, fps=fps, size=size) as writer:
-        artist = _Artist(stage, writer.size, fps) if writer else None
+        artist = _Artist(stage, scenery, writer.size, fps) if writer else None
         for number in range(count):
             positions = take.play(number)
             if artist and writer:
-                writer.write(artist.draw(positions, take.adapter.time, take.times))
+                writer.write(artist.draw(positions, take.adapter, take.times))
             if on_frame:
                 on_frame(number + 1, count)
     return FilmReport(
@@ -124,12 +129,18 @@ def film(
 class _Take:
     """Steps a stage frame by frame, as a game loop does, with a clock at its side."""
 
-    def __init__(self, stage: Stage, fps: float) -> None:
-        self.adapter = EngineAdapter(stage.world, stage.step)
+    def __init__(self, stage: Stage, scenery: Scenery, fps: float) -> None:
+        self.stage, self.scenery = stage, scenery
+        self.adapter = EngineAdapter(stage.world, stage.step, before_step=self._before_step)
         self.fps = fps
         self.bodies = [actor.body for actor in stage.actors]
         self.buffers = [np.empty((body.vertex_count, 3), dtype=np.float32) for body in self.bodies]
         self.times: list[float] = []
+
+    def _before_step(self, world: World) -> None:
+        self.scenery.remember()
+        if self.stage.act:
+            self.stage.act(world)
 
     def play(self, number: int) -> list[NDArray[np.float32]]:
         """Go on to frame `number`; the first shows the stage as it stands. Returns positions to draw."""
@@ -145,25 +156,27 @@ class _Take:
 class _Artist:
     """Draws a stage and writes beside it what the steps cost."""
 
-    def __init__(self, stage: Stage, size: tuple[int, int], fps: float) -> None:
-        self.stage = stage
+    def __init__(self, stage: Stage, scenery: Scenery, size: tuple[int, int], fps: float) -> None:
+        self.stage, self.scenery = stage, scenery
         self.fps = fps
         self.renderer = Renderer(*size, camera=stage.camera, floor=stage.world.settings.floor)
         self.times: list[float] = []
         self.surfaces = [Surface.of(actor.body.mesh, color=actor.color) for actor in stage.actors]
 
     def draw(
-        self, positions: list[NDArray[np.float32]], moment: float, step_times: list[float]
+        self, positions: list[NDArray[np.float32]], now: EngineAdapter, step_times: list[float]
     ) -> NDArray[np.uint8]:
-        """The picture of the bodies at `positions`, where they are at `moment` [s]."""
+        """The picture of the bodies at `positions`, where they are `now`."""
         start = time.perf_counter()
         for actor, surface, rows in zip(self.stage.actors, self.surfaces, positions, strict=True):
             surface.positions = rows
             if actor.paint:
                 surface.color = actor.paint(actor.body)
-        picture = self.renderer.render(self.surfaces)
+        picture = self.renderer.render([*self.scenery.at(now.alpha), *self.surfaces])
         self._draw_labels(picture, positions)
-        lines = [self.stage.title, f"t = {moment:.2f} s"]
+        lines = [self.stage.title, f"t = {now.time:.2f} s"]
+        if self.stage.caption:
+            lines.append(self.stage.caption())
         recent = step_times[_COMPILING:][-25:]
         if recent:
             mean = float(np.mean(recent))

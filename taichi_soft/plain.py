@@ -6,6 +6,7 @@ Reading makes objects of the kinds below only, through their own checks: nothing
 from __future__ import annotations
 
 import json
+import math
 from base64 import b64decode, b64encode
 from enum import Enum
 from functools import lru_cache
@@ -18,6 +19,7 @@ from taichi_soft.contact import Contact
 from taichi_soft.errors import SnapshotError
 from taichi_soft.materials import AnisotropicMaterial, Material, SpringMaterial, Stiffness
 from taichi_soft.meshing import ParticleMesh, TetMesh
+from taichi_soft.plasticity import Plasticity
 from taichi_soft.shapes import BoxShape, CapsuleShape, HeightFieldShape, MeshShape, PlaneShape, SphereShape
 
 FIELDS: dict[type, tuple[str, ...]] = {
@@ -28,6 +30,7 @@ FIELDS: dict[type, tuple[str, ...]] = {
     Stiffness: ("matrix",),
     AnisotropicMaterial: ("stiffness", "density", "damping", "frame"),
     Contact: ("friction", "thickness", "itself", "group", "mask"),
+    Plasticity: ("yield_stress", "yield_strain", "creep", "maximum"),
     PlaneShape: ("normal",),
     SphereShape: ("radius",),
     BoxShape: ("size",),
@@ -43,6 +46,8 @@ _ARRAYS = ("<f4", "<f8", "<i4", "<i8", "|b1")
 
 def as_plain(value: Any) -> Any:
     """A value as data that JSON takes. Raises: SnapshotError for what has no such form."""
+    if isinstance(value, float) and not math.isfinite(value):
+        return {"number": str(float(value))}
     if value is None or isinstance(value, (bool, int, float, str)):
         return value.value if isinstance(value, Enum) else value
     if isinstance(value, np.generic):
@@ -69,6 +74,8 @@ def from_plain(data: Any) -> Any:
         return [from_plain(each) for each in data]
     if not isinstance(data, dict):
         return data
+    if "number" in data:
+        return float(data["number"])
     if "array" in data:
         return _array(data)
     kind = KINDS.get(data.get("kind", ""))

@@ -80,7 +80,8 @@ class Recorder:
         self._present.entries.append(["step", seconds, substeps, world.state_hash(), pushes])
         self._present.steps += 1
         told = [self._write(world)] if is_broken and not self._has_written else []
-        if self._present.steps >= self._ticks:
+        # Of bodies that were cut there is no snapshot: what led to them is kept until they are gone.
+        if self._present.steps >= self._ticks and not any(body.is_cut for body in world.bodies):
             self._before, self._present = self._present, _Stretch(world.snapshot())
         return told
 
@@ -159,12 +160,14 @@ def _world_options(world: World) -> dict[str, Any]:
 
 def _asset_options(asset: SoftBodyAsset) -> dict[str, Any]:
     """Arguments of `SoftBodyAsset`."""
-    names = ("law", "strain", "flips", "damping_model")
+    names = ("law", "strain", "flips", "damping_model", "spare_vertices")
     return {
         "mesh": plain_of(asset.mesh),
         "material": plain_of(asset.material),
         "pinned": asset.description.pinned.tolist(),
         "contact": as_plain(asset.contact),
+        "plasticity": as_plain(asset.plasticity),
+        "tearing": None if asset.tearing is None else [float(asset.tearing.stress), asset.tearing.most],
         **{name: as_plain(getattr(asset, name)) for name in names},
     }
 

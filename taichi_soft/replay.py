@@ -20,6 +20,7 @@ from taichi_soft.handles import CALLS, Handle
 from taichi_soft.plain import from_plain
 from taichi_soft.recorder import read_recording
 from taichi_soft.render import FLIPPED, PALETTE, Camera, Renderer, Surface, draw_text, highlight
+from taichi_soft.tearing import Tearing
 from taichi_soft.world import World
 
 
@@ -87,8 +88,13 @@ def _rebuilt(made_of: dict[str, Any]) -> tuple[World, dict[str, Any]]:
 
 def _asset(options: dict[str, Any]) -> SoftBodyAsset:
     plain = dict(options)
-    mesh, material, contact = (from_plain(plain.pop(name)) for name in ("mesh", "material", "contact"))
-    return SoftBodyAsset(mesh, material, contact=contact, **plain)
+    mesh, material = from_plain(plain.pop("mesh")), from_plain(plain.pop("material"))
+    for name in ("contact", "plasticity"):
+        plain[name] = from_plain(plain[name])
+    if plain["tearing"] is not None:
+        stress, most = plain["tearing"]
+        plain["tearing"] = Tearing(stress, most=most)
+    return SoftBodyAsset(mesh, material, **plain)
 
 
 def _call(world: World, parts: dict[str, Any], serial: int, name: str, arguments: Any, options: Any) -> None:

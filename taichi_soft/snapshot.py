@@ -23,7 +23,8 @@ from taichi_soft.control.attachments import Attachment
 from taichi_soft.control.frames import Frame
 from taichi_soft.control.grabs import Grab
 from taichi_soft.control.materials import write_constants
-from taichi_soft.errors import SnapshotError, TaichiSoftError
+from taichi_soft.cutting import refill_slot
+from taichi_soft.errors import SnapshotError, StateError, TaichiSoftError
 from taichi_soft.failures import FailedStep
 from taichi_soft.kernels.pins import WITH_FRAME
 from taichi_soft.kernels.snapshot import (
@@ -57,6 +58,9 @@ Words = NDArray[np.int32]
 def take_snapshot(world: World) -> bytes:
     """As `World.snapshot`."""
     state = world._built
+    cut = next((body for body in world.bodies if body.is_cut), None)
+    if cut is not None:
+        raise StateError(f"body {cut.index} was cut: a snapshot holds no bodies that were cut or torn")
     table = _table(world, max(world._grabs, default=-1) + 1)
     words = np.empty(int(table[-1, 2]), dtype=np.int32)
     pack_state(state, table, words)
@@ -70,7 +74,8 @@ def state_hash(world: World) -> str:
 
 
 def _table(world: World, held: int) -> Words:
-    return row_table(world._built, world._scene.particle_count, world.slot_count, held)
+    scene = world._scene
+    return row_table(world._built, scene.particle_count, world.slot_count, scene.block_count, held)
 
 
 def structure_of(world: World) -> bytes:
@@ -103,7 +108,10 @@ def asset_digest(asset: SoftBodyAsset) -> str:
     parts = [model.law.name, model.strain, model.flips, model.damping_model]
     touch = asset.contact
     thickness = None if touch.thickness is None else float(touch.thickness)
-    contact = [float(touch.friction), thickness, touch.itself, touch.group, touch.mask]
+    contact: list[Any] = [float(touch.friction), thickness, touch.itself, touch.group, touch.mask]
+    flow = None if asset.plasticity is None else [float(each) for each in asset.plasticity.row]
+    tear = None if asset.tearing is None else [float(asset.tearing.stress), asset.tearing.most]
+    contact += [flow, asset.spare_vertices, tear]
     content = [digest_of(described.mesh), digest_of(described.material), described.pinned.tolist()]
     return blake2b(to_json([as_plain(parts), content, contact]), digest_size=8).hexdigest()
 
@@ -431,6 +439,9 @@ def _apply(world: World, state: State, plan: _Plan) -> None:
         grab.body, grab._number, grab._point = body, number, point
         world._grabs[number] = grab
     handles.count = plan.handles
+    if world._tears is not None:
+        for body in world.bodies:
+            world._tears.watch(body)
     unpack_state(state, plan.table, plan.words)
     world._read_alpha, world._checked_step = None, ()
 
@@ -461,7 +472,7 @@ def _apply_body(world: World, state: State, slot: int, wanted: _BodyPlan | None)
     """Put the right body into a slot, of the right material."""
     present, asset = world._pools.slots[slot], world._pools.assets[slot]
     if present is not None and (wanted is None or present._serial != wanted.serial):
-        if present._description is not asset.description:
+        if present._description is not asset.description and not present.is_cut:
             write_constants(state, present, asset.description)
             present._description = asset.description
         present._attachments.clear()
@@ -470,7 +481,12 @@ def _apply_body(world: World, state: State, slot: int, wanted: _BodyPlan | None)
         present = None
     if wanted is None:
         return
+    if present is not None and present.is_cut:
+        refill_slot(world, state, slot)
+        present._become_whole()
     if present is None:
+        if world._scene.bodies[slot] is not asset.arrays:
+            refill_slot(world, state, slot)
         known = world._handles.find(wanted.serial, Body)
         if known is not None and known.index == slot and known.asset is asset:
             present = known
@@ -478,6 +494,8 @@ def _apply_body(world: World, state: State, slot: int, wanted: _BodyPlan | None)
             present = Body(world, slot, asset)
             world._handles.enlist(present, wanted.serial)
         present._removed_in = None
+        if present.is_cut:
+            present._become_whole()
         present._description = asset.description
         world._pools.enter_at(present)
     present._first_step = wanted.first_step

@@ -14,21 +14,22 @@ LAYERS = """
     errors  constants
     types  runtime  checks  handles  sealed
     math
-    materials  meshing  settings  contact
+    materials  meshing  settings  contact  plasticity
     laws  collision
     scene  contact_fields
     state  integrators
     kernels
     forces  shapes
     plain
-    stability  failures  colliders  control  queries  events
+    stability  failures  colliders  control  queries  events  cutting
+    tearing
     body  assets  pools
     snapshot  recorder
     world
     taichi_soft
     render
     engine_adapter
-    stages
+    stages  scenery
     film  profiling  replay
     cli
     __main__
@@ -39,10 +40,10 @@ LEVEL = {name: level for level, line in enumerate(LAYERS.split("\n")) for name i
 # The element functions of integrators are called by the kernels as laws are, and so lie below them;
 # runtime is below everything that runs on Taichi, and knows errors only.
 
-NO_TAICHI = ("errors", "constants", "types", "checks", "materials", "meshing", "contact")
+NO_TAICHI = ("errors", "constants", "types", "checks", "materials", "meshing", "contact", "plasticity")
 """Parts that are tested in milliseconds: numpy only."""
 
-FACES = ("render", "stages", "film", "profiling", "replay", "cli", "__main__")
+FACES = ("render", "stages", "scenery", "film", "profiling", "replay", "cli", "__main__")
 """Parts of taichi_soft that lie above its public names."""
 
 

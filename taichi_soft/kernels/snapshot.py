@@ -5,12 +5,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from taichi_soft.constants import LANES
 from taichi_soft.runtime import ti
 from taichi_soft.state import ABSENT, MOST_GRABS, PATCH_ROWS, State
 
-OWNERS = PARTICLE, BODY, GRAB, HELD, PATCH, PAIR, WORLD = range(7)
+OWNERS = PARTICLE, BODY, GRAB, HELD, PATCH, PAIR, SHAPE, WORLD = range(8)
 """What a field has a row for: a particle, a body, a grab, a grab up to the last that is in use, a row of the
-patch of such a one, a pair of a body and a collider; or only one row."""
+patch of such a one, a pair of a body and a collider, a number of a rest shape; or only one row."""
 
 
 def carried(state: State, owner: int) -> list[tuple[Any, int, int]]:
@@ -43,19 +44,21 @@ def carried(state: State, owner: int) -> list[tuple[Any, int, int]]:
         fields += [state.patch_particle, state.patch_share]
     elif owner == PAIR:
         fields += [contact.impulse, contact.angular_impulse] if contact else []
+    elif owner == SHAPE:
+        fields += [state.tet_rest_inverse] if state.capacity.plastic else []
     elif owner == WORLD:
         fields += [state.wind]
     widths = [getattr(field, "n", 1) for field in fields]
     return [(field, sum(widths[:i]), widths[i]) for i, field in enumerate(fields)]
 
 
-def row_table(state: State, particles: int, bodies: int, held: int) -> NDArray[np.int32]:
-    """Rows of each owner, their width and where they begin: (8, 3), the last row being the end.
+def row_table(state: State, particles: int, bodies: int, blocks: int, held: int) -> NDArray[np.int32]:
+    """Rows of each owner, their width and where they begin: (9, 3), the last row being the end.
 
     `held`: number of the last grab in use, plus 1.
     """
     pairs = bodies * state.capacity.contact.colliders
-    counts = [particles, bodies, MOST_GRABS, held, held * PATCH_ROWS, pairs, 1]
+    counts = [particles, bodies, MOST_GRABS, held, held * PATCH_ROWS, pairs, blocks * 9 * LANES, 1]
     rows, at = [], 0
     for owner in OWNERS:
         width = sum(each for _, _, each in carried(state, owner))

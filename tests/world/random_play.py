@@ -17,7 +17,7 @@ if __name__ == "__main__":
     sys.path.insert(0, str(ROOT))
 
 # ruff: noqa: E402, E501
-from taichi_soft import Contact, Material, SoftBodyAsset, SphereShape, World, box, init
+from taichi_soft import Contact, HeightFieldShape, Material, SoftBodyAsset, SphereShape, World, box, init
 
 DT, SUBSTEPS = 1 / 60, 8
 SOFT = Material(young=3e4, poisson=0.3, density=500.0, damping=5.0)
@@ -25,10 +25,11 @@ FIRM = Material(young=6e4, poisson=0.2, density=700.0, damping=3.0)
 
 
 def make_world(**options):
-    """Two bodies and room for two more, two colliders and room for two more."""
+    """Two bodies and room for two more, three colliders and room for two more."""
     cube = SoftBodyAsset(box((0.4, 0.4, 0.4), cells=(2, 2, 2)), SOFT, contact=Contact(friction=0.4))
     world = World(soft_contact=True, sleep_speed=0.02, collider_room=2, **options)
     world.add_collider(SphereShape(0.3), position=(0, 0, 0.1))
+    world.add_collider(HeightFieldShape(np.sin(np.arange(42.0)).reshape(7, 6) / 50, 1.0))
     world.reserve(cube, 4)
     world.build()
     world.spawn(cube, position=(0.0, 0.0, 0.8))
@@ -120,12 +121,12 @@ def _drive_collider(world, cube, rng):
 
 
 def _add_collider(world, cube, rng):
-    if len(world.colliders) < 4:
+    if len(world.colliders) < 5:
         world.add_collider(SphereShape(0.2), position=rng.uniform(-1, 1, 3), thickness=0.01)
 
 
 def _remove_collider(world, cube, rng):
-    if len(world.colliders) > 2:
+    if len(world.colliders) > 3:
         world.colliders[-1].remove()
 
 

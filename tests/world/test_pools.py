@@ -155,7 +155,7 @@ def test_a_world_without_bodies_goes_on(empty):
 
 
 READABLE = {"asset", "index", "is_alive", "is_frozen", "mesh", "material", "vertex_count", "tets", "surface"}
-READABLE |= {"masses", "pinned"}
+READABLE |= {"masses", "pinned", "is_cut", "topology_version", "vertex_origins", "tet_origins"}
 ARGUMENTS = {"set_motion": (np.zeros_like(MESH.vertices), np.zeros_like(MESH.vertices))}
 ARGUMENTS |= {"watch_stress": (1e4,), "watch_tearing": (1e4,)}
 

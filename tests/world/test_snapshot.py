@@ -106,14 +106,14 @@ def test_the_hash_changes_with_the_state(small):
 
 
 def tidy(world):
-    """Leave one body, free, and the first collider and the floor."""
+    """Leave one body, free, and the first colliders."""
     for _, grab in sorted(world._grabs.items()):
         grab.release()
     for body in world.bodies[1:]:
         world.despawn(body)
     for attachment in list(world.bodies[0]._attachments):
         attachment.release()
-    for collider in world.colliders[2:]:
+    for collider in world.colliders[3:]:
         collider.remove()
 
 

@@ -1,0 +1,102 @@
+"""A soft bar hangs from a swinging plate: the engine moves the plate and is told what pulls at it."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine_adapter import FixedStep
+from taichi_soft import Attachment, Body, BoxShape, CapsuleShape, Frame, Material, World, box
+from taichi_soft.cli import main
+from taichi_soft.constants import GRAVITY_EARTH
+from taichi_soft.film import Actor, Stage
+from taichi_soft.render import Camera, colormap
+from taichi_soft.scenery import Prop
+
+MATERIAL = Material(young=4.0e5, poisson=0.3, density=1000.0, damping=60.0)
+SIZE = (0.5, 0.5, 1.4)  # of the bar [m]
+PIVOT = np.array([0.0, 0.0, 3.8])  # [m]
+ROD = 1.8  # from there to the plate [m]
+LENGTH = ROD + SIZE[2] / 2  # from there to the middle of the bar [m]
+WIDEST = np.radians(50.0)
+SCALE = 4.0e4  # of the colours [Pa]
+STEP = FixedStep(dt=1 / 50)
+
+
+class Swing:
+    """The engine's pendulum: carries the plate through every step, and keeps what it felt along the rod."""
+
+    def __init__(self, frame: Frame, hold: Attachment) -> None:
+        """At the end of a swing."""
+        self.frame, self.hold = frame, hold
+        self.angle, self.speed = WIDEST, 0.0  # [rad], [rad/s]
+        self.loads: list[float] = []  # of each step [N]
+
+    def __call__(self, world: World) -> None:
+        """Before a step."""
+        if world.step_count:
+            self.loads.append(self.load())
+        for _ in range(100):
+            self.speed -= STEP.dt / 100 * GRAVITY_EARTH / LENGTH * np.sin(self.angle)
+            self.angle += STEP.dt / 100 * self.speed
+        axes = _turn(self.angle)
+        self.frame.move_to(PIVOT - ROD * axes[:, 2], axes)
+
+    def load(self) -> float:
+        """What pulled at the plate in the last step, along the rod [N]."""
+        return float(-self.hold.force @ self.frame.rotation[:, 2])
+
+    def caption(self) -> str:
+        """For the picture."""
+        weight = float(self.hold.body.masses.sum()) * GRAVITY_EARTH
+        return f"load {self.load() / 1e3:.1f} kN, weight {weight / 1e3:.1f} kN"
+
+
+def stage() -> Stage:
+    """The bar at the end of a swing, not stretched yet."""
+    mesh = box(SIZE, (4, 4, 11))
+    start = _turn(WIDEST)
+    world = World()
+    body = world.add_body(mesh, MATERIAL, rotation=start, position=PIVOT - LENGTH * start[:, 2])
+    world.build()
+    frame = world.add_frame(PIVOT - ROD * start[:, 2], start)
+    top = np.flatnonzero(mesh.vertices[:, 2] > SIZE[2] / 2 - 1e-6)
+    swing = Swing(frame, body.attach(top, frame, two_way=True))
+    plate, rod = BoxShape((0.6, 0.6, 0.08)).surface(), CapsuleShape(0.05, ROD).surface()
+    props = [
+        Prop((plate[0] + (0, 0, 0.04), plate[1]), frame),
+        Prop((rod[0] + (0, 0, ROD / 2), rod[1]), frame),
+    ]
+    camera = Camera.framing((-2.6, -0.3, 0.0), (2.6, 0.3, 4.8), aspect=16 / 9, azimuth=-80, elevation=8)
+    title = f"hung from a frame; colour: von Mises stress to {SCALE / 1e3:g} kPa"
+    actors = [Actor(body, paint=_stress)]
+    return Stage(title, world, actors, camera, STEP, 8.0, act=swing, props=props, caption=swing.caption)
+
+
+def _turn(angle: float) -> NDArray[np.float64]:
+    """About y, so that what hangs down swings towards -x."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+
+
+def _stress(body: Body) -> NDArray[np.float32]:
+    return colormap(body.vertex_stress(), 0.0, SCALE)
+
+
+def proof(stage: Stage) -> float:
+    """Mean load along the rod over the last whole swing, in weights of the bar."""
+    swing = stage.act
+    assert isinstance(swing, Swing)
+    weight = float(swing.hold.body.masses.sum()) * GRAVITY_EARTH
+    steps = round(period() / STEP.dt)
+    return float(np.mean(swing.loads[-steps:])) / weight
+
+
+def period() -> float:
+    """Of the swing there and back [s]: Legendre's arithmetic-geometric mean."""
+    a, b = 1.0, float(np.cos(WIDEST / 2))
+    while a - b > 1e-12:
+        a, b = (a + b) / 2, float(np.sqrt(a * b))
+    return 2 * np.pi / a * float(np.sqrt(LENGTH / GRAVITY_EARTH))
+
+
+if __name__ == "__main__":
+    main("demo", "attach")

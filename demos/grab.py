@@ -1,0 +1,130 @@
+"""A hand picks bodies up, one after the other, and throws them into a crate."""
+
+import numpy as np
+
+from engine_adapter import FixedStep
+from taichi_soft import (
+    Body,
+    BoxShape,
+    Contact,
+    Frame,
+    Grab,
+    Material,
+    SphereShape,
+    World,
+    box,
+    cylinder,
+    sphere,
+    torus,
+)
+from taichi_soft.cli import main
+from taichi_soft.constants import GRAVITY_EARTH
+from taichi_soft.film import Actor, Stage
+from taichi_soft.render import PALETTE, Camera
+from taichi_soft.scenery import Prop
+
+MATERIAL = Material(young=3.0e5, poisson=0.3, density=400.0, damping=40.0)
+CRATE = np.array([2.2, 0.0, 0.0])  # middle of its bottom [m]
+INSIDE, WALL, HEIGHT = 2.2, 0.14, 0.9  # of the crate: width, thickness and height of its walls [m]
+FIRST, EVERY = 0.8, 1.7  # when the hand takes the first body, and another [s]
+LIFT, STEEP = np.array([-0.1, 0.0, 1.3]), 0.8  # way up [m]; how steeply it throws
+LIFTING, PULL = 0.7, 10.0  # how long it lifts [s], and speeds up the throw [m/s^2]
+STEP = FixedStep(dt=1 / 50)
+
+
+class Hand:
+    """Reaches, lifts, swings, and lets go where what it holds would fly into the crate."""
+
+    def __init__(self, frame: Frame) -> None:
+        """At rest, holding nothing."""
+        self.frame, self.rest = frame, frame.position.astype(np.float64)
+        self.taken = 0
+        self.grab: Grab | None = None
+        self.start = self.rest  # where it took hold
+
+    def __call__(self, world: World) -> None:
+        """Before a step."""
+        since = world.time - FIRST - EVERY * self.taken
+        if self.grab is None:
+            if self.taken < len(world.bodies):
+                self._reach(world, since)
+            return
+        throwing = max(since - LIFTING, 0.0)
+        if throwing > 0.0 and _flies_into_crate(self.grab.body):
+            self.grab.release()
+            self.grab = None
+            self.taken += 1
+            return
+        way = (CRATE - self.start) * (1, 1, 0)
+        way = way / np.linalg.norm(way) + (0, 0, STEEP)
+        place = self.start + _smooth(since / LIFTING) * LIFT + PULL / 2 * throwing**2 * way
+        self.grab.move(place)
+        self.frame.move_to(place)
+
+    def _reach(self, world: World, since: float) -> None:
+        """Go to the top of the next body, and take hold of it when it is time."""
+        body = world.bodies[self.taken]
+        over = body.center_of_mass() + (0, 0, 2)
+        near = world.closest_point(over, bodies=[body])
+        assert near is not None
+        if since >= 0.0:
+            self.grab, self.start = world.grab(over, near.point - over), near.point
+        self.frame.move_to(near.point + _smooth(-since / 0.6) * (self.rest - near.point))
+
+
+def _smooth(share: float) -> float:
+    """From 0 to 1 without a jolt."""
+    s = min(max(share, 0.0), 1.0)
+    return s * s * (3.0 - 2.0 * s)
+
+
+def _flies_into_crate(body: Body) -> bool:
+    """Whether it would come down to the rim of the crate beyond its middle, if let go now."""
+    share = body.masses / body.masses.sum()
+    place, velocity = share @ body.positions(), share @ body.velocities()
+    root = np.sqrt(max(velocity[2] ** 2 + 2.0 * GRAVITY_EARTH * (place[2] - HEIGHT), 0.0))
+    landing = place + velocity * (velocity[2] + root) / GRAVITY_EARTH
+    return bool(landing[0] > CRATE[0])
+
+
+def stage() -> Stage:
+    """Bodies in two rows on the floor, and the crate."""
+    world = World(soft_contact=True, friction=0.8)
+    _add_crate(world)
+    contact = Contact(friction=0.6)
+    meshes = [
+        sphere(0.36, 3),
+        box((0.6, 0.6, 0.6), (4, 4, 4)),
+        cylinder(0.34, 0.6, rings=2, layers=4),
+        torus(0.34, 0.14, rings=1, segments=18),
+        box((0.9, 0.45, 0.45), (6, 3, 3)),
+        sphere(0.42, 3),
+    ]
+    actors = []
+    for i, mesh in enumerate(meshes):
+        place = (-0.1 - 1.1 * (i // 2), 0.6 - 1.2 * (i % 2), 0.002 - mesh.bounds[0][2])
+        body = world.add_body(mesh, MATERIAL, law="neo_hookean", position=place, contact=contact)
+        actors.append(Actor(body, PALETTE[i]))
+    world.build()
+    frame = world.add_frame((-0.6, 0.0, 2.2))
+    props = [Prop(SphereShape(0.09).surface(), frame, color=(0.95, 0.93, 0.88))]
+    camera = Camera.framing((-3.2, -1.3, 0.0), (3.5, 1.3, 3.0), aspect=16 / 9, azimuth=-72, elevation=20)
+    return Stage("picked up and thrown", world, actors, camera, STEP, 13.0, act=Hand(frame), props=props)
+
+
+def _add_crate(world: World) -> None:
+    """Four walls, with the floor as their bottom."""
+    reach = (INSIDE + WALL) / 2
+    for x, y in ((-1, 0), (1, 0), (0, -1), (0, 1)):
+        size = (WALL if x else INSIDE + 2 * WALL, WALL if y else INSIDE, HEIGHT)
+        world.add_collider(BoxShape(size), position=CRATE + (x * reach, y * reach, HEIGHT / 2))
+
+
+def proof(stage: Stage) -> float:
+    """How many bodies lie in the crate, whole."""
+    half = np.array([INSIDE / 2 + 0.02, INSIDE / 2 + 0.02])
+    return float(sum((np.abs(a.body.positions()[:, :2] - CRATE[:2]) < half).all() for a in stage.actors))
+
+
+if __name__ == "__main__":
+    main("demo", "grab")

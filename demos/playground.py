@@ -1,0 +1,118 @@
+"""Soft bodies tumble through a course of every kind of collider, some of which move, and end in a hollow."""
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+
+from engine_adapter import FixedStep
+from taichi_soft import (
+    BoxShape,
+    CapsuleShape,
+    HeightFieldShape,
+    Material,
+    MeshShape,
+    SphereShape,
+    World,
+    box,
+    cylinder,
+    sphere,
+    torus,
+)
+from taichi_soft.cli import main
+from taichi_soft.film import Actor, Stage
+from taichi_soft.render import PALETTE, Camera
+
+MATERIAL = Material(young=2.5e5, poisson=0.3, density=400.0, damping=70.0)
+LAYERS, ROWS, COLUMNS = 2, 2, 4  # of bodies over the ramp
+SLOPE = 0.32  # of the ramp [rad]
+HUB = np.array([1.85, 0.0, 3.6])  # of the wheel [m]
+HOLLOW = np.array([1.7, 0.0, 0.0])  # its middle [m]
+RIM = 2.4  # radius of its rim [m]
+STEP = FixedStep(dt=1 / 50)
+
+
+class Course:
+    """All colliders. Those that move are moved before every step: a wheel, and bars that go up and down."""
+
+    def __init__(self, world: World) -> None:
+        """Add them."""
+        top, tilt = np.array([-1.4, 0.0, 4.85]), _turn(SLOPE)
+        world.add_collider(BoxShape((3.6, 2.4, 0.14)), position=top, rotation=tilt, friction=0.1)
+        for side in (-1.2, 1.2):
+            place = top + tilt @ (0.0, side, 0.15)
+            world.add_collider(CapsuleShape(0.14, 3.6), position=place, rotation=_turn(SLOPE + np.pi / 2))
+        self.paddles = [world.add_collider(BoxShape((1.2, 2.4, 0.12)), position=HUB) for _ in range(2)]
+        world.add_collider(MeshShape(_funnel()), position=HOLLOW + (0, 0, 1.75), friction=0.1)
+        lying = _turn(0.0, about_x=np.pi / 2)
+        self.bars = [world.add_collider(CapsuleShape(0.13, 2.4), rotation=lying) for _ in range(2)]
+        world.add_collider(SphereShape(0.45), position=HOLLOW + (0, 0, 0.25))
+        world.add_collider(HeightFieldShape(_ground(), spacing=0.2), position=HOLLOW)
+        for i, bar in enumerate(self.bars):
+            bar.teleport(self._bar(i, 0.0))
+
+    def __call__(self, world: World) -> None:
+        """Move them to where they are at the end of the coming step."""
+        time = world.time + STEP.dt
+        for i, paddle in enumerate(self.paddles):
+            paddle.move_to(HUB, _turn(1.1 * time + i * np.pi / 2))
+        for i, bar in enumerate(self.bars):
+            bar.move_to(self._bar(i, time))
+
+    def _bar(self, number: int, time: float) -> NDArray[np.float64]:
+        side = 2 * number - 1
+        return HOLLOW + (0.75 * side, 0.0, 1.2 + 0.2 * side * np.sin(2.0 * time))
+
+
+def _turn(about_y: float, about_x: float = 0.0) -> NDArray[np.float64]:
+    """First about x, then about y [rad]: the x axis towards -z."""
+    c, s, k, w = np.cos(about_y), np.sin(about_y), np.cos(about_x), np.sin(about_x)
+    return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]) @ np.array([[1, 0, 0], [0, k, -w], [0, w, k]])
+
+
+def _funnel() -> trimesh.Trimesh:
+    """A cone with a hole, its wall 16 cm thick."""
+    inner = np.array([(0.78, 0.0), (0.85, 0.15), (2.55, 1.35)])
+    outer = inner + (0.13, -0.1)
+    return trimesh.creation.revolve(np.concatenate([outer, inner[::-1], outer[:1]]), sections=64)
+
+
+def _ground() -> NDArray[np.float64]:
+    """A ring-shaped wall round a hollow, on a square of 6.8 m."""
+    x, y = np.meshgrid(*2 * [np.linspace(-3.4, 3.4, 35)], indexing="ij")
+    away = (np.hypot(x, y) - RIM) / 0.6
+    return np.asarray(0.03 + 1.0 * np.exp(-(away**2)))
+
+
+def stage() -> Stage:
+    """Bodies in a block over the ramp."""
+    shapes = [
+        sphere(0.34, 3),
+        box((0.56, 0.56, 0.56), (4, 4, 4)),
+        cylinder(0.32, 0.56, rings=2, layers=4),
+        torus(0.33, 0.15, rings=1, segments=18),
+    ]
+    world = World(soft_contact=True)
+    course = Course(world)
+    actors = []
+    for i in range(LAYERS * ROWS * COLUMNS):
+        column, (layer, row) = i % COLUMNS, divmod(i // COLUMNS, ROWS)
+        place = (-2.7 + 0.8 * column, 0.45 - 0.9 * row, 5.95 + 0.8 * layer - 0.3 * column)
+        mesh = shapes[(column + row + layer) % len(shapes)]
+        body = world.add_body(mesh, MATERIAL, law="neo_hookean", position=place)
+        actors.append(Actor(body, PALETTE[i % len(PALETTE)]))
+    world.build()
+    camera = Camera.framing((-3.0, -3.2, 0.0), (5.1, 2.4, 6.7), aspect=16 / 9, azimuth=-74, elevation=24)
+    return Stage("a course of colliders", world, actors, camera, STEP, 15.0, act=course)
+
+
+def proof(stage: Stage) -> float:
+    """How many bodies lie in the hollow, no part of them below the ground."""
+    inside = 0
+    for actor in stage.actors:
+        rows = actor.body.positions()
+        inside += np.hypot(*(rows - HOLLOW).T[:2]).max() < RIM + 0.3 and 0.0 < rows[:, 2].min() < 1.0
+    return float(inside)
+
+
+if __name__ == "__main__":
+    main("demo", "playground")
