@@ -24,7 +24,8 @@ LAYERS = """
     stability  failures  colliders  control  queries  events  cutting
     tearing
     body  assets  pools
-    snapshot  recorder
+    snapshot
+    recorder
     world
     taichi_soft
     render

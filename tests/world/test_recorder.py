@@ -31,7 +31,7 @@ def game(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def broken(tmp_path_factory):
-    """A body is torn to pieces in step 12, and another later: what the world wrote by itself, its failure, and
+    """A body breaks in step 12, and another later: what the world wrote by itself, its failure, and
     whether the second was written over the first."""
     path = tmp_path_factory.mktemp("frozen") / "it.recording"
     world, _ = make_world(record=5, record_to=path)

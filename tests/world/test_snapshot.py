@@ -11,6 +11,7 @@ from taichi_soft import (
     FrozenBodyWarning,
     Material,
     OptionError,
+    Plasticity,
     SnapshotError,
     SoftBodyAsset,
     SpringMaterial,
@@ -369,3 +370,58 @@ def test_an_asset_made_again_is_the_same():
         world.spawn(asset, position=(0, 0, 1))
         names.append(world.snapshot())
     world.restore(names[0])
+
+
+@pytest.fixture(scope="module")
+def bendable():
+    """A world of one body that can be bent for good and cut, and an empty slot."""
+    asset = SoftBodyAsset(
+        box(cells=(2, 2, 2)),
+        Material(1e5, 0.2, 1000.0, 20.0),
+        plasticity=Plasticity(yield_strain=0.02),
+        spare_vertices=30,
+    )
+    world = World()
+    world.reserve(asset, 2)
+    world.build()
+    world.spawn(asset, position=(0, 0, 0.6))
+    for _ in range(30):
+        world.step(DT, SUBSTEPS)
+    return world
+
+
+def test_rest_shapes_come_back(bendable):
+    body = bendable.bodies[0]
+    data, bent, before = bendable.snapshot(), body.plastic_strains(), bendable.state_hash()
+    assert bent.max() > 0.0
+
+    def throw():
+        body.apply_impulse((0, 0, -4000.0))
+        for _ in range(10):
+            bendable.step(DT, SUBSTEPS)
+        return bendable.state_hash()
+
+    thrown = throw()
+    assert (body.plastic_strains() != bent).any()
+    bendable.restore(data)
+    assert bendable.state_hash() == before
+    assert (body.plastic_strains() == bent).all()
+    assert throw() == thrown
+    bendable.restore(data)
+
+
+def test_no_snapshot_of_a_cut_body_but_back_to_the_whole_one(bendable):
+    body = bendable.bodies[0]
+    data, before, count = bendable.snapshot(), bendable.state_hash(), body.vertex_count
+    bendable.step(DT, SUBSTEPS)
+    expected = bendable.state_hash()
+    (fallen,) = body.cut(plane=(body.center_of_mass(), (1, 0, 0)))
+    with pytest.raises(StateError, match="was cut"):
+        bendable.snapshot()
+    bendable.step(DT, SUBSTEPS)
+    bendable.restore(data)
+    assert (body.is_cut, body.vertex_count, fallen.is_alive) == (False, count, False)
+    assert bendable.state_hash() == before
+    bendable.step(DT, SUBSTEPS)
+    assert bendable.state_hash() == expected
+    bendable.restore(data)
