@@ -19,7 +19,7 @@ if __name__ == "__main__":
 # ruff: noqa: E402, E501
 from taichi_soft import Contact, HeightFieldShape, Material, SoftBodyAsset, SphereShape, World, box, init
 
-DT, SUBSTEPS = 1 / 60, 8
+DT, SUBSTEPS = 1 / 60, 10
 SOFT = Material(young=3e4, poisson=0.3, density=500.0, damping=5.0)
 FIRM = Material(young=6e4, poisson=0.2, density=700.0, damping=3.0)
 
@@ -56,7 +56,7 @@ def _body(world, rng):
 
 def _push(world, cube, rng):
     body = _body(world, rng)
-    body.apply_impulse(rng.uniform(-40, 40, 3), rng.permutation(body.vertex_count)[: rng.integers(1, 9)])
+    body.apply_impulse(rng.uniform(-12, 12, 3), rng.permutation(body.vertex_count)[: rng.integers(5, 14)])
 
 
 def _force(world, cube, rng):
@@ -69,7 +69,7 @@ def _explode(world, cube, rng):
 
 def _pin(world, cube, rng):
     body = _body(world, rng)
-    if not body._attachments:
+    if not body.is_held and not len(body.pinned):
         body.pin(rng.permutation(27)[:2])
         body.set_targets(body.pinned, body.positions()[body.pinned] + rng.uniform(-0.02, 0.02, 3))
 
@@ -81,8 +81,9 @@ def _unpin(world, cube, rng):
 
 
 def _grab(world, cube, rng):
-    if len(world._grabs) < 3:
-        _body(world, rng).grab(rng.integers(40), max_force=400.0)
+    body = _body(world, rng)
+    if len(world._grabs) < 3 and not body.is_held and not len(body.pinned):
+        body.grab(rng.integers(40), max_force=400.0)
 
 
 def _move_grabs(world, cube, rng):
@@ -97,7 +98,7 @@ def _release(world, cube, rng):
 
 def _attach(world, cube, rng):
     body = _body(world, rng)
-    if not body._attachments and len(world._frames.handles) < 5:
+    if not body.is_held and not len(body.pinned) and len(world._frames.handles) < 5:
         frame = world.add_frame(body.center_of_mass())
         body.attach(rng.permutation(27)[:3], frame, two_way=bool(rng.integers(2)))
 

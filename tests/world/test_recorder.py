@@ -34,7 +34,11 @@ def broken(tmp_path_factory):
     """A body breaks in step 12, and another later: what the world wrote by itself, its failure, and
     whether the second was written over the first."""
     path = tmp_path_factory.mktemp("frozen") / "it.recording"
-    world, _ = make_world(record=5, record_to=path)
+    # Not in a world with soft contact, whose search looks all over the place that such a body takes up.
+    world = World(record=5, record_to=path)
+    for x in (0.0, 2.0):
+        world.add_body(box(cells=(1, 1, 1)), Material(1e5, 0.2, 1000.0, 20.0), position=(x, 0, 0.6))
+    world.build()
     world.set_force_field(lambda positions, time: np.full_like(positions, 0.3) * np.sin(9 * time))
     for _ in range(12):
         world.step(DT, SUBSTEPS)
