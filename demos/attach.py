@@ -61,7 +61,10 @@ def stage() -> Stage:
     top = np.flatnonzero(mesh.vertices[:, 2] > SIZE[2] / 2 - 1e-6)
     swing = Swing(frame, body.attach(top, frame, two_way=True))
     plate, rod = BoxShape((0.6, 0.6, 0.08)).surface(), CapsuleShape(0.05, ROD).surface()
-    props = [Prop((plate[0] + (0, 0, 0.04), plate[1]), frame), Prop((rod[0] + (0, 0, ROD / 2), rod[1]), frame)]
+    props = [
+        Prop((plate[0] + (0, 0, 0.04), plate[1]), frame),
+        Prop((rod[0] + (0, 0, ROD / 2), rod[1]), frame),
+    ]
     camera = Camera.framing((-2.6, -0.3, 0.0), (2.6, 0.3, 4.8), aspect=16 / 9, azimuth=-80, elevation=8)
     title = f"hung from a frame; colour: von Mises stress to {SCALE / 1e3:g} kPa"
     actors = [Actor(body, paint=_stress)]
