@@ -2,5 +2,6 @@
 
 from engine_adapter.adapter import EngineAdapter
 from engine_adapter.fixed_step import FixedStep
+from engine_adapter.rollback import Rollback
 
-__all__ = ["EngineAdapter", "FixedStep"]
+__all__ = ["EngineAdapter", "FixedStep", "Rollback"]

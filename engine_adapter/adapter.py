@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine_adapter.fixed_step import Accumulator, FixedStep
+from engine_adapter.rollback import Rollback
 from taichi_soft import Body, Event, OptionError, StateError, World
-from taichi_soft.checks import as_number
+from taichi_soft.checks import as_count, as_number
 
 
 class EngineAdapter:
@@ -28,6 +29,7 @@ class EngineAdapter:
         fixed_step: length of a step, its substeps, and how many one frame may make.
         before_step: called with the world before every fixed step: the place to move colliders and frames,
             to push and to grab, so that it happens at the same moments whatever the frame rate.
+        rewind_ticks: steps that `rewind` can go back; 0 keeps nothing.
     Raises: StateError if the world is not built; OptionError if `fixed_step` is not a FixedStep, or
         `before_step` cannot be called.
     """
@@ -38,6 +40,7 @@ class EngineAdapter:
         fixed_step: FixedStep | None = None,
         *,
         before_step: Callable[[World], object] | None = None,
+        rewind_ticks: int = 0,
     ) -> None:
         fixed_step = FixedStep() if fixed_step is None else fixed_step
         if not isinstance(world, World):
@@ -52,6 +55,10 @@ class EngineAdapter:
         self._fixed_step = fixed_step
         self._before_step = before_step
         self._accumulator = Accumulator(fixed_step)
+        ticks = as_count(rewind_ticks, "rewind_ticks", 0)
+        self._rollback = Rollback(world, ticks) if ticks else None
+        if self._rollback is not None:
+            self._rollback.save()
         self._dropped_time = 0.0
         self._total_dropped_time = 0.0
 
@@ -96,6 +103,8 @@ class EngineAdapter:
         if self._before_step is not None:
             self._before_step(self._world)
         self._world.step(self._fixed_step.dt, self._fixed_step.substeps)
+        if self._rollback is not None:
+            self._rollback.save()
 
     def advance(self, frame_dt: float) -> int:
         """Put in the time of one frame and make the steps that are due.
@@ -119,6 +128,21 @@ class EngineAdapter:
             self._dropped_time = dropped + (steps - made) * self._fixed_step.dt
             self._total_dropped_time += self._dropped_time
         return made
+
+    def rewind(self, steps: int) -> None:
+        """Go back by that many steps, to where the world was before the inputs of the first of them.
+
+        `alpha` stays: make the steps again by `step`, with the inputs as they should have been, and the
+        picture goes on where it was.
+        Raises: OptionError for more steps than `rewind_ticks`, or than were made; StateError where nothing
+            is kept.
+        """
+        if self._rollback is None:
+            raise StateError("this adapter keeps no steps: make it with rewind_ticks")
+        back = as_count(steps, "steps")
+        if back > self._world.step_count:
+            raise OptionError(f"steps is {back}: the world has made {self._world.step_count}")
+        self._rollback.rewind_to(self._world.step_count - back)
 
     def drain_events(self) -> list[Event]:
         """What happened in all fixed steps since the last call: see `World.drain_events`."""

@@ -26,6 +26,7 @@ from taichi_soft.cutting import cut
 from taichi_soft.errors import MeshError, OptionError, StateError
 from taichi_soft.events import Event, StressExceeded, TearCandidates
 from taichi_soft.failures import FailedStep, Failure
+from taichi_soft.handles import Handle, recorded
 from taichi_soft.laws.law import EnergyLaw
 from taichi_soft.materials import AnyMaterial, voigt_stress
 from taichi_soft.meshing.splitting import InnerFaces, inner_faces
@@ -43,7 +44,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-class Body:
+class Body(Handle):
     """A handle to one body. Positions and velocities come back in the caller's vertex order.
 
     Energies, momentum and volume are computed in float64 from the float32 state, at the time of the call.
@@ -164,6 +165,14 @@ class Body:
         for name in ("_first_rest_inverses", "_inner_faces"):
             self.__dict__.pop(name, None)
 
+    def _become_whole(self) -> None:
+        """Take note that the body is what its asset says again."""
+        self._origins, self._description = None, self.asset.description
+        self._topology_version += 1
+        for name in ("_first_rest_inverses", "_inner_faces"):
+            self.__dict__.pop(name, None)
+
+    @recorded
     def cut(
         self,
         *,
@@ -261,6 +270,7 @@ class Body:
         """
         return self._world._read_velocities(self)
 
+    @recorded
     def set_motion(self, positions: ArrayLike, velocities: ArrayLike) -> None:
         """Put the body into a given state between two steps; a frozen body is active again.
 
@@ -274,6 +284,7 @@ class Body:
         self._world._write_motion(self, x, v)
         self._frozen_in = self._failure = None
 
+    @recorded
     def apply_force(self, force: ArrayLike, particles: ArrayLike | None = None) -> None:
         """Push throughout the coming step, all particles named with the same acceleration. Calls add up.
 
@@ -289,10 +300,12 @@ class Body:
         """By what the world's gravity is multiplied for this body."""
         return self._world._gravity_scale(self)
 
+    @recorded
     def set_gravity_scale(self, scale: float) -> None:
         """Multiply the world's gravity for this body, from now on: 0 floats, -1 rises."""
         set_gravity_scale(self, scale)
 
+    @recorded
     def set_linear_damping(self, rate: float) -> None:
         """Let all velocities fade by exp(-rate t), from now on, against the world at rest [1/s].
 
@@ -300,10 +313,12 @@ class Body:
         """
         set_linear_damping(self, rate)
 
+    @recorded
     def set_sheltered(self, is_sheltered: bool) -> None:
         """True keeps the wind of `World.set_wind` off this body, from now on."""
         set_sheltered(self, is_sheltered)
 
+    @recorded
     def apply_impulse(self, impulse: ArrayLike, particles: ArrayLike | None = None) -> None:
         """Change the momentum at once; all particles named change their velocity by the same.
 
@@ -314,6 +329,7 @@ class Body:
         """
         apply_impulse(self, impulse, particles)
 
+    @recorded
     def apply_impulse_at_point(self, impulse: ArrayLike, point: ArrayLike, radius: float) -> None:
         """Change the momentum of the particles near a point, those at the distance r by (1 - (r/radius)^2)^2
         as much in velocity as one at the point.
@@ -326,6 +342,7 @@ class Body:
         """
         apply_impulse_at_point(self, impulse, point, radius)
 
+    @recorded
     def set_velocity(self, linear: ArrayLike, angular: ArrayLike = (0.0, 0.0, 0.0)) -> None:
         """Set the velocities of all particles that are not pinned to those of a rigid body.
 
@@ -335,6 +352,7 @@ class Body:
         """
         set_velocity(self, linear, angular)
 
+    @recorded
     def teleport(
         self, position: ArrayLike, rotation: ArrayLike | None = None, *, keep_velocity: bool = True
     ) -> None:
@@ -348,14 +366,17 @@ class Body:
         """
         teleport(self, position, rotation, keep_velocity)
 
+    @recorded
     def pin(self, particles: ArrayLike) -> None:
         """Hold particles where they are, from now on."""
         pin(self, particles)
 
+    @recorded
     def unpin(self, particles: ArrayLike | None = None) -> None:
         """Let pinned particles go, all if None, with the velocity that they were moved with last."""
         unpin(self, particles)
 
+    @recorded
     def set_targets(self, particles: ArrayLike, positions: ArrayLike) -> None:
         """Move pinned particles by hand: in the coming step they go straight to `positions`, (n, 3) [m].
 
@@ -364,6 +385,7 @@ class Body:
         """
         set_targets(self, particles, positions)
 
+    @recorded
     def attach(self, particles: ArrayLike, frame: Frame, *, two_way: bool = False) -> Attachment:
         """Let particles go with a frame from now on, at the places that they have relative to it.
 
@@ -376,6 +398,7 @@ class Body:
         """
         return attach(self, particles, frame, two_way)
 
+    @recorded
     def grab(
         self,
         triangle: int,
@@ -398,6 +421,7 @@ class Body:
         """
         return grab_at(self, triangle, barycentrics, None, frequency, max_force)
 
+    @recorded
     def set_material(self, material: AnyMaterial) -> None:
         """Make the body of another material of the same kind, from now on, as if it had been added with it.
 
@@ -410,6 +434,7 @@ class Body:
         """
         set_material(self, material)
 
+    @recorded
     def set_damping(self, damping: float | NDArray[np.float64]) -> None:
         """Change the material's damping b [N s/m], from now on, one number or one per element.
 

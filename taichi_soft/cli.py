@@ -204,6 +204,38 @@ def _version_of(name: str) -> str:
 
 
 @app.command()
+def replay(
+    file: Annotated[Path, typer.Argument(help="A recording, see World(record=...).")],
+    out: Annotated[
+        Path | None, typer.Option(help="Picture of the end, .png; beside the recording by default.")
+    ] = None,
+    arch: Arch = "auto",
+    threads: Threads = None,
+) -> None:
+    """Make a recording again, bit by bit; say what broke first, and draw the moment."""
+    init(arch, threads)
+    from taichi_soft.replay import failure_line
+    from taichi_soft.replay import replay as play_again
+
+    report = play_again(file, out or file.with_suffix(".png"))
+    end = f"up to step {report.world.step_count}, t = {report.world.time:.4g} s"
+    if report.first_difference is None:
+        _say(f"{report.steps} steps made again, {end}: every state is the same, bit by bit")
+    else:
+        _say(
+            f"{report.steps} steps made again, {end}: not the same from step {report.first_difference} on. "
+            "Was it recorded on another kind of machine?"
+        )
+    for failure in report.failures:
+        _say(failure_line(failure))
+    if not report.failures:
+        _say("no body is frozen")
+    _say(f"wrote {escape(str(report.picture))}")
+    if report.first_difference is not None:
+        raise typer.Exit(1)
+
+
+@app.command()
 def profile(
     bodies: Annotated[int, typer.Option(min=1, max=4096, help="Spheres of 1,280 tetrahedra.")] = 16,
     baseline: Annotated[

@@ -5,6 +5,7 @@ from __future__ import annotations
 import weakref
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,8 +14,10 @@ from taichi_soft.checks import as_count, as_number, as_rotation, as_vector
 from taichi_soft.constants import ALL_GROUPS, VELOCITY_LIMIT
 from taichi_soft.contact_fields import NO_COLLIDER, ContactCapacity, ContactFields
 from taichi_soft.errors import OptionError, StateError
+from taichi_soft.handles import Handle, recorded
 from taichi_soft.kernels.collider_rows import MOTION_WIDTH, sum_collider_impulses, write_collider_motion
 from taichi_soft.math.rotations import matrix_of, quaternion_of, rotation_vector, turned_by
+from taichi_soft.plain import digest_of
 from taichi_soft.shapes import Shape
 from taichi_soft.state import fill
 
@@ -23,8 +26,8 @@ Floats = NDArray[np.float64]
 _FASTEST_SPIN = 1e4  # [rad/s]
 
 
-@dataclass
-class _Row:
+@dataclass(eq=False)
+class ColliderRow:
     """One collider: what it is, where it is, and how it moves through the next step."""
 
     shape: Shape
@@ -46,11 +49,17 @@ class _Row:
         """How far outside of the shape its surface is felt [m]."""
         return self.thickness + self.shape.seam
 
+    @property
+    def constants(self) -> tuple[Any, ...]:
+        """All that does not move."""
+        surface = (self.friction, self.restitution, self.thickness, self.group, self.mask)
+        return (id(self.shape), self.offset, self.is_alive, *surface)
 
-class Collider:
+
+class Collider(Handle):
     """A handle to one collider. What it does to bodies it does through its surface: friction, restitution."""
 
-    def __init__(self, colliders: Colliders, index: int, row: _Row) -> None:
+    def __init__(self, colliders: Colliders, index: int, row: ColliderRow) -> None:
         """Made by `World.add_collider`."""
         self._set = weakref.ref(colliders)
         self._row = row
@@ -99,6 +108,7 @@ class Collider:
         """The same about its position, (3,) [N m s]."""
         return self._colliders().impulses()[self.index, 3:]
 
+    @recorded
     def move_to(self, position: ArrayLike, rotation: ArrayLike | None = None) -> None:
         """Be there at the end of the next step, on a straight way and an even turn; then stand still.
 
@@ -112,6 +122,7 @@ class Collider:
         self._row.target = self._pose(position, rotation)
         colliders.moved(self._row)
 
+    @recorded
     def set_velocity(self, linear: ArrayLike, angular: ArrayLike = (0.0, 0.0, 0.0)) -> None:
         """Move on like this until told otherwise: (3,) [m/s] and (3,) [rad/s] about its position."""
         colliders, row = self._colliders(), self._row
@@ -120,6 +131,7 @@ class Collider:
         row.velocity, row.spin, row.target = velocity, spin, None
         colliders.moved(row)
 
+    @recorded
     def teleport(self, position: ArrayLike, rotation: ArrayLike | None = None) -> None:
         """Be there at once, without pushing anything on the way; what it then covers is pressed out."""
         colliders, row = self._colliders(), self._row
@@ -132,6 +144,7 @@ class Collider:
         where = as_vector(position, "position", "m")
         return where, self._row.rotation if rotation is None else quaternion_of(as_rotation(rotation))
 
+    @recorded
     def remove(self) -> None:
         """Take it out of the world; its place is free for another."""
         colliders = self._colliders()
@@ -147,7 +160,8 @@ class Colliders:
     """All colliders of one world: Python's side of `ContactFields`."""
 
     def __init__(self) -> None:
-        self._rows: list[_Row] = []
+        self._rows: list[ColliderRow] = []
+        self.shapes: dict[str, Shape] = {}  # all that there ever were, by their digests
         self._handles: list[Collider] = []
         self._contact: ContactFields | None = None
         self._body_count = 0
@@ -155,7 +169,7 @@ class Colliders:
         self._sample_count = 0
         self.on_jump: Callable[[], None] = _do_nothing  # told when a collider appears, vanishes or jumps
         self._is_dirty = False  # whether poses or velocities differ from what the fields hold
-        self._movers: list[_Row] = []  # with a velocity or a target
+        self._movers: list[ColliderRow] = []  # with a velocity or a target
 
     @property
     def handles(self) -> Sequence[Collider]:
@@ -182,7 +196,7 @@ class Colliders:
         if not isinstance(shape, Shape):
             raise OptionError(f"shape must be one of taichi_soft's shapes, such as BoxShape, got {shape!r}")
         zero = np.zeros(3)
-        row = _Row(
+        row = ColliderRow(
             shape,
             as_number(friction, "friction", 0.0, 1e6, "a number from 0 to 1,000,000"),
             as_number(restitution, "restitution", 0.0, 1.0, "a number from 0 to 1"),
@@ -196,6 +210,7 @@ class Colliders:
             self._sample_count,
         )
         index = self._free_row(shape)
+        self.shapes[digest_of(shape)] = shape
         if index < len(self._rows):
             row.offset = self._rows[index].offset
             self._rows[index] = row
@@ -273,7 +288,7 @@ class Colliders:
         fill(contact.collider_surface, np.array([(r.friction, r.restitution, r.skin) for r in rows]))
         fill(contact.collider_filter, np.array([(r.group, r.mask) for r in rows]))
 
-    def moved(self, row: _Row) -> None:
+    def moved(self, row: ColliderRow) -> None:
         """Note that a collider is elsewhere, or moves differently, from the next step on."""
         self._is_dirty = True
         self._movers = [other for other in self._movers if other is not row]
@@ -307,6 +322,41 @@ class Colliders:
                 row.velocity, row.spin, row.target = np.zeros(3), np.zeros(3), None
                 self.moved(row)
 
+    @property
+    def all_handles(self) -> Sequence[Collider]:
+        """Of each row, removed ones among them."""
+        return tuple(self._handles)
+
+    @property
+    def sample_count(self) -> int:
+        """Rows of grids in use."""
+        return self._sample_count
+
+    def restore(
+        self,
+        rows: list[ColliderRow],
+        sample_count: int,
+        handle_of: Callable[[int, ColliderRow], Collider],
+    ) -> None:
+        """Put back all rows, with the handles that `handle_of` finds."""
+        before, after = [row.constants for row in self._rows], rows
+        for handle in self._handles:
+            handle._row.is_alive = False
+        self._rows, self._sample_count = after, sample_count
+        self._handles = [handle_of(index, row) for index, row in enumerate(after)]
+        for index, (handle, row) in enumerate(zip(self._handles, after, strict=True)):
+            handle.index, handle._row = index, row
+        self._impulses, self._is_dirty, self._movers = None, True, []
+        for row in after:
+            self.moved(row)
+        if self._contact is None or before == [row.constants for row in after]:
+            return
+        samples = self._contact.samples.to_numpy()
+        for row in after:
+            samples[row.offset : row.offset + len(row.shape.samples)] = row.shape.samples
+        self._contact.samples.from_numpy(samples)
+        self._write_constants()
+
     def impulses(self) -> Floats:
         """Of the last step on each, (n, 6) [N s, N m s]; zero before the first."""
         if self._impulses is None:
@@ -317,7 +367,7 @@ class Colliders:
         return np.array(self._impulses)
 
 
-def _way(row: _Row, dt: float) -> tuple[Floats, Floats, Floats]:
+def _way(row: ColliderRow, dt: float) -> tuple[Floats, Floats, Floats]:
     """Corners of a box round its way through `dt` [s], (3,) [m] each; its highest speed, (1,) [m/s]."""
     lower, upper = row.shape.bounds
     speed, spin = float(np.linalg.norm(row.velocity)), float(np.linalg.norm(row.spin))

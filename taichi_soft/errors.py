@@ -24,6 +24,10 @@ class StateError(TaichiSoftError, RuntimeError):
     """The call is right but comes at the wrong time (for example `step` before `build`)."""
 
 
+class SnapshotError(TaichiSoftError, ValueError):
+    """A snapshot or a recording is damaged, or belongs to another world."""
+
+
 class DeviceError(TaichiSoftError, RuntimeError):
     """The device asked for is not there."""
 

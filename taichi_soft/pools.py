@@ -62,6 +62,14 @@ class Pools:
         self.slots[body.index] = body
         self._living = None
 
+    def enter_at(self, body: Body) -> None:
+        """Give a body the free slot that has its number, whichever is next."""
+        free = self._free[body.asset]
+        free.remove(body.index)
+        heapq.heapify(free)
+        self.slots[body.index] = body
+        self._living = None
+
     def leave(self, body: Body) -> None:
         """Free the slot of a body."""
         heapq.heappush(self._free[body.asset], body.index)

@@ -7,6 +7,8 @@ import warnings
 import weakref
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from functools import cached_property
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
@@ -14,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.assets import SoftBodyAsset
 from taichi_soft.body import Body, Floats, Floats32, require_buffer, require_built
-from taichi_soft.checks import as_count, as_flag, as_number, as_vector
+from taichi_soft.checks import as_count, as_flag, as_number, as_path, as_vector
 from taichi_soft.colliders import Collider, Colliders
 from taichi_soft.constants import ALL_GROUPS, GRAVITY_EARTH, POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.contact import DEFAULT_CONTACT, Contact
@@ -35,6 +37,7 @@ from taichi_soft.errors import (
 )
 from taichi_soft.events import Event, EventLog, Listener, Witness
 from taichi_soft.failures import FailedStep, Failure, find_failure
+from taichi_soft.handles import Handle, Handles, recorded
 from taichi_soft.kernels.evaluate import compute_body_forces
 from taichi_soft.kernels.plasticity import read_rest_inverses
 from taichi_soft.kernels.program import Program
@@ -44,6 +47,7 @@ from taichi_soft.kernels.sleep import wake_body
 from taichi_soft.kernels.spawn import despawn_body, spawn_body
 from taichi_soft.materials import AnyMaterial
 from taichi_soft.meshing import BodyMesh
+from taichi_soft.plain import digest_of
 from taichi_soft.plasticity import RIGID_ROW, Plasticity
 from taichi_soft.pools import Pools
 from taichi_soft.queries import (
@@ -57,10 +61,12 @@ from taichi_soft.queries import (
     find_in_box,
     find_in_sphere,
 )
+from taichi_soft.recorder import Recorder, save_recording
 from taichi_soft.runtime import init
 from taichi_soft.scene import BodyArrays, BodyDescription, Ranges, Scene
 from taichi_soft.settings import Settings
 from taichi_soft.shapes import PlaneShape, Shape
+from taichi_soft.snapshot import restore_snapshot, state_hash, structure_of, take_snapshot
 from taichi_soft.stability import StableStep, stable_step
 from taichi_soft.state import ASLEEP, FROZEN, Capacity, State, acquire, fill, release
 from taichi_soft.tearing import Tearing, Tears
@@ -78,7 +84,7 @@ _PLAIN = {float, int, np.float64, type(None)}
 """Types whose values can be compared with those of the last step."""
 
 
-class World:
+class World(Handle):
     """Soft bodies under gravity, above a floor. SI units, z is up.
 
     Args:
@@ -98,6 +104,9 @@ class World:
         sleep_speed: bodies of which no particle was faster [m/s] for half a second, nor any of a body that
             they may touch, fall asleep, until something comes near or is done to them; 0 for never.
         collider_room: colliders that may be added after `build`, beside those added before.
+        record: steps that a flight recorder keeps, with all calls between them; 0 keeps nothing. See
+            `save_recording`.
+        record_to: file that it writes when a body freezes, the first time that this happens.
     Raises: OptionError for a value out of range or a name that is not known.
     """
 
@@ -115,6 +124,8 @@ class World:
         soft_contact: bool = False,
         sleep_speed: float = 0.0,
         collider_room: int = 0,
+        record: int = 0,
+        record_to: str | Path = "frozen.recording",
     ) -> None:
         downwards = as_vector(gravity, "gravity", "m/s^2")
         downwards.flags.writeable = False
@@ -130,6 +141,9 @@ class World:
         )
         if self._is_implicit and self.settings.schedule is Schedule.FLAT:
             raise OptionError("schedule 'flat' has no implicit_euler: it takes 'per_body' or 'auto'")
+        self._handles, self._serial = Handles(), 0
+        self._record, self._record_to = as_count(record, "record", 0), as_path(record_to)
+        self._built_with: list[str] = []  # shapes of colliders that came before `build`, by digest
         self._colliders = Colliders()
         self._collider_room = as_count(collider_room, "collider_room", 0)
         self._soft_contact = as_flag(soft_contact, "soft_contact")
@@ -282,6 +296,7 @@ class World:
         for _ in range(number):
             self._add_slot(asset)
 
+    @recorded
     def spawn(
         self,
         asset: SoftBodyAsset,
@@ -308,6 +323,7 @@ class World:
         rows = asset.placed(position, rotation, velocity, angular_velocity, self.settings.floor)
         return self._enter(asset, rows)
 
+    @recorded
     def despawn(self, body: Body) -> None:
         """Take a body out of the world: its slot is free, and its handle dead.
 
@@ -354,6 +370,7 @@ class World:
     def _take_in(self, asset: SoftBodyAsset) -> Body:
         """A handle to what is in the next free slot of an asset."""
         body = Body(self, self._pools.next_slot(asset), asset)
+        self._handles.enlist(body)
         self._pools.enter(body)
         if self._tears is not None:
             self._tears.watch(body)
@@ -369,6 +386,7 @@ class World:
         """The floor where there are colliders, from `build` on: to read what bodies do to it."""
         return self._floor_collider
 
+    @recorded
     def add_collider(
         self,
         shape: Shape,
@@ -401,7 +419,7 @@ class World:
                 "the world was built without colliders: add one before build(), or make the world with "
                 "collider_room"
             )
-        return self._colliders.add(
+        collider = self._colliders.add(
             shape,
             position=position,
             rotation=rotation,
@@ -411,6 +429,8 @@ class World:
             group=group,
             mask=mask,
         )
+        self._handles.enlist(collider)
+        return collider
 
     def build(self) -> None:
         """Move all bodies into Taichi fields and fix the kernels. Starts Taichi if nobody has.
@@ -422,6 +442,7 @@ class World:
         if not self._pools.slots:
             raise StateError("the world is empty: call add_body or reserve before build")
         device = init()
+        self._built_with = [digest_of(handle.shape) for handle in self._colliders.all_handles]
         kinds = self._pools.kinds
         models = list(dict.fromkeys(asset.description.model for asset in kinds))
         has_contact = (
@@ -502,6 +523,8 @@ class World:
             self._tears = Tears(state, len(self._pools.slots))
             for body in self.bodies:
                 self._tears.watch(body)
+        if self._record:
+            self._handles.recorder = Recorder(self, self._record)
 
     def _warm_up(self, state: State) -> None:
         """A body that comes and goes, so that nothing compiles where the first does in the game."""
@@ -596,6 +619,8 @@ class World:
             warnings.warn(loss, DroppedEventsWarning, stacklevel=2)
         if self._tears is not None:
             self._tears.tear(self)
+        if self._handles.recorder is not None:
+            reports += self._handles.recorder.note_step(self, seconds, count, is_broken=bool(reports))
         if reports:
             warnings.warn("; ".join(reports), FrozenBodyWarning, stacklevel=2)
         if troubled and self._is_implicit:
@@ -671,6 +696,7 @@ class World:
     def _is_asleep(self, body: Body) -> bool:
         return self._state is not None and int(self._state.body_status[body.index]) == ASLEEP
 
+    @recorded
     def wake(self) -> None:
         """Wake all bodies that sleep."""
         self._wake(-1)
@@ -679,6 +705,7 @@ class World:
         if self._has_contact and self._sleep_speed > 0.0:
             wake_body(self._state, slot)
 
+    @recorded
     def add_frame(self, position: ArrayLike = (0.0, 0.0, 0.0), rotation: ArrayLike | None = None) -> Frame:
         """A place that the engine moves, to attach bodies to; at any time.
 
@@ -687,8 +714,11 @@ class World:
             rotation: matrix (3, 3) or quaternion (x, y, z, w).
         Raises: OptionError for bad numbers.
         """
-        return Frame(self._frames, position, rotation)
+        frame = Frame(self._frames, position, rotation)
+        self._handles.enlist(frame)
+        return frame
 
+    @recorded
     def grab(
         self,
         origin: ArrayLike,
@@ -713,6 +743,7 @@ class World:
             return None
         return hit.body.grab(hit.triangle, hit.barycentrics, frequency=frequency, max_force=max_force)
 
+    @recorded
     def apply_radial_impulse(self, center: ArrayLike, impulse: float, radius: float) -> None:
         """Push all bodies away from a point: an explosion.
 
@@ -727,6 +758,7 @@ class World:
         """
         apply_radial_impulse(self, center, impulse, radius)
 
+    @recorded
     def set_wind(self, velocity: ArrayLike | None, *, density: float = 1.2, drag: float = 1.0) -> None:
         """Let air move over the surfaces of all bodies, from now on.
 
@@ -911,6 +943,53 @@ class World:
             StateError before `build`.
         """
         return find_in_box(self._built, self._pools.slots, center, size, rotation)
+
+    def snapshot(self) -> bytes:
+        """The whole state between two steps, to `restore` it here or in a world that was built alike.
+
+        Bodies, colliders, frames, grabs and attachments, the wind, materials that were set, and all that is
+        going to act in the coming step are in it; a force field and events are not. It holds numbers only, no
+        code. The first call compiles, some seconds at most.
+        Raises: StateError before `build`, and where a body was cut or torn.
+        """
+        return take_snapshot(self)
+
+    def restore(self, data: bytes) -> None:
+        """Go back to a state of `snapshot`: what follows is the same, bit for bit, given the same calls.
+
+        Handles of what the state has stay valid, or become so again; handles of what it has not are dead, as
+        if that had been removed. For what it has and nobody holds a handle to, `bodies` and `colliders` have
+        new ones. A force field stays as it is.
+        Raises: SnapshotError for what is damaged, or of a world that was built of other things, with the
+            first that differs; OptionError for what is not bytes; StateError before `build`.
+        """
+        restore_snapshot(self, data)
+        if self._handles.recorder is not None:
+            self._handles.recorder.begin_again(self)
+
+    def state_hash(self) -> str:
+        """A name of the state, 16 hexadecimal digits: the same in two worlds that are in step.
+
+        Made of step count, positions, velocities, pins, who lives, sleeps or is frozen, colliders, frames and
+        grabs; the same for any number of threads.
+        Raises: StateError before `build`.
+        """
+        return state_hash(self)
+
+    def save_recording(self, path: str | Path) -> Path:
+        """Write what was done in the last `record` steps or more, and the snapshot before them, to a file.
+
+        `taichi-soft replay FILE` makes it again anywhere, bit by bit on a machine like this one. The file
+        holds the assets and shapes as well, and the accelerations that a force field gave, but no code.
+        Returns: the path.
+        Raises: StateError without `record` or before `build`; SnapshotError where the file cannot be written.
+        """
+        require_built(self.is_built)
+        return save_recording(self, path)
+
+    @cached_property
+    def _structure(self) -> bytes:
+        return structure_of(self)
 
     @property
     def _built(self) -> State:

@@ -12,7 +12,7 @@ ROOT = Path(__file__).parents[1]
 # a neighbour on its line. Names without a prefix are parts of taichi_soft. Those not written yet are allowed.
 LAYERS = """
     errors  constants
-    types  runtime  checks
+    types  runtime  checks  handles  sealed
     math
     materials  meshing  settings  contact  plasticity
     laws  collision
@@ -20,15 +20,18 @@ LAYERS = """
     state  integrators
     kernels
     forces  shapes
-    stability  failures  colliders  control  queries  events  snapshot  cutting
+    plain
+    stability  failures  colliders  control  queries  events  cutting
     tearing
     body  assets  pools
+    snapshot
+    recorder
     world
     taichi_soft
     render
     engine_adapter
     stages  scenery
-    film  profiling  drops
+    film  profiling  drops  replay
     cli
     __main__
     demos
@@ -41,7 +44,7 @@ LEVEL = {name: level for level, line in enumerate(LAYERS.split("\n")) for name i
 NO_TAICHI = ("errors", "constants", "types", "checks", "materials", "meshing", "contact", "plasticity")
 """Parts that are tested in milliseconds: numpy only."""
 
-FACES = ("render", "stages", "scenery", "film", "profiling", "drops", "cli", "__main__")
+FACES = ("render", "stages", "scenery", "film", "profiling", "drops", "replay", "cli", "__main__")
 """Parts of taichi_soft that lie above its public names."""
 
 

@@ -11,13 +11,14 @@ from taichi_soft.checks import as_flag
 from taichi_soft.control.access import change, require_substeps, rows_of, some_particles
 from taichi_soft.control.frames import Frame
 from taichi_soft.errors import OptionError, StateError
+from taichi_soft.handles import Handle, recorded
 from taichi_soft.kernels.pins import attach_particles, free_particles, read_reaction, write_feeling
 
 if TYPE_CHECKING:
     from taichi_soft.body import Body
 
 
-class Attachment:
+class Attachment(Handle):
     """Particles of a body held by a frame. Made by `Body.attach`."""
 
     def __init__(self, body: Body, particles: NDArray[np.int32], frame: Frame, *, two_way: bool) -> None:
@@ -50,6 +51,7 @@ class Attachment:
         """The same force's torque about the frame's origin, (3,) [N m]. Raises: as `force`."""
         return self._load()[3:]
 
+    @recorded
     def release(self) -> None:
         """Let the particles go, with the velocity that they had. Raises: StateError if it was done before."""
         self._require_attached()
@@ -81,6 +83,7 @@ def attach(body: Body, particles: ArrayLike, frame: Any, two_way: bool) -> Attac
     vertices = some_particles(body, particles)
     if not isinstance(frame, Frame) or frame._frames is not body._world._frames:
         raise OptionError(f"frame must come from add_frame of the same world, got {frame!r}")
+    frame._require_alive()
     feels = as_flag(two_way, "two_way")
     require_unattached(body, vertices)
     rows = rows_of(body, vertices)
@@ -91,6 +94,7 @@ def attach(body: Body, particles: ArrayLike, frame: Any, two_way: bool) -> Attac
     change(body, attach_particles, body.index, frame._number, int(feels), rows, local)
     body._world._frames.has_work = True
     attachment = Attachment(body, vertices, frame, two_way=feels)
+    body._handles.enlist(attachment)
     body._attachments.append(attachment)
     return attachment
 

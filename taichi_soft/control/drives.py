@@ -94,5 +94,13 @@ def push_by_field(world: World, field: ForceField) -> None:
             if not np.abs(found).max() < LARGEST_PUSH:
                 raise OptionError(f"the force field must stay below {LARGEST_PUSH:g} m/s^2")
             rows.append((body, found.astype(np.float32)))
+    push_bodies(rows)
+    recorder = world._handles.recorder
+    if recorder is not None:
+        recorder.pushes = [(body._serial, accelerations) for body, accelerations in rows]
+
+
+def push_bodies(rows: list[tuple[Body, Any]]) -> None:
+    """Push bodies throughout the coming step, vertex by vertex: accelerations float32 (n, 3) [m/s^2]."""
     for body, accelerations in rows:
         change(body, add_pushes, body.index, accelerations)

@@ -12,6 +12,7 @@ from taichi_soft.constants import GRAVITY_EARTH
 from taichi_soft.control.access import change, numbers, require_substeps, rows_of
 from taichi_soft.control.patches import patch_round
 from taichi_soft.errors import MeshError, OptionError, StateError
+from taichi_soft.handles import Handle, recorded
 from taichi_soft.kernels.grabs import end_grab, read_grab_force, write_grab, write_grab_target
 from taichi_soft.state import MOST_GRABS
 
@@ -25,7 +26,7 @@ HIGHEST_SPEED = 50.0
 """[m/s] at which a grab still pulls the body along: faster than any hand."""
 
 
-class Grab:
+class Grab(Handle):
     """A hand on a body. Made by `Body.grab` and `World.grab`."""
 
     def __init__(self, body: Body, number: int, point: NDArray[np.float64]) -> None:
@@ -55,6 +56,7 @@ class Grab:
         self.body._world._read_all(read_grab_force, self._number, found)
         return found
 
+    @recorded
     def move(self, point: ArrayLike) -> None:
         """Pull to `point`, (3,) [m], from now on. Raises: StateError once released."""
         target = as_vector(point, "point", "m")
@@ -62,6 +64,7 @@ class Grab:
         change(self.body, write_grab_target, self._number, numbers(target))
         self._point = target
 
+    @recorded
     def release(self) -> None:
         """Let go. Raises: StateError if it was done before."""
         self._require_held()
@@ -109,4 +112,5 @@ def grab_at(
     rows, shares = rows_of(body, patch.vertices), patch.shares.astype(np.float32)
     change(body, write_grab, free, body.index, rows_of(body, corners), row, rows, shares)
     grabs[free] = Grab(body, free, target)
+    body._handles.enlist(grabs[free])
     return grabs[free]

@@ -28,8 +28,7 @@ def set_material(body: Body, material: Any) -> None:
             f"got {type(material).__name__}"
         )
     fit_model(before.model, before.mesh, material)
-    description = replace(before, material=material)
-    change(body, _write_constants, body, description)
+    change(body, write_constants, body, replace(before, material=material))
 
 
 def set_damping(body: Body, damping: Any) -> None:
@@ -37,7 +36,7 @@ def set_damping(body: Body, damping: Any) -> None:
     set_material(body, replace(body.material, damping=damping))
 
 
-def _write_constants(state: State, body: Body, description: BodyDescription) -> None:
+def write_constants(state: State, body: Body, description: BodyDescription) -> None:
     """Not a kernel, but called like one: what a body is made of lies in several fields."""
     arrays = rearrange(body._world._scene.bodies[body.index], description)
     place = body._world._redescribe(body, description, arrays)

@@ -1,11 +1,14 @@
 """Worlds with one small body."""
 
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from taichi_soft import Material, World, box, load_mesh
+
+sys.path.insert(0, str(Path(__file__).parent))  # for `random_play`
 
 ASSETS = Path(__file__).parents[2] / "assets"
 

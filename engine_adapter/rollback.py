@@ -1,0 +1,62 @@
+"""Going back a few steps, to make them again with inputs that came late."""
+
+from __future__ import annotations
+
+from taichi_soft import OptionError, StateError, World
+from taichi_soft.checks import as_count
+
+
+class Rollback:
+    """Snapshots of the last steps of a world.
+
+        rollback = Rollback(world, ticks=30)
+        while running:
+            if late_input is not None:
+                rollback.rewind_to(late_input.step)
+                # and the inputs and steps from there on once more, up to now
+            rollback.save()
+            apply_inputs()
+            world.step(dt, substeps)
+
+    Args:
+        world: built.
+        ticks: how many steps it is possible to go back, 1 or more. Each takes the size of a snapshot.
+    Raises: OptionError for what is no world or no count; StateError if the world is not built.
+    """
+
+    def __init__(self, world: World, ticks: int) -> None:
+        if not isinstance(world, World):
+            raise OptionError(f"world must be a taichi_soft.World, got {type(world).__name__}")
+        if not world.is_built:
+            raise StateError("the world is not built: call world.build() before Rollback(world, ticks)")
+        self._world = world
+        self._ticks = as_count(ticks, "ticks")
+        self._snapshots: dict[int, bytes] = {}  # by the world's step count, ascending
+
+    @property
+    def steps(self) -> tuple[int, ...]:
+        """Step counts that it is possible to go back to, ascending."""
+        return tuple(self._snapshots)
+
+    def save(self) -> None:
+        """Keep the state as it is now: between a step and the inputs of the next."""
+        now = self._world.step_count
+        self._snapshots.pop(now, None)
+        self._snapshots[now] = self._world.snapshot()
+        while len(self._snapshots) > self._ticks + 1:  # the present one is not a step back
+            del self._snapshots[next(iter(self._snapshots))]
+
+    def rewind_to(self, step: int) -> None:
+        """Put the world back to where `save` was called at that step count; what was saved later is dropped.
+
+        Raises: OptionError for a step that is not among `steps`, with nothing changed.
+        """
+        wanted = as_count(step, "step", 0)
+        if wanted not in self._snapshots:
+            kept = f"{self.steps[0]} to {self.steps[-1]}" if self._snapshots else "none yet"
+            raise OptionError(
+                f"step {wanted} is not kept (kept: {kept}): save more ticks, or rewind less far"
+            )
+        self._world.restore(self._snapshots[wanted])
+        for later in [each for each in self._snapshots if each > wanted]:
+            del self._snapshots[later]

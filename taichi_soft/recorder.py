@@ -1,0 +1,196 @@
+"""The flight recorder: the calls and steps of the last ticks, and the snapshot before them.
+
+A recording holds at least as many ticks as were asked for, and less than twice as many: a snapshot is taken
+every so many ticks, and the last two stretches are kept. It is plain data, with the assets and shapes that it
+needs, so that `replay` can build the world again anywhere.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.assets import SoftBodyAsset
+from taichi_soft.checks import as_path
+from taichi_soft.errors import SnapshotError, StateError
+from taichi_soft.handles import Handle
+from taichi_soft.plain import as_plain, digest_of, from_json, plain_of, to_json
+from taichi_soft.sealed import seal, unseal
+from taichi_soft.shapes import Shape
+from taichi_soft.snapshot import asset_digest
+
+if TYPE_CHECKING:
+    from taichi_soft.world import World
+
+MARK, VERSION = b"TSOFTREC", 1
+
+Pushes = list[tuple[int, NDArray[np.float32]]]
+"""Of a force field in one step: bodies by their serial numbers, accelerations (n, 3) [m/s^2]."""
+
+
+@dataclass
+class _Stretch:
+    """A snapshot, and what was done since."""
+
+    snapshot: bytes
+    entries: list[list[Any]] = field(default_factory=list)  # calls and steps
+    steps: int = 0
+
+
+class Recorder:
+    """Takes notes of what is done to one world."""
+
+    def __init__(self, world: World, ticks: int) -> None:
+        """Begins now, with a built world."""
+        self._ticks = ticks
+        self._before: _Stretch | None = None
+        self._present = _Stretch(world.snapshot())
+        self._is_inside = False
+        self._has_written = False
+        self.pushes: Pushes = []  # of a force field in the coming step
+
+    def call(
+        self, method: Callable[..., Any], handle: Handle, arguments: tuple[Any, ...], options: dict[str, Any]
+    ) -> Any:
+        """Make a call and note it, unless it is refused or another one makes it."""
+        if self._is_inside:
+            return method(handle, *arguments, **options)
+        kept = [[_kept(each) for each in arguments], {name: _kept(each) for name, each in options.items()}]
+        self._is_inside = True
+        try:
+            found = method(handle, *arguments, **options)
+        finally:
+            self._is_inside = False
+        self._present.entries.append(["call", handle._serial, method.__name__, *kept])
+        return found
+
+    def note_step(self, world: World, seconds: float, substeps: int, *, is_broken: bool) -> list[str]:
+        """Note a step that was made, and the name of the state after it; write all where a body froze in it.
+
+        Returns: what to tell the user.
+        """
+        pushes = [[serial, rows] for serial, rows in self.pushes]
+        self.pushes = []
+        self._present.entries.append(["step", seconds, substeps, world.state_hash(), pushes])
+        self._present.steps += 1
+        told = [self._write(world)] if is_broken and not self._has_written else []
+        # Of bodies that were cut there is no snapshot: what led to them is kept until they are gone.
+        if self._present.steps >= self._ticks and not any(body.is_cut for body in world.bodies):
+            self._before, self._present = self._present, _Stretch(world.snapshot())
+        return told
+
+    def _write(self, world: World) -> str:
+        self._has_written = True
+        try:
+            file = save_recording(world, world._record_to)
+        except SnapshotError as error:
+            return f"no recording: {error}"
+        return f"`taichi-soft replay {file}` shows how it came to that"
+
+    def begin_again(self, world: World) -> None:
+        """What was done before `World.restore` leads nowhere."""
+        self._before, self._present = None, _Stretch(world.snapshot())
+
+    def content(self, world: World) -> bytes:
+        """The recording as it stands."""
+        first = self._before or self._present
+        entries = [*(self._before.entries if self._before else []), *self._present.entries]
+        shapes = {name: plain_of(shape) for name, shape in world._colliders.shapes.items()}
+        assets = {asset_digest(asset): asset for asset in world._pools.kinds}
+        made_of = {
+            "world": _world_options(world),
+            "slots": [asset_digest(asset) for asset in world._pools.assets],
+            "assets": {name: _asset_options(asset) for name, asset in assets.items()},
+            "shapes": shapes,
+            "built_with": world._built_with,
+            "entries": [[as_plain(each) for each in entry[:3]] + _plain(entry[3:]) for entry in entries],
+        }
+        return seal(MARK, VERSION, [zlib.compress(to_json(made_of), 1), first.snapshot])
+
+
+def save_recording(world: World, path: Any) -> Path:
+    """As `World.save_recording`."""
+    recorder = world._handles.recorder
+    file = as_path(path)
+    if recorder is None:
+        raise StateError("this world records nothing: make it with World(record=240)")
+    content = recorder.content(world)
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_bytes(content)
+    except OSError as error:
+        raise SnapshotError(f"cannot write {str(file)!r}: {error.strerror or error}") from None
+    return file
+
+
+def read_recording(path: Any) -> tuple[dict[str, Any], bytes]:
+    """What the world was made of and what was done, and the snapshot before. Raises: SnapshotError."""
+    file = as_path(path)
+    try:
+        data = file.read_bytes()
+    except OSError as error:
+        raise SnapshotError(f"cannot read {str(file)!r}: {error.strerror or error}") from None
+    parts = unseal(data, MARK, VERSION, "recording")
+    try:
+        content, snapshot = parts
+        made_of = from_json(zlib.decompress(content))
+    except (ValueError, zlib.error):
+        raise SnapshotError("this recording is not in order") from None
+    return made_of, bytes(snapshot)
+
+
+def _world_options(world: World) -> dict[str, Any]:
+    """Arguments of `World`, beside what the snapshot holds."""
+    chosen = world.settings
+    names = ("restitution", "friction", "integrator", "tolerance", "most_iterations", "schedule", "floor")
+    return {
+        **{name: as_plain(getattr(chosen, name)) for name in names},
+        "gravity": chosen.gravity.tolist(),
+        "soft_contact": world._soft_contact,
+        "sleep_speed": world._sleep_speed,
+        "collider_room": world._collider_room,
+    }
+
+
+def _asset_options(asset: SoftBodyAsset) -> dict[str, Any]:
+    """Arguments of `SoftBodyAsset`."""
+    names = ("law", "strain", "flips", "damping_model", "spare_vertices")
+    return {
+        "mesh": plain_of(asset.mesh),
+        "material": plain_of(asset.material),
+        "pinned": asset.description.pinned.tolist(),
+        "contact": as_plain(asset.contact),
+        "plasticity": as_plain(asset.plasticity),
+        "tearing": None if asset.tearing is None else [float(asset.tearing.stress), asset.tearing.most],
+        **{name: as_plain(getattr(asset, name)) for name in names},
+    }
+
+
+def _kept(value: Any) -> Any:
+    """A copy of an argument that nobody changes any more."""
+    if isinstance(value, np.ndarray):
+        return value.copy()
+    if isinstance(value, (list, tuple)):
+        return [_kept(each) for each in value]
+    return value
+
+
+def _plain(value: Any) -> Any:
+    """An argument as plain data; handles by number, assets and shapes by their digests."""
+    if isinstance(value, Handle):
+        return {"handle": value._serial}
+    if isinstance(value, SoftBodyAsset):
+        return {"part": asset_digest(value)}
+    if isinstance(value, Shape):
+        return {"part": digest_of(value)}
+    if isinstance(value, (list, tuple)):
+        return [_plain(each) for each in value]
+    if isinstance(value, dict):
+        return {"options": {name: _plain(each) for name, each in value.items()}}
+    return as_plain(value)

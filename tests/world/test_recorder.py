@@ -1,0 +1,181 @@
+"""Flight recordings: written when a body freezes or on request, and made again from the file alone."""
+
+import numpy as np
+import pytest
+from random_play import DT, SUBSTEPS, make_world, play
+
+from taichi_soft import (
+    FrozenBodyWarning,
+    Material,
+    OptionError,
+    SnapshotError,
+    SoftBodyAsset,
+    StateError,
+    World,
+    box,
+)
+from taichi_soft.cli import main
+from taichi_soft.recorder import MARK, VERSION, read_recording
+from taichi_soft.replay import replay
+from taichi_soft.sealed import seal
+
+
+@pytest.fixture(scope="module")
+def game(tmp_path_factory):
+    """A world that records, 70 ticks into a random game, and its recording."""
+    world, cube = make_world(record=30)
+    play(world, cube, 70, seed=21)
+    path = world.save_recording(tmp_path_factory.mktemp("recording") / "sub" / "game.recording")
+    return world, path
+
+
+@pytest.fixture(scope="module")
+def broken(tmp_path_factory):
+    """A body breaks in step 12, and another later: what the world wrote by itself, its failure, and
+    whether the second was written over the first."""
+    path = tmp_path_factory.mktemp("frozen") / "it.recording"
+    # Not in a world with soft contact, whose search looks all over the place that such a body takes up.
+    world = World(record=5, record_to=path)
+    for x in (0.0, 2.0):
+        world.add_body(box(cells=(1, 1, 1)), Material(1e5, 0.2, 1000.0, 20.0), position=(x, 0, 0.6))
+    world.build()
+    world.set_force_field(lambda positions, time: np.full_like(positions, 0.3) * np.sin(9 * time))
+    for _ in range(12):
+        world.step(DT, SUBSTEPS)
+    assert not path.exists()
+    body, other = world.bodies
+    tear_to_pieces(body)
+    with pytest.warns(FrozenBodyWarning, match=r"taichi-soft replay .*it.recording"):
+        world.step(DT, SUBSTEPS)
+    first, name = path.read_bytes(), world.state_hash()
+    tear_to_pieces(other)
+    with pytest.warns(FrozenBodyWarning):
+        world.step(DT, SUBSTEPS)
+    return path, body.failure, name, path.read_bytes() == first
+
+
+def tear_to_pieces(body):
+    fast = 9e3 * np.where(np.arange(body.vertex_count) % 2, 1, -1)
+    body.set_motion(body.positions(), fast[:, None] * np.ones(3))
+
+
+def test_a_random_game_is_made_again_bit_by_bit(game, tmp_path):
+    world, path = game
+    report = replay(path)
+    assert 30 <= report.steps < 60
+    assert report.first_difference is None
+    assert report.world.state_hash() == world.state_hash()
+    assert report.world.step_count == 70
+
+
+def test_a_frozen_body_writes_what_led_to_it(broken, tmp_path):
+    path, failure, name, _ = broken
+    report = replay(path, tmp_path / "end.png")
+    assert report.first_difference is None
+    assert report.failures == (failure,)
+    assert failure.tetrahedron is not None
+    assert report.steps >= 5
+    assert report.world.state_hash() == name
+    assert (tmp_path / "end.png").stat().st_size > 1000
+
+
+def test_the_command_tells_what_broke_and_draws_it(broken, tmp_path, capsys):
+    path, failure, _, _ = broken
+    picture = tmp_path / "moment.png"
+    with pytest.raises(SystemExit) as ended:
+        main("replay", str(path), "--out", str(picture))
+    assert ended.value.code in (0, None)
+    out = capsys.readouterr().out
+    assert "every state is the same" in out
+    assert f"tetrahedron {failure.tetrahedron} broke first" in out
+    assert picture.exists()
+
+
+def test_only_the_first_freeze_is_written(broken):
+    assert broken[3]
+
+
+def test_after_a_restore_the_recording_begins_again(game, tmp_path):
+    world, _ = game
+    data = world.snapshot()
+    world.bodies[0].apply_impulse((0, 0, 5))
+    world.step(DT, SUBSTEPS)
+    world.restore(data)
+    world.bodies[0].apply_impulse((5, 0, 0))
+    world.step(DT, SUBSTEPS)
+    report = replay(world.save_recording(tmp_path / "again.recording"))
+    assert (report.steps, report.first_difference) == (1, None)
+    assert report.world.state_hash() == world.state_hash()
+
+
+def test_refused_calls_are_not_recorded(game, tmp_path):
+    world, _ = game
+    body = world.bodies[0]
+    with pytest.raises(OptionError):
+        body.apply_impulse((0, 0, np.nan))
+    body.apply_impulse((0, 0, 1))
+    world.step(DT, SUBSTEPS)
+    made_of, _ = read_recording(world.save_recording(tmp_path / "calls.recording"))
+    calls = [entry for entry in made_of["entries"] if entry[:3] == ["call", body._serial, "apply_impulse"]]
+    assert calls[-1][3] == [[0, 0, 1]]
+
+
+def test_arguments_are_kept_as_they_were(game, tmp_path):
+    world, _ = game
+    push = np.array([0.0, 0.0, 3.0])
+    world.bodies[0].apply_impulse(push)
+    push[:] = 7.0
+    world.step(DT, SUBSTEPS)
+    report = replay(world.save_recording(tmp_path / "kept.recording"))
+    assert report.first_difference is None
+
+
+def test_damaged_and_foreign_recordings_are_refused(game, tmp_path):
+    _, path = game
+    data = path.read_bytes()
+    bad = tmp_path / "bad.recording"
+    for at in (0, 9, 20, 60, len(data) // 2, len(data) - 1):
+        changed = bytearray(data)
+        changed[at] ^= 1
+        bad.write_bytes(changed)
+        with pytest.raises(SnapshotError):
+            replay(bad)
+    for content in (b"", data[:-1], data[:50], seal(MARK, VERSION, [b"?", b""]), seal(MARK, VERSION, [])):
+        bad.write_bytes(content)
+        with pytest.raises(SnapshotError):
+            replay(bad)
+    with pytest.raises(SnapshotError, match="cannot read"):
+        replay(tmp_path / "nowhere.recording")
+
+
+def test_a_recording_asks_for_recorded_calls_only(game, tmp_path):
+    """However it was made, a file calls nothing but what a recorder notes."""
+    import zlib
+
+    from taichi_soft.plain import to_json
+
+    _, path = game
+    made_of, snapshot = read_recording(path)
+    for serial, name in ((0, "save_recording"), (0, "_change"), (1, "__init__"), (10**6, "pin")):
+        made_of["entries"] = [["call", serial, name, [str(tmp_path / "evil")], {"options": {}}]]
+        bad = tmp_path / "bad.recording"
+        bad.write_bytes(seal(MARK, VERSION, [zlib.compress(to_json(made_of)), snapshot]))
+        with pytest.raises(SnapshotError, match="no call that is recorded"):
+            replay(bad)
+    assert not (tmp_path / "evil").exists()
+
+
+def test_bad_options_are_refused(tmp_path):
+    for bad in (-1, 2.5, True):
+        with pytest.raises(OptionError):
+            World(record=bad)
+    with pytest.raises(OptionError):
+        World(record=3, record_to=5)
+    with pytest.raises(StateError, match="build"):
+        World(record=3).save_recording(tmp_path / "x")
+    world = World()
+    asset = SoftBodyAsset(box(cells=(1, 1, 1)), Material(1e5, 0.2, 1000.0, 20.0))
+    world.reserve(asset, 1)
+    world.build()
+    with pytest.raises(StateError, match="records nothing"):
+        world.save_recording(tmp_path / "x")

@@ -1,0 +1,427 @@
+"""Snapshots: what comes back, bit by bit; what is refused, with nothing changed."""
+
+import json
+import warnings
+
+import numpy as np
+import pytest
+from random_play import DT, SUBSTEPS, make_world, play
+
+from taichi_soft import (
+    FrozenBodyWarning,
+    Material,
+    OptionError,
+    Plasticity,
+    SnapshotError,
+    SoftBodyAsset,
+    SpringMaterial,
+    StateError,
+    World,
+    box,
+    rope,
+)
+from taichi_soft.sealed import seal, unseal
+from taichi_soft.snapshot import MARK, VERSION
+
+
+@pytest.fixture(scope="module")
+def twins():
+    """Two worlds in the middle of the same game."""
+    found = [make_world() for _ in range(2)]
+    for world, cube in found:
+        play(world, cube, 60, seed=5)
+    return found
+
+
+@pytest.fixture
+def played(twins):
+    """One of them, put back after the test."""
+    world, cube = twins[0]
+    data = world.snapshot()
+    yield world, cube
+    world.restore(data)
+
+
+@pytest.fixture(scope="module")
+def small():
+    """Two cubes without anything else."""
+    world = World()
+    for x in (0.0, 2.0):
+        world.add_body(box(cells=(1, 1, 1)), Material(1e5, 0.2, 1000.0, 20.0), position=(x, 0, 1.5))
+    world.build()
+    return world
+
+
+def readings(world):
+    """What a user reads."""
+    bodies = world.bodies
+    return [
+        *(body.positions().tobytes() + body.velocities().tobytes() for body in bodies),
+        *((body.index, body.is_frozen, body.is_asleep, body.pinned.tolist()) for body in bodies),
+        *(each.position.tolist() for each in world.colliders),
+        *((each.impulse.tolist(), each.angular_impulse.tolist()) for each in world.colliders),
+        *(grab.force.tolist() for _, grab in sorted(world._grabs.items())),
+        *(a.force.tolist() for body in bodies for a in body._attachments if a.two_way),
+        *(world.read_positions(body, 0.25).tobytes() for body in bodies),
+        (world.step_count, world.time, world.last_dt),
+    ]  # fmt: skip
+
+
+def test_everything_that_can_be_read_comes_back(played):
+    world, cube = played
+    data, before, name = world.snapshot(), readings(world), world.state_hash()
+    play(world, cube, 15, seed=6)
+    assert readings(world) != before
+    world.restore(data)
+    assert readings(world) == before
+    assert world.state_hash() == name
+    assert world.snapshot() == data
+
+
+def test_a_world_with_the_same_history_has_the_same_hash(twins):
+    assert twins[0][0].state_hash() == twins[1][0].state_hash()
+
+
+def test_another_world_goes_on_from_a_snapshot(played, twins):
+    world, cube = played
+    play(world, cube, 15, seed=7)
+    late, its_cube = twins[1]
+    late.restore(world.snapshot())
+    assert readings(late) == readings(world)
+    assert play(late, its_cube, 20, seed=8) == play(world, cube, 20, seed=8)
+
+
+def test_the_hash_changes_with_the_state(small):
+    names = {small.state_hash()}
+    small.step(DT, SUBSTEPS)
+    names.add(small.state_hash())
+    body = small.bodies[1]
+    small.bodies[0].apply_impulse((0, 0, 1e-2), [7])
+    names.add(small.state_hash())
+    body.pin([3])
+    names.add(small.state_hash())
+    body.set_gravity_scale(1.001)
+    names.add(small.state_hash())
+    assert len(names) == 5
+    assert all(len(name) == 16 and int(name, 16) >= 0 for name in names)
+
+
+def tidy(world):
+    """Leave one body, free, and the first colliders."""
+    for _, grab in sorted(world._grabs.items()):
+        grab.release()
+    for body in world.bodies[1:]:
+        world.despawn(body)
+    for attachment in list(world.bodies[0]._attachments):
+        attachment.release()
+    for collider in world.colliders[3:]:
+        collider.remove()
+
+
+def test_handles_of_what_the_state_has_live_and_others_die(played):
+    world, cube = played
+    tidy(world)
+    first = world.bodies[0]
+    frame = world.add_frame()
+    attachment = first.attach([0, 1], frame)
+    grab = first.grab(0)
+    data = world.snapshot()
+    attachment.release()
+    grab.release()
+    world.despawn(first)
+    later = world.spawn(cube, position=(3, 0, 2))
+    sphere = world.colliders[0]
+    sphere.remove()
+    late_frame = world.add_frame()
+    late_grab = later.grab(0)
+    late_hold = later.attach([3], late_frame)
+    world.restore(data)
+    assert first.is_alive
+    assert first is world.bodies[0]
+    assert grab.is_held
+    assert attachment.is_attached
+    assert sphere.is_alive
+    assert sphere in world.colliders
+    grab.move((0, 0, 2))
+    attachment.release()
+    assert not later.is_alive
+    with pytest.raises(StateError, match="removed"):
+        later.positions()
+    with pytest.raises(StateError, match="not in the state that was restored"):
+        late_frame.move_to((0, 0, 0))
+    assert not late_frame.is_alive
+    with pytest.raises(StateError):
+        late_grab.move((0, 0, 0))
+    assert not late_hold.is_attached
+    world.step(DT, SUBSTEPS)
+
+
+def test_a_new_handle_where_nobody_holds_one(played):
+    world, cube = played
+    tidy(world)
+    body = world.spawn(cube, position=(3, 0, 2))
+    slot, place = body.index, body.positions()
+    data = world.snapshot()
+    world.despawn(body)
+    del body
+    world.restore(data)
+    found = next(each for each in world.bodies if each.index == slot)
+    assert (found.positions() == place).all()
+    world.despawn(found)
+
+
+def test_a_frozen_body_and_its_failure_come_back(small):
+    body = small.bodies[0]
+    sound, name = small.snapshot(), small.state_hash()
+    body.set_motion(body.positions(), np.full((8, 3), 9e3) * np.where(np.arange(8) % 2, 1, -1)[:, None])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FrozenBodyWarning)
+        while not body.is_frozen:
+            small.step(DT, 1)
+    failure, frozen = body.failure, small.snapshot()
+    assert failure.tetrahedron is not None
+    small.restore(sound)
+    assert not body.is_frozen
+    assert body.failure is None
+    assert small.state_hash() == name
+    small.step(DT, SUBSTEPS)
+    small.restore(frozen)
+    assert body.is_frozen
+    assert body.failure == failure
+
+
+def test_materials_that_were_set_come_back(small):
+    body, other = small.bodies
+    before = body.material
+    body.set_material(Material(3e5, 0.1, 800.0, 5.0))
+    mass = body.masses.sum()
+    data = small.snapshot()
+    small.step(DT, SUBSTEPS)
+    after = small.state_hash()
+    body.set_material(before)
+    other.set_damping(1.0)
+    small.restore(data)
+    assert (body.material.young, body.material.density) == (3e5, 800.0)
+    assert body.masses.sum() == mass
+    assert other.material.damping == 20.0
+    small.step(DT, SUBSTEPS)
+    assert small.state_hash() == after
+    assert np.isclose(mass, 800.0)
+
+
+@pytest.mark.parametrize("integrator", ["implicit_euler", "lazy_leapfrog"])
+def test_other_integrators_go_on_the_same(integrator):
+    world = World(integrator=integrator)
+    world.add_body(box(cells=(2, 2, 2)), Material(1e5, 0.2, 1000.0, 20.0), position=(0, 0, 0.52))
+    world.build()
+    for _ in range(10):
+        world.step(DT, 6)
+    data = world.snapshot()
+
+    def run():
+        found = []
+        for _ in range(10):
+            world.step(DT, 6)
+            found.append(world.state_hash())
+        return found
+
+    expected = run()
+    world.restore(data)
+    assert run() == expected
+
+
+def every_part(data):
+    """One position in each part of a snapshot: mark, version, lengths, structure, notes, words, checksum."""
+    structure, notes, words = unseal(data, MARK, VERSION, "snapshot")
+    at = [0, 9, 13, 20, 30]
+    begin = 16 + 24
+    for part in (structure, notes, words):
+        at += [begin, begin + len(part) // 2, begin + len(part) - 1]
+        begin += len(part)
+    return [*at, len(data) - 16, len(data) - 1]
+
+
+def refused(world, data, match=None):
+    """A restore that raises SnapshotError and changes nothing."""
+    name, before = world.state_hash(), world.snapshot()
+    with pytest.raises(SnapshotError, match=match):
+        world.restore(data)
+    assert world.state_hash() == name
+    assert world.snapshot() == before
+
+
+def test_a_damaged_byte_anywhere_is_refused(small):
+    data = small.snapshot()
+    for at in every_part(data):
+        for bit in (0, 7):
+            bad = bytearray(data)
+            bad[at] ^= 1 << bit
+            refused(small, bytes(bad))
+
+
+def test_what_is_cut_off_or_longer_is_refused(small):
+    data = small.snapshot()
+    for length in (0, 1, 15, 31, 100, len(data) // 2, len(data) - 1):
+        refused(small, data[:length])
+    refused(small, data + b"\0")
+    with pytest.raises(OptionError, match="must be bytes"):
+        small.restore("snapshot")
+
+
+def other_worlds():
+    jelly, firm = Material(1e5, 0.2, 1000.0, 20.0), Material(2e5, 0.2, 1000.0, 20.0)
+    mesh = box(cells=(1, 1, 1))
+    yield "another count", [(mesh, jelly, {})], {}, "bodies"
+    yield "another material", [(mesh, jelly, {}), (mesh, firm, {})], {}, "body 1"
+    yield "another mesh", [(box((1, 1, 1.5), cells=(1, 1, 1)), jelly, {}), (mesh, jelly, {})], {}, "body 0"
+    yield "another law", [(mesh, jelly, {}), (mesh, jelly, {"law": "face"})], {}, "body 1"
+    yield "another gravity", [(mesh, jelly, {})] * 2, {"gravity": (0, 0, -1.0)}, "gravity"
+    yield "another integrator", [(mesh, jelly, {})] * 2, {"integrator": "lazy_leapfrog"}, "integrator"
+
+
+@pytest.mark.parametrize(("bodies", "options", "what"), [case[1:] for case in other_worlds()])
+def test_the_snapshot_of_another_world_is_refused_with_what_differs(small, bodies, options, what):
+    world = World(**options)
+    for i, (mesh, material, more) in enumerate(bodies):
+        world.add_body(mesh, material, position=(2 * i, 0, 1.5), **more)
+    world.build()
+    refused(small, world.snapshot(), what)
+
+
+def forged(data, change):
+    """A snapshot with a right checksum of what somebody made up."""
+    structure, notes, words = unseal(data, MARK, VERSION, "snapshot")
+    content, rows = json.loads(bytes(notes)), np.frombuffer(words, "<i4").copy()
+    change(content, rows)
+    return seal(MARK, VERSION, [bytes(structure), json.dumps(content).encode(), rows.tobytes()])
+
+
+def set_note(*path, to):
+    def change(content, rows):
+        for key in path[:-1]:
+            content = content[key]
+        content[path[-1]] = to
+
+    return change
+
+
+def set_word(at, to):
+    def change(content, rows):
+        rows[at] = to
+
+    return change
+
+
+# From behind: wind (4), grabs (16), five words for each of the two bodies.
+@pytest.mark.parametrize(
+    "change",
+    [
+        set_note("bodies", to=[]),
+        set_note("bodies", 0, to=None),
+        set_note("bodies", 0, to=[1, 2]),
+        set_note("bodies", 0, 3, to={"kind": "Material"}),
+        set_note("bodies", 0, 3, to={"kind": "os.system"}),
+        set_note("bodies", 0, 4, to=[[9, 0, False, [0]]]),
+        set_note("steps", to="many"),
+        set_note("grabs", to=[[9, 99, 0, [0, 0, 0]]]),
+        set_note("grabs", to=[[9, 0, 0, [0, 0, 0]]]),
+        set_note("frames", to=[1, 2, 3]),
+        set_note("colliders", to=[[9, True, "none", 0, [0, 0, 0, 1, 1], [], None]]),
+        set_word(0, np.float32(np.nan).view(np.int32)),
+        set_word(0, np.float32(1e30).view(np.int32)),
+        set_word(14, 77),
+        set_word(-4 - 16, 99),
+        set_word(-4 - 16 - 10, 9),
+    ],
+)
+def test_what_is_whole_but_makes_no_sense_is_refused(small, change):
+    refused(small, forged(small.snapshot(), change))
+
+
+def test_it_is_no_call_before_build():
+    world = World()
+    for call in (world.snapshot, world.state_hash, lambda: world.restore(b"")):
+        with pytest.raises(StateError, match="build"):
+            call()
+
+
+def test_a_rope_goes_on_the_same():
+    world = World()
+    world.add_body(
+        rope(1.0, 8, mass=0.4), SpringMaterial(500.0, 0.2), law="springs", position=(0, 0, 2), pinned=[0]
+    )
+    world.build()
+    data = world.snapshot()
+    world.step(DT, 20)
+    name = world.state_hash()
+    world.restore(data)
+    world.step(DT, 20)
+    assert world.state_hash() == name
+
+
+def test_an_asset_made_again_is_the_same():
+    """A late player builds the world from the same numbers, not from the same objects."""
+    names = []
+    for number in (1000.0, 1000):
+        world = World()
+        asset = SoftBodyAsset(box(cells=(1, 1, 1)), Material(1e5, 0.2, number, 20))
+        world.reserve(asset, 1)
+        world.build()
+        world.spawn(asset, position=(0, 0, 1))
+        names.append(world.snapshot())
+    world.restore(names[0])
+
+
+@pytest.fixture(scope="module")
+def bendable():
+    """A world of one body that can be bent for good and cut, and an empty slot."""
+    asset = SoftBodyAsset(
+        box(cells=(2, 2, 2)),
+        Material(1e5, 0.2, 1000.0, 20.0),
+        plasticity=Plasticity(yield_strain=0.02),
+        spare_vertices=30,
+    )
+    world = World()
+    world.reserve(asset, 2)
+    world.build()
+    world.spawn(asset, position=(0, 0, 0.6))
+    for _ in range(30):
+        world.step(DT, SUBSTEPS)
+    return world
+
+
+def test_rest_shapes_come_back(bendable):
+    body = bendable.bodies[0]
+    data, bent, before = bendable.snapshot(), body.plastic_strains(), bendable.state_hash()
+    assert bent.max() > 0.0
+
+    def throw():
+        body.apply_impulse((0, 0, -4000.0))
+        for _ in range(10):
+            bendable.step(DT, SUBSTEPS)
+        return bendable.state_hash()
+
+    thrown = throw()
+    assert (body.plastic_strains() != bent).any()
+    bendable.restore(data)
+    assert bendable.state_hash() == before
+    assert (body.plastic_strains() == bent).all()
+    assert throw() == thrown
+    bendable.restore(data)
+
+
+def test_no_snapshot_of_a_cut_body_but_back_to_the_whole_one(bendable):
+    body = bendable.bodies[0]
+    data, before, count = bendable.snapshot(), bendable.state_hash(), body.vertex_count
+    bendable.step(DT, SUBSTEPS)
+    expected = bendable.state_hash()
+    (fallen,) = body.cut(plane=(body.center_of_mass(), (1, 0, 0)))
+    with pytest.raises(StateError, match="was cut"):
+        bendable.snapshot()
+    bendable.step(DT, SUBSTEPS)
+    bendable.restore(data)
+    assert (body.is_cut, body.vertex_count, fallen.is_alive) == (False, count, False)
+    assert bendable.state_hash() == before
+    bendable.step(DT, SUBSTEPS)
+    assert bendable.state_hash() == expected
+    bendable.restore(data)
