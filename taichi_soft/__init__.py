@@ -65,6 +65,7 @@ from taichi_soft.meshing import (
     voronoi_graph,
     voxels,
 )
+from taichi_soft.plasticity import Plasticity
 from taichi_soft.queries import ClosestPoint, Overlap, Pose, RayHit, RayHits
 from taichi_soft.runtime import Device, device, init
 from taichi_soft.settings import Settings
@@ -78,6 +79,7 @@ from taichi_soft.shapes import (
     SphereShape,
 )
 from taichi_soft.stability import StableStep, stable_step
+from taichi_soft.tearing import Tearing
 from taichi_soft.world import World
 
 __all__ = [
@@ -114,6 +116,7 @@ __all__ = [
     "Overlap",
     "ParticleMesh",
     "PlaneShape",
+    "Plasticity",
     "Pose",
     "RayHit",
     "RayHits",
@@ -129,6 +132,7 @@ __all__ = [
     "StressExceeded",
     "TaichiSoftError",
     "TearCandidates",
+    "Tearing",
     "TetMesh",
     "UnstableStepWarning",
     "VideoError",

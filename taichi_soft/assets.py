@@ -8,16 +8,18 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.checks import as_indices, as_rotation, as_vector
+from taichi_soft.checks import as_count, as_indices, as_rotation, as_vector
 from taichi_soft.constants import POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.contact import DEFAULT_CONTACT, THIN, Contact
-from taichi_soft.errors import OptionError
-from taichi_soft.laws import element_model, fit_model
+from taichi_soft.errors import MaterialError, OptionError
+from taichi_soft.laws import ElementModel, element_model, fit_model
 from taichi_soft.materials import AnyMaterial
 from taichi_soft.meshing import BodyMesh
 from taichi_soft.meshing.arrays import read_only
+from taichi_soft.plasticity import Plasticity
 from taichi_soft.scene import BodyArrays, BodyDescription, arrange, require_size
 from taichi_soft.stability import StableStep, stable_step
+from taichi_soft.tearing import Tearing
 from taichi_soft.types import DampingModel, Flips, Strain
 
 Floats = NDArray[np.float64]
@@ -40,6 +42,12 @@ class SoftBodyAsset:
         damping_model: "edge" (eq. 3.9) or "tet_mean" (which section 6.4 rejects: it stops rotation).
         pinned: vertices that stay where they are.
         contact: how its surface touches others, in a world with colliders or soft contact.
+        spare_vertices: how many copies of vertices there is room for where `Body.cut` splits them; 0 for a
+            body that is not cut. Takes laws that look at tetrahedra. A cut through a body of n vertices needs
+            about n^(2/3).
+        plasticity: how it is bent for good; None for never. Takes laws that look at tetrahedra, and a
+            `Material`.
+        tearing: where it tears by itself, into its spare vertices; None for nowhere. Takes a `Material`.
     Raises: MeshError, MaterialError or OptionError for bad input.
     """
 
@@ -52,6 +60,9 @@ class SoftBodyAsset:
     damping_model: str | DampingModel = DampingModel.EDGE
     pinned: ArrayLike = ()
     contact: Contact = DEFAULT_CONTACT
+    plasticity: Plasticity | None = None
+    spare_vertices: int = 0
+    tearing: Tearing | None = None
     description: BodyDescription = field(init=False)
 
     def __post_init__(self) -> None:
@@ -59,12 +70,37 @@ class SoftBodyAsset:
         model = fit_model(model, self.mesh, self.material)
         if not isinstance(self.contact, Contact):
             raise OptionError(f"contact must be a Contact, got {self.contact!r}")
+        as_count(self.spare_vertices, "spare_vertices", 0)
+        if self.spare_vertices and model.has_bonds:
+            raise OptionError(f"law {self.law!r} cannot be cut: it looks at edges, 'virial' at tetrahedra")
+        if self.tearing is not None:
+            self._require_tears(model)
+        if self.plasticity is not None:
+            self._require_flow(model)
         pinned = read_only(as_indices(self.pinned, "pinned", len(self.mesh.vertices)))
         require_size(self.mesh)
         description = BodyDescription(self.mesh, self.material, model, pinned)
         _ = description.bonds  # made now, because a pairwise law may refuse the mesh
         object.__setattr__(self, "pinned", pinned)
         object.__setattr__(self, "description", description)
+
+    def _require_tears(self, model: ElementModel) -> None:
+        if not isinstance(self.tearing, Tearing):
+            raise OptionError(f"tearing must be a Tearing or None, got {self.tearing!r}")
+        if self.spare_vertices == 0:
+            raise OptionError("tearing takes spare_vertices: a tear makes copies of vertices")
+        if model.is_anisotropic:
+            raise MaterialError("an AnisotropicMaterial takes no tearing: its strength has directions too")
+
+    def _require_flow(self, model: ElementModel) -> None:
+        if not isinstance(self.plasticity, Plasticity):
+            raise OptionError(f"plasticity must be a Plasticity or None, got {self.plasticity!r}")
+        if model.has_bonds:
+            raise OptionError(
+                f"law {self.law!r} takes no plasticity: it looks at edges, 'virial' at tetrahedra"
+            )
+        if model.is_anisotropic:
+            raise MaterialError("an AnisotropicMaterial takes no plasticity: it does not yield by von Mises")
 
     def __repr__(self) -> str:
         return f"SoftBodyAsset({self.mesh!r}, {self.law!r})"

@@ -22,11 +22,13 @@ from taichi_soft.control.impulses import apply_impulse, apply_impulse_at_point
 from taichi_soft.control.materials import set_damping, set_material
 from taichi_soft.control.pins import pin, pinned_vertices, set_targets, unpin
 from taichi_soft.control.placement import set_velocity, teleport
+from taichi_soft.cutting import cut
 from taichi_soft.errors import MeshError, OptionError, StateError
 from taichi_soft.events import Event, StressExceeded, TearCandidates
 from taichi_soft.failures import FailedStep, Failure
 from taichi_soft.laws.law import EnergyLaw
 from taichi_soft.materials import AnyMaterial, voigt_stress
+from taichi_soft.meshing.splitting import InnerFaces, inner_faces
 from taichi_soft.queries import Pose, best_fitting_pose
 from taichi_soft.scene import rest_inverses
 from taichi_soft.stability import StableStep
@@ -38,6 +40,7 @@ if TYPE_CHECKING:
 
 Floats32 = NDArray[np.float32]
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 
 class Body:
@@ -58,6 +61,8 @@ class Body:
         self._frozen_in: FailedStep | None = None
         self._failure: Failure | None = None
         self._attachments: list[Attachment] = []
+        self._topology_version = 0
+        self._origins: tuple[Ints, Ints] | None = None  # of vertices and tetrahedra, once it was cut
 
     def require_alive(self) -> None:
         """Raises: StateError once the body was removed."""
@@ -94,7 +99,7 @@ class Body:
 
     @property
     def mesh(self):  # type: ignore[no-untyped-def]
-        """The rest shape, as added."""
+        """The rest shape, as added, or as cuts have left it."""
         return self._description.mesh
 
     @property
@@ -123,6 +128,66 @@ class Body:
             raise MeshError(f"body {self.index} has no tetrahedra: it is made of particles and edges only")
 
     @property
+    def is_held(self) -> bool:
+        """Whether it is attached to a frame or grabbed."""
+        grabs = self._world._grabs.values()
+        return bool(self._attachments) or any(grab.body is self for grab in grabs)
+
+    @property
+    def topology_version(self) -> int:
+        """How often its vertices and tetrahedra have changed: where this does, read `surface` again."""
+        return self._topology_version
+
+    @property
+    def is_cut(self) -> bool:
+        """Whether it is no longer what its asset says, but what cuts have left."""
+        return self._origins is not None
+
+    @cached_property
+    def _inner_faces(self) -> InnerFaces:
+        return inner_faces(self.tets)
+
+    @property
+    def vertex_origins(self) -> Ints:
+        """The vertex of the asset's mesh that each vertex is, or is a copy of, (n,)."""
+        return np.arange(self.vertex_count) if self._origins is None else self._origins[0]
+
+    @property
+    def tet_origins(self) -> Ints:
+        """The tetrahedron of the asset's mesh that each one is, (m,)."""
+        return np.arange(len(self.tets)) if self._origins is None else self._origins[1]
+
+    def _become(self, vertex_origins: Ints, tet_origins: Ints) -> None:
+        """Take note of what a cut has left of the asset's mesh."""
+        self._origins = vertex_origins, tet_origins
+        self._topology_version += 1
+        for name in ("_first_rest_inverses", "_inner_faces"):
+            self.__dict__.pop(name, None)
+
+    def cut(
+        self,
+        *,
+        plane: tuple[ArrayLike, ArrayLike] | None = None,
+        triangle: ArrayLike | None = None,
+    ) -> tuple[Body, ...]:
+        """Cut the body along the faces of tetrahedra next to a plane or a triangle, as it is now.
+
+        A face opens where the blade passes between the centres of its two tetrahedra. Vertices keep their
+        numbers, copies come behind them; mass, momentum and elastic energy stay. What falls off becomes
+        bodies of the same asset, which take free slots of its pool; the largest part stays this one. In a
+        part, vertices and tetrahedra are counted anew in their order: `vertex_origins` tells what they were.
+        Args:
+            plane: (point (3,) [m], normal (3,)), all through the body.
+            triangle: corners, (3, 3) [m]; the cut ends where it ends.
+        Returns: the bodies that fell off, the largest first; none where nothing does.
+        Raises: OptionError for a blade without direction or area and for a body whose asset has no
+            `spare_vertices`; StateError where room or slots run out, for a body that is frozen, grabbed or
+            attached, and before `build`.
+            Nothing is changed then.
+        """
+        return cut(self, plane, triangle)
+
+    @property
     def masses(self) -> Floats:
         """Mass of each vertex, (n,) [kg]."""
         return self._description.masses
@@ -133,8 +198,15 @@ class Body:
         return pinned_vertices(self) if self._world.is_built else self._description.pinned
 
     @cached_property
-    def _rest_inverses(self) -> Floats:
+    def _first_rest_inverses(self) -> Floats:
         return rest_inverses(self.mesh)
+
+    @property
+    def _rest_inverses(self) -> Floats:
+        """A^-1 of each tetrahedron at rest as it is now, (m, 3, 3) [1/m]."""
+        if self.asset.plasticity is None or not self._world.is_built:
+            return self._first_rest_inverses
+        return self._world._rest_inverses(self)
 
     @property
     def stable_step(self) -> StableStep:
@@ -152,7 +224,7 @@ class Body:
             attachment.release()
         for grab in [each for each in self._world._grabs.values() if each.body is self]:
             grab.release()
-        if self._description is not self.asset.description:
+        if self._description is not self.asset.description and not self.is_cut:
             set_material(self, self.asset.material)
 
     @property
@@ -425,7 +497,11 @@ class Body:
         return strain, voigt_stress(self.material.stiffness_matrices(len(self.tets)), strain)
 
     def deformations(self) -> Floats:
-        """Deformation gradient F = B A^-1 of each tetrahedron (thesis eq. 6.3), (m, 3, 3)."""
+        """Deformation gradient F = B A^-1 of each tetrahedron (thesis eq. 6.3), (m, 3, 3).
+
+        Of a body with plasticity the elastic one, against the rest shape as it is now. So are all strains and
+        stresses.
+        """
         self._require_tets()
         corners = self.positions().astype(np.float64)[self.tets]
         return np.asarray(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2) @ self._rest_inverses)
@@ -434,6 +510,14 @@ class Body:
         """Linear strain 1/2 (F F^T - I) of each tetrahedron (thesis eq. 6.7), (m, 3, 3)."""
         F = self.deformations()
         return np.asarray(0.5 * (F @ np.swapaxes(F, 1, 2) - np.eye(3)))
+
+    def plastic_strains(self) -> Floats:
+        """Equivalent (von Mises) logarithmic strain that each tetrahedron has for good, (m,)."""
+        self.require_alive()
+        self._require_tets()
+        flowed = np.linalg.inv(self._rest_inverses) @ self._first_rest_inverses  # Fp
+        stretches = np.linalg.svd(flowed, compute_uv=False)
+        return np.asarray(np.sqrt(2.0 / 3.0) * np.linalg.norm(np.log(stretches), axis=1))
 
     def tet_stress(self) -> Floats:
         """Von Mises stress of each tetrahedron by Hooke's law and linear strain, (m,) [Pa]."""

@@ -257,3 +257,36 @@ def profile(
     for title, table in report.tables(found):
         _say(f"\n[bold]{escape(title)}[/]")  # not the table's own title, which breaks at the table's width
         console.print(table)
+
+
+@app.command()
+def drop_test(
+    cases: Annotated[int, typer.Option(min=1, max=100_000, help="How many random cases.")] = 1000,
+    seed: Annotated[int, typer.Option(min=0, help="Of all random numbers.")] = 0,
+    first: Annotated[int, typer.Option(min=0, help="Number of the first case: repeats it alone.")] = 0,
+    law: Annotated[str, typer.Option(help="Force law.")] = "virial",
+    flips: Annotated[
+        str | None, typer.Option(help="tolerant, recover or off; the law's own by default.")
+    ] = None,
+    worst: Annotated[int, typer.Option(min=0, help="Failed cases to list of each kind.")] = 5,
+    as_json: AsJson = False,
+    arch: Arch = "auto",
+    threads: Threads = None,
+) -> None:
+    """Drop random bodies onto random courses and count what breaks; exit code 1 where anything did."""
+    init(arch, threads)
+    from taichi_soft.drops import Summary, make_case, run_cases
+
+    columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
+    with Progress(*columns, console=errors, disable=not errors.is_terminal) as progress:
+        numbers = range(first, first + cases)
+        chosen = [make_case(seed, n, law, flips) for n in progress.track(numbers, description="making")]
+        outcomes = list(progress.track(run_cases(chosen), total=cases, description="dropping"))
+    summary = Summary(tuple(outcomes))
+    if as_json:
+        print(json.dumps(summary.rows(), indent=2))
+    else:
+        for line in summary.lines(worst):
+            _say(escape(line))
+    if summary.failed:
+        raise typer.Exit(1)

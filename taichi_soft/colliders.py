@@ -41,6 +41,11 @@ class _Row:
     target: tuple[Floats, Floats] | None = None  # pose at the end of the next step
     is_alive: bool = True
 
+    @property
+    def skin(self) -> float:
+        """How far outside of the shape its surface is felt [m]."""
+        return self.thickness + self.shape.seam
+
 
 class Collider:
     """A handle to one collider. What it does to bodies it does through its surface: friction, restitution."""
@@ -265,7 +270,7 @@ class Colliders:
         fill(contact.collider_parameters, np.array([r.shape.parameters for r in rows]))
         fill(contact.collider_resolution, np.array([r.shape.resolution for r in rows]))
         fill(contact.collider_offset, np.array([r.offset for r in rows]))
-        fill(contact.collider_surface, np.array([(r.friction, r.restitution, r.thickness) for r in rows]))
+        fill(contact.collider_surface, np.array([(r.friction, r.restitution, r.skin) for r in rows]))
         fill(contact.collider_filter, np.array([(r.group, r.mask) for r in rows]))
 
     def moved(self, row: _Row) -> None:
@@ -326,7 +331,7 @@ def _way(row: _Row, dt: float) -> tuple[Floats, Floats, Floats]:
         places = radius * np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]])
     start, end = row.position + places, row.position + dt * row.velocity + places
     both = np.concatenate([start, end])
-    fastest = np.array([speed + spin * (radius + row.thickness)])
-    lowest: Floats = both.min(axis=0) - row.thickness
-    highest: Floats = both.max(axis=0) + row.thickness
+    fastest = np.array([speed + spin * (radius + row.skin)])
+    lowest: Floats = both.min(axis=0) - row.skin
+    highest: Floats = both.max(axis=0) + row.skin
     return lowest, highest, fastest

@@ -39,6 +39,10 @@ class Pools:
         self.assets.append(asset)
         self.slots.append(None)
 
+    def free_slots(self, asset: SoftBodyAsset) -> list[int]:
+        """Where the next bodies of an asset go, in that order."""
+        return sorted(self._free[asset])
+
     def next_slot(self, asset: SoftBodyAsset) -> int:
         """Where the next body of an asset goes. Raises: StateError where it has no slot, or no free one."""
         free = self._free.get(asset)

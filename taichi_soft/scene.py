@@ -134,7 +134,7 @@ class BodyArrays:
 
 @dataclass
 class Ranges:
-    """Where the body's rows lie in the world's flat arrays."""
+    """Where the body's rows lie in the world's flat arrays, with the room for those that cuts will add."""
 
     particles: tuple[int, int] = (0, 0)
     edges: tuple[int, int] = (0, 0)
@@ -168,29 +168,60 @@ class Scene:
         """Whether any body has a pairwise law."""
         return any(body.bonds is not None for body in self.bodies)
 
-    def append(self, body: BodyArrays) -> None:
-        """Give `body` the next free rows."""
+    @property
+    def ends(self) -> Ranges:
+        """Where the next body would lie, without any rows."""
+        return Ranges(
+            (self.particle_count,) * 2,
+            (self.edge_count,) * 2,
+            (self.edge_block_count,) * 2,
+            (self.block_count,) * 2,
+            (self.ring_count,) * 2,
+            (self.triangle_count,) * 2,
+            (self.outer_count,) * 2,
+        )
+
+    def append(self, body: BodyArrays, spare_vertices: int = 0) -> None:
+        """Give `body` the next free rows, and room for copies of its vertices."""
         blocks = -(-len(body.tet_vertices) // LANES)
         rings = 0 if body.bonds is None else len(body.bonds.members)
+        particles, edges, edge_blocks, triangles, outer = room_of(body, spare_vertices)
         self.ranges.append(
             Ranges(
-                (self.particle_count, self.particle_count + len(body.mass)),
-                (self.edge_count, self.edge_count + len(body.edge_vertices)),
-                (self.edge_block_count, self.edge_block_count + len(body.edge_blocks)),
+                (self.particle_count, self.particle_count + particles),
+                (self.edge_count, self.edge_count + edges),
+                (self.edge_block_count, self.edge_block_count + edge_blocks),
                 (self.block_count, self.block_count + blocks),
                 (self.ring_count, self.ring_count + rings),
-                (self.triangle_count, self.triangle_count + len(body.triangles)),
-                (self.outer_count, self.outer_count + len(body.outer)),
+                (self.triangle_count, self.triangle_count + triangles),
+                (self.outer_count, self.outer_count + outer),
             )
         )
         self.bodies.append(body)
-        self.particle_count += len(body.mass)
-        self.edge_count += len(body.edge_vertices) + LANES
-        self.edge_block_count += len(body.edge_blocks)
+        self.particle_count += particles
+        self.edge_count += edges + LANES
+        self.edge_block_count += edge_blocks
         self.block_count += blocks
         self.ring_count += rings
-        self.triangle_count += len(body.triangles)
-        self.outer_count += len(body.outer)
+        self.triangle_count += triangles
+        self.outer_count += outer
+
+
+def room_of(body: BodyArrays, spare_vertices: int) -> tuple[int, int, int, int, int]:
+    """Rows of particles, edges, blocks of edges, triangles and outer particles for a body and its copies.
+
+    A cut has some three edges, and on either side two triangles, for each vertex that it goes through, and up
+    to twice as many where it is small and ends inside (Euler's formula).
+    """
+    if spare_vertices == 0:
+        exact = body.mass, body.edge_vertices, body.edge_blocks, body.triangles, body.outer
+        particles, edges, blocks, triangles, outer = (len(rows) for rows in exact)
+        return particles, edges, blocks, triangles, outer
+    particles = len(body.mass) + spare_vertices
+    edges = len(body.edge_vertices) + 6 * spare_vertices
+    # Every block but the last of a particle is full.
+    blocks = (edges + (LANES - 1) * particles) // LANES
+    return particles, edges, blocks, len(body.triangles) + 12 * spare_vertices, particles
 
 
 def outer_vertices(mesh: BodyMesh) -> Ints:
@@ -233,10 +264,37 @@ def arrange(description: BodyDescription) -> BodyArrays:
     mesh = description.mesh
     order = spatial_order(mesh.vertices)
     tets = tet_order(mesh.tets, order) if len(mesh.tets) else np.zeros(0, dtype=np.int32)
-    new_index = renumbered(order)
-    edges = new_index[mesh.edges]
+    edges = renumbered(order)[mesh.edges]
     if description.model.has_simple_edges:  # whose ends are alike; others have a direction from i to j
         edges = _led_by_owners(np.sort(edges, axis=1), len(order))
+    return _in_order(description, order, tets, edges)
+
+
+def arrange_part(
+    description: BodyDescription, before: BodyArrays, vertices: NDArray[np.int64], tets: NDArray[np.int64]
+) -> BodyArrays:
+    """Put what a cut has left of a body into the order that the body had: copies come behind their originals.
+
+    Args:
+        vertices, tets: which of the body before each one is, or is a copy of.
+    """
+    mesh, rank = description.mesh, before.rank[vertices]
+    order = np.argsort(rank, kind="stable").astype(np.int32)
+    ends = rank[mesh.edges].astype(np.int64)
+    # An edge is led by the same end as before.
+    count = len(before.rank)
+    old = np.sort(before.edge_vertices, axis=1).astype(np.int64) @ [count, 1]
+    by_key = np.argsort(old)
+    place = by_key[np.searchsorted(old[by_key], np.sort(ends, axis=1) @ [count, 1])]
+    is_led = ends[:, 0] == before.edge_vertices[place, 0]
+    edges = renumbered(order)[np.where(is_led[:, None], mesh.edges, mesh.edges[:, ::-1])]
+    tet_order = np.argsort(renumbered(before.tet_order)[tets]).astype(np.int32)
+    return _in_order(description, order, tet_order, edges)
+
+
+def _in_order(description: BodyDescription, order: Ints, tets: Ints, edges: Ints) -> BodyArrays:
+    """A body whose particles and tetrahedra come in these orders, and whose edges are turned as given."""
+    mesh, new_index = description.mesh, renumbered(order)
     edge_order = np.lexsort((edges[:, 1], edges[:, 0])).astype(np.int32)
     return BodyArrays(
         order=order,

@@ -45,6 +45,7 @@ class Capacity:
     implicit: bool = False  # room for the linear system of implicit integration
     anisotropic: bool = False  # room for 21 elastic constants per tetrahedron
     contact: ContactCapacity = _NO_CONTACT
+    plastic: bool = False  # room for the first rest shapes of bodies that can be bent for good
     double: bool = False  # float64 instead of float32: to evaluate forces, not to move
 
     @classmethod
@@ -55,6 +56,7 @@ class Capacity:
         parallel: bool = False,
         implicit: bool = False,
         contact: ContactCapacity = _NO_CONTACT,
+        plastic: bool = False,
         double: bool = False,
     ) -> "Capacity":
         """Room for `scene`."""
@@ -70,8 +72,14 @@ class Capacity:
             implicit,
             any(body.stiffness.any() for body in scene.bodies),
             contact,
+            plastic,
             double,
         )
+
+    @property
+    def has_contact(self) -> bool:
+        """Whether there are fields of contact."""
+        return self.contact != _NO_CONTACT
 
 
 def _power_of_two(count: int, least: int) -> int:
@@ -109,6 +117,9 @@ class State:
 
         self.tet_vertices = ti.field(ti.i32, b * 4 * LANES)
         self.tet_rest_inverse = ti.field(real, b * 9 * LANES)  # [1/m], column by column
+        if capacity.plastic:
+            self.tet_original_inverse = ti.field(real, b * 9 * LANES)  # the same before any plastic flow
+            self.body_plasticity = ti.Vector.field(4, real, bodies)  # see `Plasticity.row`
         self.tet_lame = ti.field(real, b * 2 * LANES)  # [Pa]
         if capacity.anisotropic:
             self.tet_stiffness = ti.field(real, b * 21 * LANES)  # [Pa], upper triangle row by row
@@ -181,7 +192,7 @@ class State:
         self.patch_particle = ti.field(ti.i32, MOST_GRABS * PATCH_ROWS)
         self.patch_share = ti.field(real, MOST_GRABS * PATCH_ROWS)
 
-        if capacity.contact != _NO_CONTACT:
+        if capacity.has_contact:
             self.contact = ContactFields(capacity.contact, n, bodies)
         if capacity.contact.soft:
             self.soft = SoftContactFields(n, bodies, capacity.outer, capacity.triangles)
@@ -197,40 +208,38 @@ class State:
         """
         ranges = scene.ranges
         bodies = scene.bodies
-        mass = np.concatenate([body.mass for body in bodies])
-        position = np.concatenate([body.rest_position for body in bodies])
+        position = _laid_out(scene, "particles", lambda b: b.rest_position)
         fill(self.particle_position, position)
         fill(self.prev_position, position)
         fill(self.particle_velocity, np.zeros((0, 3)))
         fill(self.prev_velocity, np.zeros((0, 3)))
         fill(self.particle_force, np.zeros((0, 4)))
-        fill(self.particle_mass, mass)
-        inv_mass = 1.0 / mass
+        fill(self.particle_mass, _laid_out(scene, "particles", lambda b: b.mass))
+        inv_mass = _laid_out(scene, "particles", lambda b: 1.0 / b.mass)
         for body, place in zip(bodies, ranges, strict=True):
             inv_mass[body.pinned + place.particles[0]] = 0.0
         fill(self.particle_inv_mass, inv_mass)
         fill(self.particle_aim, np.zeros(0))
-        fill(self.particle_body, np.repeat(np.arange(len(bodies)), [len(body.mass) for body in bodies]))
-
-        ranks = [b.rank + r.particles[0] for b, r in zip(bodies, ranges, strict=True)]
-        fill(self.particle_of_vertex, np.concatenate(ranks))
+        fill(self.particle_body, np.repeat(np.arange(len(bodies)), [np.diff(r.particles)[0] for r in ranges]))
+        fill(self.particle_of_vertex, _laid_out(scene, "particles", lambda b: b.rank, "particles"))
 
         vertices, corners = _tet_blocks(bodies, ranges)
         fill(self.tet_vertices, vertices)
-        fill(self.tet_rest_inverse, _blocks(bodies, lambda b: np.swapaxes(b.rest_inverse, 1, 2), 9))
+        inverses = _blocks(bodies, lambda b: np.swapaxes(b.rest_inverse, 1, 2), 9)
+        fill(self.tet_rest_inverse, inverses)
+        if self.capacity.plastic:
+            fill(self.tet_original_inverse, inverses)
         fill(self.tet_lame, _blocks(bodies, lambda b: b.lame, 2))
         if self.capacity.anisotropic:
             fill(self.tet_stiffness, _blocks(bodies, lambda b: b.stiffness, 21))
         fill(self.tet_damping, _blocks(bodies, lambda b: b.tet_damping, 1))
 
-        edges = np.concatenate(
-            [_with_spare_rows(b.edge_vertices) + r.particles[0] for b, r in zip(bodies, ranges, strict=True)]
-        )
+        edges = _laid_out(scene, "edges", lambda b: with_spare_rows(b.edge_vertices), "particles")
         fill(self.edge_vertices, edges)
-        fill(self.edge_blocks, _edge_blocks(bodies, ranges))
-        fill(self.edge_damping, np.concatenate([_with_spare_rows(body.edge_damping) for body in bodies]))
+        fill(self.edge_blocks, _laid_out(scene, "edge_blocks", lambda b: b.edge_blocks, "edges", columns=1))
+        fill(self.edge_damping, _laid_out(scene, "edges", lambda b: with_spare_rows(b.edge_damping)))
         if self.capacity.rings:
-            self._load_bonds(bodies, ranges)
+            self._load_bonds(scene)
         if self.capacity.rings or self.capacity.implicit:
             names = [b.tet_edges + r.edges[0] for b, r in zip(bodies, ranges, strict=True)]
             # The lanes that pad a last block pull the body's first edge with no pressure.
@@ -241,16 +250,15 @@ class State:
         if self.capacity.parallel:
             self._load_gather_lists(corners, edges, scene.particle_count)
 
-        pairs = list(zip(bodies, ranges, strict=True))
-        fill(self.triangle_vertices, np.concatenate([b.triangles + r.particles[0] for b, r in pairs]))
-        fill(self.outer_particle, np.concatenate([b.outer + r.particles[0] for b, r in pairs]))
-        fill(self.body_particles, np.array([r.particles for r in ranges]))
-        fill(self.body_triangles, np.array([r.triangles for r in ranges]))
-        fill(self.body_outer, np.array([r.outer for r in ranges]))
-        fill(self.body_edges, np.array([r.edges for r in ranges]))
-        fill(self.body_edge_blocks, np.array([r.edge_blocks for r in ranges]))
+        fill(self.triangle_vertices, _laid_out(scene, "triangles", lambda b: b.triangles, "particles"))
+        fill(self.outer_particle, _laid_out(scene, "outer", lambda b: b.outer, "particles"))
+        fill(self.body_particles, _used(scene, "particles", lambda b: b.mass))
+        fill(self.body_triangles, _used(scene, "triangles", lambda b: b.triangles))
+        fill(self.body_outer, _used(scene, "outer", lambda b: b.outer))
+        fill(self.body_edges, _used(scene, "edges", lambda b: b.edge_vertices))
+        fill(self.body_edge_blocks, _used(scene, "edge_blocks", lambda b: b.edge_blocks))
         fill(self.body_blocks, np.array([r.blocks for r in ranges]))
-        if self.capacity.contact != _NO_CONTACT:
+        if self.capacity.has_contact:
             self._load_contact(scene)
         fill(self.body_model, np.array(models))
         fill(self.body_status, np.full(len(bodies), ABSENT))
@@ -263,8 +271,7 @@ class State:
         fill(self.block_model, np.repeat(models, [r.blocks[1] - r.blocks[0] for r in ranges]))
 
     def _load_contact(self, scene: Scene) -> None:
-        pairs = list(zip(scene.bodies, scene.ranges, strict=True))
-        contact, count = self.contact, len(pairs)
+        contact, count = self.contact, len(scene.bodies)
         # What lies inside a body is never near anything.
         fill(contact.particle_clearance, np.full(scene.particle_count, np.inf))
         fill(contact.particle_touches, np.zeros(0))
@@ -278,21 +285,22 @@ class State:
             self.soft.pairs_lost[None] = 0
             fill(self.soft.pair_bodies, np.zeros((0, 2)))
             fill(self.soft.pair_impulse, np.zeros((0, 3)))
-            fill(self.soft.rest_position, np.concatenate([b.rest_position for b, _ in pairs]))
+            fill(self.soft.rest_position, _laid_out(scene, "particles", lambda b: b.rest_position))
 
-    def _load_bonds(self, bodies: list[BodyArrays], ranges: list[Ranges]) -> None:
+    def _load_bonds(self, scene: Scene) -> None:
         """What the pairwise laws know of their edges; zeros for the edges of other bodies."""
+        bodies = scene.bodies
         constants, rings, members, weights = [], [], [], []
-        for body, place in zip(bodies, ranges, strict=True):
+        for body, place, rows in zip(bodies, scene.ranges, _spans(scene, "edges"), strict=True):
             bonds = body.bonds
             if bonds is None:
-                constants.append(np.zeros((len(body.edge_vertices) + LANES, 4)))
-                rings.append(np.zeros((len(body.edge_vertices) + LANES, 2), dtype=np.int32))
+                constants.append(np.zeros((rows, 4)))
+                rings.append(np.zeros((rows, 2), dtype=np.int32))
                 continue
             names_tets = bonds.expansion_modulus is not None
             first = place.blocks[0] * LANES if names_tets else place.particles[0]
-            constants.append(_with_spare_rows(bonds.constants))
-            rings.append(_with_spare_rows(bonds.ring + place.rings[0]))
+            constants.append(with_spare_rows(bonds.constants))
+            rings.append(with_spare_rows(bonds.ring + place.rings[0]))
             members.append(bonds.members + first)
             weights.append(bonds.weights)
         fill(self.edge_bond, np.concatenate(constants))
@@ -315,16 +323,37 @@ class State:
         fill(self.particle_edges, _row_ranges(ends, count))
 
 
-def _with_spare_rows(rows: NDArray[Any]) -> NDArray[Any]:
+def with_spare_rows(rows: NDArray[Any]) -> NDArray[Any]:
     """A body's edges and `LANES` rows of zeros behind them, which lead from its first particle to itself."""
     return np.concatenate([rows, np.zeros((LANES, *rows.shape[1:]), dtype=rows.dtype)])
 
 
-def _edge_blocks(bodies: list[BodyArrays], ranges: list[Ranges]) -> NDArray[np.int32]:
-    blocks = [body.edge_blocks.copy() for body in bodies]
-    for rows, place in zip(blocks, ranges, strict=True):
-        rows[:, 0] += place.edges[0]
-    return np.concatenate(blocks)
+def _laid_out(scene: Scene, kind: str, rows_of, counted_from: str = "", columns=None):  # type: ignore[no-untyped-def]
+    """Rows of all bodies, each at the start of its range, with zeros in the room that is left.
+
+    `counted_from`: the kind of rows that the numbers in them name, which become rows of the world; in the
+    first so many `columns` where they are given.
+    """
+    parts = []
+    for body, place, span in zip(scene.bodies, scene.ranges, _spans(scene, kind), strict=True):
+        rows = np.array(rows_of(body))
+        if counted_from:
+            numbers = rows if columns is None else rows[:, :columns]
+            numbers += getattr(place, counted_from)[0]
+        parts += [rows, np.zeros((span - len(rows), *rows.shape[1:]), dtype=rows.dtype)]
+    return np.concatenate(parts)
+
+
+def _spans(scene: Scene, kind: str) -> NDArray[np.int64]:
+    """How many rows of a kind each body has for its own, used or not."""
+    starts = [getattr(place, kind)[0] for place in (*scene.ranges, scene.ends)]
+    return np.diff(starts)
+
+
+def _used(scene: Scene, kind: str, rows_of) -> NDArray[np.int64]:  # type: ignore[no-untyped-def]
+    """Which rows of its range each body uses, (bodies, 2)."""
+    starts = np.array([getattr(place, kind)[0] for place in scene.ranges])
+    return np.stack([starts, starts + [len(rows_of(body)) for body in scene.bodies]], axis=1)
 
 
 def _row_ranges(owner: NDArray[np.int64], count: int) -> NDArray[np.int64]:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.assets import SoftBodyAsset
-from taichi_soft.body import Body, Floats32, require_buffer, require_built
+from taichi_soft.body import Body, Floats, Floats32, require_buffer, require_built
 from taichi_soft.checks import as_count, as_flag, as_number, as_vector
 from taichi_soft.colliders import Collider, Colliders
 from taichi_soft.constants import ALL_GROUPS, GRAVITY_EARTH, POSITION_LIMIT, VELOCITY_LIMIT
@@ -24,6 +24,7 @@ from taichi_soft.control.drives import ForceField, push_by_field, require_field,
 from taichi_soft.control.frames import Frame, Frames
 from taichi_soft.control.grabs import Grab
 from taichi_soft.control.impulses import apply_radial_impulse
+from taichi_soft.cutting import refill_slot, warm_up
 from taichi_soft.errors import (
     DroppedEventsWarning,
     FrozenBodyWarning,
@@ -35,6 +36,7 @@ from taichi_soft.errors import (
 from taichi_soft.events import Event, EventLog, Listener, Witness
 from taichi_soft.failures import FailedStep, Failure, find_failure
 from taichi_soft.kernels.evaluate import compute_body_forces
+from taichi_soft.kernels.plasticity import read_rest_inverses
 from taichi_soft.kernels.program import Program
 from taichi_soft.kernels.readout import read_positions, read_velocities, write_motion
 from taichi_soft.kernels.schedules import Launch, choose_schedule, make_launch
@@ -42,6 +44,7 @@ from taichi_soft.kernels.sleep import wake_body
 from taichi_soft.kernels.spawn import despawn_body, spawn_body
 from taichi_soft.materials import AnyMaterial
 from taichi_soft.meshing import BodyMesh
+from taichi_soft.plasticity import RIGID_ROW, Plasticity
 from taichi_soft.pools import Pools
 from taichi_soft.queries import (
     ClosestPoint,
@@ -60,6 +63,7 @@ from taichi_soft.settings import Settings
 from taichi_soft.shapes import PlaneShape, Shape
 from taichi_soft.stability import StableStep, stable_step
 from taichi_soft.state import ASLEEP, FROZEN, Capacity, State, acquire, fill, release
+from taichi_soft.tearing import Tearing, Tears
 from taichi_soft.types import DampingModel, Flips, Integrator, Schedule, Strain
 
 SHORTEST_STEP, LONGEST_STEP = 1e-9, 1e4
@@ -142,6 +146,7 @@ class World:
         self._scene = Scene()
         self._state: State | None = None
         self._program: Program | None = None
+        self._tears: Tears | None = None
         self._launch: Launch | None = None
         self._events: EventLog | None = None
         self._frames = Frames()
@@ -212,12 +217,16 @@ class World:
         velocity: ArrayLike = (0.0, 0.0, 0.0),
         pinned: ArrayLike = (),
         contact: Contact = DEFAULT_CONTACT,
+        plasticity: Plasticity | None = None,
+        spare_vertices: int = 0,
+        tearing: Tearing | None = None,
     ) -> Body:
         """Add a body before `build`: an asset of its own, one slot for it, and a body in that.
 
         Copies, of the same mesh and material with the same options, share the asset.
         Args:
-            mesh, material, law, strain, flips, damping_model, pinned, contact: as `SoftBodyAsset` takes them.
+            mesh, material, law, strain, flips, damping_model, pinned, contact, plasticity, spare_vertices,
+                tearing: as `SoftBodyAsset` takes them.
             position, rotation, velocity: as `spawn` takes them.
         Returns: a handle.
         Raises: MeshError, MaterialError or OptionError for bad input; StateError after `build`.
@@ -232,9 +241,21 @@ class World:
             damping_model=damping_model,
             pinned=pinned,
             contact=contact,
+            plasticity=plasticity,
+            spare_vertices=spare_vertices,
+            tearing=tearing,
         )
         described = asset.description
-        key = (id(mesh), id(material), described.model, described.pinned.tobytes(), contact)
+        key = (
+            id(mesh),
+            id(material),
+            described.model,
+            described.pinned.tobytes(),
+            contact,
+            plasticity,
+            spare_vertices,
+            tearing,
+        )
         asset = self._added.get(key, asset)
         described.model.require_integrator(self.settings.integrator)
         rows = asset.placed(position, rotation, velocity, (0.0, 0.0, 0.0), self.settings.floor)
@@ -253,7 +274,7 @@ class World:
         _require_asset(asset)
         number = as_count(count, "count")
         asset.description.model.require_integrator(self.settings.integrator)
-        vertices = self._scene.particle_count + number * len(asset.mesh.vertices)
+        vertices = self._scene.particle_count + number * (len(asset.mesh.vertices) + asset.spare_vertices)
         if vertices > MOST_VERTICES:
             raise OptionError(
                 f"count is {number:,}: the world would hold {vertices:,} vertices, at most {MOST_VERTICES:,}"
@@ -315,7 +336,7 @@ class World:
         body.require_alive()
 
     def _add_slot(self, asset: SoftBodyAsset) -> None:
-        self._scene.append(asset.arrays)
+        self._scene.append(asset.arrays, asset.spare_vertices)
         self._pools.add_slot(asset)
 
     def _enter(self, asset: SoftBodyAsset, rows: Floats32) -> Body:
@@ -324,10 +345,18 @@ class World:
         if self._state is None:
             self._starts[slot] = rows
         else:
+            if self._scene.bodies[slot] is not asset.arrays:
+                refill_slot(self, self._state, slot)
             spawn_body(self._state, slot, rows)
             self._read_alpha = None
-        body = Body(self, slot, asset)
+        return self._take_in(asset)
+
+    def _take_in(self, asset: SoftBodyAsset) -> Body:
+        """A handle to what is in the next free slot of an asset."""
+        body = Body(self, self._pools.next_slot(asset), asset)
         self._pools.enter(body)
+        if self._tears is not None:
+            self._tears.watch(body)
         return body
 
     @property
@@ -402,9 +431,18 @@ class World:
         )
         if has_contact:
             self._require_contact()
+        is_cut = any(asset.spare_vertices for asset in kinds)
+        if is_cut and self.settings.schedule is Schedule.FLAT:
+            raise OptionError(
+                "schedule 'flat' cuts no bodies: take 'per_body' or 'auto', or no spare_vertices"
+            )
         schedule = choose_schedule(
-            self.settings.schedule, self._scene, device, needs_bodies=self._is_implicit or has_contact
+            self.settings.schedule,
+            self._scene,
+            device,
+            needs_bodies=self._is_implicit or has_contact or is_cut,
         )
+        is_plastic = any(asset.plasticity is not None for asset in kinds)
         capacity = Capacity.of(
             self._scene,
             parallel=schedule is Schedule.FLAT,
@@ -412,6 +450,7 @@ class World:
             contact=self._colliders.capacity(self._collider_room, soft=self._soft_contact)
             if has_contact
             else ContactCapacity(),
+            plastic=is_plastic,
         )
         program = Program(
             tuple(models),
@@ -419,6 +458,7 @@ class World:
             self.settings.floor is not None and not has_contact,
             has_contact,
             self._soft_contact,
+            is_plastic,
             device.threads,
         )
         if self.settings.integrator is Integrator.EXPLICIT_EULER:
@@ -431,6 +471,9 @@ class World:
         state = acquire(capacity)
         weakref.finalize(self, release, state)
         state.load(self._scene, [models.index(asset.description.model) for asset in self._pools.assets])
+        if is_plastic:
+            flows = [a.plasticity.row if a.plasticity else RIGID_ROW for a in self._pools.assets]
+            fill(state.body_plasticity, np.array(flows))
         self._warm_up(state)
         for slot, rows in self._starts.items():
             spawn_body(state, slot, rows)
@@ -455,11 +498,17 @@ class World:
         self._launch = make_launch(schedule, state, program, self._scene, device)
         colliders = self._colliders if has_contact else None
         self._events = EventLog(Witness(state, self._scene, self._pools.slots, colliders))
+        if any(asset.tearing for asset in kinds):
+            self._tears = Tears(state, len(self._pools.slots))
+            for body in self.bodies:
+                self._tears.watch(body)
 
     def _warm_up(self, state: State) -> None:
         """A body that comes and goes, so that nothing compiles where the first does in the game."""
         for asset in self._pools.kinds:
             slot = self._pools.assets.index(asset)
+            if asset.spare_vertices:
+                warm_up(self, state, slot)
             spawn_body(state, slot, asset.rest_rows)
             despawn_body(state, slot)
 
@@ -482,7 +531,7 @@ class World:
             )
 
     def stable_step(self, body: Body) -> StableStep:
-        """Estimate of the largest stable substep of a body; bodies of one asset share it.
+        """Estimate of the largest stable substep of a body; bodies of one asset share it until they are cut.
 
         Raises: OptionError for what is no body.
         """
@@ -499,7 +548,9 @@ class World:
         """Number of substeps that a fixed step of `dt` [s] needs, with a margin, for the stiffest asset.
 
         Of all that have slots, whether a body lives there or not: so that neither the time of a frame nor the
-        motion of the others changes where one comes or goes. 1 for implicit Euler, which needs none.
+        motion of the others changes where one comes or goes. Bodies that were cut, or given another material,
+        count with an estimate of their own after each change, which takes some 0.2 s for 5,000 tetrahedra:
+        give substeps where that is too long. 1 for implicit Euler, which needs none.
         """
         if not self._pools.slots:
             raise StateError("the world is empty: call add_body or reserve first")
@@ -507,6 +558,9 @@ class World:
             _as_step(dt)
             return 1
         longest = min(asset.stable_step.recommended for asset in self._pools.kinds)
+        for body in self.bodies:
+            if body._description is not body.asset.description:
+                longest = min(longest, self.stable_step(body).recommended)
         return max(1, math.ceil(_as_step(dt) / longest))
 
     def step(self, dt: float, substeps: int | None = None) -> None:
@@ -540,6 +594,8 @@ class World:
         loss = self._event_log.collect(self._step_count - 1, self._time, seconds)
         if loss:
             warnings.warn(loss, DroppedEventsWarning, stacklevel=2)
+        if self._tears is not None:
+            self._tears.tear(self)
         if reports:
             warnings.warn("; ".join(reports), FrozenBodyWarning, stacklevel=2)
         if troubled and self._is_implicit:
@@ -598,6 +654,14 @@ class World:
                 "softer material"
             )
         return reports
+
+    def _rest_inverses(self, body: Body) -> Floats:
+        """A^-1 of each tetrahedron of a body that may have flowed, (m, 3, 3) [1/m], in the caller's order."""
+        rows = np.empty((len(body.tets), 3, 3), dtype=np.float32)
+        read_rest_inverses(self._state, body.index, rows)
+        inverses = np.empty(rows.shape)
+        inverses[self._scene.bodies[body.index].tet_order] = rows
+        return inverses
 
     def _find_failure(self, body: Body, failed: FailedStep) -> Failure:
         assert self._state is not None
@@ -708,8 +772,8 @@ class World:
         if self._read_alpha != alpha:
             read_positions(self._state, alpha, self._rows)
             self._read_alpha = alpha
-        begin, end = self._scene.ranges[body.index].particles
-        rows[:] = self._rows[begin:end]
+        begin = self._scene.ranges[body.index].particles[0]
+        rows[:] = self._rows[begin : begin + body.vertex_count]
         return rows
 
     def record_events(self, kinds: Iterable[type[Event]] = (Event,)) -> None:
@@ -882,8 +946,8 @@ class World:
         """Which vertices of a body touched something in the last substep, (n,)."""
         assert self._state is not None
         if self._has_contact:
-            begin, end = self._scene.ranges[body.index].particles
-            touches = self._state.contact.particle_touches.to_numpy()[begin:end]
+            begin = self._scene.ranges[body.index].particles[0]
+            touches = self._state.contact.particle_touches.to_numpy()[begin : begin + body.vertex_count]
             return np.asarray(touches[self._scene.bodies[body.index].rank] == 1)
         floor = self.settings.floor
         if floor is None:

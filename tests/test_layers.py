@@ -14,20 +14,21 @@ LAYERS = """
     errors  constants
     types  runtime  checks
     math
-    materials  meshing  settings  contact
+    materials  meshing  settings  contact  plasticity
     laws  collision
     scene  contact_fields
     state  integrators
     kernels
     forces  shapes
-    stability  failures  colliders  control  queries  events  snapshot
+    stability  failures  colliders  control  queries  events  snapshot  cutting
+    tearing
     body  assets  pools
     world
     taichi_soft
     render
     engine_adapter
     stages  scenery
-    film  profiling
+    film  profiling  drops
     cli
     __main__
     demos
@@ -37,10 +38,10 @@ LEVEL = {name: level for level, line in enumerate(LAYERS.split("\n")) for name i
 # The element functions of integrators are called by the kernels as laws are, and so lie below them;
 # runtime is below everything that runs on Taichi, and knows errors only.
 
-NO_TAICHI = ("errors", "constants", "types", "checks", "materials", "meshing", "contact")
+NO_TAICHI = ("errors", "constants", "types", "checks", "materials", "meshing", "contact", "plasticity")
 """Parts that are tested in milliseconds: numpy only."""
 
-FACES = ("render", "stages", "scenery", "film", "profiling", "cli", "__main__")
+FACES = ("render", "stages", "scenery", "film", "profiling", "drops", "cli", "__main__")
 """Parts of taichi_soft that lie above its public names."""
 
 

@@ -77,6 +77,7 @@ class Attachment:
 
 def attach(body: Body, particles: ArrayLike, frame: Any, two_way: bool) -> Attachment:
     """As `Body.attach`."""
+    body.require_alive()
     vertices = some_particles(body, particles)
     if not isinstance(frame, Frame) or frame._frames is not body._world._frames:
         raise OptionError(f"frame must come from add_frame of the same world, got {frame!r}")

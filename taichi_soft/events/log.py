@@ -92,6 +92,10 @@ class EventLog:
         if threshold is not None:
             self._record(self._kinds | {kind})
 
+    def renew_watches(self, body: Body) -> None:
+        """Look at the tetrahedra that a cut has left of a body."""
+        self._witness.stress.renew(body)
+
     def note_frozen(self, body: Body) -> None:
         """The step that is being made has frozen a body."""
         if self._kinds:

@@ -64,6 +64,12 @@ class StressWatches:
         if len(self._blocks):
             self._evaluate()  # so that nothing compiles in the game's next step
 
+    def renew(self, body: Body) -> None:
+        """Go on with a body that has lost tetrahedra; those over a threshold count as new."""
+        for (kind, watched), watch in list(self._watches.items()):
+            if watched is body:
+                self.set(kind, body, watch.threshold)
+
     def _arrange(self) -> None:
         bodies = sorted({body for _, body in self._watches}, key=lambda body: body.index)
         ranges = [self._scene.ranges[body.index].blocks for body in bodies]

@@ -113,16 +113,17 @@ def collided(state: ti.template(), body, p, start, way_velocity, h, since):
             # What contact takes from the velocity it takes from the way left, or what friction holds
             # would creep.
             x0 = x0 + earliest * (x1 - x0) - ti.min(distance, 0.0) * n
-            x1 = place + left * h * (push - n * push.dot(n))
-            v = v_out
-            impulse = -push / ti.max(state.particle_inv_mass[p], 1e-30)
-            state.contact.impulse[row + c] = state.contact.impulse[row + c] + impulse
-            state.contact.angular_impulse[row + c] = state.contact.angular_impulse[row + c] + (
-                place - centre
-            ).cross(impulse)
-            state.contact.particle_touches[p] = 1
+            end = place + left * h * (push - n * push.dot(n))
             touches += 1
             if touches == MOST_TOUCHES:
-                x1 = x0
+                end = x0
                 is_open = 0
+            mass = 1.0 / ti.max(state.particle_inv_mass[p], 1e-30)
+            impulse = -mass * push
+            # With what the shift of the path, which v takes no part in, does to the angular momentum.
+            angular_impulse = (end - centre).cross(impulse) - mass * (end - x1).cross(v)
+            state.contact.impulse[row + c] = state.contact.impulse[row + c] + impulse
+            state.contact.angular_impulse[row + c] = state.contact.angular_impulse[row + c] + angular_impulse
+            state.contact.particle_touches[p] = 1
+            x1, v = end, v_out
     return x1, v

@@ -11,6 +11,7 @@ from taichi_soft.kernels.internal_forces import accumulate_forces
 from taichi_soft.kernels.islands import find_islands
 from taichi_soft.kernels.motion import gravity_on, remember_particle
 from taichi_soft.kernels.per_body import before_kick, settle_body
+from taichi_soft.kernels.plasticity import flow_body
 from taichi_soft.kernels.sleep import note_motion, settle_island, wake_by_colliders, wake_island
 from taichi_soft.kernels.soft_contact import solve_island
 from taichi_soft.kernels.soft_search import find_box, is_social, island_margin, search_body, search_island
@@ -157,6 +158,8 @@ def _move_island(state: ti.template(), program: ti.template(), island, substeps,
             if has_failed == 0:
                 state.body_velocity_lag[body] = h
                 state.body_drives[body] = state.body_drives[body] & ~PUSHED
+                if ti.static(program.has_plasticity):
+                    flow_body(state, body, substeps * h)
     return failed
 
 

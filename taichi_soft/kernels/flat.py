@@ -21,6 +21,7 @@ from taichi_soft.kernels.motion import (
     remember_particle,
     restore_particle,
 )
+from taichi_soft.kernels.plasticity import flow_block
 from taichi_soft.runtime import ti
 from taichi_soft.state import ABSENT, ACTIVE, FROZEN
 
@@ -104,6 +105,13 @@ def _fall_back_phase(state: ti.template(), p):
 
 
 @ti.func
+def _flow_phase(state: ti.template(), block, dt):
+    body = state.particle_body[state.tet_vertices[block * 4 * LANES]]
+    if state.body_status[body] == ACTIVE:
+        flow_block(state, body, block, dt)
+
+
+@ti.func
 def _settle_body(state: ti.template(), body, h):
     failed = 0
     if state.body_status[body] == _FAILING:
@@ -162,6 +170,9 @@ def step_flat_cpu(
         _meet(state, workers)
         for p in range(p0, p1):
             _fall_back_phase(state, p)
+        if ti.static(program.has_plasticity):
+            for block in range(b0, b1):
+                _flow_phase(state, block, substeps * h)
     ti.loop_config(serialize=True)
     for body in range(body_count):
         failed += _settle_body(state, body, h)
@@ -202,13 +213,24 @@ def substep_flat(
 
 
 @ti.kernel
-def end_flat(state: ti.template(), body_count: ti.i32, particle_count: ti.i32, h: ti.f32) -> ti.i32:
+def end_flat(
+    state: ti.template(),
+    program: ti.template(),
+    body_count: ti.i32,
+    block_count: ti.i32,
+    particle_count: ti.i32,
+    substeps: ti.i32,
+    h: ti.f32,
+) -> ti.i32:
     """Freeze what went non-finite. Returns how many bodies failed."""
     failed = 0
     for p in range(particle_count):
         _check_phase(state, p)
     for p in range(particle_count):
         _fall_back_phase(state, p)
+    if ti.static(program.has_plasticity):
+        for block in range(block_count):
+            _flow_phase(state, block, substeps * h)
     for body in range(body_count):
         failed += _settle_body(state, body, h)
     return failed

@@ -15,6 +15,7 @@ from taichi_soft.kernels.motion import (
     remember_particle,
     restore_particle,
 )
+from taichi_soft.kernels.plasticity import flow_body
 from taichi_soft.runtime import ti
 from taichi_soft.state import ABSENT, ACTIVE, FROZEN, PUSHED
 from taichi_soft.types import Integrator
@@ -85,6 +86,8 @@ def _step_body(state: ti.template(), program: ti.template(), body, substeps, h):
         if failed == 0:
             state.body_velocity_lag[body] = h
             state.body_drives[body] = state.body_drives[body] & ~PUSHED
+            if ti.static(program.has_plasticity):
+                flow_body(state, body, substeps * h)
             if ti.static(program.integrator == Integrator.IMPLICIT_EULER):
                 failed = int(state.body_residual[body] > state.solver[None][0])
     return failed

@@ -17,6 +17,7 @@ class Program:
     has_floor: bool
     has_contact: bool = False  # with colliders, of which the floor then is one
     has_soft_contact: bool = False  # bodies with each other
+    has_plasticity: bool = False  # of any body
     worker_count: int = 1  # threads that share one flat step
 
     @property

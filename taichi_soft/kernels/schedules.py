@@ -62,7 +62,7 @@ def make_launch(schedule: Schedule, state: State, program: Program, scene: Scene
         begin_flat(state, particles)
         for s in range(substeps):
             substep_flat(state, program, blocks, edges, particles, h, int(s == 0))
-        return int(end_flat(state, bodies, particles, h))
+        return int(end_flat(state, program, bodies, blocks, particles, substeps, h))
 
     if schedule is Schedule.PER_BODY:
         return per_body

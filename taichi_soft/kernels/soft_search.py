@@ -18,6 +18,11 @@ CELL = 2.0
 difference in a heap."""
 
 
+MOST_CELLS = 32.0
+"""Cells along one axis that one triangle looks into. One that an exploding body has drawn out over kilometres
+is left out, or the step that ends with that body frozen would take hours."""
+
+
 @ti.func
 def _cell_of(x, cell):
     return ti.cast(ti.floor(x / cell), ti.i32)
@@ -137,7 +142,8 @@ def _search_triangle(state: ti.template(), table, size, lowest, highest, body, o
     """
     lower = ti.max(state.soft.triangle_lower[triangle] - margin, lowest)
     upper = ti.min(state.soft.triangle_upper[triangle] + margin, highest)
-    if (upper - lower).min() >= 0.0:
+    widest = (upper - lower).max()
+    if (upper - lower).min() >= 0.0 and widest <= MOST_CELLS * cell:
         corners = state.triangle_vertices[triangle]
         a = state.particle_position[corners[0]]
         b = state.particle_position[corners[1]]

@@ -1,6 +1,7 @@
 """Bodies come and go: one slot is written, the rest of the world is left alone."""
 
 from taichi_soft.kernels.collide import forget_contacts
+from taichi_soft.kernels.plasticity import restore_shape
 from taichi_soft.runtime import ti
 from taichi_soft.state import ABSENT, ACTIVE
 
@@ -36,6 +37,8 @@ def spawn_body(state: ti.template(), body: ti.i32, rows: ti.types.ndarray(dtype=
         state.body_damping[body] = 0.0
         if ti.static(state.capacity.implicit):
             state.body_residual[body] = 0.0
+        if ti.static(state.capacity.plastic):
+            restore_shape(state, body)
         if ti.static(state.capacity.contact.colliders > 0):
             state.contact.calm[body] = 0.0
         state.body_status[body] = ACTIVE

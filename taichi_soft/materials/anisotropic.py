@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -75,6 +75,14 @@ class AnisotropicMaterial:
             raise MaterialError(
                 f"frame has {len(self.frame)} rotations for a mesh of {tet_count} tetrahedra: give one each"
             )
+
+    def of_tets(self, rows: NDArray[np.int64]) -> AnisotropicMaterial:
+        """The material of some of the tetrahedra."""
+        lists = {"density": 1, "damping": 1, "frame": 3}
+        given = {
+            name: getattr(self, name) for name, ndim in lists.items() if np.ndim(getattr(self, name)) == ndim
+        }
+        return replace(self, **{name: value[rows] for name, value in given.items()})
 
     def stiffness_matrices(self, tet_count: int) -> Array:
         """Stiffness of each tetrahedron in the axes of the mesh, (m, 6, 6) [Pa], as `Stiffness.matrix`.

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from taichi_soft.checks import as_count
 from taichi_soft.errors import MaterialError
@@ -83,6 +84,11 @@ class Material:
         """
         tet_count = as_count(tet_count, "tet_count", high=2**31 - 1)
         return spread(getattr(self, name), name, "tetrahedra", tet_count)
+
+    def of_tets(self, rows: NDArray[np.int64]) -> Material:
+        """The material of some of the tetrahedra."""
+        given = {name: getattr(self, name) for name in CONSTANTS}
+        return replace(self, **{name: value[rows] for name, value in given.items() if np.ndim(value) == 1})
 
     def stiffness_matrices(self, tet_count: int) -> Array:
         """Stiffness of each tetrahedron, (m, 6, 6) [Pa], as `Stiffness.matrix`."""

@@ -6,7 +6,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.errors import MeshError
 from taichi_soft.meshing.arrays import FloatArray, IntArray, as_indices, as_points, name_vertices, read_only
@@ -62,14 +62,27 @@ class TetMesh(BodyMesh):
         turned = volumes < 0
         corners[turned] = corners[turned][:, [0, 1, 3, 2]]
         _refuse_unused(len(points), corners)
+        self._fill(points, corners, np.abs(volumes))
+
+    def _fill(self, points: FloatArray, corners: IntArray, volumes: FloatArray) -> None:
         surface = surface_of(corners)
         edges, tet_edges = edges_of(corners)
         super().__init__(points, edges, corners)
         self.__dict__.update(
-            tet_edges=read_only(tet_edges),
-            surface=read_only(surface),
-            volumes=read_only(np.abs(volumes)),
+            tet_edges=read_only(tet_edges), surface=read_only(surface), volumes=read_only(volumes)
         )
+
+    def part(self, vertices: NDArray[Any], tets: IntArray, rows: NDArray[Any]) -> TetMesh:
+        """Some of the tetrahedra, with vertices of their own, as a cut leaves them: checked once is enough.
+
+        Args:
+            vertices: of this mesh, that each new one is or is a copy of, (n,).
+            tets: new vertices of each tetrahedron, (m, 4), every one in use.
+            rows: of this mesh, that each tetrahedron is, (m,).
+        """
+        mesh = TetMesh.__new__(TetMesh)
+        mesh._fill(self.vertices[vertices], tets, self.volumes[rows])
+        return mesh
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Copying and unpickling rebuild the mesh, so that its arrays are locked again.

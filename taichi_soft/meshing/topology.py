@@ -32,7 +32,7 @@ def surface_of(tets: IntArray) -> IntArray:
     Raises: MeshError if more than two of them share a face, or two lie on the same side of one.
     """
     faces = tets[:, LOCAL_FACES].reshape(-1, 3)
-    order, starts, counts = _groups(np.sort(faces, axis=1))
+    order, starts, counts = groups(np.sort(faces, axis=1))
     if counts.max() > 2:
         start = starts[int(np.argmax(counts))]
         face = order[start]
@@ -55,7 +55,7 @@ def surface_of(tets: IntArray) -> IntArray:
 
 def first_duplicate(tets: IntArray) -> tuple[int, int] | None:
     """Two rows that name the same four vertices, lower row first; None if there are none."""
-    order, starts, counts = _groups(np.sort(tets, axis=1))
+    order, starts, counts = groups(np.sort(tets, axis=1))
     if counts.max() == 1:
         return None
     start = starts[int(np.argmax(counts > 1))]
@@ -63,7 +63,7 @@ def first_duplicate(tets: IntArray) -> tuple[int, int] | None:
     return first, second
 
 
-def _groups(rows: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+def groups(rows: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
     """Equal rows brought together: the order that does it, where each group starts, how many it has."""
     order = np.lexsort(rows.T[::-1])
     in_order = rows[order]

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from taichi_soft.checks import as_array
 from taichi_soft.collision.kinds import ShapeKind
 from taichi_soft.meshing.arrays import read_only
-from taichi_soft.shapes.shape import Shape, Triangles, about_origin, as_length, triangles_of
+from taichi_soft.shapes.shape import SEAM, Shape, Triangles, about_origin, as_length, triangles_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,6 +23,7 @@ class BoxShape(Shape):
     """
 
     kind = ShapeKind.BOX
+    seam = SEAM
     size: ArrayLike
 
     def __post_init__(self) -> None:

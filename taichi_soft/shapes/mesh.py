@@ -14,7 +14,7 @@ from taichi_soft.meshing.arrays import FloatArray, IntArray, read_only
 from taichi_soft.shapes.closed_mesh import ClosedMesh, closed_mesh
 from taichi_soft.shapes.distance_grid import Grid, distance_grid, grid_round
 from taichi_soft.shapes.grid_cache import grid_key, read_grid, write_grid
-from taichi_soft.shapes.shape import Shape, Triangles
+from taichi_soft.shapes.shape import SEAM, Shape, Triangles
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -35,6 +35,7 @@ class MeshShape(Shape):
     """
 
     kind = ShapeKind.MESH
+    seam = SEAM
     vertices: FloatArray
     triangles: IntArray
     cell: float

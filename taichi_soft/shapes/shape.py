@@ -20,10 +20,17 @@ SHORTEST, LONGEST = 1e-6, 1e6
 """Lengths of a shape [m] within which float32 resolves it."""
 
 
+SEAM = 1e-4
+"""Skin [m] on what has flat faces and edges. Where two of them meet flush, what lies on one is inside the
+other by more than rounding, or it would slip into the seam between them."""
+
+
 class Shape(ABC):
     """A solid in a frame of its own, immutable. Not made by itself: see `SphereShape` and its neighbours."""
 
     kind: ClassVar[ShapeKind]
+    seam: ClassVar[float] = 0.0
+    """Skin [m] beside the collider's thickness."""
 
     @abstractmethod
     def _values(self) -> tuple[float, ...]:

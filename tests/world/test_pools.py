@@ -155,9 +155,16 @@ def test_a_world_without_bodies_goes_on(empty):
 
 
 READABLE = {"asset", "index", "is_alive", "is_frozen", "mesh", "material", "vertex_count", "tets", "surface"}
-READABLE |= {"masses", "pinned"}
+READABLE |= {"masses", "is_cut", "topology_version", "vertex_origins", "tet_origins"}
 ARGUMENTS = {"set_motion": (np.zeros_like(MESH.vertices), np.zeros_like(MESH.vertices))}
-ARGUMENTS |= {"watch_stress": (1e4,), "watch_tearing": (1e4,)}
+ARGUMENTS |= {"watch_stress": (1e4,), "watch_tearing": (1e4,), "cut": ()}
+ARGUMENTS |= {
+    name: ((0.0, 0.0, 1.0),) for name in ("apply_force", "apply_impulse", "set_velocity", "teleport")
+}
+ARGUMENTS |= {"apply_impulse_at_point": (UP, (9.0, 0.0, 0.0), 1.0), "attach": ([0], None)}
+ARGUMENTS |= {"grab": (0, (1.0, 0.0, 0.0)), "pin": ([0],), "set_targets": ([0], [(9.0, 0.0, 0.0)])}
+ARGUMENTS |= {name: (1.0,) for name in ("set_damping", "set_gravity_scale", "set_linear_damping")}
+ARGUMENTS |= {"set_material": (JELLY,), "set_sheltered": (True,)}
 
 
 def asked(body, name):

@@ -1,0 +1,75 @@
+"""Signed distances of points (n, 3) from solids in their own frames [m]: float64, written from the formulas.
+
+They judge what the kernels do, so they share nothing with them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Distance = Callable[[Floats], Floats]
+
+
+def half_space(normal: Floats, offset: float = 0.0) -> Distance:
+    """All below the plane with that unit normal (3,), `offset` from the origin along it [m]."""
+    return lambda x: np.asarray(x @ normal - offset)
+
+
+def ball(radius: float) -> Distance:
+    """About the origin."""
+    return lambda x: np.asarray(np.linalg.norm(x, axis=1) - radius)
+
+
+def cuboid(size: Floats) -> Distance:
+    """About the origin, edges (3,) along the axes."""
+
+    def distance(x: Floats) -> Floats:
+        beyond = np.abs(x) - size / 2
+        outside = np.linalg.norm(np.maximum(beyond, 0.0), axis=1)
+        return np.asarray(outside + np.minimum(beyond.max(axis=1), 0.0))
+
+    return distance
+
+
+def capsule(radius: float, length: float) -> Distance:
+    """Round a piece of the z axis about the origin."""
+
+    def distance(x: Floats) -> Floats:
+        axis = x - np.outer(np.clip(x[:, 2], -length / 2, length / 2), (0.0, 0.0, 1.0))
+        return np.asarray(np.linalg.norm(axis, axis=1) - radius)
+
+    return distance
+
+
+def ring(major: float, minor: float) -> Distance:
+    """A torus about the z axis."""
+
+    def distance(x: Floats) -> Floats:
+        along = np.hypot(x[:, 0], x[:, 1]) - major
+        return np.asarray(np.hypot(along, x[:, 2]) - minor)
+
+    return distance
+
+
+def ground(heights: Floats, spacing: float) -> Distance:
+    """Height above a height field whose cells are parted from node (i, j) to (i + 1, j + 1), times the cosine
+    of the steepest slope: no more than the distance."""
+    nx, ny = heights.shape
+    along, across = (np.abs(np.diff(heights, axis=axis)).max() / spacing for axis in (0, 1))
+    cosine = 1.0 / np.sqrt(1.0 + along**2 + across**2)
+
+    def distance(x: Floats) -> Floats:
+        u = np.clip(x[:, 0] / spacing + (nx - 1) / 2, 0.0, nx - 1.0)
+        v = np.clip(x[:, 1] / spacing + (ny - 1) / 2, 0.0, ny - 1.0)
+        i, j = np.minimum(u.astype(int), nx - 2), np.minimum(v.astype(int), ny - 2)
+        s, t = u - i, v - j
+        near, far = heights[i, j], heights[i + 1, j + 1]
+        side = np.where(s >= t, heights[i + 1, j], heights[i, j + 1])
+        rise = np.where(s >= t, s * (side - near) + t * (far - side), s * (far - side) + t * (side - near))
+        return np.asarray((x[:, 2] - near - rise) * cosine)
+
+    return distance

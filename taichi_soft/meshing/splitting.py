@@ -1,0 +1,95 @@
+"""Tetrahedra taken apart along their faces, by giving vertices copies (thesis chapter 7)."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.meshing.arrays import IntArray
+from taichi_soft.meshing.topology import groups
+
+_FACES = [(1, 2, 3), (0, 2, 3), (0, 1, 3), (0, 1, 2)]
+
+
+class InnerFaces(NamedTuple):
+    """Faces between two tetrahedra."""
+
+    tets: NDArray[np.int64]  # (f, 2) that share each, the lower number first
+    corners: NDArray[
+        np.int64
+    ]  # (f, 2, 3) its vertices as corners of either, the same vertex in the same place
+
+
+def inner_faces(tets: IntArray) -> InnerFaces:
+    """All faces that two tetrahedra share."""
+    # With the corners of each tetrahedron in ascending order, those of its faces are too.
+    corners = np.argsort(tets, axis=1)[:, _FACES].reshape(-1, 3)
+    rows, starts, counts = groups(tets.repeat(4, axis=0)[np.arange(len(corners))[:, None], corners])
+    pairs = np.stack([rows[starts[counts == 2]], rows[starts[counts == 2] + 1]], axis=1)
+    return InnerFaces(pairs // 4, corners[pairs])
+
+
+def split_vertices(
+    tets: IntArray, vertex_count: int, faces: InnerFaces, is_cut: NDArray[np.bool_]
+) -> tuple[IntArray, NDArray[np.int64]]:
+    """Let go of each other what hangs together through cut faces only.
+
+    The tetrahedra round a vertex of a cut face fall into groups that faces still join. The group with the
+    lowest tetrahedron keeps the vertex, each other one gets a copy of it.
+    Args:
+        is_cut: (f,), of each of `faces`.
+    Returns: the tetrahedra with their new vertices, and the vertex that each is a copy of, (n,): itself for
+        the old ones, which keep their numbers.
+    """
+    if not is_cut.any():
+        return tets, np.arange(vertex_count)
+    is_touched = np.zeros(vertex_count, dtype=np.bool_)
+    cut_tets, cut_corners = faces.tets[is_cut], faces.corners[is_cut]
+    is_touched[tets[cut_tets[:, :1], cut_corners[:, 0]]] = True
+
+    flat = tets.ravel()
+    loose = np.flatnonzero(is_touched[flat])  # corners of tetrahedra whose vertex may be split
+    row = np.full(len(flat), -1)
+    row[loose] = np.arange(len(loose))
+    links = row[
+        (4 * faces.tets[~is_cut][:, :, None] + faces.corners[~is_cut]).transpose(1, 0, 2).reshape(2, -1)
+    ]
+    group = connected(len(loose), *links[:, links[0] >= 0])
+
+    owners, first = flat[loose], np.unique(group)  # a group is called by its lowest corner
+    by_vertex = first[np.lexsort((first, owners[first]))]
+    is_copy = owners[by_vertex] == np.r_[-1, owners[by_vertex[:-1]]]
+    name = np.zeros(len(loose), dtype=np.int64)
+    name[by_vertex] = owners[by_vertex]
+    name[by_vertex[is_copy]] = vertex_count + np.arange(is_copy.sum())
+    split = flat.astype(np.int32)
+    split[loose] = name[group]
+    return split.reshape(-1, 4), np.r_[np.arange(vertex_count), owners[by_vertex[is_copy]]]
+
+
+def loose_parts(tets: IntArray, vertex_count: int) -> NDArray[np.int64]:
+    """Which part each tetrahedron belongs to, (m,), counted from 0 in the order of their first ones.
+
+    Parts have no vertex in common.
+    """
+    label = connected(vertex_count, tets[:, :3].ravel(), tets[:, 1:].ravel())[tets[:, 0]]
+    _, first, part = np.unique(label, return_index=True, return_inverse=True)
+    rank = np.empty(len(first), dtype=np.int64)
+    rank[np.argsort(first)] = np.arange(len(first))
+    return np.asarray(rank[part.reshape(-1)])
+
+
+def connected(count: int, first: NDArray[Any], second: NDArray[Any]) -> NDArray[np.int64]:
+    """The lowest number that links lead to from each of `count` numbers."""
+    label = np.arange(count)
+    while True:
+        ends = label[first], label[second]
+        low = np.minimum(*ends)
+        before = label.copy()
+        for end in ends:  # not the number but what it is called by, so that ways shorten by half each time
+            np.minimum.at(label, end, low)
+        label = label[label]
+        if (label == before).all():
+            return label

@@ -1,0 +1,135 @@
+"""Bodies that tear where they are pulled too hard."""
+
+from __future__ import annotations
+
+from dataclasses import KW_ONLY, dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.checks import as_count, as_positive
+from taichi_soft.cutting import divide
+from taichi_soft.errors import StateError
+from taichi_soft.kernels.tearing import find_overloaded
+from taichi_soft.meshing.splitting import InnerFaces
+
+if TYPE_CHECKING:
+    from taichi_soft.body import Body
+    from taichi_soft.state import State
+    from taichi_soft.world import World
+
+Floats = NDArray[np.float64]
+
+_WORST = 0.9
+"""Of the largest stress: what bears less waits for the next step, in which the tear has shifted the load."""
+
+_TIP = 2.0
+"""Stress at the end of a tear over that of the tetrahedra there, which are too large to resolve its rise: so
+that a tear runs on before another begins."""
+
+
+@dataclass(frozen=True)
+class Tearing:
+    """Tear vertices in two where the material is pulled beyond its strength (O'Brien and Hodgins 1999).
+
+    Looked for after each step. The face between two tetrahedra tears where the largest principal stress of
+    their mean, of Hooke's law and linear strain, is above the strength: its vertices are split across the
+    pull, along the faces of the tetrahedra round them. A body tears as long as its `spare_vertices` last;
+    what falls off becomes a body while slots are free, the largest first; the rest, and crumbs of less than
+    2 % of the whole, stay loose in the body. While it is grabbed or attached, it holds.
+
+    Args:
+        stress: tensile strength [Pa].
+        most: faces that one step may tear in one body: how fast a tear runs.
+    Raises: OptionError for a value out of range.
+    """
+
+    stress: float
+    _: KW_ONLY
+    most: int = 4
+
+    def __post_init__(self) -> None:
+        as_positive(self.stress, "stress", "Pa")
+        as_count(self.most, "most", 1, 1000)
+
+
+class Tears:
+    """Where a world's bodies may tear, after every step."""
+
+    def __init__(self, state: State, slots: int) -> None:
+        self._limits = np.zeros(slots, dtype=np.float32)
+        self._found = np.zeros(slots, dtype=np.int32)
+        find_overloaded(state, self._limits, self._found)  # compiles
+
+    def watch(self, body: Body) -> None:
+        """Look at a body from now on, if it can tear; its slot may have held another."""
+        tearing = body.asset.tearing
+        self._limits[body.index] = 0.0 if tearing is None else tearing.stress
+
+    def tear(self, world: World) -> None:
+        """Tear what the last step has pulled too hard."""
+        find_overloaded(world._built, self._limits, self._found)
+        for slot in np.flatnonzero(self._found):
+            body = world._pools.slots[slot]
+            if body is None or body.is_held:
+                continue
+            try:
+                _tear(body)
+            except StateError:  # no room for more copies
+                self._limits[slot] = 0.0
+
+
+def _tear(body: Body) -> None:
+    tearing, mesh = body.asset.tearing, body.mesh
+    assert tearing is not None
+    stress = body._green_strain_and_stress()[1]
+    faces = body._inner_faces
+    pulls, axes = np.linalg.eigh(stress[faces.tets].mean(axis=1))
+    pull, axis = pulls[:, -1], axes[:, :, -1]
+    is_torn = np.bincount(body.vertex_origins)[body.vertex_origins] > 1
+    over = pull > tearing.stress
+    if not over.any():
+        return
+    pull[is_torn[_corners(mesh.tets, faces)].any(axis=1)] *= _TIP
+    chosen = _worst_faces(mesh.vertices, mesh.tets, faces, np.where(over, pull, 0.0), axis, tearing.most)
+    is_cut = np.zeros(len(pull), dtype=np.bool_)
+    is_cut[chosen] = True
+    centers = mesh.vertices[mesh.tets].mean(axis=1)
+    corners = _corners(mesh.tets, faces)
+    for face in chosen:
+        near = np.flatnonzero(np.isin(corners, corners[face]).any(axis=1))
+        side = (centers[faces.tets[near]] - mesh.vertices[corners[face]].mean(axis=0)) @ axis[face] > 0
+        is_cut[near[side[:, 0] != side[:, 1]]] = True
+    divide(body, faces, is_cut, keeps_crumbs=True)
+
+
+def _corners(tets: NDArray[np.int32], faces: InnerFaces) -> NDArray[np.int32]:
+    """Vertices of each face, (f, 3)."""
+    return np.asarray(tets[faces.tets[:, :1], faces.corners[:, 0]])
+
+
+def _worst_faces(
+    vertices: Floats,
+    tets: NDArray[np.int32],
+    faces: InnerFaces,
+    pull: Floats,
+    axis: Floats,
+    most: int,
+) -> list[int]:
+    """Those that tear: the worst, most across the pull, without a common vertex.
+
+    `pull`: (f,) [Pa], zero for faces that hold.
+    """
+    over = np.flatnonzero((pull > 0.0) & (pull >= _WORST * pull.max()))
+    corners = _corners(tets, faces)
+    x = vertices[corners[over]]
+    normal = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
+    across = np.abs(np.einsum("fa,fa->f", normal, axis[over])) / np.linalg.norm(normal, axis=1)
+    chosen: list[int] = []
+    used: set[int] = set()
+    for face in over[np.argsort(-pull[over] * across, kind="stable")].tolist():
+        if len(chosen) < most and not used & set(corners[face].tolist()):
+            chosen.append(face)
+            used |= set(corners[face].tolist())
+    return chosen

@@ -1,0 +1,106 @@
+"""Random bodies on random courses, 30 of them, and the report about them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from taichi_soft.drops import Summary, make_case, run_cases
+from taichi_soft.drops.case import FASTEST, LARGEST, MOST_SAG, SHAPES, SMALLEST, SOFTEST, STIFFEST
+from taichi_soft.drops.trial import PER_SHAPE, batches
+
+SEED, COUNT = 0, 30
+
+
+@pytest.fixture(scope="module")
+def cases():
+    return [make_case(SEED, number, flips="recover") for number in range(COUNT)]
+
+
+@pytest.fixture(scope="module")
+def outcomes(cases):
+    return {outcome.case.number: outcome for outcome in run_cases(cases)}
+
+
+def test_cases_are_as_various_as_they_are_said_to_be(cases):
+    assert {case.shape for case in cases} == set(SHAPES)
+    for case in cases:
+        extent = np.ptp(case.mesh.vertices, axis=0).max()
+        assert SMALLEST <= case.size <= LARGEST
+        assert extent == pytest.approx(case.size, rel=0.06)
+        assert SOFTEST <= case.material.young <= STIFFEST
+        assert case.material.density * 9.81 * case.size / case.material.young <= MOST_SAG * (1 + 1e-9)
+        assert np.linalg.norm(case.velocity) <= FASTEST
+        corners = case.mesh.vertices @ case.rotation.T + case.position
+        assert all(solid.depth(corners) < 0 for solid in case.course)  # it starts in free space
+
+
+def test_a_case_follows_from_its_seed_and_number(cases):
+    again = make_case(SEED, 7, flips="recover")
+    np.testing.assert_array_equal(again.mesh.vertices, cases[7].mesh.vertices)
+    np.testing.assert_array_equal(again.velocity, cases[7].velocity)
+    assert str(again) == str(cases[7])
+    assert str(make_case(SEED + 1, 7)) != str(again)
+
+
+def test_worlds_hold_cases_of_one_number_of_substeps_and_every_case_once(cases):
+    found = list(batches(cases))
+    assert sorted(case.number for batch in found for case in batch) == list(range(COUNT))
+    for batch in found:
+        assert len({case.substeps for case in batch}) == 1
+        assert all(sum(case.shape == shape for case in batch) <= PER_SHAPE for shape in SHAPES)
+
+
+def test_nothing_gets_out_of_the_room_or_stays_in_an_obstacle(outcomes):
+    assert len(outcomes) == COUNT
+    for outcome in outcomes.values():
+        assert outcome.out_through is None, outcome
+        assert outcome.inside_of is None or outcome.frozen_at is not None, outcome
+
+
+def test_only_what_is_thrown_at_twice_its_speed_of_sound_goes_non_finite(outcomes):
+    """The substep is chosen for small deformation; a body flattened by such an impact is stiffer."""
+    for outcome in outcomes.values():
+        assert outcome.frozen_at is None or outcome.case.mach > 2.0, outcome
+
+
+def test_what_does_not_go_non_finite_comes_to_rest_but_for_a_ball_that_rolls_slowly(outcomes):
+    going = [each for each in outcomes.values() if each.frozen_at is None and each.rest_at is None]
+    assert len(going) <= 2
+    for outcome in going:
+        assert outcome.case.shape == "sphere", outcome
+        assert outcome.speed < 0.1, outcome
+
+
+def test_a_case_ends_the_same_alone(outcomes):
+    """As the command repeats it: other bodies of a world change nothing."""
+    alone = next(iter(run_cases([make_case(SEED, 3, flips="recover")])))
+    among = outcomes[3]
+    assert (alone.rest_at, alone.out, alone.inside, alone.speed) == (
+        among.rest_at,
+        among.out,
+        among.inside,
+        among.speed,
+    )
+
+
+def test_a_summary_counts_faults_and_says_how_to_repeat_the_worst(outcomes):
+    sound = replace(outcomes[3], frozen_at=None, out_through=None, inside_of=None, rest_at=2.0, flipped=0)
+    frozen = replace(sound, frozen_at=0.5, rest_at=None, flipped=4)
+    lost = replace(sound, out=3.5, out_through="wall", rest_at=None, speed=0.25)
+    summary = Summary((sound, frozen, lost, replace(lost, out=7.5)))
+    assert summary.counts == {
+        "non-finite": 1,
+        "through the room": 2,
+        "in an obstacle": 0,
+        "not at rest": 2,
+        "inside out": 1,
+    }
+    text = "\n".join(summary.lines(1))
+    assert "4 cases, 1 of them sound" in text
+    assert "7.5 m through the wall, still 0.25 sizes per second" in text
+    assert "drop-test --seed 0 --law virial --flips recover --cases 1 --first NUMBER" in text
+    rows = summary.rows()
+    assert rows["counts"]["non-finite"] == 1
+    assert [row["case"] for row in rows["failed"]] == [3, 3, 3]
+    assert Summary((sound,)).failed == ()

@@ -1,0 +1,450 @@
+"""Bodies against colliders: friction, motion, restitution, impulses, filters, walls, rest.
+
+Bodies of one world that belong to different experiments share it: each has a group of its own.
+"""
+
+import numpy as np
+import pytest
+import trimesh
+
+from taichi_soft import (
+    BoxShape,
+    CapsuleShape,
+    Contact,
+    HeightFieldShape,
+    Material,
+    MeshShape,
+    OptionError,
+    PlaneShape,
+    SphereShape,
+    StateError,
+    World,
+    box,
+    sphere,
+)
+
+G = 9.81
+DT = 1 / 60
+FIRM = Material(young=1e6, poisson=0.2, density=1000.0, damping=300.0)
+BLOCK = box((1.0, 1.0, 0.5), (2, 2, 1))
+
+
+def turn(angle, axis):
+    """Rodrigues's rotation about a unit axis."""
+    x, y, z = axis
+    k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * k @ k
+
+
+def alone(number):
+    """The group and mask of experiment `number`, for a body or a collider."""
+    return {"group": 1 << number, "mask": 1 << number}
+
+
+def add(world, number, mesh, material, **options):
+    return world.add_body(mesh, material, contact=Contact(**alone(number)), **options)
+
+
+def run(world, seconds):
+    for _ in range(round(seconds * 60)):
+        world.step(DT)
+
+
+def room(**options):
+    """A world without a floor, of a capacity that most tests share."""
+    return World(**{"floor": None, "collider_room": 8, **options})
+
+
+SLOPE = 0.3
+SHARES = (0.5, 0.9, 0.98, 1.02, 1.1, 2.0)
+
+
+@pytest.fixture(scope="module", params=["plane", "turned plane", "box"])
+def slides(request):
+    """Blocks on an incline whose friction is a share of the tangent of its angle: ways, every 0.5 s."""
+    tilt = turn(SLOPE, (0.0, 1.0, 0.0))  # down along +x
+    world = World(floor=None)
+    for number, share in enumerate(SHARES):
+        options = {"friction": share * np.tan(SLOPE), **alone(number)}
+        if request.param == "plane":
+            world.add_collider(PlaneShape(tilt[:, 2]), **options)
+        elif request.param == "turned plane":
+            world.add_collider(PlaneShape(), rotation=tilt, **options)
+        else:
+            size = (60.0, 4.0, 0.1)
+            world.add_collider(BoxShape(size), rotation=tilt, position=-0.05 * tilt[:, 2], **options)
+        add(world, number, BLOCK, FIRM, position=0.25 * tilt[:, 2], rotation=tilt)
+    world.build()
+    ways = []
+    for _ in range(8):
+        run(world, 0.5)
+        ways.append([body.center_of_mass() @ tilt[:, 0] for body in world.bodies])
+    return np.array(ways)
+
+
+def test_a_block_slides_on_an_incline_at_and_only_at_the_angle_of_friction(slides):
+    """Two per cent above it rests, two per cent below it slides, once it has sunk in: after a second."""
+    gone = slides[-1] - slides[1]
+    for share, way in zip(SHARES, gone, strict=True):
+        if share > 1:
+            assert abs(way) < 2e-4
+        else:
+            assert way > 0.5 * (1 - share) * G * np.sin(SLOPE) * 4.0
+
+
+def test_a_sliding_block_is_as_fast_as_the_book_says(slides):
+    """Acceleration g (sin a - mu cos a) from the second difference of its way."""
+    measured = (slides[7] - 2 * slides[4] + slides[1]) / 1.5**2
+    for share, found in zip(SHARES, measured, strict=True):
+        book = max(0.0, (1 - share) * G * np.sin(SLOPE))
+        assert found == pytest.approx(book, abs=2e-3 * G * np.sin(SLOPE))
+
+
+def test_a_moving_belt_carries_a_body_along_once_friction_has_brought_it_to_speed():
+    """Way v t - v^2 / (2 mu g), the second part lost while it slides."""
+    world = room()
+    belt = world.add_collider(BoxShape((40.0, 4.0, 1.0)), position=(0, 0, -0.5), friction=0.3)
+    body = world.add_body(BLOCK, FIRM, position=(0, 0, 0.25))
+    world.build()
+    run(world, 1.0)
+    start = body.center_of_mass()[0]
+    belt.set_velocity((2.0, 0.0, 0.0))
+    run(world, 3.0)
+    assert belt.position[0] == pytest.approx(6.0, rel=1e-5)
+    assert body.center_of_mass()[0] - start == pytest.approx(6.0 - 4.0 / (2 * 0.3 * G), rel=0.02)
+    assert body.velocities()[:, 0] == pytest.approx(2.0, abs=0.02)
+
+
+def test_a_turntable_carries_what_friction_can_hold_and_loses_the_rest():
+    """Held where w^2 r < mu g."""
+    world = room()
+    for number, friction in enumerate((0.5, 0.05)):
+        table = world.add_collider(
+            BoxShape((8.0, 8.0, 0.5)), position=(0, 0, -0.25), friction=friction, **alone(number)
+        )
+        table.set_velocity((0, 0, 0), (0, 0, 1.2))
+        body = add(world, number, BLOCK, FIRM, position=(1.0, 0.0, 0.25))
+    world.build()
+    for body in world.bodies:
+        body.set_velocity((0.0, 1.2, 0.0), (0.0, 0.0, 1.2))
+    run(world, 2.5)
+    held, lost = (body.center_of_mass()[:2] for body in world.bodies)
+    assert np.linalg.norm(held) == pytest.approx(1.0, abs=0.01)
+    assert np.arctan2(held[1], held[0]) == pytest.approx(3.0, abs=0.02)
+    assert np.linalg.norm(lost) > 1.5
+
+
+def test_a_piston_pushes_a_body_before_it_and_never_enters_it():
+    world = room(floor=0.0)
+    piston = world.add_collider(BoxShape((1.0, 2.0, 2.0)), position=(-1.05, 0, 0.5), friction=0.0)
+    body = world.add_body(BLOCK, FIRM, position=(0, 0, 0.25))
+    world.build()
+    run(world, 0.5)
+    face, speed = -0.55, 0.5
+    for step in range(120):
+        face = -0.55 + speed * (step + 1) / 60
+        piston.move_to((face - 0.5, 0, 0.5))
+        world.step(DT)
+        assert body.positions()[:, 0].min() > face - 1e-5
+    assert piston.position[0] == pytest.approx(face - 0.5, abs=1e-9)
+    run(world, 1.0)  # where it comes to rest, sliding on for v^2 / (2 mu g) at the most
+    gap = body.positions()[:, 0].min() - face
+    assert -1e-5 < gap < 1.5 * speed**2 / (2 * 0.5 * G)
+    assert np.abs(body.velocities()).max() < 0.01
+
+
+RESTITUTIONS = (0.0, 0.25, 0.5, 0.75, 1.0)
+
+
+def test_vertices_leave_a_collider_with_its_restitution():
+    """A flat fall: when the soles touch, no tetrahedron is deformed yet, so v+ = -e v- exactly."""
+    world = room(gravity=(0, 0, 0))
+    for number, restitution in enumerate(RESTITUTIONS):
+        world.add_collider(PlaneShape(), restitution=restitution, **alone(number))
+        add(world, number, BLOCK, FIRM, position=(0, 0, 0.2515), velocity=(0, 0, -3.0))
+    world.build()
+    world.step(1e-3, 1)
+    soles = BLOCK.vertices[:, 2] < 0.0
+    for restitution, body in zip(RESTITUTIONS, world.bodies, strict=True):
+        assert body.positions()[soles, 2].max() == pytest.approx(0.0, abs=1e-6)
+        np.testing.assert_allclose(body.velocities()[soles, 2], 3.0 * restitution, atol=1e-4)
+        np.testing.assert_allclose(body.velocities()[~soles, 2], -3.0, atol=0.05)
+
+
+def test_a_ball_bounces_by_its_own_elasticity_whatever_restitution_is_asked_of_its_vertices():
+    """Speed after over speed before, of a stiff ball without damping and of one with much."""
+    world = room(gravity=(0, 0, 0))
+    for number in range(6):
+        world.add_collider(PlaneShape(), restitution=(0.0, 0.5, 1.0)[number % 3], **alone(number))
+        ball = Material(1e8, 0.3, 1000.0, (0.0, 3e4)[number // 3])
+        add(world, number, sphere(0.5, 2), ball, position=(0, 0, 0.55), velocity=(0, 0, -4.0))
+    world.build()
+    run(world, 0.5)
+    measured = [body.momentum()[2] / body.masses.sum() / 4.0 for body in world.bodies]
+    assert 0.9 < min(measured[:3]) <= max(measured[:3]) <= 1.0
+    assert 0.25 < min(measured[3:]) <= max(measured[3:]) < 0.45
+
+
+@pytest.fixture(scope="module")
+def impact():
+    """A spinning ball thrown into a corner of two boxes, a sphere and a plane; what each took up."""
+    world = room(gravity=(0, 0, 0))
+    world.add_collider(PlaneShape(), friction=0.4, restitution=0.5)
+    world.add_collider(BoxShape((0.5, 6, 6)), position=(1.8, 0, 3.0), rotation=turn(0.2, (0, 0, 1)))
+    world.add_collider(BoxShape((6, 0.5, 6)), position=(0, 1.9, 3.0), friction=0.9)
+    world.add_collider(SphereShape(0.6), position=(0.9, 1.3, 2.0))
+    body = world.add_body(sphere(0.5, 2), Material(1e6, 0.3, 1000.0, 20.0), position=(-0.5, -0.5, 1.5))
+    world.build()
+    body.set_velocity((5.0, 6.0, -5.0), (3.0, -4.0, 5.0))
+    first = body.momentum(), body.angular_momentum()
+    taken = np.zeros((len(world.colliders), 6))
+    for _ in range(60):
+        world.step(DT)
+        for row, collider in zip(taken, world.colliders, strict=True):
+            row[:3] += collider.impulse
+            row[3:] += collider.angular_impulse + np.cross(collider.position, collider.impulse)
+        last = np.array([collider.impulse for collider in world.colliders])
+    assert not last.any()  # it has left: momentum is exact while nothing touches
+    return first, (body.momentum(), body.angular_momentum()), taken
+
+
+def test_what_colliders_take_up_is_what_the_body_lost_to_round_off(impact):
+    (p0, _), (p1, _), taken = impact
+    assert np.linalg.norm(p1 - p0) > 0.5 * np.linalg.norm(p0)
+    assert (np.linalg.norm(taken[:, :3], axis=1) > 10.0).all()  # all four were hit
+    np.testing.assert_allclose(p1 + taken[:, :3].sum(axis=0), p0, atol=2e-5 * np.linalg.norm(p0))
+
+
+def test_the_turn_that_colliders_take_up_is_what_the_body_lost_to_round_off(impact):
+    (p0, l0), (_, l1), taken = impact
+    scale = np.linalg.norm(l0) + np.linalg.norm(p0)  # at arms of a metre
+    assert np.linalg.norm(l1 - l0) > 0.2 * scale
+    np.testing.assert_allclose(l1 + taken[:, 3:].sum(axis=0), l0, atol=1e-4 * scale)
+
+
+FILTERS = [(1, 1), (2, 1), (1, 2), (3, 6), (4, 7), (2, 2), (1, 0), (0, 1)]
+
+
+def test_a_body_and_a_collider_touch_where_each_ones_mask_has_the_others_group():
+    world = room()
+    world.add_collider(PlaneShape(), group=1, mask=3)
+    for group, mask in FILTERS:
+        world.add_body(BLOCK, FIRM, position=(0, 0, 0.5), contact=Contact(group=group, mask=mask))
+    world.build()
+    run(world, 1.0)
+    for (group, mask), body in zip(FILTERS, world.bodies, strict=True):
+        falls = not (group & 3 and mask & 1)
+        assert (body.center_of_mass()[2] < -1.0) == falls, (group, mask)
+
+
+def test_a_skin_keeps_bodies_its_thickness_away():
+    world = room()
+    thicknesses = (0.0, 0.01, 0.3)
+    for number, thickness in enumerate(thicknesses):
+        shape = (PlaneShape(), BoxShape((4, 4, 2)), SphereShape(10.0))[number]
+        position = ((0, 0, 0), (0, 0, -1.0), (0, 0, -10.0))[number]
+        world.add_collider(shape, position=position, thickness=thickness, **alone(number))
+        add(world, number, BLOCK, FIRM, position=(0, 0, 0.75))
+    world.build()
+    run(world, 4.0)
+    for thickness, body in zip(thicknesses, world.bodies, strict=True):
+        assert body.positions()[:, 2].min() >= thickness - 0.026 * (thickness == 0.3) - 1e-5
+        top = body.positions()[:, 2].min()
+        assert top == pytest.approx(thickness, abs=1e-4 if thickness < 0.3 else 0.03)
+
+
+FAST = 30.0
+WALLED = [  # pose about a skew axis [rad], Young's modulus [Pa], size [m]
+    (0.0, 1e6, 1.0),
+    (0.4, 1e6, 0.3),
+    (1.1, 1e7, 1.0),
+    (2.3, 1e7, 0.1),
+    (0.8, 5e6, 3.0),
+]
+
+
+@pytest.fixture(scope="module")
+def wall_mesh():
+    """A slab of 2 cm as a mesh, in cells of 1 cm."""
+    return MeshShape(trimesh.creation.box((0.6, 0.6, 0.02)), cell=0.01, cache=False)
+
+
+def thrown_at(world, number, pose, young, size):
+    """A cube of `size` thrown along x at `FAST`, 1 m before the wall at 0."""
+    mesh = box((size, size, size), (2, 2, 2))
+    soft = Material(young, 0.3, 1000.0, 0.3 * (size / 2) ** 2 * np.sqrt(1000 * young))
+    tilt = turn(pose, np.array([0.6, 0.48, 0.64]))
+    return add(world, number, mesh, soft, position=(-size - 1, 0, 0), rotation=tilt, velocity=(FAST, 0, 0))
+
+
+def test_nothing_passes_a_wall_of_2_cm_at_30_metres_a_second():
+    world = World(floor=None, gravity=(0, 0, 0))
+    world.add_collider(BoxShape((0.02, 20.0, 20.0)), position=(0.01, 0, 0))
+    for pose, young, size in WALLED:
+        body = thrown_at(world, 0, pose, young, size)
+    world.build()
+    outer = [np.unique(body.surface) for body in world.bodies]
+    for _ in range(45):
+        world.step(DT)
+        for body, rows in zip(world.bodies, outer, strict=True):
+            assert body.positions()[rows, 0].max() < 1e-4
+    for body in world.bodies:
+        assert not body.is_frozen
+        assert body.center_of_mass()[0] < -0.4 * abs(body.mesh.vertices).max()
+
+
+def test_nothing_passes_a_mesh_of_two_cells_or_a_fence_of_thin_capsules_at_30_metres_a_second(wall_mesh):
+    """The vertices of the thrown box, 3 cm apart, are as dense as the bars, of 2 cm radius, are wide."""
+    world = room(gravity=(0, 0, 0), collider_room=0)
+    across = turn(np.pi / 2, (0, 1, 0))
+    world.add_collider(wall_mesh, rotation=across, position=(0.01, 0, 0), **alone(0))
+    for bar in range(-3, 4):
+        world.add_collider(CapsuleShape(0.02, 1.0), position=(0.0, 0.07 * bar, 0), **alone(1))
+    soft = Material(5e6, 0.3, 1000.0, 5.0)
+    for number, pose in enumerate((0.7, 0.0)):
+        tilt = turn(pose, np.array([0.6, 0.48, 0.64]))
+        options = {"position": (-0.5, 0, 0), "rotation": tilt, "velocity": (FAST, 0, 0)}
+        add(world, number, box((0.12,) * 3, (4, 4, 4)), soft, **options)
+    world.build()
+    for _ in range(15):
+        world.step(DT)
+        for body in world.bodies:
+            assert body.center_of_mass()[0] < 0.0
+            assert not body.is_frozen
+    assert all(body.momentum()[0] < 0.1 * FAST * body.masses.sum() for body in world.bodies)
+
+
+def test_nothing_slips_into_the_seam_between_the_floor_and_a_box_that_stands_on_it_and_moves():
+    """The box's lower edge lies in the floor: there its bottom is as near as the face that pushes."""
+    world = room(floor=0.0)
+    piston = world.add_collider(BoxShape((1.0, 2.0, 2.0)), position=(-1.05, 0, 1.0), friction=0.0)
+    body = world.add_body(BLOCK, FIRM, position=(0, 0, 0.25))
+    world.build()
+    run(world, 0.5)
+    for step in range(60):
+        face = -0.55 + (step + 1) / 120
+        piston.move_to((face - 0.5, 0, 1.0))
+        world.step(DT)
+        assert body.positions()[:, 0].min() > face - 1e-4
+
+
+def test_colliders_come_go_and_jump_while_the_world_runs():
+    world = room()
+    shelf = world.add_collider(BoxShape((4, 4, 0.2)), position=(0, 0, 2.9))
+    body = world.add_body(BLOCK, FIRM, position=(0, 0, 3.3))
+    world.build()
+    run(world, 1.0)
+    assert body.positions()[:, 2].min() == pytest.approx(3.0, abs=1e-3)
+    ground = world.add_collider(BoxShape((9, 9, 9)), position=(0, 0, -4.5))
+    shelf.remove()
+    assert world.colliders == (ground,)
+    run(world, 2.5)
+    assert body.positions()[:, 2].min() == pytest.approx(0.0, abs=1e-4)
+    ground.teleport((0, 0, -6.5))
+    run(world, 2.0)
+    assert body.positions()[:, 2].min() == pytest.approx(-2.0, abs=1e-4)
+    lift = world.add_collider(BoxShape((3, 3, 1)), position=(0, 0, -2.5))
+    assert lift.index == shelf.index  # its place
+    for step in range(60):
+        lift.move_to((0, 0, -2.5 + (step + 1) / 60))
+        world.step(DT)
+    run(world, 1.0)
+    assert body.positions()[:, 2].min() == pytest.approx(-1.0, abs=1e-4)
+    with pytest.raises(StateError, match="removed"):
+        shelf.set_velocity((1, 0, 0))
+
+
+@pytest.fixture(scope="module")
+def bowl():
+    """Half a hollow ball, outer radius 1.2 m, inner 1 m, its rim at z = 0."""
+    angle = np.linspace(0.0, np.pi / 2, 13)
+    outer = np.stack([1.2 * np.sin(angle), -1.2 * np.cos(angle)], axis=1)
+    inner = np.stack([np.sin(angle), -np.cos(angle)], axis=1)[::-1]
+    return MeshShape(trimesh.creation.revolve(np.vstack([outer, inner]), sections=32), cell=0.08, cache=False)
+
+
+def test_a_body_comes_to_rest_on_every_kind_of_collider(bowl):
+    """At rest: it does not move, and each step what it lies on takes up its weight times the step."""
+    slope = 0.2 * np.add.outer(np.arange(9.0), np.zeros(9))  # 0.2 m in 1 m
+    lying = turn(np.pi / 2, (1, 0, 0))
+    grounds = [
+        (PlaneShape(), {}, BLOCK, 0.3),
+        (BoxShape((4, 4, 2)), {"position": (0, 0, -1)}, BLOCK, 0.3),
+        (SphereShape(30.0), {"position": (0, 0, -30), "friction": 1.0}, BLOCK, 0.3),
+        (CapsuleShape(30.0, 2.0), {"position": (0, 0, -30), "rotation": lying, "friction": 1.0}, BLOCK, 0.3),
+        (HeightFieldShape(slope, 1.0), {"position": (0, 0, -0.8)}, BLOCK, 0.4),
+        (bowl, {}, sphere(0.4, 2), -0.4),
+    ]
+    world = room()
+    damped = Material(5e5, 0.3, 1000.0, 600.0)
+    for number, (shape, options, mesh, height) in enumerate(grounds):
+        world.add_collider(shape, **options, **alone(number))
+        add(world, number, mesh, damped, position=(0.02, 0, height))
+    world.build()
+    for body in world.bodies:
+        body.set_linear_damping(2.0)  # rocking and rolling would go on for long
+    run(world, 6.0)
+    before = [body.positions() for body in world.bodies]
+    pushed = np.zeros((len(grounds), 3))
+    for _ in range(30):
+        world.step(DT)
+        pushed += [collider.impulse for collider in world.colliders]
+    for (shape, *_), body, start, push in zip(grounds, world.bodies, before, pushed, strict=True):
+        assert np.abs(body.positions() - start).max() < 1e-3, shape
+        weight = body.masses.sum() * G * 0.5
+        np.testing.assert_allclose(push, (0, 0, -weight), atol=0.02 * weight, err_msg=repr(shape))
+
+
+NAN, INF = float("nan"), float("inf")
+REFUSED = {
+    "a position that is not finite": lambda w, c: c.move_to((NAN, 0, 0)),
+    "two numbers": lambda w, c: c.teleport((0, 0)),
+    "a quaternion of length 2": lambda w, c: c.move_to((0, 0, 0), (0, 0, 0, 2)),
+    "a matrix that mirrors": lambda w, c: c.teleport((0, 0, 0), np.diag([1, 1, -1])),
+    "an infinite velocity": lambda w, c: c.set_velocity((INF, 0, 0)),
+    "a spin that is not finite": lambda w, c: c.set_velocity((0, 0, 0), (0, NAN, 0)),
+    "words": lambda w, c: c.set_velocity("fast"),
+    "negative friction": lambda w, c: w.add_collider(PlaneShape(), friction=-1),
+    "restitution above 1": lambda w, c: w.add_collider(PlaneShape(), restitution=1.5),
+    "a negative skin": lambda w, c: w.add_collider(PlaneShape(), thickness=-0.1),
+    "a group of half a bit": lambda w, c: w.add_collider(PlaneShape(), group=0.5),
+    "a mask below 0": lambda w, c: w.add_collider(PlaneShape(), mask=-1),
+    "no shape": lambda w, c: w.add_collider("box"),
+    "a place out of reach": lambda w, c: w.add_collider(PlaneShape(), position=(0, 0, 1e9)),
+    "one more than there is room for": lambda w, c: w.add_collider(PlaneShape()),
+    "a removed handle": lambda w, c: w.removed.remove(),
+    "a removed handle to read": lambda w, c: w.removed.impulse,
+}
+
+
+def full_world():
+    """A body that slides on a moving box; eight colliders, for which there is room, and one removed."""
+    world = room(collider_room=7)
+    moving = world.add_collider(BoxShape((9, 9, 1)), position=(0, 0, -0.5))
+    world.add_body(BLOCK, FIRM, position=(0, 0, 0.26))
+    world.build()
+    moving.set_velocity((0.5, 0.2, 0.1), (0, 0, 0.3))
+    world.removed = world.add_collider(PlaneShape(), mask=0)
+    world.removed.remove()
+    for _ in range(7):
+        world.add_collider(PlaneShape(), mask=0)
+    return world, moving
+
+
+def test_a_refused_call_changes_nothing():
+    """A world in which every wrong call is tried between the steps ends with the bits of one left alone."""
+    ends = []
+    for tries in (REFUSED, {}):
+        world, moving = full_world()
+        for _ in range(3):
+            for wrong in tries.values():
+                with pytest.raises((OptionError, StateError)):
+                    wrong(world, moving)
+            run(world, 1 / 12)
+        ends.append(
+            (world.bodies[0].positions(), world.bodies[0].velocities(), moving.position, moving.rotation)
+        )
+        assert len(world.colliders) == 8
+        del world, moving
+    for one, other in zip(*ends, strict=True):
+        np.testing.assert_array_equal(one, other)

@@ -1,0 +1,268 @@
+"""Bodies against each other and against themselves.
+
+Without gravity and floor, two bodies and what passes between them are all there is.
+"""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from taichi_soft import Contact, Material, World, beam, box, sphere
+
+DT = 1 / 60
+ROOT = Path(__file__).parents[2]
+SOFT = Material(young=2e5, poisson=0.3, density=1000.0, damping=60.0)
+
+
+def world_of(*bodies, **options):
+    """A world with soft contact, of (mesh, material, options of `add_body`)."""
+    world = World(**{"floor": None, "gravity": (0, 0, 0), "soft_contact": True, **options})
+    for mesh, material, each in bodies:
+        world.add_body(mesh, material, **each)
+    world.build()
+    return world
+
+
+def run(world, seconds):
+    for _ in range(round(seconds * 60)):
+        world.step(DT)
+
+
+def deepest(body, other):
+    """How deep any vertex of `body` lies in a tetrahedron of `other` [m], the distance to its nearest face.
+
+    Barycentric coordinates in float64, of every vertex in every tetrahedron.
+    """
+    x = body.positions().astype(np.float64)[np.unique(body.surface)]
+    corners = other.positions().astype(np.float64)[other.tets]
+    shape = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
+    inverse = np.linalg.inv(shape)
+    rest = np.einsum("mab,mnb->mna", inverse, x[None] - corners[:, :1])
+    shares = np.concatenate([1.0 - rest.sum(axis=2, keepdims=True), rest], axis=2)
+    heights = 1.0 / np.linalg.norm(
+        np.concatenate([-inverse.sum(axis=1, keepdims=True), inverse], axis=1), axis=2
+    )
+    inside = (shares > 0).all(axis=2)
+    if not inside.any():
+        return 0.0
+    # Of those inside: how far from the outer surface, at the least over its triangles.
+    vertices = other.positions().astype(np.float64)
+    a, b, c = np.moveaxis(vertices[other.surface], 1, 0)
+    normal = np.cross(b - a, c - a)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    assert (heights > 0).all()
+    points = x[inside.any(axis=0)]
+    planes = np.abs(np.einsum("fa,nfa->nf", normal, points[:, None] - a[None]))
+    return float(planes.min(axis=1).max())
+
+
+def totals(world):
+    momentum = sum(body.momentum() for body in world.bodies)
+    turn = sum(body.angular_momentum() for body in world.bodies)
+    return momentum, turn
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.8])
+def test_a_collision_keeps_momentum_and_angular_momentum(friction):
+    """Two bodies of different size and density, thrown past each other's middle; both spin."""
+    contact = Contact(friction=friction)
+    world = world_of(
+        (box((1, 1, 1), (2, 2, 2)), SOFT, {"contact": contact}),
+        (sphere(0.4, 2), Material(1e5, 0.3, 300.0, 20.0), {"contact": contact, "position": (1.3, 0.3, 0.2)}),
+    )
+    one, other = world.bodies
+    one.set_velocity((2.0, 0.0, 0.0), (0.0, 0.5, -1.0))
+    other.set_velocity((-6.0, 0.5, 0.0), (3.0, 0.0, 2.0))
+    first, turn = totals(world)
+    before = one.momentum()
+    run(world, 1.0)
+    last, end = totals(world)
+    passed = np.linalg.norm(one.momentum() - before)
+    assert passed > 100.0
+    assert np.linalg.norm(last - first) < 1e-6 * 2000.0
+    assert np.linalg.norm(end - turn) < 1e-4 * passed
+
+
+def test_a_pile_of_five_blocks_stands_without_creeping():
+    """8 s after it was set up, a hundredth of its size in no direction; without sinking into each other."""
+    edge = 0.5
+    block = box((edge,) * 3, (2, 2, 2))
+    firm = Material(5e6, 0.3, 1000.0, 600.0)  # a tenth of that leans and falls after 4 s
+    piled = [(block, firm, {"position": (0, 0, edge / 2 + 1.01 * edge * i)}) for i in range(5)]
+    world = world_of(*piled, floor=0.0, gravity=(0, 0, -9.81))
+    run(world, 2.0)
+    before = [body.positions() for body in world.bodies]
+    run(world, 8.0)
+    for start, body in zip(before, world.bodies, strict=True):
+        assert np.abs(body.positions() - start).max() < 0.01 * edge
+    for lower, upper in zip(world.bodies[:-1], world.bodies[1:], strict=True):
+        assert upper.center_of_mass()[2] > lower.center_of_mass()[2] + 0.9 * edge
+        skin = lower.asset.surface_row[1]
+        assert max(deepest(upper, lower), deepest(lower, upper)) < skin
+
+
+def test_a_ball_dropped_on_a_soft_plate_bends_it_and_comes_to_rest_on_it():
+    """The plate is held at two edges; in the end it carries the ball, with its middle below its edges."""
+    plate = box((2.0, 2.0, 0.2), (6, 6, 1))
+    held = np.flatnonzero(np.abs(plate.vertices[:, 0]) > 0.99)
+    ball = sphere(0.3, 2)
+    world = world_of(
+        (plate, Material(1e6, 0.3, 1000.0, 100.0), {"pinned": held}),
+        (ball, Material(3e5, 0.3, 1000.0, 40.0), {"position": (0.05, 0, 0.6)}),
+        gravity=(0, 0, -9.81),
+    )
+    for body in world.bodies:
+        body.set_linear_damping(1.0)
+    run(world, 5.0)
+    before = [body.positions() for body in world.bodies]
+    run(world, 0.5)
+    for start, body in zip(before, world.bodies, strict=True):
+        assert np.abs(body.positions() - start).max() < 2e-3
+    lower, upper = world.bodies
+    assert lower.positions()[:, 2].min() < -0.12
+    assert upper.center_of_mass()[2] > 0.25 + lower.positions()[:, 2].min()
+    skin = 0.5 * (lower.asset.surface_row[1] + upper.asset.surface_row[1])
+    assert deepest(upper, lower) < skin
+
+
+def folding(itself):
+    """A strip in the shape of a U, its ends thrown towards each other: the least gap between its two arms."""
+    strip = beam(2.0, 0.2, 0.1, 1)
+    world = world_of((strip, Material(1e5, 0.3, 1000.0, 3.0), {"contact": Contact(itself=itself)}))
+    body = world.bodies[0]
+    x, _, z = strip.vertices.T
+    bend = np.clip(x / 0.2, -np.pi / 2, np.pi / 2)  # an arc of 0.2 m, straight arms to its sides
+    rest = x - 0.2 * bend
+    bent = np.stack(
+        [
+            (0.2 - z) * np.sin(bend) + rest * np.cos(bend),
+            strip.vertices[:, 1],
+            0.2 - (0.2 - z) * np.cos(bend) + rest * np.sin(bend),
+        ],
+        axis=1,
+    )
+    arms = np.abs(bend) > 1.5
+    velocity = np.where(
+        arms[:, None] * (np.abs(x)[:, None] > 0.6), np.stack([-np.sign(x), 0 * x, 0 * x], 1), 0.0
+    )
+    body.set_motion(bent, 3.0 * velocity)
+    upper, lower = x > 0.6, x < -0.6
+    least = np.inf
+    for _ in range(30):
+        world.step(DT)
+        now = body.positions()
+        least = min(least, now[upper, 0].mean() - now[lower, 0].mean())
+    return least, body
+
+
+def test_the_halves_of_a_folded_strip_meet_where_contact_with_itself_is_on_and_pass_where_it_is_off():
+    on, body = folding(True)
+    assert on > 0.06  # its own thickness is 0.1 m
+    assert not body.is_frozen
+    assert folding(False)[0] < 0.0
+
+
+FILTERS = [
+    ((1, 1), (1, 1)),
+    ((1, 2), (2, 1)),
+    ((1, 1), (2, 2)),
+    ((1, 3), (2, 2)),
+    ((1, 0), (1, 1)),
+    ((5, 4), (4, 6)),
+]
+
+
+def test_bodies_touch_where_each_ones_mask_has_the_others_group():
+    cube = box((0.3,) * 3, (1, 1, 1))
+    bodies = []
+    for row, pair in enumerate(FILTERS):
+        for side, (group, mask) in zip((-1, 1), pair, strict=True):
+            options = {"position": (0.3 * side, 0, 2 * row), "velocity": (-2.0 * side, 0, 0)}
+            bodies.append((cube, SOFT, {**options, "contact": Contact(group=group, mask=mask)}))
+    world = world_of(*bodies)
+    run(world, 0.6)
+    for pair, left, right in zip(FILTERS, world.bodies[::2], world.bodies[1::2], strict=True):
+        (group, mask), (other_group, other_mask) = pair
+        touch = bool(group & other_mask and other_group & mask)
+        passed = left.center_of_mass()[0] > right.center_of_mass()[0]
+        assert passed != touch, pair
+
+
+def test_a_body_of_5_cm_rests_on_one_of_2_m():
+    """Between its vertices: its own vertices are what the big one's triangles hold."""
+    world = world_of(
+        (box((2, 2, 2), (2, 2, 2)), Material(1e6, 0.3, 1000.0, 600.0), {"position": (0, 0, 1.0)}),
+        (box((0.05,) * 3, (1, 1, 1)), Material(1e5, 0.3, 1000.0, 0.3), {"position": (0.37, 0.21, 2.08)}),
+        floor=0.0,
+        gravity=(0, 0, -9.81),
+    )
+    big, small = world.bodies
+    run(world, 3.0)
+    before = small.positions()
+    run(world, 0.5)
+    assert np.abs(small.positions() - before).max() < 2e-3
+    skin = 0.5 * (big.asset.surface_row[1] + small.asset.surface_row[1])
+    gap = small.positions()[:, 2].min() - big.positions()[:, 2].max()
+    assert -0.02 < gap < 1.2 * skin
+    assert deepest(small, big) == 0.0
+
+
+@pytest.mark.filterwarnings("ignore::taichi_soft.FrozenBodyWarning")
+def test_where_a_body_freezes_the_others_go_on_and_lie_on_it():
+    cube = box((0.5,) * 3, (2, 2, 2))
+    world = world_of(
+        *((cube, SOFT, {"position": (0, 0, 0.26 + 0.55 * i)}) for i in range(3)),
+        floor=0.0,
+        gravity=(0, 0, -9.81),
+    )
+    middle = world.bodies[1]
+    run(world, 0.5)
+    hot = middle.velocities()
+    hot[0] = 1.9e4
+    middle.set_motion(middle.positions(), hot)
+    world.step(DT)
+    assert [body.is_frozen for body in world.bodies] == [False, True, False]
+    still = middle.positions()
+    world.bodies[2].apply_impulse((0, 0, 2.0 * world.bodies[2].masses.sum()))
+    run(world, 2.0)
+    np.testing.assert_array_equal(middle.positions(), still)
+    assert np.isfinite(world.bodies[0].positions()).all()
+    upper = world.bodies[2]
+    assert np.abs(upper.velocities()).max() < 0.05
+    assert upper.positions()[:, 2].min() > still[:, 2].max() - 0.02
+
+
+SCRIPT = """
+import sys
+import numpy as np
+from taichi_soft import Contact, Material, World, box, init, sphere
+init("cpu", threads=int(sys.argv[1]))
+world = World(soft_contact=True)
+for i in range(6):
+    mesh = sphere(0.3, 2) if i % 2 else box((0.5, 0.5, 0.5), (2, 2, 2))
+    material = Material(2e5, 0.3, 1000.0, 40.0)
+    options = {"contact": Contact(itself=i == 0)}
+    place = (0.1 * i + 3.0 * (i > 3), 0.05 * i, 0.4 + 0.6 * (i % 4))
+    world.add_body(mesh, material, position=place, **options)
+world.build()
+for _ in range(60):
+    world.step(1 / 60)
+np.savez(sys.argv[2], *[rows for b in world.bodies for rows in (b.positions(), b.velocities())])
+"""
+
+
+def test_a_heap_has_the_same_bits_for_one_and_two_threads(tmp_path):
+    found = []
+    for threads in (1, 2):
+        out = tmp_path / f"{threads}.npz"
+        subprocess.run(
+            [sys.executable, "-c", SCRIPT, str(threads), str(out)], cwd=ROOT, check=True, timeout=300
+        )
+        found.append(dict(np.load(out)))
+    assert len(found[0]) == 12
+    for name, rows in found[0].items():
+        assert np.isfinite(rows).all()
+        np.testing.assert_array_equal(rows, found[1][name])

@@ -1,0 +1,139 @@
+"""Bodies that tear by themselves: where, and only where, they are pulled too hard."""
+
+import numpy as np
+import pytest
+
+from taichi_soft import (
+    AnisotropicMaterial,
+    Material,
+    MaterialError,
+    OptionError,
+    SoftBodyAsset,
+    Stiffness,
+    Tearing,
+    TetMesh,
+    World,
+    box,
+)
+
+DT = 1 / 60
+STRENGTH = 3e4
+JELLY = Material(1e5, 0.3, 1000.0, 60.0)
+
+
+def waisted_bar():
+    """A bar of 2 m along x whose upper half is missing between x = 0.5 and 0.75."""
+    whole = box((2.0, 0.5, 0.5), (8, 2, 2))
+    centers = whole.vertices[whole.tets].mean(axis=1)
+    kept = ~((centers[:, 2] > 0) & (centers[:, 0] > 0.5) & (centers[:, 0] < 0.75))
+    used, corners = np.unique(whole.tets[kept], return_inverse=True)
+    return TetMesh(whole.vertices[used], corners.reshape(-1, 4))
+
+
+BAR = waisted_bar()
+ENDS = np.flatnonzero(np.abs(BAR.vertices[:, 0]) > 0.99)
+
+
+def asset(**options):
+    return SoftBodyAsset(
+        BAR, JELLY, pinned=ENDS, **{"spare_vertices": 60, "tearing": Tearing(STRENGTH), **options}
+    )
+
+
+@pytest.fixture(scope="module")
+def world():
+    """With a pool of three bars that tear, and one of one that cannot fall apart."""
+    world = World(floor=None, gravity=(0, 0, 0))
+    world.assets = asset(), asset(spare_vertices=61)
+    world.reserve(world.assets[0], 3)
+    world.reserve(world.assets[1], 1)
+    world.build()
+    return world
+
+
+def pulled(world, stretch, kind=0):
+    """A new bar, stretched along its axis and held at its ends."""
+    for each in world.bodies:
+        world.despawn(each)
+    body = world.spawn(world.assets[kind])
+    body.set_motion(BAR.vertices * [stretch, 1.0, 1.0], np.zeros_like(BAR.vertices))
+    return body
+
+
+def principal(body):
+    """Largest principal stress of each tetrahedron [Pa], by Hooke's law and linear strain, on paper."""
+    F = body.deformations()
+    strain = 0.5 * (np.swapaxes(F, 1, 2) @ F - np.eye(3))
+    lame_lambda, mu = JELLY.lame_lambda, JELLY.lame_mu
+    trace = np.einsum("maa->m", strain)[:, None, None]
+    return np.linalg.eigvalsh(lame_lambda * trace * np.eye(3) + 2 * mu * strain)[:, -1]
+
+
+def run(world, steps):
+    for _ in range(steps):
+        world.step(DT, 24)
+
+
+def test_below_its_strength_nothing_tears(world):
+    body = pulled(world, 1.08)
+    highest = 0.0
+    for _ in range(60):
+        run(world, 1)
+        highest = max(highest, principal(body).max())
+    assert 0.5 * STRENGTH < highest < STRENGTH
+    assert body.topology_version == 0
+
+
+def test_a_bar_tears_through_at_its_waist_and_nowhere_else(world):
+    body = pulled(world, 1.2)
+    masses = body.masses.sum()
+    run(world, 240)
+    parts = world.bodies
+    assert len(parts) >= 2
+    assert sum(part.masses.sum() for part in parts) == pytest.approx(masses, rel=1e-12)
+    assert sum(len(part.tets) for part in parts) == len(BAR.tets)
+    copies = np.concatenate([part.vertex_origins for part in parts])
+    torn = np.flatnonzero(np.bincount(copies, minlength=len(BAR.vertices)) > 1)
+    assert len(torn) >= 6
+    assert (np.abs(BAR.vertices[torn, 0] - 0.625) < 0.3).all()
+    held = [part for part in parts if len(part.pinned)]
+    assert len(held) == 2  # one at each end
+    for part in parts:
+        assert principal(part).max() < STRENGTH
+        x = part.positions()
+        assert np.ptp(x[:, 0]) < 1.9
+
+
+def test_what_falls_off_stays_in_the_body_where_no_slot_is_free(world):
+    body = pulled(world, 1.2, kind=1)
+    run(world, 240)
+    assert world.bodies == (body,)
+    assert body.topology_version > 0
+    across = body.positions()[body.tets][:, :, 0]
+    middle = 0.5 * (across.min() + across.max())
+    assert principal(body).max() < STRENGTH
+    assert middle == pytest.approx(0.0, abs=0.01)
+
+
+def test_tears_are_the_same_every_time(world):
+    told = []
+    for _ in range(2):
+        pulled(world, 1.2)
+        run(world, 40)
+        told.append(b"".join(part.positions().tobytes() for part in world.bodies))
+    assert told[0] == told[1]
+
+
+def test_bad_options_are_refused():
+    for stress in (0.0, -1.0, np.nan, None, "strong"):
+        with pytest.raises(OptionError, match="stress must be"):
+            Tearing(stress)
+    with pytest.raises(OptionError, match="most must be"):
+        Tearing(1.0, most=0)
+    with pytest.raises(OptionError, match="must be a Tearing or None"):
+        asset(tearing=3e4)
+    with pytest.raises(OptionError, match="tearing takes spare_vertices"):
+        asset(spare_vertices=0)
+    wood = AnisotropicMaterial(Stiffness.isotropic(1e5, 0.3), 1000.0)
+    with pytest.raises(MaterialError, match="takes no tearing"):
+        SoftBodyAsset(BAR, wood, spare_vertices=5, tearing=Tearing(1.0))
