@@ -111,7 +111,7 @@ def proof(stage: Stage) -> float:
     inside = 0
     for actor in stage.actors:
         rows = actor.body.positions()
-        inside += np.hypot(*(rows - HOLLOW).T[:2]).max() < RIM + 0.3 and 0.0 < rows[:, 2].min() < 1.0
+        inside += np.hypot(*(rows - HOLLOW).T[:2]).max() < RIM + 0.3 and 0.0 < rows[:, 2].min() < 1.5
     return float(inside)
 
 
