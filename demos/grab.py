@@ -107,7 +107,7 @@ def stage() -> Stage:
     world.build()
     frame = world.add_frame((-0.6, 0.0, 2.2))
     props = [Prop(SphereShape(0.09).surface(), frame, color=(0.95, 0.93, 0.88))]
-    camera = Camera.framing((-2.2, -1.4, 0.0), (3.8, 1.4, 3.0), aspect=16 / 9, azimuth=-72, elevation=20)
+    camera = Camera.framing((-2.2, -1.4, 0.0), (3.8, 1.4, 3.0), aspect=16 / 9, azimuth=-72, elevation=36)
     return Stage("picked up and thrown", world, actors, camera, STEP, 10.0, act=Hand(frame), props=props)
 
 

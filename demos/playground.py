@@ -72,7 +72,7 @@ def _turn(about_y: float, about_x: float = 0.0) -> NDArray[np.float64]:
 
 def _funnel() -> trimesh.Trimesh:
     """A cone with a hole, its wall 16 cm thick."""
-    inner = np.array([(0.78, 0.0), (0.85, 0.15), (2.55, 1.35)])
+    inner = np.array([(0.78, 0.0), (0.85, 0.15), (2.85, 1.55)])
     outer = inner + np.array([0.13, -0.1])
     return trimesh.creation.revolve(np.concatenate([outer, inner[::-1], outer[:1]]), sections=64)
 
@@ -111,7 +111,7 @@ def proof(stage: Stage) -> float:
     inside = 0
     for actor in stage.actors:
         rows = actor.body.positions()
-        inside += np.hypot(*(rows - HOLLOW).T[:2]).max() < RIM + 0.3 and 0.0 < rows[:, 2].min() < 1.0
+        inside += np.hypot(*(rows - HOLLOW).T[:2]).max() < RIM + 0.3 and 0.0 < rows[:, 2].min() < 1.5
     return float(inside)
 
 
