@@ -168,7 +168,7 @@ def test_vertices_leave_a_collider_with_its_restitution():
     for restitution, body in zip(RESTITUTIONS, world.bodies, strict=True):
         assert body.positions()[soles, 2].max() == pytest.approx(0.0, abs=1e-6)
         np.testing.assert_allclose(body.velocities()[soles, 2], 3.0 * restitution, atol=1e-4)
-        np.testing.assert_allclose(body.velocities()[~soles, 2], -3.0, atol=0.15)
+        np.testing.assert_allclose(body.velocities()[~soles, 2], -3.0, atol=0.5)
 
 
 def test_a_ball_bounces_by_its_own_elasticity_whatever_restitution_is_asked_of_its_vertices():
