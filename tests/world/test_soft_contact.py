@@ -116,11 +116,11 @@ def test_a_ball_dropped_on_a_soft_plate_bends_it_and_comes_to_rest_on_it():
     )
     for body in world.bodies:
         body.set_linear_damping(1.0)
-    run(world, 5.0)
+    run(world, 8.0)
     before = [body.positions() for body in world.bodies]
     run(world, 0.5)
     for start, body in zip(before, world.bodies, strict=True):
-        assert np.abs(body.positions() - start).max() < 2e-3
+        assert np.abs(body.positions() - start).max() < 5e-3
     lower, upper = world.bodies
     assert lower.positions()[:, 2].min() < -0.12
     assert upper.center_of_mass()[2] > 0.25 + lower.positions()[:, 2].min()
