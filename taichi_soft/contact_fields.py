@@ -66,6 +66,7 @@ class ContactFields:
         self.body_upper = ti.Vector.field(3, ti.f32, bodies)
         self.sleep_speed = ti.field(ti.f32, ())  # [m/s] below which bodies fall asleep; 0 for never
         self.calm = ti.field(ti.f32, bodies)  # time since a body was faster [s]
+        self.is_wild = ti.field(ti.i32, bodies)  # 1 where it flies apart, and must not take others with it
         self.body_filter = ti.Vector.field(2, ti.i32, bodies)  # group, mask
         self.particle_clearance = ti.field(ti.f32, particles)  # [m] from all that is near, at that time
         self.particle_touches = ti.field(ti.i32, particles)  # 1 where something held it in the last substep

@@ -20,6 +20,10 @@ from taichi_soft.runtime import ti
 from taichi_soft.state import ABSENT, ACTIVE, PUSHED
 from taichi_soft.types import Integrator
 
+WILD = 20.0
+"""Way of a particle within one substep, over the mean edge of its body's surface, from which the body is
+taken to be exploding: others pass through it until it is frozen or calm."""
+
 
 @ti.func
 def _begin_body(state: ti.template(), body):
@@ -28,6 +32,7 @@ def _begin_body(state: ti.template(), body):
         for p in range(particles[0], particles[1]):
             remember_particle(state, p)
         forget_contacts(state, body)
+        state.contact.is_wild[body] = 0
 
 
 @ti.func
@@ -132,6 +137,12 @@ def _move_island(state: ti.template(), program: ti.template(), island, substeps,
                 add_reactions(state, body, lasting)
                 pull_grabs(state, body, h, lasting)
                 speed, speed_beside = _kick_body(state, program, body, kick, common)
+                state.contact.is_wild[body] = 0
+                if ti.static(program.has_soft_contact):
+                    far = WILD * state.soft.body_surface[body].z
+                    state.contact.is_wild[body] = int(not (speed * h <= far))
+                if state.contact.is_wild[body] == 1:
+                    speed, speed_beside = 0.0, 0.0
                 fastest = ti.max(fastest, speed)
                 fastest_beside = ti.max(fastest_beside, speed_beside)
         if ti.static(program.has_soft_contact):

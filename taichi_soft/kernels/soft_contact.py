@@ -96,7 +96,8 @@ def _find_gaps(state: ti.template(), k, gone, way):
             distance, normal, weights, can_touch = _gap(state, p, corners)
             state.soft.slot_normal[slot] = normal
             state.soft.slot_weights[slot] = weights
-            if distance > thickness + way:
+            is_wild = state.contact.is_wild[state.particle_body[p]] + state.contact.is_wild[other]
+            if distance > thickness + way or is_wild > 0:
                 can_touch = 0
             if can_touch == 1 and distance >= 0.0:
                 state.soft.slot_gap[slot] = distance - thickness
