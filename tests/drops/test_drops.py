@@ -69,7 +69,7 @@ def test_what_does_not_go_non_finite_comes_to_rest_but_for_balls_that_roll_slowl
     assert len(going) <= 4  # of thirty; three roll on
     for outcome in going:
         assert outcome.case.shape == "sphere", outcome
-        assert outcome.speed < 0.1, outcome
+        assert outcome.speed < 0.03 * outcome.case.size, outcome
 
 
 def test_a_case_ends_the_same_alone(outcomes):
