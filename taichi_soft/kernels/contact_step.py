@@ -10,14 +10,13 @@ from taichi_soft.kernels.grabs import pull_grabs
 from taichi_soft.kernels.internal_forces import accumulate_forces
 from taichi_soft.kernels.islands import find_islands
 from taichi_soft.kernels.motion import gravity_on, remember_particle
-from taichi_soft.kernels.per_body import before_kick, settle_body
-from taichi_soft.kernels.plasticity import flow_body
+from taichi_soft.kernels.per_body import before_kick, end_body
 from taichi_soft.kernels.sleep import note_motion, settle_island, wake_by_colliders, wake_island
 from taichi_soft.kernels.soft_contact import solve_island
 from taichi_soft.kernels.soft_search import find_box, is_social, island_margin, search_body, search_island
 from taichi_soft.kernels.touches import add_touches
 from taichi_soft.runtime import ti
-from taichi_soft.state import ABSENT, ACTIVE, PUSHED
+from taichi_soft.state import ABSENT, ACTIVE
 from taichi_soft.types import Integrator
 
 WILD = 20.0
@@ -141,10 +140,9 @@ def _move_island(state: ti.template(), program: ti.template(), island, substeps,
                 if ti.static(program.has_soft_contact):
                     far = WILD * state.soft.body_surface[body].z
                     state.contact.is_wild[body] = int(not (speed * h <= far))
-                if state.contact.is_wild[body] == 1:
-                    speed, speed_beside = 0.0, 0.0
                 fastest = ti.max(fastest, speed)
-                fastest_beside = ti.max(fastest_beside, speed_beside)
+                if state.contact.is_wild[body] == 0:  # or the others' candidates would age by its speed
+                    fastest_beside = ti.max(fastest_beside, speed_beside)
         if ti.static(program.has_soft_contact):
             reach, gone = _touch_each_other(state, island, reach, gone, fastest_beside, h)
         for i in range(first, last):
@@ -162,15 +160,7 @@ def _move_island(state: ti.template(), program: ti.template(), island, substeps,
     for i in range(first, last):
         body = state.contact.island_body[i]
         if state.body_status[body] == ACTIVE:
-            if ti.static(program.integrator == Integrator.LEAPFROG):
-                push_particles(state, body, 0.5 * h)
-            has_failed = settle_body(state, body)
-            failed += has_failed
-            if has_failed == 0:
-                state.body_velocity_lag[body] = h
-                state.body_drives[body] = state.body_drives[body] & ~PUSHED
-                if ti.static(program.has_plasticity):
-                    flow_body(state, body, substeps * h)
+            failed += end_body(state, program, body, substeps, h)
     return failed
 
 

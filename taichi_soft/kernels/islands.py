@@ -4,6 +4,7 @@ One thread steps an island, so that what passes between its bodies needs no wait
 that stays clear of all others is an island of its own.
 """
 
+from taichi_soft.kernels.motion import gravity_on
 from taichi_soft.runtime import ti
 from taichi_soft.state import ABSENT, ASLEEP
 
@@ -11,7 +12,6 @@ from taichi_soft.state import ABSENT, ASLEEP
 @ti.func
 def _find_boxes(state: ti.template(), body_count, dt):
     """Box round each body's surface and its way through a step of `dt` [s]; of absent ones far away."""
-    fall = state.gravity[None].norm() * dt * dt
     for body in range(body_count):
         if state.body_status[body] == ABSENT:
             state.contact.body_lower[body] = ti.Vector.one(ti.f32, 3) * 1e30
@@ -29,6 +29,7 @@ def _find_boxes(state: ti.template(), body_count, dt):
             slow, fast = ti.min(slow, v), ti.max(fast, v)
         surface = state.soft.body_surface[body]
         # What its parts do beside each other, they may do otherwise before the step is over.
+        fall = gravity_on(state, body).norm() * dt * dt
         reach = 0.5 * (fast - slow) * dt + fall + surface.y + search_margin(surface)
         state.contact.body_lower[body] = lower - reach
         state.contact.body_upper[body] = upper + reach

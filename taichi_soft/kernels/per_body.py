@@ -53,7 +53,7 @@ def before_kick(program: ti.template(), h, is_first):
 
 
 @ti.func
-def settle_body(state: ti.template(), body):
+def _settle_body(state: ti.template(), body):
     """Freeze a body that went non-finite in its last sound state. Returns 1 where that happened."""
     particles = state.body_particles[body]
     sound = 1
@@ -65,6 +65,20 @@ def settle_body(state: ti.template(), body):
         clear_forces(state, body)
         state.body_status[body] = FROZEN
     return 1 - sound
+
+
+@ti.func
+def end_body(state: ti.template(), program: ti.template(), body, substeps, h):
+    """What comes after the last substep of an active body. Returns 1 where it failed."""
+    if ti.static(program.integrator == Integrator.LEAPFROG):
+        push_particles(state, body, 0.5 * h)
+    failed = _settle_body(state, body)
+    if failed == 0:
+        state.body_velocity_lag[body] = h
+        state.body_drives[body] = state.body_drives[body] & ~PUSHED
+        if ti.static(program.has_plasticity):
+            flow_body(state, body, substeps * h)
+    return failed
 
 
 @ti.func
@@ -80,14 +94,8 @@ def _step_body(state: ti.template(), program: ti.template(), body, substeps, h):
         for s in range(substeps):
             advance_body(state, program, body, h, kick, int(s == 0))
             kick = h
-        if ti.static(program.integrator == Integrator.LEAPFROG):
-            push_particles(state, body, 0.5 * h)
-        failed = settle_body(state, body)
+        failed = end_body(state, program, body, substeps, h)
         if failed == 0:
-            state.body_velocity_lag[body] = h
-            state.body_drives[body] = state.body_drives[body] & ~PUSHED
-            if ti.static(program.has_plasticity):
-                flow_body(state, body, substeps * h)
             if ti.static(program.integrator == Integrator.IMPLICIT_EULER):
                 failed = int(state.body_residual[body] > state.solver[None][0])
     return failed

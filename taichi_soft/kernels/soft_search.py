@@ -17,7 +17,6 @@ CELL = 2.0
 """Edge of a cell of the hash over the mean edge of the triangles that look round in it. From 1 to 4 makes no
 difference in a heap."""
 
-
 MOST_CELLS = 32.0
 """Cells along one axis that one triangle looks into. One that an exploding body has drawn out over kilometres
 is left out, or the step that ends with that body frozen would take hours."""
@@ -89,9 +88,8 @@ def _fill_table(state: ti.template(), table, body, other, cell, margin):
                 k = state.soft.item[i]
                 x = state.particle_position[state.outer_particle[k]]
                 row = table[0] + _bucket(_cell_of(x, cell), size)
-                at = (
-                    state.soft.cell_first[row] + 1 - 2 * pass_number
-                )  # counts up, and down again to the first
+                # It counts up, and then down again to the first.
+                at = state.soft.cell_first[row] + 1 - 2 * pass_number
                 state.soft.cell_first[row] = at
                 if pass_number == 1:
                     state.soft.cell_item[at] = k
