@@ -19,7 +19,6 @@ from taichi_soft.kernels.collider_rows import MOTION_WIDTH, sum_collider_impulse
 from taichi_soft.math.rotations import matrix_of, quaternion_of, rotation_vector, turned_by
 from taichi_soft.plain import digest_of
 from taichi_soft.shapes import Shape
-from taichi_soft.state import fill
 
 Floats = NDArray[np.float64]
 
@@ -258,9 +257,7 @@ class Colliders:
         """Fill the fields with what was added before `build`."""
         self._contact, self._body_count = contact, body_count
         rows = self._rows
-        samples = [np.zeros(0, np.float32), *(row.shape.samples for row in rows)]
-        fill(contact.samples, np.concatenate(samples))
-        fill(contact.near_count, np.zeros(0))
+        self._write_samples(rows)
         self._write_constants()
         self._is_dirty = True
 
@@ -269,24 +266,32 @@ class Colliders:
         if self._contact is None:
             return
         row = self._rows[index]
-        if row.is_alive and len(row.shape.samples):
-            samples = self._contact.samples.to_numpy()
-            samples[row.offset : row.offset + len(row.shape.samples)] = row.shape.samples
-            self._contact.samples.from_numpy(samples)
+        if row.is_alive:
+            self._write_samples([row])
         self._write_constants()
         self._is_dirty = True
         self.on_jump()
+
+    def _write_samples(self, rows: list[ColliderRow]) -> None:
+        assert self._contact is not None
+        if any(len(row.shape.samples) for row in rows):
+            samples = self._contact.samples.to_numpy()
+            for row in rows:
+                samples[row.offset : row.offset + len(row.shape.samples)] = row.shape.samples
+            self._contact.samples.from_numpy(samples)
 
     def _write_constants(self) -> None:
         contact, rows = self._contact, self._rows
         assert contact is not None
         contact.collider_count[None] = len(rows)
+        fill = contact.loader.fill
         fill(contact.collider_kind, np.array([r.shape.kind if r.is_alive else NO_COLLIDER for r in rows]))
         fill(contact.collider_parameters, np.array([r.shape.parameters for r in rows]))
         fill(contact.collider_resolution, np.array([r.shape.resolution for r in rows]))
         fill(contact.collider_offset, np.array([r.offset for r in rows]))
         fill(contact.collider_surface, np.array([(r.friction, r.restitution, r.skin) for r in rows]))
         fill(contact.collider_filter, np.array([(r.group, r.mask) for r in rows]))
+        contact.loader.write()
 
     def moved(self, row: ColliderRow) -> None:
         """Note that a collider is elsewhere, or moves differently, from the next step on."""
@@ -351,10 +356,7 @@ class Colliders:
             self.moved(row)
         if self._contact is None or before == [row.constants for row in after]:
             return
-        samples = self._contact.samples.to_numpy()
-        for row in after:
-            samples[row.offset : row.offset + len(row.shape.samples)] = row.shape.samples
-        self._contact.samples.from_numpy(samples)
+        self._write_samples(after)
         self._write_constants()
 
     def impulses(self) -> Floats:

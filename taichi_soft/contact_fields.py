@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from taichi_soft.loading import Loader
 from taichi_soft.runtime import ti
 
 NO_COLLIDER = -1
@@ -39,6 +40,7 @@ class ContactFields:
         """Allocate; contents are zero."""
         c = capacity.colliders
         self.capacity = capacity
+        self.loader = Loader()  # of what does not change when a collider moves
         self.collider_count = ti.field(ti.i32, ())  # rows in use, removed ones among them
         self.collider_kind = ti.field(ti.i32, c)  # a `ShapeKind`, or NO_COLLIDER
         self.collider_parameters = ti.Vector.field(8, ti.f32, c)

@@ -23,6 +23,11 @@ __all__ = ["Device", "device", "init", "is_initialized", "ti"]
 _MOST_THREADS = 256
 _ARCHS = ("cpu", "cuda", "vulkan", "metal")
 
+# A `ti.real_func` is compiled once instead of being copied to wherever it is called, and twice the code takes
+# Taichi more than twice the time. But Taichi 1.7 puts branches and loops of a `ti.func` called in it into the
+# kernel instead, and crashes. With this they go into what is being compiled.
+ti.lang.kernel_impl.Kernel.ast_builder = lambda _: ti.lang.impl.get_runtime().compiling_callable.ast_builder()
+
 
 @dataclass(frozen=True)
 class Device:
@@ -95,6 +100,7 @@ def init(arch: str = "auto", threads: int | None = None) -> Device:
                 enable_fallback=False,
                 cfg_optimization=False,  # halves the compile time; the kernels run as fast without it
                 make_cpu_multithreading_loop=False,  # it would put up to 512 bodies into one thread
+                unrolling_limit=0,  # no warning
                 log_level=ti.ERROR,
             )
     except RuntimeError as error:

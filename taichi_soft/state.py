@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from taichi_soft.constants import LANES
 from taichi_soft.contact_fields import ContactCapacity, ContactFields, SoftContactFields
+from taichi_soft.loading import Loader
 from taichi_soft.runtime import ti
 from taichi_soft.scene import BodyArrays, Ranges, Scene, blocks_of
 
@@ -98,6 +99,7 @@ class State:
     def __init__(self, capacity: Capacity) -> None:
         """Allocate `capacity`; contents are zero until `load`."""
         self.capacity = capacity
+        self.loader = Loader()
         n, k, b, bodies = capacity.particles, capacity.edges, capacity.blocks, capacity.bodies
         real = self.real = ti.f64 if capacity.double else ti.f32
         self.particle_position = ti.Vector.field(3, real, n)  # [m]
@@ -202,12 +204,13 @@ class State:
         self.floor = ti.Vector.field(3, real, ())  # height [m], restitution, friction
 
     def load(self, scene: Scene, models: list[int]) -> None:
-        """Fill every field from `scene`; `models[i]` is the number of body i's force model.
+        """Fill every field from `scene`, and those that `loader` has rows for already.
+
+        `models[i]` is the number of body i's force model.
 
         All bodies are absent, and their particles where their meshes are, until `spawn_body` places them.
         """
-        ranges = scene.ranges
-        bodies = scene.bodies
+        fill, ranges, bodies = self.loader.fill, scene.ranges, scene.bodies
         position = _laid_out(scene, "particles", lambda b: b.rest_position)
         fill(self.particle_position, position)
         fill(self.prev_position, position)
@@ -269,9 +272,11 @@ class State:
         self.wind[None] = [0.0, 0.0, 0.0, 0.0]
         fill(self.body_gravity_scale, np.ones(self.capacity.bodies))
         fill(self.block_model, np.repeat(models, [r.blocks[1] - r.blocks[0] for r in ranges]))
+        self.loader.write()
 
     def _load_contact(self, scene: Scene) -> None:
-        contact, count = self.contact, len(scene.bodies)
+        fill, contact, count = self.loader.fill, self.contact, len(scene.bodies)
+        fill(contact.near_count, np.zeros(0))
         # What lies inside a body is never near anything.
         fill(contact.particle_clearance, np.full(scene.particle_count, np.inf))
         fill(contact.particle_touches, np.zeros(0))
@@ -289,7 +294,7 @@ class State:
 
     def _load_bonds(self, scene: Scene) -> None:
         """What the pairwise laws know of their edges; zeros for the edges of other bodies."""
-        bodies = scene.bodies
+        fill, bodies = self.loader.fill, scene.bodies
         constants, rings, members, weights = [], [], [], []
         for body, place, rows in zip(bodies, scene.ranges, _spans(scene, "edges"), strict=True):
             bonds = body.bonds
@@ -313,7 +318,7 @@ class State:
 
     def _load_gather_lists(self, corners: NDArray[np.int64], edges: NDArray[np.int64], count: int) -> None:
         """For each particle, the corner forces and edge forces that act on it, in a fixed order."""
-        order = np.argsort(corners[:, 0], kind="stable")
+        fill, order = self.loader.fill, np.argsort(corners[:, 0], kind="stable")
         fill(self.corner_slot, corners[order, 1])
         fill(self.particle_corners, _row_ranges(corners[:, 0], count))
         numbers = np.flatnonzero(edges[:, 0] != edges[:, 1])  # without the spare rows
@@ -384,18 +389,6 @@ def _tet_blocks(
             corners.append(np.stack([rows[:, corner], slot], axis=1))
     none = np.zeros((0, 2), dtype=np.int64)
     return np.concatenate(blocks), np.concatenate([none, *corners]).astype(np.int64)
-
-
-_NUMPY = {ti.f32: np.float32, ti.f64: np.float64, ti.i32: np.int32}
-
-
-def fill(target, rows: NDArray[np.generic]) -> None:  # type: ignore[no-untyped-def]
-    """Write `rows` to the front of a field and zeros behind them."""
-    shape = tuple(target.shape) + ((target.n,) if hasattr(target, "n") else ())
-    whole = np.zeros(shape, dtype=_NUMPY[target.dtype])
-    if len(rows):
-        whole[: len(rows)] = rows
-    target.from_numpy(whole)
 
 
 _free: dict[Capacity, list[State]] = {}

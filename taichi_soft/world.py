@@ -68,7 +68,7 @@ from taichi_soft.settings import Settings
 from taichi_soft.shapes import PlaneShape, Shape
 from taichi_soft.snapshot import restore_snapshot, state_hash, structure_of, take_snapshot
 from taichi_soft.stability import StableStep, stable_step
-from taichi_soft.state import ASLEEP, FROZEN, Capacity, State, acquire, fill, release
+from taichi_soft.state import ASLEEP, FROZEN, Capacity, State, acquire, release
 from taichi_soft.tearing import Tearing, Tears
 from taichi_soft.types import DampingModel, Flips, Integrator, Schedule, Strain
 
@@ -491,10 +491,16 @@ class World(Handle):
             )
         state = acquire(capacity)
         weakref.finalize(self, release, state)
-        state.load(self._scene, [models.index(asset.description.model) for asset in self._pools.assets])
+        fill, assets = state.loader.fill, self._pools.assets
         if is_plastic:
-            flows = [a.plasticity.row if a.plasticity else RIGID_ROW for a in self._pools.assets]
+            flows = [a.plasticity.row if a.plasticity else RIGID_ROW for a in assets]
             fill(state.body_plasticity, np.array(flows))
+        if has_contact:
+            fill(state.contact.body_filter, np.array([(a.contact.group, a.contact.mask) for a in assets]))
+        if self._soft_contact:
+            fill(state.soft.body_surface, np.array([a.surface_row for a in assets]))
+            fill(state.soft.body_touches_itself, np.array([a.contact.itself for a in assets]))
+        state.load(self._scene, [models.index(a.description.model) for a in assets])
         self._warm_up(state)
         for slot, rows in self._starts.items():
             spawn_body(state, slot, rows)
@@ -509,11 +515,6 @@ class World(Handle):
             woken = weakref.WeakMethod(self.wake)  # or the two would keep each other
             self._colliders.on_jump = lambda: (woken() or _do_nothing)()
             state.contact.sleep_speed[None] = self._sleep_speed
-            filters = [(asset.contact.group, asset.contact.mask) for asset in self._pools.assets]
-            fill(state.contact.body_filter, np.array(filters))
-        if self._soft_contact:
-            fill(state.soft.body_surface, np.array([asset.surface_row for asset in self._pools.assets]))
-            fill(state.soft.body_touches_itself, np.array([a.contact.itself for a in self._pools.assets]))
         self._rows = np.empty((self._scene.particle_count, 3), dtype=np.float32)
         self._program, self._state = program, state
         self._launch = make_launch(schedule, state, program, self._scene, device)

@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[1]
 LAYERS = """
     errors  constants
     types  runtime  checks  handles  sealed
-    math
+    math  loading
     materials  meshing  settings  contact  plasticity
     laws  collision
     scene  contact_fields

@@ -17,8 +17,8 @@ def _in_frame(contact: ti.template(), c, x, time):
     return turned_back(spun(contact.collider_rotation[c], contact.collider_spin[c] * time), x - position)
 
 
-@ti.func
-def find_near_colliders(state: ti.template(), body, reach, since, left):
+@ti.real_func
+def find_near_colliders(state: ti.template(), body: ti.i32, reach: ti.f32, since: ti.f32, left: ti.f32):
     """List the colliders that come within `reach` [m] of a body's particles, and how clear of them each is.
 
     Args:
@@ -69,8 +69,16 @@ def forget_contacts(state: ti.template(), body):
     state.contact.gone[body] = 0.0
 
 
-@ti.func
-def collided(state: ti.template(), body, p, start, way_velocity, h, since):
+@ti.real_func
+def collided(
+    state: ti.template(),
+    body: ti.i32,
+    p: ti.i32,
+    start: ti.math.vec3,
+    way_velocity: ti.math.vec3,
+    h: ti.f32,
+    since: ti.f32,
+) -> (ti.math.vec3, ti.math.vec3):
     """Position and velocity of a particle after a substep among colliders.
 
     Args:

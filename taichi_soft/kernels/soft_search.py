@@ -182,8 +182,8 @@ def _search_pair(state: ti.template(), body, other, margin):
             _search_triangle(state, table, size, lowest, highest, body, other, t, cell, margin)
 
 
-@ti.func
-def search_body(state: ti.template(), body, island, margin):
+@ti.real_func
+def search_body(state: ti.template(), body: ti.i32, island: ti.i32, margin: ti.f32):
     """Find the candidates of a body's vertices, within `margin` [m], after `find_box` of all its island."""
     lower, upper = state.contact.body_lower[body] - margin, state.contact.body_upper[body] + margin
     for j in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
