@@ -128,7 +128,7 @@ def as_rotation(value: Any) -> Floats:
     """
     if value is None:
         return np.eye(3)
-    if hasattr(value, "__len__") and getattr(value, "ndim", 1) == 1 and len(value) == 4:
+    if to_array(value, "rotation").shape == (4,):
         quaternion = as_array(value, "rotation", (4,), "quaternion x, y, z, w")
         length = float(np.linalg.norm(quaternion))
         _require_unit(np.array([length]), "rotation")
@@ -148,8 +148,10 @@ def as_rotations(value: Any, name: str) -> Floats:
 
 
 def _rotations(matrices: Floats, name: str) -> Floats:
-    gap = np.abs(matrices @ np.swapaxes(matrices, 1, 2) - np.eye(3)).max(axis=(1, 2))
-    bad = (gap > 1e-5) | (np.linalg.det(matrices) < 0)
+    bad = np.abs(matrices).max(axis=(1, 2), initial=0.0) > 2.0  # whose squares might overflow
+    sound = matrices[~bad]
+    gap = np.abs(sound @ np.swapaxes(sound, 1, 2) - np.eye(3)).max(axis=(1, 2))
+    bad[~bad] = (gap > 1e-5) | (np.linalg.det(sound) < 0)
     if bad.any():
         raise OptionError(
             f"{name}{_which(bad)} must be an orthonormal matrix with determinant +1, "

@@ -24,7 +24,7 @@ from taichi_soft.contact_fields import ContactCapacity
 from taichi_soft.control.access import require_substeps
 from taichi_soft.control.drives import ForceField, push_by_field, require_field, set_wind
 from taichi_soft.control.frames import Frame, Frames
-from taichi_soft.control.grabs import Grab
+from taichi_soft.control.grabs import Grab, as_pull
 from taichi_soft.control.impulses import apply_radial_impulse
 from taichi_soft.cutting import refill_slot, warm_up
 from taichi_soft.errors import (
@@ -739,6 +739,7 @@ class World(Handle):
         Raises: OptionError for numbers out of range; StateError before `build`, under schedule "flat", or
             where all grabs are in use.
         """
+        as_pull(frequency, max_force)  # also where the ray hits nothing
         hit = self.raycast(origin, direction, max_distance=max_distance)
         if hit is None:
             return None

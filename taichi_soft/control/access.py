@@ -36,6 +36,11 @@ def some_particles(body: Body, particles: ArrayLike | None, name: str = "particl
     """Vertex numbers of a body, ascending; None means all. Raises: OptionError, also for none at all."""
     if particles is None:
         return np.arange(body.vertex_count, dtype=np.int32)
+    return named_particles(body, particles, name)
+
+
+def named_particles(body: Body, particles: ArrayLike, name: str = "particles") -> NDArray[np.int32]:
+    """The same where they have to be named."""
     vertices = as_indices(particles, name, body.vertex_count)
     if len(vertices) == 0:
         raise OptionError(f"{name} is empty: name at least one vertex, from 0 to {body.vertex_count - 1}")
