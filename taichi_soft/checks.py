@@ -17,6 +17,9 @@ Floats = NDArray[np.float64]
 LARGEST_COUNT = 1_000_000
 """Substeps, bodies or pixels: more would not end within minutes, or not fit 32 bits."""
 
+SHORTEST_STEP, LONGEST_STEP = 1e-9, 1e4
+"""Fixed steps [s]: shorter ones are lost in float32, longer ones would take days of computing."""
+
 
 def as_number(value: Any, name: str, low: float, high: float, text: str = "") -> float:
     """`value` as a float within [low, high]. Raises: OptionError saying `text`, or the range."""
@@ -38,6 +41,11 @@ def as_positive(value: Any, name: str, unit: str) -> float:
     if number == 0.0:
         raise OptionError(f"{name} must be a number above 0 {unit}, got 0")
     return number
+
+
+def as_step(dt: float) -> float:
+    """`dt` if it can be the length of a fixed step [s]. Raises: OptionError."""
+    return as_number(dt, "dt", SHORTEST_STEP, LONGEST_STEP, "a number above 0 s, from 1e-9 to 1e4")
 
 
 def as_count(value: Any, name: str, low: int = 1, high: int = LARGEST_COUNT) -> int:

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.assets import SoftBodyAsset
 from taichi_soft.body import Body, Floats, Floats32, require_buffer, require_built
-from taichi_soft.checks import as_count, as_flag, as_number, as_path, as_vector
+from taichi_soft.checks import as_count, as_flag, as_number, as_path, as_step, as_vector
 from taichi_soft.colliders import Collider, Colliders
 from taichi_soft.constants import ALL_GROUPS, GRAVITY_EARTH, POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.contact import DEFAULT_CONTACT, Contact
@@ -71,9 +71,6 @@ from taichi_soft.stability import StableStep, stable_step
 from taichi_soft.state import ASLEEP, FROZEN, Capacity, State, acquire, release
 from taichi_soft.tearing import Tearing, Tears
 from taichi_soft.types import DampingModel, Flips, Integrator, Schedule, Strain
-
-SHORTEST_STEP, LONGEST_STEP = 1e-9, 1e4
-"""Fixed steps [s]: shorter ones are lost in float32, longer ones would take days of computing."""
 
 MOST_VERTICES = 10_000_000
 """In a world: the constants of the tetrahedra between more would not be counted in 32 bits."""
@@ -579,13 +576,13 @@ class World(Handle):
         if not self._pools.slots:
             raise StateError("the world is empty: call add_body or reserve first")
         if self._is_implicit:
-            _as_step(dt)
+            as_step(dt)
             return 1
         longest = min(asset.stable_step.recommended for asset in self._pools.kinds)
         for body in self.bodies:
             if body._description is not body.asset.description:
                 longest = min(longest, self.stable_step(body).recommended)
-        return max(1, math.ceil(_as_step(dt) / longest))
+        return max(1, math.ceil(as_step(dt) / longest))
 
     def step(self, dt: float, substeps: int | None = None) -> None:
         """Make one fixed step of `dt` [s] in `substeps` equal substeps; None chooses their number.
@@ -628,7 +625,7 @@ class World(Handle):
             self._check_solves()
 
     def _check_step(self, dt: float, substeps: int | None) -> tuple[float, int, float]:
-        seconds = _as_step(dt)
+        seconds = as_step(dt)
         count = as_count(self.stable_substeps(seconds) if substeps is None else substeps, "substeps")
         h = seconds / count
         if self._is_implicit:
@@ -1067,17 +1064,20 @@ class World(Handle):
 
     def _change(self, body: Body, kernel: Callable[..., Any], *arguments: Any) -> Any:
         """Call a kernel (state, *arguments) that changes a body: the way of all control."""
-        require_built(self.is_built)
-        self._wake(body.index)
-        self._read_alpha = None
-        return kernel(self._state, *arguments)
+        found = self._read_all(kernel, *arguments)
+        self._rouse(body.index)
+        return found
 
     def _change_all(self, kernel: Callable[..., Any], *arguments: Any) -> Any:
         """Call a kernel (state, *arguments) that changes all bodies. Raises: StateError before `build`."""
-        require_built(self.is_built)
-        self._wake(-1)
+        found = self._read_all(kernel, *arguments)
+        self._rouse(-1)
+        return found
+
+    def _rouse(self, slot: int) -> None:
+        """Take note that control has changed a body, or all (-1)."""
+        self._wake(slot)
         self._read_alpha = None
-        return kernel(self._state, *arguments)
 
     def _write_motion(self, body: Body, positions: NDArray[Any], velocities: NDArray[Any]) -> None:
         """Put a body somewhere else. Raises: StateError before `build`."""
@@ -1097,7 +1097,3 @@ def _do_nothing() -> None:
 def _require_asset(asset: SoftBodyAsset) -> None:
     if not isinstance(asset, SoftBodyAsset):
         raise OptionError(f"asset must be a SoftBodyAsset, got {asset!r}")
-
-
-def _as_step(dt: float) -> float:
-    return as_number(dt, "dt", SHORTEST_STEP, LONGEST_STEP, "a number above 0 s, from 1e-9 to 1e4")

@@ -27,6 +27,16 @@ def change(body: Body, kernel: Callable[..., Any], *arguments: Any) -> Any:
     return body._world._change(body, kernel, *arguments)
 
 
+def attempt(body: Body, kernel: Callable[..., Any], *arguments: Any) -> Any:
+    """The same by a kernel that may refuse: the body sleeps on until the caller knows and calls `rouse`."""
+    return body._world._read_all(kernel, *arguments)
+
+
+def rouse(body: Body) -> None:
+    """An attempt has changed `body`."""
+    body._world._rouse(body.index)
+
+
 def numbers(*values: Any) -> Rows32:
     """Numbers and vectors in a row, as kernels take them."""
     return np.concatenate([np.ravel(value) for value in values]).astype(np.float32)

@@ -1,5 +1,6 @@
 """The public face as a table: what each call takes, sound and bad, and when it comes at the wrong time."""
 
+# ruff: noqa: E501 (one line for each call)
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -42,7 +43,13 @@ class Game:
     def __init__(self, folder):
         self.folder = folder
         self.cube = SoftBodyAsset(BLOCK, SOFT, contact=Contact(friction=0.4), spare_vertices=40)
-        world = self.world = World(soft_contact=True, sleep_speed=0.3, collider_room=4, record=6)
+        world = self.world = World(
+            soft_contact=True,
+            sleep_speed=0.3,
+            collider_room=4,
+            record=6,
+            record_to=folder / "frozen.recording",
+        )
         world.add_collider(SphereShape(0.3), position=(0.0, 0.0, 0.1))
         world.add_collider(HeightFieldShape(np.zeros((4, 4)), 1.0), position=(0.0, 0.0, 0.02))
         world.reserve(self.cube, 5)
@@ -174,10 +181,10 @@ def number(low, high, /, **more):
 
 
 def vector(low, high, /, **more):
-    """Of tuples, lists and arrays alike; now and then at the limits."""
+    """Of tuples, lists and arrays alike; now and then a thousand times as long."""
 
     def draw(game, rng):
-        values = rng.uniform(low, high, 3)
+        values = rng.uniform(low, high, 3) * (1000.0 if rng.integers(12) == 0 else 1.0)
         return [tuple(values.tolist()), values.tolist(), values, values.astype(np.float32)][rng.integers(4)]
 
     return Kind(draw, NOT_VECTORS | more)
@@ -189,7 +196,9 @@ def choice(*values, **bad):
 
 def or_none(kind):
     """None is sound too."""
-    return Kind(lambda game, rng: None if rng.integers(3) == 0 else kind.sound(game, rng), kind.but("none").bad)
+    return Kind(
+        lambda game, rng: None if rng.integers(3) == 0 else kind.sound(game, rng), kind.but("none").bad
+    )
 
 
 def _turn(game, rng):
@@ -266,11 +275,12 @@ FRAME = Kind(
 STEP_LENGTH = number(1 / 240, 1 / 40, zero=0.0, short=1e-10, long=1e5, below=-DT)
 SUBSTEP_COUNT = or_none(choice(6, 8, 12, **NOT_COUNTS, zero=0))
 REACH = Kind(
-    lambda game, rng: INF if rng.integers(2) else rng.uniform(0.5, 9.0), NOT_NUMBERS | {"zero": 0.0, "below": -1.0}
+    lambda game, rng: INF if rng.integers(2) else rng.uniform(0.5, 9.0),
+    NOT_NUMBERS | {"zero": 0.0, "below": -1.0},
 ).but("inf")
 RAY = vector((-1.0, -1.0, 2.0), (1.0, 1.0, 4.0), far=(1e7, 0.0, 0.0))
 WAY = vector((-0.2, -0.2, -1.0), (0.2, 0.2, -0.5), zero=(0.0, 0.0, 0.0)).but("huge")
-RAYS = Kind(lambda game, rng: rng.uniform(-1, 1, (5, 3)) + (0, 0, 3), NOT_ROWS | {
+RAYS = Kind(lambda game, rng: rng.uniform(-1, 1, (5, 3)) + np.array([0, 0, 3]), NOT_ROWS | {
     "one": (0.0, 0.0, 1.0), "nan": np.full((5, 3), NAN), "far": np.full((5, 3), 1e7), "other": np.zeros((5, 2)),
 })  # fmt: skip
 WAYS = Kind(lambda game, rng: rng.uniform(-1, -0.5, (5, 3)), NOT_ROWS | {
@@ -303,6 +313,7 @@ PATH = Kind(lambda game, rng: game.folder / "game.recording", {
     "none": None, "number": 3, "empty": "", "nul": "a\0b", "folder": Of(lambda g: g.folder), "list": ["a"],
 })  # fmt: skip
 
+
 def _pinned(game, rng):
     return [25, 26]
 
@@ -330,6 +341,14 @@ def _is_wild(body):
 
 def if_wild(game, body, given):
     return None if _is_wild(body) else False
+
+
+def if_strong(game, body, given):
+    return None if np.abs(given["impulse"]).max() > 100.0 else False
+
+
+def if_wild_or_far(game, body, given):
+    return None if _is_wild(body) or np.abs(given["point"]).max() > 10.0 else if_strong(game, body, given)
 
 
 def _touches_attached(game, body, given):
@@ -417,10 +436,10 @@ CALLS: dict[str, dict[str, Call]] = {
         "set_gravity_scale": Call({"scale": SCALE}),
         "set_linear_damping": Call({"rate": number(0.0, 2.0, below=-1.0)}),
         "set_sheltered": Call({"is_sheltered": FLAG}),
-        "apply_impulse": Call({"impulse": PUSH, "particles": or_none(VERTICES)}),
+        "apply_impulse": Call({"impulse": PUSH, "particles": or_none(VERTICES)}, if_strong),
         "apply_impulse_at_point": Call({
             "impulse": PUSH, "point": POINT, "radius": number(20.0, 30.0, zero=0.0, below=-1.0, short=1e-6),
-        }, if_wild),
+        }, if_wild_or_far),
         "set_velocity": Call({"linear": SPEED, "angular": SPIN}, if_wild),
         "teleport": Call({"position": PLACE, "rotation": ROTATION, "keep_velocity": FLAG}, _cannot_turn),
         "pin": Call({"particles": VERTICES}, _touches_attached),
@@ -512,6 +531,7 @@ MESH = choice(
     nan=(BLOCK.vertices * NAN, BLOCK.surface), far=(BLOCK.vertices, BLOCK.surface + 99), one=(BLOCK.vertices,),
 )  # fmt: skip
 MODULUS = number(1e4, 1e5, zero=0.0, below=-1.0)
+CONSTANT, DAMPING = (kind.but("list", "array") for kind in (MODULUS, number(0.0, 9.0, below=-1.0)))
 SOFT_MESH = choice(BLOCK, none=None, text="cube", number=1, rows=BLOCK.vertices, rope=rope(1.0, 4, mass=0.1))
 BITS = choice(1, 2, **NOT_COUNTS).but("none")
 NAME_OF = {"none": None, "number": 1, "text": "no such name", "list": ["virial"]}
@@ -542,8 +562,8 @@ MAKERS: dict[Any, dict[str, Kind]] = {
     },
     Tearing: {"stress": MODULUS, "most": choice(4, **NOT_COUNTS, zero=0)},
     Material: {
-        "young": MODULUS, "poisson": number(0.1, 0.4, above=0.5, below=-1.0), "density": MODULUS,
-        "damping": number(0.0, 9.0, below=-1.0),
+        "young": CONSTANT, "poisson": number(0.1, 0.4, above=0.5, below=-1.0).but("list", "array"),
+        "density": CONSTANT, "damping": DAMPING, "shear_modulus": or_none(CONSTANT), "shear_damping": or_none(DAMPING),
     },
     SphereShape: {"radius": LENGTH},
     BoxShape: {"size": vector(0.1, 1.0, zero=(0.0, 1.0, 1.0), below=(-1.0, 1.0, 1.0))},
