@@ -23,7 +23,7 @@ from taichi_soft.control.materials import set_damping, set_material
 from taichi_soft.control.pins import pin, pinned_vertices, set_targets, unpin
 from taichi_soft.control.placement import set_velocity, teleport
 from taichi_soft.cutting import cut
-from taichi_soft.errors import MeshError, OptionError, StateError
+from taichi_soft.errors import MeshError, StateError
 from taichi_soft.events import Event, StressExceeded, TearCandidates
 from taichi_soft.failures import FailedStep, Failure
 from taichi_soft.handles import Handle, recorded
@@ -31,7 +31,7 @@ from taichi_soft.laws.law import EnergyLaw
 from taichi_soft.materials import AnyMaterial, voigt_stress
 from taichi_soft.meshing.splitting import InnerFaces, inner_faces
 from taichi_soft.queries import Pose, best_fitting_pose
-from taichi_soft.scene import rest_inverses
+from taichi_soft.scene import BodyArrays, BodyDescription, Ranges, rest_inverses
 from taichi_soft.stability import StableStep
 
 if TYPE_CHECKING:
@@ -172,6 +172,14 @@ class Body(Handle):
         for name in ("_first_rest_inverses", "_inner_faces"):
             self.__dict__.pop(name, None)
 
+    def _redescribe(self, description: BodyDescription, arrays: BodyArrays) -> Ranges:
+        """Take note that the body is made of something else. Returns where it lies in the fields."""
+        world = self._world
+        self._description = description
+        world._scene.bodies[self.index] = arrays
+        world._substeps.renew()
+        return world._scene.ranges[self.index]
+
     @recorded
     def cut(
         self,
@@ -215,7 +223,7 @@ class Body(Handle):
         """A^-1 of each tetrahedron at rest as it is now, (m, 3, 3) [1/m]."""
         if self.asset.plasticity is None or not self._world.is_built:
             return self._first_rest_inverses
-        return self._world._rest_inverses(self)
+        return self._world._built.readout.rest_inverses(self)
 
     @property
     def stable_step(self) -> StableStep:
@@ -239,20 +247,21 @@ class Body(Handle):
     @property
     def is_asleep(self) -> bool:
         """True while the body rests and costs nothing (see `World.sleep_speed`)."""
-        return self._world._is_asleep(self)
+        simulation = self._world._simulation
+        return simulation is not None and simulation.is_asleep(self.index)
 
     @property
     def failure(self) -> Failure | None:
         """What broke first, None while the body is sound. Found out when first asked, not within a step."""
         self.require_alive()
         if self._frozen_in is not None and self._failure is None:
-            self._failure = self._world._find_failure(self, self._frozen_in)
+            self._failure = self._world._built.find_failure(self.index, self._frozen_in)
         return self._failure
 
     @property
     def solve_residual(self) -> float | None:
         """Largest residual of the last step's implicit solves, over their right-hand sides; None before."""
-        return self._world._solve_residual(self)
+        return self._world._built.solve_residual(self)
 
     def positions(self, out: Floats32 | None = None) -> Floats32:
         """Vertex positions after the last step, float32 (n, 3) [m].
@@ -268,7 +277,7 @@ class Body(Handle):
 
         Leapfrog keeps them half a substep behind; they are brought up with the present acceleration.
         """
-        return self._world._read_velocities(self)
+        return self._world._built.readout.velocities(self)
 
     @recorded
     def set_motion(self, positions: ArrayLike, velocities: ArrayLike) -> None:
@@ -281,7 +290,7 @@ class Body(Handle):
         """
         shape = (self.vertex_count, 3)
         x, v = as_array(positions, "positions", shape, "m"), as_array(velocities, "velocities", shape, "m/s")
-        self._world._write_motion(self, x, v)
+        self._world._built.write_motion(self.index, x, v)
         self._frozen_in = self._failure = None
 
     @recorded
@@ -298,7 +307,8 @@ class Body(Handle):
     @property
     def gravity_scale(self) -> float:
         """By what the world's gravity is multiplied for this body."""
-        return self._world._gravity_scale(self)
+        simulation = self._world._simulation
+        return 1.0 if simulation is None else float(simulation.state.body_gravity_scale[self.index])
 
     @recorded
     def set_gravity_scale(self, scale: float) -> None:
@@ -569,7 +579,7 @@ class Body(Handle):
         self._watch(TearCandidates, tear_stress, "tear_stress")
 
     def _watch(self, kind: type[Event], threshold: float | None, name: str) -> None:
-        log = self._world._event_log
+        log = self._world._built.events
         self._require_tets()
         limit = None if threshold is None else as_positive(threshold, name, "Pa")
         log.watch(kind, self, limit)
@@ -598,24 +608,3 @@ def _deviator_norms(tensors: Floats) -> Floats:
     """sqrt(e:e) of the part e of each tensor (m, 3, 3) that changes shape."""
     deviators = tensors - np.einsum("maa->m", tensors)[:, None, None] / 3.0 * np.eye(3)
     return np.asarray(np.linalg.norm(deviators, axis=(1, 2)))
-
-
-def require_buffer(out: Floats32 | None, count: int) -> Floats32:
-    """`out` if it can take (count, 3) positions, or a new array. Raises: OptionError."""
-    if out is None:
-        return np.empty((count, 3), dtype=np.float32)
-    if not isinstance(out, np.ndarray):
-        raise OptionError(f"out must be a numpy array, got {type(out).__name__}")
-    if out.shape != (count, 3) or out.dtype != np.float32:
-        raise OptionError(f"out must be float32 of shape ({count}, 3), got {out.dtype} of shape {out.shape}")
-    if not (out.flags.c_contiguous and out.flags.writeable):
-        raise OptionError(
-            "out must be C-contiguous and writeable: make it with numpy.empty((n, 3), numpy.float32)"
-        )
-    return out
-
-
-def require_built(is_built: bool) -> None:
-    """Raises: StateError before `World.build`."""
-    if not is_built:
-        raise StateError("the world is not built: call world.build() after the last add_body")

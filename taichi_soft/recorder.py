@@ -152,9 +152,9 @@ def _world_options(world: World) -> dict[str, Any]:
     return {
         **{name: as_plain(getattr(chosen, name)) for name in names},
         "gravity": chosen.gravity.tolist(),
-        "soft_contact": world._soft_contact,
-        "sleep_speed": world._sleep_speed,
-        "collider_room": world._collider_room,
+        "soft_contact": world._contact.soft,
+        "sleep_speed": world._contact.sleep_speed,
+        "collider_room": world._contact.collider_room,
     }
 
 

@@ -57,7 +57,7 @@ Words = NDArray[np.int32]
 
 def take_snapshot(world: World) -> bytes:
     """As `World.snapshot`."""
-    state = world._built
+    state = world._built.state
     cut = next((body for body in world.bodies if body.is_cut), None)
     if cut is not None:
         raise StateError(f"body {cut.index} was cut: a snapshot holds no bodies that were cut or torn")
@@ -69,25 +69,24 @@ def take_snapshot(world: World) -> bytes:
 
 def state_hash(world: World) -> str:
     """As `World.state_hash`."""
-    code = int(hash_bodies(world._built, world.slot_count))
+    code = int(hash_bodies(world._built.state, world.slot_count))
     return blake2b(to_json([code, take_notes(world)]), digest_size=8).hexdigest()
 
 
 def _table(world: World, held: int) -> Words:
     scene = world._scene
-    return row_table(world._built, scene.particle_count, world.slot_count, scene.block_count, held)
+    return row_table(world._built.state, scene.particle_count, world.slot_count, scene.block_count, held)
 
 
 def structure_of(world: World) -> bytes:
     """What a snapshot's world must be built of, as JSON."""
     settings = {name: as_plain(value) for name, value in asdict(world.settings).items()}
-    assert world._state is not None
     return to_json(
         {
             "package": _package_version(),
-            "capacity": asdict(world._state.capacity),
-            "soft_contact": world._soft_contact,
-            "sleep_speed": world._sleep_speed,
+            "capacity": asdict(world._built.state.capacity),
+            "soft_contact": world._contact.soft,
+            "sleep_speed": world._contact.sleep_speed,
             **settings,
             "bodies": [asset_digest(asset) for asset in world._pools.assets],
         }
@@ -120,9 +119,9 @@ def take_notes(world: World) -> dict[str, Any]:
     """What Python knows of a world's state, as plain data."""
     frames = world._frames
     return {
-        "steps": world._step_count,
-        "time": world._time,
-        "last_dt": world._last_dt,
+        "steps": world._clock.steps,
+        "time": world._clock.time,
+        "last_dt": world._clock.last_dt,
         "handles": world._handles.count,
         "bodies": [None if body is None else _body_note(body) for body in world._pools.slots],
         "colliders": [_collider_note(handle) for handle in world._colliders.all_handles],
@@ -200,7 +199,7 @@ class _Plan:
 
 def restore_snapshot(world: World, data: Any) -> None:
     """As `World.restore`."""
-    state = world._built
+    state = world._built.state
     structure, notes, words = _three(unseal(data, MARK, VERSION, "snapshot"))
     _require_structure(bytes(structure), world._structure)
     content = from_json(notes)
@@ -285,8 +284,7 @@ def _read_plan(world: World, notes: dict[str, Any], words: Words) -> _Plan:
 
 
 def _some(notes: list[Any], world: World) -> list[Any]:
-    assert world._state is not None
-    if len(notes) > world._state.capacity.contact.colliders:
+    if len(notes) > world._built.state.capacity.contact.colliders:
         raise ValueError(f"it has {len(notes)} colliders, and there is no room for them")
     return notes
 
@@ -352,8 +350,7 @@ def _read_collider(world: World, note: Any, shapes: dict[str, Any]) -> tuple[int
         None if target is None else (_vector(target[0], 3), _vector(target[1], 4)),
         bool(is_alive),
     )
-    assert world._state is not None
-    if not 0 <= row.offset <= world._state.capacity.contact.samples - len(shape.samples):
+    if not 0 <= row.offset <= world._built.state.capacity.contact.samples - len(shape.samples):
         raise ValueError("a collider's grid lies outside the room for grids")
     return int(serial), row
 
@@ -380,7 +377,7 @@ def _indices(numbers: Any, limit: int) -> NDArray[np.int32]:
 
 def _require_words(world: World, plan: _Plan) -> None:
     """Raises: SnapshotError where a kernel would read beyond its fields, or begin with what is not finite."""
-    state = world._built
+    state = world._built.state
     particles, slots = world._scene.particle_count, world.slot_count
     limits: list[tuple[int, Any, int]] = [
         (PARTICLE, state.particle_aim, WITH_FRAME + len(plan.frames)),
@@ -420,7 +417,8 @@ def _rows(plan: _Plan, state: State, owner: int, wanted: Any) -> Words:
 
 def _apply(world: World, state: State, plan: _Plan) -> None:
     """Nothing here can be refused any more."""
-    world._step_count, world._time, world._last_dt = plan.steps, plan.time, plan.last_dt
+    simulation, clock = world._built, world._clock
+    clock.steps, clock.time, clock.last_dt = plan.steps, plan.time, plan.last_dt
     handles = world._handles
     _apply_frames(world, plan)
     colliders = world._colliders
@@ -439,11 +437,12 @@ def _apply(world: World, state: State, plan: _Plan) -> None:
         grab.body, grab._number, grab._point = body, number, point
         world._grabs[number] = grab
     handles.count = plan.handles
-    if world._tears is not None:
+    if simulation.tears is not None:
         for body in world.bodies:
-            world._tears.watch(body)
+            simulation.tears.watch(body)
     unpack_state(state, plan.table, plan.words)
-    world._read_alpha, world._checked_step = None, ()
+    simulation.readout.has_moved()
+    world._substeps.forget()
 
 
 def _handle(world: World, serial: int, kind: type[Any], make: Callable[[], Any]) -> Any:
@@ -477,7 +476,7 @@ def _apply_body(world: World, state: State, slot: int, wanted: _BodyPlan | None)
             present._description = asset.description
         present._attachments.clear()
         world._pools.leave(present)
-        present._removed_in = world._step_count
+        present._removed_in = world.step_count
         present = None
     if wanted is None:
         return
