@@ -23,7 +23,7 @@ from taichi_soft.handles import Handle
 from taichi_soft.plain import as_plain, digest_of, from_json, plain_of, to_json
 from taichi_soft.sealed import seal, unseal
 from taichi_soft.shapes import Shape
-from taichi_soft.snapshot import asset_digest
+from taichi_soft.structure import asset_digest
 
 if TYPE_CHECKING:
     from taichi_soft.world import World

@@ -50,7 +50,7 @@ class Simulation:
     events: EventLog
     tears: Tears | None  # None where no body tears
     readout: Readout = field(init=False)
-    _troubled: int = 0  # bodies that failed in the last step, or whose solves were not exact
+    troubled: int = 0  # bodies that failed in the last step, or whose solves were not exact
     _warned: set[int] = field(default_factory=set)  # slots of bodies with such solves
 
     def __post_init__(self) -> None:
@@ -63,10 +63,10 @@ class Simulation:
         self.frames.aim(self.state, len(self.pools.slots), seconds)
         if colliders is not None:
             colliders.prepare(seconds)
-        self._troubled = self.launch(substeps, h)
+        self.troubled = self.launch(substeps, h)
         if colliders is not None:
             colliders.finish(seconds)
-        reports = self._note_failures(substeps, h) if self._troubled else []
+        reports = self._note_failures(substeps, h) if self.troubled else []
         clock.steps += 1
         clock.time += seconds
         clock.last_dt = seconds
@@ -95,7 +95,7 @@ class Simulation:
 
     def check_solves(self) -> None:
         """Warn of bodies whose implicit solves were not exact in the last step, once of each."""
-        if not self._troubled:
+        if not self.settings.is_implicit:
             return
         residuals = self.state.body_residual.to_numpy()
         for body in self.pools.living:

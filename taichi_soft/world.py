@@ -47,9 +47,10 @@ from taichi_soft.scene import Scene
 from taichi_soft.settings import ContactSettings, Settings
 from taichi_soft.shapes import Shape
 from taichi_soft.simulation import Simulation, require_built
-from taichi_soft.snapshot import restore_snapshot, state_hash, structure_of, take_snapshot
+from taichi_soft.snapshot import restore_snapshot, state_hash, take_snapshot
 from taichi_soft.spawning import add_body, despawn, require_open, require_own, reserve, spawn, take_in
 from taichi_soft.stability import StableStep
+from taichi_soft.structure import structure_of
 from taichi_soft.substeps import Substeps
 from taichi_soft.tearing import Tearing
 from taichi_soft.types import DampingModel, Flips, Integrator, Schedule, Strain
@@ -357,7 +358,7 @@ class World(Handle):
         Raises: OptionError if dt is not a positive number or substeps not a positive whole one;
             StateError before `build`.
         """
-        simulation = self._built
+        simulation = self._simulation or self._built  # which raises
         seconds, count, h = self._substeps.choose(dt, substeps)
         if self._force_field is not None:
             push_by_field(self, self._force_field)
@@ -366,7 +367,7 @@ class World(Handle):
             reports += self._handles.recorder.note_step(self, seconds, count, is_broken=bool(reports))
         if reports:
             warnings.warn("; ".join(reports), FrozenBodyWarning, stacklevel=2)
-        if simulation.settings.is_implicit:
+        if simulation.troubled:
             simulation.check_solves()
 
     @recorded

@@ -25,7 +25,9 @@ LAYERS = """
     tearing  readout  substeps
     body  assets  pools
     simulation
-    building  spawning  snapshot
+    building  spawning  structure  notes
+    restoring
+    snapshot
     recorder
     world
     taichi_soft
