@@ -37,7 +37,7 @@ def cut(body: Body, plane: Any, triangle: Any) -> tuple[Body, ...]:
     require_cuttable(body)
     corners, normal, is_endless = _blade(plane, triangle)
     mesh = body.mesh
-    faces = body._inner_faces
+    faces = body._description.inner_faces
     centers = body.positions().astype(np.float64)[mesh.tets].mean(axis=1)
     is_cut = _crosses(corners, normal, is_endless, centers[faces.tets[:, 0]], centers[faces.tets[:, 1]])
     return divide(body, faces, is_cut)

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from taichi_soft.assets import Floats32, SoftBodyAsset
 from taichi_soft.body import Body
 from taichi_soft.checks import as_count
+from taichi_soft.control.materials import set_material
 from taichi_soft.cutting import refill_slot
 from taichi_soft.errors import OptionError, StateError
 
@@ -79,12 +80,22 @@ def despawn(world: World, body: Body) -> None:
     require_own(world, body)
     simulation = world._simulation
     if simulation is not None:
-        body._let_go()
+        _let_go(world, body)
         simulation.wake_all()  # what may have lain on it
     world._pools.leave(body)
     body._removed_in = world.step_count
     if simulation is not None:
         simulation.empty(body.index)
+
+
+def _let_go(world: World, body: Body) -> None:
+    """Give up what is tied to a body, and a material that it was given, before its slot is emptied."""
+    for attachment in list(body._attachments):
+        attachment.release()
+    for grab in [each for each in world._grabs.values() if each.body is body]:
+        grab.release()
+    if body._description is not body.asset.description and not body.is_cut:
+        set_material(body, body.asset.material)
 
 
 def _require_asset(asset: Any) -> None:

@@ -13,6 +13,7 @@ from taichi_soft.checks import as_count, as_positive
 from taichi_soft.cutting import divide
 from taichi_soft.errors import StateError
 from taichi_soft.kernels.tearing import find_overloaded
+from taichi_soft.measures import green_strain_and_stress
 from taichi_soft.meshing.splitting import InnerFaces
 
 if TYPE_CHECKING:
@@ -85,8 +86,8 @@ class Tears:
 def _tear(body: Body) -> None:
     tearing, mesh = body.asset.tearing, body.mesh
     assert tearing is not None
-    stress = body._green_strain_and_stress()[1]
-    faces = body._inner_faces
+    stress = green_strain_and_stress(body)[1]
+    faces = body._description.inner_faces
     pulls, axes = np.linalg.eigh(stress[faces.tets].mean(axis=1))
     pull, axis = pulls[:, -1], axes[:, :, -1]
     is_torn = np.bincount(body.vertex_origins)[body.vertex_origins] > 1

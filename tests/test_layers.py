@@ -22,6 +22,7 @@ LAYERS = """
     forces  shapes
     plain
     stability  failures  colliders  control  queries  events  cutting
+    measures
     tearing  readout  substeps
     body  assets  pools
     simulation
