@@ -24,17 +24,17 @@ def change(body: Body, kernel: Callable[..., Any], *arguments: Any) -> Any:
 
     Raises: StateError before `World.build`.
     """
-    return body._world._change(body, kernel, *arguments)
+    return body._world._built.change(body.index, kernel, *arguments)
 
 
 def attempt(body: Body, kernel: Callable[..., Any], *arguments: Any) -> Any:
     """The same by a kernel that may refuse: the body sleeps on until the caller knows and calls `rouse`."""
-    return body._world._read_all(kernel, *arguments)
+    return body._world._built.attempt(kernel, *arguments)
 
 
 def rouse(body: Body) -> None:
     """An attempt has changed `body`."""
-    body._world._rouse(body.index)
+    body._world._built.rouse(body.index)
 
 
 def numbers(*values: Any) -> Rows32:
@@ -59,7 +59,7 @@ def named_particles(body: Body, particles: ArrayLike, name: str = "particles") -
 
 def rows_of(body: Body, vertices: NDArray[np.int32]) -> NDArray[np.int32]:
     """Where vertices of a body lie in the fields. Raises: StateError before `World.build`."""
-    return body._world._rows_of(body, vertices)
+    return body._world._built.rows_of(body.index, vertices)
 
 
 def require_substeps(world: World, what: str) -> None:

@@ -57,8 +57,8 @@ def ball():
 def build(world, mode="per_body"):
     world.build()
     if mode == "gpu":  # one launch per substep, on the CPU
-        pretended = Device("cuda", 1, "pretended")
-        world._launch = make_launch(Schedule.FLAT, world._state, world._program, world._scene, pretended)
+        pretended, built = Device("cuda", 1, "pretended"), world._built
+        built.launch = make_launch(Schedule.FLAT, built.state, built.program, built.scene, pretended)
     return world
 
 
@@ -197,7 +197,7 @@ def test_a_dead_handle_says_so_and_what_it_was_can_still_be_read(empty, name):
 
 def state_of(world):
     fields = ("particle_position", "particle_velocity", "prev_position", "particle_inv_mass", "body_status")
-    rows = [getattr(world._state, name).to_numpy().tobytes() for name in fields]
+    rows = [getattr(world._built.state, name).to_numpy().tobytes() for name in fields]
     return rows, world.bodies, world.step_count, world.is_built
 
 

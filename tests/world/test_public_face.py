@@ -47,7 +47,7 @@ def test_the_table_is_complete(kind):
 
 def world_as_it_is(game):
     """All that a call could have changed: the state, who is there, what waits, where the adapter is."""
-    world = game.world
+    world, events = game.world, game.world._built.events
     return (
         world.state_hash(),
         world.snapshot(),
@@ -56,7 +56,7 @@ def world_as_it_is(game):
         (world.step_count, world.time, world.last_dt, world.dropped_events),
         (game.adapter.alpha, game.adapter.time, game.adapter.total_dropped_time, game.rollback.steps),
         [body.topology_version for body in world.bodies],
-        (world._event_log._kinds, len(world._event_log._waiting), len(world._event_log._listeners)),
+        (events._kinds, len(events._waiting), len(events._listeners)),
         (world._force_field, len(world._handles.recorder._present.entries)),
     )
 
