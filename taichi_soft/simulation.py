@@ -142,7 +142,7 @@ class Simulation:
         return found
 
     def attempt(self, kernel: Callable[..., Any], *arguments: Any) -> Any:
-        """Call a kernel (state, *arguments) that may refuse: bodies sleep on until who called calls `rouse`."""
+        """Call a kernel (state, *arguments) that may refuse: bodies sleep on until `rouse` is called."""
         return kernel(self.state, *arguments)
 
     def rouse(self, slot: int) -> None:

@@ -611,7 +611,7 @@ class World(Handle):
         Bodies, colliders, frames, grabs and attachments, the wind, materials that were set, and all that is
         going to act in the coming step are in it; a force field and events are not. It holds numbers only, no
         code. The first call compiles, some seconds at most.
-        Raises: StateError before `build`, and where a body was cut or torn.
+        Raises: StateError before `build`.
         """
         return take_snapshot(self)
 
