@@ -452,7 +452,7 @@ CALLS: dict[str, dict[str, Call]] = {
         }, _has_no_pins),
         "attach": Call({"particles": VERTICES, "frame": FRAME, "two_way": FLAG}, _touches_attached),
         "grab": Call({
-            "triangle": choice(0, 7, 40, **NOT_COUNTS, beyond=10**5), "barycentrics": WEIGHTS, "frequency": FREQUENCY,
+            "triangle": Kind(lambda g, rng: int(rng.integers(len(g.receiver.surface))), NOT_COUNTS | {"beyond": 10**5}), "barycentrics": WEIGHTS, "frequency": FREQUENCY,
             "max_force": LOAD,
         }, _has_full_hands),
         "set_material": Call({"material": MATERIAL}),

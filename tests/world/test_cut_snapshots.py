@@ -105,11 +105,12 @@ def meshes(world):
 def go_on(world):
     """Steps, a cut across the earlier ones, another material, and steps."""
     names = run(world)
+    count = len(world.bodies)
     bar_of(world).cut(plane=SECOND)
+    assert len(world.bodies) > count
     names += run(world)
     bar_of(world).set_damping(5.0)
     world.bodies[-1].apply_impulse((3.0, 0.0, 1.0))
-    assert bar_of(world).topology_version >= 3
     return names + run(world)
 
 
@@ -230,7 +231,7 @@ def test_a_record_is_kept_of_what_happens_to_cut_bodies(played, tmp_path):
     cut_open(played.bodies[1])
     run(played, 3)
     report = replay(played.save_recording(tmp_path / "cut.recording"))
-    assert report.difference is None
+    assert report.first_difference is None
     assert 5 <= report.steps < 11
     assert report.world.state_hash() == played.state_hash()
     assert bar_of(report.world).is_cut
