@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import KW_ONLY, dataclass, field
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -105,20 +104,6 @@ class SoftBodyAsset:
 
     def __repr__(self) -> str:
         return f"SoftBodyAsset({self.mesh!r}, {self.law!r})"
-
-    @property
-    def content(self) -> tuple[Any, ...]:
-        """What it is made of; equal where another asset is made of the same, as long as that one is there."""
-        return (
-            id(self.mesh),
-            id(self.material),
-            self.description.model,
-            self.description.pinned.tobytes(),
-            self.contact,
-            self.plasticity,
-            self.spare_vertices,
-            self.tearing,
-        )
 
     @cached_property
     def arrays(self) -> BodyArrays:

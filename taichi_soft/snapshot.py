@@ -24,10 +24,9 @@ from taichi_soft.kernels.snapshot import (
     PARTICLE,
     PATCH,
     carried,
+    copy_state,
     hash_bodies,
-    pack_state,
     row_table,
-    unpack_state,
 )
 from taichi_soft.notes import Notes, read_notes, read_parts, take_notes
 from taichi_soft.plain import from_json, to_json
@@ -49,7 +48,7 @@ def take_snapshot(world: World) -> bytes:
     state = world._built.state
     table = _table(world, max(world._grabs, default=-1) + 1)
     words = np.empty(int(table[-1, 2]), dtype=np.int32)
-    pack_state(state, table, words)
+    copy_state(state, table, words, True)
     words = np.concatenate([words, *(body._part.rows for body in world.bodies if body._part is not None)])
     return seal(MARK, VERSION, [world._structure, to_json(take_notes(world)), words.astype("<i4").tobytes()])
 
@@ -83,7 +82,7 @@ def restore_snapshot(world: World, data: Any) -> None:
         raise SnapshotError(f"this snapshot is not in order: {error}") from None
     _require_words(world, notes, table, words)
     put_back(world, notes)
-    unpack_state(state, table, words)
+    copy_state(state, table, words, False)
 
 
 def _three(parts: list[memoryview]) -> list[memoryview]:

@@ -37,12 +37,28 @@ def add_body(
     world: World, new: SoftBodyAsset, position: ArrayLike, rotation: ArrayLike | None, velocity: ArrayLike
 ) -> Body:
     """As `World.add_body`, of an asset made for it; copies share the first one."""
-    asset = world._pools.added.get(new.content, new)
+    key = _content(new)
+    asset = world._pools.added.get(key, new)
     asset.description.model.require_integrator(world.settings.integrator)
     rows = asset.placed(position, rotation, velocity, (0.0, 0.0, 0.0), world.settings.floor)
     _add_slot(world, asset)
-    world._pools.added[asset.content] = asset
+    world._pools.added[key] = asset
     return _enter(world, asset, rows)
+
+
+def _content(asset: SoftBodyAsset) -> tuple[Any, ...]:
+    """What an asset is made of: the same for copies, as long as one of them is there."""
+    made_of = asset.description
+    return (
+        id(asset.mesh),
+        id(asset.material),
+        made_of.model,
+        made_of.pinned.tobytes(),
+        asset.contact,
+        asset.plasticity,
+        asset.spare_vertices,
+        asset.tearing,
+    )
 
 
 def reserve(world: World, asset: SoftBodyAsset, count: int) -> None:
