@@ -173,12 +173,13 @@ def _read_body(world: World, slot: int, note: Any, frame_count: int, part: Part 
         return None
     serial, first_step, failed, material, attachments, _, rests = note
     asset = world._pools.assets[slot]
-    description, arrays = asset.description, None
-    present = world._pools.slots[slot]
-    is_here = present is not None and present._serial == serial and name_of(present._part) == name_of(part)
+    whole, present = asset.description, world._pools.slots[slot]
+    if present is not None and (present._serial != serial or name_of(present._part) != name_of(part)):
+        present = None
+    own = None if present is None or present._description is whole else present._description
+    description, arrays = whole, None
     if part is not None:
-        assert present is not None or not is_here
-        description = present._description if is_here else part.describe(asset, description.material)  # type: ignore[union-attr]
+        description = own or part.describe(asset, whole.material)
     if material is not None:
         try:
             made = from_plain(material)
@@ -189,11 +190,11 @@ def _read_body(world: World, slot: int, note: Any, frame_count: int, part: Part 
             ) from None
         if type(made) is not type(description.material):
             raise ValueError(f"body {slot} is of another kind of material")
-        if as_plain(made) != as_plain(description.material):
-            description = replace(description, material=made)
+        is_same = own is not None and as_plain(made) == as_plain(own.material)
+        description = own if own and is_same else replace(description, material=made)
     elif part is not None:
         raise ValueError(f"body {slot} was cut and has no material")
-    if part is not None and not is_here:
+    if part is not None and present is None:
         arrays = part.arrange(asset, description)
         require_room(world, slot, arrays)
     n = len(description.mesh.vertices)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.constants import POSITION_LIMIT, VELOCITY_LIMIT
-from taichi_soft.errors import SnapshotError
+from taichi_soft.errors import SnapshotError, StateError
 from taichi_soft.kernels.pins import WITH_FRAME
 from taichi_soft.kernels.snapshot import (
     BODY,
@@ -73,10 +73,12 @@ def restore_snapshot(world: World, data: Any) -> None:
     try:
         words = np.frombuffer(rows, "<i4").astype(np.int32)
         table = _table(world, max((int(number) for _, number, _, _ in plain["grabs"]), default=-1) + 1)
+        if len(words) < table[-1, 2]:
+            raise ValueError(f"it has {len(words)} words, where this world takes {table[-1, 2]}")
         parts = read_parts(world, plain["bodies"], words[table[-1, 2] :])
         words = words[: table[-1, 2]]
         notes = read_notes(world, plain, parts)
-    except (KeyError, TypeError, ValueError, IndexError, OverflowError, AttributeError) as error:
+    except (KeyError, TypeError, ValueError, IndexError, OverflowError, AttributeError, StateError) as error:
         if isinstance(error, SnapshotError):
             raise
         raise SnapshotError(f"this snapshot is not in order: {error}") from None
