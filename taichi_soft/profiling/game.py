@@ -168,7 +168,8 @@ def measure_moments(repeats: int = 61) -> list[Moments]:
         pool.despawn(last.pop())
         step()
 
-    time_calls(come, 1), time_calls(go, 1)
+    time_calls(come, 1)
+    time_calls(go, 1)
     plain, coming, going = [], [], []
     for _ in range(repeats):
         plain += time_calls(step, 1)
