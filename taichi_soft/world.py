@@ -296,7 +296,7 @@ class World(Handle):
         Returns: a handle, to move it and to read the impulse on it.
         Raises: OptionError for bad values; StateError where there is no room left.
         """
-        if self.is_built and self._floor_collider is None and not self._colliders.handles:
+        if self._simulation is not None and self._simulation.colliders is None:
             raise StateError(
                 "the world was built without colliders: add one before build(), or make the world with "
                 "collider_room"
