@@ -7,6 +7,7 @@ from taichi_soft.contact import Contact
 from taichi_soft.control.attachments import Attachment
 from taichi_soft.control.frames import Frame
 from taichi_soft.control.grabs import Grab
+from taichi_soft.control.joints import Joint
 from taichi_soft.errors import (
     DeviceError,
     DroppedEventsWarning,
@@ -107,6 +108,7 @@ __all__ = [
     "FrozenBodyWarning",
     "Grab",
     "HeightFieldShape",
+    "Joint",
     "Listener",
     "Material",
     "MaterialError",

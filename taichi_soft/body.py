@@ -19,6 +19,7 @@ from taichi_soft.control.drives import (
 )
 from taichi_soft.control.grabs import Grab, grab_at
 from taichi_soft.control.impulses import apply_impulse, apply_impulse_at_point
+from taichi_soft.control.joints import Joint, attach_to
 from taichi_soft.control.materials import set_damping, set_material
 from taichi_soft.control.pins import pin, pinned_vertices, set_targets, unpin
 from taichi_soft.control.placement import set_velocity, teleport
@@ -124,9 +125,14 @@ class Body(Handle):
 
     @property
     def is_held(self) -> bool:
-        """Whether it is attached to a frame or grabbed."""
+        """Whether it is attached, to a frame or another body, or grabbed."""
         grabs = self._world._grabs.values()
-        return bool(self._attachments) or any(grab.body is self for grab in grabs)
+        return bool(self._attachments or self._joints) or any(grab.body is self for grab in grabs)
+
+    @property
+    def _joints(self) -> list[Joint]:
+        """Those that hold it, from either side."""
+        return [joint for joint in self._world._joints.values() if self in (joint.body, joint.other)]
 
     @property
     def topology_version(self) -> int:
@@ -375,6 +381,27 @@ class Body(Handle):
             already, and for `two_way` under schedule "flat".
         """
         return attach(self, particles, frame, two_way)
+
+    @recorded
+    def attach_to(self, other: Body, particles: ArrayLike, *, onto: ArrayLike | None = None) -> Joint:
+        """Let another body hold particles of this one from now on, until `Joint.release`.
+
+        The two then move as one there, whatever their masses and stiffness: what a particle does to its place
+        the place does to it, so momentum and angular momentum stay. Where they come apart all the same, as by
+        `teleport`, they are drawn together no faster than they can follow. The particles and what holds them
+        do not touch each other; the rest of the two bodies does, where `soft_contact` lets them. Joined
+        bodies sleep and wake together; `World.despawn` of either ends the joint, a frozen one holds the other
+        where it is.
+        Args:
+            other: of the same world, with tetrahedra unless `onto` is given.
+            particles: vertices of this body; best those of the finer mesh.
+            onto: vertices of `other`, one for each of `particles`, that these are drawn to. None holds each
+                at the place in `other` where it is, in a tetrahedron or just outside of one.
+        Raises: OptionError for what is no other body, for bad vertices, and without `onto` for those that are
+            too far away; StateError before `build`, in a world without contact, and where the world's 64
+            joints, or the 2,048 particles that they may hold, are all in use.
+        """
+        return attach_to(self, other, particles, onto)
 
     @recorded
     def grab(

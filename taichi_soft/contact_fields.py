@@ -75,7 +75,9 @@ class ContactFields:
 
         self.island_count = ti.field(ti.i32, ())
         self.island_first = ti.field(ti.i32, bodies + 1)  # row of its first body
-        self.island_body = ti.field(ti.i32, bodies)  # bodies that may touch, island by island
+        self.island_body = ti.field(ti.i32, bodies)  # bodies that may touch or are joined, island by island
+        self.body_island = ti.field(ti.i32, bodies)
+        self.parent = ti.field(ti.i32, bodies)  # in the forest of islands
 
 
 @ti.data_oriented
@@ -90,8 +92,6 @@ class SoftContactFields:
         self.body_surface = ti.Vector.field(3, ti.f32, bodies)  # friction, thickness [m], mean edge [m]
         self.body_touches_itself = ti.field(ti.i32, bodies)
         self.sweep_order = ti.field(ti.i32, bodies)  # bodies by their lower x
-        self.parent = ti.field(ti.i32, bodies)  # in the forest of islands
-        self.body_island = ti.field(ti.i32, bodies)
         self.cell_first = ti.field(ti.i32, 4 * outer + bodies)
         self.item = ti.field(ti.i32, outer)  # rows of `outer_particle` that may be near the other body
         self.cell_item = ti.field(ti.i32, outer)  # the same, cell by cell

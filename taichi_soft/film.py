@@ -45,7 +45,7 @@ class Stage:
 
     title: str
     world: World
-    actors: list[Actor]
+    actors: list[Actor]  # `act` may add pieces that fell off
     camera: Camera
     step: FixedStep
     seconds: float  # that a film of it shows
@@ -135,7 +135,7 @@ class _Take:
         self.stage, self.scenery = stage, scenery
         self.adapter = EngineAdapter(stage.world, stage.step, before_step=self._before_step)
         self.fps = fps
-        self.buffers = [np.empty((a.body.vertex_count, 3), dtype=np.float32) for a in stage.actors]
+        self.buffers: list[NDArray[np.float32]] = []
         self.times: list[float] = []
 
     def _before_step(self, world: World) -> None:
@@ -148,7 +148,10 @@ class _Take:
         start = time.perf_counter()
         if number > 0:
             self.adapter.advance(1.0 / self.fps)
-        for actor, buffer in zip(self.stage.actors, self.buffers, strict=True):
+        actors = self.stage.actors
+        if [actor.body.vertex_count for actor in actors] != [len(buffer) for buffer in self.buffers]:
+            self.buffers = [np.empty((actor.body.vertex_count, 3), dtype=np.float32) for actor in actors]
+        for actor, buffer in zip(actors, self.buffers, strict=True):
             world = actor.world or self.stage.world
             world.read_positions(actor.body, self.adapter.alpha, buffer)
             buffer += np.asarray(actor.shift, dtype=np.float32)
@@ -164,18 +167,19 @@ class _Artist:
         self.fps = fps
         self.renderer = Renderer(*size, camera=stage.camera, floor=stage.world.settings.floor)
         self.times: list[float] = []
-        self.surfaces = [Surface.of(actor.body.mesh, color=actor.color) for actor in stage.actors]
+        self.surfaces: dict[tuple[int, int], Surface] = {}  # by actor and version of its topology
 
     def draw(
         self, positions: list[NDArray[np.float32]], now: EngineAdapter, step_times: list[float]
     ) -> NDArray[np.uint8]:
         """The picture of the bodies at `positions`, where they are `now`."""
         start = time.perf_counter()
-        for actor, surface, rows in zip(self.stage.actors, self.surfaces, positions, strict=True):
+        surfaces = [self._surface_of(actor) for actor in self.stage.actors]
+        for actor, surface, rows in zip(self.stage.actors, surfaces, positions, strict=True):
             surface.positions = rows
             if actor.paint:
                 surface.color = actor.paint(actor.body)
-        picture = self.renderer.render([*self.scenery.at(now.alpha), *self.surfaces])
+        picture = self.renderer.render([*self.scenery.at(now.alpha), *surfaces])
         self._draw_labels(picture, positions)
         lines = [self.stage.title, f"t = {now.time:.2f} s"]
         if self.stage.caption:
@@ -188,6 +192,13 @@ class _Artist:
         draw_text(picture, lines)
         self.times.append(time.perf_counter() - start)
         return picture
+
+    def _surface_of(self, actor: Actor) -> Surface:
+        """Its surface, made anew where a cut has changed it."""
+        key = id(actor), actor.body.topology_version
+        if key not in self.surfaces:
+            self.surfaces[key] = Surface.of(actor.body.mesh, color=actor.color)
+        return self.surfaces[key]
 
     def _draw_labels(self, picture: NDArray[np.uint8], positions: list[NDArray[np.float32]]) -> None:
         """A caption on the floor in front of each body that has one."""

@@ -1,4 +1,4 @@
-"""What Python knows of a world's state, as plain data and back: time, who lives where, colliders, grabs."""
+"""What Python knows of a world's state, as plain data and back: time, who lives where, colliders, joints."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from taichi_soft.colliders import Collider, ColliderRow
 from taichi_soft.cutting import require_room
 from taichi_soft.errors import SnapshotError, TaichiSoftError
 from taichi_soft.failures import FailedStep
+from taichi_soft.joint_fields import MOST_JOINTS
 from taichi_soft.laws import fit_model
 from taichi_soft.parts import Part, name_of
 from taichi_soft.plain import as_plain, digest_of, from_plain, plain_of
@@ -47,6 +48,10 @@ def take_notes(world: World) -> dict[str, Any]:
         "grabs": [
             [grab._serial, number, grab.body.index, grab.point.tolist()]
             for number, grab in sorted(world._grabs.items())
+        ],
+        "joints": [
+            [joint._serial, number, joint.body.index, joint.other.index, joint.particles.tolist()]
+            for number, joint in sorted(world._joints.items())
         ],
     }
 
@@ -107,6 +112,7 @@ class Notes:
     coming: NDArray[np.float32]
     aims: bool
     grabs: list[tuple[int, int, int, NDArray[np.float64]]]
+    joints: list[tuple[int, int, int, int, NDArray[np.int32]]]
 
 
 def read_parts(world: World, notes: list[Any], rows: NDArray[np.int32]) -> dict[int, Part]:
@@ -159,6 +165,7 @@ def read_notes(world: World, notes: dict[str, Any], parts: dict[int, Part]) -> N
         poses["coming"],
         bool(notes["aims"]),
         grabs,
+        [_read_joint(world, bodies, note) for note in notes["joints"]],
     )
 
 
@@ -247,6 +254,17 @@ def _read_collider(world: World, note: Any, shapes: dict[str, Any]) -> tuple[int
     if not 0 <= row.offset <= world._built.state.capacity.contact.samples - len(shape.samples):
         raise ValueError("a collider's grid lies outside the room for grids")
     return int(serial), row
+
+
+def _read_joint(
+    world: World, bodies: list[BodyNote | None], note: Any
+) -> tuple[int, int, int, int, NDArray[np.int32]]:
+    serial, number, body, other, particles = note
+    a, b = (_below(slot, len(bodies)) for slot in (body, other))
+    if a == b or bodies[a] is None or bodies[b] is None or not world._built.program.has_contact:
+        raise ValueError("a joint holds no bodies")
+    n = len(world._pools.assets[a].mesh.vertices)
+    return int(serial), _below(number, MOST_JOINTS), a, b, _indices(particles, n)
 
 
 def _below(number: Any, limit: int) -> int:

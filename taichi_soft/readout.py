@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from taichi_soft.errors import OptionError
 from taichi_soft.kernels.evaluate import compute_body_forces
+from taichi_soft.kernels.joints import add_joint_forces
 from taichi_soft.kernels.plasticity import read_rest_inverses
 from taichi_soft.kernels.program import Program
 from taichi_soft.kernels.readout import read_positions, read_velocities
@@ -55,6 +56,8 @@ class Readout:
         if settings.integrator is Integrator.LEAPFROG and lag > 0.0 and not body.is_frozen:
             forces = np.empty_like(rows)
             compute_body_forces(state, self._program, body.index, forces)
+            if body._joints:
+                add_joint_forces(state, body.index, lag, forces)
             by_vertex = forces[self._scene.bodies[body.index].rank]
             acceleration = by_vertex / body.masses[:, None] + settings.gravity * body.gravity_scale
             acceleration[body.pinned] = 0.0

@@ -10,6 +10,7 @@ from taichi_soft.colliders import Collider
 from taichi_soft.control.attachments import Attachment
 from taichi_soft.control.frames import Frame
 from taichi_soft.control.grabs import Grab
+from taichi_soft.control.joints import Joint
 from taichi_soft.control.materials import write_constants
 from taichi_soft.cutting import refill_slot
 from taichi_soft.notes import BodyNote, Notes
@@ -43,6 +44,7 @@ def put_back(world: World, notes: Notes) -> None:
         grab = _handle(world, serial, Grab, lambda b=body, n=number, x=point: Grab(b, n, x))  # type: ignore[misc]
         grab.body, grab._number, grab._point = body, number, point
         world._grabs[number] = grab
+    _apply_joints(world, notes)
     handles.count = notes.handles
     if simulation.tears is not None:
         for body, wanted in zip(world._pools.slots, notes.bodies, strict=True):
@@ -64,6 +66,18 @@ def _handle(world: World, serial: int, kind: type[Any], make: Callable[[], Any])
         found = make()
         world._handles.enlist(found, serial)
     return found
+
+
+def _apply_joints(world: World, notes: Notes) -> None:
+    world._joints.clear()
+    for serial, number, a, b, particles in notes.joints:
+        body, other = world._pools.slots[a], world._pools.slots[b]
+        assert body is not None
+        assert other is not None
+        joint = world._handles.find(serial, Joint) or Joint(body, other, number, particles)
+        world._handles.enlist(joint, serial)
+        joint.body, joint.other, joint._number, joint.particles = body, other, number, particles
+        world._joints[number] = joint
 
 
 def _apply_frames(world: World, notes: Notes) -> None:

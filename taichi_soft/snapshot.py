@@ -1,9 +1,9 @@
 """The state of a world between two steps, as bytes and back.
 
 A snapshot has three parts. The *structure* is what the world was built of; a world of another structure
-refuses it. The *notes* are what Python knows: time, who lives in which slot, colliders, frames, grabs. The
-*words* are what the fields hold, bit by bit (see `kernels.snapshot`), and the parts of meshes that cuts have
-left (see `parts`).
+refuses it. The *notes* are what Python knows: time, who lives in which slot, colliders, frames, grabs and
+joints. The *words* are what the fields hold, bit by bit (see `kernels.snapshot`), and the parts of meshes
+that cuts have left (see `parts`).
 """
 
 from __future__ import annotations
@@ -15,12 +15,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.constants import POSITION_LIMIT, VELOCITY_LIMIT
+from taichi_soft.control.joints import renew_islands, rows_in_use
 from taichi_soft.errors import SnapshotError, StateError
+from taichi_soft.joint_fields import JOINT_ROWS
+from taichi_soft.kernels.joints import forget_held
 from taichi_soft.kernels.pins import WITH_FRAME
 from taichi_soft.kernels.snapshot import (
     BODY,
     GRAB,
     HELD,
+    JOINT,
+    JOINT_END,
     PARTICLE,
     PATCH,
     carried,
@@ -46,7 +51,7 @@ Words = NDArray[np.int32]
 def take_snapshot(world: World) -> bytes:
     """As `World.snapshot`."""
     state = world._built.state
-    table = _table(world, max(world._grabs, default=-1) + 1)
+    table = _table(world, max(world._grabs, default=-1) + 1, rows_in_use(world))
     words = np.empty(int(table[-1, 2]), dtype=np.int32)
     copy_state(state, table, words, True)
     words = np.concatenate([words, *(body._part.rows for body in world.bodies if body._part is not None)])
@@ -59,9 +64,9 @@ def state_hash(world: World) -> str:
     return blake2b(to_json([code, take_notes(world)]), digest_size=8).hexdigest()
 
 
-def _table(world: World, held: int) -> Words:
-    scene = world._scene
-    return row_table(world._built.state, scene.particle_count, world.slot_count, scene.block_count, held)
+def _table(world: World, held: int, joint_rows: int) -> Words:
+    state, scene, slots = world._built.state, world._scene, world.slot_count
+    return row_table(state, scene.particle_count, slots, scene.block_count, held, joint_rows)
 
 
 def restore_snapshot(world: World, data: Any) -> None:
@@ -72,7 +77,9 @@ def restore_snapshot(world: World, data: Any) -> None:
     plain = from_json(content)
     try:
         words = np.frombuffer(rows, "<i4").astype(np.int32)
-        table = _table(world, max((int(number) for _, number, _, _ in plain["grabs"]), default=-1) + 1)
+        grabs = (int(number) for _, number, _, _ in plain["grabs"])
+        joined = sum(len(each[-1]) for each in plain["joints"])
+        table = _table(world, max(grabs, default=-1) + 1, joined)
         if len(words) < table[-1, 2]:
             raise ValueError(f"it has {len(words)} words, where this world takes {table[-1, 2]}")
         parts = read_parts(world, plain["bodies"], words[table[-1, 2] :])
@@ -84,7 +91,10 @@ def restore_snapshot(world: World, data: Any) -> None:
         raise SnapshotError(f"this snapshot is not in order: {error}") from None
     _require_words(world, notes, table, words)
     put_back(world, notes)
+    if world._built.program.has_contact:
+        forget_held(state)
     copy_state(state, table, words, False)
+    renew_islands(world)
 
 
 def _three(parts: list[memoryview]) -> list[memoryview]:
@@ -105,6 +115,12 @@ def _require_words(world: World, notes: Notes, table: Words, words: Words) -> No
         (HELD, state.grab_count, PATCH_ROWS + 1),
         (PATCH, state.patch_particle, particles),
     ]
+    if world._built.program.has_contact:
+        limits += [
+            (JOINT, state.joints.bodies, slots + 1),
+            (JOINT, state.joints.rows, JOINT_ROWS + 1),
+            (JOINT_END, state.joints.particle, particles),
+        ]
     for owner, field, limit in limits:
         rows = _rows(table, words, state, owner, field)
         if rows.size and not (rows.min() >= 0 and rows.max() < limit):
@@ -118,9 +134,25 @@ def _require_words(world: World, notes: Notes, table: Words, words: Words) -> No
         values = _rows(table, words, state, PARTICLE, field).view(np.float32)
         if not np.abs(values).max() <= highest:
             raise SnapshotError("this snapshot is not in order: particles are out of reach, or not finite")
+    if world._built.program.has_contact:
+        _require_joints(state, notes, table, words)
     lives = _rows(table, words, state, BODY, state.body_status)[:, 0] != ABSENT
     if lives.tolist() != [body is not None for body in notes.bodies]:
         raise SnapshotError("this snapshot is not in order: it is not sure who lives")
+
+
+def _require_joints(state: State, notes: Notes, table: Words, words: Words) -> None:
+    """Raises: SnapshotError where the words of joints do not say what the notes do."""
+    bodies = _rows(table, words, state, JOINT, state.joints.bodies)
+    rows = _rows(table, words, state, JOINT, state.joints.rows)
+    noted = {number: (a + 1, b + 1, len(particles)) for _, number, a, b, particles in notes.joints}
+    used = np.flatnonzero(bodies[:, 0])
+    told = {int(j): (*bodies[j].tolist(), int(rows[j, 1] - rows[j, 0])) for j in used}
+    weights = _rows(table, words, state, JOINT_END, state.joints.weight).view(np.float32)
+    spans = sorted(rows[used].tolist())
+    ends = [0, *(end for _, end in spans)]
+    if told != noted or [start for start, _ in spans] != ends[:-1] or not (np.abs(weights) < 1e3).all():
+        raise SnapshotError("this snapshot is not in order: its joints are not those that it names")
 
 
 def _rows(table: Words, words: Words, state: State, owner: int, wanted: Any) -> Words:

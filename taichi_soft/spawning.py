@@ -110,6 +110,8 @@ def _let_go(world: World, body: Body) -> None:
         attachment.release()
     for grab in [each for each in world._grabs.values() if each.body is body]:
         grab.release()
+    for joint in body._joints:
+        joint.release()
     if body._description is not body.asset.description and not body.is_cut:
         set_material(body, body.asset.material)
 

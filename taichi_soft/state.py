@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from taichi_soft.constants import LANES
 from taichi_soft.contact_fields import ContactCapacity, ContactFields, SoftContactFields
+from taichi_soft.joint_fields import JointFields
 from taichi_soft.loading import Loader
 from taichi_soft.runtime import ti
 from taichi_soft.scene import BodyArrays, Ranges, Scene, blocks_of
@@ -22,10 +23,10 @@ ACTIVE, FROZEN, ASLEEP, ABSENT = 0, 1, 2, 3
 
 _NO_CONTACT = ContactCapacity()
 
-MOVES_PINS, FEELS_REACTION, PUSHED, DAMPED, SHELTERED, GRABBED = 1, 2, 4, 8, 16, 32
+MOVES_PINS, FEELS_REACTION, PUSHED, DAMPED, SHELTERED, GRABBED, JOINED = 1, 2, 4, 8, 16, 32, 64
 """Bits of `body_drives`: some pinned particles have somewhere to go; what they take up is added up;
 `particle_push` counts in the coming step; `body_damping` is not zero; the wind misses the body; a
-grab pulls at it."""
+grab pulls at it; a joint holds it to another."""
 
 MOST_GRABS, PATCH_ROWS = 16, 128
 """Grabs of one world at a time, and particles that one of them holds."""
@@ -196,6 +197,7 @@ class State:
 
         if capacity.has_contact:
             self.contact = ContactFields(capacity.contact, n, bodies)
+            self.joints = JointFields(n)
         if capacity.contact.soft:
             self.soft = SoftContactFields(n, bodies, capacity.outer, capacity.triangles)
 
@@ -277,6 +279,8 @@ class State:
     def _load_contact(self, scene: Scene) -> None:
         fill, contact, count = self.loader.fill, self.contact, len(scene.bodies)
         fill(contact.near_count, np.zeros(0))
+        fill(self.joints.bodies, np.zeros((0, 2)))
+        fill(self.joints.is_held, np.zeros(0))
         # What lies inside a body is never near anything.
         fill(contact.particle_clearance, np.full(scene.particle_count, np.inf))
         fill(contact.particle_touches, np.zeros(0))

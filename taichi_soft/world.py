@@ -24,6 +24,7 @@ from taichi_soft.control.drives import ForceField, push_by_field, require_field,
 from taichi_soft.control.frames import Frame, Frames
 from taichi_soft.control.grabs import Grab, as_pull
 from taichi_soft.control.impulses import apply_radial_impulse
+from taichi_soft.control.joints import Joint
 from taichi_soft.errors import FrozenBodyWarning, OptionError, StateError
 from taichi_soft.events import Event, Listener
 from taichi_soft.handles import Handle, Handles, recorded
@@ -132,6 +133,7 @@ class World(Handle):
         self._built_with: list[str] = []  # shapes of colliders that came before `build`, by digest
         self._frames = Frames()
         self._grabs: dict[int, Grab] = {}
+        self._joints: dict[int, Joint] = {}
         self._force_field: ForceField | None = None
         self._simulation: Simulation | None = None
 
@@ -608,9 +610,9 @@ class World(Handle):
     def snapshot(self) -> bytes:
         """The whole state between two steps, to `restore` it here or in a world that was built alike.
 
-        Bodies, colliders, frames, grabs and attachments, the wind, materials that were set, and all that is
-        going to act in the coming step are in it; a force field and events are not. It holds numbers only, no
-        code. The first call compiles, some seconds at most.
+        Bodies, colliders, frames, grabs, attachments and joints, the wind, materials that were set, and all
+        that is going to act in the coming step are in it; a force field and events are not. It holds numbers
+        only, no code. The first call compiles, some seconds at most.
         Raises: StateError before `build`.
         """
         return take_snapshot(self)
@@ -631,8 +633,8 @@ class World(Handle):
     def state_hash(self) -> str:
         """A name of the state, 16 hexadecimal digits: the same in two worlds that are in step.
 
-        Made of step count, positions, velocities, pins, who lives, sleeps or is frozen, colliders, frames and
-        grabs; the same for any number of threads.
+        Made of step count, positions, velocities, pins, who lives, sleeps or is frozen, colliders, frames,
+        grabs and joints; the same for any number of threads.
         Raises: StateError before `build`.
         """
         return state_hash(self)

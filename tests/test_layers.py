@@ -16,7 +16,7 @@ LAYERS = """
     math  loading
     materials  meshing  settings  contact  plasticity
     laws  collision
-    scene  contact_fields
+    scene  contact_fields  joint_fields
     state  integrators
     kernels
     forces  shapes

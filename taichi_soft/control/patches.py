@@ -63,5 +63,26 @@ def _stiffness(body: BodyDescription, falloff: NDArray[np.float64]) -> float:
     ends = mesh.vertices[mesh.tets[near]]
     rise = (corner[near, 1:] - corner[near, :1])[..., None]
     slope = np.linalg.solve(ends[:, 1:] - ends[:, :1], rise)[..., 0]
-    shear = body.material.stiffness_matrices(len(mesh.tets))[near][:, range(3, 6), range(3, 6)].min(axis=1)
-    return float((mesh.volumes[near] * shear) @ (slope**2).sum(axis=1))
+    return float((mesh.volumes[near] * _shear_moduli(body)[near]) @ (slope**2).sum(axis=1))
+
+
+def _shear_moduli(body: BodyDescription) -> NDArray[np.float64]:
+    """The smallest of each tetrahedron, (m,) [Pa]."""
+    mesh: Any = body.mesh
+    material: Any = body.material
+    moduli = material.stiffness_matrices(len(mesh.tets))
+    return np.asarray(moduli[:, range(3, 6), range(3, 6)].min(axis=1))
+
+
+def wave_speed(body: BodyDescription) -> float:
+    """With which what is done to a part of a body reaches the rest, at least [m/s].
+
+    sqrt(mu / density); in springs, a sqrt(k / m) of the mean edge a and the mean mass m.
+    """
+    mesh: Any = body.mesh
+    if isinstance(body.material, SpringMaterial):
+        assert body.bonds is not None
+        ends = mesh.vertices[mesh.edges]
+        edge = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).mean()
+        return float(edge * np.sqrt(body.bonds.constants[:, 1].min() / body.masses.mean()))
+    return float(np.sqrt(_shear_moduli(body).min() * mesh.volumes.sum() / body.masses.sum()))

@@ -1,7 +1,7 @@
 """Schedule `per_body` where bodies touch more than the floor: one thread makes all substeps of an island.
 
-A substep goes in the order velocity, contact, position: contact takes velocities away before they move
-anything.
+A substep goes in the order velocity, joints, contact, position: contact takes velocities away before they
+move anything, and what it changes of joints they make good in the next substep.
 """
 
 from taichi_soft.kernels.collide import collided, find_near_colliders, forget_contacts
@@ -9,6 +9,7 @@ from taichi_soft.kernels.drives import add_reactions, blow_on, push_particles
 from taichi_soft.kernels.grabs import pull_grabs
 from taichi_soft.kernels.internal_forces import accumulate_forces
 from taichi_soft.kernels.islands import find_islands
+from taichi_soft.kernels.joints import solve_joints
 from taichi_soft.kernels.motion import gravity_on, remember_particle
 from taichi_soft.kernels.per_body import before_kick, end_body
 from taichi_soft.kernels.sleep import note_motion, settle_island, wake_by_colliders, wake_island
@@ -150,6 +151,8 @@ def _move_island(state: ti.template(), program: ti.template(), island, substeps,
                 fastest = ti.max(fastest, speed)
                 if state.contact.is_wild[body] == 0:  # or the others' candidates would age by its speed
                     fastest_beside = ti.max(fastest_beside, speed_beside)
+        held, held_beside = solve_joints(state, island, h, int(s == 0), common)
+        fastest, fastest_beside = ti.max(fastest, held), ti.max(fastest_beside, held_beside)
         if ti.static(program.has_soft_contact):
             reach, gone = _touch_each_other(state, island, reach, gone, fastest_beside, h)
         farthest = ti.cast(0.0, ti.f32)
@@ -191,7 +194,7 @@ def _is_to_be_searched(state: ti.template(), body):
     """Whether a body is awake, or will be, and may be touched (1)."""
     found = 0
     if state.body_status[body] != ABSENT:
-        island = state.soft.body_island[body]
+        island = state.contact.body_island[body]
         if is_social(state, island) == 1:
             for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
                 found = found | int(state.body_status[state.contact.island_body[i]] == ACTIVE)
@@ -218,7 +221,7 @@ def step_islands(
         ti.loop_config(block_dim=1)
         for body in range(body_count):
             if _is_to_be_searched(state, body) == 1:
-                island = state.soft.body_island[body]
+                island = state.contact.body_island[body]
                 holds, thickness = island_margin(state, island)
                 search_body(state, body, island, holds + thickness)
     ti.loop_config(block_dim=1)

@@ -1,9 +1,11 @@
-"""Islands: bodies that may touch each other in a step, directly or through others.
+"""Islands: bodies that may touch each other in a step or are joined, directly or through others.
 
 One thread steps an island, so that what passes between its bodies needs no waiting and has one order. A body
 that stays clear of all others is an island of its own.
 """
 
+from taichi_soft.joint_fields import MOST_JOINTS
+from taichi_soft.kernels.joints import mark_held
 from taichi_soft.kernels.motion import gravity_on
 from taichi_soft.runtime import ti
 from taichi_soft.state import ABSENT, ASLEEP
@@ -55,11 +57,17 @@ def _sort_by_lower_x(state: ti.template(), body_count):
 
 
 @ti.func
-def _root(soft: ti.template(), body):
+def _root(contact: ti.template(), body):
     root = body
-    while soft.parent[root] != root:
-        root = soft.parent[root]
+    while contact.parent[root] != root:
+        root = contact.parent[root]
     return root
+
+
+@ti.func
+def _join(contact: ti.template(), a, b):
+    p, q = _root(contact, a), _root(contact, b)
+    contact.parent[ti.max(p, q)] = ti.min(p, q)
 
 
 @ti.func
@@ -86,21 +94,28 @@ def _join_overlapping(state: ti.template(), body_count):
                     apart = apart | int(state.contact.body_lower[a][k] > state.contact.body_upper[b][k])
                     apart = apart | int(state.contact.body_lower[b][k] > state.contact.body_upper[a][k])
                 if apart == 0:
-                    p, q = _root(state.soft, a), _root(state.soft, b)
-                    state.soft.parent[ti.max(p, q)] = ti.min(p, q)
+                    _join(state.contact, a, b)
 
 
 @ti.func
-def _list_islands(state: ti.template(), body_count):
-    """Bodies island by island, both in ascending order."""
+def _join_held(state: ti.template()):
+    for j in range(MOST_JOINTS):
+        ends = state.joints.bodies[j]
+        if ends[0] > 0:
+            _join(state.contact, ends[0] - 1, ends[1] - 1)
+
+
+@ti.func
+def _list_islands(state: ti.template(), body_count, end):
+    """Bodies of a status before `end`, island by island, both in ascending order."""
     islands, rows = 0, 0
     for first in range(body_count):
-        if state.soft.parent[first] == first and state.body_status[first] != ABSENT:
+        if state.contact.parent[first] == first and state.body_status[first] < end:
             state.contact.island_first[islands] = rows
             for body in range(first, body_count):
-                if state.body_status[body] != ABSENT and _root(state.soft, body) == first:
+                if state.body_status[body] < end and _root(state.contact, body) == first:
                     state.contact.island_body[rows] = body
-                    state.soft.body_island[body] = islands
+                    state.contact.body_island[body] = islands
                     rows += 1
             islands += 1
     state.contact.island_first[islands] = rows
@@ -111,8 +126,21 @@ def _list_islands(state: ti.template(), body_count):
 def find_islands(state: ti.template(), body_count, dt):
     """Find which bodies may touch within a step of `dt` [s], and list them."""
     for body in range(body_count):
-        state.soft.parent[body] = body
+        state.contact.parent[body] = body
     _find_boxes(state, body_count, dt)
     _sort_by_lower_x(state, body_count)
     _join_overlapping(state, body_count)
-    _list_islands(state, body_count)
+    _join_held(state)
+    mark_held(state, 1)
+    _list_islands(state, body_count, ABSENT)
+
+
+@ti.kernel
+def list_joined_islands(state: ti.template(), body_count: ti.i32):
+    """The islands where bodies do not touch each other: what joints make of them, until those change."""
+    ti.loop_config(serialize=True)
+    for _ in range(1):
+        for body in range(body_count):
+            state.contact.parent[body] = body
+        _join_held(state)
+        _list_islands(state, body_count, ABSENT + 1)  # with empty slots, where bodies may come any time

@@ -6,12 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.constants import LANES
+from taichi_soft.joint_fields import ENDS, MOST_JOINTS
 from taichi_soft.runtime import ti
 from taichi_soft.state import ABSENT, MOST_GRABS, PATCH_ROWS, State
 
-OWNERS = PARTICLE, BODY, GRAB, HELD, PATCH, PAIR, SHAPE, WORLD = range(8)
+OWNERS = PARTICLE, BODY, GRAB, HELD, PATCH, PAIR, SHAPE, JOINT, JOINT_ROW, JOINT_END, WORLD = range(11)
 """What a field has a row for: a particle, a body, a grab, a grab up to the last that is in use, a row of the
-patch of such a one, a pair of a body and a collider, a number of a rest shape; or only one row."""
+patch of such a one, a pair of a body and a collider, a number of a rest shape, a joint, a row of it, an end
+of such a row; or only one row."""
 
 
 def carried(state: State, owner: int) -> list[tuple[Any, int, int]]:
@@ -21,7 +23,7 @@ def carried(state: State, owner: int) -> list[tuple[Any, int, int]]:
     read: forces, boxes, candidates of contacts, islands.
     """
     is_implicit, touches = state.capacity.implicit, state.capacity.contact.colliders > 0
-    contact = state.contact if touches else None
+    contact, joints = (state.contact, state.joints) if touches else (None, None)
     fields: list[Any] = []
     if owner == PARTICLE:
         fields += [state.particle_position, state.particle_velocity, state.prev_position, state.prev_velocity]
@@ -46,19 +48,30 @@ def carried(state: State, owner: int) -> list[tuple[Any, int, int]]:
         fields += [contact.impulse, contact.angular_impulse] if contact else []
     elif owner == SHAPE:
         fields += [state.tet_rest_inverse] if state.capacity.plastic else []
+    elif owner == JOINT:
+        fields += [joints.bodies, joints.rows, joints.draw_speed, joints.impulse] if joints else []
+    elif owner == JOINT_ROW and joints:
+        fields += [joints.row_impulse]
+    elif owner == JOINT_END and joints:
+        fields += [joints.particle, joints.weight, joints.share]
     elif owner == WORLD:
         fields += [state.wind]
     widths = [getattr(field, "n", 1) for field in fields]
     return [(field, sum(widths[:i]), widths[i]) for i, field in enumerate(fields)]
 
 
-def row_table(state: State, particles: int, bodies: int, blocks: int, held: int) -> NDArray[np.int32]:
-    """Rows of each owner, their width and where they begin: (9, 3), the last row being the end.
+def row_table(
+    state: State, particles: int, bodies: int, blocks: int, held: int, joint_rows: int
+) -> NDArray[np.int32]:
+    """Rows of each owner, their width and where they begin: (12, 3), the last row being the end.
 
-    `held`: number of the last grab in use, plus 1.
+    Args:
+        held: number of the last grab in use, plus 1.
+        joint_rows: that joints use.
     """
     pairs = bodies * state.capacity.contact.colliders
-    counts = [particles, bodies, MOST_GRABS, held, held * PATCH_ROWS, pairs, blocks * 9 * LANES, 1]
+    counts = [particles, bodies, MOST_GRABS, held, held * PATCH_ROWS, pairs, blocks * 9 * LANES]
+    counts += [MOST_JOINTS, joint_rows, joint_rows * ENDS, 1]
     rows, at = [], 0
     for owner in OWNERS:
         width = sum(each for _, _, each in carried(state, owner))

@@ -27,10 +27,17 @@ met once, however it is cut into triangles; a corner twice."""
 
 
 @ti.func
-def _mobility(state: ti.template(), p):
+def mobility(state: ti.template(), p):
     """Inverse mass [1/kg]; zero where the body does not move."""
     free = state.body_status[state.particle_body[p]] == ACTIVE
     return state.particle_inv_mass[p] * ti.select(free, 1.0, 0.0)
+
+
+@ti.func
+def velocity(state: ti.template(), p):
+    """[m/s]; zero where the body does not move: a frozen one keeps those that broke it."""
+    moves = state.body_status[state.particle_body[p]] == ACTIVE
+    return state.particle_velocity[p] * ti.select(moves, 1.0, 0.0)
 
 
 @ti.func
@@ -114,20 +121,20 @@ def _press(state: ti.template(), p, corners, slot, h, is_first):
     """Impulse along the normal that leaves no approach which would close the gap within `h` [s]."""
     normal, weights = state.soft.slot_normal[slot], state.soft.slot_weights[slot]
     before = state.soft.slot_press[slot]
-    total, approach = _mobility(state, p), state.particle_velocity[p].dot(normal)
+    total, approach = mobility(state, p), velocity(state, p).dot(normal)
     for i in range(3):
-        total += weights[i] * weights[i] * _mobility(state, corners[i])
-        approach -= weights[i] * state.particle_velocity[corners[i]].dot(normal)
+        total += weights[i] * weights[i] * mobility(state, corners[i])
+        approach -= weights[i] * velocity(state, corners[i]).dot(normal)
     change = before
     if is_first == 0:
         allowed = -ti.max(state.soft.slot_gap[slot], 0.0) / h
         change = ti.max(before + (allowed - approach) / ti.max(total, 1e-30), 0.0) - before
         state.soft.slot_press[slot] = before + change
     if change != 0.0 and is_finite(change * normal):
-        state.particle_velocity[p] = state.particle_velocity[p] + _mobility(state, p) * change * normal
+        state.particle_velocity[p] = state.particle_velocity[p] + mobility(state, p) * change * normal
         for i in range(3):
             q = corners[i]
-            pull = weights[i] * _mobility(state, q) * change
+            pull = weights[i] * mobility(state, q) * change
             state.particle_velocity[q] = state.particle_velocity[q] - pull * normal
 
 
@@ -155,17 +162,17 @@ def _rub(state: ti.template(), p, corners, slot, friction, is_first):
     before = state.soft.slot_rub[slot]
     change = before
     if is_first == 0:
-        relative = state.particle_velocity[p]
+        relative = velocity(state, p)
         for i in ti.static(range(3)):
-            v = state.particle_velocity[corners[i]]
+            v = velocity(state, corners[i])
             gradient = ti.Vector([gradients[i, 0], gradients[i, 1], gradients[i, 2]])
             relative -= shares[i] * v - height * gradient * n.dot(v)
         sliding = relative - relative.dot(normal) * normal
         slide = sliding.norm()
         tilt = gradients @ (sliding / ti.max(slide, 1e-30))
-        total = _mobility(state, p)
+        total = mobility(state, p)
         for i in ti.static(range(3)):
-            total += _mobility(state, corners[i]) * (
+            total += mobility(state, corners[i]) * (
                 shares[i] * shares[i] + height * height * tilt[i] * tilt[i]
             )
         wanted = before - sliding / ti.max(total, 1e-30)
@@ -174,27 +181,27 @@ def _rub(state: ti.template(), p, corners, slot, friction, is_first):
         change = wanted - before
         state.soft.slot_rub[slot] = wanted
     if is_finite(change):
-        state.particle_velocity[p] = state.particle_velocity[p] + _mobility(state, p) * change
+        state.particle_velocity[p] = state.particle_velocity[p] + mobility(state, p) * change
         tilt = gradients @ change
         for i in ti.static(range(3)):
             q = corners[i]
             impulse = shares[i] * change - height * tilt[i] * n
-            state.particle_velocity[q] = state.particle_velocity[q] - _mobility(state, q) * impulse
+            state.particle_velocity[q] = state.particle_velocity[q] - mobility(state, q) * impulse
 
 
 @ti.func
 def _push_apart(state: ti.template(), p, corners, slot):
     """Move apart what is nearer than the thickness, by a part, without giving it a velocity."""
     normal, weights = state.soft.slot_normal[slot], state.soft.slot_weights[slot]
-    total = _mobility(state, p)
+    total = mobility(state, p)
     for i in range(3):
-        total += weights[i] * weights[i] * _mobility(state, corners[i])
+        total += weights[i] * weights[i] * mobility(state, corners[i])
     if total > 0.0:
         push = -PUSH_OUT * state.soft.slot_gap[slot] / total
-        state.particle_position[p] = state.particle_position[p] + _mobility(state, p) * push * normal
+        state.particle_position[p] = state.particle_position[p] + mobility(state, p) * push * normal
         for i in range(3):
             q = corners[i]
-            back = weights[i] * _mobility(state, q) * push
+            back = weights[i] * mobility(state, q) * push
             state.particle_position[q] = state.particle_position[q] - back * normal
 
 

@@ -7,6 +7,7 @@ which it was looked for.
 
 from taichi_soft.contact_fields import SLOTS
 from taichi_soft.kernels.islands import may_touch, search_margin
+from taichi_soft.kernels.joints import are_joined
 from taichi_soft.math.triangle import closest_point_on_triangle
 from taichi_soft.runtime import ti
 
@@ -133,10 +134,13 @@ def _is_self_neighbour(state: ti.template(), p, corners, edge):
 
 
 @ti.func
-def _search_triangle(state: ti.template(), table, size, lowest, highest, body, other, triangle, cell, margin):
+def _search_triangle(
+    state: ti.template(), table, size, lowest, highest, body, other, is_joined, triangle, cell, margin
+):
     """Give a triangle of `other` to the vertices of `body` within `margin` [m] of it.
 
-    Those in the hash lie between `lowest` and `highest`.
+    Those in the hash lie between `lowest` and `highest`. Where the two are joined, what the joint holds is
+    left out: it is to stay where it is.
     """
     lower = ti.max(state.soft.triangle_lower[triangle] - margin, lowest)
     upper = ti.min(state.soft.triangle_upper[triangle] + margin, highest)
@@ -146,6 +150,9 @@ def _search_triangle(state: ti.template(), table, size, lowest, highest, body, o
         a = state.particle_position[corners[0]]
         b = state.particle_position[corners[1]]
         c = state.particle_position[corners[2]]
+        is_held = 0
+        for i in ti.static(range(3)):
+            is_held = is_held | state.joints.is_held[corners[i]]
         low, high = _cell_of(lower, cell), _cell_of(upper, cell)
         for cx in range(low.x, high.x + 1):
             for cy in range(low.y, high.y + 1):
@@ -160,6 +167,8 @@ def _search_triangle(state: ti.template(), table, size, lowest, highest, body, o
                         wanted = (
                             ti.max(lower - x, x - upper).max() <= 0.0 and (_cell_of(x, cell) == here).all()
                         )
+                        if wanted and is_joined == 1:
+                            wanted = is_held | state.joints.is_held[p] == 0
                         if wanted and other == body:
                             wanted = not _is_self_neighbour(state, p, corners, cell / CELL)
                         if wanted:
@@ -177,9 +186,10 @@ def _search_pair(state: ti.template(), body, other, margin):
     cell = ti.max(CELL * state.soft.body_surface[other].z, 1e-6)
     size, lowest, highest = _fill_table(state, table, body, other, cell, margin)
     if size > 0:
+        is_joined = are_joined(state, body, other)
         triangles = state.body_triangles[other]
         for t in range(triangles[0], triangles[1]):
-            _search_triangle(state, table, size, lowest, highest, body, other, t, cell, margin)
+            _search_triangle(state, table, size, lowest, highest, body, other, is_joined, t, cell, margin)
 
 
 @ti.real_func

@@ -1,5 +1,6 @@
 """Every demo for a few frames; each has to come out at one number."""
 
+import cv2
 import numpy as np
 import pytest
 from scipy.special import ellipe, ellipk
@@ -106,6 +107,29 @@ def test_all_bodies_that_the_hand_throws_land_in_the_crate():
     assert stage.act.grab is None
 
 
+def test_what_is_cut_off_is_what_lay_below_the_blade_and_falls_freely():
+    """Mass by how much of each tetrahedron lies below the plane, to a fifth of a layer of them; the height
+    from the place and speed that the lower part of the bar had at the cut, until it is near the floor."""
+    demo = load_demo("cut")
+    stage = demo.stage()
+    game = EngineAdapter(stage.world, stage.step, before_step=stage.act)
+    knife, heights = stage.act, []
+    while knife.fallen is None or stage.world.time < knife.parted + 0.4:
+        game.step()
+        if knife.fallen is not None:
+            body = knife.fallen
+            heights.append((body.center_of_mass()[2], body.momentum()[2] / body.masses.sum()))
+    assert demo.proof(stage) == pytest.approx(1.0, abs=0.2 * 36.0 / knife.below)
+    assert knife.fallen.masses.sum() + knife.bar.masses.sum() == pytest.approx(knife.whole, rel=1e-9)
+    t = stage.step.dt * np.arange(len(heights))
+    (start, speed), found = heights[0], np.array(heights)[:, 0]
+    np.testing.assert_allclose(found, start + speed * t - 9.81 / 2 * t**2, atol=2e-3)
+    assert found[-1] < start - 0.5
+    for body in (knife.bar, knife.fallen):  # closed, and outward: the divergence theorem
+        corners = body.positions().astype(float)[body.surface]
+        assert np.linalg.det(corners).sum() / 6 == pytest.approx(body.volume(), rel=1e-5)
+
+
 def test_bodies_heaped_in_a_bowl_rest_and_lie_outside_each_other():
     deepest, stage = run("bowl", 10.0)
     assert len(stage.actors) == 20
@@ -146,10 +170,24 @@ def test_every_demo_can_be_filmed(name, tmp_path):
     assert stage.world.step_count >= 1
 
 
+def test_a_film_shows_what_was_cut_off(tmp_path):
+    """In its own colour, teal, from the frame after the cut on."""
+    stage = load_demo("cut").stage()
+    film(stage, tmp_path / "cut.png", seconds=2.2, size=(480, 270))
+    frames = [cv2.imread(str(path)).astype(int) for path in sorted(tmp_path.glob("cut_*.png"))]
+    teal = [
+        int(((each[..., 0] > each[..., 2] + 30) & (each[..., 1] > each[..., 2] + 30)).sum())
+        for each in frames
+    ]
+    first = round(stage.act.parted / stage.step.dt)
+    assert max(teal[:first]) == 0
+    assert min(teal[first + 2 :]) > 500
+
+
 def test_there_are_the_demos_of_the_readme():
     assert demo_names() == [
-        *("attach", "bars", "bounce", "bowl", "cloth", "compare", "density", "dents", "grab", "many"),
-        *("playground", "rollback"),
+        *("attach", "bars", "bounce", "bowl", "cloth", "compare", "cut", "density", "dents", "grab"),
+        *("many", "playground", "rollback"),
     ]
 
 

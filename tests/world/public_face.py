@@ -52,7 +52,7 @@ class Game:
         )
         world.add_collider(SphereShape(0.3), position=(0.0, 0.0, 0.1))
         world.add_collider(HeightFieldShape(np.zeros((4, 4)), 1.0), position=(0.0, 0.0, 0.02))
-        world.reserve(self.cube, 5)
+        world.reserve(self.cube, 6)
         world.build()
         world.set_wind((0.3, 0.0, 0.0))
         self.sleeper = world.spawn(self.cube, position=(3.0, 3.0, 0.21))
@@ -72,8 +72,12 @@ class Game:
         self.dead_frame = world.add_frame()
         world.restore(before)
         self.dead_grab, self.dead_hold = body.grab(0), body.attach([0], world.add_frame(), two_way=True)
+        neighbour = world.spawn(self.cube, position=(0.5, 0.0, 2.0))
+        self.dead_joint = body.attach_to(neighbour, [0], onto=[0])
         self.dead_grab.release()
         self.dead_hold.release()
+        self.dead_joint.release()
+        world.despawn(neighbour)
         self.dead_collider = world.add_collider(SphereShape(0.1), position=(9.0, 0.0, 0.0))
         self.dead_collider.remove()
         world.despawn(body)
@@ -86,6 +90,8 @@ class Game:
         self.frame = world.add_frame(position=(1.5, 0.0, 1.0))
         self.hold = self.held.attach([0, 1], self.frame, two_way=True)
         self.hand = self.held.grab(3)
+        self.hanging = world.spawn(self.cube, position=(1.9, 0.0, 1.0))
+        self.joint = self.hanging.attach_to(self.held, np.flatnonzero(BLOCK.vertices[:, 0] < -0.19))
         self.collider = world.colliders[0]
         for _ in range(5):
             world.step(DT, SUBSTEPS)
@@ -120,6 +126,10 @@ class Game:
         return [each for body in self.world.bodies for each in body._attachments]
 
     @property
+    def joints(self):
+        return [joint for _, joint in sorted(self.world._joints.items())]
+
+    @property
     def frames(self):
         return list(self.world._frames.handles)
 
@@ -129,7 +139,12 @@ class Game:
         if kind in single:
             return [single[kind]]
         lists = {"Body": self.world.bodies, "Collider": self.world.colliders, "Frame": self.frames}
-        lists |= {"Grab": self.grabs, "Attachment": self.holds, "Listener": [self.listener]}
+        lists |= {
+            "Grab": self.grabs,
+            "Attachment": self.holds,
+            "Joint": self.joints,
+            "Listener": [self.listener],
+        }
         return list(lists[kind])
 
 
@@ -451,6 +466,9 @@ CALLS: dict[str, dict[str, Call]] = {
             }),
         }, _has_no_pins),
         "attach": Call({"particles": VERTICES, "frame": FRAME, "two_way": FLAG}, _touches_attached),
+        "attach_to": Call({
+            "other": BODY, "particles": choice([0, 3], **VERTICES.bad), "onto": choice([1, 2], **VERTICES.but("none").bad),
+        }, perhaps),
         "grab": Call({
             "triangle": Kind(lambda g, rng: int(rng.integers(len(g.receiver.surface))), NOT_COUNTS | {"beyond": 10**5}), "barycentrics": WEIGHTS, "frequency": FREQUENCY,
             "max_force": LOAD,
@@ -479,6 +497,7 @@ CALLS: dict[str, dict[str, Call]] = {
     "Frame": {"move_to": Call({"position": POINT, "rotation": ROTATION})},
     "Grab": {"move": Call({"point": POINT}), "release": NOTHING},
     "Attachment": {"release": NOTHING},
+    "Joint": {"release": NOTHING},
     "Listener": {"remove": NOTHING},
     "EngineAdapter": {
         "step": NOTHING,
@@ -504,6 +523,7 @@ READERS: dict[str, str] = {
     "Frame": """at is_alive position rotation""",
     "Grab": """body force is_held point""",
     "Attachment": """body force frame is_attached particles torque two_way""",
+    "Joint": """body force is_attached other particles""",
     "Listener": """function is_active kind""",
     "EngineAdapter": """alpha dropped_time fixed_step time total_dropped_time world""",
     "Rollback": """steps""",
@@ -511,7 +531,7 @@ READERS: dict[str, str] = {
 """What is asked without arguments and changes nothing."""
 
 DEAD = {"Body": "dead_body", "Collider": "dead_collider", "Frame": "dead_frame", "Grab": "dead_grab"}
-DEAD |= {"Attachment": "dead_hold"}
+DEAD |= {"Attachment": "dead_hold", "Joint": "dead_joint"}
 
 READABLE_WHEN_DEAD: dict[str, str] = {
     "Body": """asset index is_alive is_cut is_frozen masses material mesh surface tet_origins tets topology_version
@@ -520,6 +540,7 @@ READABLE_WHEN_DEAD: dict[str, str] = {
     "Frame": "at is_alive",
     "Grab": "body point",
     "Attachment": "body frame is_attached particles two_way",
+    "Joint": "body is_attached other particles",
 }
 
 LENGTH = number(0.1, 1.0, zero=0.0, below=-1.0, long=1e7)

@@ -113,6 +113,17 @@ def _detach(world, cube, rng):
         attachment.release()
 
 
+def _join(world, cube, rng):
+    if len(world.bodies) > 1 and len(world._joints) < 3:
+        a, b = (world.bodies[i] for i in rng.permutation(len(world.bodies))[:2])
+        a.attach_to(b, rng.permutation(27)[:3], onto=rng.permutation(27)[:3])
+
+
+def _part(world, cube, rng):
+    for _, joint in sorted(world._joints.items())[:1]:
+        joint.release()
+
+
 def _move_collider(world, cube, rng):
     world.colliders[0].move_to(world.colliders[0].position + rng.uniform(-0.05, 0.05, 3))
 
@@ -156,6 +167,7 @@ def _throw(world, cube, rng):
 ACTIONS = (
     _spawn, _despawn, _push, _force, _explode, _pin, _unpin, _grab, _move_grabs, _release, _attach, _move_frames,
     _detach, _move_collider, _drive_collider, _add_collider, _remove_collider, _blow, _remake, _tune, _throw,
+    _join, _part,
 )  # fmt: skip
 
 

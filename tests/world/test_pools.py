@@ -155,7 +155,11 @@ ARGUMENTS = {"set_motion": (np.zeros_like(MESH.vertices), np.zeros_like(MESH.ver
 ARGUMENTS |= {"watch_stress": (1e4,), "watch_tearing": (1e4,), "cut": ()}
 UP = (0.0, 0.0, 1.0)
 ARGUMENTS |= {name: (UP,) for name in ("apply_force", "apply_impulse", "set_velocity", "teleport")}
-ARGUMENTS |= {"apply_impulse_at_point": (UP, (9.0, 0.0, 0.0), 1.0), "attach": ([0], None)}
+ARGUMENTS |= {
+    "apply_impulse_at_point": (UP, (9.0, 0.0, 0.0), 1.0),
+    "attach": ([0], None),
+    "attach_to": (None, [0]),
+}
 ARGUMENTS |= {"grab": (0, (1.0, 0.0, 0.0)), "pin": ([0],), "set_targets": ([0], [(9.0, 0.0, 0.0)])}
 ARGUMENTS |= {name: (1.0,) for name in ("set_damping", "set_gravity_scale", "set_linear_damping")}
 ARGUMENTS |= {"set_material": (JELLY,), "set_sheltered": (True,)}

@@ -61,6 +61,7 @@ def readings(world):
         *(each.position.tolist() for each in world.colliders),
         *((each.impulse.tolist(), each.angular_impulse.tolist()) for each in world.colliders),
         *(grab.force.tolist() for _, grab in sorted(world._grabs.items())),
+        *(joint.force.tolist() for _, joint in sorted(world._joints.items())),
         *(a.force.tolist() for body in bodies for a in body._attachments if a.two_way),
         *(world.read_positions(body, 0.25).tobytes() for body in bodies),
         (world.step_count, world.time, world.last_dt),

@@ -1,0 +1,95 @@
+"""A bar hangs from its upper end and is cut in two: the lower part falls, and lies where it came down."""
+
+import numpy as np
+
+from engine_adapter import FixedStep
+from taichi_soft import Body, BoxShape, Frame, Material, SoftBodyAsset, World, box
+from taichi_soft.cli import main
+from taichi_soft.film import Actor, Stage
+from taichi_soft.render import PALETTE, Camera
+from taichi_soft.scenery import Prop
+
+MATERIAL = Material(young=2.5e5, poisson=0.3, density=1000.0, damping=20.0)
+SIZE = (0.6, 0.6, 2.0)  # of the bar [m]
+HEIGHT = 2.4  # of its middle [m]
+CUT = np.array([0.0, 0.0, 2.25])  # where the blade crosses the middle [m]
+ALONG = np.array([1.0, 0.0, 0.1]) / np.hypot(1.0, 0.1)  # its way
+ASIDE = np.array([0.0, 1.0, 0.0])  # its edge
+WAY, WIDTH = 2.6, 0.3  # how far it goes, and from its edge to its back [m]
+BEGIN, PASSING = 1.6, 0.5  # when it sets out, and how long it takes [s]
+STEP = FixedStep(dt=1 / 50, substeps=16)
+
+
+class Knife:
+    """Goes through the bar; when half of it is out on the other side the bar is cut."""
+
+    def __init__(self, blade: Frame, stage: Stage) -> None:
+        """Beside the bar, which is whole."""
+        self.blade, self.stage = blade, stage
+        self.bar = stage.actors[0].body
+        self.start = blade.position.astype(np.float64)
+        self.fallen: Body | None = None
+        self.parted = 0.0  # when the bar was cut [s]
+        self.whole = self.below = 0.0  # mass of the bar then, and of what lay below the blade [kg]
+
+    def __call__(self, world: World) -> None:
+        """Before a step."""
+        way = min(max((world.time - BEGIN) / PASSING, 0.0), 1.0) * WAY
+        self.blade.move_to(self.start + way * ALONG)
+        is_through = way > WAY / 2 + SIZE[0] / 2
+        if is_through and self.fallen is None:
+            self.whole = float(self.bar.masses.sum())
+            self.below = _mass_below(self.bar)
+            (self.fallen,) = self.bar.cut(plane=(CUT, np.cross(ALONG, ASIDE)))
+            self.parted = world.time
+            self.stage.actors.append(Actor(self.fallen, PALETTE[1]))
+
+    def caption(self) -> str:
+        """For the picture."""
+        pieces = [self.bar] if self.fallen is None else [self.bar, self.fallen]
+        return " + ".join(f"{piece.masses.sum():.0f} kg" for piece in pieces)
+
+
+def stage() -> Stage:
+    """The bar at rest by its upper end, not stretched yet."""
+    mesh = box(SIZE, (6, 6, 20))
+    top = np.flatnonzero(mesh.vertices[:, 2] > SIZE[2] / 2 - 1e-6)
+    asset = SoftBodyAsset(mesh, MATERIAL, pinned=top, spare_vertices=400)
+    world = World()
+    world.reserve(asset, 2)
+    bar = world.spawn(asset, position=(0.0, 0.0, HEIGHT))
+    world.build()
+    ceiling = world.add_frame((0.0, 0.0, HEIGHT + SIZE[2] / 2))
+    axes = np.stack([ALONG, ASIDE, np.cross(ALONG, ASIDE)], axis=1)
+    blade = world.add_frame(CUT - WAY / 2 * ALONG, axes)
+    plate, steel = BoxShape((1.1, 1.1, 0.12)).surface(), BoxShape((WIDTH, 1.2, 0.02)).surface()
+    props = [
+        Prop((plate[0] + (0, 0, 0.06), plate[1]), ceiling),
+        Prop(steel, blade, color=(0.95, 0.93, 0.88)),
+    ]
+    camera = Camera.framing((-1.9, -0.6, 0.0), (1.9, 0.6, 3.6), aspect=16 / 9, azimuth=-66, elevation=17)
+    found = Stage(
+        "cut along the faces of its tetrahedra", world, [Actor(bar)], camera, STEP, 7.0, props=props
+    )
+    found.act = knife = Knife(blade, found)
+    found.caption = knife.caption
+    return found
+
+
+def _mass_below(body: Body) -> float:
+    """Of what lies below the blade [kg]: of a tetrahedron across it as much as of its height."""
+    heights = np.sort((body.positions()[body.tets] - CUT) @ np.cross(ALONG, ASIDE), axis=1)
+    share = np.clip(-heights[:, 0] / (heights[:, 3] - heights[:, 0]), 0.0, 1.0)
+    return float(body.material.density * body.mesh.volumes @ share)
+
+
+def proof(stage: Stage) -> float:
+    """Mass of what fell over that of what lay below the blade."""
+    knife = stage.act
+    assert isinstance(knife, Knife)
+    assert knife.fallen is not None
+    return float(knife.fallen.masses.sum()) / knife.below
+
+
+if __name__ == "__main__":
+    main("demo", "cut")

@@ -1,0 +1,74 @@
+"""Places in a body: points that go with the vertices of a tetrahedron. Numpy only."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.errors import OptionError
+
+if TYPE_CHECKING:
+    from taichi_soft.body import Body
+
+Floats = NDArray[np.float64]
+
+FARTHEST = -0.5
+"""Least weight of a corner: a place lies in a tetrahedron drawn out threefold from its centre."""
+
+
+@dataclass(frozen=True)
+class Places:
+    """Where each of n points lies among four vertices; the weights of one add up to 1."""
+
+    vertices: NDArray[np.int32]  # (n, 4)
+    weights: Floats  # (n, 4)
+
+
+def places_at(body: Body, points: Floats, names: list[str]) -> Places:
+    """Points (n, 3) [m] in the tetrahedra of a body as it is now; a point outside in that which it is least
+    outside of.
+
+    Raises: OptionError by the name of the first that is too far away, and for a body without tetrahedra.
+    """
+    if len(body.tets) == 0:
+        raise OptionError(
+            f"body {body.index} has no tetrahedra to hold by: attach it to the other one instead, or name "
+            "vertices of it by onto"
+        )
+    positions = body.positions().astype(np.float64)
+    corners = positions[body.tets]
+    edges = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
+    is_solid = np.abs(np.linalg.det(edges)) > 1e-30
+    tets, starts, inverses = body.tets[is_solid], corners[is_solid, 0], np.linalg.inv(edges[is_solid])
+    weights = np.empty((len(points), 4))
+    chosen = np.zeros(len(points), dtype=np.int64)
+    for i, point in enumerate(points):
+        rest = np.einsum("mab,mb->ma", inverses, point - starts)
+        least = np.minimum(rest.min(axis=1), 1.0 - rest.sum(axis=1)) if len(rest) else np.array([-np.inf])
+        chosen[i] = np.argmax(least)
+        if not least[chosen[i]] >= FARTHEST:
+            nearest = np.linalg.norm(positions - point, axis=1).min()
+            raise OptionError(
+                f"{names[i]} is too far from body {body.index}, {nearest:.4g} m from its nearest vertex: "
+                "bring the two together first, or name vertices by onto"
+            )
+        weights[i] = [1.0 - rest[chosen[i]].sum(), *rest[chosen[i]]]
+    weights[np.abs(weights) < 1e-4] = 0.0  # or neighbours would be held by what is none of theirs
+    return Places(tets[chosen], weights / weights.sum(axis=1, keepdims=True))
+
+
+def places_on(body: Body, vertices: NDArray[np.int32]) -> Places:
+    """The places of vertices, each by the first tetrahedron that has it, if there is one."""
+    corners = np.repeat(vertices[:, None], 4, axis=1)
+    if len(body.tets):
+        flat = body.tets.ravel()
+        first = np.zeros(body.vertex_count, dtype=np.int64)
+        first[flat[::-1]] = np.arange(len(flat))[::-1] // 4
+        corners = body.tets[first[vertices]]
+    is_it = corners == vertices[:, None]
+    weights = np.zeros(corners.shape)
+    weights[np.arange(len(vertices)), np.argmax(is_it, axis=1)] = 1.0
+    return Places(corners.astype(np.int32), weights)
