@@ -70,6 +70,8 @@ class ContactFields:
         self.calm = ti.field(ti.f32, bodies)  # time since a body was faster [s]
         self.is_wild = ti.field(ti.i32, bodies)  # 1 where it flies apart, and must not take others with it
         self.body_filter = ti.Vector.field(2, ti.i32, bodies)  # group, mask
+        self.body_edge = ti.field(ti.f32, bodies)  # mean edge of its surface [m]
+        self.prev_reaction = ti.Vector.field(3, ti.f32, particles)  # `particle_reaction` before the step
         self.particle_clearance = ti.field(ti.f32, particles)  # [m] from all that is near, at that time
         self.particle_touches = ti.field(ti.i32, particles)  # 1 where something held it in the last substep
 

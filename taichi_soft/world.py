@@ -497,6 +497,7 @@ class World(Handle):
             fill(state.body_plasticity, np.array(flows))
         if has_contact:
             fill(state.contact.body_filter, np.array([(a.contact.group, a.contact.mask) for a in assets]))
+            fill(state.contact.body_edge, np.array([a.surface_row[2] for a in assets]))
         if self._soft_contact:
             fill(state.soft.body_surface, np.array([a.surface_row for a in assets]))
             fill(state.soft.body_touches_itself, np.array([a.contact.itself for a in assets]))
