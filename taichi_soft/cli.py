@@ -298,7 +298,7 @@ def drop_test(
     first: Annotated[int, typer.Option(min=0, help="Number of the first case: repeats it alone.")] = 0,
     law: Annotated[str, typer.Option(help="Force law.")] = "virial",
     flips: Annotated[
-        str | None, typer.Option(help="tolerant, recover or off; the law's own by default.")
+        str | None, typer.Option(help="tolerant, recover or off; recover by default, where the law takes it.")
     ] = None,
     worst: Annotated[int, typer.Option(min=0, help="Failed cases to list of each kind.")] = 5,
     as_json: AsJson = False,

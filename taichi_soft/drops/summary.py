@@ -13,8 +13,8 @@ from taichi_soft.drops.trial import BRAKE, CALM_SPEED, CALM_TIME, FREE_TIME, PAT
 
 CRITERION = (
     f"at rest: slower than {CALM_SPEED:g} sizes per second (root mean square over vertices) for "
-    f"{CALM_TIME:g} s, within {PATIENCE:g} s; from {FREE_TIME:g} s on velocities fade at "
-    f"{BRAKE:g} /s, or balls would roll on"
+    f"{CALM_TIME:g} s, within {PATIENCE:g} T, T = sqrt(size / g) being 0.07 to 1 s; after {FREE_TIME:g} T "
+    f"velocities fade at {BRAKE:g} / T, or balls would roll on"
 )
 
 
