@@ -63,6 +63,14 @@ class ContactFields:
         self.gone = ti.field(ti.f32, bodies)  # way [m] since it was looked which are near, at most
         self.impulse = ti.Vector.field(3, ti.f32, bodies * c)  # on the collider in this step [N s]
         self.angular_impulse = ti.Vector.field(3, ti.f32, bodies * c)  # about its position [N m s]
+        self.press = ti.Vector.field(3, ti.f32, bodies * c)  # on the body in this substep [N s]
+        # Of the presses of its particles: their sum [N s], and those times the speed along the normal with
+        # which the surface came, and with which particle and surface came together [N].
+        self.press_rates = ti.Vector.field(3, ti.f32, bodies * c)
+        self.rebound = ti.field(
+            ti.f32, bodies * c
+        )  # speed [m/s] at which the body may leave, 0 for no contact
+        self.prev_rebound = ti.field(ti.f32, bodies * c)  # before the step
         # Corners of a box [m]: of the way through a step, of the search in an island, or where a body sleeps.
         self.body_lower = ti.Vector.field(3, ti.f32, bodies)
         self.body_upper = ti.Vector.field(3, ti.f32, bodies)

@@ -91,7 +91,8 @@ class World(Handle):
         gravity: (3,) [m/s^2].
         floor: height of a horizontal floor [m], or None for none.
         restitution: of the floor, 0 (default: bodies bounce by their own elasticity) to 1. It throws each
-            vertex back by itself, so a damped body may well bounce lower with it than without.
+            vertex back by itself, so a damped body may well bounce lower with it than without. With colliders
+            or contact between bodies in the world it limits bodies too, as in `add_collider`.
         friction: Coulomb coefficient of the floor, 0 or more.
         integrator: "leapfrog", "lazy_leapfrog", "explicit_euler", or "implicit_euler": stable for every step,
             at the price of a linear solve in each and of damping that grows with its length. A step in which
@@ -394,7 +395,7 @@ class World(Handle):
         position: ArrayLike = (0.0, 0.0, 0.0),
         rotation: ArrayLike | None = None,
         friction: float = 0.5,
-        restitution: float = 0.0,
+        restitution: float | None = None,
         thickness: float = 0.0,
         group: int = 1,
         mask: int = ALL_GROUPS,
@@ -407,7 +408,9 @@ class World(Handle):
             position: of its origin, (3,) [m].
             rotation: matrix (3, 3) or quaternion (x, y, z, w).
             friction: Coulomb coefficient, 0 or more.
-            restitution: 0 to 1, of each vertex that hits it.
+            restitution: 0 to 1: speed with which a body's centre of mass leaves it, over that with which it
+                came near, for what comes faster than half a metre per second; no more than the body's own
+                elasticity gives. None leaves bodies that elasticity.
             thickness: of a skin on it [m].
             group, mask: bits. A body and a collider touch where each one's mask has a bit of the other's
                 group.
@@ -552,7 +555,7 @@ class World(Handle):
                 PlaneShape(),
                 position=(0.0, 0.0, chosen.floor),
                 friction=chosen.friction,
-                restitution=chosen.restitution,
+                restitution=chosen.restitution or None,
             )
 
     def stable_step(self, body: Body) -> StableStep:

@@ -69,11 +69,12 @@ class Case:
         speed = np.linalg.norm(self.velocity)
         solids = ", ".join(solid.name for solid in self.course if solid.name not in ("wall", "lid"))
         first = self.course[0]
+        restitution = "its own" if first.restitution is None else f"{first.restitution:.2f}"
         return (
             f"{self.shape} {self.size:.3g} m, E {self.material.young:.2g} Pa, "
             f"{self.material.density:.0f} kg/m^3, nu {self.material.poisson:.2f}, "
             f"{speed:.1f} m/s (Mach {self.mach:.2f}), friction {first.friction:.2f}, "
-            f"restitution {first.restitution:.2f}; {solids}"
+            f"restitution {restitution}; {solids}"
         )
 
 

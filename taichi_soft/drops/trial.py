@@ -22,8 +22,10 @@ PER_SHAPE = 6
 MOST_COLLIDERS, MOST_SAMPLES = 512, 1 << 20
 """Of a world, always the same, so that all worlds share kernels."""
 
-CALM_SPEED, CALM_TIME = 0.01, 0.5
-"""At rest is what was slower than this (root mean square over vertices, in sizes per second) so long [s]."""
+CALM_SPEED, LEAST_CALM_SPEED, CALM_TIME = 0.01, 0.005, 0.5
+"""At rest is what was slower than this (root mean square over vertices, in sizes per second) so long [s]; what
+is smaller than half a metre, slower than the second [m/s], half of what Box2D's bodies may have to sleep: the
+facets of a small ball in a corner tremble at some mm/s."""
 
 PATIENCE = 150.0
 """Time in which a body must have come to rest, in that in which it falls half its size: sqrt(size / g)."""
@@ -64,7 +66,8 @@ class _Run:
         now = self.body.positions()
         ways = np.linalg.norm(now - self.before, axis=1).astype(np.float64)
         self.speed = float(np.sqrt((ways**2).mean())) * STEPS_PER_SECOND / self.case.size
-        self.calm = self.calm + 1 if self.speed < CALM_SPEED else 0
+        is_calm = self.speed < max(CALM_SPEED, LEAST_CALM_SPEED / self.case.size)
+        self.calm = self.calm + 1 if is_calm else 0
         self.before = now
         outer = now[self.outer].astype(np.float64)
         for solid in self.case.course:

@@ -16,6 +16,7 @@ from taichi_soft.kernels.internal_forces import accumulate_forces, clear_forces
 from taichi_soft.kernels.islands import find_islands
 from taichi_soft.kernels.motion import gravity_on, remember_particle, restore_particle
 from taichi_soft.kernels.per_body import before_kick, body_is_sound, end_body
+from taichi_soft.kernels.rebound import begin_rebounds, limit_rebounds, take_back_rebounds
 from taichi_soft.kernels.sleep import note_motion, settle_island, wake_by_colliders, wake_island
 from taichi_soft.kernels.soft_contact import solve_island
 from taichi_soft.kernels.soft_search import find_box, is_social, island_margin, search_body, search_island
@@ -45,6 +46,7 @@ def _begin_body(state: ti.template(), body):
         if state.body_drives[body] & FEELS_REACTION != 0:
             for p in range(particles[0], particles[1]):
                 state.contact.prev_reaction[p] = state.particle_reaction[p]
+        begin_rebounds(state, body)
         forget_contacts(state, body)
         state.contact.is_wild[body] = 0
 
@@ -60,6 +62,7 @@ def _take_back(state: ti.template(), program: ti.template(), island):
             if state.body_drives[body] & FEELS_REACTION != 0:
                 state.particle_reaction[p] = state.contact.prev_reaction[p]
         clear_forces(state, body)
+        take_back_rebounds(state, body)
         forget_contacts(state, body)
     if ti.static(program.has_soft_contact):
         forget_touches(state, island)
@@ -202,6 +205,7 @@ def _move_island(state: ti.template(), program: ti.template(), island, substeps,
                     way = fastest * h
                 state.contact.gone[body] = way
                 note_motion(state, body, _drift_body(state, body, h, s * h))
+                limit_rebounds(state, body, (s + 1) * h)
     return is_gentle
 
 
