@@ -67,9 +67,7 @@ class ContactFields:
         # Of the presses of its particles: their sum [N s], and those times the speed along the normal with
         # which the surface came, and with which particle and surface came together [N].
         self.press_rates = ti.Vector.field(3, ti.f32, bodies * c)
-        self.rebound = ti.field(
-            ti.f32, bodies * c
-        )  # speed [m/s] at which the body may leave, 0 for no contact
+        self.rebound = ti.field(ti.f32, bodies * c)  # speed at which the body may leave [m/s]; 0 where apart
         self.prev_rebound = ti.field(ti.f32, bodies * c)  # before the step
         # Corners of a box [m]: of the way through a step, of the search in an island, or where a body sleeps.
         self.body_lower = ti.Vector.field(3, ti.f32, bodies)

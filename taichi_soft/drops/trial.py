@@ -23,9 +23,9 @@ MOST_COLLIDERS, MOST_SAMPLES = 512, 1 << 20
 """Of a world, always the same, so that all worlds share kernels."""
 
 CALM_SPEED, LEAST_CALM_SPEED, CALM_TIME = 0.01, 0.005, 0.5
-"""At rest is what was slower than this (root mean square over vertices, in sizes per second) so long [s]; what
-is smaller than half a metre, slower than the second [m/s], half of what Box2D's bodies may have to sleep: the
-facets of a small ball in a corner tremble at some mm/s."""
+"""At rest is what was slower than this (root mean square over vertices, in sizes per second) so long [s]. For
+what is smaller than half a metre the second counts [m/s], half of the speed at which Box2D's bodies fall
+asleep: a small ball in a corner goes on rocking from facet to facet at some mm/s."""
 
 PATIENCE = 150.0
 """Time in which a body must have come to rest, in that in which it falls half its size: sqrt(size / g)."""

@@ -66,6 +66,8 @@ def forget_contacts(state: ti.template(), body):
     for row in range(body * state.contact.capacity.colliders, (body + 1) * state.contact.capacity.colliders):
         state.contact.impulse[row] = ti.Vector.zero(ti.f32, 3)
         state.contact.angular_impulse[row] = ti.Vector.zero(ti.f32, 3)
+        state.contact.press[row] = ti.Vector.zero(ti.f32, 3)
+        state.contact.press_rates[row] = ti.Vector.zero(ti.f32, 3)
     state.contact.reach[body] = -1.0
     state.contact.gone[body] = 0.0
 

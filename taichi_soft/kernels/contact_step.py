@@ -4,9 +4,9 @@ A substep goes in the order velocity, contact, position: contact takes velocitie
 anything.
 
 Substeps are chosen for small deformation; an impact faster than sound flattens tetrahedra, which are stiffer
-then. Where a step ends non-finite, or forces moved a particle by more than `JOLT` edges at once, the island is
-put back to where it was, and makes the step again with twice as many substeps, up to `MOST_FINER` times as
-many.
+then. Where a step ends non-finite, or forces moved a particle by more than `JOLT` edges at once, the island
+is put back to where it was, and makes the step again with twice as many substeps, up to `MOST_FINER` times
+as many.
 """
 
 from taichi_soft.kernels.collide import collided, find_near_colliders, forget_contacts

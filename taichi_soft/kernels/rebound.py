@@ -17,13 +17,10 @@ LEAST_REBOUND = 0.1
 def begin_rebounds(state: ti.template(), body):
     """Before the impulses of the last step are cleared: contacts that ended in it are over."""
     for row in range(body * state.contact.capacity.colliders, (body + 1) * state.contact.capacity.colliders):
-        leave = state.contact.rebound[row]
-        if ti.abs(state.contact.impulse[row]).max() == 0.0:
-            leave = 0.0
+        lasts = ti.abs(state.contact.impulse[row]).max() > 0.0
+        leave = ti.select(lasts, state.contact.rebound[row], 0.0)
         state.contact.rebound[row] = leave
         state.contact.prev_rebound[row] = leave
-        state.contact.press[row] = ti.Vector.zero(ti.f32, 3)
-        state.contact.press_rates[row] = ti.Vector.zero(ti.f32, 3)
 
 
 @ti.func
@@ -31,8 +28,6 @@ def take_back_rebounds(state: ti.template(), body):
     """The step is made again."""
     for row in range(body * state.contact.capacity.colliders, (body + 1) * state.contact.capacity.colliders):
         state.contact.rebound[row] = state.contact.prev_rebound[row]
-        state.contact.press[row] = ti.Vector.zero(ti.f32, 3)
-        state.contact.press_rates[row] = ti.Vector.zero(ti.f32, 3)
 
 
 @ti.func
