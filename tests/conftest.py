@@ -1,10 +1,13 @@
 """For all tests: repeatable property tests, and buffers that fit nowhere."""
 
 import gc
+import os
 
 import numpy as np
 import pytest
 from hypothesis import settings
+
+from taichi_soft import init
 
 settings.register_profile("same every time", derandomize=True, deadline=None)
 settings.load_profile("same every time")
@@ -15,6 +18,13 @@ def settle_imports():
     """What the imports made stays: the collector need not walk it after every test."""
     gc.collect()
     gc.freeze()
+
+
+@pytest.fixture(autouse=True, scope="session")
+def share_the_cores():
+    """Tests that run side by side take a core each: threads that wait for others would wait for theirs too."""
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        init("cpu", threads=1)
 
 
 def _read_only(n):
