@@ -313,7 +313,11 @@ def drop_test(
     with Progress(*columns, console=errors, disable=not errors.is_terminal) as progress:
         numbers = range(first, first + cases)
         chosen = [make_case(seed, n, law, flips) for n in progress.track(numbers, description="making")]
-        outcomes = list(progress.track(run_cases(chosen), total=cases, description="dropping"))
+        outcomes = []
+        for outcome in progress.track(run_cases(chosen), total=cases, description="dropping"):
+            outcomes.append(outcome)
+            if not errors.is_terminal and len(outcomes) % 50 == 0:
+                errors.print(f"{len(outcomes)} of {cases} cases")
     summary = Summary(tuple(outcomes))
     if as_json:
         print(json.dumps(summary.rows(), indent=2))

@@ -595,7 +595,8 @@ class World(Handle):
         """Make one fixed step of `dt` [s] in `substeps` equal substeps; None chooses their number.
 
         A body that goes non-finite is put back to where it was before the step and frozen, with a
-        `FrozenBodyWarning` and `body.failure`; the other bodies go on.
+        `FrozenBodyWarning` and `body.failure`; the other bodies go on. Among colliders, and where bodies may
+        touch, it and what it may touch first make the step again with up to eight times the substeps.
         Raises: OptionError if dt is not a positive number or substeps not a positive whole one;
             StateError before `build`.
         """

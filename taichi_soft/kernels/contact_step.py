@@ -228,7 +228,9 @@ def _step_awake_island(state: ti.template(), program: ti.template(), island, sub
     for i in range(first, last):
         body = state.contact.island_body[i]
         if state.body_status[body] == ACTIVE:
-            failed += end_body(state, program, body, finer * substeps, h / finer)
+            if end_body(state, program, body, finer * substeps, h / finer) == 1:
+                forget_contacts(state, body)  # it was put back: nothing has touched it
+                failed += 1
     return failed
 
 
