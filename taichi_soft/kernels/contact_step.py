@@ -107,41 +107,48 @@ def _kick_body(state: ti.template(), program: ti.template(), body, kick, common)
 
 
 @ti.func
-def _drift_body(state: ti.template(), body, h, since):
-    """New positions, and what colliders in the way make of velocities. Returns the highest speed [m/s]."""
+def _drift_body(state: ti.template(), body, h, since, common):
+    """New positions, and what colliders in the way make of velocities.
+
+    Returns: the highest speed [m/s], and the highest beside the `common` velocity.
+    """
     particles = state.body_particles[body]
     gone = state.contact.gone[body]
-    farthest2 = ti.cast(0.0, state.real)
+    farthest2, farthest_beside2 = ti.cast(0.0, state.real), ti.cast(0.0, state.real)
     for p in range(particles[0], particles[1]):
         x, v = state.particle_position[p], state.particle_velocity[p]
+        way = h * v
         if state.contact.particle_clearance[p] <= gone and state.particle_inv_mass[p] > 0.0:
             x_new, v_new = collided(state, body, p, x, v, h, since)
-            state.particle_position[p] = x_new
             state.particle_velocity[p] = v_new
-            farthest2 = ti.max(farthest2, (x_new - x).dot(x_new - x))
-        else:
-            state.particle_position[p] = x + h * v
-            farthest2 = ti.max(farthest2, h * h * v.dot(v))
-    return ti.sqrt(farthest2) / h
+            way = x_new - x
+        state.particle_position[p] = x + way
+        farthest2 = ti.max(farthest2, way.dot(way))
+        beside = way - h * common
+        farthest_beside2 = ti.max(farthest_beside2, beside.dot(beside))
+    return ti.sqrt(farthest2) / h, ti.sqrt(farthest_beside2) / h
 
 
 @ti.func
 def _touch_each_other(state: ti.template(), island, reach, gone, fastest, h):
     """Contact between bodies of one island in a substep; looks for candidates again where they have aged.
 
-    Returns: the way [m] for which the candidates hold, and how much of it may be gone.
+    Args:
+        reach, gone: way [m] for which the candidates hold, and how much of it may be gone.
+        fastest: speed [m/s] before contact, beside what all have in common.
+    Returns: `reach` and `gone` as they are now.
     """
     way = 2.0 * fastest * h
-    holds, used = reach, gone + way
+    holds, gone_now, used = reach, gone, gone + way
     if is_social(state, island) == 1:
         if not (used <= holds):
             least, thickness = island_margin(state, island)
-            holds, used = ti.max(way, least), way
+            holds, gone_now, used = ti.max(way, least), ti.cast(0.0, ti.f32), way
             search_island(state, island, thickness + holds)
         solve_island(state, island, h, used, way)
         if state.soft.records_touches[None] == 1:
             add_touches(state, island)
-    return holds, used
+    return holds, gone_now
 
 
 @ti.func
@@ -194,6 +201,7 @@ def _move_island(state: ti.template(), program: ti.template(), island, substeps,
                     fastest_beside = ti.max(fastest_beside, speed_beside)
         if ti.static(program.has_soft_contact):
             reach, gone = _touch_each_other(state, island, reach, gone, fastest_beside, h)
+        farthest = ti.cast(0.0, ti.f32)
         for i in range(first, last):
             body = state.contact.island_body[i]
             if state.body_status[body] == ACTIVE:
@@ -204,8 +212,12 @@ def _move_island(state: ti.template(), program: ti.template(), island, substeps,
                     find_near_colliders(state, body, 1.25 * fastest * left + 1e-3, s * h, left)
                     way = fastest * h
                 state.contact.gone[body] = way
-                note_motion(state, body, _drift_body(state, body, h, s * h))
+                speed, speed_beside = _drift_body(state, body, h, s * h, common)
+                note_motion(state, body, speed)
                 limit_rebounds(state, body, (s + 1) * h)
+                if state.contact.is_wild[body] == 0:
+                    farthest = ti.max(farthest, speed_beside)
+        gone += 2.0 * h * farthest
     return is_gentle
 
 
