@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import weakref
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from taichi_soft import measures
 from taichi_soft.checks import as_array, as_positive
 from taichi_soft.control.attachments import Attachment, attach
 from taichi_soft.control.drives import (
@@ -23,15 +23,13 @@ from taichi_soft.control.materials import set_damping, set_material
 from taichi_soft.control.pins import pin, pinned_vertices, set_targets, unpin
 from taichi_soft.control.placement import set_velocity, teleport
 from taichi_soft.cutting import cut
-from taichi_soft.errors import MeshError, OptionError, StateError
+from taichi_soft.errors import StateError
 from taichi_soft.events import Event, StressExceeded, TearCandidates
 from taichi_soft.failures import FailedStep, Failure
 from taichi_soft.handles import Handle, recorded
-from taichi_soft.laws.law import EnergyLaw
-from taichi_soft.materials import AnyMaterial, voigt_stress
-from taichi_soft.meshing.splitting import InnerFaces, inner_faces
-from taichi_soft.queries import Pose, best_fitting_pose
-from taichi_soft.scene import rest_inverses
+from taichi_soft.materials import AnyMaterial
+from taichi_soft.queries import Pose
+from taichi_soft.scene import BodyArrays, BodyDescription, Ranges
 from taichi_soft.stability import StableStep
 
 if TYPE_CHECKING:
@@ -123,11 +121,6 @@ class Body(Handle):
         """Surface triangles, outward, (f, 3)."""
         return np.asarray(self.mesh.surface)
 
-    def _require_tets(self) -> None:
-        """Raises: MeshError for a body without tetrahedra."""
-        if len(self.tets) == 0:
-            raise MeshError(f"body {self.index} has no tetrahedra: it is made of particles and edges only")
-
     @property
     def is_held(self) -> bool:
         """Whether it is attached to a frame or grabbed."""
@@ -144,10 +137,6 @@ class Body(Handle):
         """Whether it is no longer what its asset says, but what cuts have left."""
         return self._origins is not None
 
-    @cached_property
-    def _inner_faces(self) -> InnerFaces:
-        return inner_faces(self.tets)
-
     @property
     def vertex_origins(self) -> Ints:
         """The vertex of the asset's mesh that each vertex is, or is a copy of, (n,)."""
@@ -162,15 +151,19 @@ class Body(Handle):
         """Take note of what a cut has left of the asset's mesh."""
         self._origins = vertex_origins, tet_origins
         self._topology_version += 1
-        for name in ("_first_rest_inverses", "_inner_faces"):
-            self.__dict__.pop(name, None)
 
     def _become_whole(self) -> None:
         """Take note that the body is what its asset says again."""
         self._origins, self._description = None, self.asset.description
         self._topology_version += 1
-        for name in ("_first_rest_inverses", "_inner_faces"):
-            self.__dict__.pop(name, None)
+
+    def _redescribe(self, description: BodyDescription, arrays: BodyArrays) -> Ranges:
+        """Take note that the body is made of something else. Returns where it lies in the fields."""
+        world = self._world
+        self._description = description
+        world._scene.bodies[self.index] = arrays
+        world._substeps.renew()
+        return world._scene.ranges[self.index]
 
     @recorded
     def cut(
@@ -206,16 +199,12 @@ class Body(Handle):
         """Vertices that are held now, ascending."""
         return pinned_vertices(self) if self._world.is_built else self._description.pinned
 
-    @cached_property
-    def _first_rest_inverses(self) -> Floats:
-        return rest_inverses(self.mesh)
-
     @property
     def _rest_inverses(self) -> Floats:
         """A^-1 of each tetrahedron at rest as it is now, (m, 3, 3) [1/m]."""
         if self.asset.plasticity is None or not self._world.is_built:
-            return self._first_rest_inverses
-        return self._world._rest_inverses(self)
+            return self._description.rest_inverses
+        return self._world._built.readout.rest_inverses(self)
 
     @property
     def stable_step(self) -> StableStep:
@@ -227,32 +216,24 @@ class Body(Handle):
         """True once the body went non-finite; it stays in its last finite state from then on."""
         return self._frozen_in is not None
 
-    def _let_go(self) -> None:
-        """Give up what is tied to the body, and a material that it was given, before its slot is emptied."""
-        for attachment in list(self._attachments):
-            attachment.release()
-        for grab in [each for each in self._world._grabs.values() if each.body is self]:
-            grab.release()
-        if self._description is not self.asset.description and not self.is_cut:
-            set_material(self, self.asset.material)
-
     @property
     def is_asleep(self) -> bool:
         """True while the body rests and costs nothing (see `World.sleep_speed`)."""
-        return self._world._is_asleep(self)
+        simulation = self._world._simulation
+        return simulation is not None and simulation.is_asleep(self.index)
 
     @property
     def failure(self) -> Failure | None:
         """What broke first, None while the body is sound. Found out when first asked, not within a step."""
         self.require_alive()
         if self._frozen_in is not None and self._failure is None:
-            self._failure = self._world._find_failure(self, self._frozen_in)
+            self._failure = self._world._built.find_failure(self.index, self._frozen_in)
         return self._failure
 
     @property
     def solve_residual(self) -> float | None:
         """Largest residual of the last step's implicit solves, over their right-hand sides; None before."""
-        return self._world._solve_residual(self)
+        return self._world._built.solve_residual(self)
 
     def positions(self, out: Floats32 | None = None) -> Floats32:
         """Vertex positions after the last step, float32 (n, 3) [m].
@@ -268,7 +249,7 @@ class Body(Handle):
 
         Leapfrog keeps them half a substep behind; they are brought up with the present acceleration.
         """
-        return self._world._read_velocities(self)
+        return self._world._built.readout.velocities(self)
 
     @recorded
     def set_motion(self, positions: ArrayLike, velocities: ArrayLike) -> None:
@@ -281,7 +262,7 @@ class Body(Handle):
         """
         shape = (self.vertex_count, 3)
         x, v = as_array(positions, "positions", shape, "m"), as_array(velocities, "velocities", shape, "m/s")
-        self._world._write_motion(self, x, v)
+        self._world._built.write_motion(self.index, x, v)
         self._frozen_in = self._failure = None
 
     @recorded
@@ -298,7 +279,8 @@ class Body(Handle):
     @property
     def gravity_scale(self) -> float:
         """By what the world's gravity is multiplied for this body."""
-        return self._world._gravity_scale(self)
+        simulation = self._world._simulation
+        return 1.0 if simulation is None else float(simulation.state.body_gravity_scale[self.index])
 
     @recorded
     def set_gravity_scale(self, scale: float) -> None:
@@ -444,8 +426,7 @@ class Body(Handle):
 
     def volumes(self) -> Floats:
         """Signed volume of each tetrahedron, (m,) [m^3]: negative where it is flipped."""
-        corners = self.positions().astype(np.float64)[self.tets]
-        return np.asarray(np.linalg.det(corners[:, 1:] - corners[:, :1]) / 6.0)
+        return measures.tet_volumes(self)
 
     def volume(self) -> float:
         """Volume of the body, flipped tetrahedra counted negative [m^3]."""
@@ -461,7 +442,7 @@ class Body(Handle):
 
     def aabb(self) -> tuple[Floats, Floats]:
         """Least and greatest coordinates of the vertices, (3,) each [m]."""
-        positions = self.positions().astype(np.float64)
+        positions = measures.positions_of(self)
         return positions.min(axis=0), positions.max(axis=0)
 
     def pose(self) -> Pose:
@@ -471,29 +452,27 @@ class Body(Handle):
         also where the body is flat or inside out; about the axis of a straight rope it turns as little as
         possible.
         """
-        return best_fitting_pose(self.mesh.vertices, self.positions().astype(np.float64), self.masses)
+        return measures.pose(self)
 
     def center_of_mass(self) -> Floats:
         """(3,) [m]."""
-        return np.asarray(self.masses @ self.positions().astype(np.float64) / self.masses.sum())
+        return np.asarray(self.masses @ measures.positions_of(self) / self.masses.sum())
 
     def momentum(self) -> Floats:
         """Linear momentum, (3,) [kg m/s]."""
-        return np.asarray(self.masses @ self.velocities().astype(np.float64))
+        return np.asarray(self.masses @ measures.velocities_of(self))
 
     def angular_momentum(self) -> Floats:
         """About the world's origin, (3,) [kg m^2/s]."""
-        impulses = self.masses[:, None] * self.velocities().astype(np.float64)
-        return np.asarray(np.cross(self.positions().astype(np.float64), impulses).sum(axis=0))
+        return measures.angular_momentum(self)
 
     def kinetic_energy(self) -> float:
         """1/2 sum m v^2 [J]."""
-        return float(0.5 * self.masses @ (self.velocities().astype(np.float64) ** 2).sum(axis=1))
+        return measures.kinetic_energy(self)
 
     def gravitational_energy(self) -> float:
         """- sum m g.x, zero at the origin [J]."""
-        gravity = self._world.settings.gravity * self.gravity_scale
-        return float(-(self.masses @ self.positions().astype(np.float64)) @ gravity)
+        return measures.gravitational_energy(self)
 
     def elastic_energy(self) -> float:
         """Of springs and the laws "st_venant_kirchhoff" and "neo_hookean": what deforming the body took [J].
@@ -502,24 +481,7 @@ class Body(Handle):
         energy. Their stress is not the derivative of any energy (except of another one at poisson = 1/4), so
         the total may drift without damping.
         """
-        model, bonds = self._description.model, self._description.bonds
-        law = model.law
-        if bonds is not None and law.name == "springs":
-            ends = self.positions().astype(np.float64)[self.mesh.edges]
-            growth = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) - bonds.constants[:, 0]
-            return float(0.5 * bonds.constants[:, 1] @ growth**2)
-        if isinstance(law, EnergyLaw) and not model.is_anisotropic:
-            count = len(self.tets)
-            constants = (self.material.per_tet(name, count) for name in ("lame_lambda", "lame_mu"))
-            return float(law.energy_density(self.deformations(), *constants) @ self.mesh.volumes)
-        strain, stress = self._green_strain_and_stress()
-        return float(0.5 * np.einsum("mab,mab->m", strain, stress) @ self.mesh.volumes)
-
-    def _green_strain_and_stress(self) -> tuple[Floats, Floats]:
-        """1/2 (F^T F - I), and Hooke's stress of it [Pa], in the axes of the rest shape, (m, 3, 3) each."""
-        F = self.deformations()
-        strain = 0.5 * (np.swapaxes(F, 1, 2) @ F - np.eye(3))
-        return strain, voigt_stress(self.material.stiffness_matrices(len(self.tets)), strain)
+        return measures.elastic_energy(self)
 
     def deformations(self) -> Floats:
         """Deformation gradient F = B A^-1 of each tetrahedron (thesis eq. 6.3), (m, 3, 3).
@@ -527,26 +489,19 @@ class Body(Handle):
         Of a body with plasticity the elastic one, against the rest shape as it is now. So are all strains and
         stresses.
         """
-        self._require_tets()
-        corners = self.positions().astype(np.float64)[self.tets]
-        return np.asarray(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2) @ self._rest_inverses)
+        return measures.deformations(self)
 
     def strains(self) -> Floats:
         """Linear strain 1/2 (F F^T - I) of each tetrahedron (thesis eq. 6.7), (m, 3, 3)."""
-        F = self.deformations()
-        return np.asarray(0.5 * (F @ np.swapaxes(F, 1, 2) - np.eye(3)))
+        return measures.strains(self)
 
     def plastic_strains(self) -> Floats:
         """Equivalent (von Mises) logarithmic strain that each tetrahedron has for good, (m,)."""
-        self.require_alive()
-        self._require_tets()
-        flowed = np.linalg.inv(self._rest_inverses) @ self._first_rest_inverses  # Fp
-        stretches = np.linalg.svd(flowed, compute_uv=False)
-        return np.asarray(np.sqrt(2.0 / 3.0) * np.linalg.norm(np.log(stretches), axis=1))
+        return measures.plastic_strains(self)
 
     def tet_stress(self) -> Floats:
         """Von Mises stress of each tetrahedron by Hooke's law and linear strain, (m,) [Pa]."""
-        return np.asarray(np.sqrt(1.5) * _deviator_norms(self._green_strain_and_stress()[1]))
+        return measures.tet_stress(self)
 
     def watch_stress(self, threshold: float | None) -> None:
         """Record a `StressExceeded` in every step in which tetrahedra come over a stress.
@@ -569,8 +524,8 @@ class Body(Handle):
         self._watch(TearCandidates, tear_stress, "tear_stress")
 
     def _watch(self, kind: type[Event], threshold: float | None, name: str) -> None:
-        log = self._world._event_log
-        self._require_tets()
+        log = self._world._built.events
+        measures.require_tets(self)
         limit = None if threshold is None else as_positive(threshold, name, "Pa")
         log.watch(kind, self, limit)
 
@@ -579,43 +534,12 @@ class Body(Handle):
 
         The strain of a pull that keeps the volume; a change of volume alone has none.
         """
-        return np.asarray(np.sqrt(2.0 / 3.0) * _deviator_norms(self.strains()))
+        return measures.tet_strain(self)
 
     def vertex_stress(self) -> Floats:
         """`tet_stress` averaged by volume over the tetrahedra round each vertex, (n,) [Pa]."""
-        return self._vertex_means(self.tet_stress())
+        return measures.vertex_means(self, self.tet_stress())
 
     def vertex_strain(self) -> Floats:
         """`tet_strain` averaged by volume over the tetrahedra round each vertex, (n,)."""
-        return self._vertex_means(self.tet_strain())
-
-    def _vertex_means(self, values: Floats) -> Floats:
-        flat, shares = self.tets.ravel(), np.repeat(values * self.mesh.volumes / 4.0, 4)
-        return np.asarray(np.bincount(flat, shares, minlength=self.vertex_count) / self.mesh.vertex_volumes)
-
-
-def _deviator_norms(tensors: Floats) -> Floats:
-    """sqrt(e:e) of the part e of each tensor (m, 3, 3) that changes shape."""
-    deviators = tensors - np.einsum("maa->m", tensors)[:, None, None] / 3.0 * np.eye(3)
-    return np.asarray(np.linalg.norm(deviators, axis=(1, 2)))
-
-
-def require_buffer(out: Floats32 | None, count: int) -> Floats32:
-    """`out` if it can take (count, 3) positions, or a new array. Raises: OptionError."""
-    if out is None:
-        return np.empty((count, 3), dtype=np.float32)
-    if not isinstance(out, np.ndarray):
-        raise OptionError(f"out must be a numpy array, got {type(out).__name__}")
-    if out.shape != (count, 3) or out.dtype != np.float32:
-        raise OptionError(f"out must be float32 of shape ({count}, 3), got {out.dtype} of shape {out.shape}")
-    if not (out.flags.c_contiguous and out.flags.writeable):
-        raise OptionError(
-            "out must be C-contiguous and writeable: make it with numpy.empty((n, 3), numpy.float32)"
-        )
-    return out
-
-
-def require_built(is_built: bool) -> None:
-    """Raises: StateError before `World.build`."""
-    if not is_built:
-        raise StateError("the world is not built: call world.build() after the last add_body")
+        return measures.vertex_means(self, self.tet_strain())

@@ -253,6 +253,9 @@ def profile(
     startup: Annotated[
         bool, typer.Option("--startup", help="Time a new process to its first frame, cold and warm.")
     ] = False,
+    game: Annotated[
+        bool, typer.Option("--game", help="What contact, sleep, spawning and unused features cost.")
+    ] = False,
     repeats: Annotated[int, typer.Option(min=3, help="Measurements of each figure.")] = 121,
     as_json: AsJson = False,
     arch: Arch = "auto",
@@ -281,6 +284,11 @@ def profile(
         if startup:
             status.update("starting new processes")
             found["startup"] = [profiling.measure_startup(device.arch, device.threads)]
+        if game:
+            status.update("measuring what a game does")
+            found["features"] = profiling.measure_features(max(3, repeats // 3))
+            found["heap"] = [profiling.measure_heap(device.threads, max(3, repeats // 2))]
+            found["moments"] = profiling.measure_moments(max(3, repeats // 2))
     if as_json:
         rows = {key: [asdict(row) for row in value] for key, value in found.items()}
         print(json.dumps({"device": _device_facts(device), **rows}, indent=2))

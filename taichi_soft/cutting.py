@@ -37,7 +37,7 @@ def cut(body: Body, plane: Any, triangle: Any) -> tuple[Body, ...]:
     require_cuttable(body)
     corners, normal, is_endless = _blade(plane, triangle)
     mesh = body.mesh
-    faces = body._inner_faces
+    faces = body._description.inner_faces
     centers = body.positions().astype(np.float64)[mesh.tets].mean(axis=1)
     is_cut = _crosses(corners, normal, is_endless, centers[faces.tets[:, 0]], centers[faces.tets[:, 1]])
     return divide(body, faces, is_cut)
@@ -168,7 +168,8 @@ def _require_room(body: Body, arrays: BodyArrays) -> None:
 
 def _settle(world: World, body: Body, pieces: list[_Piece], slots: list[int]) -> tuple[Body, ...]:
     """Write the first piece into the body's slot and the others into free ones. Refuses nothing."""
-    state = world._built
+    simulation = world._built
+    state = simulation.state
     motion = np.empty((body.vertex_count, MOTION_WIDTH), dtype=np.float32)
     read_motion(state, body.index, motion)
     inverses = None
@@ -185,13 +186,13 @@ def _settle(world: World, body: Body, pieces: list[_Piece], slots: list[int]) ->
         rows[:, 15] = masses
         present = None if inverses is None else inverses[piece.tets][piece.arrays.tet_order]
         _write(state, slot, piece.arrays, rows, ACTIVE, body.index, present)
-    world._read_alpha = None
+    simulation.readout.has_moved()
     fallen = tuple(world._take_in(body.asset) for _ in pieces[1:])
     vertices, tets = body.vertex_origins, body.tet_origins
     for each, piece in zip((body, *fallen), pieces, strict=True):
-        world._redescribe(each, piece.description, piece.arrays)
+        each._redescribe(piece.description, piece.arrays)
         each._become(vertices[piece.vertices], tets[piece.tets])
-    world._event_log.renew_watches(body)
+    simulation.events.renew_watches(body)
     return fallen
 
 

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import heapq
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from taichi_soft.errors import StateError
 
@@ -18,6 +21,8 @@ class Pools:
     def __init__(self) -> None:
         self.assets: list[SoftBodyAsset] = []  # of each slot
         self.slots: list[Body | None] = []  # who lives there
+        self.starts: dict[int, NDArray[np.float32]] = {}  # of bodies that came before build, by slot
+        self.added: dict[tuple[Any, ...], SoftBodyAsset] = {}  # by add_body, by their content
         self._free: dict[SoftBodyAsset, list[int]] = {}  # heaps
         self._living: tuple[Body, ...] | None = ()
 
@@ -74,4 +79,5 @@ class Pools:
         """Free the slot of a body."""
         heapq.heappush(self._free[body.asset], body.index)
         self.slots[body.index] = None
+        self.starts.pop(body.index, None)
         self._living = None

@@ -23,7 +23,7 @@ from taichi_soft.handles import Handle
 from taichi_soft.plain import as_plain, digest_of, from_json, plain_of, to_json
 from taichi_soft.sealed import seal, unseal
 from taichi_soft.shapes import Shape
-from taichi_soft.snapshot import asset_digest
+from taichi_soft.structure import asset_digest
 
 if TYPE_CHECKING:
     from taichi_soft.world import World
@@ -152,9 +152,9 @@ def _world_options(world: World) -> dict[str, Any]:
     return {
         **{name: as_plain(getattr(chosen, name)) for name in names},
         "gravity": chosen.gravity.tolist(),
-        "soft_contact": world._soft_contact,
-        "sleep_speed": world._sleep_speed,
-        "collider_room": world._collider_room,
+        "soft_contact": world._contact.soft,
+        "sleep_speed": world._contact.sleep_speed,
+        "collider_room": world._contact.collider_room,
     }
 
 

@@ -23,6 +23,7 @@ from taichi_soft.meshing import (
     tet_order,
 )
 from taichi_soft.meshing.arrays import read_only
+from taichi_soft.meshing.splitting import InnerFaces, inner_faces
 from taichi_soft.types import DampingModel
 
 SHORTEST_EDGE = 1e-6
@@ -61,6 +62,16 @@ class BodyDescription:
         if isinstance(self.material, SpringMaterial):
             return np.zeros(0)
         return self.material.per_tet(name, len(self.mesh.tets))
+
+    @cached_property
+    def rest_inverses(self) -> Floats:
+        """A^-1 of each tetrahedron, (m, 3, 3) [1/m], in the caller's order, read-only."""
+        return read_only(rest_inverses(self.mesh))
+
+    @cached_property
+    def inner_faces(self) -> InnerFaces:
+        """Where it can be cut."""
+        return inner_faces(self.mesh.tets)
 
     @property
     def lame(self) -> Floats:

@@ -22,3 +22,17 @@ class Settings:
     tolerance: float  # of implicit solves: residual over right-hand side
     most_iterations: int  # of an implicit solve
     schedule: Schedule  # as chosen by `World.build`; AUTO before where it is left open
+
+    @property
+    def is_implicit(self) -> bool:
+        """Whether steps take linear solves."""
+        return self.integrator is Integrator.IMPLICIT_EULER
+
+
+@dataclass(frozen=True)
+class ContactSettings:
+    """What bodies may meet beside a floor, and how they come to rest."""
+
+    soft: bool  # each other
+    sleep_speed: float  # [m/s]; 0 for never
+    collider_room: int  # colliders that may come after `World.build`

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass
 from typing import TYPE_CHECKING
 
@@ -12,12 +13,12 @@ from taichi_soft.checks import as_count, as_positive
 from taichi_soft.cutting import divide
 from taichi_soft.errors import StateError
 from taichi_soft.kernels.tearing import find_overloaded
+from taichi_soft.measures import green_strain_and_stress
 from taichi_soft.meshing.splitting import InnerFaces
 
 if TYPE_CHECKING:
     from taichi_soft.body import Body
     from taichi_soft.state import State
-    from taichi_soft.world import World
 
 Floats = NDArray[np.float64]
 
@@ -57,9 +58,11 @@ class Tearing:
 class Tears:
     """Where a world's bodies may tear, after every step."""
 
-    def __init__(self, state: State, slots: int) -> None:
-        self._limits = np.zeros(slots, dtype=np.float32)
-        self._found = np.zeros(slots, dtype=np.int32)
+    def __init__(self, state: State, slots: Sequence[Body | None]) -> None:
+        """Args: slots: the body in each."""
+        self._state, self._slots = state, slots
+        self._limits = np.zeros(len(slots), dtype=np.float32)
+        self._found = np.zeros(len(slots), dtype=np.int32)
         find_overloaded(state, self._limits, self._found)  # compiles
 
     def watch(self, body: Body) -> None:
@@ -67,11 +70,11 @@ class Tears:
         tearing = body.asset.tearing
         self._limits[body.index] = 0.0 if tearing is None else tearing.stress
 
-    def tear(self, world: World) -> None:
+    def tear(self) -> None:
         """Tear what the last step has pulled too hard."""
-        find_overloaded(world._built, self._limits, self._found)
-        for slot in np.flatnonzero(self._found):
-            body = world._pools.slots[slot]
+        find_overloaded(self._state, self._limits, self._found)
+        for slot in np.flatnonzero(self._found).tolist():
+            body = self._slots[slot]
             if body is None or body.is_held:
                 continue
             try:
@@ -83,8 +86,8 @@ class Tears:
 def _tear(body: Body) -> None:
     tearing, mesh = body.asset.tearing, body.mesh
     assert tearing is not None
-    stress = body._green_strain_and_stress()[1]
-    faces = body._inner_faces
+    stress = green_strain_and_stress(body)[1]
+    faces = body._description.inner_faces
     pulls, axes = np.linalg.eigh(stress[faces.tets].mean(axis=1))
     pull, axis = pulls[:, -1], axes[:, :, -1]
     is_torn = np.bincount(body.vertex_origins)[body.vertex_origins] > 1

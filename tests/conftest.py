@@ -22,7 +22,7 @@ def settle_imports():
 
 @pytest.fixture(autouse=True, scope="session")
 def share_the_cores():
-    """Tests that run side by side take a core each: threads that wait for others would wait for theirs too."""
+    """Tests that run side by side take a core each: threads would wait for those of others."""
     if "PYTEST_XDIST_WORKER" in os.environ:
         init("cpu", threads=1)
 

@@ -11,7 +11,7 @@ ROOT = Path(__file__).parents[1]
 # From the ground up. A module or package imports from its own line's package and from lines below, never from
 # a neighbour on its line. Names without a prefix are parts of taichi_soft. Those not written yet are allowed.
 LAYERS = """
-    errors  constants
+    errors  constants  clock
     types  runtime  checks  handles  sealed
     math  loading
     materials  meshing  settings  contact  plasticity
@@ -22,8 +22,12 @@ LAYERS = """
     forces  shapes
     plain
     stability  failures  colliders  control  queries  events  cutting
-    tearing
+    measures
+    tearing  readout  substeps
     body  assets  pools
+    simulation
+    building  spawning  structure  notes
+    restoring
     snapshot
     recorder
     world

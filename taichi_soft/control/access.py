@@ -24,7 +24,7 @@ def change(body: Body, kernel: Callable[..., Any], *arguments: Any) -> Any:
 
     Raises: StateError before `World.build`.
     """
-    return body._world._change(body, kernel, *arguments)
+    return body._world._built.change(body.index, kernel, *arguments)
 
 
 def numbers(*values: Any) -> Rows32:
@@ -44,7 +44,7 @@ def some_particles(body: Body, particles: ArrayLike | None, name: str = "particl
 
 def rows_of(body: Body, vertices: NDArray[np.int32]) -> NDArray[np.int32]:
     """Where vertices of a body lie in the fields. Raises: StateError before `World.build`."""
-    return body._world._rows_of(body, vertices)
+    return body._world._built.rows_of(body.index, vertices)
 
 
 def require_substeps(world: World, what: str) -> None:

@@ -71,9 +71,8 @@ class Attachment(Handle):
             raise StateError("this attachment feels nothing: make it with two_way=True")
         impulses = np.empty(6)
         world = self.body._world
-        world._read(
-            self.body, read_reaction, rows_of(self.body, self.particles), self.frame.position, impulses
-        )
+        rows = rows_of(self.body, self.particles)
+        world._built.read(self.body.index, read_reaction, rows, self.frame.position, impulses)
         return impulses / max(world.last_dt, 1e-30)
 
 

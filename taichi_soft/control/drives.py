@@ -71,7 +71,7 @@ def set_wind(world: World, velocity: ArrayLike | None, density: float, drag: flo
     kilograms = as_number(density, "density", 0.0, 1e5, "a number from 0 to 100,000 kg/m^3")
     coefficient = as_number(drag, "drag", 0.0, 1e3)
     require_substeps(world, "wind")
-    world._change_all(write_wind, numbers(speed, kilograms * coefficient * blows))
+    world._built.change(-1, write_wind, numbers(speed, kilograms * coefficient * blows))
 
 
 def require_field(field: Any) -> ForceField | None:

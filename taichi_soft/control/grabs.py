@@ -53,7 +53,7 @@ class Grab(Handle):
         """With what it pulls the body, in the last substep, (3,) [N]. Raises: StateError once released."""
         self._require_held()
         found = np.empty(3, dtype=np.float32)
-        self.body._world._read_all(read_grab_force, self._number, found)
+        read_grab_force(self.body._world._built.state, self._number, found)
         return found
 
     @recorded

@@ -55,7 +55,7 @@ def apply_radial_impulse(world: World, center: ArrayLike, impulse: float, radius
     momentum = as_number(impulse, "impulse", -LARGEST_IMPULSE, LARGEST_IMPULSE)
     reach = as_number(radius, "radius", 1e-9, 1e9, "a number above 0 m, from 1e-9 to 1e9")
     row = numbers(origin, reach, momentum)
-    _require_speed(world._change_all(add_radial_impulse, world.slot_count, row), "impulse")
+    _require_speed(world._built.change(-1, add_radial_impulse, world.slot_count, row), "impulse")
 
 
 def _require_speed(speed: float, name: str) -> None:

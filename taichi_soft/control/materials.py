@@ -39,7 +39,7 @@ def set_damping(body: Body, damping: Any) -> None:
 def write_constants(state: State, body: Body, description: BodyDescription) -> None:
     """Not a kernel, but called like one: what a body is made of lies in several fields."""
     arrays = rearrange(body._world._scene.bodies[body.index], description)
-    place = body._world._redescribe(body, description, arrays)
+    place = body._redescribe(description, arrays)
     masses = arrays.mass
     write_masses(state, place.particles[0], masses.astype(np.float32), (1.0 / masses).astype(np.float32))
     write_numbers(state.edge_damping, place.edges[0], arrays.edge_damping.astype(np.float32))

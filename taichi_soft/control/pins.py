@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 def pinned_vertices(body: Body) -> NDArray[np.int32]:
     """As `Body.pinned`, of a built world."""
     flags = np.empty(body.vertex_count, dtype=np.int32)
-    body._world._read(body, read_pinned, flags)
+    body._world._built.read(body.index, read_pinned, flags)
     return np.flatnonzero(flags).astype(np.int32)
 
 

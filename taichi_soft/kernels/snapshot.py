@@ -68,47 +68,33 @@ def row_table(state: State, particles: int, bodies: int, blocks: int, held: int)
 
 
 @ti.kernel
-def pack_state(
+def copy_state(
     state: ti.template(),
     table: ti.types.ndarray(dtype=ti.i32, ndim=2),
     words: ti.types.ndarray(dtype=ti.i32, ndim=1),
+    packs: ti.template(),
 ):
-    """Copy everything that is `carried` into `words`, row by row as `table` says."""
+    """Copy everything that is `carried` into `words`, row by row as `table` says; back where not `packs`."""
     for owner in ti.static(OWNERS):
         ti.loop_config(serialize=True)
         for i in range(table[owner, 0]):
-            row = table[owner, 2] + i * table[owner, 1]
             for field, column, width in ti.static(carried(state, owner)):
-                if ti.static(owner == WORLD):
-                    for k in ti.static(range(width)):
-                        words[row + column + k] = ti.bit_cast(field[None][k], ti.i32)
-                elif ti.static(width == 1):
-                    words[row + column] = ti.bit_cast(field[i], ti.i32)
-                else:
-                    for k in ti.static(range(width)):
-                        words[row + column + k] = ti.bit_cast(field[i][k], ti.i32)
-
-
-@ti.kernel
-def unpack_state(
-    state: ti.template(),
-    table: ti.types.ndarray(dtype=ti.i32, ndim=2),
-    words: ti.types.ndarray(dtype=ti.i32, ndim=1),
-):
-    """Copy `words` back."""
-    for owner in ti.static(OWNERS):
-        ti.loop_config(serialize=True)
-        for i in range(table[owner, 0]):
-            row = table[owner, 2] + i * table[owner, 1]
-            for field, column, width in ti.static(carried(state, owner)):
-                if ti.static(owner == WORLD):
-                    for k in ti.static(range(width)):
-                        field[None][k] = ti.bit_cast(words[row + column + k], field.dtype)
-                elif ti.static(width == 1):
-                    field[i] = ti.bit_cast(words[row + column], field.dtype)
-                else:
-                    for k in ti.static(range(width)):
-                        field[i][k] = ti.bit_cast(words[row + column + k], field.dtype)
+                at = table[owner, 2] + i * table[owner, 1] + column
+                for k in ti.static(range(width)):
+                    if ti.static(owner == WORLD):
+                        if ti.static(packs):
+                            words[at + k] = ti.bit_cast(field[None][k], ti.i32)
+                        else:
+                            field[None][k] = ti.bit_cast(words[at + k], field.dtype)
+                    elif ti.static(width == 1):
+                        if ti.static(packs):
+                            words[at] = ti.bit_cast(field[i], ti.i32)
+                        else:
+                            field[i] = ti.bit_cast(words[at], field.dtype)
+                    elif ti.static(packs):
+                        words[at + k] = ti.bit_cast(field[i][k], ti.i32)
+                    else:
+                        field[i][k] = ti.bit_cast(words[at + k], field.dtype)
 
 
 @ti.func

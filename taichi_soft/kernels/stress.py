@@ -21,7 +21,8 @@ NO_LIMIT = 1e30
 
 
 @ti.func
-def _deformation_of(state: ti.template(), block, lane):
+def deformation_of(state: ti.template(), block, lane):
+    """F of a tetrahedron, as columns."""
     p0, p1, p2, p3 = particles_of(state, block, lane)
     x0 = state.particle_position[p0]
     a, b, c = state.particle_position[p1], state.particle_position[p2], state.particle_position[p3]
@@ -29,7 +30,7 @@ def _deformation_of(state: ti.template(), block, lane):
 
 
 @ti.func
-def _stress_of(state: ti.template(), F, block, lane):
+def stress_of(state: ti.template(), F, block, lane):
     """Hooke's stress of 1/2 (F^T F - I) [Pa], as columns, in the axes of the rest shape."""
     strain = scaled_plus_identity(inner_square(F), 0.5, -0.5)
     base = block * 2 * LANES + lane
@@ -71,7 +72,7 @@ def read_stress(
         means, squares = ti.Vector.zero(state.real, LANES), ti.Vector.zero(state.real, LANES)
         determinants = ti.Vector.zero(state.real, LANES)
         for lane in range(LANES):  # vector registers take all of them at once, see `kernels.elastic`
-            stress = _stress_of(state, _deformation_of(state, block, lane), block, lane)
+            stress = stress_of(state, deformation_of(state, block, lane), block, lane)
             means[lane] = trace(stress) / 3.0
             deviator = scaled_plus_identity(stress, 1.0, -means[lane])
             squares[lane] = deviator[0].norm_sqr() + deviator[1].norm_sqr() + deviator[2].norm_sqr()
@@ -82,8 +83,8 @@ def read_stress(
             if limits[i] < NO_LIMIT:
                 out[row, 1] = _largest_principal(means[lane], squares[lane], determinants[lane])
                 if out[row, 1] > limits[i]:
-                    F = _deformation_of(state, block, lane)
-                    values, axes = symmetric_eigen(_stress_of(state, F, block, lane))
+                    F = deformation_of(state, block, lane)
+                    values, axes = symmetric_eigen(stress_of(state, F, block, lane))
                     # F carries an axis of a stretch to where that stretch is now; of others it comes near.
                     along = times(F, axes[0]).normalized(1e-30)
                     out[row, 1] = values[0]

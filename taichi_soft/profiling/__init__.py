@@ -4,6 +4,14 @@ from taichi_soft.profiling.baseline import Baseline, compile_baseline, find_comp
 from taichi_soft.profiling.budget import Budget, measure_budget
 from taichi_soft.profiling.comparison import Comparison, compare_with_baseline
 from taichi_soft.profiling.crossover import Crossover, measure_crossover
+from taichi_soft.profiling.game import (
+    FeatureCost,
+    Heap,
+    Moments,
+    measure_features,
+    measure_heap,
+    measure_moments,
+)
 from taichi_soft.profiling.implicit import ImplicitGain, measure_implicit
 from taichi_soft.profiling.law_costs import LawCost, measure_laws
 from taichi_soft.profiling.phases import Phases, measure_phases
@@ -16,8 +24,11 @@ __all__ = [
     "Budget",
     "Comparison",
     "Crossover",
+    "FeatureCost",
+    "Heap",
     "ImplicitGain",
     "LawCost",
+    "Moments",
     "Phases",
     "Scaling",
     "Spread",
@@ -27,8 +38,11 @@ __all__ = [
     "find_compiler",
     "measure_budget",
     "measure_crossover",
+    "measure_features",
+    "measure_heap",
     "measure_implicit",
     "measure_laws",
+    "measure_moments",
     "measure_phases",
     "measure_scaling",
     "measure_startup",

@@ -77,8 +77,8 @@ def measure_phases(count: int = 16, dt: float = 1 / 60, repeats: int = 121) -> P
 
 
 def _phase_call(world: World, phase: str, substeps: int) -> Callable[[], object]:
-    state, program, count = world._state, world._program, len(world.bodies)
-    return lambda: repeat_phase(state, program, phase, count, substeps, TINY_H)
+    built, count = world._built, len(world.bodies)
+    return lambda: repeat_phase(built.state, built.program, phase, count, substeps, TINY_H)
 
 
 def _measure_python(repeats: int) -> Spread:

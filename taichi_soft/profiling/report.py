@@ -57,6 +57,24 @@ def tables(found: dict[str, Any]) -> Iterator[tuple[str, Table]]:
         table.add_row("empty", f"{found['startup'][0].cold:.2f}")
         table.add_row("full", f"{found['startup'][0].warm:.2f}")
         yield "A new process to its first frame [s]", table
+    if "features" in found:
+        table = _table("a step with", "used", "least", "median", "most")
+        for row in found["features"]:
+            table.add_row(row.name, "yes" if row.is_used else "no", *_ratios(row.ratio))
+        yield "What features cost: a step over that of as many bodies that fall freely", table
+    if "heap" in found:
+        table = _table(
+            "spheres", "tetrahedra", "threads", "step [ms]", "real time", "least", "of free ones", "most"
+        )
+        for row in found["heap"]:
+            step = f"{row.step.median:.2f}", f"{row.real_time:.2f}"
+            table.add_row(str(row.bodies), f"{row.tets:,}", str(row.threads), *step, *_ratios(row.ratio))
+        yield "A heap in a pit, 12 substeps for 1/60 s", table
+    if "moments" in found:
+        table = _table("", "least", "median", "p99", "most")
+        for row in found["moments"]:
+            table.add_row(row.name, *_cells(row.cost, 3))
+        yield "What happens once", table
 
 
 def law_rows(costs: list[LawCost]) -> list[dict[str, Any]]:
@@ -110,6 +128,10 @@ def _table(*columns: str) -> Table:
     for name in columns[1:]:
         table.add_column(name, justify="right")
     return table
+
+
+def _ratios(spread: Spread) -> list[str]:
+    return [f"{x:.2f}" for x in (spread.least, spread.median, spread.most)]
 
 
 def _cells(spread: Spread, digits: int) -> list[str]:

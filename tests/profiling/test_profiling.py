@@ -5,13 +5,17 @@ import sys
 
 import pytest
 
+from taichi_soft import box
 from taichi_soft.errors import DeviceError
 from taichi_soft.profiling import (
     compare_with_baseline,
     compile_baseline,
     find_compiler,
+    game,
     measure_budget,
     measure_crossover,
+    measure_heap,
+    measure_moments,
     scaling,
 )
 from taichi_soft.profiling.report import tables
@@ -50,6 +54,26 @@ def test_the_crossover_times_both_schedules():
     ((title, table),) = tables({"crossover": rows})
     assert "flat against per_body" in title
     assert table.row_count == 1
+
+
+def test_a_heap_is_timed_against_as_many_free_bodies(monkeypatch):
+    monkeypatch.setattr(game, "_mesh", lambda: box((1.6, 1.6, 1.6), (1, 1, 1)))
+    monkeypatch.setattr(game, "SETTLING", 3)
+    heap = measure_heap(1, 3)
+    assert (heap.bodies, heap.tets) == (32, 32 * 5)
+    assert heap.real_time * heap.step.median == pytest.approx(1e3 / 60)
+    assert heap.ratio.least > 0
+    ((title, table),) = tables({"heap": [heap]})
+    assert "heap" in title
+    assert table.row_count == 1
+
+
+def test_a_frame_with_a_spawn_is_timed_against_the_others(monkeypatch):
+    monkeypatch.setattr(game, "_mesh", lambda: box((1.6, 1.6, 1.6), (1, 1, 1)))
+    snapshot, come, go, plain = measure_moments(5)
+    assert "5,000 tetrahedra" in snapshot.name
+    assert plain.cost.median == 1.0
+    assert min(come.cost.least, go.cost.least, snapshot.cost.least) > 0
 
 
 def test_a_missing_compiler_gives_one_line():

@@ -112,12 +112,12 @@ def test_a_state_is_reused_and_clean(jelly):
         for _ in range(20):
             previous.step(1 / 60, 2)
     assert broken.is_frozen
-    state = previous._state
+    state = previous._built.state
     del previous, broken
     gc.collect()
 
     world, body = small()
-    assert world._state is state
+    assert world._built.state is state
     assert run(world, body) == expected
 
 
@@ -128,7 +128,7 @@ def test_a_world_that_is_dropped_gives_its_state_back_at_once(cube, jelly):
         world = World()
         body = world.add_body(cube, jelly, position=(0, 0, 5.0))
         world.build()
-        return world._state, body
+        return world._built.state, body
 
     gc.disable()
     try:

@@ -348,9 +348,9 @@ def test_nothing_slips_into_the_seam_between_the_floor_and_a_box_that_stands_on_
 
 def test_colliders_come_go_and_jump_while_the_world_runs():
     world = room()
-    shelf = world.add_collider(BoxShape((4, 4, 0.2)), position=(0, 0, 2.9))
     body = world.add_body(BLOCK, FIRM, position=(0, 0, 3.3))
     world.build()
+    shelf = world.add_collider(BoxShape((4, 4, 0.2)), position=(0, 0, 2.9))
     run(world, 1.0)
     assert body.positions()[:, 2].min() == pytest.approx(3.0, abs=1e-3)
     ground = world.add_collider(BoxShape((9, 9, 9)), position=(0, 0, -4.5))

@@ -29,7 +29,7 @@ def made():
 def kept_momentum(world, body):
     """Of the velocities as the integrator keeps them: leapfrog's are half a substep old."""
     rows = np.empty((27, 3), dtype=np.float32)
-    read_velocities(world._state, 0, 27, rows)
+    read_velocities(world._built.state, 0, 27, rows)
     return body.masses @ rows.astype(float)
 
 

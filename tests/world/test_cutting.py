@@ -252,7 +252,7 @@ def test_cuts_are_the_same_every_time(swinging):
 
 
 def everything(world, *bodies):
-    state = world._state
+    state = world._built.state
     fields = (
         "tet_vertices",
         "edge_vertices",

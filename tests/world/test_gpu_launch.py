@@ -12,7 +12,8 @@ GPU = Device("cuda", 1, "pretended")
 
 def as_on_gpu(world):
     """Let a built world of schedule "flat" launch its steps as it would on a GPU."""
-    world._launch = make_launch(Schedule.FLAT, world._state, world._program, world._scene, GPU)
+    built = world._built
+    built.launch = make_launch(Schedule.FLAT, built.state, built.program, built.scene, GPU)
     return world
 
 

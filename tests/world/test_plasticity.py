@@ -208,7 +208,7 @@ def test_others_in_the_same_world_do_not_flow(fresh):
     rigid = fresh("elastic")
     deform(rigid, np.diag([2.0, 0.7, 0.7]))
     rows = np.empty((40, 3, 3), dtype=np.float32)
-    read_rest_inverses(fresh.world._state, rigid.index, rows)
+    read_rest_inverses(fresh.world._built.state, rigid.index, rows)
     np.testing.assert_allclose(rows, rigid.asset.arrays.rest_inverse, rtol=1e-6, atol=1e-6)
 
 

@@ -47,7 +47,8 @@ def unchanged(crowd):
     """Positions, velocities and status of all bodies are the same after the test."""
 
     def state():
-        fields = (crowd._state.particle_position, crowd._state.particle_velocity, crowd._state.body_status)
+        present = crowd._built.state
+        fields = (present.particle_position, present.particle_velocity, present.body_status)
         return [field.to_numpy().tobytes() for field in fields], crowd.step_count
 
     before = state()
@@ -372,7 +373,7 @@ def test_a_shape_within_a_body_touches_it_and_a_body_within_a_shape_is_whole(cro
 
 def test_frozen_bodies_answer_and_absent_ones_do_not(crowd):
     ray, point = ((0, -2, 5), (0, 0, -1)), (0, -2, 0.45)
-    status = crowd._state.body_status
+    status = crowd._built.state.body_status
     try:
         status[CUBE] = FROZEN
         assert crowd.raycast(*ray).body.index == CUBE

@@ -1,0 +1,227 @@
+"""What Python knows of a world's state, as plain data and back: time, who lives where, colliders, grabs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.body import Body
+from taichi_soft.colliders import Collider, ColliderRow
+from taichi_soft.errors import SnapshotError, TaichiSoftError
+from taichi_soft.failures import FailedStep
+from taichi_soft.laws import fit_model
+from taichi_soft.plain import as_plain, digest_of, from_plain, plain_of
+from taichi_soft.scene import BodyDescription
+from taichi_soft.shapes import Shape
+from taichi_soft.state import MOST_GRABS
+
+if TYPE_CHECKING:
+    from taichi_soft.world import World
+
+
+def take_notes(world: World) -> dict[str, Any]:
+    """What Python knows of a world's state, as plain data."""
+    frames = world._frames
+    return {
+        "steps": world._clock.steps,
+        "time": world._clock.time,
+        "last_dt": world._clock.last_dt,
+        "handles": world._handles.count,
+        "bodies": [None if body is None else _body_note(body) for body in world._pools.slots],
+        "colliders": [_collider_note(handle) for handle in world._colliders.all_handles],
+        "shapes": {
+            digest_of(row.shape): plain_of(row.shape)
+            for row in (handle._row for handle in world._colliders.all_handles)
+            if not len(row.shape.samples)
+        },
+        "samples": world._colliders.sample_count,
+        "frames": [frame._serial for frame in frames.handles],
+        "present": frames.present.tolist(),
+        "coming": frames.coming.tolist(),
+        "aims": frames.has_work,
+        "grabs": [
+            [grab._serial, number, grab.body.index, grab.point.tolist()]
+            for number, grab in sorted(world._grabs.items())
+        ],
+    }
+
+
+def _body_note(body: Body) -> list[Any]:
+    failed = body._frozen_in
+    is_own = body._description is not body.asset.description
+    return [
+        body._serial,
+        body._first_step,
+        None if failed is None else [failed.step, failed.time, failed.substeps, failed.h],
+        _material_note(body._description) if is_own else None,
+        [[a._serial, a.frame._number, a.two_way, a.particles.tolist()] for a in body._attachments],
+    ]
+
+
+def _material_note(description: BodyDescription) -> Any:
+    return as_plain(description.material)
+
+
+def _collider_note(handle: Collider) -> list[Any]:
+    row = handle._row
+    target = None if row.target is None else [each.tolist() for each in row.target]
+    motion = [each.tolist() for each in (row.position, row.rotation, row.velocity, row.spin)]
+    surface = [row.friction, row.restitution, row.thickness, row.group, row.mask]
+    return [handle._serial, row.is_alive, digest_of(row.shape), row.offset, surface, motion, target]
+
+
+@dataclass
+class BodyNote:
+    """Who is to live in a slot."""
+
+    serial: int
+    first_step: int
+    failed: FailedStep | None
+    description: BodyDescription
+    attachments: list[tuple[int, int, bool, NDArray[np.int32]]]
+
+
+@dataclass
+class Notes:
+    """Notes that were checked against a world in every respect."""
+
+    steps: int
+    time: float
+    last_dt: float
+    handles: int
+    bodies: list[BodyNote | None]
+    colliders: list[tuple[int, ColliderRow]]
+    samples: int
+    frames: list[int]
+    present: NDArray[np.float32]
+    coming: NDArray[np.float32]
+    aims: bool
+    grabs: list[tuple[int, int, int, NDArray[np.float64]]]
+
+
+def read_notes(world: World, notes: dict[str, Any]) -> Notes:
+    """Notes of `take_notes`. Raises: SnapshotError, or what Python raises where they are not in order."""
+    count = len(notes["frames"])
+    poses = {
+        name: np.array(notes[name], dtype=np.float32).reshape(max(count, 1), 12)
+        for name in ("present", "coming")
+    }
+    slots = world.slot_count
+    if len(notes["bodies"]) != slots:
+        raise ValueError("it has another number of bodies")
+    bodies = [_read_body(world, i, note, count) for i, note in enumerate(notes["bodies"])]
+    grabs = [
+        (int(serial), _below(number, MOST_GRABS), _below(slot, slots), _vector(point, 3))
+        for serial, number, slot, point in notes["grabs"]
+    ]
+    if any(bodies[slot] is None for _, _, slot, _ in grabs):
+        raise ValueError("a grab holds no body")
+    return Notes(
+        int(notes["steps"]),
+        float(notes["time"]),
+        float(notes["last_dt"]),
+        int(notes["handles"]),
+        bodies,
+        [_read_collider(world, note, notes["shapes"]) for note in _some(notes["colliders"], world)],
+        int(notes["samples"]),
+        [int(serial) for serial in notes["frames"]],
+        poses["present"],
+        poses["coming"],
+        bool(notes["aims"]),
+        grabs,
+    )
+
+
+def _some(notes: list[Any], world: World) -> list[Any]:
+    if len(notes) > world._built.state.capacity.contact.colliders:
+        raise ValueError(f"it has {len(notes)} colliders, and there is no room for them")
+    return notes
+
+
+def _read_body(world: World, slot: int, note: Any, frame_count: int) -> BodyNote | None:
+    if note is None:
+        return None
+    serial, first_step, failed, material, attachments = note
+    asset = world._pools.assets[slot]
+    description = asset.description
+    if material is not None:
+        try:
+            made = from_plain(material)
+            fit_model(description.model, description.mesh, made)
+        except TaichiSoftError as error:
+            raise SnapshotError(
+                f"this snapshot gives body {slot} a material that it cannot have: {error}"
+            ) from None
+        if type(made) is not type(description.material):
+            raise ValueError(f"body {slot} is of another kind of material")
+        description = replace(description, material=made)
+    n = len(asset.mesh.vertices)
+    return BodyNote(
+        int(serial),
+        int(first_step),
+        None
+        if failed is None
+        else FailedStep(int(failed[0]), float(failed[1]), int(failed[2]), float(failed[3])),
+        description,
+        [
+            (int(each), _below(frame, frame_count), bool(two_way), _indices(particles, n))
+            for each, frame, two_way, particles in attachments
+        ],
+    )
+
+
+def _read_collider(world: World, note: Any, shapes: dict[str, Any]) -> tuple[int, ColliderRow]:
+    serial, is_alive, digest, offset, surface, motion, target = note
+    shape = world._colliders.shapes.get(digest)
+    if shape is None:
+        shape = from_plain(shapes.get(digest))
+    if not isinstance(shape, Shape):
+        raise SnapshotError(
+            "this snapshot has a collider with a grid that this world never had: add one of each MeshShape "
+            "and HeightFieldShape (and remove it again) before restoring"
+        )
+    friction, restitution, thickness, group, mask = surface
+    position, rotation, velocity, spin = (
+        _vector(each, n) for each, n in zip(motion, (3, 4, 3, 3), strict=True)
+    )
+    row = ColliderRow(
+        shape,
+        float(friction),
+        float(restitution),
+        float(thickness),
+        int(group),
+        int(mask),
+        position,
+        rotation,
+        velocity,
+        spin,
+        int(offset),
+        None if target is None else (_vector(target[0], 3), _vector(target[1], 4)),
+        bool(is_alive),
+    )
+    if not 0 <= row.offset <= world._built.state.capacity.contact.samples - len(shape.samples):
+        raise ValueError("a collider's grid lies outside the room for grids")
+    return int(serial), row
+
+
+def _below(number: Any, limit: int) -> int:
+    if not 0 <= int(number) < limit:
+        raise ValueError(f"it names number {number} of {limit}")
+    return int(number)
+
+
+def _vector(numbers: Any, count: int) -> NDArray[np.float64]:
+    vector = np.array(numbers, dtype=np.float64)
+    if vector.shape != (count,) or not np.isfinite(vector).all():
+        raise ValueError("a vector is none")
+    return vector
+
+
+def _indices(numbers: Any, limit: int) -> NDArray[np.int32]:
+    found = np.array(numbers, dtype=np.int32)
+    if found.ndim != 1 or len(found) == 0 or found.min() < 0 or found.max() >= limit:
+        raise ValueError("an attachment names vertices that there are not")
+    return found

@@ -1,0 +1,117 @@
+"""A world put back to earlier notes: handles that callers hold, and new ones where nobody holds any."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from taichi_soft.body import Body
+from taichi_soft.colliders import Collider
+from taichi_soft.control.attachments import Attachment
+from taichi_soft.control.frames import Frame
+from taichi_soft.control.grabs import Grab
+from taichi_soft.control.materials import write_constants
+from taichi_soft.cutting import refill_slot
+from taichi_soft.notes import BodyNote, Notes
+from taichi_soft.plain import as_plain
+from taichi_soft.state import State
+
+if TYPE_CHECKING:
+    from taichi_soft.world import World
+
+
+def put_back(world: World, notes: Notes) -> None:
+    """Let a world be as its notes say, but for what the fields hold. Nothing here can be refused any more."""
+    simulation, clock = world._built, world._clock
+    clock.steps, clock.time, clock.last_dt = notes.steps, notes.time, notes.last_dt
+    handles = world._handles
+    _apply_frames(world, notes)
+    colliders = world._colliders
+    colliders.restore(
+        [row for _, row in notes.colliders],
+        notes.samples,
+        lambda i, row: _handle(world, notes.colliders[i][0], Collider, lambda: Collider(colliders, i, row)),
+    )
+    for slot, wanted in enumerate(notes.bodies):
+        _apply_body(world, simulation.state, slot, wanted)
+    world._grabs.clear()
+    for serial, number, slot, point in notes.grabs:
+        body = world._pools.slots[slot]
+        assert body is not None
+        grab = _handle(world, serial, Grab, lambda b=body, n=number, x=point: Grab(b, n, x))  # type: ignore[misc]
+        grab.body, grab._number, grab._point = body, number, point
+        world._grabs[number] = grab
+    handles.count = notes.handles
+    if simulation.tears is not None:
+        for body in world.bodies:
+            simulation.tears.watch(body)
+    simulation.readout.has_moved()
+    world._substeps.forget()
+
+
+def _handle(world: World, serial: int, kind: type[Any], make: Callable[[], Any]) -> Any:
+    """The handle of that number: the one that the caller has, or a new one."""
+    found = world._handles.find(serial, kind)
+    if found is None:
+        found = make()
+        world._handles.enlist(found, serial)
+    return found
+
+
+def _apply_frames(world: World, notes: Notes) -> None:
+    frames = world._frames
+    frames.present, frames.coming, frames.has_work = notes.present, notes.coming, notes.aims
+    frames.handles.clear()
+    frames.count = len(notes.frames)
+    for number, serial in enumerate(notes.frames):
+        frame = world._handles.find(serial, Frame) or Frame.at(frames, number)
+        if frame._number != number:
+            frame = Frame.at(frames, number)
+        world._handles.enlist(frame, serial)
+        frames.handles.append(frame)
+
+
+def _apply_body(world: World, state: State, slot: int, wanted: BodyNote | None) -> None:
+    """Put the right body into a slot, of the right material."""
+    present, asset = world._pools.slots[slot], world._pools.assets[slot]
+    if present is not None and (wanted is None or present._serial != wanted.serial):
+        if present._description is not asset.description and not present.is_cut:
+            write_constants(state, present, asset.description)
+            present._description = asset.description
+        present._attachments.clear()
+        world._pools.leave(present)
+        present._removed_in = world.step_count
+        present = None
+    if wanted is None:
+        return
+    if present is not None and present.is_cut:
+        refill_slot(world, state, slot)
+        present._become_whole()
+    if present is None:
+        if world._scene.bodies[slot] is not asset.arrays:
+            refill_slot(world, state, slot)
+        known = world._handles.find(wanted.serial, Body)
+        if known is not None and known.index == slot and known.asset is asset:
+            present = known
+        else:
+            present = Body(world, slot, asset)
+            world._handles.enlist(present, wanted.serial)
+        present._removed_in = None
+        if present.is_cut:
+            present._become_whole()
+        present._description = asset.description
+        world._pools.enter_at(present)
+    present._first_step = wanted.first_step
+    present._frozen_in, present._failure = wanted.failed, None
+    if as_plain(present._description.material) != as_plain(wanted.description.material):
+        write_constants(state, present, wanted.description)
+    present._description = wanted.description
+    present._attachments.clear()
+    for serial, number, two_way, particles in wanted.attachments:
+        frame = world._frames.handles[number]
+        held = world._handles.find(serial, Attachment) or Attachment(
+            present, particles, frame, two_way=two_way
+        )
+        held.body, held.frame, held.particles, held.two_way = present, frame, particles, two_way
+        world._handles.enlist(held, serial)
+        present._attachments.append(held)

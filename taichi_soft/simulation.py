@@ -1,0 +1,176 @@
+"""What `World.build` makes: fields, the kernel that moves them, and all that goes with a step of it."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.clock import Clock
+from taichi_soft.colliders import Colliders
+from taichi_soft.constants import POSITION_LIMIT, VELOCITY_LIMIT
+from taichi_soft.control.frames import Frames
+from taichi_soft.errors import DroppedEventsWarning, OptionError, SolverWarning, StateError
+from taichi_soft.events import EventLog
+from taichi_soft.failures import FailedStep, Failure, find_failure
+from taichi_soft.kernels.program import Program
+from taichi_soft.kernels.readout import write_motion
+from taichi_soft.kernels.schedules import Launch
+from taichi_soft.kernels.sleep import wake_body
+from taichi_soft.kernels.spawn import despawn_body, spawn_body
+from taichi_soft.pools import Pools
+from taichi_soft.readout import Readout
+from taichi_soft.scene import Scene
+from taichi_soft.settings import Settings
+from taichi_soft.state import ASLEEP, FROZEN, State
+from taichi_soft.tearing import Tears
+
+if TYPE_CHECKING:
+    from taichi_soft.body import Body
+
+
+@dataclass(eq=False)
+class Simulation:
+    """A built world without its public face."""
+
+    settings: Settings
+    pools: Pools
+    scene: Scene
+    clock: Clock
+    frames: Frames
+    colliders: Colliders | None  # None in a world without contact
+    sleeps: bool  # whether bodies fall asleep
+    state: State
+    program: Program
+    launch: Launch
+    events: EventLog
+    tears: Tears | None  # None where no body tears
+    readout: Readout = field(init=False)
+    troubled: int = 0  # bodies that failed in the last step, or whose solves were not exact
+    _warned: set[int] = field(default_factory=set)  # slots of bodies with such solves
+
+    def __post_init__(self) -> None:
+        self.readout = Readout(self.settings, self.state, self.program, self.scene)
+
+    def step(self, seconds: float, substeps: int, h: float) -> list[str]:
+        """Make one fixed step of `seconds`, in substeps of `h` [s]. Returns a line for each body it froze."""
+        clock, colliders = self.clock, self.colliders
+        self.readout.has_moved()
+        self.frames.aim(self.state, len(self.pools.slots), seconds)
+        if colliders is not None:
+            colliders.prepare(seconds)
+        self.troubled = self.launch(substeps, h)
+        if colliders is not None:
+            colliders.finish(seconds)
+        reports = self._note_failures(substeps, h) if self.troubled else []
+        clock.steps += 1
+        clock.time += seconds
+        clock.last_dt = seconds
+        loss = self.events.collect(clock.steps - 1, clock.time, seconds)
+        if loss:
+            warnings.warn(loss, DroppedEventsWarning, stacklevel=3)
+        if self.tears is not None:
+            self.tears.tear()
+        return reports
+
+    def _note_failures(self, substeps: int, h: float) -> list[str]:
+        """Mark the bodies that the last step froze; a line about each."""
+        clock, reports = self.clock, []
+        status = self.state.body_status.to_numpy()
+        for body in self.pools.living:
+            if status[body.index] != FROZEN or body.is_frozen:
+                continue
+            body._frozen_in = FailedStep(clock.steps, clock.time, substeps, h)
+            self.events.note_frozen(body)
+            reports.append(
+                f"body {body.index} went non-finite in step {clock.steps}: put back to t = "
+                f"{clock.time:.4g} s and frozen; body.failure tells where it broke. Use more substeps or a "
+                "softer material"
+            )
+        return reports
+
+    def check_solves(self) -> None:
+        """Warn of bodies whose implicit solves were not exact in the last step, once of each."""
+        if not self.settings.is_implicit:
+            return
+        residuals = self.state.body_residual.to_numpy()
+        for body in self.pools.living:
+            index = body.index
+            is_exact = residuals[index] <= self.settings.tolerance
+            if is_exact or index in self._warned or body.is_frozen:
+                continue
+            self._warned.add(index)
+            warnings.warn(
+                f"the implicit solve of body {index} ended with a residual of {residuals[index]:.2g} instead "
+                f"of {self.settings.tolerance:g} within {self.settings.most_iterations} iterations: raise "
+                "most_iterations or tolerance, or use more substeps",
+                SolverWarning,
+                stacklevel=3,
+            )
+
+    def fill(self, slot: int, rows: NDArray[np.float32]) -> None:
+        """Let a body begin in an empty slot, as `rows` say (see `SoftBodyAsset.placed`)."""
+        spawn_body(self.state, slot, rows)
+        self.readout.has_moved()
+
+    def empty(self, slot: int) -> None:
+        """Take the body in a slot out of the fields."""
+        self._warned.discard(slot)
+        despawn_body(self.state, slot)
+
+    def wake(self, slot: int) -> None:
+        """Wake a body, or all for -1."""
+        if self.sleeps:
+            wake_body(self.state, slot)
+
+    def wake_all(self) -> None:
+        """Wake all bodies."""
+        self.wake(-1)
+
+    def read(self, slot: int, kernel: Callable[..., Any], *arguments: Any) -> Any:
+        """Call a kernel (state, first particle of a body, *arguments) that changes nothing."""
+        return kernel(self.state, self.scene.ranges[slot].particles[0], *arguments)
+
+    def change(self, slot: int, kernel: Callable[..., Any], *arguments: Any) -> Any:
+        """Call a kernel (state, *arguments) that changes a body, or all for -1: the way of all control."""
+        self.wake(slot)
+        self.readout.has_moved()
+        return kernel(self.state, *arguments)
+
+    def write_motion(self, slot: int, positions: NDArray[Any], velocities: NDArray[Any]) -> None:
+        """Put a body somewhere else. Raises: OptionError for what is out of reach or too fast."""
+        x, v = positions.astype(np.float32), velocities.astype(np.float32)
+        for name, rows, limit in (("positions", x, POSITION_LIMIT), ("velocities", v, VELOCITY_LIMIT)):
+            if not np.abs(rows).max() < limit:
+                raise OptionError(f"{name} must lie within {limit:g} of zero")
+        write_motion(self.state, slot, x, v)
+        self.readout.has_moved()
+
+    def rows_of(self, slot: int, vertices: NDArray[np.int32]) -> NDArray[np.int32]:
+        """Where vertices of a body lie in the fields."""
+        rows: NDArray[np.int32] = self.scene.bodies[slot].rank[vertices]
+        return (rows + self.scene.ranges[slot].particles[0]).astype(np.int32)
+
+    def is_asleep(self, slot: int) -> bool:
+        """Whether the body in a slot sleeps."""
+        return int(self.state.body_status[slot]) == ASLEEP
+
+    def solve_residual(self, body: Body) -> float | None:
+        """As `Body.solve_residual`."""
+        has_solved = self.settings.is_implicit and self.clock.steps > body._first_step
+        return float(self.state.body_residual[body.index]) if has_solved else None
+
+    def find_failure(self, slot: int, failed: FailedStep) -> Failure:
+        """What broke first in the body in a slot."""
+        return find_failure(self.state, self.program, self.scene, slot, failed)
+
+
+def require_built(simulation: Simulation | None) -> Simulation:
+    """Raises: StateError before `World.build`."""
+    if simulation is None:
+        raise StateError("the world is not built: call world.build() after the last add_body")
+    return simulation

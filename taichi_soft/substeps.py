@@ -1,0 +1,104 @@
+"""Into how many substeps a fixed step is cut."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from taichi_soft.checks import as_count, as_number
+from taichi_soft.errors import StateError, UnstableStepWarning
+from taichi_soft.scene import BodyDescription
+from taichi_soft.stability import StableStep, stable_step
+
+if TYPE_CHECKING:
+    from taichi_soft.body import Body
+    from taichi_soft.pools import Pools
+
+SHORTEST_STEP, LONGEST_STEP = 1e-9, 1e4
+"""Fixed steps [s]: shorter ones are lost in float32, longer ones would take days of computing."""
+
+_PLAIN = {float, int, np.float64, type(None)}
+"""Types whose values can be compared with those of the last step."""
+
+
+class Substeps:
+    """How long the substeps of one world can be, and how long they are."""
+
+    def __init__(self, pools: Pools, *, is_implicit: bool) -> None:
+        """`is_implicit`: its integrator takes substeps of any length."""
+        self._pools = pools
+        self._is_implicit = is_implicit
+        self._estimates: dict[BodyDescription, StableStep] = {}  # of bodies with another material
+        self._asked: tuple[Any, ...] = ()
+        self._chosen = (0.0, 0, 0.0)  # for what was asked last
+        self._warned: set[float] = set()
+
+    def stable_step(self, body: Body) -> StableStep:
+        """As `World.stable_step`."""
+        described = body._description
+        if described is body.asset.description:
+            return body.asset.stable_step
+        if described not in self._estimates:
+            self._estimates[described] = stable_step(described.mesh, described.material, described.model)
+        return self._estimates[described]
+
+    def stable_count(self, dt: float) -> int:
+        """As `World.stable_substeps`."""
+        if not self._pools.slots:
+            raise StateError("the world is empty: call add_body or reserve first")
+        if self._is_implicit:
+            _as_step(dt)
+            return 1
+        longest = min(asset.stable_step.recommended for asset in self._pools.kinds)
+        for body in self._pools.living:
+            if body._description is not body.asset.description:
+                longest = min(longest, self.stable_step(body).recommended)
+        return max(1, math.ceil(_as_step(dt) / longest))
+
+    def choose(self, dt: float, substeps: int | None) -> tuple[float, int, float]:
+        """Length of a step [s], number of its substeps and their length [s], as `World.step` takes them.
+
+        Raises: OptionError.
+        """
+        asked = (dt, substeps, type(dt), type(substeps))  # 4.0 == 4 and True == 1, but they are refused
+        if not {type(dt), type(substeps)} <= _PLAIN or self._asked != asked:
+            self._chosen = self._check(dt, substeps)
+            self._asked = asked
+        return self._chosen
+
+    def _check(self, dt: float, substeps: int | None) -> tuple[float, int, float]:
+        seconds = _as_step(dt)
+        count = as_count(self.stable_count(seconds) if substeps is None else substeps, "substeps")
+        h = seconds / count
+        if self._is_implicit:
+            return seconds, count, h
+        stiffest = min(self._pools.kinds, key=lambda asset: asset.stable_step.limit)
+        limit = stiffest.stable_step.limit
+        if h > limit and h not in self._warned:
+            warnings.warn(
+                f"substep {h * 1e3:.4g} ms is longer than the {limit * 1e3:.4g} ms that body "
+                f"{self._pools.assets.index(stiffest)} can take ({stiffest.stable_step.stiffest}): it may "
+                f"explode. Use substeps={self.stable_count(seconds)} or leave substeps out",
+                UnstableStepWarning,
+                stacklevel=4,  # who called World.step
+            )
+            self._warned.add(h)
+        return seconds, count, h
+
+    def forget(self) -> None:
+        """Choose anew, whatever is asked."""
+        self._asked = ()
+
+    def renew(self) -> None:
+        """Take note that a body is made of something else."""
+        used = {each._description for each in self._pools.living}
+        self._estimates = {key: step for key, step in self._estimates.items() if key in used}
+        if self._asked[1:2] == (None,):  # whose number was chosen for what was there before
+            self.forget()
+
+
+def _as_step(dt: float) -> float:
+    return as_number(dt, "dt", SHORTEST_STEP, LONGEST_STEP, "a number above 0 s, from 1e-9 to 1e4")

@@ -1,0 +1,90 @@
+"""What bodies of one kind share: made once, never changed, and checked before any body is made of it."""
+
+import numpy as np
+import pytest
+
+from taichi_soft import (
+    AnisotropicMaterial,
+    Material,
+    MaterialError,
+    MeshError,
+    OptionError,
+    SoftBodyAsset,
+    StateError,
+    Stiffness,
+    World,
+    box,
+)
+from taichi_soft.scene import arrange
+
+JELLY = Material(1e5, 0.2, 1000.0, 20.0)
+MESH = box(cells=(2, 2, 2))
+
+
+def cube(**options):
+    return SoftBodyAsset(MESH, JELLY, **options)
+
+
+def test_copies_are_arranged_once(monkeypatch):
+    made = []
+
+    def counted(description):
+        made.append(description)
+        return arrange(description)
+
+    monkeypatch.setattr("taichi_soft.assets.arrange", counted)
+    world, kind = World(floor=None), cube()
+    for x in range(4):
+        world.add_body(MESH, JELLY, position=(3 * x, 0, 0))
+    assert len(made) == 1
+    world.add_body(MESH, JELLY, pinned=[0])
+    world.add_body(MESH, JELLY, law="face")
+    assert len(made) == 3
+    for other in (world, World(floor=None)):
+        other.reserve(kind, 5)
+    assert len(made) == 4
+    assert len({body.asset for body in world.bodies}) == 3
+
+
+def test_an_asset_cannot_be_changed_through_anything_it_shares():
+    pinned = np.array([4, 2, 2])
+    asset = cube(pinned=pinned)
+    pinned[:] = 0
+    assert asset.pinned.tolist() == [2, 4]
+    body = World(floor=None).add_body(MESH, JELLY)
+    for name in ("mesh", "law", "pinned", "description"):
+        with pytest.raises(AttributeError):
+            setattr(asset, name, None)
+    for rows in (asset.pinned, body.masses, body.mesh.vertices):
+        with pytest.raises(ValueError, match="read-only"):
+            rows[...] = 0
+
+
+@pytest.mark.parametrize(
+    ("change", "error"),
+    [
+        ({"mesh": None}, MeshError),
+        ({"mesh": MESH.scaled(1e-9)}, MeshError),
+        ({"material": 5}, MaterialError),
+        ({"law": "hope"}, OptionError),
+        ({"law": "neo_hookean", "flips": "off"}, OptionError),
+        ({"strain": 3}, OptionError),
+        ({"damping_model": None}, OptionError),
+        ({"pinned": [27]}, OptionError),
+        ({"pinned": [0.5]}, OptionError),
+    ],
+)
+def test_what_makes_no_body_makes_no_asset(change, error):
+    options = {"mesh": MESH, "material": JELLY, **change}
+    mesh, material = options.pop("mesh"), options.pop("material")
+    with pytest.raises(error):
+        SoftBodyAsset(mesh, material, **options)
+
+
+def test_an_asset_that_the_integrator_cannot_take_is_refused():
+    grain = AnisotropicMaterial(Stiffness.isotropic(1e6, 0.2), density=500.0)
+    world, kind = World(integrator="implicit_euler"), SoftBodyAsset(MESH, grain, law="virial")
+    with pytest.raises(OptionError, match="has no gradients for an AnisotropicMaterial"):
+        world.reserve(kind, 1)
+    with pytest.raises(StateError, match="has no pool in this world"):
+        world.spawn(kind)
