@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from taichi_soft.checks import as_count, as_positive
+from taichi_soft.checks import as_count, as_step
 
 ROUND_OFF = 1e-9
 """Part of a step that may be missing when the step is due. Sums of frame times are rounded: six frames of
@@ -16,7 +16,7 @@ class FixedStep:
     """How a game loop's time is cut into steps.
 
     Args:
-        dt: length of one step [s], above 0.
+        dt: length of one step [s], as `World.step` takes it.
         substeps: equal parts of a step, 1 or more; None: the world chooses what is stable.
         max_steps: most steps that one frame may make, 1 or more. Time beyond is dropped: a machine too slow
             for the simulation then shows slow motion, not ever longer frames.
@@ -28,7 +28,7 @@ class FixedStep:
     max_steps: int = 8
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "dt", as_positive(self.dt, "dt", "s"))
+        object.__setattr__(self, "dt", as_step(self.dt))
         object.__setattr__(self, "max_steps", as_count(self.max_steps, "max_steps"))
         if self.substeps is not None:
             object.__setattr__(self, "substeps", as_count(self.substeps, "substeps"))

@@ -28,6 +28,7 @@ from taichi_soft.events import Event, StressExceeded, TearCandidates
 from taichi_soft.failures import FailedStep, Failure
 from taichi_soft.handles import Handle, recorded
 from taichi_soft.materials import AnyMaterial
+from taichi_soft.parts import Part
 from taichi_soft.queries import Pose
 from taichi_soft.scene import BodyArrays, BodyDescription, Ranges
 from taichi_soft.stability import StableStep
@@ -61,7 +62,7 @@ class Body(Handle):
         self._failure: Failure | None = None
         self._attachments: list[Attachment] = []
         self._topology_version = 0
-        self._origins: tuple[Ints, Ints] | None = None  # of vertices and tetrahedra, once it was cut
+        self._part: Part | None = None  # of the asset's mesh, once it was cut
 
     def require_alive(self) -> None:
         """Raises: StateError once the body was removed."""
@@ -135,26 +136,21 @@ class Body(Handle):
     @property
     def is_cut(self) -> bool:
         """Whether it is no longer what its asset says, but what cuts have left."""
-        return self._origins is not None
+        return self._part is not None
 
     @property
     def vertex_origins(self) -> Ints:
         """The vertex of the asset's mesh that each vertex is, or is a copy of, (n,)."""
-        return np.arange(self.vertex_count) if self._origins is None else self._origins[0]
+        return np.arange(self.vertex_count) if self._part is None else self._part.vertices
 
     @property
     def tet_origins(self) -> Ints:
         """The tetrahedron of the asset's mesh that each one is, (m,)."""
-        return np.arange(len(self.tets)) if self._origins is None else self._origins[1]
+        return np.arange(len(self.tets)) if self._part is None else self._part.tets
 
-    def _become(self, vertex_origins: Ints, tet_origins: Ints) -> None:
-        """Take note of what a cut has left of the asset's mesh."""
-        self._origins = vertex_origins, tet_origins
-        self._topology_version += 1
-
-    def _become_whole(self) -> None:
-        """Take note that the body is what its asset says again."""
-        self._origins, self._description = None, self.asset.description
+    def _become(self, part: Part | None) -> None:
+        """Take note of what cuts have left of the asset's mesh, None for all of it."""
+        self._part = part
         self._topology_version += 1
 
     def _redescribe(self, description: BodyDescription, arrays: BodyArrays) -> Ranges:

@@ -19,6 +19,7 @@ from taichi_soft.kernels.plasticity import read_rest_inverses
 from taichi_soft.kernels.topology import MOTION_WIDTH, read_motion, write_body
 from taichi_soft.meshing import TetMesh
 from taichi_soft.meshing.splitting import InnerFaces, loose_parts, split_vertices
+from taichi_soft.parts import Part
 from taichi_soft.scene import BodyArrays, BodyDescription, arrange_part, blocks_of
 from taichi_soft.state import ABSENT, ACTIVE, State, with_spare_rows
 
@@ -130,7 +131,7 @@ def divide(
         )
     pieces = [_piece(body, tets, vertices, np.flatnonzero(part == number)) for number in numbers]
     for piece in pieces:
-        _require_room(body, piece.arrays)
+        require_room(world, body.index, piece.arrays)
     return _settle(world, body, pieces, slots)
 
 
@@ -152,8 +153,9 @@ def _piece(
     return _Piece(description, arrays, origins, rows)
 
 
-def _require_room(body: Body, arrays: BodyArrays) -> None:
-    place = body._world._scene.ranges[body.index]
+def require_room(world: World, slot: int, arrays: BodyArrays) -> None:
+    """Raises: StateError where a part of a body does not fit into its slot."""
+    place = world._scene.ranges[slot]
     for name, rows, (begin, end) in (
         ("vertices", arrays.mass, place.particles),
         ("edges", arrays.edge_vertices, place.edges),
@@ -161,8 +163,9 @@ def _require_room(body: Body, arrays: BodyArrays) -> None:
     ):
         if len(rows) > end - begin:
             raise StateError(
-                f"the cut would leave {len(rows)} {name} in body {body.index}, and there is room for "
-                f"{end - begin}: make its asset with more spare_vertices than {body.asset.spare_vertices}"
+                f"the cut would leave {len(rows)} {name} in body {slot}, and there is room for "
+                f"{end - begin}: make its asset with more spare_vertices than "
+                f"{world._pools.assets[slot].spare_vertices}"
             )
 
 
@@ -191,7 +194,8 @@ def _settle(world: World, body: Body, pieces: list[_Piece], slots: list[int]) ->
     vertices, tets = body.vertex_origins, body.tet_origins
     for each, piece in zip((body, *fallen), pieces, strict=True):
         each._redescribe(piece.description, piece.arrays)
-        each._become(vertices[piece.vertices], tets[piece.tets])
+        corners, order = piece.description.mesh.tets, piece.arrays.order
+        each._become(Part(vertices[piece.vertices], order, tets[piece.tets], corners))
     simulation.events.renew_watches(body)
     return fallen
 
@@ -202,9 +206,9 @@ def warm_up(world: World, state: State, slot: int) -> None:
     refill_slot(world, state, slot)
 
 
-def refill_slot(world: World, state: State, slot: int) -> None:
-    """Write the whole body of its asset into an empty slot in which a part of one was."""
-    arrays = world._pools.assets[slot].arrays
+def refill_slot(world: World, state: State, slot: int, part: BodyArrays | None = None) -> None:
+    """Write the whole body of its asset, or a part of it, into a slot where another part was, at rest."""
+    arrays = world._pools.assets[slot].arrays if part is None else part
     rows = np.zeros((len(arrays.mass), MOTION_WIDTH), dtype=np.float32)
     _write(state, slot, arrays, rows, ABSENT, slot, None)
     world._scene.bodies[slot] = arrays

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from engine_adapter import EngineAdapter, FixedStep
 from taichi_soft.body import Body
@@ -35,6 +35,8 @@ class Actor:
     color: Color = PALETTE[0]
     paint: Paint | None = None  # vertex colours (n, 3) after the last step, instead of `color`
     label: str = ""  # below the body
+    world: World | None = None  # that it lives in, where that is not the stage's
+    shift: ArrayLike = (0.0, 0.0, 0.0)  # from where it is to where it is drawn, (3,) [m]
 
 
 @dataclass
@@ -133,8 +135,7 @@ class _Take:
         self.stage, self.scenery = stage, scenery
         self.adapter = EngineAdapter(stage.world, stage.step, before_step=self._before_step)
         self.fps = fps
-        self.bodies = [actor.body for actor in stage.actors]
-        self.buffers = [np.empty((body.vertex_count, 3), dtype=np.float32) for body in self.bodies]
+        self.buffers = [np.empty((a.body.vertex_count, 3), dtype=np.float32) for a in stage.actors]
         self.times: list[float] = []
 
     def _before_step(self, world: World) -> None:
@@ -147,8 +148,10 @@ class _Take:
         start = time.perf_counter()
         if number > 0:
             self.adapter.advance(1.0 / self.fps)
-        for body, buffer in zip(self.bodies, self.buffers, strict=True):
-            self.adapter.positions(body, buffer)
+        for actor, buffer in zip(self.stage.actors, self.buffers, strict=True):
+            world = actor.world or self.stage.world
+            world.read_positions(actor.body, self.adapter.alpha, buffer)
+            buffer += np.asarray(actor.shift, dtype=np.float32)
         self.times.append(time.perf_counter() - start)
         return self.buffers
 

@@ -10,11 +10,13 @@ from numpy.typing import NDArray
 
 from taichi_soft.body import Body
 from taichi_soft.colliders import Collider, ColliderRow
+from taichi_soft.cutting import require_room
 from taichi_soft.errors import SnapshotError, TaichiSoftError
 from taichi_soft.failures import FailedStep
 from taichi_soft.laws import fit_model
+from taichi_soft.parts import Part, name_of
 from taichi_soft.plain import as_plain, digest_of, from_plain, plain_of
-from taichi_soft.scene import BodyDescription
+from taichi_soft.scene import BodyArrays, BodyDescription
 from taichi_soft.shapes import Shape
 from taichi_soft.state import MOST_GRABS
 
@@ -50,7 +52,7 @@ def take_notes(world: World) -> dict[str, Any]:
 
 
 def _body_note(body: Body) -> list[Any]:
-    failed = body._frozen_in
+    failed, tears = body._frozen_in, body._world._built.tears
     is_own = body._description is not body.asset.description
     return [
         body._serial,
@@ -58,6 +60,8 @@ def _body_note(body: Body) -> list[Any]:
         None if failed is None else [failed.step, failed.time, failed.substeps, failed.h],
         _material_note(body._description) if is_own else None,
         [[a._serial, a.frame._number, a.two_way, a.particles.tolist()] for a in body._attachments],
+        None if body._part is None else body._part.note,
+        tears is not None and tears.rests(body),
     ]
 
 
@@ -80,8 +84,11 @@ class BodyNote:
     serial: int
     first_step: int
     failed: FailedStep | None
+    part: Part | None
     description: BodyDescription
+    arrays: BodyArrays | None  # of a part
     attachments: list[tuple[int, int, bool, NDArray[np.int32]]]
+    rests: bool  # tears no more
 
 
 @dataclass
@@ -102,7 +109,27 @@ class Notes:
     grabs: list[tuple[int, int, int, NDArray[np.float64]]]
 
 
-def read_notes(world: World, notes: dict[str, Any]) -> Notes:
+def read_parts(world: World, notes: list[Any], rows: NDArray[np.int32]) -> dict[int, Part]:
+    """What cuts have left of bodies, by slot, from the notes of these and the rows of all parts one by one.
+
+    Raises: as `read_notes`.
+    """
+    parts: dict[int, Part] = {}
+    for slot, note in enumerate(notes):
+        if note is not None and note[5] is not None:
+            n, m = (_below(count, len(rows) + 1) for count in note[5][:2])
+            size = 2 * n + 5 * m
+            parts[slot] = Part.of_rows(rows[:size], n, m)
+            parts[slot].require_of(world._pools.assets[slot])
+            if parts[slot].digest != note[5][2]:
+                raise ValueError(f"what was cut off body {slot} has another name")
+            rows = rows[size:]
+    if len(rows):
+        raise ValueError(f"it has {len(rows)} words too many")
+    return parts
+
+
+def read_notes(world: World, notes: dict[str, Any], parts: dict[int, Part]) -> Notes:
     """Notes of `take_notes`. Raises: SnapshotError, or what Python raises where they are not in order."""
     count = len(notes["frames"])
     poses = {
@@ -112,7 +139,7 @@ def read_notes(world: World, notes: dict[str, Any]) -> Notes:
     slots = world.slot_count
     if len(notes["bodies"]) != slots:
         raise ValueError("it has another number of bodies")
-    bodies = [_read_body(world, i, note, count) for i, note in enumerate(notes["bodies"])]
+    bodies = [_read_body(world, i, note, count, parts.get(i)) for i, note in enumerate(notes["bodies"])]
     grabs = [
         (int(serial), _below(number, MOST_GRABS), _below(slot, slots), _vector(point, 3))
         for serial, number, slot, point in notes["grabs"]
@@ -141,12 +168,18 @@ def _some(notes: list[Any], world: World) -> list[Any]:
     return notes
 
 
-def _read_body(world: World, slot: int, note: Any, frame_count: int) -> BodyNote | None:
+def _read_body(world: World, slot: int, note: Any, frame_count: int, part: Part | None) -> BodyNote | None:
     if note is None:
         return None
-    serial, first_step, failed, material, attachments = note
+    serial, first_step, failed, material, attachments, _, rests = note
     asset = world._pools.assets[slot]
-    description = asset.description
+    whole, present = asset.description, world._pools.slots[slot]
+    if present is not None and (present._serial != serial or name_of(present._part) != name_of(part)):
+        present = None
+    own = None if present is None or present._description is whole else present._description
+    description, arrays = whole, None
+    if part is not None:
+        description = own or part.describe(asset, whole.material)
     if material is not None:
         try:
             made = from_plain(material)
@@ -157,19 +190,28 @@ def _read_body(world: World, slot: int, note: Any, frame_count: int) -> BodyNote
             ) from None
         if type(made) is not type(description.material):
             raise ValueError(f"body {slot} is of another kind of material")
-        description = replace(description, material=made)
-    n = len(asset.mesh.vertices)
+        is_same = own is not None and as_plain(made) == as_plain(own.material)
+        description = own if own and is_same else replace(description, material=made)
+    elif part is not None:
+        raise ValueError(f"body {slot} was cut and has no material")
+    if part is not None and present is None:
+        arrays = part.arrange(asset, description)
+        require_room(world, slot, arrays)
+    n = len(description.mesh.vertices)
     return BodyNote(
         int(serial),
         int(first_step),
         None
         if failed is None
         else FailedStep(int(failed[0]), float(failed[1]), int(failed[2]), float(failed[3])),
+        part,
         description,
+        arrays,
         [
             (int(each), _below(frame, frame_count), bool(two_way), _indices(particles, n))
             for each, frame, two_way, particles in attachments
         ],
+        bool(rests),
     )
 
 

@@ -48,7 +48,7 @@ class Plasticity:
             as_positive(self.yield_stress, "yield_stress", "Pa")
         if self.yield_strain is not None:
             as_positive(self.yield_strain, "yield_strain", "")
-        if self.creep != math.inf:
+        if not (isinstance(self.creep, float) and self.creep == math.inf):
             as_positive(self.creep, "creep", "1/s, or infinity")
         as_number(self.maximum, "maximum", 0.0, 10.0)
 

@@ -80,8 +80,7 @@ class Recorder:
         self._present.entries.append(["step", seconds, substeps, world.state_hash(), pushes])
         self._present.steps += 1
         told = [self._write(world)] if is_broken and not self._has_written else []
-        # Of bodies that were cut there is no snapshot: what led to them is kept until they are gone.
-        if self._present.steps >= self._ticks and not any(body.is_cut for body in world.bodies):
+        if self._present.steps >= self._ticks:
             self._before, self._present = self._present, _Stretch(world.snapshot())
         return told
 

@@ -13,6 +13,7 @@ from taichi_soft.control.grabs import Grab
 from taichi_soft.control.materials import write_constants
 from taichi_soft.cutting import refill_slot
 from taichi_soft.notes import BodyNote, Notes
+from taichi_soft.parts import name_of
 from taichi_soft.plain import as_plain
 from taichi_soft.state import State
 
@@ -32,6 +33,7 @@ def put_back(world: World, notes: Notes) -> None:
         notes.samples,
         lambda i, row: _handle(world, notes.colliders[i][0], Collider, lambda: Collider(colliders, i, row)),
     )
+    versions = {body: body.topology_version for body in world.bodies}
     for slot, wanted in enumerate(notes.bodies):
         _apply_body(world, simulation.state, slot, wanted)
     world._grabs.clear()
@@ -43,8 +45,14 @@ def put_back(world: World, notes: Notes) -> None:
         world._grabs[number] = grab
     handles.count = notes.handles
     if simulation.tears is not None:
-        for body in world.bodies:
-            simulation.tears.watch(body)
+        for body, wanted in zip(world._pools.slots, notes.bodies, strict=True):
+            if body is not None and wanted is not None:
+                simulation.tears.watch(body)
+                if wanted.rests:
+                    simulation.tears.rest(body)
+    for body in world.bodies:
+        if versions.get(body) != body.topology_version:
+            simulation.events.renew_watches(body)
     simulation.readout.has_moved()
     world._substeps.forget()
 
@@ -84,12 +92,11 @@ def _apply_body(world: World, state: State, slot: int, wanted: BodyNote | None) 
         present = None
     if wanted is None:
         return
-    if present is not None and present.is_cut:
-        refill_slot(world, state, slot)
-        present._become_whole()
+    if present is not None and name_of(present._part) != name_of(wanted.part):
+        refill_slot(world, state, slot, wanted.arrays)
     if present is None:
-        if world._scene.bodies[slot] is not asset.arrays:
-            refill_slot(world, state, slot)
+        if wanted.part is not None or world._scene.bodies[slot] is not asset.arrays:
+            refill_slot(world, state, slot, wanted.arrays)
         known = world._handles.find(wanted.serial, Body)
         if known is not None and known.index == slot and known.asset is asset:
             present = known
@@ -97,10 +104,11 @@ def _apply_body(world: World, state: State, slot: int, wanted: BodyNote | None) 
             present = Body(world, slot, asset)
             world._handles.enlist(present, wanted.serial)
         present._removed_in = None
-        if present.is_cut:
-            present._become_whole()
-        present._description = asset.description
+        present._description = asset.description if wanted.part is None else wanted.description
         world._pools.enter_at(present)
+    if name_of(present._part) != name_of(wanted.part):
+        present._become(wanted.part)
+        present._description = asset.description if wanted.part is None else wanted.description
     present._first_step = wanted.first_step
     present._frozen_in, present._failure = wanted.failed, None
     if as_plain(present._description.material) != as_plain(wanted.description.material):

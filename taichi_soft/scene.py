@@ -282,15 +282,21 @@ def arrange(description: BodyDescription) -> BodyArrays:
 
 
 def arrange_part(
-    description: BodyDescription, before: BodyArrays, vertices: NDArray[np.int64], tets: NDArray[np.int64]
+    description: BodyDescription,
+    before: BodyArrays,
+    vertices: NDArray[np.int64],
+    tets: NDArray[np.int64],
+    order: Ints | None = None,
 ) -> BodyArrays:
     """Put what a cut has left of a body into the order that the body had: copies come behind their originals.
 
     Args:
         vertices, tets: which of the body before each one is, or is a copy of.
+        order: of the vertices; None for copies in the order of their numbers.
     """
     mesh, rank = description.mesh, before.rank[vertices]
-    order = np.argsort(rank, kind="stable").astype(np.int32)
+    if order is None:
+        order = np.argsort(rank, kind="stable").astype(np.int32)
     ends = rank[mesh.edges].astype(np.int64)
     # An edge is led by the same end as before.
     count = len(before.rank)

@@ -137,9 +137,18 @@ class Simulation:
 
     def change(self, slot: int, kernel: Callable[..., Any], *arguments: Any) -> Any:
         """Call a kernel (state, *arguments) that changes a body, or all for -1: the way of all control."""
+        found = self.attempt(kernel, *arguments)
+        self.rouse(slot)
+        return found
+
+    def attempt(self, kernel: Callable[..., Any], *arguments: Any) -> Any:
+        """Call a kernel (state, *arguments) that may refuse: bodies sleep on until `rouse` is called."""
+        return kernel(self.state, *arguments)
+
+    def rouse(self, slot: int) -> None:
+        """Take note that control has changed a body, or all for -1."""
         self.wake(slot)
         self.readout.has_moved()
-        return kernel(self.state, *arguments)
 
     def write_motion(self, slot: int, positions: NDArray[Any], velocities: NDArray[Any]) -> None:
         """Put a body somewhere else. Raises: OptionError for what is out of reach or too fast."""

@@ -2,7 +2,8 @@
 
 A snapshot has three parts. The *structure* is what the world was built of; a world of another structure
 refuses it. The *notes* are what Python knows: time, who lives in which slot, colliders, frames, grabs. The
-*words* are what the fields hold, bit by bit (see `kernels.snapshot`).
+*words* are what the fields hold, bit by bit (see `kernels.snapshot`), and the parts of meshes that cuts have
+left (see `parts`).
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from taichi_soft.kernels.snapshot import (
     hash_bodies,
     row_table,
 )
-from taichi_soft.notes import Notes, read_notes, take_notes
+from taichi_soft.notes import Notes, read_notes, read_parts, take_notes
 from taichi_soft.plain import from_json, to_json
 from taichi_soft.restoring import put_back
 from taichi_soft.sealed import seal, unseal
@@ -37,7 +38,7 @@ from taichi_soft.structure import require_structure
 if TYPE_CHECKING:
     from taichi_soft.world import World
 
-MARK, VERSION = b"TSOFTSNP", 1
+MARK, VERSION = b"TSOFTSNP", 2
 
 Words = NDArray[np.int32]
 
@@ -45,12 +46,10 @@ Words = NDArray[np.int32]
 def take_snapshot(world: World) -> bytes:
     """As `World.snapshot`."""
     state = world._built.state
-    cut = next((body for body in world.bodies if body.is_cut), None)
-    if cut is not None:
-        raise StateError(f"body {cut.index} was cut: a snapshot holds no bodies that were cut or torn")
     table = _table(world, max(world._grabs, default=-1) + 1)
     words = np.empty(int(table[-1, 2]), dtype=np.int32)
     copy_state(state, table, words, True)
+    words = np.concatenate([words, *(body._part.rows for body in world.bodies if body._part is not None)])
     return seal(MARK, VERSION, [world._structure, to_json(take_notes(world)), words.astype("<i4").tobytes()])
 
 
@@ -73,11 +72,13 @@ def restore_snapshot(world: World, data: Any) -> None:
     plain = from_json(content)
     try:
         words = np.frombuffer(rows, "<i4").astype(np.int32)
-        notes = read_notes(world, plain)
-        table = _table(world, max((number for _, number, _, _ in notes.grabs), default=-1) + 1)
-        if len(words) != table[-1, 2]:
+        table = _table(world, max((int(number) for _, number, _, _ in plain["grabs"]), default=-1) + 1)
+        if len(words) < table[-1, 2]:
             raise ValueError(f"it has {len(words)} words, where this world takes {table[-1, 2]}")
-    except (KeyError, TypeError, ValueError, IndexError, OverflowError, AttributeError) as error:
+        parts = read_parts(world, plain["bodies"], words[table[-1, 2] :])
+        words = words[: table[-1, 2]]
+        notes = read_notes(world, plain, parts)
+    except (KeyError, TypeError, ValueError, IndexError, OverflowError, AttributeError, StateError) as error:
         if isinstance(error, SnapshotError):
             raise
         raise SnapshotError(f"this snapshot is not in order: {error}") from None

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from taichi_soft.checks import as_count, as_number
+from taichi_soft.checks import as_count, as_step
 from taichi_soft.errors import StateError, UnstableStepWarning
 from taichi_soft.scene import BodyDescription
 from taichi_soft.stability import StableStep, stable_step
@@ -16,9 +16,6 @@ from taichi_soft.stability import StableStep, stable_step
 if TYPE_CHECKING:
     from taichi_soft.body import Body
     from taichi_soft.pools import Pools
-
-SHORTEST_STEP, LONGEST_STEP = 1e-9, 1e4
-"""Fixed steps [s]: shorter ones are lost in float32, longer ones would take days of computing."""
 
 _PLAIN = {float, int, np.float64, type(None)}
 """Types whose values can be compared with those of the last step."""
@@ -50,13 +47,13 @@ class Substeps:
         if not self._pools.slots:
             raise StateError("the world is empty: call add_body or reserve first")
         if self._is_implicit:
-            _as_step(dt)
+            as_step(dt)
             return 1
         longest = min(asset.stable_step.recommended for asset in self._pools.kinds)
         for body in self._pools.living:
             if body._description is not body.asset.description:
                 longest = min(longest, self.stable_step(body).recommended)
-        return max(1, math.ceil(_as_step(dt) / longest))
+        return max(1, math.ceil(as_step(dt) / longest))
 
     def choose(self, dt: float, substeps: int | None) -> tuple[float, int, float]:
         """Length of a step [s], number of its substeps and their length [s], as `World.step` takes them.
@@ -70,7 +67,7 @@ class Substeps:
         return self._chosen
 
     def _check(self, dt: float, substeps: int | None) -> tuple[float, int, float]:
-        seconds = _as_step(dt)
+        seconds = as_step(dt)
         count = as_count(self.stable_count(seconds) if substeps is None else substeps, "substeps")
         h = seconds / count
         if self._is_implicit:
@@ -98,7 +95,3 @@ class Substeps:
         self._estimates = {key: step for key, step in self._estimates.items() if key in used}
         if self._asked[1:2] == (None,):  # whose number was chosen for what was there before
             self.forget()
-
-
-def _as_step(dt: float) -> float:
-    return as_number(dt, "dt", SHORTEST_STEP, LONGEST_STEP, "a number above 0 s, from 1e-9 to 1e4")

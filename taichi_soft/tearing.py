@@ -70,6 +70,14 @@ class Tears:
         tearing = body.asset.tearing
         self._limits[body.index] = 0.0 if tearing is None else tearing.stress
 
+    def rests(self, body: Body) -> bool:
+        """Whether a body that can tear has no room for it any more."""
+        return body.asset.tearing is not None and bool(self._limits[body.index] == 0.0)
+
+    def rest(self, body: Body) -> None:
+        """Look at a body no more."""
+        self._limits[body.index] = 0.0
+
     def tear(self) -> None:
         """Tear what the last step has pulled too hard."""
         find_overloaded(self._state, self._limits, self._found)
@@ -80,7 +88,7 @@ class Tears:
             try:
                 _tear(body)
             except StateError:  # no room for more copies
-                self._limits[slot] = 0.0
+                self.rest(body)
 
 
 def _tear(body: Body) -> None:

@@ -22,7 +22,7 @@ from taichi_soft.contact import DEFAULT_CONTACT, Contact
 from taichi_soft.control.access import require_substeps
 from taichi_soft.control.drives import ForceField, push_by_field, require_field, set_wind
 from taichi_soft.control.frames import Frame, Frames
-from taichi_soft.control.grabs import Grab
+from taichi_soft.control.grabs import Grab, as_pull
 from taichi_soft.control.impulses import apply_radial_impulse
 from taichi_soft.errors import FrozenBodyWarning, OptionError, StateError
 from taichi_soft.events import Event, Listener
@@ -413,6 +413,7 @@ class World(Handle):
         Raises: OptionError for numbers out of range; StateError before `build`, under schedule "flat", or
             where all grabs are in use.
         """
+        as_pull(frequency, max_force)  # also where the ray hits nothing
         hit = self.raycast(origin, direction, max_distance=max_distance)
         if hit is None:
             return None
@@ -614,7 +615,7 @@ class World(Handle):
         Bodies, colliders, frames, grabs and attachments, the wind, materials that were set, and all that is
         going to act in the coming step are in it; a force field and events are not. It holds numbers only, no
         code. The first call compiles, some seconds at most.
-        Raises: StateError before `build`, and where a body was cut or torn.
+        Raises: StateError before `build`.
         """
         return take_snapshot(self)
 

@@ -20,7 +20,7 @@ LAYERS = """
     state  integrators
     kernels
     forces  shapes
-    plain
+    plain  parts
     stability  failures  colliders  control  queries  events  cutting
     measures
     tearing  readout  substeps

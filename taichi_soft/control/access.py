@@ -27,6 +27,16 @@ def change(body: Body, kernel: Callable[..., Any], *arguments: Any) -> Any:
     return body._world._built.change(body.index, kernel, *arguments)
 
 
+def attempt(body: Body, kernel: Callable[..., Any], *arguments: Any) -> Any:
+    """The same by a kernel that may refuse: the body sleeps on until the caller knows and calls `rouse`."""
+    return body._world._built.attempt(kernel, *arguments)
+
+
+def rouse(body: Body) -> None:
+    """An attempt has changed `body`."""
+    body._world._built.rouse(body.index)
+
+
 def numbers(*values: Any) -> Rows32:
     """Numbers and vectors in a row, as kernels take them."""
     return np.concatenate([np.ravel(value) for value in values]).astype(np.float32)
@@ -36,6 +46,11 @@ def some_particles(body: Body, particles: ArrayLike | None, name: str = "particl
     """Vertex numbers of a body, ascending; None means all. Raises: OptionError, also for none at all."""
     if particles is None:
         return np.arange(body.vertex_count, dtype=np.int32)
+    return named_particles(body, particles, name)
+
+
+def named_particles(body: Body, particles: ArrayLike, name: str = "particles") -> NDArray[np.int32]:
+    """The same where they have to be named."""
     vertices = as_indices(particles, name, body.vertex_count)
     if len(vertices) == 0:
         raise OptionError(f"{name} is empty: name at least one vertex, from 0 to {body.vertex_count - 1}")

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.checks import as_flag
-from taichi_soft.control.access import change, require_substeps, rows_of, some_particles
+from taichi_soft.control.access import change, named_particles, require_substeps, rows_of
 from taichi_soft.control.frames import Frame
 from taichi_soft.errors import OptionError, StateError
 from taichi_soft.handles import Handle, recorded
@@ -79,7 +79,7 @@ class Attachment(Handle):
 def attach(body: Body, particles: ArrayLike, frame: Any, two_way: bool) -> Attachment:
     """As `Body.attach`."""
     body.require_alive()
-    vertices = some_particles(body, particles)
+    vertices = named_particles(body, particles)
     if not isinstance(frame, Frame) or frame._frames is not body._world._frames:
         raise OptionError(f"frame must come from add_frame of the same world, got {frame!r}")
     frame._require_alive()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -76,6 +76,14 @@ class Grab(Handle):
             raise StateError(f"this grab of body {self.body.index} was released: grab again")
 
 
+def as_pull(frequency: Any, max_force: Any) -> tuple[float, float | None]:
+    """Frequency [Hz] and strongest force [N] of a grab, if they can be. Raises: OptionError."""
+    hertz = as_number(frequency, "frequency", 1e-3, 1e3, "a number from 0.001 to 1000 Hz")
+    if max_force is None:
+        return hertz, None
+    return hertz, as_number(max_force, "max_force", 0.0, 1e20, "a number of 0 N or more, or None")
+
+
 def grab_at(
     body: Body,
     triangle: int,
@@ -92,11 +100,9 @@ def grab_at(
     if weights.min() < -1e-3 or abs(weights.sum() - 1) > 1e-3:
         raise OptionError(f"barycentrics must be 0 or more and add up to 1, got {weights.tolist()}")
     weights = np.maximum(weights, 0) / np.maximum(weights, 0).sum()
-    omega = 2 * np.pi * as_number(frequency, "frequency", 1e-3, 1e3, "a number from 0.001 to 1000 Hz")
-    mass = float(body.masses.sum())
-    strongest = WEIGHTS * GRAVITY_EARTH * mass
-    if max_force is not None:
-        strongest = as_number(max_force, "max_force", 0.0, 1e20, "a number of 0 N or more, or None")
+    hertz, limit = as_pull(frequency, max_force)
+    omega, mass = 2 * np.pi * hertz, float(body.masses.sum())
+    strongest = WEIGHTS * GRAVITY_EARTH * mass if limit is None else limit
     require_substeps(body._world, "grabs")
     corners = body.surface[number]
     target = weights @ body.positions()[corners].astype(np.float64)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from taichi_soft.checks import as_number, as_vector
 from taichi_soft.constants import VELOCITY_LIMIT
-from taichi_soft.control.access import change, numbers, rows_of, some_particles
+from taichi_soft.control.access import attempt, change, numbers, rouse, rows_of, some_particles
 from taichi_soft.errors import OptionError
 from taichi_soft.kernels.impulses import add_impulse_near, add_radial_impulse, add_velocity
 
@@ -39,7 +39,7 @@ def apply_impulse_at_point(body: Body, impulse: ArrayLike, point: ArrayLike, rad
     center = as_vector(point, "point", "m")
     reach = as_number(radius, "radius", 1e-9, 1e9, "a number above 0 m, from 1e-9 to 1e9")
     found = np.empty(2)
-    change(body, add_impulse_near, body.index, numbers(center, reach, momentum), found)
+    attempt(body, add_impulse_near, body.index, numbers(center, reach, momentum), found)
     nearest, speed = found.tolist()
     _require_speed(speed, "impulse")
     if nearest >= reach:
@@ -47,6 +47,7 @@ def apply_impulse_at_point(body: Body, impulse: ArrayLike, point: ArrayLike, rad
             f"point {center.tolist()} is {nearest:.4g} m from the nearest particle of body {body.index}, "
             f"beyond radius={reach:g} m: aim at the body, or reach farther"
         )
+    rouse(body)
 
 
 def apply_radial_impulse(world: World, center: ArrayLike, impulse: float, radius: float) -> None:
@@ -55,7 +56,8 @@ def apply_radial_impulse(world: World, center: ArrayLike, impulse: float, radius
     momentum = as_number(impulse, "impulse", -LARGEST_IMPULSE, LARGEST_IMPULSE)
     reach = as_number(radius, "radius", 1e-9, 1e9, "a number above 0 m, from 1e-9 to 1e9")
     row = numbers(origin, reach, momentum)
-    _require_speed(world._built.change(-1, add_radial_impulse, world.slot_count, row), "impulse")
+    _require_speed(world._built.attempt(add_radial_impulse, world.slot_count, row), "impulse")
+    world._built.rouse(-1)
 
 
 def _require_speed(speed: float, name: str) -> None:

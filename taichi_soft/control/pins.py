@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.checks import as_array
 from taichi_soft.constants import POSITION_LIMIT
-from taichi_soft.control.access import change, rows_of, some_particles
+from taichi_soft.control.access import attempt, change, named_particles, rouse, rows_of, some_particles
 from taichi_soft.control.attachments import attached_vertices, require_unattached
 from taichi_soft.errors import OptionError, StateError
 from taichi_soft.kernels.pins import free_particles, pin_particles, read_pinned, write_targets
@@ -27,7 +27,7 @@ def pinned_vertices(body: Body) -> NDArray[np.int32]:
 
 def pin(body: Body, particles: ArrayLike) -> None:
     """As `Body.pin`."""
-    vertices = some_particles(body, particles)
+    vertices = named_particles(body, particles)
     require_unattached(body, vertices)
     change(body, pin_particles, rows_of(body, vertices))
 
@@ -44,8 +44,8 @@ def unpin(body: Body, particles: ArrayLike | None) -> None:
 
 def set_targets(body: Body, particles: ArrayLike, positions: ArrayLike) -> None:
     """As `Body.set_targets`."""
+    vertices = named_particles(body, particles)
     given = np.asarray(particles)
-    vertices = some_particles(body, particles)
     if len(vertices) != len(given):
         raise OptionError(f"particles names {len(given) - len(vertices)} vertices twice: name each once")
     targets = as_array(positions, "positions", (len(given), 3), "m")
@@ -53,7 +53,8 @@ def set_targets(body: Body, particles: ArrayLike, positions: ArrayLike) -> None:
         raise OptionError(f"positions must lie within {POSITION_LIMIT:g} m of zero")
     require_unattached(body, vertices)
     order = np.argsort(given, kind="stable")
-    loose = change(body, write_targets, rows_of(body, vertices), targets[order].astype(np.float32))
+    loose = attempt(body, write_targets, rows_of(body, vertices), targets[order].astype(np.float32))
     if loose >= 0:
         raise StateError(f"vertex {vertices[loose]} of body {body.index} is not pinned: call body.pin first")
+    rouse(body)
     body._world._frames.has_work = True

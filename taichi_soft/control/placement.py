@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from taichi_soft.checks import as_flag, as_rotation, as_vector
 from taichi_soft.constants import POSITION_LIMIT, VELOCITY_LIMIT
-from taichi_soft.control.access import change, numbers, some_particles
+from taichi_soft.control.access import attempt, numbers, rouse, some_particles
 from taichi_soft.control.attachments import require_unattached
 from taichi_soft.errors import OptionError
 from taichi_soft.kernels.placement import jump, write_rigid_velocity
@@ -23,11 +23,12 @@ def set_velocity(body: Body, linear: ArrayLike, angular: ArrayLike) -> None:
     motion = numbers(
         as_vector(linear, "linear", "m/s", VELOCITY_LIMIT), as_vector(angular, "angular", "rad/s")
     )
-    fastest = change(body, write_rigid_velocity, body.index, motion)
+    fastest = attempt(body, write_rigid_velocity, body.index, motion)
     if not fastest < VELOCITY_LIMIT:
         raise OptionError(
             f"linear and angular make some vertices {fastest:.4g} m/s fast: keep below {VELOCITY_LIMIT:g} m/s"
         )
+    rouse(body)
 
 
 def teleport(body: Body, position: ArrayLike, rotation: Any, keep_velocity: bool) -> None:
@@ -38,7 +39,7 @@ def teleport(body: Body, position: ArrayLike, rotation: Any, keep_velocity: bool
     floor = body._world.settings.floor
     lowest = -np.inf if floor is None else floor
     found = np.empty(3)
-    change(body, jump, body.index, np.array([*target, lowest, float(keep)]), turn, found)
+    attempt(body, jump, body.index, np.array([*target, lowest, float(keep)]), turn, found)
     bottom, top, farthest = found.tolist()
     if not farthest < POSITION_LIMIT:
         raise OptionError(f"position puts the body beyond {POSITION_LIMIT:g} m: stay nearer the origin")
@@ -46,3 +47,4 @@ def teleport(body: Body, position: ArrayLike, rotation: Any, keep_velocity: bool
         raise OptionError(
             f"position={target.tolist()} puts the body {lowest - bottom:.4g} m below the floor: raise it"
         )
+    rouse(body)

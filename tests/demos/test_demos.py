@@ -126,6 +126,18 @@ def test_all_bodies_come_through_the_course_into_the_hollow():
     assert arrived == len(stage.actors) == 16
 
 
+def test_two_machines_with_late_inputs_are_in_the_same_state_in_every_tick():
+    """Once all inputs are known; before that each has guessed wrong, seen other states, and gone back."""
+    share, stage = run("rollback", 3.0)
+    assert share == 1.0
+    first, second = stage.act.machines
+    assert len(stage.act.settled()) == 150 - 8
+    assert stage.world is first.world is not second.world
+    for machine in (first, second):
+        assert machine.rewinds > 5
+        assert machine.wrong > 20
+
+
 @pytest.mark.parametrize("name", demo_names())
 def test_every_demo_can_be_filmed(name, tmp_path):
     stage = load_demo(name).stage()
@@ -137,7 +149,7 @@ def test_every_demo_can_be_filmed(name, tmp_path):
 def test_there_are_the_demos_of_the_readme():
     assert demo_names() == [
         *("attach", "bars", "bounce", "bowl", "cloth", "compare", "density", "dents", "grab", "many"),
-        "playground",
+        *("playground", "rollback"),
     ]
 
 
@@ -152,7 +164,7 @@ def test_every_demo_stands_above_the_floor_inside_the_picture():
         for actor in stage.actors:
             rows = actor.body.positions()
             assert rows[:, 2].min() > 0
-            pixels = stage.camera.project(rows, 1280, 720)
+            pixels = stage.camera.project(rows + actor.shift, 1280, 720)
             assert np.isfinite(pixels).all()
             assert pixels[:, :2].min() > 0
             assert (pixels[:, :2] < (1280, 720)).all()

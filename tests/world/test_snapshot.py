@@ -408,20 +408,3 @@ def test_rest_shapes_come_back(bendable):
     assert (body.plastic_strains() == bent).all()
     assert throw() == thrown
     bendable.restore(data)
-
-
-def test_no_snapshot_of_a_cut_body_but_back_to_the_whole_one(bendable):
-    body = bendable.bodies[0]
-    data, before, count = bendable.snapshot(), bendable.state_hash(), body.vertex_count
-    bendable.step(DT, SUBSTEPS)
-    expected = bendable.state_hash()
-    (fallen,) = body.cut(plane=(body.center_of_mass(), (1, 0, 0)))
-    with pytest.raises(StateError, match="was cut"):
-        bendable.snapshot()
-    bendable.step(DT, SUBSTEPS)
-    bendable.restore(data)
-    assert (body.is_cut, body.vertex_count, fallen.is_alive) == (False, count, False)
-    assert bendable.state_hash() == before
-    bendable.step(DT, SUBSTEPS)
-    assert bendable.state_hash() == expected
-    bendable.restore(data)

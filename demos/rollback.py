@@ -1,0 +1,174 @@
+"""Two machines play one game: each sees the other's inputs late, goes back, and makes the steps again."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from engine_adapter import FixedStep, Rollback
+from taichi_soft import BoxShape, Contact, Material, World, box, sphere
+from taichi_soft.cli import main
+from taichi_soft.constants import GRAVITY_EARTH
+from taichi_soft.film import Actor, Stage
+from taichi_soft.render import PALETTE, Camera
+from taichi_soft.scenery import Prop
+
+MATERIAL = Material(young=1.0e5, poisson=0.3, density=300.0, damping=30.0)
+CONTACT = Contact(friction=0.3)
+ROOM, WALL, HEIGHT = 4.0, 0.12, 0.5  # width of the arena, thickness and height of its walls [m]
+BESIDE = np.array([ROOM + 0.9, 0.0, 0.0])  # where the second machine's picture is drawn [m]
+LATE = 8  # ticks that an input takes to the other machine
+PUSH, JUMP = 0.75 * GRAVITY_EARTH, 1.6  # [m/s^2], [m/s]
+STEP = FixedStep(dt=1 / 50, substeps=16)
+
+Keys = tuple[float, float, float]
+"""What a player presses in a tick: where to, (2,), and whether to jump, 0 or 1."""
+
+
+def make_world() -> World:
+    """An arena with the two players' bodies in it, and four loose ones."""
+    world = World(soft_contact=True, friction=0.3)
+    reach = (ROOM + WALL) / 2
+    for x, y in ((-1, 0), (1, 0), (0, -1), (0, 1)):
+        size = (WALL if x else ROOM + 2 * WALL, WALL if y else ROOM, HEIGHT)
+        world.add_collider(BoxShape(size), position=(x * reach, y * reach, HEIGHT / 2))
+    cube, ball = box((0.7, 0.7, 0.7), (3, 3, 3)), sphere(0.25, 2)
+    for x in (-1.2, 1.2):
+        world.add_body(cube, MATERIAL, position=(x, 0.0, 0.352), contact=CONTACT)
+    for x, y in ((0.0, 1.0), (0.0, -1.0), (0.1, 0.1), (-0.4, 1.5)):
+        world.add_body(ball, MATERIAL, position=(x, y, 0.252), contact=CONTACT)
+    world.build()
+    for body in world.bodies:
+        body.set_linear_damping(0.5)
+    return world
+
+
+@dataclass
+class Machine:
+    """One player's computer: a world, all inputs that it knows, and guesses for those it does not."""
+
+    player: int
+    world: World
+    known: dict[tuple[int, int], Keys] = field(default_factory=dict)  # by tick and player
+    used: dict[int, tuple[Keys, Keys]] = field(default_factory=dict)  # by tick
+    names: dict[int, str] = field(default_factory=dict)  # hashes of the states before each tick
+    rewinds: int = 0
+    wrong: int = 0  # ticks that were made again and came out differently
+
+    def __post_init__(self) -> None:
+        self.rollback = Rollback(self.world, LATE + 1)
+
+    def press(self) -> None:
+        """What the player presses in this tick, given the picture: a chase, with a jump now and then."""
+        tick, me = self.world.step_count, self.player
+        x, y, _ = self._keys(tick, me)
+        if tick % (17 + 6 * me) == 0:
+            turn = tick // (17 + 6 * me)
+            goal = 1 if me == 0 and turn % 3 else 2 + turn % 4  # now at the other, now at what lies about
+            way = (self.world.bodies[goal].center_of_mass() - self.world.bodies[me].center_of_mass())[:2]
+            x, y = (way / max(float(np.linalg.norm(way)), 1e-3)).tolist()
+        self.known[tick, me] = (x, y, float(tick % (61 + 12 * me) == 40))
+
+    def receive(self, tick: int, keys: Keys) -> None:
+        """Learn what the other has pressed, and make the ticks since again where the guess was wrong."""
+        self.known[tick, 1 - self.player] = keys
+        if self.used[tick][1 - self.player] == keys:
+            return
+        now = self.world.step_count
+        self.rollback.rewind_to(tick)
+        self.rewinds += 1
+        while self.world.step_count < now:
+            self.begin_tick()
+            self.world.step(STEP.dt, STEP.substeps)
+
+    def begin_tick(self) -> None:
+        """Keep the state, and do what the players press."""
+        tick = self.world.step_count
+        self.rollback.save()
+        name = self.world.state_hash()
+        self.wrong += self.names.get(tick, name) != name
+        self.names[tick] = name
+        self.used[tick] = (self._keys(tick, 0), self._keys(tick, 1))
+        for body, (x, y, jumps) in zip(self.world.bodies, self.used[tick], strict=False):
+            mass = float(body.masses.sum())
+            body.apply_force((mass * PUSH * x, mass * PUSH * y, 0.0))
+            if jumps:
+                body.apply_impulse((0.0, 0.0, mass * JUMP))
+
+    def _keys(self, tick: int, player: int) -> Keys:
+        """What is known, or the guess that the other still presses what was last heard of."""
+        if (tick, player) in self.known:
+            return self.known[tick, player]
+        x, y, _ = self.known.get((tick - 1, player)) or self.used.get(tick - 1, (_NONE, _NONE))[player]
+        return x, y, 0.0
+
+
+_NONE: Keys = (0.0, 0.0, 0.0)
+
+
+class Match:
+    """Both machines, and the slow line between them."""
+
+    def __init__(self, worlds: tuple[World, World]) -> None:
+        """Before the first tick."""
+        self.machines = [Machine(player, world) for player, world in enumerate(worlds)]
+
+    def __call__(self, world: World) -> None:
+        """Before a step of the first world: all that both do in a tick, but that step."""
+        tick = world.step_count
+        for machine in self.machines:
+            if tick >= LATE:
+                other = self.machines[1 - machine.player]
+                machine.receive(tick - LATE, other.known[tick - LATE, other.player])
+            machine.press()
+            machine.begin_tick()
+        second = self.machines[1].world
+        second.step(STEP.dt, STEP.substeps)
+
+    def settled(self) -> list[int]:
+        """Ticks before which both know all inputs."""
+        return sorted(self.machines[0].names)[: -LATE or None]
+
+    def agreed(self) -> int:
+        """How many of them both machines have begun in the same state, bit by bit."""
+        first, second = (machine.names for machine in self.machines)
+        return sum(first[tick] == second[tick] for tick in self.settled())
+
+    def caption(self) -> str:
+        """For the picture."""
+        rewinds = sum(machine.rewinds for machine in self.machines)
+        return (
+            f"inputs arrive {LATE} ticks late: {rewinds} rollbacks; {self.agreed()} of {len(self.settled())} "
+            "hashes agree"
+        )
+
+
+def stage() -> Stage:
+    """The first machine's world, and beside it the second one's."""
+    first, second = make_world(), make_world()
+    match = Match((first, second))
+    colors = [PALETTE[0], PALETTE[1], *[PALETTE[2]] * 4]
+    actors = [Actor(body, color) for body, color in zip(first.bodies, colors, strict=True)]
+    actors += [
+        Actor(body, color, world=second, shift=BESIDE)
+        for body, color in zip(second.bodies, colors, strict=True)
+    ]
+    walls = [each for each in second.colliders if each is not second.floor_collider]
+    props = [Prop((wall.shape.surface()[0] + BESIDE, wall.shape.surface()[1]), wall) for wall in walls]
+    camera = Camera.framing(
+        (-2.2, -2.2, 0.0), (BESIDE[0] + 2.2, 2.2, 1.0), aspect=16 / 9, azimuth=-90, elevation=50
+    )
+    title = "one game on two machines: the red player's, and the green one's"
+    return Stage(title, first, actors, camera, STEP, 10.0, act=match, props=props, caption=match.caption)
+
+
+def proof(stage: Stage) -> float:
+    """Share of the settled ticks that both machines have begun in the same state; 0 without a rollback."""
+    match = stage.act
+    assert isinstance(match, Match)
+    if not all(machine.rewinds and machine.wrong for machine in match.machines):
+        return 0.0
+    return match.agreed() / len(match.settled())
+
+
+if __name__ == "__main__":
+    main("demo", "rollback")
