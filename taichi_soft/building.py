@@ -105,7 +105,7 @@ def _add_floor(world: World) -> None:
             PlaneShape(),
             position=(0.0, 0.0, settings.floor),
             friction=settings.friction,
-            restitution=settings.restitution,
+            restitution=settings.restitution or None,
         )
 
 
@@ -155,6 +155,7 @@ def _fill(world: World, state: State, program: Program) -> None:
         fill(state.body_plasticity, np.array(flows))
     if program.has_contact:
         fill(state.contact.body_filter, np.array([(a.contact.group, a.contact.mask) for a in assets]))
+        fill(state.contact.body_edge, np.array([a.surface_row[2] for a in assets]))
     if program.has_soft_contact:
         fill(state.soft.body_surface, np.array([a.surface_row for a in assets]))
         fill(state.soft.body_touches_itself, np.array([a.contact.itself for a in assets]))

@@ -306,7 +306,7 @@ def drop_test(
     first: Annotated[int, typer.Option(min=0, help="Number of the first case: repeats it alone.")] = 0,
     law: Annotated[str, typer.Option(help="Force law.")] = "virial",
     flips: Annotated[
-        str | None, typer.Option(help="tolerant, recover or off; the law's own by default.")
+        str | None, typer.Option(help="tolerant, recover or off; recover by default, where the law takes it.")
     ] = None,
     worst: Annotated[int, typer.Option(min=0, help="Failed cases to list of each kind.")] = 5,
     as_json: AsJson = False,
@@ -321,7 +321,11 @@ def drop_test(
     with Progress(*columns, console=errors, disable=not errors.is_terminal) as progress:
         numbers = range(first, first + cases)
         chosen = [make_case(seed, n, law, flips) for n in progress.track(numbers, description="making")]
-        outcomes = list(progress.track(run_cases(chosen), total=cases, description="dropping"))
+        outcomes = []
+        for outcome in progress.track(run_cases(chosen), total=cases, description="dropping"):
+            outcomes.append(outcome)
+            if not errors.is_terminal and len(outcomes) % 50 == 0:
+                errors.print(f"{len(outcomes)} of {cases} cases")
     summary = Summary(tuple(outcomes))
     if as_json:
         print(json.dumps(summary.rows(), indent=2))

@@ -31,7 +31,7 @@ class ColliderRow:
 
     shape: Shape
     friction: float
-    restitution: float
+    restitution: float  # -1 for that of the bodies
     thickness: float
     group: int
     mask: int
@@ -186,7 +186,7 @@ class Colliders:
         position: ArrayLike,
         rotation: ArrayLike | None,
         friction: float,
-        restitution: float,
+        restitution: float | None,
         thickness: float,
         group: int,
         mask: int,
@@ -198,7 +198,9 @@ class Colliders:
         row = ColliderRow(
             shape,
             as_number(friction, "friction", 0.0, 1e6, "a number from 0 to 1,000,000"),
-            as_number(restitution, "restitution", 0.0, 1.0, "a number from 0 to 1"),
+            -1.0
+            if restitution is None
+            else as_number(restitution, "restitution", 0.0, 1.0, "a number from 0 to 1"),
             as_number(thickness, "thickness", 0.0, 1e3, "a length of 0 to 1000 m"),
             as_count(group, "group", 0, ALL_GROUPS),
             as_count(mask, "mask", 0, ALL_GROUPS),

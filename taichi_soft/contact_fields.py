@@ -63,6 +63,12 @@ class ContactFields:
         self.gone = ti.field(ti.f32, bodies)  # way [m] since it was looked which are near, at most
         self.impulse = ti.Vector.field(3, ti.f32, bodies * c)  # on the collider in this step [N s]
         self.angular_impulse = ti.Vector.field(3, ti.f32, bodies * c)  # about its position [N m s]
+        self.press = ti.Vector.field(3, ti.f32, bodies * c)  # on the body in this substep [N s]
+        # Of the presses of its particles: their sum [N s], and those times the speed along the normal with
+        # which the surface came, and with which particle and surface came together [N].
+        self.press_rates = ti.Vector.field(3, ti.f32, bodies * c)
+        self.rebound = ti.field(ti.f32, bodies * c)  # speed at which the body may leave [m/s]; 0 where apart
+        self.prev_rebound = ti.field(ti.f32, bodies * c)  # before the step
         # Corners of a box [m]: of the way through a step, of the search in an island, or where a body sleeps.
         self.body_lower = ti.Vector.field(3, ti.f32, bodies)
         self.body_upper = ti.Vector.field(3, ti.f32, bodies)
@@ -70,6 +76,8 @@ class ContactFields:
         self.calm = ti.field(ti.f32, bodies)  # time since a body was faster [s]
         self.is_wild = ti.field(ti.i32, bodies)  # 1 where it flies apart, and must not take others with it
         self.body_filter = ti.Vector.field(2, ti.i32, bodies)  # group, mask
+        self.body_edge = ti.field(ti.f32, bodies)  # mean edge of its surface [m]
+        self.prev_reaction = ti.Vector.field(3, ti.f32, particles)  # `particle_reaction` before the step
         self.particle_clearance = ti.field(ti.f32, particles)  # [m] from all that is near, at that time
         self.particle_touches = ti.field(ti.i32, particles)  # 1 where something held it in the last substep
 

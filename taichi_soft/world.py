@@ -66,7 +66,8 @@ class World(Handle):
         gravity: (3,) [m/s^2].
         floor: height of a horizontal floor [m], or None for none.
         restitution: of the floor, 0 (default: bodies bounce by their own elasticity) to 1. It throws each
-            vertex back by itself, so a damped body may well bounce lower with it than without.
+            vertex back by itself, so a damped body may well bounce lower with it than without. With colliders
+            or contact between bodies in the world it limits bodies too, as in `add_collider`.
         friction: Coulomb coefficient of the floor, 0 or more.
         integrator: "leapfrog", "lazy_leapfrog", "explicit_euler", or "implicit_euler": stable for every step,
             at the price of a linear solve in each and of damping that grows with its length. A step in which
@@ -278,7 +279,7 @@ class World(Handle):
         position: ArrayLike = (0.0, 0.0, 0.0),
         rotation: ArrayLike | None = None,
         friction: float = 0.5,
-        restitution: float = 0.0,
+        restitution: float | None = None,
         thickness: float = 0.0,
         group: int = 1,
         mask: int = ALL_GROUPS,
@@ -291,7 +292,9 @@ class World(Handle):
             position: of its origin, (3,) [m].
             rotation: matrix (3, 3) or quaternion (x, y, z, w).
             friction: Coulomb coefficient, 0 or more.
-            restitution: 0 to 1, of each vertex that hits it.
+            restitution: 0 to 1: speed with which a body's centre of mass leaves it, over that with which it
+                came near, for what comes faster than half a metre per second; no more than the body's own
+                elasticity gives. None leaves bodies that elasticity.
             thickness: of a skin on it [m].
             group, mask: bits. A body and a collider touch where each one's mask has a bit of the other's
                 group.
@@ -356,7 +359,8 @@ class World(Handle):
         """Make one fixed step of `dt` [s] in `substeps` equal substeps; None chooses their number.
 
         A body that goes non-finite is put back to where it was before the step and frozen, with a
-        `FrozenBodyWarning` and `body.failure`; the other bodies go on.
+        `FrozenBodyWarning` and `body.failure`; the other bodies go on. Among colliders, and where bodies may
+        touch, it and what it may touch first make the step again with up to eight times the substeps.
         Raises: OptionError if dt is not a positive number or substeps not a positive whole one;
             StateError before `build`.
         """

@@ -14,11 +14,11 @@ def resolved_velocity(v, normal, surface_velocity, friction, restitution):
         surface_velocity: of the surface at the contact [m/s].
         friction: coefficient, 0 or more. What the surface takes from the normal velocity bounds what it may
             take from the tangential one.
-        restitution: 0 to 1, for impacts faster than `RESTITUTION_SPEED`.
+        restitution: 0 to 1, for impacts faster than `RESTITUTION_SPEED`; below 0 as 0.
     """
     relative = v - surface_velocity
     approach = -relative.dot(normal)
-    bounce = ti.select(approach > RESTITUTION_SPEED, restitution, 0.0)
+    bounce = ti.select(approach > RESTITUTION_SPEED, ti.max(restitution, 0.0), 0.0)
     impulse = ti.max(approach, 0.0) * (1.0 + bounce)
     sliding = relative + approach * normal
     slide = sliding.norm()

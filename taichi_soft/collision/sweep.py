@@ -64,7 +64,8 @@ def first_touch(contact: ti.template(), c, start, end, slack):
             step = ti.max(ti.abs(distance) / length, 1.0 / MOST_MARCHES)
             if is_convex:
                 step = ti.max(distance / ti.max(-climb, 1e-30), 1.0 / MOST_MARCHES / MOST_MARCHES)
-            part += step
-            if not (part <= 1.0):
+            if part == 1.0:
                 part, is_open = NEVER, 0
+            else:
+                part = ti.min(part + step, 1.0)  # the end is looked at too, or a last step might go beneath
     return part, distance, beyond, normal

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from taichi_soft import Material, TetMesh, box, cylinder, element_model, sphere, stable_step, torus
 from taichi_soft.constants import GRAVITY_EARTH
 from taichi_soft.drops.course import HALF, Solid, make_course, random_rotation
+from taichi_soft.laws import LAWS
+from taichi_soft.types import Flips
 
 Floats = NDArray[np.float64]
 
@@ -53,6 +55,11 @@ class Case:
     substeps: int  # of a step of 1/60 s
 
     @property
+    def unit_time(self) -> float:
+        """In which the body falls half its size [s]."""
+        return math.sqrt(self.size / GRAVITY_EARTH)
+
+    @property
     def mach(self) -> float:
         """Speed over that of sound in the body: above 1 nothing but its mass resists an impact."""
         wave = math.sqrt(float(np.max(self.material.young / self.material.density)))
@@ -62,21 +69,25 @@ class Case:
         speed = np.linalg.norm(self.velocity)
         solids = ", ".join(solid.name for solid in self.course if solid.name not in ("wall", "lid"))
         first = self.course[0]
+        restitution = "its own" if first.restitution is None else f"{first.restitution:.2f}"
         return (
             f"{self.shape} {self.size:.3g} m, E {self.material.young:.2g} Pa, "
             f"{self.material.density:.0f} kg/m^3, nu {self.material.poisson:.2f}, "
             f"{speed:.1f} m/s (Mach {self.mach:.2f}), friction {first.friction:.2f}, "
-            f"restitution {first.restitution:.2f}; {solids}"
+            f"restitution {restitution}; {solids}"
         )
 
 
 def make_case(seed: int, number: int, law: str = "virial", flips: str | None = None) -> Case:
-    """Case `number` of `seed`, by a law and its treatment of flips.
+    """Case `number` of `seed`, by a law and its treatment of flips: "recover" where none is given and the law
+    lets one choose.
 
     Damping b of an edge is a share of 0.1 to 0.5, evenly, of l^2 sqrt(E density), l being the mean edge:
     about that share of critical damping for the fastest vibrations; for the slowest, of wave length L, l/L
     of it.
     """
+    if flips is None and law in LAWS and Flips.RECOVER in LAWS[law].flips:
+        flips = Flips.RECOVER.value
     rng = np.random.default_rng([seed, number])
     shape = SHAPES[number % len(SHAPES)]
     size = float(np.exp(rng.uniform(np.log(SMALLEST), np.log(LARGEST))))

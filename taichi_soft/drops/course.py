@@ -48,7 +48,7 @@ class Solid:
     position: Floats
     rotation: Floats  # (3, 3)
     friction: float
-    restitution: float
+    restitution: float | None
 
     def depth(self, points: Floats) -> float:
         """How deep inside the deepest of the points (n, 3) lies [m]; negative outside."""
@@ -63,9 +63,10 @@ def random_rotation(rng: np.random.Generator) -> Floats:
 
 
 def make_course(rng: np.random.Generator, size: float) -> tuple[Solid, ...]:
-    """A room of 6 x 6 x 8 sizes of the body [m], and one to four solids in its lower half."""
+    """A room of 6 x 6 x 8 sizes of the body [m], and one to four solids in its lower half. Every other course
+    leaves bodies their own restitution."""
     friction, restitution = rng.uniform(0.2, 1.0), rng.choice([0.0, rng.uniform(0.0, 0.9)])
-    surface = {"friction": float(friction), "restitution": float(restitution)}
+    surface = {"friction": float(friction), "restitution": float(restitution) or None}
     room = [_floor(rng, size, surface), *_walls(rng, size, surface)]
     return (*room, *(_obstacle(rng, size, surface) for _ in range(rng.integers(1, 5))))
 
@@ -86,7 +87,7 @@ def _solid(  # type: ignore[no-untyped-def]
     )
 
 
-def _floor(rng: np.random.Generator, size: float, surface: dict[str, float]) -> Solid:
+def _floor(rng: np.random.Generator, size: float, surface: dict[str, float | None]) -> Solid:
     on = 1e-4 + 1e-3 * size
     kind = rng.choice(["plane", "slab", "tilted plane", "height field"], p=[0.3, 0.2, 0.25, 0.25])
     if kind == "slab":
@@ -112,7 +113,7 @@ def _thickness(rng: np.random.Generator, size: float) -> float:
     return float(rng.choice([THINNEST, max(THINNEST, rng.uniform(0.0, 0.5) * size)]))
 
 
-def _walls(rng: np.random.Generator, size: float, surface: dict[str, float]) -> list[Solid]:
+def _walls(rng: np.random.Generator, size: float, surface: dict[str, float | None]) -> list[Solid]:
     thick, on = _thickness(rng, size), 1e-4 + 1e-3 * size
     wide, tall = 2 * HALF * size + 2 * thick, (HEIGHT + BELOW) * size
     middle = (HEIGHT - BELOW) / 2 * size
@@ -131,7 +132,7 @@ def _walls(rng: np.random.Generator, size: float, surface: dict[str, float]) -> 
     return [*walls, _solid("lid", BoxShape(edges), below, on, surface, True, place)]
 
 
-def _obstacle(rng: np.random.Generator, size: float, surface: dict[str, float]) -> Solid:
+def _obstacle(rng: np.random.Generator, size: float, surface: dict[str, float | None]) -> Solid:
     kind = rng.choice(["box", "sphere", "capsule", "mesh"])
     on = 1e-4 + 1e-2 * size
     place = size * np.array([*rng.uniform(-2.0, 2.0, 2), rng.uniform(0.0, 3.0)])

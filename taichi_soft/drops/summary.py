@@ -9,12 +9,19 @@ from typing import Any
 import numpy as np
 
 from taichi_soft.drops.outcome import FAULTS, Outcome
-from taichi_soft.drops.trial import BRAKE, CALM_SPEED, CALM_TIME, FREE_TIME, PATIENCE
+from taichi_soft.drops.trial import (
+    BRAKE,
+    CALM_SPEED,
+    CALM_TIME,
+    FREE_TIME,
+    LEAST_CALM_SPEED,
+    PATIENCE,
+)
 
 CRITERION = (
-    f"at rest: slower than {CALM_SPEED:g} sizes per second (root mean square over vertices) for "
-    f"{CALM_TIME:g} s, within {PATIENCE:g} s; from {FREE_TIME:g} s on velocities fade at "
-    f"{BRAKE:g} /s, or balls would roll on"
+    f"at rest: slower than {CALM_SPEED:g} sizes per second or {LEAST_CALM_SPEED * 1000:g} mm/s (root mean "
+    f"square over vertices) for {CALM_TIME:g} s, within {PATIENCE:g} T, T = sqrt(size / g) being 0.07 "
+    f"to 1 s; after {FREE_TIME:g} T velocities fade at {BRAKE:g} / T, or balls would roll on"
 )
 
 

@@ -22,15 +22,17 @@ PER_SHAPE = 6
 MOST_COLLIDERS, MOST_SAMPLES = 512, 1 << 20
 """Of a world, always the same, so that all worlds share kernels."""
 
-CALM_SPEED, CALM_TIME = 0.01, 0.5
-"""At rest is what was slower than this (root mean square over vertices, in sizes per second) so long [s]."""
+CALM_SPEED, LEAST_CALM_SPEED, CALM_TIME = 0.01, 0.005, 0.5
+"""At rest is what was slower than this (root mean square over vertices, in sizes per second) so long [s]. For
+what is smaller than half a metre the second counts [m/s], half of the speed at which Box2D's bodies fall
+asleep: a small ball in a corner goes on rocking from facet to facet at some mm/s."""
 
-PATIENCE = 20.0
-"""Time in which a body must have come to rest [s]."""
+PATIENCE = 150.0
+"""Time in which a body must have come to rest, in that in which it falls half its size: sqrt(size / g)."""
 
-FREE_TIME, BRAKE = 5.0, 1.0
-"""After so long [s] all velocities fade at this rate [1/s]: a stiff ball on a plane would roll for minutes.
-What shakes by itself goes on shaking."""
+FREE_TIME, BRAKE = 20.0, 0.2
+"""After so long all velocities fade at this rate, in the same unit: a stiff ball on a plane would roll for
+minutes. What shakes by itself goes on shaking, and what slides down a slope goes on sliding."""
 
 
 def run_cases(cases: Iterable[Case]) -> Iterator[Outcome]:
@@ -64,7 +66,8 @@ class _Run:
         now = self.body.positions()
         ways = np.linalg.norm(now - self.before, axis=1).astype(np.float64)
         self.speed = float(np.sqrt((ways**2).mean())) * STEPS_PER_SECOND / self.case.size
-        self.calm = self.calm + 1 if self.speed < CALM_SPEED else 0
+        is_calm = self.speed < max(CALM_SPEED, LEAST_CALM_SPEED / self.case.size)
+        self.calm = self.calm + 1 if is_calm else 0
         self.before = now
         outer = now[self.outer].astype(np.float64)
         for solid in self.case.course:
@@ -98,14 +101,14 @@ def _run_batch(batch: list[Case]) -> Iterator[Outcome]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FrozenBodyWarning)
         while runs:
-            if world.step_count == round(FREE_TIME * STEPS_PER_SECOND):
-                for run in runs:
-                    run.body.set_linear_damping(BRAKE)
+            for run in runs:
+                if world.step_count == round(FREE_TIME * run.case.unit_time * STEPS_PER_SECOND):
+                    run.body.set_linear_damping(BRAKE / run.case.unit_time)
             world.step(1 / STEPS_PER_SECOND, count)
             for run in list(runs):
                 run.note_step()
                 is_at_rest = run.calm >= CALM_TIME * STEPS_PER_SECOND and not run.body.is_frozen
-                if is_at_rest or run.body.is_frozen or world.time >= PATIENCE:
+                if is_at_rest or run.body.is_frozen or world.time >= PATIENCE * run.case.unit_time:
                     yield run.outcome(world.time, is_at_rest=is_at_rest)
                     world.despawn(run.body)
                     runs.remove(run)

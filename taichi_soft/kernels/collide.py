@@ -3,6 +3,7 @@
 from taichi_soft.collision.response import resolved_velocity
 from taichi_soft.collision.sweep import NEVER, TOUCHING, distance_from, first_touch
 from taichi_soft.contact_fields import NO_COLLIDER
+from taichi_soft.kernels.rebound import add_press
 from taichi_soft.math.quaternion import spun, turned, turned_back
 from taichi_soft.runtime import ti
 
@@ -65,6 +66,8 @@ def forget_contacts(state: ti.template(), body):
     for row in range(body * state.contact.capacity.colliders, (body + 1) * state.contact.capacity.colliders):
         state.contact.impulse[row] = ti.Vector.zero(ti.f32, 3)
         state.contact.angular_impulse[row] = ti.Vector.zero(ti.f32, 3)
+        state.contact.press[row] = ti.Vector.zero(ti.f32, 3)
+        state.contact.press_rates[row] = ti.Vector.zero(ti.f32, 3)
     state.contact.reach[body] = -1.0
     state.contact.gone[body] = 0.0
 
@@ -128,6 +131,8 @@ def collided(
                 is_open = 0
             mass = 1.0 / ti.max(state.particle_inv_mass[p], 1e-30)
             impulse = -mass * push
+            if surface.y >= 0.0:
+                add_press(state.contact, row + c, -n.dot(impulse), n, n.dot(v), n.dot(surface_velocity))
             # With what the shift of the path, which v takes no part in, does to the angular momentum.
             angular_impulse = (end - centre).cross(impulse) - mass * (end - x1).cross(v)
             state.contact.impulse[row + c] = state.contact.impulse[row + c] + impulse

@@ -2,27 +2,40 @@
 
 A substep goes in the order velocity, joints, contact, position: contact takes velocities away before they
 move anything, and what it changes of joints they make good in the next substep.
+
+Substeps are chosen for small deformation; an impact faster than sound flattens tetrahedra, which are stiffer
+then. Where a step ends non-finite, or forces moved a particle by more than `JOLT` edges at once, the island
+is put back to where it was, and makes the step again with twice as many substeps, up to `MOST_FINER` times
+as many.
 """
 
 from taichi_soft.kernels.collide import collided, find_near_colliders, forget_contacts
 from taichi_soft.kernels.drives import add_reactions, blow_on, push_particles
 from taichi_soft.kernels.grabs import pull_grabs
-from taichi_soft.kernels.internal_forces import accumulate_forces
+from taichi_soft.kernels.internal_forces import accumulate_forces, clear_forces
 from taichi_soft.kernels.islands import find_islands
 from taichi_soft.kernels.joints import solve_joints
-from taichi_soft.kernels.motion import gravity_on, remember_particle
-from taichi_soft.kernels.per_body import before_kick, end_body
+from taichi_soft.kernels.motion import gravity_on, remember_particle, restore_particle
+from taichi_soft.kernels.per_body import before_kick, body_is_sound, end_body
+from taichi_soft.kernels.rebound import begin_rebounds, limit_rebounds, take_back_rebounds
 from taichi_soft.kernels.sleep import note_motion, settle_island, wake_by_colliders, wake_island
 from taichi_soft.kernels.soft_contact import solve_island
 from taichi_soft.kernels.soft_search import find_box, is_social, island_margin, search_body, search_island
-from taichi_soft.kernels.touches import add_touches
+from taichi_soft.kernels.touches import add_touches, forget_touches
 from taichi_soft.runtime import ti
-from taichi_soft.state import ABSENT, ACTIVE
+from taichi_soft.state import ABSENT, ACTIVE, FEELS_REACTION
 from taichi_soft.types import Integrator
 
 WILD = 20.0
 """Way of a particle within one substep, over the mean edge of its body's surface, from which the body is
 taken to be exploding: others pass through it until it is frozen or calm."""
+
+JOLT = 1.0
+"""Way by which the forces of one substep may move a particle within it, over the mean edge of its body's
+surface. Vibrations of a stable substep stay below it."""
+
+MOST_FINER = 8
+"""Times as many substeps as asked for, at most."""
 
 
 @ti.func
@@ -31,19 +44,52 @@ def _begin_body(state: ti.template(), body):
         particles = state.body_particles[body]
         for p in range(particles[0], particles[1]):
             remember_particle(state, p)
+        if state.body_drives[body] & FEELS_REACTION != 0:
+            for p in range(particles[0], particles[1]):
+                state.contact.prev_reaction[p] = state.particle_reaction[p]
+        begin_rebounds(state, body)
         forget_contacts(state, body)
         state.contact.is_wild[body] = 0
+
+
+@ti.func
+def _take_back(state: ti.template(), program: ti.template(), island):
+    """Put an island back to where it was before the step."""
+    for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
+        body = state.contact.island_body[i]
+        particles = state.body_particles[body]
+        for p in range(particles[0], particles[1]):
+            restore_particle(state, p)
+            if state.body_drives[body] & FEELS_REACTION != 0:
+                state.particle_reaction[p] = state.contact.prev_reaction[p]
+        clear_forces(state, body)
+        take_back_rebounds(state, body)
+        forget_contacts(state, body)
+    if ti.static(program.has_soft_contact):
+        forget_touches(state, island)
+
+
+@ti.func
+def _island_is_sound(state: ti.template(), island):
+    """Whether all that moves in an island can still be computed with (1)."""
+    sound = 1
+    for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
+        body = state.contact.island_body[i]
+        if state.body_status[body] == ACTIVE:
+            sound = sound & body_is_sound(state, body)
+    return sound
 
 
 @ti.func
 def _kick_body(state: ti.template(), program: ti.template(), body, kick, common):
     """New velocities from the forces, which are cleared.
 
-    Returns: the highest speed [m/s], and the highest beside the `common` velocity.
+    Returns: the highest speed [m/s], the highest beside the `common` velocity, and the largest change.
     """
     particles = state.body_particles[body]
     gravity = gravity_on(state, body)
     highest, highest_beside = ti.cast(0.0, state.real), ti.cast(0.0, state.real)
+    largest = ti.cast(0.0, state.real)
     for p in range(particles[0], particles[1]):
         inv_mass = state.particle_inv_mass[p]
         acceleration = state.particle_force[p].xyz * inv_mass + gravity
@@ -57,7 +103,8 @@ def _kick_body(state: ti.template(), program: ti.template(), body, kick, common)
         highest = ti.max(highest, v.dot(v))
         beside = v - common
         highest_beside = ti.max(highest_beside, beside.dot(beside))
-    return ti.sqrt(highest), ti.sqrt(highest_beside)
+        largest = ti.max(largest, acceleration.dot(acceleration))
+    return ti.sqrt(highest), ti.sqrt(highest_beside), kick * ti.sqrt(largest)
 
 
 @ti.func
@@ -118,12 +165,13 @@ def _common_velocity(state: ti.template(), island):
 
 
 @ti.func
-def _move_island(state: ti.template(), program: ti.template(), island, substeps, h):
-    """All substeps of an island that is awake. Returns how many of its bodies failed."""
+def _move_island(state: ti.template(), program: ti.template(), island, substeps, h, age):
+    """All substeps of an island that is awake, from `age` [m] of way since candidates were looked for.
+
+    Returns: whether forces moved no particle too far at once (1).
+    """
     first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
-    for i in range(first, last):
-        _begin_body(state, state.contact.island_body[i])
-    reach, gone = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32)
+    reach, gone, is_gentle = ti.cast(0.0, ti.f32), age, 1
     common = ti.Vector.zero(ti.f32, 3)
     if ti.static(program.has_soft_contact):
         reach, _ = island_margin(state, island)
@@ -143,11 +191,12 @@ def _move_island(state: ti.template(), program: ti.template(), island, substeps,
                 accumulate_forces(state, program, body)
                 add_reactions(state, body, lasting)
                 pull_grabs(state, body, h, lasting)
-                speed, speed_beside = _kick_body(state, program, body, kick, common)
+                speed, speed_beside, change = _kick_body(state, program, body, kick, common)
+                edge = state.contact.body_edge[body]
+                is_gentle = is_gentle & int(change * h <= JOLT * edge)
                 state.contact.is_wild[body] = 0
                 if ti.static(program.has_soft_contact):
-                    far = WILD * state.soft.body_surface[body].z
-                    state.contact.is_wild[body] = int(not (speed * h <= far))
+                    state.contact.is_wild[body] = int(not (speed * h <= WILD * edge))
                 fastest = ti.max(fastest, speed)
                 if state.contact.is_wild[body] == 0:  # or the others' candidates would age by its speed
                     fastest_beside = ti.max(fastest_beside, speed_beside)
@@ -168,14 +217,35 @@ def _move_island(state: ti.template(), program: ti.template(), island, substeps,
                 state.contact.gone[body] = way
                 speed, speed_beside = _drift_body(state, body, h, s * h, common)
                 note_motion(state, body, speed)
+                limit_rebounds(state, body, (s + 1) * h)
                 if state.contact.is_wild[body] == 0:
                     farthest = ti.max(farthest, speed_beside)
         gone += 2.0 * h * farthest
+    return is_gentle
+
+
+@ti.func
+def _step_awake_island(state: ti.template(), program: ti.template(), island, substeps, h):
+    """One fixed step of an island, as fine as it needs. Returns how many of its bodies failed."""
+    first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
+    for i in range(first, last):
+        _begin_body(state, state.contact.island_body[i])
+    finer, is_open, age = 1, 1, ti.cast(0.0, ti.f32)
+    while is_open == 1:
+        is_gentle = _move_island(state, program, island, finer * substeps, h / finer, age)
+        if finer == MOST_FINER or (is_gentle & _island_is_sound(state, island)) == 1:
+            is_open = 0
+        else:
+            _take_back(state, program, island)
+            finer *= 2
+            age = 1e30  # the candidates are those of where it went
     failed = 0
     for i in range(first, last):
         body = state.contact.island_body[i]
         if state.body_status[body] == ACTIVE:
-            failed += end_body(state, program, body, substeps, h)
+            if end_body(state, program, body, finer * substeps, h / finer) == 1:
+                forget_contacts(state, body)  # it was put back: nothing has touched it
+                failed += 1
     return failed
 
 
@@ -184,7 +254,7 @@ def _step_island(state: ti.template(), program: ti.template(), island, substeps,
     """One fixed step of one island. Returns how many of its bodies failed."""
     failed = 0
     if wake_island(state, island) == 1:
-        failed = _move_island(state, program, island, substeps, h)
+        failed = _step_awake_island(state, program, island, substeps, h)
         settle_island(state, island, substeps * h)
     return failed
 

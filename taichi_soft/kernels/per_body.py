@@ -53,13 +53,21 @@ def before_kick(program: ti.template(), h, is_first):
 
 
 @ti.func
-def _settle_body(state: ti.template(), body):
-    """Freeze a body that went non-finite in its last sound state. Returns 1 where that happened."""
+def body_is_sound(state: ti.template(), body):
+    """Whether all of a body can still be computed with (1)."""
     particles = state.body_particles[body]
     sound = 1
     for p in range(particles[0], particles[1]):
         sound = sound & particle_is_sound(state, p)
+    return sound
+
+
+@ti.func
+def _settle_body(state: ti.template(), body):
+    """Freeze a body that went non-finite in its last sound state. Returns 1 where that happened."""
+    sound = body_is_sound(state, body)
     if sound == 0:
+        particles = state.body_particles[body]
         for p in range(particles[0], particles[1]):
             restore_particle(state, p)
         clear_forces(state, body)

@@ -45,7 +45,7 @@ def carried(state: State, owner: int) -> list[tuple[Any, int, int]]:
     elif owner == PATCH:
         fields += [state.patch_particle, state.patch_share]
     elif owner == PAIR:
-        fields += [contact.impulse, contact.angular_impulse] if contact else []
+        fields += [contact.impulse, contact.angular_impulse, contact.rebound] if contact else []
     elif owner == SHAPE:
         fields += [state.tet_rest_inverse] if state.capacity.plastic else []
     elif owner == JOINT:

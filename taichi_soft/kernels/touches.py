@@ -53,6 +53,15 @@ def add_touches(state: ti.template(), island):
 
 
 @ti.func
+def forget_touches(state: ti.template(), island):
+    """Clear the rows of an island: its step is made again."""
+    first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
+    for row in range(first * PAIR_ROWS, last * PAIR_ROWS):
+        state.soft.pair_bodies[row] = ti.Vector.zero(ti.i32, 2)
+        state.soft.pair_impulse[row] = ti.Vector.zero(ti.f32, 3)
+
+
+@ti.func
 def _write_touch(who: ti.template(), impulses: ti.template(), at, a, kind, b, impulse):
     who[at, 0], who[at, 1], who[at, 2] = a, kind, b
     for k in ti.static(range(3)):

@@ -14,7 +14,7 @@ SEED, COUNT = 0, 30
 
 @pytest.fixture(scope="module")
 def cases():
-    return [make_case(SEED, number, flips="recover") for number in range(COUNT)]
+    return [make_case(SEED, number) for number in range(COUNT)]
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +36,7 @@ def test_cases_are_as_various_as_they_are_said_to_be(cases):
 
 
 def test_a_case_follows_from_its_seed_and_number(cases):
-    again = make_case(SEED, 7, flips="recover")
+    again = make_case(SEED, 7)
     np.testing.assert_array_equal(again.mesh.vertices, cases[7].mesh.vertices)
     np.testing.assert_array_equal(again.velocity, cases[7].velocity)
     assert str(again) == str(cases[7])
@@ -51,29 +51,25 @@ def test_worlds_hold_cases_of_one_number_of_substeps_and_every_case_once(cases):
         assert all(sum(case.shape == shape for case in batch) <= PER_SHAPE for shape in SHAPES)
 
 
-def test_nothing_gets_out_of_the_room_or_stays_in_an_obstacle(outcomes):
+def test_nothing_goes_non_finite_gets_out_of_the_room_or_stays_in_an_obstacle(outcomes):
+    """Five of them hit something faster than twice their speed of sound."""
     assert len(outcomes) == COUNT
+    assert sum(outcome.case.mach > 2.0 for outcome in outcomes.values()) >= 5
     for outcome in outcomes.values():
+        assert outcome.frozen_at is None, outcome
         assert outcome.out_through is None, outcome
-        assert outcome.inside_of is None or outcome.frozen_at is not None, outcome
+        assert outcome.inside_of is None, outcome
 
 
-def test_only_what_is_thrown_at_twice_its_speed_of_sound_goes_non_finite(outcomes):
-    """The substep is chosen for small deformation; a body flattened by such an impact is stiffer."""
+def test_all_come_to_rest_and_none_inside_out(outcomes):
     for outcome in outcomes.values():
-        assert outcome.frozen_at is None or outcome.case.mach > 2.0, outcome
-
-
-def test_what_does_not_go_non_finite_is_at_rest_in_the_end_or_moves_slowly(outcomes):
-    going = [each for each in outcomes.values() if each.frozen_at is None and each.rest_at is None]
-    assert len(going) <= 5  # of thirty: balls that roll on, and a beam that rocks
-    for outcome in going:
-        assert outcome.speed < 0.03 * outcome.case.size, outcome
+        assert outcome.rest_at is not None, outcome
+        assert outcome.flipped == 0, outcome
 
 
 def test_a_case_ends_the_same_alone(outcomes):
     """As the command repeats it: other bodies of a world change nothing."""
-    alone = next(iter(run_cases([make_case(SEED, 3, flips="recover")])))
+    alone = next(iter(run_cases([make_case(SEED, 3)])))
     among = outcomes[3]
     assert (alone.rest_at, alone.out, alone.inside, alone.speed) == (
         among.rest_at,

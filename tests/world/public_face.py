@@ -415,7 +415,7 @@ CALLS: dict[str, dict[str, Call]] = {
         "despawn": Call({"body": BODY}),
         "add_collider": Call({
             "shape": SHAPE, "position": POINT, "rotation": ROTATION, "friction": number(0.0, 1.0, below=-0.1),
-            "restitution": number(0.0, 1.0, below=-0.1, above=1.1), "thickness": number(0.0, 0.02, below=-1.0),
+            "restitution": or_none(number(0.0, 1.0, below=-0.1, above=1.1)), "thickness": number(0.0, 0.02, below=-1.0),
             "group": GROUP, "mask": GROUP,
         }, _has_no_room),
         "stable_step": Call({"body": BODY.but("removed", "of another world")}),
