@@ -18,8 +18,8 @@ def _in_frame(contact: ti.template(), c, x, time):
     return turned_back(spun(contact.collider_rotation[c], contact.collider_spin[c] * time), x - position)
 
 
-@ti.real_func
-def find_near_colliders(state: ti.template(), body: ti.i32, reach: ti.f32, since: ti.f32, left: ti.f32):
+@ti.func
+def find_near_colliders(state: ti.template(), body, reach, since, left):
     """List the colliders that come within `reach` [m] of a body's particles, and how clear of them each is.
 
     Args:
@@ -72,16 +72,8 @@ def forget_contacts(state: ti.template(), body):
     state.contact.gone[body] = 0.0
 
 
-@ti.real_func
-def collided(
-    state: ti.template(),
-    body: ti.i32,
-    p: ti.i32,
-    start: ti.math.vec3,
-    way_velocity: ti.math.vec3,
-    h: ti.f32,
-    since: ti.f32,
-) -> (ti.math.vec3, ti.math.vec3):
+@ti.func
+def collided(state: ti.template(), body, p, start, way_velocity, h, since):
     """Position and velocity of a particle after a substep among colliders.
 
     Args:

@@ -108,13 +108,21 @@ def _kick_body(state: ti.template(), program: ti.template(), body, kick, common)
 
 
 @ti.func
-def _drift_body(state: ti.template(), body, h, since, common):
+def _drift_body(state: ti.template(), body, h, since, left, fastest, common):
     """New positions, and what colliders in the way make of velocities.
 
+    Args:
+        since, left: time since the start of the step, and until its end [s].
+        fastest: speed of what is fastest in the island [m/s].
     Returns: the highest speed [m/s], and the highest beside the `common` velocity.
     """
+    gone = state.contact.gone[body] + fastest * h
+    if not (state.contact.reach[body] >= gone):
+        # A quarter more than the rest of the step needs at this speed.
+        find_near_colliders(state, body, 1.25 * fastest * left + 1e-3, since, left)
+        gone = fastest * h
+    state.contact.gone[body] = gone
     particles = state.body_particles[body]
-    gone = state.contact.gone[body]
     farthest2, farthest_beside2 = ti.cast(0.0, state.real), ti.cast(0.0, state.real)
     for p in range(particles[0], particles[1]):
         x, v = state.particle_position[p], state.particle_velocity[p]
@@ -127,11 +135,14 @@ def _drift_body(state: ti.template(), body, h, since, common):
         farthest2 = ti.max(farthest2, way.dot(way))
         beside = way - h * common
         farthest_beside2 = ti.max(farthest_beside2, beside.dot(beside))
+    limit_rebounds(state, body, since + h)
     return ti.sqrt(farthest2) / h, ti.sqrt(farthest_beside2) / h
 
 
-@ti.func
-def _touch_each_other(state: ti.template(), island, reach, gone, fastest, h):
+@ti.real_func
+def _touch_each_other(
+    state: ti.template(), island: ti.i32, reach: ti.f32, gone: ti.f32, fastest: ti.f32, h: ti.f32
+) -> (ti.f32, ti.f32):
     """Contact between bodies of one island in a substep; looks for candidates again where they have aged.
 
     Args:
@@ -150,6 +161,43 @@ def _touch_each_other(state: ti.template(), island, reach, gone, fastest, h):
         if state.soft.records_touches[None] == 1:
             add_touches(state, island)
     return holds, gone_now
+
+
+@ti.real_func
+def _end_substep(
+    state: ti.template(),
+    program: ti.template(),
+    island: ti.i32,
+    h: ti.f32,
+    since: ti.f32,
+    left: ti.f32,
+    fastest: ti.f32,
+    fastest_beside: ti.f32,
+    common: ti.math.vec3,
+    reach: ti.f32,
+    gone: ti.f32,
+) -> (ti.f32, ti.f32):
+    """What joints and contact make of new velocities, and the new positions.
+
+    Args:
+        since, left: time since the start of the step, and until its end [s].
+        fastest, fastest_beside: highest speed in the island [m/s], and the highest beside `common`.
+        reach, gone: way [m] for which candidates hold, and how much of it may be gone.
+    Returns: `reach` and `gone` after the substep.
+    """
+    held, held_beside = solve_joints(state, island, h, int(since == 0.0), common)
+    highest, holds, used = ti.max(fastest, held), reach, gone
+    if ti.static(program.has_soft_contact):
+        holds, used = _touch_each_other(state, island, reach, gone, ti.max(fastest_beside, held_beside), h)
+    farthest = ti.cast(0.0, ti.f32)
+    for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
+        body = state.contact.island_body[i]
+        if state.body_status[body] == ACTIVE:
+            speed, speed_beside = _drift_body(state, body, h, since, left, highest, common)
+            note_motion(state, body, speed)
+            if state.contact.is_wild[body] == 0:
+                farthest = ti.max(farthest, speed_beside)
+    return holds, used + 2.0 * h * farthest
 
 
 @ti.func
@@ -200,27 +248,10 @@ def _move_island(state: ti.template(), program: ti.template(), island, substeps,
                 fastest = ti.max(fastest, speed)
                 if state.contact.is_wild[body] == 0:  # or the others' candidates would age by its speed
                     fastest_beside = ti.max(fastest_beside, speed_beside)
-        held, held_beside = solve_joints(state, island, h, int(s == 0), common)
-        fastest, fastest_beside = ti.max(fastest, held), ti.max(fastest_beside, held_beside)
-        if ti.static(program.has_soft_contact):
-            reach, gone = _touch_each_other(state, island, reach, gone, fastest_beside, h)
-        farthest = ti.cast(0.0, ti.f32)
-        for i in range(first, last):
-            body = state.contact.island_body[i]
-            if state.body_status[body] == ACTIVE:
-                way = state.contact.gone[body] + fastest * h
-                if not (state.contact.reach[body] >= way):
-                    # A quarter more than the rest of the step needs at this speed.
-                    left = h * (substeps - s)
-                    find_near_colliders(state, body, 1.25 * fastest * left + 1e-3, s * h, left)
-                    way = fastest * h
-                state.contact.gone[body] = way
-                speed, speed_beside = _drift_body(state, body, h, s * h, common)
-                note_motion(state, body, speed)
-                limit_rebounds(state, body, (s + 1) * h)
-                if state.contact.is_wild[body] == 0:
-                    farthest = ti.max(farthest, speed_beside)
-        gone += 2.0 * h * farthest
+        left = h * (substeps - s)
+        reach, gone = _end_substep(
+            state, program, island, h, s * h, left, fastest, fastest_beside, common, reach, gone
+        )
     return is_gentle
 
 
@@ -272,28 +303,38 @@ def _is_to_be_searched(state: ti.template(), body):
 
 
 @ti.kernel
+def prepare_islands(state: ti.template(), body_count: ti.i32, dt: ti.f32):
+    """Find the islands of a step of `dt` [s], and what is near what in them, on all threads.
+
+    A kernel of its own, because one with all of contact compiles for twice as long. What comes nearer within
+    the step is looked for by the island.
+    """
+    ti.loop_config(serialize=True)
+    for _ in range(1):
+        wake_by_colliders(state, body_count)
+        find_islands(state, body_count, dt)
+    ti.loop_config(block_dim=1)
+    for body in range(body_count):
+        if _is_to_be_searched(state, body) == 1:
+            find_box(state, body)
+    ti.loop_config(block_dim=1)
+    for body in range(body_count):
+        if _is_to_be_searched(state, body) == 1:
+            island = state.contact.body_island[body]
+            holds, thickness = island_margin(state, island)
+            search_body(state, body, island, holds + thickness)
+
+
+@ti.kernel
 def step_islands(
     state: ti.template(), program: ti.template(), body_count: ti.i32, substeps: ti.i32, h: ti.f32
 ) -> ti.i32:
     """One fixed step of every active body. Returns how many failed."""
     failed = 0
-    ti.loop_config(serialize=True)
-    for _ in range(1):
-        wake_by_colliders(state, body_count)
-        if ti.static(program.has_soft_contact):
-            find_islands(state, body_count, substeps * h)
-    if ti.static(program.has_soft_contact):
-        # On all threads, however few islands there are. What comes nearer later is looked for by the island.
-        ti.loop_config(block_dim=1)
-        for body in range(body_count):
-            if _is_to_be_searched(state, body) == 1:
-                find_box(state, body)
-        ti.loop_config(block_dim=1)
-        for body in range(body_count):
-            if _is_to_be_searched(state, body) == 1:
-                island = state.contact.body_island[body]
-                holds, thickness = island_margin(state, island)
-                search_body(state, body, island, holds + thickness)
+    if ti.static(not program.has_soft_contact):
+        ti.loop_config(serialize=True)
+        for _ in range(1):
+            wake_by_colliders(state, body_count)
     ti.loop_config(block_dim=1)
     for island in range(state.contact.island_count[None]):
         failed += _step_island(state, program, island, substeps, h)

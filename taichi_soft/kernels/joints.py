@@ -86,10 +86,8 @@ def _turned(i, first, last, back):
     return ti.select(back == 1, first + last - 1 - i, i)
 
 
-@ti.real_func
-def solve_joints(
-    state: ti.template(), island: ti.i32, h: ti.f32, is_first: ti.i32, common: ti.math.vec3
-) -> (ti.f32, ti.f32):
+@ti.func
+def solve_joints(state: ti.template(), island, h, is_first, common):
     """Let the joints of an island act for a substep of `h` [s], after all its bodies have been kicked.
 
     Args:

@@ -43,8 +43,8 @@ def add_press(contact: ti.template(), row, press, normal, before, surface):
     contact.press_rates[row] = contact.press_rates[row] + rates
 
 
-@ti.real_func
-def limit_rebounds(state: ti.template(), body: ti.i32, time: ti.f32):
+@ti.func
+def limit_rebounds(state: ti.template(), body, time):
     """Take from a body what the presses of a substep give its centre of mass beyond the restitution.
 
     Args:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from taichi_soft.kernels.contact_step import step_islands
+from taichi_soft.kernels.contact_step import prepare_islands, step_islands
 from taichi_soft.kernels.flat import begin_flat, end_flat, step_flat_cpu, substep_flat
 from taichi_soft.kernels.per_body import step_in_turn, step_per_body
 from taichi_soft.kernels.program import Program
@@ -53,6 +53,8 @@ def make_launch(schedule: Schedule, state: State, program: Program, scene: Scene
         step_bodies = step_islands
 
     def per_body(substeps: int, h: float) -> int:
+        if program.has_soft_contact:
+            prepare_islands(state, bodies, substeps * h)
         return int(step_bodies(state, program, bodies, substeps, h))
 
     def flat_cpu(substeps: int, h: float) -> int:

@@ -230,8 +230,8 @@ def _solve_vertex(state: ti.template(), k, h, sweep):
             state.soft.slot_rub[slot] = ti.Vector.zero(ti.f32, 3)
 
 
-@ti.real_func
-def solve_island(state: ti.template(), island: ti.i32, h: ti.f32, gone: ti.f32, way: ti.f32):
+@ti.func
+def solve_island(state: ti.template(), island, h, gone, way):
     """Take from the velocities of an island what would bring its bodies too near within `h` [s].
 
     `gone` and `way` as in `_find_gaps`.
