@@ -120,7 +120,7 @@ def measure_features(repeats: int = 41) -> list[FeatureCost]:
     against(free, "touching itself allowed", True, itself)
     asleep = _settled(_spheres(1.0, collider_room=8, soft_contact=True, sleep_speed=0.2), 6 * SETTLING)
     sleeping = sum(body.is_asleep for body in asleep.bodies)
-    against(_stepping(lying), f"{sleeping} of {COUNT} asleep, against awake", True, asleep)
+    against(_stepping(soft), f"{sleeping} of {COUNT} asleep, against awake", True, asleep)
     return found
 
 

@@ -63,9 +63,7 @@ def tables(found: dict[str, Any]) -> Iterator[tuple[str, Table]]:
             table.add_row(row.name, "yes" if row.is_used else "no", *_ratios(row.ratio))
         yield "What features cost: a step over that of as many bodies that fall freely", table
     if "heap" in found:
-        table = _table(
-            "spheres", "tetrahedra", "threads", "step [ms]", "real time", "least", "of free ones", "most"
-        )
+        table = _table("spheres", "tetrahedra", "threads", "step [ms]", "x real", "least", "of free", "most")
         for row in found["heap"]:
             step = f"{row.step.median:.2f}", f"{row.real_time:.2f}"
             table.add_row(str(row.bodies), f"{row.tets:,}", str(row.threads), *step, *_ratios(row.ratio))
