@@ -306,8 +306,8 @@ def _is_to_be_searched(state: ti.template(), body):
 def prepare_islands(state: ti.template(), body_count: ti.i32, dt: ti.f32):
     """Find the islands of a step of `dt` [s], and what is near what in them, on all threads.
 
-    A kernel of its own, because one with all of contact compiles for twice as long. What comes nearer within
-    the step is looked for by the island.
+    A kernel of its own, because a kernel may call one real function only, or Taichi's cache does not find it
+    again. What comes nearer within the step is looked for by the island.
     """
     ti.loop_config(serialize=True)
     for _ in range(1):

@@ -55,3 +55,12 @@ def solo():
         return world, body
 
     return build
+
+
+@pytest.fixture
+def empty(play):
+    """The built world with pools of a test file's `play`, and their assets, without bodies."""
+    world, kinds = play
+    for body in world.bodies:
+        world.despawn(body)
+    return world, kinds

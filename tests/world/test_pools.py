@@ -132,15 +132,6 @@ def play():
     return world, kinds
 
 
-@pytest.fixture
-def empty(play):
-    """The same without bodies."""
-    world, kinds = play
-    for body in world.bodies:
-        world.despawn(body)
-    return world, kinds
-
-
 def test_a_world_without_bodies_goes_on(empty):
     world, _ = empty
     before = world.time

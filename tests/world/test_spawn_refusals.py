@@ -23,15 +23,6 @@ def play():
     return world, kinds
 
 
-@pytest.fixture
-def empty(play):
-    """The same without bodies."""
-    world, kinds = play
-    for body in world.bodies:
-        world.despawn(body)
-    return world, kinds
-
-
 def state_of(world):
     fields = ("particle_position", "particle_velocity", "prev_position", "particle_inv_mass", "body_status")
     rows = [getattr(world._built.state, name).to_numpy().tobytes() for name in fields]
