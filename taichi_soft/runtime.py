@@ -24,7 +24,7 @@ _MOST_THREADS = 256
 _ARCHS = ("cpu", "cuda", "vulkan", "metal")
 
 # A `ti.real_func` is compiled once and by itself, where a `ti.func` is copied to wherever it is called. But
-# Taichi 1.7 puts branches and loops of a `ti.func` called in it into the kernel instead, and crashes. With this
+# Taichi 1.7 puts branches and loops of a `ti.func` called in it into the kernel, and crashes. With this
 # they go into what is being compiled.
 ti.lang.kernel_impl.Kernel.ast_builder = lambda _: ti.lang.impl.get_runtime().compiling_callable.ast_builder()
 
