@@ -1,4 +1,4 @@
-"""Twenty soft bodies are dropped into a bowl, a collider made of triangles, and come to rest in a heap."""
+"""Twenty soft bodies are dropped into a bowl, a collider made of triangles, and fall asleep in a heap."""
 
 import numpy as np
 import trimesh
@@ -14,6 +14,8 @@ MATERIAL = Material(young=3.0e5, poisson=0.3, density=500.0, damping=40.0)
 THICKNESS = 0.02  # of the skins of the bodies [m]
 RADIUS, WALL = 2.0, 0.2  # of the inside of the bowl, and how thick it is [m]
 BODIES = 20
+SLEEP_SPEED = 0.05  # [m/s]
+DRAG = 1.0  # [1/s]: nothing else stops a ball that rolls to and fro between others
 STEP = FixedStep(dt=1 / 50)
 
 
@@ -25,7 +27,7 @@ def stage() -> Stage:
         cylinder(0.34, 0.6, rings=2, layers=4),
         torus(0.34, 0.15, rings=1, segments=18),
     ]
-    world = World(soft_contact=True)
+    world = World(soft_contact=True, sleep_speed=SLEEP_SPEED)
     world.add_collider(MeshShape(_bowl()), position=(0, 0, RADIUS + WALL + 0.01), friction=0.4)
     actors = []
     for i in range(BODIES):
@@ -37,6 +39,8 @@ def stage() -> Stage:
         body = world.add_body(mesh, MATERIAL, law="neo_hookean", position=place, contact=contact)
         actors.append(Actor(body, PALETTE[i % len(PALETTE)]))
     world.build()
+    for body in world.bodies:
+        body.set_linear_damping(DRAG)
     camera = Camera.framing((-2.2, -2.2, 0.0), (2.2, 2.2, 3.2), aspect=16 / 9, elevation=36)
     return Stage(f"{BODIES} bodies in a bowl of triangles", world, actors, camera, STEP, 10.0)
 

@@ -17,7 +17,8 @@ from taichi_soft.checks import as_count, as_number
 class EngineAdapter:
     """Runs a built world in fixed steps, whatever the frame rate, and gives the positions to draw.
 
-    While an adapter is in use, only the adapter steps its world: `alpha` and `time` count its steps.
+    While an adapter is in use, only the adapter steps and restores its world: `alpha` and `time` count its
+    steps.
 
         adapter = EngineAdapter(world, FixedStep(dt=1 / 60))
         while running:
@@ -134,8 +135,8 @@ class EngineAdapter:
 
         `alpha` stays: make the steps again by `step`, with the inputs as they should have been, and the
         picture goes on where it was.
-        Raises: OptionError for more steps than `rewind_ticks`, or than were made; StateError where nothing
-            is kept.
+        Raises: OptionError for more steps than `rewind_ticks`, or than were made since the last `restore`;
+            StateError where nothing is kept.
         """
         if self._rollback is None:
             raise StateError("this adapter keeps no steps: make it with rewind_ticks")
@@ -143,6 +144,24 @@ class EngineAdapter:
         if back > self._world.step_count:
             raise OptionError(f"steps is {back}: the world has made {self._world.step_count}")
         self._rollback.rewind_to(self._world.step_count - back)
+
+    def snapshot(self) -> bytes:
+        """See `World.snapshot`. The part of a step that `alpha` says is not in it."""
+        return self._world.snapshot()
+
+    def restore(self, data: bytes) -> None:
+        """Load a state: as `World.restore`, with `alpha` 0, and `rewind` as far as to here.
+
+        Raises: as `World.restore`, with nothing changed.
+        """
+        self._world.restore(data)
+        self._accumulator.remainder = 0.0
+        if self._rollback is not None:
+            self._rollback.save()
+
+    def state_hash(self) -> str:
+        """See `World.state_hash`."""
+        return self._world.state_hash()
 
     def drain_events(self) -> list[Event]:
         """What happened in all fixed steps since the last call: see `World.drain_events`."""

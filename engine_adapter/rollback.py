@@ -18,6 +18,9 @@ class Rollback:
             apply_inputs()
             world.step(dt, substeps)
 
+    What is kept is one course of events. Where others call `World.restore`, to load a game say, it is not
+    what led to the present state: `steps` is empty then, and `save` begins anew.
+
     Args:
         world: built.
         ticks: how many steps it is possible to go back, 1 or more. Each takes the size of a snapshot.
@@ -32,14 +35,23 @@ class Rollback:
         self._world = world
         self._ticks = as_count(ticks, "ticks")
         self._snapshots: dict[int, bytes] = {}  # by the world's step count, ascending
+        self._restore_count = world.restore_count  # of the world when they were all of its own past
 
     @property
     def steps(self) -> tuple[int, ...]:
         """Step counts that it is possible to go back to, ascending."""
-        return tuple(self._snapshots)
+        return tuple(self._snapshots) if self._is_past else ()
+
+    @property
+    def _is_past(self) -> bool:
+        """Whether what is kept led to the present state."""
+        return self._restore_count == self._world.restore_count
 
     def save(self) -> None:
         """Keep the state as it is now: between a step and the inputs of the next."""
+        if not self._is_past:
+            self._snapshots.clear()
+            self._restore_count = self._world.restore_count
         now = self._world.step_count
         self._snapshots.pop(now, None)
         self._snapshots[now] = self._world.snapshot()
@@ -52,11 +64,17 @@ class Rollback:
         Raises: OptionError for a step that is not among `steps`, with nothing changed.
         """
         wanted = as_count(step, "step", 0)
+        if not self._is_past:
+            raise OptionError(
+                f"step {wanted} is not kept: the world was restored since, to where other steps led. Rewind "
+                "after the next save"
+            )
         if wanted not in self._snapshots:
             kept = f"{self.steps[0]} to {self.steps[-1]}" if self._snapshots else "none yet"
             raise OptionError(
                 f"step {wanted} is not kept (kept: {kept}): save more ticks, or rewind less far"
             )
         self._world.restore(self._snapshots[wanted])
+        self._restore_count = self._world.restore_count
         for later in [each for each in self._snapshots if each > wanted]:
             del self._snapshots[later]

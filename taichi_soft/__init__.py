@@ -31,6 +31,7 @@ from taichi_soft.events import (
     Listener,
     StressExceeded,
     TearCandidates,
+    Torn,
     Woke,
 )
 from taichi_soft.failures import Failure
@@ -138,6 +139,7 @@ __all__ = [
     "TearCandidates",
     "Tearing",
     "TetMesh",
+    "Torn",
     "UnstableStepWarning",
     "VideoError",
     "Woke",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import weakref
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft import measures
 from taichi_soft.checks import as_array, as_positive
-from taichi_soft.control.attachments import Attachment, attach
+from taichi_soft.control.attachments import Attachment, attach, share_attachments
 from taichi_soft.control.drives import (
     apply_force,
     set_gravity_scale,
@@ -29,10 +30,12 @@ from taichi_soft.events import Event, StressExceeded, TearCandidates
 from taichi_soft.failures import FailedStep, Failure
 from taichi_soft.handles import Handle, recorded
 from taichi_soft.materials import AnyMaterial
+from taichi_soft.meshing import BodyMesh
 from taichi_soft.parts import Part
 from taichi_soft.queries import Pose
 from taichi_soft.scene import BodyArrays, BodyDescription, Ranges
 from taichi_soft.stability import StableStep
+from taichi_soft.state import SHELTERED
 
 if TYPE_CHECKING:
     from taichi_soft.assets import SoftBodyAsset
@@ -65,14 +68,14 @@ class Body(Handle):
         self._topology_version = 0
         self._part: Part | None = None  # of the asset's mesh, once it was cut
 
-    def require_alive(self) -> None:
+    def _require_alive(self) -> None:
         """Raises: StateError once the body was removed."""
         if self._removed_in is not None:
             raise StateError(f"body {self.index} was removed by despawn in step {self._removed_in}")
 
     @property
     def _world(self) -> World:
-        self.require_alive()
+        self._require_alive()
         world = self._world_ref()
         if world is None:
             raise StateError(f"the world of body {self.index} is gone: keep a reference to it")
@@ -99,12 +102,12 @@ class Body(Handle):
         return self._removed_in is None
 
     @property
-    def mesh(self):  # type: ignore[no-untyped-def]
+    def mesh(self) -> BodyMesh:
         """The rest shape, as added, or as cuts have left it."""
         return self._description.mesh
 
     @property
-    def material(self):  # type: ignore[no-untyped-def]
+    def material(self) -> AnyMaterial:
         """The material, as added or set since."""
         return self._description.material
 
@@ -126,8 +129,19 @@ class Body(Handle):
     @property
     def is_held(self) -> bool:
         """Whether it is attached, to a frame or another body, or grabbed."""
+        return self._is_pulled or bool(self._attachments)
+
+    @property
+    def _is_pulled(self) -> bool:
+        """Whether it is grabbed, or joined to another body."""
         grabs = self._world._grabs.values()
-        return bool(self._attachments or self._joints) or any(grab.body is self for grab in grabs)
+        return bool(self._joints) or any(grab.body is self for grab in grabs)
+
+    @property
+    def attachments(self) -> tuple[Attachment, ...]:
+        """What holds it to frames; of a piece that was cut or torn off, what it took along of these."""
+        self._require_alive()
+        return tuple(self._attachments)
 
     @property
     def _joints(self) -> list[Joint]:
@@ -159,6 +173,10 @@ class Body(Handle):
         self._part = part
         self._topology_version += 1
 
+    def _share_attachments(self, pieces: Sequence[tuple[Body, Ints]]) -> None:
+        """As `control.attachments.share_attachments`."""
+        share_attachments(self, pieces)
+
     def _redescribe(self, description: BodyDescription, arrays: BodyArrays) -> Ranges:
         """Take note that the body is made of something else. Returns where it lies in the fields."""
         world = self._world
@@ -180,13 +198,14 @@ class Body(Handle):
         numbers, copies come behind them; mass, momentum and elastic energy stay. What falls off becomes
         bodies of the same asset, which take free slots of its pool; the largest part stays this one. In a
         part, vertices and tetrahedra are counted anew in their order: `vertex_origins` tells what they were.
+        What is attached to a frame stays so in every piece, copies of it as well: see `Attachment`.
         Args:
             plane: (point (3,) [m], normal (3,)), all through the body.
             triangle: corners, (3, 3) [m]; the cut ends where it ends.
         Returns: the bodies that fell off, the largest first; none where nothing does.
         Raises: OptionError for a blade without direction or area and for a body whose asset has no
             `spare_vertices`; StateError where room or slots run out, for a body that is frozen, grabbed or
-            attached, and before `build`.
+            joined to another, and before `build`.
             Nothing is changed then.
         """
         return cut(self, plane, triangle)
@@ -227,7 +246,7 @@ class Body(Handle):
     @property
     def failure(self) -> Failure | None:
         """What broke first, None while the body is sound. Found out when first asked, not within a step."""
-        self.require_alive()
+        self._require_alive()
         if self._frozen_in is not None and self._failure is None:
             self._failure = self._world._built.find_failure(self.index, self._frozen_in)
         return self._failure
@@ -264,7 +283,7 @@ class Body(Handle):
         """
         shape = (self.vertex_count, 3)
         x, v = as_array(positions, "positions", shape, "m"), as_array(velocities, "velocities", shape, "m/s")
-        self._world._built.write_motion(self.index, x, v)
+        self._world._built.write_motion(self, x, v)
         self._frozen_in = self._failure = None
 
     @recorded
@@ -288,6 +307,19 @@ class Body(Handle):
     def set_gravity_scale(self, scale: float) -> None:
         """Multiply the world's gravity for this body, from now on: 0 floats, -1 rises."""
         set_gravity_scale(self, scale)
+
+    @property
+    def linear_damping(self) -> float:
+        """Rate at which its velocities fade [1/s], 0 unless it was set."""
+        simulation = self._world._simulation
+        return 0.0 if simulation is None else float(simulation.state.body_damping[self.index])
+
+    @property
+    def is_sheltered(self) -> bool:
+        """Whether no wind blows on it."""
+        simulation = self._world._simulation
+        drives = 0 if simulation is None else int(simulation.state.body_drives[self.index])
+        return bool(drives & SHELTERED)
 
     @recorded
     def set_linear_damping(self, rate: float) -> None:
@@ -340,7 +372,8 @@ class Body(Handle):
     def teleport(
         self, position: ArrayLike, rotation: ArrayLike | None = None, *, keep_velocity: bool = True
     ) -> None:
-        """Move the whole body, deformed as it is, by a jump; pictures between two steps jump with it.
+        """Move the whole body, deformed as it is, by a jump; pictures between two steps jump with it, and so
+        do targets that were set for the coming step.
 
         Args:
             position: where its centre of mass goes, (3,) [m].
@@ -398,8 +431,8 @@ class Body(Handle):
             onto: vertices of `other`, one for each of `particles`, that these are drawn to. None holds each
                 at the place in `other` where it is, in a tetrahedron or just outside of one.
         Raises: OptionError for what is no other body, for bad vertices, and without `onto` for those that are
-            too far away; StateError before `build`, in a world without contact, and where the world's 64
-            joints, or the 2,048 particles that they may hold, are all in use.
+            too far away; StateError before `build`, in a world without contact, under implicit Euler, and
+            where the world's 64 joints, or the 2,048 particles that they may hold, are all in use.
         """
         return attach_to(self, other, particles, onto)
 

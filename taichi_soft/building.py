@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from taichi_soft.colliders import ignore
 from taichi_soft.contact_fields import ContactCapacity
 from taichi_soft.cutting import warm_up
 from taichi_soft.errors import OptionError, StateError, UnstableStepWarning
@@ -52,7 +53,7 @@ def build(world: World) -> Simulation:
             UnstableStepWarning,
             stacklevel=3,
         )
-    state = acquire(capacity)
+    state = acquire(capacity, program)
     weakref.finalize(world, release, state)
     _fill(world, state, program)
     _warm_up(world, state)
@@ -78,16 +79,12 @@ def build(world: World) -> Simulation:
     if has_contact:
         state.contact.sleep_speed[None] = contact.sleep_speed
         colliders.load(state.contact, len(pools.slots))
-        woken = weakref.WeakMethod(simulation.wake_all)  # or the two would keep each other
-        colliders.on_jump = lambda: (woken() or _do_nothing)()
+        woken = weakref.WeakMethod(simulation.wake_near)  # or the two would keep each other
+        colliders.on_jump = lambda lower, upper: (woken() or ignore)(lower, upper)
     if tears is not None:
         for body in pools.living:
             tears.watch(body)
     return simulation
-
-
-def _do_nothing() -> None:
-    pass
 
 
 def _add_floor(world: World) -> None:
@@ -95,17 +92,14 @@ def _add_floor(world: World) -> None:
     settings = world.settings
     if settings.schedule is Schedule.FLAT:
         raise OptionError("schedule 'flat' has no colliders: it takes 'per_body' or 'auto'")
-    if settings.integrator in (Integrator.EXPLICIT_EULER, Integrator.IMPLICIT_EULER):
-        raise OptionError(
-            f"integrator {settings.integrator.value!r} takes no colliders: it takes 'leapfrog' or "
-            "'lazy_leapfrog'"
-        )
+    if settings.integrator is Integrator.EXPLICIT_EULER:
+        raise OptionError("integrator 'explicit_euler' has no colliders: any other has")
     if settings.floor is not None:
         world._floor_collider = world.add_collider(
             PlaneShape(),
             position=(0.0, 0.0, settings.floor),
             friction=settings.friction,
-            restitution=settings.restitution or None,
+            restitution=settings.restitution,
         )
 
 
@@ -121,7 +115,8 @@ def _schedule(world: World, device: Device, has_contact: bool) -> Schedule:
 def _capacity(world: World, settings: Settings, has_contact: bool) -> Capacity:
     contact = ContactCapacity()
     if has_contact:
-        contact = world._colliders.capacity(world._contact.collider_room, soft=world._contact.soft)
+        chosen = world._contact
+        contact = world._colliders.capacity(chosen.collider_room, chosen.sample_room, soft=chosen.soft)
     return Capacity.of(
         world._scene,
         parallel=settings.schedule is Schedule.FLAT,
@@ -175,6 +170,6 @@ def _warm_up(world: World, state: State) -> None:
 def _set(settings: Settings, state: State) -> None:
     """Write the numbers that hold for all bodies."""
     state.gravity[None] = settings.gravity.tolist()
-    state.floor[None] = [settings.floor or 0.0, settings.restitution, settings.friction]
+    state.floor[None] = [settings.floor or 0.0, settings.restitution or 0.0, settings.friction]
     if settings.is_implicit:
         state.solver[None] = [settings.tolerance, settings.most_iterations]

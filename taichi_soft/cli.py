@@ -139,6 +139,7 @@ def _size_of(text: str) -> tuple[int, int]:
 @app.command()
 def info(
     laws: Annotated[bool, typer.Option("--laws", help="Measure what each force law costs.")] = False,
+    law: Annotated[list[str] | None, typer.Option(help="Measure this one; once for each of several.")] = None,
     arch: Arch = "auto",
     threads: Threads = None,
     as_json: AsJson = False,
@@ -149,8 +150,8 @@ def info(
     from taichi_soft.profiling.baseline import find_compiler
 
     device = init(arch, threads)
-    if laws:
-        _say_laws(as_json)
+    if laws or law:
+        _say_laws(list(LAWS) if laws else law or [], as_json)
         return
     facts = {
         **_device_facts(device),
@@ -172,12 +173,12 @@ def info(
     console.print(table)
 
 
-def _say_laws(as_json: bool) -> None:
+def _say_laws(names: list[str], as_json: bool) -> None:
     from taichi_soft.profiling import measure_laws
     from taichi_soft.profiling.report import law_rows, law_table
 
-    with errors.status("compiling and measuring every law"):
-        costs = measure_laws()
+    with errors.status("compiling and measuring laws"):
+        costs = measure_laws(names)
     if as_json:
         print(json.dumps(law_rows(costs), indent=2))
         return

@@ -15,12 +15,20 @@ from taichi_soft.constants import ALL_GROUPS, VELOCITY_LIMIT
 from taichi_soft.contact_fields import NO_COLLIDER, ContactCapacity, ContactFields
 from taichi_soft.errors import OptionError, StateError
 from taichi_soft.handles import Handle, recorded
-from taichi_soft.kernels.collider_rows import MOTION_WIDTH, sum_collider_impulses, write_collider_motion
+from taichi_soft.kernels.collider_rows import (
+    MOTION_WIDTH,
+    sum_collider_impulses,
+    write_collider_motion,
+    write_samples,
+)
 from taichi_soft.math.rotations import matrix_of, quaternion_of, rotation_vector, turned_by
 from taichi_soft.plain import digest_of
 from taichi_soft.shapes import Shape
 
 Floats = NDArray[np.float64]
+
+MOST_SAMPLES = 100_000_000
+"""Of all grids that come after `World.build`: 400 MB."""
 
 _FASTEST_SPIN = 1e4  # [rad/s]
 
@@ -39,7 +47,7 @@ class ColliderRow:
     rotation: Floats  # quaternion
     velocity: Floats
     spin: Floats
-    offset: int  # of its samples
+    offset: int  # of its samples, from `World.build` on
     target: tuple[Floats, Floats] | None = None  # pose at the end of the next step
     is_alive: bool = True
 
@@ -98,8 +106,47 @@ class Collider(Handle):
         return matrix
 
     @property
+    def velocity(self) -> Floats:
+        """Of its origin from the coming step on, (3,) [m/s]; zero where `move_to` takes it somewhere."""
+        return np.array(self._row.velocity)
+
+    @property
+    def angular_velocity(self) -> Floats:
+        """The same of its rotation, (3,) [rad/s]."""
+        return np.array(self._row.spin)
+
+    @property
+    def friction(self) -> float:
+        """Coulomb's coefficient."""
+        return self._row.friction
+
+    @property
+    def restitution(self) -> float | None:
+        """Of whole bodies; None for their own elasticity."""
+        return None if self._row.restitution < 0.0 else self._row.restitution
+
+    @property
+    def thickness(self) -> float:
+        """How far outside of its shape bodies meet it [m]."""
+        return self._row.thickness
+
+    @property
+    def group(self) -> int:
+        """Bits that bodies' masks are compared with."""
+        return self._row.group
+
+    @property
+    def mask(self) -> int:
+        """Bits of the groups of bodies that it touches."""
+        return self._row.mask
+
+    @property
     def impulse(self) -> Floats:
-        """What bodies gave it in the last step, (3,) [N s]: apply it to the engine's rigid body."""
+        """What bodies gave it in the last step, (3,) [N s]: apply it to the engine's rigid body.
+
+        To that body's velocity for the coming step add half of it beforehand: it is about what that step
+        will bring, and comes too late otherwise.
+        """
         return self._colliders().impulses()[self.index, :3]
 
     @property
@@ -134,10 +181,12 @@ class Collider(Handle):
     def teleport(self, position: ArrayLike, rotation: ArrayLike | None = None) -> None:
         """Be there at once, without pushing anything on the way; what it then covers is pressed out."""
         colliders, row = self._colliders(), self._row
-        row.position, row.rotation = self._pose(position, rotation)
+        pose = self._pose(position, rotation)
+        colliders.on_jump(*_box(row))
+        row.position, row.rotation = pose
         row.target = None
         colliders.moved(row)
-        colliders.on_jump()
+        colliders.on_jump(*_box(row))
 
     def _pose(self, position: ArrayLike, rotation: ArrayLike | None) -> tuple[Floats, Floats]:
         where = as_vector(position, "position", "m")
@@ -151,8 +200,8 @@ class Collider(Handle):
         colliders.write(self.index)
 
 
-def _do_nothing() -> None:
-    pass
+def ignore(lower: Floats, upper: Floats) -> None:
+    """What is told of jumps where nobody listens."""
 
 
 class Colliders:
@@ -165,8 +214,8 @@ class Colliders:
         self._contact: ContactFields | None = None
         self._body_count = 0
         self._impulses: Floats | None = None  # of the last step, once asked for
-        self._sample_count = 0
-        self.on_jump: Callable[[], None] = _do_nothing  # told when a collider appears, vanishes or jumps
+        # Told where a collider appears, vanishes, jumps from or jumps to: lower and upper corner [m].
+        self.on_jump: Callable[[Floats, Floats], None] = ignore
         self._is_dirty = False  # whether poses or velocities differ from what the fields hold
         self._movers: list[ColliderRow] = []  # with a velocity or a target
 
@@ -208,47 +257,58 @@ class Colliders:
             quaternion_of(as_rotation(rotation)),
             zero,
             zero,
-            self._sample_count,
+            0,
         )
-        index = self._free_row(shape)
+        index, row.offset = self._free_row(), self._free_samples(shape)
         self.shapes[digest_of(shape)] = shape
         if index < len(self._rows):
-            row.offset = self._rows[index].offset
             self._rows[index] = row
             self._handles[index] = Collider(self, index, row)
         else:
             self._rows.append(row)
             self._handles.append(Collider(self, index, row))
-            self._sample_count += len(shape.samples)
         if self._contact is not None:
             self.write(index)
         return self._handles[index]
 
-    def _free_row(self, shape: Shape) -> int:
-        """A row for a new collider. Raises: StateError where there is no room for it."""
-        needed = len(shape.samples)
+    def _free_row(self) -> int:
+        """A row for a new collider. Raises: StateError where there is none."""
         for index, row in enumerate(self._rows):
-            if not row.is_alive and len(row.shape.samples) >= needed:
+            if not row.is_alive:
                 return index
-        if self._contact is None:
-            return len(self._rows)
-        room = self._contact.capacity
-        if len(self._rows) >= room.colliders:
+        if self._contact is not None and len(self._rows) >= self._contact.capacity.colliders:
             raise StateError(
-                f"there is room for {room.colliders} colliders and all are in use: remove one, or make the "
+                f"there is room for {len(self._rows)} colliders and all are in use: remove one, or make the "
                 "world with a larger collider_room"
-            )
-        if self._sample_count + needed > room.samples:
-            raise StateError(
-                f"the grid of {shape!r} takes {needed:,} samples, and {room.samples - self._sample_count:,} "
-                "are left: add it before build()"
             )
         return len(self._rows)
 
-    def capacity(self, room: int, *, soft: bool) -> ContactCapacity:
-        """What these colliders and `room` more need, rounded up so that similar worlds share kernels."""
+    def _free_samples(self, shape: Shape) -> int:
+        """Where the grid of a new collider goes. Raises: StateError where there is no room for it."""
+        needed = len(shape.samples)
+        if self._contact is None or needed == 0:
+            return 0
+        gaps, begin = [], 0
+        used = sorted((row.offset, len(row.shape.samples)) for row in self._rows if row.is_alive)
+        for offset, count in [*used, (self._contact.capacity.samples, 0)]:
+            gaps.append((begin, offset - begin))
+            begin = max(begin, offset + count)
+        found = next((begin for begin, room in gaps if room >= needed), None)
+        if found is None:
+            raise StateError(
+                f"the grid of {shape!r} takes {needed:,} samples, and there is room for "
+                f"{max(room for _, room in gaps):,}: make the world with a larger sample_room, or add it "
+                "before build()"
+            )
+        return found
+
+    def capacity(self, room: int, sample_room: int, *, soft: bool) -> ContactCapacity:
+        """What these colliders and `room` more with so many samples need.
+
+        Rounded up so that similar worlds share kernels.
+        """
         count = len(self._rows) + room
-        samples = self._sample_count
+        samples = sum(len(row.shape.samples) for row in self._rows) + sample_room
         return ContactCapacity(
             max(8, 1 << (count - 1).bit_length()) if count else 8,
             max(1024, 1 << (samples - 1).bit_length()) if samples else 0,
@@ -258,8 +318,13 @@ class Colliders:
     def load(self, contact: ContactFields, body_count: int) -> None:
         """Fill the fields with what was added before `build`."""
         self._contact, self._body_count = contact, body_count
-        rows = self._rows
-        self._write_samples(rows)
+        if contact.capacity.samples:
+            write_samples(contact, 0, np.zeros(1, dtype=np.float32))  # compiles
+        begin = 0
+        for row in self._rows:
+            row.offset = begin
+            begin += len(row.shape.samples)
+            self._write_samples(row)
         self._write_constants()
         self._is_dirty = True
 
@@ -268,19 +333,14 @@ class Colliders:
         if self._contact is None:
             return
         row = self._rows[index]
-        if row.is_alive:
-            self._write_samples([row])
+        self._write_samples(row)
         self._write_constants()
         self._is_dirty = True
-        self.on_jump()
+        self.on_jump(*_box(row))
 
-    def _write_samples(self, rows: list[ColliderRow]) -> None:
-        assert self._contact is not None
-        if any(len(row.shape.samples) for row in rows):
-            samples = self._contact.samples.to_numpy()
-            for row in rows:
-                samples[row.offset : row.offset + len(row.shape.samples)] = row.shape.samples
-            self._contact.samples.from_numpy(samples)
+    def _write_samples(self, row: ColliderRow) -> None:
+        if row.is_alive and len(row.shape.samples):
+            write_samples(self._contact, row.offset, np.ascontiguousarray(row.shape.samples))
 
     def _write_constants(self) -> None:
         contact, rows = self._contact, self._rows
@@ -302,11 +362,14 @@ class Colliders:
         if row.target is not None or row.velocity.any() or row.spin.any():
             self._movers.append(row)
 
-    def prepare(self, dt: float) -> None:
-        """Tell the fields where the colliders are and how they move through the coming step of `dt` [s]."""
+    def prepare(self, dt: float) -> bool:
+        """Tell the fields where the colliders are and how they move through the coming step of `dt` [s].
+
+        Returns: whether any may be elsewhere, or move otherwise, than in the step before.
+        """
         self._impulses = None
         if not (self._is_dirty or self._movers):
-            return
+            return False
         for row in self._movers:
             if row.target is not None:
                 position, rotation = row.target
@@ -317,6 +380,7 @@ class Colliders:
             line[:] = np.concatenate([row.position, row.rotation, row.velocity, row.spin, *_way(row, dt)])
         write_collider_motion(self._contact, motion)
         self._is_dirty = False
+        return True
 
     def finish(self, dt: float) -> None:
         """Take the colliders to where they are after a step of `dt` [s]."""
@@ -334,22 +398,16 @@ class Colliders:
         """Of each row, removed ones among them."""
         return tuple(self._handles)
 
-    @property
-    def sample_count(self) -> int:
-        """Rows of grids in use."""
-        return self._sample_count
-
     def restore(
         self,
         rows: list[ColliderRow],
-        sample_count: int,
         handle_of: Callable[[int, ColliderRow], Collider],
     ) -> None:
         """Put back all rows, with the handles that `handle_of` finds."""
         before, after = [row.constants for row in self._rows], rows
         for handle in self._handles:
             handle._row.is_alive = False
-        self._rows, self._sample_count = after, sample_count
+        self._rows = after
         self._handles = [handle_of(index, row) for index, row in enumerate(after)]
         for index, (handle, row) in enumerate(zip(self._handles, after, strict=True)):
             handle.index, handle._row = index, row
@@ -358,7 +416,8 @@ class Colliders:
             self.moved(row)
         if self._contact is None or before == [row.constants for row in after]:
             return
-        self._write_samples(after)
+        for row in after:
+            self._write_samples(row)
         self._write_constants()
 
     def impulses(self) -> Floats:
@@ -369,6 +428,12 @@ class Colliders:
                 sum_collider_impulses(self._contact, self._body_count, rows)
             self._impulses = rows.astype(np.float64)
         return np.array(self._impulses)
+
+
+def _box(row: ColliderRow) -> tuple[Floats, Floats]:
+    """Corners of a box round a collider where it is, (3,) [m] each."""
+    lower, upper, _ = _way(row, 0.0)
+    return lower, upper
 
 
 def _way(row: ColliderRow, dt: float) -> tuple[Floats, Floats, Floats]:

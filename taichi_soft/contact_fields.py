@@ -113,6 +113,10 @@ class SoftContactFields:
         self.slot_normal = ti.Vector.field(3, ti.f32, outer * SLOTS)  # from the triangle to the vertex
         self.slot_press = ti.field(ti.f32, outer * SLOTS)  # impulse along it in this substep [N s]
         self.slot_rub = ti.Vector.field(3, ti.f32, outer * SLOTS)  # friction on the vertex [N s]
+        # The contact in which a particle was pressed most at the end of the last step.
+        self.kept_triangle = ti.field(ti.i32, particles)
+        self.kept_press = ti.field(ti.f32, particles)  # as `slot_press`; 0 for none
+        self.kept_rub = ti.Vector.field(3, ti.f32, particles)
         self.rest_position = ti.Vector.field(3, ti.f32, particles)  # [m]
         self.records_touches = ti.field(ti.i32, ())  # 1 where the rows below are filled
         # Two bodies, the smaller index first; both 0 in a free row. Island by island, as in `island_body`.

@@ -53,8 +53,10 @@ def require_cuttable(body: Body) -> None:
         )
     if not world.is_built:
         raise StateError("the world is not built: call world.build() first, and cut what moves")
-    if body.is_held:
-        raise StateError(f"body {body.index} is grabbed or attached: release it before it is cut")
+    if body._is_pulled:
+        raise StateError(
+            f"body {body.index} is grabbed or joined to another body: release it before it is cut"
+        )
     if body.is_frozen:
         raise StateError(f"body {body.index} is frozen: bring it back with set_motion before it is cut")
 
@@ -111,6 +113,7 @@ def divide(
         keeps_crumbs: small parts stay in the body, and so do those for which there is no slot.
     """
     world, mesh = body._world, body.mesh
+    assert isinstance(mesh, TetMesh), "others are refused before"
     tets, vertices = split_vertices(mesh.tets, len(mesh.vertices), faces, is_cut)
     if len(vertices) == len(mesh.vertices):
         return ()
@@ -185,17 +188,20 @@ def _settle(world: World, body: Body, pieces: list[_Piece], slots: list[int]) ->
         free = rows[:, 12] > 0.0
         masses = piece.description.masses
         rows[free, 12] = 1.0 / masses[free]
-        rows[:, 20:23] *= (masses / rows[:, 15])[:, None]  # a push is shared like the mass
+        rows[:, 20:26] *= (masses / rows[:, 15])[:, None]  # pushes and reactions are shared like the mass
         rows[:, 15] = masses
         present = None if inverses is None else inverses[piece.tets][piece.arrays.tet_order]
         _write(state, slot, piece.arrays, rows, ACTIVE, body.index, present)
-    simulation.readout.has_moved()
+    simulation.has_changed()
     fallen = tuple(world._take_in(body.asset) for _ in pieces[1:])
     vertices, tets = body.vertex_origins, body.tet_origins
     for each, piece in zip((body, *fallen), pieces, strict=True):
         each._redescribe(piece.description, piece.arrays)
         corners, order = piece.description.mesh.tets, piece.arrays.order
         each._become(Part(vertices[piece.vertices], order, tets[piece.tets], corners))
+    body._share_attachments(
+        [(each, piece.vertices) for each, piece in zip((body, *fallen), pieces, strict=True)]
+    )
     simulation.events.renew_watches(body)
     return fallen
 

@@ -104,7 +104,7 @@ class StillBody:
         self._program = Program((body.model,), Integrator.LEAPFROG, has_floor=False, worker_count=1)
         scene = Scene()
         scene.append(self._rows)
-        self._state = acquire(Capacity.of(scene, double=double, implicit=implicit))
+        self._state = acquire(Capacity.of(scene, double=double, implicit=implicit), self._program)
         weakref.finalize(self, release, self._state)
         self._state.load(scene, [0])
 

@@ -52,7 +52,9 @@ def _write_pieces(
     wholes: ti.types.ndarray(dtype=ti.i32, ndim=1),
 ):
     for field, width, is_whole, start in ti.static(loader.pieces):
-        ti.loop_config(serialize=True)
+        # Serial loops become one function, and of many fields that compiles three times as long as a function
+        # per field; but to write the few of a collider, no threads are worth waking up.
+        ti.loop_config(serialize=ti.static(len(loader.pieces) < 20))
         for i in range(field.shape[0]):
             for k in ti.static(range(width)):
                 value = (

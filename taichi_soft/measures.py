@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from taichi_soft.errors import MeshError
 from taichi_soft.laws.law import EnergyLaw
-from taichi_soft.materials import voigt_stress
+from taichi_soft.materials import AnisotropicMaterial, Material, SpringMaterial, voigt_stress
+from taichi_soft.meshing import TetMesh
 from taichi_soft.queries import Pose, best_fitting_pose
 
 if TYPE_CHECKING:
@@ -67,6 +68,17 @@ def gravitational_energy(body: Body) -> float:
     return float(-(body.masses @ positions_of(body)) @ gravity)
 
 
+def _material(body: Body) -> Material | AnisotropicMaterial:
+    assert not isinstance(body.material, SpringMaterial), "laws on tetrahedra take none"
+    return body.material
+
+
+def tet_mesh(body: Body) -> TetMesh:
+    """The mesh of a body with tetrahedra."""
+    assert isinstance(body.mesh, TetMesh), "meshes without tetrahedra are refused before"
+    return body.mesh
+
+
 def elastic_energy(body: Body) -> float:
     """As `Body.elastic_energy`."""
     model, bonds = body._description.model, body._description.bonds
@@ -77,17 +89,17 @@ def elastic_energy(body: Body) -> float:
         return float(0.5 * bonds.constants[:, 1] @ growth**2)
     if isinstance(law, EnergyLaw) and not model.is_anisotropic:
         count = len(body.tets)
-        constants = (body.material.per_tet(name, count) for name in ("lame_lambda", "lame_mu"))
-        return float(law.energy_density(deformations(body), *constants) @ body.mesh.volumes)
+        constants = (_material(body).per_tet(name, count) for name in ("lame_lambda", "lame_mu"))
+        return float(law.energy_density(deformations(body), *constants) @ tet_mesh(body).volumes)
     strain, stress = green_strain_and_stress(body)
-    return float(0.5 * np.einsum("mab,mab->m", strain, stress) @ body.mesh.volumes)
+    return float(0.5 * np.einsum("mab,mab->m", strain, stress) @ tet_mesh(body).volumes)
 
 
 def green_strain_and_stress(body: Body) -> tuple[Floats, Floats]:
     """1/2 (F^T F - I), and Hooke's stress of it [Pa], in the axes of the rest shape, (m, 3, 3) each."""
     F = deformations(body)
     strain = 0.5 * (np.swapaxes(F, 1, 2) @ F - np.eye(3))
-    return strain, voigt_stress(body.material.stiffness_matrices(len(body.tets)), strain)
+    return strain, voigt_stress(_material(body).stiffness_matrices(len(body.tets)), strain)
 
 
 def deformations(body: Body) -> Floats:
@@ -104,7 +116,7 @@ def strains(body: Body) -> Floats:
 
 def plastic_strains(body: Body) -> Floats:
     """As `Body.plastic_strains`."""
-    body.require_alive()
+    body._require_alive()
     require_tets(body)
     flowed = np.linalg.inv(body._rest_inverses) @ body._description.rest_inverses  # Fp
     stretches = np.linalg.svd(flowed, compute_uv=False)
@@ -129,5 +141,5 @@ def _deviator_norms(tensors: Floats) -> Floats:
 
 def vertex_means(body: Body, values: Floats) -> Floats:
     """Values (m,) averaged by volume over the tetrahedra round each vertex, (n,)."""
-    flat, shares = body.tets.ravel(), np.repeat(values * body.mesh.volumes / 4.0, 4)
-    return np.asarray(np.bincount(flat, shares, minlength=body.vertex_count) / body.mesh.vertex_volumes)
+    flat, shares = body.tets.ravel(), np.repeat(values * tet_mesh(body).volumes / 4.0, 4)
+    return np.asarray(np.bincount(flat, shares, minlength=body.vertex_count) / tet_mesh(body).vertex_volumes)

@@ -40,8 +40,7 @@ def take_notes(world: World) -> dict[str, Any]:
             for row in (handle._row for handle in world._colliders.all_handles)
             if not len(row.shape.samples)
         },
-        "samples": world._colliders.sample_count,
-        "frames": [frame._serial for frame in frames.handles],
+        "frames": [None if frame is None else frame._serial for frame in frames.rows],
         "present": frames.present.tolist(),
         "coming": frames.coming.tolist(),
         "aims": frames.has_work,
@@ -106,8 +105,7 @@ class Notes:
     handles: int
     bodies: list[BodyNote | None]
     colliders: list[tuple[int, ColliderRow]]
-    samples: int
-    frames: list[int]
+    frames: list[int | None]  # None for a free row
     present: NDArray[np.float32]
     coming: NDArray[np.float32]
     aims: bool
@@ -137,15 +135,15 @@ def read_parts(world: World, notes: list[Any], rows: NDArray[np.int32]) -> dict[
 
 def read_notes(world: World, notes: dict[str, Any], parts: dict[int, Part]) -> Notes:
     """Notes of `take_notes`. Raises: SnapshotError, or what Python raises where they are not in order."""
-    count = len(notes["frames"])
+    frames = [None if serial is None else int(serial) for serial in notes["frames"]]
     poses = {
-        name: np.array(notes[name], dtype=np.float32).reshape(max(count, 1), 12)
+        name: np.array(notes[name], dtype=np.float32).reshape(max(len(frames), 1), 12)
         for name in ("present", "coming")
     }
     slots = world.slot_count
     if len(notes["bodies"]) != slots:
         raise ValueError("it has another number of bodies")
-    bodies = [_read_body(world, i, note, count, parts.get(i)) for i, note in enumerate(notes["bodies"])]
+    bodies = [_read_body(world, i, note, frames, parts.get(i)) for i, note in enumerate(notes["bodies"])]
     grabs = [
         (int(serial), _below(number, MOST_GRABS), _below(slot, slots), _vector(point, 3))
         for serial, number, slot, point in notes["grabs"]
@@ -159,8 +157,7 @@ def read_notes(world: World, notes: dict[str, Any], parts: dict[int, Part]) -> N
         int(notes["handles"]),
         bodies,
         [_read_collider(world, note, notes["shapes"]) for note in _some(notes["colliders"], world)],
-        int(notes["samples"]),
-        [int(serial) for serial in notes["frames"]],
+        frames,
         poses["present"],
         poses["coming"],
         bool(notes["aims"]),
@@ -175,7 +172,9 @@ def _some(notes: list[Any], world: World) -> list[Any]:
     return notes
 
 
-def _read_body(world: World, slot: int, note: Any, frame_count: int, part: Part | None) -> BodyNote | None:
+def _read_body(
+    world: World, slot: int, note: Any, frames: list[int | None], part: Part | None
+) -> BodyNote | None:
     if note is None:
         return None
     serial, first_step, failed, material, attachments, _, rests = note
@@ -215,7 +214,7 @@ def _read_body(world: World, slot: int, note: Any, frame_count: int, part: Part 
         description,
         arrays,
         [
-            (int(each), _below(frame, frame_count), bool(two_way), _indices(particles, n))
+            (int(each), _row_of_frame(frame, frames), bool(two_way), _indices(particles, n))
             for each, frame, two_way, particles in attachments
         ],
         bool(rests),
@@ -261,10 +260,17 @@ def _read_joint(
 ) -> tuple[int, int, int, int, NDArray[np.int32]]:
     serial, number, body, other, particles = note
     a, b = (_below(slot, len(bodies)) for slot in (body, other))
-    if a == b or bodies[a] is None or bodies[b] is None or not world._built.program.has_contact:
+    held = bodies[a]
+    if a == b or held is None or bodies[b] is None or not world._built.program.has_contact:
         raise ValueError("a joint holds no bodies")
-    n = len(world._pools.assets[a].mesh.vertices)
+    n = len(held.description.mesh.vertices)
     return int(serial), _below(number, MOST_JOINTS), a, b, _indices(particles, n)
+
+
+def _row_of_frame(number: Any, frames: list[int | None]) -> int:
+    if frames[_below(number, len(frames))] is None:
+        raise ValueError("an attachment hangs from no frame")
+    return int(number)
 
 
 def _below(number: Any, limit: int) -> int:

@@ -1,8 +1,8 @@
 """The flight recorder: the calls and steps of the last ticks, and the snapshot before them.
 
 A recording holds at least as many ticks as were asked for, and less than twice as many: a snapshot is taken
-every so many ticks, and the last two stretches are kept. It is plain data, with the assets and shapes that it
-needs, so that `replay` can build the world again anywhere.
+every so many ticks, and the last two stretches are kept. Ticks that `restore` has undone are not in it. It is
+plain data, with the assets and shapes that it needs, so that `replay` can build the world again anywhere.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from taichi_soft.checks import as_path
 from taichi_soft.errors import SnapshotError, StateError
 from taichi_soft.handles import Handle
 from taichi_soft.plain import as_plain, digest_of, from_json, plain_of, to_json
-from taichi_soft.sealed import seal, unseal
+from taichi_soft.sealed import name_of_sealed, seal, unseal
 from taichi_soft.shapes import Shape
 from taichi_soft.structure import asset_digest
 
@@ -40,7 +40,22 @@ class _Stretch:
 
     snapshot: bytes
     entries: list[list[Any]] = field(default_factory=list)  # calls and steps
+    marks: dict[bytes, int] = field(default_factory=dict)  # entries before a snapshot of each name was taken
     steps: int = 0
+
+    def __post_init__(self) -> None:
+        self.mark(self.snapshot)
+
+    def mark(self, snapshot: bytes) -> None:
+        """It is possible to go back to here."""
+        self.marks[name_of_sealed(snapshot)] = len(self.entries)
+
+    def go_back(self, name: bytes) -> None:
+        """What was done after the snapshot of that name was not."""
+        end = self.marks[name]
+        del self.entries[end:]
+        self.marks = {name: at for name, at in self.marks.items() if at <= end}
+        self.steps = sum(entry[0] == "step" for entry in self.entries)
 
 
 class Recorder:
@@ -92,9 +107,21 @@ class Recorder:
             return f"no recording: {error}"
         return f"`taichi-soft replay {file}` shows how it came to that"
 
-    def begin_again(self, world: World) -> None:
-        """What was done before `World.restore` leads nowhere."""
-        self._before, self._present = None, _Stretch(world.snapshot())
+    def note_snapshot(self, snapshot: bytes) -> None:
+        """Note that one was taken now."""
+        self._present.mark(snapshot)
+
+    def go_back(self, world: World, snapshot: bytes) -> None:
+        """Note that `World.restore` has undone what was done since; begin again where that was not here."""
+        name = name_of_sealed(snapshot)
+        self.pushes = []
+        if name in self._present.marks:
+            self._present.go_back(name)
+        elif self._before is not None and name in self._before.marks:
+            self._before.go_back(name)
+            self._present, self._before = self._before, None
+        else:
+            self._before, self._present = None, _Stretch(world.snapshot())
 
     def content(self, world: World) -> bytes:
         """The recording as it stands."""
@@ -154,6 +181,7 @@ def _world_options(world: World) -> dict[str, Any]:
         "soft_contact": world._contact.soft,
         "sleep_speed": world._contact.sleep_speed,
         "collider_room": world._contact.collider_room,
+        "sample_room": world._contact.sample_room,
     }
 
 

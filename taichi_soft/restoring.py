@@ -31,10 +31,8 @@ def put_back(world: World, notes: Notes) -> None:
     colliders = world._colliders
     colliders.restore(
         [row for _, row in notes.colliders],
-        notes.samples,
         lambda i, row: _handle(world, notes.colliders[i][0], Collider, lambda: Collider(colliders, i, row)),
     )
-    versions = {body: body.topology_version for body in world.bodies}
     for slot, wanted in enumerate(notes.bodies):
         _apply_body(world, simulation.state, slot, wanted)
     world._grabs.clear()
@@ -52,10 +50,7 @@ def put_back(world: World, notes: Notes) -> None:
                 simulation.tears.watch(body)
                 if wanted.rests:
                     simulation.tears.rest(body)
-    for body in world.bodies:
-        if versions.get(body) != body.topology_version:
-            simulation.events.renew_watches(body)
-    simulation.readout.has_moved()
+    simulation.has_changed()
     world._substeps.forget()
 
 
@@ -83,14 +78,15 @@ def _apply_joints(world: World, notes: Notes) -> None:
 def _apply_frames(world: World, notes: Notes) -> None:
     frames = world._frames
     frames.present, frames.coming, frames.has_work = notes.present, notes.coming, notes.aims
-    frames.handles.clear()
-    frames.count = len(notes.frames)
+    frames.rows = [None] * len(notes.frames)
     for number, serial in enumerate(notes.frames):
-        frame = world._handles.find(serial, Frame) or Frame.at(frames, number)
-        if frame._number != number:
-            frame = Frame.at(frames, number)
+        if serial is None:
+            continue
+        frame = world._handles.find(serial, Frame)
+        if frame is None or frame._number != number:
+            frame = Frame._at(frames, number)
         world._handles.enlist(frame, serial)
-        frames.handles.append(frame)
+        frames.rows[number] = frame
 
 
 def _apply_body(world: World, state: State, slot: int, wanted: BodyNote | None) -> None:
@@ -130,7 +126,8 @@ def _apply_body(world: World, state: State, slot: int, wanted: BodyNote | None) 
     present._description = wanted.description
     present._attachments.clear()
     for serial, number, two_way, particles in wanted.attachments:
-        frame = world._frames.handles[number]
+        frame = world._frames.rows[number]
+        assert frame is not None
         held = world._handles.find(serial, Attachment) or Attachment(
             present, particles, frame, two_way=two_way
         )

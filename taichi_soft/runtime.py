@@ -7,9 +7,15 @@ imported, and only this module calls `ti.init` (which would reset every field in
 from __future__ import annotations
 
 import contextlib
+import functools
 import io
 import os
+import textwrap
+import types
+import weakref
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 os.environ.setdefault("TI_SKIP_VERSION_CHECK", "ON")
 os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
@@ -27,6 +33,36 @@ _ARCHS = ("cpu", "cuda", "vulkan", "metal")
 # Taichi 1.7 puts branches and loops of a `ti.func` called in it into the kernel, and crashes. With this
 # they go into what is being compiled.
 ti.lang.kernel_impl.Kernel.ast_builder = lambda _: ti.lang.impl.get_runtime().compiling_callable.ast_builder()
+
+
+def _remember(look_up: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """`look_up`, which asks once about each object, for as long as the object lives."""
+    known: weakref.WeakKeyDictionary[Any, Any] = weakref.WeakKeyDictionary()
+
+    def remembered(key: Any) -> Any:
+        if key not in known:
+            known[key] = look_up(key)
+        return known[key]
+
+    return remembered
+
+
+def _remember_sources() -> None:
+    """Wherever a `ti.func` is called, Taichi 1.7 reads its source again, and wraps the line of every name and
+    operator in it for messages of errors: a third of a first step whose kernels are in the cache. The answers
+    are always the same, so they are kept."""
+    kernels, nodes = ti.lang.kernel_impl, ti.lang.ast.ast_transformer_utils
+    kernels.getsourcefile = _remember(kernels.getsourcefile)
+    kernels.getsourcelines = _remember(kernels.getsourcelines)
+    kernels.textwrap = types.SimpleNamespace(
+        fill=functools.cache(textwrap.fill), dedent=functools.cache(textwrap.dedent)
+    )
+    wrapper = types.SimpleNamespace(wrap=functools.cache(nodes.TextWrapper(width=80).wrap))
+    nodes.TextWrapper = lambda width: wrapper
+
+
+if ti.__version__[:2] == (1, 7):
+    _remember_sources()
 
 
 @dataclass(frozen=True)
@@ -97,6 +133,8 @@ def init(arch: str = "auto", threads: int | None = None) -> Device:
                 default_fp=ti.f32,
                 default_ip=ti.i32,
                 offline_cache=True,
+                offline_cache_max_size_of_files=1
+                << 29,  # a game of many kinds of worlds fills the default 100 MB
                 enable_fallback=False,
                 cfg_optimization=False,  # halves the compile time; the kernels run as fast without it
                 make_cpu_multithreading_loop=False,  # it would put up to 512 bodies into one thread

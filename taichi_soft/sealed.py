@@ -50,5 +50,10 @@ def unseal(data: Any, mark: bytes, version: int, name: str) -> list[memoryview]:
     return parts
 
 
+def name_of_sealed(data: bytes) -> bytes:
+    """A name of what `seal` put together, that nothing else has."""
+    return bytes(memoryview(data).cast("B")[-_DIGEST:])
+
+
 def _digest(whole: bytes | memoryview) -> bytes:
     return blake2b(whole, digest_size=_DIGEST).digest()

@@ -16,7 +16,7 @@ class Settings:
 
     gravity: NDArray[np.float64]  # (3,) [m/s^2], read-only
     floor: float | None  # height [m]
-    restitution: float
+    restitution: float | None  # of the floor; None for that of the bodies
     friction: float
     integrator: Integrator
     tolerance: float  # of implicit solves: residual over right-hand side
@@ -36,3 +36,4 @@ class ContactSettings:
     soft: bool  # each other
     sleep_speed: float  # [m/s]; 0 for never
     collider_room: int  # colliders that may come after `World.build`
+    sample_room: int  # values in their grids

@@ -17,10 +17,11 @@ from taichi_soft.control.frames import Frames
 from taichi_soft.errors import DroppedEventsWarning, OptionError, SolverWarning, StateError
 from taichi_soft.events import EventLog
 from taichi_soft.failures import FailedStep, Failure, find_failure
+from taichi_soft.kernels.contact_step import ALL_SLEEP
 from taichi_soft.kernels.program import Program
 from taichi_soft.kernels.readout import write_motion
 from taichi_soft.kernels.schedules import Launch
-from taichi_soft.kernels.sleep import wake_body
+from taichi_soft.kernels.sleep import wake_body, wake_near
 from taichi_soft.kernels.spawn import despawn_body, spawn_body
 from taichi_soft.pools import Pools
 from taichi_soft.readout import Readout
@@ -51,6 +52,7 @@ class Simulation:
     tears: Tears | None  # None where no body tears
     readout: Readout = field(init=False)
     troubled: int = 0  # bodies that failed in the last step, or whose solves were not exact
+    _is_still: bool = False  # none was awake after the last step, and nothing was changed since
     _warned: set[int] = field(default_factory=set)  # slots of bodies with such solves
 
     def __post_init__(self) -> None:
@@ -59,11 +61,14 @@ class Simulation:
     def step(self, seconds: float, substeps: int, h: float) -> list[str]:
         """Make one fixed step of `seconds`, in substeps of `h` [s]. Returns a line for each body it froze."""
         clock, colliders = self.clock, self.colliders
-        self.readout.has_moved()
         self.frames.aim(self.state, len(self.pools.slots), seconds)
+        goes_on = not self._is_still or self.frames.has_work
         if colliders is not None:
-            colliders.prepare(seconds)
-        self.troubled = self.launch(substeps, h)
+            goes_on = colliders.prepare(seconds) or goes_on
+        if goes_on:
+            self.readout.has_moved()
+            found = self.launch(substeps, h)
+            self.troubled, self._is_still = max(found, 0), found == ALL_SLEEP
         if colliders is not None:
             colliders.finish(seconds)
         reports = self._note_failures(substeps, h) if self.troubled else []
@@ -74,8 +79,17 @@ class Simulation:
         if loss:
             warnings.warn(loss, DroppedEventsWarning, stacklevel=3)
         if self.tears is not None:
-            self.tears.tear()
+            for body, pieces in self.tears.tear():
+                self.events.note_torn(clock.steps - 1, clock.time, body, pieces)
         return reports
+
+    def rehearse(self, seconds: float) -> None:
+        """Move the fields by a step that nobody takes note of, and that the caller takes back."""
+        self.frames.aim(self.state, len(self.pools.slots), seconds)
+        if self.colliders is not None:
+            self.colliders.prepare(seconds)
+        self.launch(1, seconds)
+        self.state.body_status.to_numpy()  # as where a body fails
 
     def _note_failures(self, substeps: int, h: float) -> list[str]:
         """Mark the bodies that the last step froze; a line about each."""
@@ -88,10 +102,20 @@ class Simulation:
             self.events.note_frozen(body)
             reports.append(
                 f"body {body.index} went non-finite in step {clock.steps}: put back to t = "
-                f"{clock.time:.4g} s and frozen; body.failure tells where it broke. Use more substeps or a "
-                "softer material"
+                f"{clock.time:.4g} s and frozen; body.failure tells where it broke. {self._way_out(body)}"
             )
         return reports
+
+    def _way_out(self, body: Body) -> str:
+        """What may help a body that the last step froze."""
+        lower, upper = body.aabb()
+        way, size = self.frames.way(body), float((upper - lower).max())
+        if way > size:
+            return (
+                f"It is {size:.3g} m large, and its frame moved it by {way:.3g} m in this step: move frames "
+                "in shorter ways, or make the jump by Frame.teleport"
+            )
+        return "Use more substeps or a softer material"
 
     def check_solves(self) -> None:
         """Warn of bodies whose implicit solves were not exact in the last step, once of each."""
@@ -115,21 +139,36 @@ class Simulation:
     def fill(self, slot: int, rows: NDArray[np.float32]) -> None:
         """Let a body begin in an empty slot, as `rows` say (see `SoftBodyAsset.placed`)."""
         spawn_body(self.state, slot, rows)
-        self.readout.has_moved()
+        self.has_changed()
 
     def empty(self, slot: int) -> None:
         """Take the body in a slot out of the fields."""
         self._warned.discard(slot)
+        self._is_still = False
         despawn_body(self.state, slot)
 
     def wake(self, slot: int) -> None:
         """Wake a body, or all for -1."""
+        self._is_still = False
         if self.sleeps:
             wake_body(self.state, slot)
 
     def wake_all(self) -> None:
         """Wake all bodies."""
         self.wake(-1)
+
+    def wake_near(self, lower: NDArray[Any], upper: NDArray[Any]) -> None:
+        """Wake who sleeps near a box, given by two corners [m]."""
+        if self.sleeps:
+            box = np.concatenate([lower, upper]).astype(np.float32)
+            if wake_near(self.state, len(self.pools.slots), box):
+                self._is_still = False
+
+    def box_of(self, body: Body) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Corners of a box round a body and its skin, as it is now [m]."""
+        lower, upper = body.aabb()
+        thickness = body.asset.surface_row[1]
+        return lower - thickness, upper + thickness
 
     def read(self, slot: int, kernel: Callable[..., Any], *arguments: Any) -> Any:
         """Call a kernel (state, first particle of a body, *arguments) that changes nothing."""
@@ -148,15 +187,22 @@ class Simulation:
     def rouse(self, slot: int) -> None:
         """Take note that control has changed a body, or all for -1."""
         self.wake(slot)
-        self.readout.has_moved()
+        self.has_changed()
 
-    def write_motion(self, slot: int, positions: NDArray[Any], velocities: NDArray[Any]) -> None:
+    def write_motion(self, body: Body, positions: NDArray[Any], velocities: NDArray[Any]) -> None:
         """Put a body somewhere else. Raises: OptionError for what is out of reach or too fast."""
         x, v = positions.astype(np.float32), velocities.astype(np.float32)
         for name, rows, limit in (("positions", x, POSITION_LIMIT), ("velocities", v, VELOCITY_LIMIT)):
             if not np.abs(rows).max() < limit:
                 raise OptionError(f"{name} must lie within {limit:g} of zero")
-        write_motion(self.state, slot, x, v)
+        left = self.box_of(body)
+        write_motion(self.state, body.index, x, v)
+        self.rouse(body.index)
+        self.wake_near(*left)
+
+    def has_changed(self) -> None:
+        """Take note that the fields were written to."""
+        self._is_still = False
         self.readout.has_moved()
 
     def rows_of(self, slot: int, vertices: NDArray[np.int32]) -> NDArray[np.int32]:

@@ -1,9 +1,9 @@
 """The state of a world between two steps, as bytes and back.
 
-A snapshot has three parts. The *structure* is what the world was built of; a world of another structure
+A snapshot has four parts. The *structure* is what the world was built of; a world of another structure
 refuses it. The *notes* are what Python knows: time, who lives in which slot, colliders, frames, grabs and
 joints. The *words* are what the fields hold, bit by bit (see `kernels.snapshot`), and the parts of meshes
-that cuts have left (see `parts`).
+that cuts have left (see `parts`). The last part is what events go on with (see `events.memory`).
 """
 
 from __future__ import annotations
@@ -14,9 +14,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from taichi_soft.body import Body
+from taichi_soft.colliders import Collider
 from taichi_soft.constants import POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.control.joints import renew_islands, rows_in_use
 from taichi_soft.errors import SnapshotError, StateError
+from taichi_soft.events import Known, Memory
 from taichi_soft.joint_fields import JOINT_ROWS
 from taichi_soft.kernels.joints import forget_held
 from taichi_soft.kernels.pins import WITH_FRAME
@@ -43,7 +46,10 @@ from taichi_soft.structure import require_structure
 if TYPE_CHECKING:
     from taichi_soft.world import World
 
-MARK, VERSION = b"TSOFTSNP", 2
+MARK, VERSION = b"TSOFTSNP", 4
+
+MOST_PRESS = 1e30
+"""Impulse [N s] that no contact has reached: what is beyond is not finite."""
 
 Words = NDArray[np.int32]
 
@@ -55,7 +61,8 @@ def take_snapshot(world: World) -> bytes:
     words = np.empty(int(table[-1, 2]), dtype=np.int32)
     copy_state(state, table, words, True)
     words = np.concatenate([words, *(body._part.rows for body in world.bodies if body._part is not None)])
-    return seal(MARK, VERSION, [world._structure, to_json(take_notes(world)), words.astype("<i4").tobytes()])
+    notes, memory = to_json(take_notes(world)), to_json(world._built.events.remember().plain)
+    return seal(MARK, VERSION, [world._structure, notes, words.astype("<i4").tobytes(), memory])
 
 
 def state_hash(world: World) -> str:
@@ -72,7 +79,7 @@ def _table(world: World, held: int, joint_rows: int) -> Words:
 def restore_snapshot(world: World, data: Any) -> None:
     """As `World.restore`."""
     state = world._built.state
-    structure, content, rows = _three(unseal(data, MARK, VERSION, "snapshot"))
+    structure, content, rows, remembered = _four(unseal(data, MARK, VERSION, "snapshot"))
     require_structure(bytes(structure), world._structure)
     plain = from_json(content)
     try:
@@ -85,6 +92,7 @@ def restore_snapshot(world: World, data: Any) -> None:
         parts = read_parts(world, plain["bodies"], words[table[-1, 2] :])
         words = words[: table[-1, 2]]
         notes = read_notes(world, plain, parts)
+        memory = Memory.of(from_json(remembered), world.slot_count)
     except (KeyError, TypeError, ValueError, IndexError, OverflowError, AttributeError, StateError) as error:
         if isinstance(error, SnapshotError):
             raise
@@ -95,11 +103,14 @@ def restore_snapshot(world: World, data: Any) -> None:
         forget_held(state)
     copy_state(state, table, words, False)
     renew_islands(world)
+    find = world._handles.find
+    known = Known(lambda serial: find(serial, Body), lambda serial: find(serial, Collider))
+    world._built.events.recall(memory, notes.steps, known)
 
 
-def _three(parts: list[memoryview]) -> list[memoryview]:
-    if len(parts) != 3:
-        raise SnapshotError(f"this snapshot has {len(parts)} parts instead of 3")
+def _four(parts: list[memoryview]) -> list[memoryview]:
+    if len(parts) != 4:
+        raise SnapshotError(f"this snapshot has {len(parts)} parts instead of 4")
     return parts
 
 
@@ -115,6 +126,8 @@ def _require_words(world: World, notes: Notes, table: Words, words: Words) -> No
         (HELD, state.grab_count, PATCH_ROWS + 1),
         (PATCH, state.patch_particle, particles),
     ]
+    if state.capacity.implicit:
+        limits.append((PARTICLE, state.particle_contact, max(state.capacity.contact.colliders, 1) + 1))
     if world._built.program.has_contact:
         limits += [
             (JOINT, state.joints.bodies, slots + 1),
@@ -127,10 +140,13 @@ def _require_words(world: World, notes: Notes, table: Words, words: Words) -> No
             raise SnapshotError(
                 "this snapshot is not in order: it names particles or bodies that there are not"
             )
-    for field, highest in (
+    bounds: list[tuple[Any, float]] = [
         (state.particle_position, POSITION_LIMIT),
         (state.particle_velocity, VELOCITY_LIMIT),
-    ):
+    ]
+    if state.capacity.contact.soft:
+        bounds += [(state.soft.kept_press, MOST_PRESS), (state.soft.kept_rub, MOST_PRESS)]
+    for field, highest in bounds:
         values = _rows(table, words, state, PARTICLE, field).view(np.float32)
         if not np.abs(values).max() <= highest:
             raise SnapshotError("this snapshot is not in order: particles are out of reach, or not finite")

@@ -30,7 +30,7 @@ def require_own(world: World, body: Any) -> None:
     """Raises: OptionError for what is no body of this world; StateError for one that was removed."""
     if not isinstance(body, Body) or body._world_ref() is not world:
         raise OptionError(f"body must be one that this world made, got {body!r}")
-    body.require_alive()
+    body._require_alive()
 
 
 def add_body(
@@ -97,7 +97,7 @@ def despawn(world: World, body: Body) -> None:
     simulation = world._simulation
     if simulation is not None:
         _let_go(world, body)
-        simulation.wake_all()  # what may have lain on it
+        simulation.wake_near(*simulation.box_of(body))  # what may have lain on it
     world._pools.leave(body)
     body._removed_in = world.step_count
     if simulation is not None:

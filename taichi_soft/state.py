@@ -1,12 +1,12 @@
 """The Taichi fields that hold particles, edges and tetrahedra of all bodies of one world.
 
 Fields live as long as the process: Taichi compiles kernels per set of fields, and destroying one while
-a game runs stalls it. A closed world therefore gives its state back, and the next world of the same
-capacity takes it over with its kernels compiled.
+a game runs stalls it. A closed world therefore gives its state back, and the next world that fits into
+it takes it over with its kernels compiled.
 """
 
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +18,16 @@ from taichi_soft.loading import Loader
 from taichi_soft.runtime import ti
 from taichi_soft.scene import BodyArrays, Ranges, Scene, blocks_of
 
+if TYPE_CHECKING:
+    from taichi_soft.kernels.program import Program
+
 ACTIVE, FROZEN, ASLEEP, ABSENT = 0, 1, 2, 3
 """Status of a body: it moves, it went non-finite and rests, it sleeps, its slot is empty."""
 
 _NO_CONTACT = ContactCapacity()
+
+ROOMS = "particles", "edges", "blocks", "triangles", "outer", "rings", "bodies"
+"""The numbers of a `Capacity` that a world does not notice if they are larger than it needs."""
 
 MOVES_PINS, FEELS_REACTION, PUSHED, DAMPED, SHELTERED, GRABBED, JOINED = 1, 2, 4, 8, 16, 32, 64
 """Bits of `body_drives`: some pinned particles have somewhere to go; what they take up is added up;
@@ -83,6 +89,16 @@ class Capacity:
         """Whether there are fields of contact."""
         return self.contact != _NO_CONTACT
 
+    @property
+    def rooms(self) -> list[int]:
+        """How much room there is, in the order of `ROOMS`."""
+        return [getattr(self, name) for name in ROOMS]
+
+    def has_room_for(self, other: "Capacity") -> bool:
+        """Whether a state of this capacity has the fields of one of `other`, and none of them shorter."""
+        widened = {name: max(getattr(self, name), getattr(other, name)) for name in ROOMS}
+        return replace(other, **widened) == self and (self.rings > 0) == (other.rings > 0)
+
 
 def _power_of_two(count: int, least: int) -> int:
     return max(least, 1 << max(count - 1, 0).bit_length())
@@ -100,6 +116,7 @@ class State:
     def __init__(self, capacity: Capacity) -> None:
         """Allocate `capacity`; contents are zero until `load`."""
         self.capacity = capacity
+        self.programs: set[Program] = set()  # that it has been used with
         self.loader = Loader()
         n, k, b, bodies = capacity.particles, capacity.edges, capacity.blocks, capacity.bodies
         real = self.real = ti.f64 if capacity.double else ti.f32
@@ -152,8 +169,12 @@ class State:
             self.residual = ti.Vector.field(3, real, n)
             self.direction = ti.Vector.field(3, real, n)
             self.image = ti.Vector.field(3, real, n)
-            self.particle_contact = ti.field(ti.i32, n)  # 1 where the floor holds it from below
+            # 1 where the floor holds it, or a collider's number plus 1.
+            self.particle_contact = ti.field(ti.i32, n)
             self.prev_contact = ti.field(ti.i32, n)  # before a piece of a step that may be taken back
+            if capacity.has_contact:
+                # Normal of the collider that holds it, and what that gave it before the solve [N s].
+                self.particle_hold = ti.Vector.field(4, real, n)
             self.body_residual = ti.field(real, bodies)  # largest of the last step, over the right-hand side
             self.solver = ti.Vector.field(2, real, ())  # tolerance, most iterations
         if capacity.parallel:
@@ -279,6 +300,10 @@ class State:
     def _load_contact(self, scene: Scene) -> None:
         fill, contact, count = self.loader.fill, self.contact, len(scene.bodies)
         fill(contact.near_count, np.zeros(0))
+        # Of slots that stay empty too: what colliders are told is a sum over all.
+        fill(contact.impulse, np.zeros((0, 3)))
+        fill(contact.angular_impulse, np.zeros((0, 3)))
+        fill(contact.rebound, np.zeros(0))
         fill(self.joints.bodies, np.zeros((0, 2)))
         fill(self.joints.is_held, np.zeros(0))
         # What lies inside a body is never near anything.
@@ -290,6 +315,7 @@ class State:
         if self.capacity.contact.soft:
             fill(self.soft.sweep_order, np.arange(count))
             fill(self.soft.slot_count, np.zeros(0))
+            fill(self.soft.kept_press, np.zeros(0))
             self.soft.records_touches[None] = 0
             self.soft.pairs_lost[None] = 0
             fill(self.soft.pair_bodies, np.zeros((0, 2)))
@@ -395,15 +421,22 @@ def _tet_blocks(
     return np.concatenate(blocks), np.concatenate([none, *corners]).astype(np.int64)
 
 
-_free: dict[Capacity, list[State]] = {}
+_free: list[State] = []
 
 
-def acquire(capacity: Capacity) -> State:
-    """A state of that capacity: one that a closed world gave back, or a new one."""
-    waiting = _free.get(capacity)
-    return waiting.pop() if waiting else State(capacity)
+def acquire(capacity: Capacity, program: "Program") -> State:
+    """A state with room for that: of those that closed worlds gave back one for which the step of `program`
+    is compiled, and of these the smallest; or a new one."""
+    fitting = [state for state in _free if state.capacity.has_room_for(capacity)]
+    if fitting:
+        state = min(fitting, key=lambda each: (program not in each.programs, each.capacity.rooms))
+        _free.remove(state)
+    else:
+        state = State(capacity)
+    state.programs.add(program)
+    return state
 
 
 def release(state: State) -> None:
     """Take back the state of a world that is gone."""
-    _free.setdefault(state.capacity, []).append(state)
+    _free.append(state)

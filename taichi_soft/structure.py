@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from taichi_soft.errors import SnapshotError
 from taichi_soft.plain import as_plain, digest_of, from_json, to_json
+from taichi_soft.state import ROOMS
 
 if TYPE_CHECKING:
     from taichi_soft.assets import SoftBodyAsset
@@ -18,10 +19,12 @@ if TYPE_CHECKING:
 def structure_of(world: World) -> bytes:
     """What a snapshot's world must be built of, as JSON."""
     settings = {name: as_plain(value) for name, value in asdict(world.settings).items()}
+    capacity = asdict(world._built.state.capacity)
     return to_json(
         {
             "package": _package_version(),
-            "capacity": asdict(world._built.state.capacity),
+            # The rooms may be another world's, and follow from the bodies.
+            "capacity": {name: value for name, value in capacity.items() if name not in ROOMS},
             "soft_contact": world._contact.soft,
             "sleep_speed": world._contact.sleep_speed,
             **settings,

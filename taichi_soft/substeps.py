@@ -21,13 +21,20 @@ _PLAIN = {float, int, np.float64, type(None)}
 """Types whose values can be compared with those of the last step."""
 
 
+SOFT_CONTACT_STEP = 1 / 240
+"""Substep of implicit Euler [s], at most, where bodies touch each other and nothing else is asked for. What
+passes between them the solve does not know of, so they look softer the longer it is: in a pile of three,
+blocks of half a metre (1 MPa) are lower than by leapfrog by 3 to 9 mm so, and by 9 to 27 mm at 120 Hz; at
+60 Hz the pile falls."""
+
+
 class Substeps:
     """How long the substeps of one world can be, and how long they are."""
 
-    def __init__(self, pools: Pools, *, is_implicit: bool) -> None:
+    def __init__(self, pools: Pools, *, is_implicit: bool, soft_contact: bool) -> None:
         """`is_implicit`: its integrator takes substeps of any length."""
         self._pools = pools
-        self._is_implicit = is_implicit
+        self._is_implicit, self._soft_contact = is_implicit, soft_contact
         self._estimates: dict[BodyDescription, StableStep] = {}  # of bodies with another material
         self._asked: tuple[Any, ...] = ()
         self._chosen = (0.0, 0, 0.0)  # for what was asked last
@@ -47,8 +54,8 @@ class Substeps:
         if not self._pools.slots:
             raise StateError("the world is empty: call add_body or reserve first")
         if self._is_implicit:
-            as_step(dt)
-            return 1
+            seconds = as_step(dt)
+            return max(1, math.ceil(0.999 * seconds / SOFT_CONTACT_STEP)) if self._soft_contact else 1
         longest = min(asset.stable_step.recommended for asset in self._pools.kinds)
         for body in self._pools.living:
             if body._description is not body.asset.description:

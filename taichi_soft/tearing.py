@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import KW_ONLY, dataclass
 from typing import TYPE_CHECKING
 
@@ -38,7 +38,8 @@ class Tearing:
     their mean, of Hooke's law and linear strain, is above the strength: its vertices are split across the
     pull, along the faces of the tetrahedra round them. A body tears as long as its `spare_vertices` last;
     what falls off becomes a body while slots are free, the largest first; the rest, and crumbs of less than
-    2 % of the whole, stay loose in the body. While it is grabbed or attached, it holds.
+    2 % of the whole, stay loose in the body. What a frame holds it goes on holding, copies of it as well;
+    while a body is grabbed, or joined to another one, it does not tear.
 
     Args:
         stress: tensile strength [Pa].
@@ -78,20 +79,24 @@ class Tears:
         """Look at a body no more."""
         self._limits[body.index] = 0.0
 
-    def tear(self) -> None:
-        """Tear what the last step has pulled too hard."""
+    def tear(self) -> Iterator[tuple[Body, tuple[Body, ...]]]:
+        """Tear what the last step has pulled too hard. Yields: each body that tore, and what fell off it."""
         find_overloaded(self._state, self._limits, self._found)
         for slot in np.flatnonzero(self._found).tolist():
             body = self._slots[slot]
-            if body is None or body.is_held:
+            if body is None or body._is_pulled:
                 continue
+            version = body.topology_version
             try:
-                _tear(body)
+                pieces = _tear(body)
             except StateError:  # no room for more copies
                 self.rest(body)
+                continue
+            if body.topology_version != version:
+                yield body, pieces
 
 
-def _tear(body: Body) -> None:
+def _tear(body: Body) -> tuple[Body, ...]:
     tearing, mesh = body.asset.tearing, body.mesh
     assert tearing is not None
     stress = green_strain_and_stress(body)[1]
@@ -99,20 +104,21 @@ def _tear(body: Body) -> None:
     pulls, axes = np.linalg.eigh(stress[faces.tets].mean(axis=1))
     pull, axis = pulls[:, -1], axes[:, :, -1]
     is_torn = np.bincount(body.vertex_origins)[body.vertex_origins] > 1
-    over = pull > tearing.stress
+    corners = _corners(mesh.tets, faces)
+    # A vertex that is held opens nothing when it is split: copies of it are held where it is.
+    over = (pull > tearing.stress) & ~np.isin(corners, body.pinned).any(axis=1)
     if not over.any():
-        return
-    pull[is_torn[_corners(mesh.tets, faces)].any(axis=1)] *= _TIP
+        return ()
+    pull[is_torn[corners].any(axis=1)] *= _TIP
     chosen = _worst_faces(mesh.vertices, mesh.tets, faces, np.where(over, pull, 0.0), axis, tearing.most)
     is_cut = np.zeros(len(pull), dtype=np.bool_)
     is_cut[chosen] = True
     centers = mesh.vertices[mesh.tets].mean(axis=1)
-    corners = _corners(mesh.tets, faces)
     for face in chosen:
         near = np.flatnonzero(np.isin(corners, corners[face]).any(axis=1))
         side = (centers[faces.tets[near]] - mesh.vertices[corners[face]].mean(axis=0)) @ axis[face] > 0
         is_cut[near[side[:, 0] != side[:, 1]]] = True
-    divide(body, faces, is_cut, keeps_crumbs=True)
+    return divide(body, faces, is_cut, keeps_crumbs=True)
 
 
 def _corners(tets: NDArray[np.int32], faces: InnerFaces) -> NDArray[np.int32]:

@@ -16,7 +16,7 @@ from taichi_soft.body import Body
 from taichi_soft.building import build
 from taichi_soft.checks import as_count, as_flag, as_number, as_path, as_vector
 from taichi_soft.clock import Clock
-from taichi_soft.colliders import Collider, Colliders
+from taichi_soft.colliders import MOST_SAMPLES, Collider, Colliders
 from taichi_soft.constants import ALL_GROUPS, GRAVITY_EARTH, VELOCITY_LIMIT
 from taichi_soft.contact import DEFAULT_CONTACT, Contact
 from taichi_soft.control.access import require_substeps
@@ -44,6 +44,7 @@ from taichi_soft.queries import (
     find_in_sphere,
 )
 from taichi_soft.recorder import Recorder, save_recording
+from taichi_soft.rehearsal import rehearse
 from taichi_soft.scene import Scene
 from taichi_soft.settings import ContactSettings, Settings
 from taichi_soft.shapes import Shape
@@ -65,9 +66,10 @@ class World(Handle):
     Args:
         gravity: (3,) [m/s^2].
         floor: height of a horizontal floor [m], or None for none.
-        restitution: of the floor, 0 (default: bodies bounce by their own elasticity) to 1. It throws each
-            vertex back by itself, so a damped body may well bounce lower with it than without. With colliders
-            or contact between bodies in the world it limits bodies too, as in `add_collider`.
+        restitution: of the floor, 0 to 1; None leaves bodies their own elasticity. With colliders or contact
+            between bodies in the world it is as in `add_collider`. Without, the floor throws each vertex back
+            by itself: bodies keep their own elasticity at 0 too, which is what None is there, and a damped
+            one may well bounce lower at 1 than at 0.
         friction: Coulomb coefficient of the floor, 0 or more.
         integrator: "leapfrog", "lazy_leapfrog", "explicit_euler", or "implicit_euler": stable for every step,
             at the price of a linear solve in each and of damping that grows with its length. A step in which
@@ -80,6 +82,8 @@ class World(Handle):
         sleep_speed: bodies of which no particle was faster [m/s] for half a second, nor any of a body that
             they may touch, fall asleep, until something comes near or is done to them; 0 for never.
         collider_room: colliders that may be added after `build`, beside those added before.
+        sample_room: samples of their grids, beside those of colliders added before: a `HeightFieldShape` or
+            `MeshShape` takes `len(shape.samples)`, as long as its collider is there.
         record: steps that a flight recorder keeps, with all calls between them; 0 keeps nothing. See
             `save_recording`.
         record_to: file that it writes when a body freezes, the first time that this happens.
@@ -91,7 +95,7 @@ class World(Handle):
         *,
         gravity: ArrayLike = (0.0, 0.0, -GRAVITY_EARTH),
         floor: float | None = 0.0,
-        restitution: float = 0.0,
+        restitution: float | None = None,
         friction: float = 0.5,
         integrator: str | Integrator = Integrator.LEAPFROG,
         tolerance: float = 1e-3,
@@ -100,6 +104,7 @@ class World(Handle):
         soft_contact: bool = False,
         sleep_speed: float = 0.0,
         collider_room: int = 0,
+        sample_room: int = 0,
         record: int = 0,
         record_to: str | Path = "frozen.recording",
     ) -> None:
@@ -108,7 +113,9 @@ class World(Handle):
         self._settings = Settings(
             gravity=downwards,
             floor=None if floor is None else as_number(floor, "floor", -1e6, 1e6, "a height [m] or None"),
-            restitution=as_number(restitution, "restitution", 0.0, 1.0, "a number from 0 to 1"),
+            restitution=None
+            if restitution is None
+            else as_number(restitution, "restitution", 0.0, 1.0, "a number from 0 to 1, or None"),
             friction=as_number(friction, "friction", 0.0, 1e6, "a number from 0 to 1,000,000"),
             integrator=Integrator.parse(integrator),
             tolerance=as_number(tolerance, "tolerance", 1e-6, 0.5),
@@ -121,6 +128,7 @@ class World(Handle):
         self._record, self._record_to = as_count(record, "record", 0), as_path(record_to)
         self._contact = ContactSettings(
             collider_room=as_count(collider_room, "collider_room", 0),
+            sample_room=as_count(sample_room, "sample_room", 0, MOST_SAMPLES),
             soft=as_flag(soft_contact, "soft_contact"),
             sleep_speed=as_number(
                 sleep_speed, "sleep_speed", 0.0, VELOCITY_LIMIT, "a speed of 0 m/s or more"
@@ -128,15 +136,18 @@ class World(Handle):
         )
         self._clock = Clock()
         self._pools, self._scene = Pools(), Scene()
-        self._substeps = Substeps(self._pools, is_implicit=self.settings.is_implicit)
+        self._substeps = Substeps(
+            self._pools, is_implicit=self.settings.is_implicit, soft_contact=self._contact.soft
+        )
         self._colliders = Colliders()
         self._floor_collider: Collider | None = None
         self._built_with: list[str] = []  # shapes of colliders that came before `build`, by digest
-        self._frames = Frames()
+        self._frames = Frames(self._pools)
         self._grabs: dict[int, Grab] = {}
         self._joints: dict[int, Joint] = {}
         self._force_field: ForceField | None = None
         self._simulation: Simulation | None = None
+        self._restore_count = 0
 
     @property
     def settings(self) -> Settings:
@@ -284,7 +295,8 @@ class World(Handle):
         group: int = 1,
         mask: int = ALL_GROUPS,
     ) -> Collider:
-        """Add something solid that bodies hit: after `build` where `collider_room` was left for it.
+        """Add something solid that bodies hit: after `build` where `collider_room` was left for it, and
+        `sample_room` for a height field or mesh.
 
         Vertices of bodies touch it; what is smaller than a body's triangles may slip between them.
         Args:
@@ -351,7 +363,8 @@ class World(Handle):
         Of all that have slots, whether a body lives there or not: so that neither the time of a frame nor the
         motion of the others changes where one comes or goes. Bodies that were cut, or given another material,
         count with an estimate of their own after each change, which takes some 0.2 s for 5,000 tetrahedra:
-        give substeps where that is too long. 1 for implicit Euler, which needs none.
+        give substeps where that is too long. 1 for implicit Euler, which needs none; with `soft_contact` so
+        many that they last no longer than 1/240 s.
         """
         return self._substeps.stable_count(dt)
 
@@ -377,6 +390,16 @@ class World(Handle):
             simulation.check_solves()
 
     @recorded
+    def warm_up(self) -> None:
+        """Compile all that a game may call, behind its loading screen, so that nothing stops it later.
+
+        Without it each kind of call compiles where it is made first: for 0.1 to 1 s with an empty cache, for
+        less in a later process. The world stays as it is, to the bit.
+        Raises: StateError before `build`.
+        """
+        rehearse(self)
+
+    @recorded
     def wake(self) -> None:
         """Wake all bodies that sleep."""
         if self._simulation is not None:
@@ -395,28 +418,28 @@ class World(Handle):
         self._handles.enlist(frame)
         return frame
 
-    @recorded
     def grab(
         self,
         origin: ArrayLike,
         direction: ArrayLike,
         *,
         max_distance: float = math.inf,
+        bodies: Iterable[Body] | None = None,
         frequency: float = 5.0,
         max_force: float | None = None,
     ) -> Grab | None:
         """Take hold of the first body that a ray hits: as `raycast`, and `Body.grab` there.
 
         Args:
-            origin, direction, max_distance: of the ray.
+            origin, direction, max_distance, bodies: of the ray.
             frequency: of the spring, critically damped [Hz].
             max_force: strongest pull [N]; None for ten times the weight of the body on Earth.
         Returns: a handle to move and release it with, or None where the ray hits nothing.
-        Raises: OptionError for numbers out of range; StateError before `build`, under schedule "flat", or
-            where all grabs are in use.
+        Raises: OptionError for numbers out of range or a body of another world; StateError before `build`,
+            under schedule "flat", or where all grabs are in use.
         """
         as_pull(frequency, max_force)  # also where the ray hits nothing
-        hit = self.raycast(origin, direction, max_distance=max_distance)
+        hit = self.raycast(origin, direction, max_distance=max_distance, bodies=bodies)
         if hit is None:
             return None
         return hit.body.grab(hit.triangle, hit.barycentrics, frequency=frequency, max_force=max_force)
@@ -483,7 +506,8 @@ class World(Handle):
     def record_events(self, kinds: Iterable[type[Event]] = (Event,)) -> None:
         """Record events of these kinds, and no others, from the next step on, for `drain_events`.
 
-        What touches already counts as a contact that begins in that step.
+        What touches already counts as a contact that begins in that step. `StressExceeded` and
+        `TearCandidates` come of bodies with `Body.watch_stress` and `Body.watch_tearing` only.
         Args:
             kinds: classes of events; `Event` stands for all that this world has, an empty list for none.
         Raises: OptionError for what is no class of events; StateError before `build`, and for contacts in a
@@ -495,6 +519,8 @@ class World(Handle):
         """Let a function hear of all events of a kind, and record that kind.
 
         It is called by `drain_events`, never within a step, so it may do what can be done between two steps.
+        Of `StressExceeded` and `TearCandidates` it hears only for bodies with a `Body.watch_stress` or
+        `Body.watch_tearing`.
         Args:
             kind: a class of events; `Event` for all that this world has.
             function: takes the event.
@@ -506,9 +532,9 @@ class World(Handle):
     def drain_events(self) -> list[Event]:
         """All events since the last call, after those who listen have heard of them.
 
-        They come step by step; within a step by kind (contacts begun and ended, stress, tears, sleep, waking,
-        freezing), then by the indices of bodies. Up to 10,000 wait, then the oldest are dropped, with a
-        `DroppedEventsWarning` in the step.
+        They come step by step; within a step by kind (contacts begun and ended, stress, tear candidates,
+        sleep, waking, freezing, tearing), then by the indices of bodies. Up to 10,000 wait, then the oldest
+        are dropped, with a `DroppedEventsWarning` in the step.
 
         An exception of a listener keeps no other from hearing of any event: the first is raised at the end.
         The next call then returns these events with those that came since, and listeners hear of none twice.
@@ -584,20 +610,28 @@ class World(Handle):
         """
         return find_closest_point(self._built.state, self._pools.slots, point, max_distance, bodies)
 
-    def overlap_sphere(self, center: ArrayLike, radius: float) -> tuple[Overlap, ...]:
+    def overlap_sphere(
+        self, center: ArrayLike, radius: float, *, bodies: Iterable[Body] | None = None
+    ) -> tuple[Overlap, ...]:
         """Bodies that touch a sphere or enclose it; of a body without triangles its vertices count.
 
         Args:
             center: (3,) [m].
             radius: above 0 [m].
+            bodies: to ask; None for all.
         Returns: the bodies, in the world's order, each with its vertices in the sphere.
-        Raises: OptionError for numbers that are not finite or a radius not above 0; StateError before
-            `build`.
+        Raises: OptionError for numbers that are not finite, a radius not above 0 or a body of another world;
+            StateError before `build`.
         """
-        return find_in_sphere(self._built.state, self._pools.slots, center, radius)
+        return find_in_sphere(self._built.state, self._pools.slots, center, radius, bodies)
 
     def overlap_box(
-        self, center: ArrayLike, size: ArrayLike, rotation: ArrayLike | None = None
+        self,
+        center: ArrayLike,
+        size: ArrayLike,
+        rotation: ArrayLike | None = None,
+        *,
+        bodies: Iterable[Body] | None = None,
     ) -> tuple[Overlap, ...]:
         """Bodies that touch a box or enclose it; of a body without triangles its vertices count.
 
@@ -605,34 +639,47 @@ class World(Handle):
             center: (3,) [m].
             size: (3,) lengths of its edges, above 0 [m].
             rotation: about its centre, matrix (3, 3) or quaternion (x, y, z, w).
+            bodies: to ask; None for all.
         Returns: the bodies, in the world's order, each with its vertices in the box.
-        Raises: OptionError for numbers that are not finite, a size not above 0 or what is no rotation;
-            StateError before `build`.
+        Raises: OptionError for numbers that are not finite, a size not above 0, what is no rotation or a body
+            of another world; StateError before `build`.
         """
-        return find_in_box(self._built.state, self._pools.slots, center, size, rotation)
+        return find_in_box(self._built.state, self._pools.slots, center, size, rotation, bodies)
 
     def snapshot(self) -> bytes:
         """The whole state between two steps, to `restore` it here or in a world that was built alike.
 
         Bodies, colliders, frames, grabs, attachments and joints, the wind, materials that were set, and all
-        that is going to act in the coming step are in it; a force field and events are not. It holds numbers
-        only, no code. The first call compiles, some seconds at most.
+        that is going to act in the coming step are in it; a force field is not. Of the events recorded it has
+        what goes on, such as contacts. It holds numbers only, no code. The first call compiles, some seconds
+        at most.
         Raises: StateError before `build`.
         """
-        return take_snapshot(self)
+        data = take_snapshot(self)
+        if self._handles.recorder is not None:
+            self._handles.recorder.note_snapshot(data)
+        return data
 
     def restore(self, data: bytes) -> None:
         """Go back to a state of `snapshot`: what follows is the same, bit for bit, given the same calls.
 
         Handles of what the state has stay valid, or become so again; handles of what it has not are dead, as
         if that had been removed. For what it has and nobody holds a handle to, `bodies` and `colliders` have
-        new ones. A force field stays as it is.
+        new ones. A force field stays as it is. Those who listen to events go on to; watched stress is as it
+        was, and what else is watched now stays so. Events of undone steps that wait are dropped: when the
+        steps are made again, they come again, and so do those that were drained before.
         Raises: SnapshotError for what is damaged, or of a world that was built of other things, with the
             first that differs; OptionError for what is not bytes; StateError before `build`.
         """
         restore_snapshot(self, data)
+        self._restore_count += 1
         if self._handles.recorder is not None:
-            self._handles.recorder.begin_again(self)
+            self._handles.recorder.go_back(self, data)
+
+    @property
+    def restore_count(self) -> int:
+        """How often `restore` was called: whoever keeps earlier states sees that they are of another past."""
+        return self._restore_count
 
     def state_hash(self) -> str:
         """A name of the state, 16 hexadecimal digits: the same in two worlds that are in step.
@@ -646,6 +693,8 @@ class World(Handle):
     def save_recording(self, path: str | Path) -> Path:
         """Write what was done in the last `record` steps or more, and the snapshot before them, to a file.
 
+        Steps that `restore` has undone are not in it, and do not count; where it went to a state that was
+        not kept here, the recording begins again there.
         `taichi-soft replay FILE` makes it again anywhere, bit by bit on a machine like this one. The file
         holds the assets and shapes as well, and the accelerations that a force field gave, but no code.
         Returns: the path.

@@ -6,11 +6,41 @@ import os
 import numpy as np
 import pytest
 from hypothesis import settings
+from xdist.scheduler import LoadFileScheduling
 
 from taichi_soft import init
 
 settings.register_profile("same every time", derandomize=True, deadline=None)
 settings.load_profile("same every time")
+
+LONGEST = (
+    *("cli/test_cli", "world/test_threads", "demos/test_demos", "world/test_joints", "world/test_plasticity"),
+    *("integrators/test_implicit_euler", "laws/test_gradients", "laws/test_anisotropy"),
+    *("laws/test_evaluation", "laws/test_inside_out", "world/test_colliders", "world/test_cutting"),
+    *("world/test_particle_bodies", "profiling/test_profiling", "drops/test_drops"),
+)
+"""Files that take longest where nothing is compiled yet. They begin first, so that no worker ends alone."""
+
+RANDOM_GAMES = ("world/test_threads", "world/test_snapshot", "world/test_recorder", "world/test_rollback")
+"""Files with the same game, and so with the same kernels: one worker runs them all."""
+
+
+class ByKernels(LoadFileScheduling):
+    """Whole files to one worker, and those that share their kernels to the same one."""
+
+    def _split_scope(self, nodeid):
+        file = super()._split_scope(nodeid)
+        return "random games" if file in {f"tests/{name}.py" for name in RANDOM_GAMES} else file
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    return ByKernels(config, log) if config.getvalue("dist") == "loadfile" else None
+
+
+def pytest_collection_modifyitems(items):
+    order = {f"tests/{name}.py": number for number, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: order.get(item.nodeid.split("::")[0], len(order)))
 
 
 @pytest.fixture(autouse=True, scope="session")
@@ -22,7 +52,11 @@ def settle_imports():
 
 @pytest.fixture(autouse=True, scope="session")
 def share_the_cores():
-    """Tests that run side by side take a core each: threads would wait for those of others."""
+    """Tests that run side by side take a core each: threads would wait for those of others.
+
+    Taichi flushes subnormal numbers to zero in all of the process, so that strategies of floats round zero
+    have to say `allow_subnormal=False`.
+    """
     if "PYTEST_XDIST_WORKER" in os.environ:
         init("cpu", threads=1)
 

@@ -29,7 +29,7 @@ LAYERS = """
     building  spawning  structure  notes
     restoring
     snapshot
-    recorder
+    recorder  rehearsal
     world
     taichi_soft
     render

@@ -1,5 +1,6 @@
 """Taichi is started once per process, as asked, or not at all. In processes of their own."""
 
+import inspect
 import subprocess
 import sys
 from pathlib import Path
@@ -7,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from taichi_soft import OptionError, init
+from taichi_soft.runtime import ti
 
 ROOT = Path(__file__).parents[1]
 
@@ -105,3 +107,47 @@ print("done")
         [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, timeout=120
     )
     assert done.stdout.endswith("done\n"), done.stderr
+
+
+@ti.func
+def doubled(x):
+    return 2 * x
+
+
+@ti.kernel
+def eightfold(x: ti.i32) -> ti.i32:
+    return doubled(doubled(doubled(x)))
+
+
+@ti.func
+def unknown(x):
+    y = doubled(x)
+    return y + nowhere  # noqa: F821
+
+
+@ti.kernel
+def ask(x: ti.i32) -> ti.i32:
+    return unknown(x)
+
+
+def test_the_source_of_a_function_that_is_called_often_is_read_once(monkeypatch):
+    init()
+    read, inner = [], inspect.getsourcelines
+
+    def noted(function):
+        read.append(function.__name__)
+        return inner(function)
+
+    monkeypatch.setattr(inspect, "getsourcelines", noted)
+    assert eightfold(3) == 24
+    assert sorted(read) == ["doubled", "eightfold"]
+
+
+def test_a_mistake_in_a_kernel_is_shown_in_its_line_each_time():
+    init()
+    line = inspect.getsourcelines(unknown)[1] + 3
+    for _ in range(2):
+        with pytest.raises(ti.TaichiCompilationError) as failure:
+            ask(1)
+        assert f'test_runtime.py", line {line}, in unknown:' in str(failure.value)
+        assert "    return y + nowhere  # noqa: F821\n               ^^^^^^^" in str(failure.value)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,7 +20,12 @@ if TYPE_CHECKING:
 
 
 class Attachment(Handle):
-    """Particles of a body held by a frame. Made by `Body.attach`."""
+    """Particles of a body held by a frame. Made by `Body.attach`.
+
+    Where the body is cut or tears, they are held on, and so are copies of them: `particles` has them all. If
+    it falls apart, `body` is the largest piece that has some; what another has is held by an attachment of
+    its own, in its `Body.attachments`.
+    """
 
     def __init__(self, body: Body, particles: NDArray[np.int32], frame: Frame, *, two_way: bool) -> None:
         """Made by `Body.attach`."""
@@ -78,7 +84,7 @@ class Attachment(Handle):
 
 def attach(body: Body, particles: ArrayLike, frame: Any, two_way: bool) -> Attachment:
     """As `Body.attach`."""
-    body.require_alive()
+    body._require_alive()
     vertices = named_particles(body, particles)
     if not isinstance(frame, Frame) or frame._frames is not body._world._frames:
         raise OptionError(f"frame must come from add_frame of the same world, got {frame!r}")
@@ -96,6 +102,28 @@ def attach(body: Body, particles: ArrayLike, frame: Any, two_way: bool) -> Attac
     body._handles.enlist(attachment)
     body._attachments.append(attachment)
     return attachment
+
+
+def share_attachments(body: Body, pieces: Sequence[tuple[Body, NDArray[np.int64]]]) -> None:
+    """Let go on what holds a body that was cut.
+
+    Args:
+        pieces: what it has become, the largest first, with the vertex of the body before that each vertex is,
+            or is a copy of, (n,).
+    """
+    before, body._attachments = body._attachments, []
+    for attachment in before:
+        found = [(each, np.flatnonzero(np.isin(origins, attachment.particles))) for each, origins in pieces]
+        held = [(each, particles.astype(np.int32)) for each, particles in found if len(particles)]
+        attachment.body, attachment.particles = held[0]
+        attachment.body._attachments.append(attachment)
+        for each, particles in held[1:]:
+            other = Attachment(each, particles, attachment.frame, two_way=attachment.two_way)
+            body._handles.enlist(other)
+            each._attachments.append(other)
+    if any(attachment.two_way for attachment in before):
+        for each, _ in pieces:
+            change(each, write_feeling, each.index, int(any(held.two_way for held in each._attachments)))
 
 
 def attached_vertices(body: Body) -> NDArray[np.int32]:

@@ -71,7 +71,8 @@ def set_wind(world: World, velocity: ArrayLike | None, density: float, drag: flo
     kilograms = as_number(density, "density", 0.0, 1e5, "a number from 0 to 100,000 kg/m^3")
     coefficient = as_number(drag, "drag", 0.0, 1e3)
     require_substeps(world, "wind")
-    world._built.change(-1, write_wind, numbers(speed, kilograms * coefficient * blows))
+    if world._built.attempt(write_wind, numbers(speed, kilograms * coefficient * blows)):
+        world._built.rouse(-1)
 
 
 def require_field(field: Any) -> ForceField | None:
@@ -101,6 +102,10 @@ def push_by_field(world: World, field: ForceField) -> None:
 
 
 def push_bodies(rows: list[tuple[Body, Any]]) -> None:
-    """Push bodies throughout the coming step, vertex by vertex: accelerations float32 (n, 3) [m/s^2]."""
+    """Push bodies throughout the coming step, vertex by vertex: accelerations float32 (n, 3) [m/s^2].
+
+    Where all are zero, who sleeps sleeps on.
+    """
     for body, accelerations in rows:
-        change(body, add_pushes, body.index, accelerations)
+        if accelerations.any():
+            change(body, add_pushes, body.index, accelerations)

@@ -7,40 +7,68 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.checks import as_rotation, as_vector
+from taichi_soft.checks import as_flag, as_rotation, as_vector
+from taichi_soft.control.jumps import carry
 from taichi_soft.errors import StateError
 from taichi_soft.handles import Handle, recorded
 from taichi_soft.kernels.pins import aim_pinned
 
 if TYPE_CHECKING:
+    from taichi_soft.body import Body
+    from taichi_soft.control.attachments import Attachment
+    from taichi_soft.pools import Pools
     from taichi_soft.state import State
 
 
 class Frames:
     """Poses of all frames of one world: rotation row by row, and position [m], (f, 12)."""
 
-    def __init__(self) -> None:
+    def __init__(self, pools: Pools) -> None:
         """None yet; one row, as a kernel takes no empty array."""
-        self.count = 0
-        self.handles: list[Frame] = []
+        self._pools = pools
+        self.rows: list[Frame | None] = []  # None where one was removed: the next frame takes the first such
         self.present = np.zeros((1, 12), dtype=np.float32)
         self.coming = self.present.copy()  # at the end of the coming step
+        self.past = self.present.copy()  # before the last step
         self.has_work = False  # some pinned particle has somewhere to go, or has just arrived
 
+    @property
+    def handles(self) -> list[Frame]:
+        """Those that are alive, by row."""
+        return [frame for frame in self.rows if frame is not None]
+
     def add(self, frame: Frame, pose: NDArray[np.float32]) -> int:
-        """The number of a new frame."""
-        self.handles.append(frame)
-        self.present = np.concatenate([self.present[: self.count], pose[None]])
-        self.coming = np.concatenate([self.coming[: self.count], pose[None]])
-        self.count += 1
-        return self.count - 1
+        """The row of a new frame."""
+        number = self.rows.index(None) if None in self.rows else len(self.rows)
+        if number == len(self.rows):
+            self.rows.append(frame)
+            self.present, self.coming = (
+                np.concatenate([poses[:number], pose[None]]) for poses in (self.present, self.coming)
+            )
+        self.rows[number] = frame
+        self.present[number] = self.coming[number] = pose
+        return number
+
+    def attachments(self, frame: Frame) -> list[Attachment]:
+        """What hangs from a frame, body by body."""
+        return [each for body in self._pools.living for each in body._attachments if each.frame is frame]
 
     def aim(self, state: State, body_count: int, dt: float) -> None:
         """Give pinned particles the velocities of the coming step."""
         if self.has_work:
             self.has_work = aim_pinned(state, body_count, dt, self.coming) > 0
-        if self.count:
-            self.present[:] = self.coming
+        self.past, self.present = self.present, self.coming.copy()
+
+    def way(self, body: Body) -> float:
+        """How far frames moved a particle of a body in the last step, which was undone for it [m]."""
+        x, longest = body.positions().astype(np.float64), 0.0
+        for each in body._attachments:
+            (a, start), (b, end) = (
+                _axes_and_place(poses[each.frame._number]) for poses in (self.past, self.present)
+            )
+            moved = (x[each.particles] - start) @ a @ b.T + end
+            longest = max(longest, float(np.linalg.norm(moved - x[each.particles], axis=1).max()))
+        return longest
 
 
 class Frame(Handle):
@@ -52,7 +80,7 @@ class Frame(Handle):
         self._number = frames.add(self, _pose(position, rotation))
 
     @classmethod
-    def at(cls, frames: Frames, number: int) -> Frame:
+    def _at(cls, frames: Frames, number: int) -> Frame:
         """A handle to a frame that there is."""
         frame = cls.__new__(cls)
         frame._frames, frame._number = frames, number
@@ -65,13 +93,15 @@ class Frame(Handle):
 
     @property
     def is_alive(self) -> bool:
-        """False once the world was put back to a state without it."""
-        handles = self._frames.handles
-        return self._number < len(handles) and handles[self._number] is self
+        """False once it was removed, or the world put back to a state without it."""
+        rows = self._frames.rows
+        return self._number < len(rows) and rows[self._number] is self
 
     def _require_alive(self) -> None:
         if not self.is_alive:
-            raise StateError(f"frame {self._number} is not in the state that was restored: add another")
+            raise StateError(
+                f"frame {self._number} was removed, or is not in the state that was restored: add another"
+            )
 
     @property
     def position(self) -> NDArray[np.float32]:
@@ -89,6 +119,8 @@ class Frame(Handle):
     def move_to(self, position: ArrayLike, rotation: ArrayLike | None = None) -> None:
         """Say where it is at the end of the coming step; it stays there until it is moved again.
 
+        What hangs from it is dragged along, and breaks where that is farther in a step than it is large: a
+        jump is one of `teleport`.
         Args:
             position: of its origin, (3,) [m].
             rotation: matrix (3, 3) or quaternion (x, y, z, w); None keeps its axes as they are.
@@ -100,6 +132,51 @@ class Frame(Handle):
         if rotation is None:
             pose[:9] = axes
         self._frames.coming[self._number] = pose
+
+    @recorded
+    def teleport(
+        self, position: ArrayLike, rotation: ArrayLike | None = None, *, keep_velocity: bool = True
+    ) -> None:
+        """Be there at once, with the whole of every body attached to it, by the same rigid motion.
+
+        Pictures between two steps jump with them, and so do targets that were set for their pins. Bodies that
+        are joined to them, and grabs, stay where they are. A `move_to` that was said before is forgotten.
+        What then lies below the floor or in a collider is pressed out, and breaks where that is far.
+        Args:
+            position: of its origin, (3,) [m].
+            rotation: matrix (3, 3) or quaternion (x, y, z, w); None keeps its axes as they are.
+            keep_velocity: True turns velocities with the bodies, False stops them.
+        Raises: OptionError for bad numbers or where a body would be out of reach; StateError for a body that
+            hangs from another frame as well.
+        """
+        self._require_alive()
+        frames, keep = self._frames, as_flag(keep_velocity, "keep_velocity")
+        pose, present = _pose(position, rotation), frames.present[self._number].copy()
+        if rotation is None:
+            pose[:9] = present[:9]
+        bodies = list(dict.fromkeys(each.body for each in frames.attachments(self)))
+        for body in bodies:
+            if any(each.frame is not self for each in body._attachments):
+                raise StateError(
+                    f"body {body.index} hangs from another frame as well: release it there before this jumps"
+                )
+        (axes, start), (turned, end) = _axes_and_place(present), _axes_and_place(pose)
+        turn = np.eye(3) if rotation is None else turned @ axes.T
+        carry(bodies, turn, start, end, keep=keep)
+        frames.present[self._number] = frames.coming[self._number] = pose
+
+    @recorded
+    def remove(self) -> None:
+        """Take it out of the world; what is attached to it is released, with the velocity that it had."""
+        self._require_alive()
+        for attachment in self._frames.attachments(self):
+            attachment.release()
+        self._frames.rows[self._number] = None
+
+
+def _axes_and_place(pose: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Axes as columns (3, 3), and origin (3,) [m]."""
+    return pose[:9].reshape(3, 3).astype(np.float64), pose[9:].astype(np.float64)
 
 
 def _pose(position: ArrayLike, rotation: Any) -> NDArray[np.float32]:

@@ -57,7 +57,8 @@ def apply_radial_impulse(world: World, center: ArrayLike, impulse: float, radius
     reach = as_number(radius, "radius", 1e-9, 1e9, "a number above 0 m, from 1e-9 to 1e9")
     row = numbers(origin, reach, momentum)
     _require_speed(world._built.attempt(add_radial_impulse, world.slot_count, row), "impulse")
-    world._built.rouse(-1)
+    world._built.has_changed()
+    world._built.wake_near(origin - reach, origin + reach)
 
 
 def _require_speed(speed: float, name: str) -> None:

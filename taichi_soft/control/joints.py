@@ -82,8 +82,10 @@ def attach_to(body: Body, other: Any, particles: ArrayLike, onto: ArrayLike | No
     world = body._world
     if not isinstance(other, type(body)) or other is body or other._world_ref() is not world:
         raise OptionError(f"other must be another body of the same world, got {other!r}")
-    other.require_alive()
+    other._require_alive()
     vertices, places = _find_places(body, other, particles, onto)
+    if world.settings.is_implicit:
+        raise StateError("implicit_euler has no joints: make the world with integrator='leapfrog'")
     if not world._built.program.has_contact:
         raise StateError(
             "joints need bodies that are stepped together: make the world with soft_contact=True, or with "

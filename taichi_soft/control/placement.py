@@ -11,8 +11,9 @@ from taichi_soft.checks import as_flag, as_rotation, as_vector
 from taichi_soft.constants import POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.control.access import attempt, numbers, rouse, some_particles
 from taichi_soft.control.attachments import require_unattached
+from taichi_soft.control.jumps import jump_to
 from taichi_soft.errors import OptionError
-from taichi_soft.kernels.placement import jump, write_rigid_velocity
+from taichi_soft.kernels.placement import write_rigid_velocity
 
 if TYPE_CHECKING:
     from taichi_soft.body import Body
@@ -36,11 +37,10 @@ def teleport(body: Body, position: ArrayLike, rotation: Any, keep_velocity: bool
     target, turn = as_vector(position, "position", "m"), as_rotation(rotation)
     keep = as_flag(keep_velocity, "keep_velocity")
     require_unattached(body, some_particles(body, None))
-    floor = body._world.settings.floor
+    floor, simulation = body._world.settings.floor, body._world._built
+    left = simulation.box_of(body)
     lowest = -np.inf if floor is None else floor
-    found = np.empty(3)
-    attempt(body, jump, body.index, np.array([*target, lowest, float(keep)]), turn, found)
-    bottom, top, farthest = found.tolist()
+    bottom, top, farthest = jump_to(body, target, turn, lowest=lowest, keep=keep)
     if not farthest < POSITION_LIMIT:
         raise OptionError(f"position puts the body beyond {POSITION_LIMIT:g} m: stay nearer the origin")
     if bottom < lowest - 1e-3 * (top - bottom):
@@ -48,3 +48,4 @@ def teleport(body: Body, position: ArrayLike, rotation: Any, keep_velocity: bool
             f"position={target.tolist()} puts the body {lowest - bottom:.4g} m below the floor: raise it"
         )
     rouse(body)
+    simulation.wake_near(*left)

@@ -8,9 +8,11 @@ from taichi_soft.events.kinds import (
     Froze,
     StressExceeded,
     TearCandidates,
+    Torn,
     Woke,
 )
 from taichi_soft.events.log import EventLog, Listener
+from taichi_soft.events.memory import Known, Memory
 from taichi_soft.events.witness import Witness
 
 __all__ = [
@@ -20,9 +22,12 @@ __all__ = [
     "EventLog",
     "FellAsleep",
     "Froze",
+    "Known",
     "Listener",
+    "Memory",
     "StressExceeded",
     "TearCandidates",
+    "Torn",
     "Witness",
     "Woke",
 ]

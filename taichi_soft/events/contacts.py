@@ -7,8 +7,10 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from taichi_soft.events.kinds import ContactBegan, ContactEnded
+from taichi_soft.events.memory import CONTACT_WIDTH, Known
 from taichi_soft.kernels.touches import OF_BODY
 
 if TYPE_CHECKING:
@@ -94,3 +96,23 @@ class Contacts:
                 began.append(ContactBegan(step, time, a, b, np.array(touches[key])))
             self._going_on[key].add(touches[key], time)
         return began, ended
+
+    @property
+    def rows(self) -> NDArray[np.float64]:
+        """All of them, as `Memory` keeps them."""
+        rows = [
+            (*key, c.a._serial, c.b._serial, c.began, c.touched, c.pause, *c.impulse)
+            for key, c in sorted(self._going_on.items())
+        ]
+        return np.array(rows, dtype=np.float64).reshape(-1, CONTACT_WIDTH)
+
+    def recall(self, rows: NDArray[np.float64], known: Known) -> None:
+        """Go on with the contacts of an earlier state; who was gone then, and nobody knows, has none."""
+        going_on: dict[Key, _Contact] = {}
+        for row in rows.tolist():
+            i, kind, j, serial, other = map(int, row[:5])
+            a, b = known.body(serial), (known.body if kind == OF_BODY else known.collider)(other)
+            if a is not None and b is not None and (a.index, b.index) == (i, j):
+                began, touched, pause, x, y, z = row[5:]
+                going_on[i, kind, j] = _Contact(a, b, began, touched, pause, (x, y, z))
+        self._going_on = going_on

@@ -46,7 +46,10 @@ class ContactEnded(Event):
 
 @dataclass(frozen=True, eq=False)
 class StressExceeded(Event):
-    """Tetrahedra have come over the von Mises stress that `Body.watch_stress` was given."""
+    """Tetrahedra have come over the von Mises stress that `Body.watch_stress` was given.
+
+    Of a body that `watch_stress` was not called for nothing is told.
+    """
 
     body: Body
     tetrahedra: Ints  # (k,) those that were not over it before, ascending
@@ -55,7 +58,10 @@ class StressExceeded(Event):
 
 @dataclass(frozen=True, eq=False)
 class TearCandidates(Event):
-    """Tetrahedra are pulled harder than `Body.watch_tearing` allows: where a tear would begin (Rankine)."""
+    """Tetrahedra are pulled harder than `Body.watch_tearing` allows: where a tear would begin (Rankine).
+
+    Of a body that `watch_tearing` was not called for nothing is told. Nothing tears by it: see `Torn`.
+    """
 
     body: Body
     tetrahedra: Ints  # (k,) those that were not before, ascending
@@ -89,6 +95,16 @@ class Froze(Event):
         return self.body.failure
 
 
+@dataclass(frozen=True, eq=False)
+class Torn(Event):
+    """A body with `Tearing` has torn after that step; whoever calls `Body.cut` knows without being told."""
+
+    body: Body  # what is left of it; see `Body.topology_version`
+    pieces: tuple[
+        Body, ...
+    ]  # new bodies that fell off, the largest first; none where it still holds together
+
+
 KINDS: tuple[type[Event], ...] = (
     ContactBegan,
     ContactEnded,
@@ -97,6 +113,7 @@ KINDS: tuple[type[Event], ...] = (
     FellAsleep,
     Woke,
     Froze,
+    Torn,
 )
 """In the order in which the events of one step come."""
 

@@ -7,7 +7,8 @@ from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
 from taichi_soft.errors import OptionError, StateError
-from taichi_soft.events.kinds import CONTACT_KINDS, KINDS, Event
+from taichi_soft.events.kinds import CONTACT_KINDS, KINDS, Event, Torn
+from taichi_soft.events.memory import Known, Memory
 from taichi_soft.events.witness import Witness
 
 if TYPE_CHECKING:
@@ -100,6 +101,22 @@ class EventLog:
         """The step that is being made has frozen a body."""
         if self._kinds:
             self._witness.note_frozen(body)
+
+    def note_torn(self, step: int, time: float, body: Body, pieces: tuple[Body, ...]) -> None:
+        """What the step that ended at `time` [s] has pulled too hard has torn a body."""
+        if Torn in self._kinds:
+            self._waiting.append(Torn(step, time, body, pieces))
+
+    def remember(self) -> Memory:
+        """What the events of coming steps depend on."""
+        return self._witness.remember(self._kinds)
+
+    def recall(self, memory: Memory, step: int, known: Known) -> None:
+        """The world was put back to a state of that step count: what waits of later steps never happened."""
+        while self._waiting and self._waiting[-1].step >= step:
+            self._waiting.pop()
+        self._heard = min(self._heard, len(self._waiting))
+        self._witness.recall(self._kinds, memory, step, known)
 
     def collect(self, step: int, time: float, dt: float) -> str:
         """Take down what happened in a step.

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from taichi_soft.constants import LANES
 from taichi_soft.events.kinds import Event, StressExceeded, TearCandidates
+from taichi_soft.events.memory import Known, WatchNote
 from taichi_soft.kernels.stress import NO_LIMIT, read_stress
 from taichi_soft.scene import Scene
 from taichi_soft.state import State
@@ -58,17 +59,42 @@ class StressWatches:
         """Watch a body for a kind of event from a stress [Pa] on; None for no longer."""
         self._watches.pop((kind, body), None)
         if threshold is not None:
-            count = len(self._scene.bodies[body.index].tet_vertices)
-            self._watches[kind, body] = _Watch(body, threshold, np.zeros(count, dtype=np.bool_))
+            self._watches[kind, body] = _Watch(body, threshold, self._none_over(body))
         self._arrange()
         if len(self._blocks):
             self._evaluate()  # so that nothing compiles in the game's next step
+
+    def _none_over(self, body: Body) -> NDArray[np.bool_]:
+        return np.zeros(len(self._scene.bodies[body.index].tet_vertices), dtype=np.bool_)
 
     def renew(self, body: Body) -> None:
         """Go on with a body that has lost tetrahedra; those over a threshold count as new."""
         for (kind, watched), watch in list(self._watches.items()):
             if watched is body:
                 self.set(kind, body, watch.threshold)
+
+    @property
+    def notes(self) -> list[WatchNote]:
+        """Of all bodies that are alive."""
+        return [
+            WatchNote(kind, body._serial, watch.threshold, np.packbits(watch.is_over).tobytes())
+            for (kind, body), watch in self._watches.items()
+            if body.is_alive
+        ]
+
+    def recall(self, notes: list[WatchNote], known: Known) -> None:
+        """Go on as in an earlier state. Watches that were set since stay, and all over them count as new."""
+        if not notes and not self._watches:
+            return
+        for (_, body), watch in self._watches.items():
+            watch.is_over = self._none_over(body)
+        for note in notes:
+            found = known.body(note.serial)
+            if found is not None:
+                bits = np.frombuffer(note.is_over, dtype=np.uint8)
+                is_over = np.unpackbits(bits, count=len(self._none_over(found))).astype(np.bool_)
+                self._watches[note.kind, found] = _Watch(found, note.threshold, is_over)
+        self._arrange()
 
     def _arrange(self) -> None:
         bodies = sorted({body for _, body in self._watches}, key=lambda body: body.index)

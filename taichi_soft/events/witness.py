@@ -20,6 +20,7 @@ from taichi_soft.events.kinds import (
     TearCandidates,
     Woke,
 )
+from taichi_soft.events.memory import Known, Memory
 from taichi_soft.events.stress import StressWatches
 from taichi_soft.kernels.touches import OF_BODY, read_touches
 from taichi_soft.scene import Scene
@@ -103,6 +104,31 @@ class Witness:
         frozen, self._frozen = self._frozen, []
         for body in frozen:
             yield Froze(step, time, body)
+
+    def remember(self, kinds: frozenset[type[Event]]) -> Memory:
+        """What events of some kinds depend on."""
+        return Memory(
+            self._status[:-1].copy() if kinds & (CONTACT_KINDS | SLEEP_KINDS) else None,
+            self._contacts.rows if kinds & CONTACT_KINDS else None,
+            self.stress.notes if kinds & STRESS_KINDS else [],
+        )
+
+    def recall(self, kinds: frozenset[type[Event]], memory: Memory, step: int, known: Known) -> None:
+        """The world was put back to a state of that step count: go on as after it, where that is known."""
+        self._frozen = []
+        if kinds & CONTACT_KINDS and memory.contacts is not None:
+            self._contacts.recall(memory.contacts, known)
+        else:
+            self._contacts = Contacts()
+        if memory.status is not None:
+            self._status[:-1] = memory.status
+            # Who came after the last step took the slot of one who may have slept in it.
+            asleep = self._sleeping().items()
+            self._sleepers = {slot: body for slot, body in asleep if body._first_step < step}
+        elif kinds & (CONTACT_KINDS | SLEEP_KINDS):
+            self._look()
+            self._sleepers = self._sleeping()
+        self.stress.recall(memory.watches if kinds & STRESS_KINDS else [], known)
 
     def _look(self) -> None:
         """Read who touched whom in the last step, and who sleeps."""

@@ -62,13 +62,14 @@ def find_near_colliders(state: ti.template(), body, reach, since, left):
 
 @ti.func
 def forget_contacts(state: ti.template(), body):
-    """Start a step: no impulses yet, and nobody knows which colliders are near."""
+    """Start a step: no impulses yet, and where there is any collider, nobody knows which are near."""
     for row in range(body * state.contact.capacity.colliders, (body + 1) * state.contact.capacity.colliders):
         state.contact.impulse[row] = ti.Vector.zero(ti.f32, 3)
         state.contact.angular_impulse[row] = ti.Vector.zero(ti.f32, 3)
         state.contact.press[row] = ti.Vector.zero(ti.f32, 3)
         state.contact.press_rates[row] = ti.Vector.zero(ti.f32, 3)
-    state.contact.reach[body] = -1.0
+    state.contact.near_count[body] = 0
+    state.contact.reach[body] = ti.select(state.contact.collider_count[None] == 0, 1e30, -1.0)
     state.contact.gone[body] = 0.0
 
 
@@ -130,5 +131,8 @@ def collided(state: ti.template(), body, p, start, way_velocity, h, since):
             state.contact.impulse[row + c] = state.contact.impulse[row + c] + impulse
             state.contact.angular_impulse[row + c] = state.contact.angular_impulse[row + c] + angular_impulse
             state.contact.particle_touches[p] = 1
+            if ti.static(state.capacity.implicit):
+                if state.particle_contact[p] == 0:
+                    state.particle_contact[p] = c + 1
             x1, v = end, v_out
     return x1, v

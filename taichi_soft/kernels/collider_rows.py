@@ -26,6 +26,13 @@ def write_collider_motion(contact: ti.template(), rows: ti.types.ndarray(dtype=t
 
 
 @ti.kernel
+def write_samples(contact: ti.template(), begin: ti.i32, samples: ti.types.ndarray(dtype=ti.f32, ndim=1)):
+    """The grid of one solid, from row `begin` on."""
+    for i in range(samples.shape[0]):
+        contact.samples[begin + i] = samples[i]
+
+
+@ti.kernel
 def sum_collider_impulses(
     contact: ti.template(), body_count: ti.i32, out: ti.types.ndarray(dtype=ti.f32, ndim=2)
 ):

@@ -9,9 +9,14 @@ from taichi_soft.runtime import ti
 
 @ti.func
 def held(state: ti.template(), p, v):
-    """`v` without what a pin or the floor under particle `p` takes up."""
+    """`v` without what a pin, or the floor or a collider under particle `p`, takes up."""
     kept = v * ti.select(state.particle_inv_mass[p] > 0.0, 1.0, 0.0)
-    kept.z = ti.select(state.particle_contact[p] == 1, 0.0, kept.z)
+    if ti.static(state.capacity.has_contact):
+        if state.particle_contact[p] > 0:
+            n = state.particle_hold[p].xyz
+            kept -= kept.dot(n) * n
+    else:
+        kept.z = ti.select(state.particle_contact[p] == 1, 0.0, kept.z)
     return kept
 
 

@@ -129,9 +129,12 @@ def write_shelter(state: ti.template(), body: ti.i32, is_sheltered: ti.i32):
 
 
 @ti.kernel
-def write_wind(state: ti.template(), wind: ti.types.ndarray(dtype=ti.f32, ndim=1)):
-    """Velocity [m/s] and density times drag coefficient [kg/m^3], (4,)."""
-    state.wind[None] = ti.Vector([wind[0], wind[1], wind[2], wind[3]])
+def write_wind(state: ti.template(), wind: ti.types.ndarray(dtype=ti.f32, ndim=1)) -> ti.i32:
+    """Velocity [m/s] and density times drag coefficient [kg/m^3], (4,). Returns whether any differs (1)."""
+    given = ti.Vector([wind[0], wind[1], wind[2], wind[3]])
+    differs = int((given != state.wind[None]).any())
+    state.wind[None] = given
+    return differs
 
 
 @ti.func

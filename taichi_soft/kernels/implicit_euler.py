@@ -52,6 +52,19 @@ def assemble(state: ti.template(), program: ti.template(), body, h):
 
 
 @ti.func
+def solve_body(state: ti.template(), program: ti.template(), body, h):
+    """Changes of velocity in `solution`, and in `image` what the system makes of them [N s].
+
+    Returns: the residual left, over the first.
+    """
+    accumulate_forces(state, program, body)
+    assemble(state, program, body, h)
+    residual = solve_system(state, body)
+    multiply_system(state, body, state.solution, state.image)
+    return residual
+
+
+@ti.func
 def _move(state: ti.template(), program: ti.template(), p, h):
     """Position and velocity of one particle after the solve; what the floor does with it."""
     if state.particle_inv_mass[p] == 0.0:  # pinned: goes on with the velocity that it was given
@@ -101,7 +114,7 @@ def _take_back(state: ti.template(), body):
 
 
 @ti.func
-def _add_reactions(state: ti.template(), body, h):
+def add_pin_reactions(state: ti.template(), body, h):
     """Add up what pinned particles took up in a piece of a step [N s]."""
     if state.body_drives[body] & FEELS_REACTION != 0:
         gravity = gravity_on(state, body)
@@ -113,8 +126,15 @@ def _add_reactions(state: ti.template(), body, h):
 
 
 @ti.func
-def _reach(state: ti.template(), body):
-    """Largest change of an edge against where it was remembered, over its length then, squared."""
+def keep_residual(state: ti.template(), body, residual, is_first):
+    """Note how exact a solve was, with those of the step before it."""
+    so_far = ti.select(is_first == 1, 0.0, state.body_residual[body])
+    state.body_residual[body] = ti.max(so_far, residual)
+
+
+@ti.func
+def keeps_shape(state: ti.template(), body):
+    """Whether no edge has changed by more than `FARTHEST` since particles were where `direction` says."""
     edges = state.body_edges[body]
     mean = ti.cast(0.0, state.real)
     for e in range(edges[0], edges[1]):
@@ -127,7 +147,7 @@ def _reach(state: ti.template(), body):
         r = state.direction[q] - state.direction[p]
         change = state.particle_position[q] - state.particle_position[p] - r
         worst = ti.max(worst, change.dot(change) / ti.max(r.dot(r), least))
-    return worst
+    return worst <= FARTHEST * FARTHEST
 
 
 @ti.func
@@ -140,22 +160,16 @@ def implicit_substep(state: ti.template(), program: ti.template(), body, h, is_f
     piece, left = h, 1
     largest = ti.cast(0.0, state.real)
     while left > 0:
-        accumulate_forces(state, program, body)
-        assemble(state, program, body, piece)
-        residual = solve_system(state, body)
-        multiply_system(state, body, state.solution, state.image)
+        residual = solve_body(state, program, body, piece)
         _remember(state, body)
         particles = state.body_particles[body]
         for p in range(particles[0], particles[1]):
             _move(state, program, p, piece)
-        if _reach(state, body) > FARTHEST * FARTHEST and piece > h / MOST_PIECES:
+        if not keeps_shape(state, body) and piece > h / MOST_PIECES:
             _take_back(state, body)
             piece, left = 0.5 * piece, 2 * left
         else:
             largest = ti.max(largest, residual)
             left -= 1
-            _add_reactions(state, body, piece)
-    if is_first == 1:
-        state.body_residual[body] = largest
-    else:
-        state.body_residual[body] = ti.max(state.body_residual[body], largest)
+            add_pin_reactions(state, body, piece)
+    keep_residual(state, body, largest, is_first)

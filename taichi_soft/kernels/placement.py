@@ -1,6 +1,7 @@
 """A whole body moved or set in motion as a rigid one, between two steps."""
 
 from taichi_soft.constants import POSITION_LIMIT, VELOCITY_LIMIT
+from taichi_soft.kernels.pins import TO_TARGET
 from taichi_soft.runtime import ti
 
 
@@ -61,7 +62,8 @@ def jump(
     turn: ti.types.ndarray(dtype=ti.f64, ndim=2),
     found: ti.types.ndarray(dtype=ti.f64, ndim=1),
 ):
-    """Turn one body about its centre of mass and put that somewhere else, with where it was before the step.
+    """Turn one body about its centre of mass and put that somewhere else, with where it was before the step
+    and where its pins are to be after the coming one.
 
     Args:
         place: the new centre [m], the height below which nothing may come [m], what the velocity is
@@ -88,5 +90,8 @@ def jump(
                     old[p] = ti.cast(_turned(turn, ti.cast(old[p], ti.f64) - center) + target, ti.f32)
                 for old in ti.static((state.particle_velocity, state.prev_velocity)):
                     old[p] = ti.cast(_turned(turn, ti.cast(old[p], ti.f64)) * place[4], ti.f32)
+                if state.particle_aim[p] == TO_TARGET:
+                    target_before = ti.cast(state.particle_target[p], ti.f64)
+                    state.particle_target[p] = ti.cast(_turned(turn, target_before - center) + target, ti.f32)
                 if ti.static(state.capacity.implicit):
                     state.particle_contact[p] = 0

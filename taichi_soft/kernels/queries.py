@@ -138,20 +138,22 @@ def shape_touches(size, is_box: ti.template(), a, b, c):
 def find_overlaps(
     state: ti.template(),
     is_box: ti.template(),
-    body_count: ti.i32,
+    bodies: ti.types.ndarray(dtype=ti.i32, ndim=1),
     shape: ti.types.ndarray(dtype=ti.f32, ndim=2),
     first_vertex: ti.types.ndarray(dtype=ti.i32, ndim=1),
     inside: ti.types.ndarray(dtype=ti.i32, ndim=1),
 ):
-    """Bodies that touch a sphere or a box, or enclose it.
+    """Which of some bodies touch a sphere or a box, or enclose it.
 
     Args:
+        bodies: to ask, by number.
         shape: (5, 3): centre [m]; the box's axes, one a row; its size, or the sphere's radius thrice [m].
         first_vertex: of each body that does, its place in `inside`; left alone for others.
         inside: 1 for each vertex, in the caller's order, that lies in the shape; left alone for others.
     """
     ti.loop_config(serialize=True)
-    for body in range(body_count):
+    for row in range(bodies.shape[0]):
+        body = bodies[row]
         center = ti.Vector([shape[0, k] for k in range(3)])
         axes = ti.Matrix([[shape[1 + j, k] for k in range(3)] for j in range(3)])
         size = ti.Vector([shape[4, k] for k in range(3)])

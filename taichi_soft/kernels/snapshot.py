@@ -31,6 +31,8 @@ def carried(state: State, owner: int) -> list[tuple[Any, int, int]]:
         fields += [state.particle_push, state.particle_reaction]
         fields += [state.particle_contact] if is_implicit else []
         fields += [contact.particle_touches] if contact else []
+        if state.capacity.contact.soft:
+            fields += [state.soft.kept_triangle, state.soft.kept_press, state.soft.kept_rub]
     elif owner == BODY:
         fields += [state.body_status, state.body_velocity_lag, state.body_drives]
         fields += [state.body_gravity_scale, state.body_damping]
@@ -111,10 +113,21 @@ def copy_state(
 
 
 @ti.func
-def _mix(code, x):
-    """Take one more word into a hash: FNV-1a (Fowler, Noll, Vo) with 64 bits, word by word, then a shift."""
-    mixed = (code ^ ti.cast(ti.bit_cast(x, ti.u32), ti.u64)) * ti.u64(1099511628211)
+def _word(x):
+    return ti.cast(ti.bit_cast(x, ti.u32), ti.u64)
+
+
+@ti.func
+def _mix(code, word):
+    """Take a word into a hash: FNV-1a (Fowler, Noll, Vo) with 64 bits, word by word, then a shift."""
+    mixed = (code ^ word) * ti.u64(1099511628211)
     return mixed ^ (mixed >> ti.u64(29))
+
+
+@ti.func
+def _mix_two(code, x, y):
+    """Take two numbers of 32 bits into a hash at once."""
+    return _mix(code, _word(x) | (_word(y) << ti.u64(32)))
 
 
 @ti.kernel
@@ -123,17 +136,14 @@ def hash_bodies(state: ti.template(), body_count: ti.i32) -> ti.i64:
     code = ti.u64(1469598103934665603)
     ti.loop_config(serialize=True)
     for body in range(body_count):
-        code = _mix(code, state.body_status[body])
+        code = _mix(code, _word(state.body_status[body]))
         if state.body_status[body] != ABSENT:
-            for field in ti.static((state.body_velocity_lag, state.body_gravity_scale, state.body_damping)):
-                code = _mix(code, field[body])
-            code = _mix(code, state.body_drives[body])
+            code = _mix_two(code, state.body_velocity_lag[body], state.body_drives[body])
+            code = _mix_two(code, state.body_gravity_scale[body], state.body_damping[body])
             particles = state.body_particles[body]
             for p in range(particles[0], particles[1]):
                 x, v = state.particle_position[p], state.particle_velocity[p]
                 for k in ti.static(range(3)):
-                    code = _mix(code, x[k])
-                    code = _mix(code, v[k])
-                code = _mix(code, state.particle_inv_mass[p])
-                code = _mix(code, state.particle_aim[p])
+                    code = _mix_two(code, x[k], v[k])
+                code = _mix_two(code, state.particle_inv_mass[p], state.particle_aim[p])
     return ti.cast(code, ti.i64)

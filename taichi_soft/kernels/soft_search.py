@@ -41,14 +41,13 @@ def _boxes_overlap(lower, upper, other_lower, other_upper):
 
 @ti.func
 def find_box(state: ti.template(), body):
-    """Boxes round the surface of a body, and round each of its triangles, as they are now; no candidates."""
+    """Boxes round the surface of a body, and round each of its triangles, as they are now."""
     outer = state.body_outer[body]
     lower = state.particle_position[state.outer_particle[outer[0]]]
     upper = lower
     for k in range(outer[0], outer[1]):
         x = state.particle_position[state.outer_particle[k]]
         lower, upper = ti.min(lower, x), ti.max(upper, x)
-        state.soft.slot_count[k] = 0
     state.contact.body_lower[body] = lower
     state.contact.body_upper[body] = upper
     triangles = state.body_triangles[body]
@@ -103,8 +102,27 @@ def _fill_table(state: ti.template(), table, body, other, cell, margin):
 
 
 @ti.func
-def _keep(soft: ti.template(), k, triangle, distance):
-    """Put a triangle among the nearest of a vertex."""
+def forget_candidates(state: ti.template(), body):
+    """Drop the candidates of a body's vertices, but for what its search needs to go on with their contacts.
+
+    A search that began without the impulses of the last substep would let all sag a little, once a step, and
+    a heap would never cease to tremble.
+    """
+    outer = state.body_outer[body]
+    for k in range(outer[0], outer[1]):
+        p = state.outer_particle[k]
+        state.soft.kept_press[p] = 0.0
+        for slot in range(k * SLOTS, k * SLOTS + state.soft.slot_count[k]):
+            if state.soft.slot_press[slot] > state.soft.kept_press[p]:
+                state.soft.kept_triangle[p] = state.soft.slot_triangle[slot]
+                state.soft.kept_press[p] = state.soft.slot_press[slot]
+                state.soft.kept_rub[p] = state.soft.slot_rub[slot]
+        state.soft.slot_count[k] = 0
+
+
+@ti.func
+def _keep(soft: ti.template(), k, p, triangle, distance):
+    """Put a triangle among the nearest of a vertex, which is particle `p`."""
     count = soft.slot_count[k]
     at = count
     if count == SLOTS:
@@ -118,8 +136,9 @@ def _keep(soft: ti.template(), k, triangle, distance):
     if at < SLOTS:
         soft.slot_triangle[k * SLOTS + at] = triangle
         soft.slot_distance[k * SLOTS + at] = distance
-        soft.slot_press[k * SLOTS + at] = 0.0
-        soft.slot_rub[k * SLOTS + at] = ti.Vector.zero(ti.f32, 3)
+        goes_on = ti.select(soft.kept_triangle[p] == triangle and soft.kept_press[p] > 0.0, 1.0, 0.0)
+        soft.slot_press[k * SLOTS + at] = goes_on * soft.kept_press[p]
+        soft.slot_rub[k * SLOTS + at] = goes_on * soft.kept_rub[p]
 
 
 @ti.func
@@ -175,7 +194,7 @@ def _search_triangle(
                             weights = closest_point_on_triangle(x, a, b, c)
                             gap = (x - weights.x * a - weights.y * b - weights.z * c).norm()
                             if gap < margin:
-                                _keep(state.soft, k, triangle, gap)
+                                _keep(state.soft, k, p, triangle, gap)
 
 
 @ti.func
@@ -230,6 +249,7 @@ def search_island(state: ti.template(), island, margin):
     """Find the candidates of all vertices of an island, within `margin` [m]."""
     first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
     for i in range(first, last):
+        forget_candidates(state, state.contact.island_body[i])
         find_box(state, state.contact.island_body[i])
     for i in range(first, last):
         search_body(state, state.contact.island_body[i], island, margin)

@@ -4,9 +4,9 @@ from taichi_soft.constants import LANES
 from taichi_soft.contact_fields import NO_CONTACT
 from taichi_soft.runtime import ti
 
-MOTION_WIDTH = 23
+MOTION_WIDTH = 26
 """Of a row of `read_motion`: position, velocity, both before the last step, inverse mass, floor, touch, mass,
-aim, target, push."""
+aim, target, push, reaction."""
 
 
 @ti.func
@@ -31,6 +31,7 @@ def read_motion(state: ti.template(), body: ti.i32, out: ti.types.ndarray(dtype=
         for k in range(3):
             out[i, 17 + k] = state.particle_target[p][k]
             out[i, 20 + k] = state.particle_push[p][k]
+            out[i, 23 + k] = state.particle_reaction[p][k]
         out[i, 13], out[i, 14] = 0.0, 0.0
         if ti.static(state.capacity.implicit):
             out[i, 13] = state.particle_contact[p]
@@ -88,7 +89,7 @@ def write_body(
             state.particle_aim[p] = int(motion[i, 16])
             state.particle_target[p] = _three(motion, i, 17)
             state.particle_push[p] = _three(motion, i, 20)
-            state.particle_reaction[p] = ti.Vector.zero(state.real, 3)
+            state.particle_reaction[p] = _three(motion, i, 23)
             if ti.static(state.capacity.implicit):
                 state.particle_contact[p] = int(motion[i, 13])
             if ti.static(state.capacity.has_contact):

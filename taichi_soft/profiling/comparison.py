@@ -16,8 +16,8 @@ from taichi_soft.profiling.spread import Spread, compare
 from taichi_soft.scene import BodyDescription, arrange
 from taichi_soft.world import World
 
-SIZES = {1_000: (6, 6, 6), 5_000: (10, 10, 10), 25_000: (17, 17, 17)}
-"""Cells of a box that has about as many tetrahedra."""
+SIZES = {25_000: (17, 17, 17), 5_000: (10, 10, 10), 1_000: (6, 6, 6)}
+"""Cells of a box that has about as many tetrahedra. The largest first: the others take over its kernels."""
 
 MATERIAL = Material(young=1.0e5, poisson=0.1, density=1000.0, damping=0.1)
 SUBSTEP = 1.0e-5  # [s], far below every limit: the bodies just fall

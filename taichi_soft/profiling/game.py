@@ -83,13 +83,7 @@ def measure_features(repeats: int = 41) -> list[FeatureCost]:
     def against(other: Callable[[], object], name: str, is_used: bool, world: World) -> None:
         found.append(FeatureCost(name, is_used, compare(_stepping(world), other, repeats, 1e3)[2]))
 
-    unused: dict[str, dict[str, Any]] = {
-        "colliders, none near": {"collider_room": 8},
-        "soft contact, nobody near": {"soft_contact": True, "collider_room": 8},
-        "flight recorder": {"record": 60},
-    }
-    for name, options in unused.items():
-        against(free, name, False, _spheres(high, floor=None, **options))
+    against(free, "room for colliders", False, _spheres(high, floor=None, collider_room=8))
     pooled = _spheres(high, floor=None)
     pooled.reserve(SoftBodyAsset(_mesh(), preset("thesis_sphere")), COUNT)
     against(free, "as many empty slots of a pool", False, pooled)
@@ -107,6 +101,13 @@ def measure_features(repeats: int = 41) -> list[FeatureCost]:
         body.unpin([0])
     against(free, "forces and pins, no longer used", False, idle)
 
+    far = _spheres(high, floor=None)
+    for i in range(8):
+        far.add_collider(BoxShape((1.0, 1.0, 1.0)), position=(SPACING * i, 0.0, 0.0))
+    against(free, "colliders, none near", True, far)
+    lonely = _spheres(high, floor=None, soft_contact=True, collider_room=8)
+    against(free, "soft contact, nobody near", True, lonely)
+    against(free, "flight recorder", True, _spheres(high, floor=None, record=60))
     windy = _spheres(high, floor=None)
     windy.build()
     windy.set_wind((5.0, 0.0, 0.0))

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from taichi_soft.laws import LAWS, BondLaw
+from taichi_soft.laws import LAWS, BondLaw, Law, element_model
 from taichi_soft.materials import AnisotropicMaterial, Material, Stiffness
 from taichi_soft.meshing import box
 from taichi_soft.profiling.spread import Spread, compare
@@ -31,18 +32,26 @@ class LawCost:
     ratio: Spread  # over that of "virial" with the linear strain, pair by pair
 
 
-def measure_laws(repeats: int = 11) -> list[LawCost]:
-    """Measure every law with every strain and kind of material, on one body and so on one thread."""
+def kinds_of(laws: Iterable[Law]) -> list[tuple[Law, str | None, bool]]:
+    """Each law with every strain, None where it has none to choose, and once with anisotropic material."""
+    found: list[tuple[Law, str | None, bool]] = []
+    for law in laws:
+        strains: list[str | None] = [strain.value for strain in law.strains] or [None]
+        found += [(law, strain, False) for strain in strains]
+        found += [(law, strains[0], True)] * law.takes_anisotropy
+    return found
+
+
+def measure_laws(names: Sequence[str] = tuple(LAWS), repeats: int = 11) -> list[LawCost]:
+    """Measure every kind of these laws, on one body and so on one thread. Raises: OptionError for no law."""
+    laws = [element_model(name).law for name in names]
     usual = _falling("virial", None, MATERIAL)
     found = []
-    for law in LAWS.values():
-        strains: list[str | None] = [strain.value for strain in law.strains] or [None]
-        choices = [(strain, False) for strain in strains] + [(strains[0], True)] * law.takes_anisotropy
-        for strain, is_anisotropic in choices:
-            element, count = ("edge", EDGES) if isinstance(law, BondLaw) else ("tetrahedron", TETS)
-            moving = _falling(law.name, strain, WOODEN if is_anisotropic else MATERIAL)
-            cost, _, ratio = compare(moving, usual, repeats, 1e9 / SUBSTEPS / count)
-            found.append(LawCost(law.name, strain, is_anisotropic, element, cost, ratio))
+    for law, strain, is_anisotropic in kinds_of(laws):
+        element, count = ("edge", EDGES) if isinstance(law, BondLaw) else ("tetrahedron", TETS)
+        moving = _falling(law.name, strain, WOODEN if is_anisotropic else MATERIAL)
+        cost, _, ratio = compare(moving, usual, repeats, 1e9 / SUBSTEPS / count)
+        found.append(LawCost(law.name, strain, is_anisotropic, element, cost, ratio))
     return found
 
 

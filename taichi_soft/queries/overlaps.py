@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +13,7 @@ from taichi_soft.checks import as_number, as_rotation, as_vector
 from taichi_soft.constants import POSITION_LIMIT
 from taichi_soft.errors import OptionError
 from taichi_soft.kernels.queries import find_overlaps
+from taichi_soft.queries.asking import as_chosen
 from taichi_soft.state import State
 
 if TYPE_CHECKING:
@@ -32,18 +33,27 @@ SMALLEST = 1e-9
 
 
 def find_in_sphere(
-    state: State, handles: Sequence[Body | None], center: ArrayLike, radius: float
+    state: State,
+    handles: Sequence[Body | None],
+    center: ArrayLike,
+    radius: float,
+    bodies: Iterable[Body] | None,
 ) -> tuple[Overlap, ...]:
     """Bodies that touch a sphere. Raises: OptionError, see `World.overlap_sphere`."""
     shape = np.zeros((5, 3), dtype=np.float32)
     shape[0] = as_vector(center, "center", "m")
     shape[1:4] = np.eye(3)
     shape[4] = as_number(radius, "radius", SMALLEST, POSITION_LIMIT, "a length above 0 m")
-    return _overlaps(state, handles, False, shape)
+    return _overlaps(state, handles, False, shape, bodies)
 
 
 def find_in_box(
-    state: State, handles: Sequence[Body | None], center: ArrayLike, size: ArrayLike, rotation: Any
+    state: State,
+    handles: Sequence[Body | None],
+    center: ArrayLike,
+    size: ArrayLike,
+    rotation: Any,
+    bodies: Iterable[Body] | None,
 ) -> tuple[Overlap, ...]:
     """Bodies that touch a box. Raises: OptionError, see `World.overlap_box`."""
     shape = np.zeros((5, 3), dtype=np.float32)
@@ -53,15 +63,21 @@ def find_in_box(
     if not (lengths >= SMALLEST).all():
         raise OptionError(f"size must be three lengths above 0 m, got {lengths.tolist()}")
     shape[4] = lengths
-    return _overlaps(state, handles, True, shape)
+    return _overlaps(state, handles, True, shape, bodies)
 
 
 def _overlaps(
-    state: State, handles: Sequence[Body | None], is_box: bool, shape: NDArray[np.float32]
+    state: State,
+    handles: Sequence[Body | None],
+    is_box: bool,
+    shape: NDArray[np.float32],
+    bodies: Iterable[Body] | None,
 ) -> tuple[Overlap, ...]:
     first_vertex = np.full(len(handles), -1, dtype=np.int32)
     inside = np.zeros(state.capacity.particles, dtype=np.int32)
-    find_overlaps(state, is_box, len(handles), shape, first_vertex, inside)
+    chosen = as_chosen(bodies, handles)
+    if len(chosen):
+        find_overlaps(state, is_box, chosen, shape, first_vertex, inside)
     overlaps = []
     for index in np.flatnonzero(first_vertex >= 0).tolist():
         begin, body = first_vertex[index], handles[index]

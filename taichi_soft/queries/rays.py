@@ -39,7 +39,8 @@ class RayHit:
 class RayHits:
     """Where each of n rays meets a surface first.
 
-    A ray that hits nothing has body and triangle -1, distance infinity and NaN in the rest.
+    A ray that hits nothing has body and triangle -1, distance infinity and NaN in the rest. `body` numbers
+    slots: another body may take one once this is despawned, so look handles up before the next change.
     """
 
     body: NDArray[np.int32]  # (n,) body.index

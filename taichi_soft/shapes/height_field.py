@@ -46,6 +46,13 @@ class HeightFieldShape(Shape):
         object.__setattr__(self, "heights", read_only(heights))
         object.__setattr__(self, "spacing", as_length(self.spacing, "spacing"))
 
+    def __repr__(self) -> str:
+        (nx, ny, _), heights = self.resolution, np.asarray(self.heights)
+        return (
+            f"HeightFieldShape({nx} x {ny} nodes, spacing={self.spacing:.6g}, heights from "
+            f"{heights.min():.6g} to {heights.max():.6g} m)"
+        )
+
     def _values(self) -> tuple[float, ...]:
         heights = np.asarray(self.heights, dtype=np.float64)
         along, across = (np.abs(np.diff(heights, axis=axis)).max() / self.spacing for axis in (0, 1))

@@ -10,6 +10,7 @@ import pytest
 
 from taichi_soft import LAWS
 from taichi_soft.profiling import LawCost, Spread, find_compiler
+from taichi_soft.profiling.law_costs import kinds_of
 from taichi_soft.profiling.report import law_table
 
 SPREAD = Spread(1.0, 1.0, 1.0, 1.0)
@@ -65,6 +66,7 @@ def test_demo_writes_a_film_and_says_how_much_faster_than_real_time_it_ran(tmp_p
         (("demo", "bounce", "--fps", "nan"), "nan"),
         (("info", "--arch", "abacus"), "'abacus'"),
         (("info", "--threads", "0"), "0"),
+        (("info", "--law", "none"), "'none'"),
     ],
 )
 def test_a_wrong_argument_gives_one_line_that_names_it_and_exit_code_1(arguments, named, tmp_path):
@@ -97,9 +99,8 @@ def test_info_says_which_device_and_versions():
     assert facts["material"]["thesis_sphere"].startswith("E = 1 MPa, nu = 0.1")
 
 
-def test_info_lists_every_law_with_its_cost():
-    costs = json.loads(run("info", "--laws", "--json").stdout)
-    rows = [(cost["law"], cost["strain"], "frame" in cost["parameters"]) for cost in costs]
+def test_laws_are_measured_with_every_strain_and_kind_of_material():
+    rows = [(law.name, strain, is_anisotropic) for law, strain, is_anisotropic in kinds_of(LAWS.values())]
     assert rows == [
         ("virial", "linear", False),
         ("virial", "exact", False),
@@ -112,14 +113,26 @@ def test_info_lists_every_law_with_its_cost():
         ("neo_hookean", None, False),
         *((name, None, False) for name in list(LAWS)[4:]),
     ]
-    assert all(cost["ratio"]["least"] > 0 for cost in costs)
-    assert {cost["element"] for cost in costs} == {"tetrahedron", "edge"}
-    assert all(cost["source"] == LAWS[cost["law"]].source and cost["integrators"] for cost in costs)
     table = law_table([LawCost(*row, "edge", SPREAD, SPREAD) for row in rows])
-    assert table.row_count == len(costs)
+    assert table.row_count == len(rows)
     cells = {column.header: list(column.cells) for column in table.columns}
     assert all("young" in text or "stiffness" in text for text in cells["parameters"])
     assert set(cells["integrators"]) == {"all", "all but implicit_euler"}
+
+
+def test_info_lists_laws_with_their_costs():
+    names = ("st_venant_kirchhoff", "neo_hookean", "springs")
+    options = [text for name in names for text in ("--law", name)]
+    costs = json.loads(run("info", *options, "--json").stdout)
+    assert [(cost["law"], "frame" in cost["parameters"]) for cost in costs] == [
+        ("st_venant_kirchhoff", False),
+        ("st_venant_kirchhoff", True),
+        ("neo_hookean", False),
+        ("springs", False),
+    ]
+    assert all(cost["ratio"]["least"] > 0 for cost in costs)
+    assert [cost["element"] for cost in costs] == ["tetrahedron", "tetrahedron", "tetrahedron", "edge"]
+    assert all(cost["source"] == LAWS[cost["law"]].source and cost["integrators"] for cost in costs)
 
 
 def test_profile_prints_phases_and_budgets_as_json():

@@ -130,19 +130,25 @@ def test_what_is_cut_off_is_what_lay_below_the_blade_and_falls_freely():
         assert np.linalg.det(corners).sum() / 6 == pytest.approx(body.volume(), rel=1e-5)
 
 
-def test_bodies_heaped_in_a_bowl_rest_and_lie_outside_each_other():
+def test_bodies_heaped_in_a_bowl_sleep_outside_each_other_and_stay_where_they_are_when_woken():
     deepest, stage = run("bowl", 10.0)
     assert len(stage.actors) == 20
-    assert deepest <= load_demo("bowl").THICKNESS
+    assert deepest <= 0.25 * load_demo("bowl").THICKNESS
+    assert all(body.is_asleep for body in stage.world.bodies)
+    stage.world.wake()
     before = [body.positions() for body in stage.world.bodies]
     for _ in range(10):
         stage.world.step(stage.step.dt)
     for body, rows in zip(stage.world.bodies, before, strict=True):
         now = body.positions()
-        assert np.linalg.norm(now - rows, axis=1).max() < 0.2 * 0.12  # [m]: slower than 12 cm/s
+        assert np.linalg.norm(now - rows, axis=1).max() < 0.005  # [m] in 0.2 s
+        assert np.linalg.norm(body.velocities(), axis=1).max() < 0.025  # [m/s]
         # Inside the bowl, whose middle is at the height of its rim.
         assert np.linalg.norm(now - (0, 0, 2.21), axis=1).max() < 2.0 + 0.01
         assert now[:, 2].max() < 2.21
+    for _ in range(50):
+        stage.world.step(stage.step.dt)
+    assert all(body.is_asleep for body in stage.world.bodies)
 
 
 def test_all_bodies_come_through_the_course_into_the_hollow():

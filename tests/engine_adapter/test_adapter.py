@@ -111,7 +111,7 @@ def test_default_is_sixty_steps_a_second(make_world):
 
 
 @settings(max_examples=40)
-@given(alpha=st.floats(0, 0.999))
+@given(alpha=st.floats(0, 0.999, allow_subnormal=False))
 def test_positions_lie_between_the_last_two_steps(alpha, shared_run):
     adapter, before, now = shared_run(alpha)
     expected = (1 - adapter.alpha) * before.astype(float) + adapter.alpha * now.astype(float)

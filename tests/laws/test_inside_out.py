@@ -174,7 +174,7 @@ def opening_powers(x, forces):
 @pytest.mark.parametrize("law", oracle.LAWS)
 @EACH_STRAIN
 @settings(max_examples=25)
-@given(seed=seeds, nu=st.floats(0, 0.45))
+@given(seed=seeds, nu=st.floats(0, 0.45, allow_subnormal=False))
 def test_recover_pushes_every_compressed_flip_through_its_thinnest_axis(law, strain, seed, nu):
     """The negative stretch grows, in any inverted pose that is nowhere longer than at rest."""
     rng = np.random.default_rng(seed)

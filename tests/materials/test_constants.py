@@ -10,7 +10,7 @@ from taichi_soft.errors import MaterialError, TaichiSoftError
 
 CUBE = box((1, 1, 1), (1, 1, 1))
 GOOD = {"young": 1e6, "poisson": 0.3, "density": 1000.0, "damping": 10.0}
-ratios = st.floats(-0.99, 0.499)
+ratios = st.floats(-0.99, 0.499, allow_subnormal=False)
 moduli = st.floats(1e-3, 1e12)
 
 
@@ -32,7 +32,7 @@ def test_every_material_that_is_accepted_resists_shear_and_compression(young, nu
     )
 
 
-@given(young=moduli, nu=ratios, stress=st.floats(-1e6, 1e6))
+@given(young=moduli, nu=ratios, stress=st.floats(-1e6, 1e6, allow_subnormal=False))
 def test_uniaxial_stress_strains_by_one_over_young_and_contracts_by_poisson(young, nu, stress):
     """The strain (s, -nu s, -nu s) with s = stress / E leaves no stress on the sides."""
     material = Material(young, nu, 1.0)

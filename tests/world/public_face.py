@@ -40,20 +40,23 @@ N, M = len(BLOCK.vertices), len(BLOCK.tets)
 class Game:
     """A world with everything in it, and handles of all kinds, alive, dead and of another world."""
 
-    def __init__(self, folder):
+    def __init__(self, folder, *, slots=6, warm=False):
         self.folder = folder
         self.cube = SoftBodyAsset(BLOCK, SOFT, contact=Contact(friction=0.4), spare_vertices=40)
         world = self.world = World(
             soft_contact=True,
             sleep_speed=0.3,
             collider_room=4,
+            sample_room=20,
             record=6,
             record_to=folder / "frozen.recording",
         )
         world.add_collider(SphereShape(0.3), position=(0.0, 0.0, 0.1))
         world.add_collider(HeightFieldShape(np.zeros((4, 4)), 1.0), position=(0.0, 0.0, 0.02))
-        world.reserve(self.cube, 6)
+        world.reserve(self.cube, slots)
         world.build()
+        if warm:
+            world.warm_up()
         world.set_wind((0.3, 0.0, 0.0))
         self.sleeper = world.spawn(self.cube, position=(3.0, 3.0, 0.21))
         self._leave_dead_handles()
@@ -68,9 +71,8 @@ class Game:
     def _leave_dead_handles(self):
         world = self.world
         body = self.dead_body = world.spawn(self.cube, position=(0.0, 0.0, 2.0))
-        before = world.snapshot()
         self.dead_frame = world.add_frame()
-        world.restore(before)
+        self.dead_frame.remove()
         self.dead_grab, self.dead_hold = body.grab(0), body.attach([0], world.add_frame(), two_way=True)
         neighbour = world.spawn(self.cube, position=(0.5, 0.0, 2.0))
         self.dead_joint = body.attach_to(neighbour, [0], onto=[0])
@@ -268,6 +270,7 @@ BUFFER = Kind(
 GROUP = choice(1, 2, 3, **NOT_COUNTS, **{"too many bits": 2**40})
 SHAPE = choice(
     SphereShape(0.2), BoxShape((0.3, 0.3, 0.2)), CapsuleShape(0.1, 0.3), PlaneShape(),
+    HeightFieldShape(np.full((3, 3), 0.1), 0.5),
     none=None, text="sphere", **{"class": SphereShape, "mesh": BLOCK, "number": 1.0},
 )  # fmt: skip
 MATERIAL = choice(
@@ -400,6 +403,13 @@ def _cannot_turn(game, body, given):
     return bool(body._attachments) or if_wild(game, body, given)
 
 
+def _hangs_elsewhere(game, frame, given):
+    bodies = [each for each in game.world.bodies if any(hold.frame is frame for hold in each._attachments)]
+    if any(hold.frame is not frame for each in bodies for hold in each._attachments):
+        return True
+    return None if any(_is_wild(each) for each in bodies) else False
+
+
 NOTHING = Call({})
 CALLS: dict[str, dict[str, Call]] = {
     "World": {
@@ -422,8 +432,9 @@ CALLS: dict[str, dict[str, Call]] = {
         "stable_substeps": Call({"dt": STEP_LENGTH}),
         "step": Call({"dt": STEP_LENGTH, "substeps": choice(6, 8, 12, **NOT_COUNTS, zero=0).but("none")}),
         "wake": NOTHING,
+        "warm_up": NOTHING,
         "add_frame": Call({"position": POINT, "rotation": ROTATION}),
-        "grab": Call({"origin": RAY, "direction": WAY, "max_distance": REACH, "frequency": FREQUENCY, "max_force": LOAD}, _is_sound_grab),
+        "grab": Call({"origin": RAY, "direction": WAY, "max_distance": REACH, "bodies": BODIES, "frequency": FREQUENCY, "max_force": LOAD}, _is_sound_grab),
         "apply_radial_impulse": Call({"center": POINT, "impulse": number(-20.0, 60.0, strong=1e21, **{"too strong for a body": 1e13}), "radius": number(0.5, 3.0, zero=0.0, below=-1.0)}),
         "set_wind": Call({"velocity": or_none(SPEED), "density": number(0.5, 2.0, below=-1.0), "drag": number(0.1, 2.0, below=-1.0)}),
         "set_force_field": Call({"function": FIELD}),
@@ -434,8 +445,8 @@ CALLS: dict[str, dict[str, Call]] = {
         "raycast": Call({"origin": RAY, "direction": WAY, "max_distance": REACH, "bodies": BODIES, "cull_back": FLAG}),
         "raycasts": Call({"origins": RAYS, "directions": WAYS, "max_distance": REACH, "bodies": BODIES, "cull_back": FLAG}),
         "closest_point": Call({"point": POINT, "max_distance": REACH, "bodies": BODIES}),
-        "overlap_sphere": Call({"center": POINT, "radius": number(0.1, 2.0, zero=0.0, below=-1.0)}),
-        "overlap_box": Call({"center": POINT, "size": SIZE, "rotation": ROTATION}),
+        "overlap_sphere": Call({"center": POINT, "radius": number(0.1, 2.0, zero=0.0, below=-1.0), "bodies": BODIES}),
+        "overlap_box": Call({"center": POINT, "size": SIZE, "rotation": ROTATION, "bodies": BODIES}),
         "snapshot": NOTHING,
         "restore": Call({"data": DATA}),
         "state_hash": NOTHING,
@@ -494,7 +505,11 @@ CALLS: dict[str, dict[str, Call]] = {
         "teleport": Call({"position": POINT, "rotation": ROTATION}),
         "remove": NOTHING,
     },
-    "Frame": {"move_to": Call({"position": POINT, "rotation": ROTATION})},
+    "Frame": {
+        "move_to": Call({"position": POINT, "rotation": ROTATION}),
+        "teleport": Call({"position": POINT, "rotation": ROTATION, "keep_velocity": FLAG}, _hangs_elsewhere),
+        "remove": NOTHING,
+    },
     "Grab": {"move": Call({"point": POINT}), "release": NOTHING},
     "Attachment": {"release": NOTHING},
     "Joint": {"release": NOTHING},
@@ -503,6 +518,9 @@ CALLS: dict[str, dict[str, Call]] = {
         "step": NOTHING,
         "advance": Call({"frame_dt": number(0.0, 0.05, below=-0.1)}),
         "rewind": Call({"steps": choice(1, 2, 3, **NOT_COUNTS, zero=0)}, _is_not_kept),
+        "snapshot": NOTHING,
+        "restore": Call({"data": DATA}),
+        "state_hash": NOTHING,
         "drain_events": NOTHING,
         "positions": Call({"body": BODY, "out": BUFFER}),
     },
@@ -513,14 +531,16 @@ CALLS: dict[str, dict[str, Call]] = {
 }  # fmt: skip
 
 READERS: dict[str, str] = {
-    "World": """bodies colliders dropped_events floor_collider is_built last_dt settings slot_count step_count time""",
-    "Body": """aabb angular_momentum asset center_of_mass deformations elastic_energy failure flipped_count flipped_tets
-        gravitational_energy gravity_scale index is_alive is_asleep is_cut is_frozen is_held kinetic_energy masses
-        material mesh momentum pinned plastic_strains pose require_alive solve_residual stable_step strains surface
+    "World": """bodies colliders dropped_events floor_collider is_built last_dt restore_count settings slot_count step_count
+        time""",
+    "Body": """aabb angular_momentum asset attachments center_of_mass deformations elastic_energy failure flipped_count flipped_tets
+        gravitational_energy gravity_scale index is_alive is_asleep is_cut is_frozen is_held is_sheltered
+        kinetic_energy linear_damping masses material mesh momentum pinned plastic_strains pose solve_residual stable_step strains surface
         tet_origins tet_strain tet_stress tets topology_version velocities vertex_count vertex_origins vertex_strain
         vertex_stress volume volumes""",
-    "Collider": """angular_impulse impulse index is_alive position rotation shape""",
-    "Frame": """at is_alive position rotation""",
+    "Collider": """angular_impulse angular_velocity friction group impulse index is_alive mask position restitution
+        rotation shape thickness velocity""",
+    "Frame": """is_alive position rotation""",
     "Grab": """body force is_held point""",
     "Attachment": """body force frame is_attached particles torque two_way""",
     "Joint": """body force is_attached other particles""",
@@ -536,8 +556,9 @@ DEAD |= {"Attachment": "dead_hold", "Joint": "dead_joint"}
 READABLE_WHEN_DEAD: dict[str, str] = {
     "Body": """asset index is_alive is_cut is_frozen masses material mesh surface tet_origins tets topology_version
         vertex_count vertex_origins""",
-    "Collider": "index is_alive position rotation shape",
-    "Frame": "at is_alive",
+    "Collider": """angular_velocity friction group index is_alive mask position restitution rotation shape thickness
+        velocity""",
+    "Frame": "is_alive",
     "Grab": "body point",
     "Attachment": "body frame is_attached particles two_way",
     "Joint": "body is_attached other particles",
@@ -560,10 +581,11 @@ OPTIONAL = {"number": 1, "text": "no such name", "list": ["virial"], "object": o
 MAKERS: dict[Any, dict[str, Kind]] = {
     World: {
         "gravity": vector(-9.0, 9.0), "floor": or_none(number(-1.0, 1.0, low=-1e7)),
-        "restitution": number(0.0, 1.0, above=1.1), "friction": number(0.0, 1.0, below=-1.0),
+        "restitution": or_none(number(0.0, 1.0, above=1.1)), "friction": number(0.0, 1.0, below=-1.0),
         "integrator": choice("leapfrog", **NAME_OF), "tolerance": number(1e-4, 0.1, zero=0.0, above=0.6),
         "most_iterations": choice(100, **NOT_COUNTS, zero=0), "schedule": choice("auto", **NAME_OF),
         "soft_contact": ANY_FLAG, "sleep_speed": number(0.0, 1.0, below=-1.0), "collider_room": choice(2, **NOT_COUNTS),
+        "sample_room": choice(8, **NOT_COUNTS),
         "record": choice(2, **NOT_COUNTS), "record_to": choice("a", none=None, number=1, empty="", nul="\0"),
     },
     SoftBodyAsset: {

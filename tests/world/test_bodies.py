@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from taichi_soft import Material, StateError, World, beam, box, sphere
+from taichi_soft import state as states
 
 # mesh, material, options: everything in which bodies can differ.
 KINDS = {
@@ -85,6 +86,13 @@ def test_two_worlds_do_not_disturb_each_other(solo, cube, jelly):
     assert second_body.center_of_mass()[2] == pytest.approx(0.7 + 1.5 * (40 / 30) ** 2, rel=1e-3)
 
 
+@pytest.fixture
+def no_states(monkeypatch):
+    """No fields that other tests have left."""
+    monkeypatch.setattr(states, "_free", [])
+
+
+@pytest.mark.usefixtures("no_states")
 def test_a_state_is_reused_and_clean(jelly):
     """The world that was there before was larger, broken, elsewhere and had another floor."""
 
@@ -99,10 +107,8 @@ def test_a_state_is_reused_and_clean(jelly):
         world.build()
         return world, body
 
-    world, body = small()
-    expected = run(world, body)
-    del world, body
-    gc.collect()
+    first, body = small()
+    expected = run(first, body)
 
     previous = World(gravity=(0, 0, 5.0), floor=3.0, restitution=1.0, friction=0.0)
     broken = previous.add_body(box(cells=(3, 3, 3)), Material(1e9, 0.2, 1000.0, 20.0), position=(0, 0, 4))
@@ -121,6 +127,7 @@ def test_a_state_is_reused_and_clean(jelly):
     assert run(world, body) == expected
 
 
+@pytest.mark.usefixtures("no_states")
 def test_a_world_that_is_dropped_gives_its_state_back_at_once(cube, jelly):
     """Without waiting for the garbage collector; its bodies say so."""
 

@@ -6,6 +6,7 @@ Bodies of one world that belong to different experiments share it: each has a gr
 import numpy as np
 import pytest
 import trimesh
+from experiments import alone, turn
 
 from taichi_soft import (
     BoxShape,
@@ -27,18 +28,6 @@ G = 9.81
 DT = 1 / 60
 FIRM = Material(young=1e6, poisson=0.2, density=1000.0, damping=300.0)
 BLOCK = box((1.0, 1.0, 0.5), (2, 2, 1))
-
-
-def turn(angle, axis):
-    """Rodrigues's rotation about a unit axis."""
-    x, y, z = axis
-    k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * k @ k
-
-
-def alone(number):
-    """The group and mask of experiment `number`, for a body or a collider."""
-    return {"group": 1 << number, "mask": 1 << number}
 
 
 def add(world, number, mesh, material, **options):
@@ -63,7 +52,7 @@ SHARES = (0.5, 0.9, 0.98, 1.02, 1.1, 2.0)
 def slides(request):
     """Blocks on an incline whose friction is a share of the tangent of its angle: ways, every 0.5 s."""
     tilt = turn(SLOPE, (0.0, 1.0, 0.0))  # down along +x
-    world = World(floor=None)
+    world = room()
     for number, share in enumerate(SHARES):
         options = {"friction": share * np.tan(SLOPE), **alone(number)}
         if request.param == "plane":
@@ -199,6 +188,17 @@ def test_a_stiff_ball_leaves_a_collider_with_the_restitution_asked_for_or_its_ow
 def test_what_restitution_takes_from_a_body_the_collider_is_told(rebounds):
     _, taken, given = rebounds
     np.testing.assert_allclose(taken, -given, atol=2e-6 * np.abs(given).max())
+
+
+@pytest.mark.parametrize(("restitution", "lowest", "highest"), [(None, 0.9, 1.0), (0.0, 0.0, 0.07)])
+def test_a_floor_among_colliders_has_their_restitution(restitution, lowest, highest):
+    world = World(restitution=restitution, gravity=(0, 0, 0), collider_room=1)
+    ball = Material(1e8, 0.3, 1000.0, 0.0)
+    body = world.add_body(sphere(0.5, 2), ball, position=(0, 0, 0.55), velocity=(0, 0, -4.0))
+    world.build()
+    for _ in range(30):
+        world.step(DT)
+    assert lowest <= body.momentum()[2] / body.masses.sum() / 4.0 <= highest
 
 
 @pytest.fixture(scope="module")
@@ -393,7 +393,7 @@ def test_a_body_comes_to_rest_on_every_kind_of_collider(bowl):
         (HeightFieldShape(slope, 1.0), {"position": (0, 0, -0.8)}, BLOCK, 0.4),
         (bowl, {}, sphere(0.4, 2), -0.4),
     ]
-    world = room()
+    world = room(collider_room=20)  # and so the capacity of the world with a fence of capsules
     damped = Material(5e5, 0.3, 1000.0, 600.0)
     for number, (shape, options, mesh, height) in enumerate(grounds):
         world.add_collider(shape, **options, **alone(number))
@@ -433,6 +433,42 @@ REFUSED = {
     "a removed handle": lambda w, c: w.removed.remove(),
     "a removed handle to read": lambda w, c: w.removed.impulse,
 }
+
+
+def test_grounds_come_and_go_while_the_world_runs():
+    """What lies on one stays there, whatever comes and goes beside it, as long as `sample_room` lasts."""
+    world = room(collider_room=5, sample_room=1024)
+    bodies = [world.add_body(BLOCK, FIRM, position=(x, 0, 0.27)) for x in (0.0, 20.0)]
+    world.build()
+    grounds = [HeightFieldShape(np.full((16, 16), 0.1 * i), 0.5) for i in range(3)]
+    first = world.add_collider(grounds[0])
+    second = world.add_collider(grounds[1], position=(20, 0, -0.1))
+    others = [world.add_collider(grounds[2], position=(0, 0, -9)) for _ in range(2)]
+    with pytest.raises(StateError, match=r"256 samples.* room for 0: .*sample_room") as refusal:
+        world.add_collider(grounds[2])
+    assert len(str(refusal.value)) < 300
+    run(world, 0.5)
+    data = world.snapshot()
+    for time in range(6):
+        others[time % 2].remove()
+        ball = world.add_collider(SphereShape(0.1), position=(0, 0, -30))
+        others[time % 2] = world.add_collider(grounds[time % 3], position=(time, 0, -9))
+        ball.remove()
+        run(world, 1 / 12)
+    lows = [body.positions()[:, 2].min() for body in bodies]
+    np.testing.assert_allclose(lows, [0.0, 0.0], atol=2e-3)
+    second.remove()
+    world.add_collider(grounds[0], position=(20, 0, -3))
+    run(world, 0.5)
+    assert bodies[1].positions()[:, 2].min() < -0.5
+    assert bodies[0].positions()[:, 2].min() == pytest.approx(0.0, abs=2e-3)
+    world.restore(data)
+    assert second.is_alive
+    run(world, 0.5)
+    lows = [body.positions()[:, 2].min() for body in bodies]
+    np.testing.assert_allclose(lows, [0.0, 0.0], atol=2e-3)
+    assert first.impulse[2] < 0
+    assert repr(grounds[1]) == "HeightFieldShape(16 x 16 nodes, spacing=0.5, heights from 0.1 to 0.1 m)"
 
 
 def full_world():

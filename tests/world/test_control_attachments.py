@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from taichi_soft import Material, OptionError, StateError, World, box
+from taichi_soft import FrozenBodyWarning, Material, OptionError, StateError, World, box
 from taichi_soft.kernels.readout import read_velocities
 
 SIDE = np.flatnonzero(box(cells=(2, 2, 2)).vertices[:, 0] < -0.4)
@@ -34,8 +34,8 @@ def kept_momentum(world, body):
 
 
 def at_rest(world, body):
-    for attachment in list(body._attachments):
-        attachment.release()
+    for frame in world._frames.handles:
+        frame.remove()
     body.unpin()
     body.set_linear_damping(0.0)
     body.set_motion(body.mesh.vertices, np.zeros((27, 3)))
@@ -168,6 +168,132 @@ def test_other_pins_stay_when_all_are_let_go_but_attached_ones(plain):
     body.pin([26])
     body.unpin()
     assert body.pinned.tolist() == SIDE.tolist()
+
+
+def test_what_hangs_from_a_frame_jumps_with_it_rigidly(loose, turned):
+    """Positions, velocities, pictures between two steps and targets: x -> R (x - a) + b."""
+    world, body = loose
+    start, end = np.array([0.3, -0.2, 0.4]), np.array([40.0, -3.0, 7.0])
+    frame = world.add_frame(start, about_z(0.5))
+    body.attach(SIDE, frame)
+    body.pin([26])
+    for step in range(5):
+        frame.move_to(start + np.array([0, 0, 0.02 * step]), about_z(0.5 + 0.05 * step))
+        world.step(1 / 60, 8)
+    a, turn = frame.position.astype(float), turned @ frame.rotation.T
+    x, v = body.positions(), body.velocities()
+    halfway, goal = world.read_positions(body, 0.5).astype(float), x[26] + np.array([0.0, 0.02, 0.0])
+    body.set_targets([26], [goal])
+    frame.move_to((9, 9, 9))  # is forgotten
+    frame.teleport(end, turned)
+    np.testing.assert_allclose(frame.position, end, atol=1e-6)
+    np.testing.assert_allclose(frame.rotation, turned, atol=1e-6)
+    moved = (x - a) @ turn.T + end
+    np.testing.assert_allclose(body.positions(), moved, atol=1e-5)
+    np.testing.assert_allclose(world.read_positions(body, 0.5), (halfway - a) @ turn.T + end, atol=1e-5)
+    np.testing.assert_allclose(body.velocities(), v @ turn.T, atol=0.01)
+    world.step(1 / 60, 8)
+    assert not body.is_frozen
+    np.testing.assert_allclose(body.positions()[26], (goal - a) @ turn.T + end, atol=1e-5)
+    np.testing.assert_allclose(body.positions()[SIDE], moved[SIDE], atol=1e-5)
+
+
+def test_a_jump_leaves_no_trace_on_how_a_hanging_body_swings(plain):
+    """About an upright axis and away: the body swings on as one whose frame stayed."""
+    world, body = plain
+    frame = world.add_frame()
+    body.attach(SIDE, frame)
+    for _ in range(10):
+        world.step(1 / 60, 8)
+    data, stories = world.snapshot(), []
+    for place, turn in (((0, 0, 0), about_z(0)), ((3, -2, 5), about_z(2.0))):
+        world.restore(data)
+        frame.teleport(place, turn)
+        for _ in range(10):
+            world.step(1 / 60, 8)
+        stories.append((body.positions() - np.array(place)) @ turn)
+    np.testing.assert_allclose(stories[0], stories[1], atol=2e-5)
+    world.restore(data)
+    frame.teleport((0, 0, 9), keep_velocity=False)
+    assert np.abs(kept_momentum(world, body)).max() == 0.0
+
+
+def test_what_is_dragged_too_far_in_a_step_is_told_the_way_out(plain):
+    world, body = plain
+    frame = world.add_frame()
+    body.attach(SIDE, frame)
+    frame.move_to((0, 0, 30))
+    with pytest.warns(FrozenBodyWarning, match=r"1 m large, .* moved it by 30 m .* Frame\.teleport"):
+        world.step(1 / 60, 8)
+    world, body = at_rest(world, body)
+    body.set_motion(np.full((27, 3), 9.9999e6), np.full((27, 3), 1.9e4))
+    with pytest.warns(FrozenBodyWarning, match="Use more substeps or a softer material"):
+        world.step(1 / 60, 1)
+
+
+def test_a_jump_that_cannot_be_is_refused_and_changes_nothing(plain):
+    world, body = plain
+    frame, other = world.add_frame((0, 0, 1)), world.add_frame()
+    body.attach(SIDE, frame)
+    name = world.state_hash()
+    with pytest.raises(OptionError, match=r"beyond 1e\+07 m"):
+        frame.teleport((9999999.9, 0, 0), about_z(np.pi))
+    assert world.state_hash() == name
+    hold = body.attach([26], other)
+    with pytest.raises(StateError, match="body 0 hangs from another frame"):
+        frame.teleport((0, 0, 3))
+    hold.release()
+    frame.teleport((0, 0, 3))
+    np.testing.assert_allclose(body.positions(), body.mesh.vertices + np.array([0, 0, 2]), atol=1e-6)
+
+
+def test_a_removed_frame_lets_go_and_makes_room(plain):
+    """What hung from it falls as if it had been released; others hang on; the next frame takes its row."""
+    world, body = plain
+    kept, frame = world.add_frame((0, 0, 1)), world.add_frame((0, 0, 2))
+    held, left = body.attach([26], kept), body.attach(SIDE, frame)
+    rows, data = len(world._frames.rows), world.snapshot()
+    frame.remove()
+    assert not frame.is_alive
+    assert not left.is_attached
+    assert held.is_attached
+    assert body.pinned.tolist() == [26]
+    for use in (lambda: frame.position, frame.remove, lambda: body.attach([1], frame)):
+        with pytest.raises(StateError, match="was removed"):
+            use()
+    later = world.add_frame((5, 0, 0))
+    later.move_to((5, 0, 1))
+    assert not frame.is_alive
+    assert len(world._frames.rows) == rows
+    gone = world.snapshot()
+    world.step(1 / 60, 8)
+    name = world.state_hash()
+    np.testing.assert_array_equal(body.positions()[26], body.mesh.vertices[26].astype(np.float32))
+    assert body.center_of_mass()[2] < -5e-4
+    world.restore(gone)
+    assert not frame.is_alive
+    np.testing.assert_array_equal(later.position, (5, 0, 0))
+    world.step(1 / 60, 8)
+    assert world.state_hash() == name
+    world.restore(data)
+    assert frame.is_alive
+    assert left.is_attached
+    assert not later.is_alive
+    frame.move_to((0, 0, 2.05))
+    world.step(1 / 60, 8)
+    np.testing.assert_allclose(body.positions()[SIDE], body.mesh.vertices[SIDE] + [0, 0, 0.05], atol=1e-6)
+
+
+def test_frames_that_come_and_go_take_no_room(plain):
+    world, body = plain
+    world.add_frame().remove()
+    rows, size = len(world._frames.rows), len(world.snapshot())
+    for turn in range(20):
+        frame = world.add_frame((turn, 0, 0))
+        body.attach([turn], frame)
+        frame.remove()
+    assert len(world._frames.rows) == rows
+    assert len(world.snapshot()) < size + 50  # of digits
 
 
 BAD_CALLS = {

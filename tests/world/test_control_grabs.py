@@ -230,6 +230,14 @@ def test_a_refused_call_changes_nothing(plain, name):
     assert body.positions().tobytes() == before[0][0]
 
 
+def test_a_ray_grabs_only_what_it_may(plain):
+    world, body, other = plain
+    down = ((0.3, 0.3, 60.0), (0, 0, -1))
+    assert world.grab(*down, bodies=[]) is None
+    assert world.grab(*down, bodies=iter([body])).body is body
+    assert world.grab(*down).body is other
+
+
 def test_a_released_grab_is_spent(plain):
     _, body, _ = plain
     grab = body.grab(TOP)

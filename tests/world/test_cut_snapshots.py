@@ -287,10 +287,12 @@ def test_a_damaged_part_is_refused_before_anything_changes(played, name):
     bar_of(played).cut(plane=FIRST)
     fallen = played.bodies[1]
     played.despawn(fallen)
-    structure, notes, words = unseal(played.snapshot(), MARK, VERSION, "snapshot")
+    structure, notes, words, memory = unseal(played.snapshot(), MARK, VERSION, "snapshot")
     content, rows = json.loads(bytes(notes)), np.frombuffer(words, "<i4").copy()
     rows = FORGED[name](content, rows)
-    data = seal(MARK, VERSION, [bytes(structure), json.dumps(content).encode(), rows.tobytes()])
+    data = seal(
+        MARK, VERSION, [bytes(structure), json.dumps(content).encode(), rows.tobytes(), bytes(memory)]
+    )
     before, seen = played.state_hash(), meshes(played)
     with pytest.raises(SnapshotError, match="not in order"):
         played.restore(data)

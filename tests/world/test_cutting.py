@@ -364,13 +364,9 @@ def test_a_part_keeps_its_pins_its_fibres_and_its_dents():
 def test_what_is_held_is_not_cut_and_what_is_watched_is_watched_on(swinging):
     world, body = swinging()
     grab = body.grab(0)
-    with pytest.raises(StateError, match="body 0 is grabbed or attached: release it"):
+    with pytest.raises(StateError, match="body 0 is grabbed or joined to another body: release it"):
         body.cut(plane=ALONG)
     grab.release()
-    held = body.attach([3], world.add_frame())
-    with pytest.raises(StateError, match="body 0 is grabbed or attached: release it"):
-        body.cut(plane=ALONG)
-    held.release()
     body.watch_stress(10.0)
     world.step(DT, 24)
     world.drain_events()
@@ -382,6 +378,49 @@ def test_what_is_held_is_not_cut_and_what_is_watched_is_watched_on(swinging):
     np.testing.assert_allclose(event.stress, stress[event.tetrahedra], rtol=1e-3, atol=1.0)
     assert len(event.tetrahedra) == (stress > 10.0).sum()
     assert len(fallen) == 1
+
+
+def test_every_piece_hangs_on_by_what_it_has_of_what_was_attached(swinging):
+    """Loads add up to that of before the cut; each piece then goes with the frame, and can be released."""
+    world, body = swinging()
+    ends, middle = np.flatnonzero(np.abs(BAR.vertices[:, 0]) > 0.99), np.flatnonzero(BAR.vertices[:, 0] == 0)
+    frame, other = world.add_frame(), world.add_frame((5, 0, 0))
+    hold, clamp = body.attach(ends, frame, two_way=True), body.attach(middle, other)
+    world.step(DT, 24)
+    load, turn, where = hold.force, hold.torque, body.positions()
+    assert np.abs(load).max() > 10.0
+    (fallen,) = body.cut(plane=((0.03, 0, 0), (1, 0, 0)))
+    (first, second) = (each.attachments for each in (body, fallen))
+    assert first == (hold, clamp)
+    assert [each.frame for each in second] == [frame, other]
+    assert [each.two_way for each in second] == [True, False]
+    np.testing.assert_allclose(hold.force + second[0].force, load, rtol=1e-5, atol=1e-3)
+    np.testing.assert_allclose(hold.torque + second[0].torque, turn, rtol=1e-5, atol=1e-3)
+    for each, (outer, inner) in ((body, first), (fallen, second)):
+        assert set(each.vertex_origins[outer.particles]) == set(each.vertex_origins) & set(ends)
+        assert set(each.vertex_origins[inner.particles]) == set(each.vertex_origins) & set(middle)
+        assert each.pinned.tolist() == sorted([*outer.particles, *inner.particles])
+    data = world.snapshot()
+    frame.move_to((0.1, 0, 0.2))
+    world.step(DT, 24)
+    name = world.state_hash()
+    for each, (outer, inner) in ((body, first), (fallen, second)):
+        start = where[each.vertex_origins]
+        for held, way in ((outer, [0.1, 0, 0.2]), (inner, [0, 0, 0])):
+            moved = each.positions()[held.particles] - start[held.particles]
+            np.testing.assert_allclose(moved, np.tile(way, (len(moved), 1)), atol=1e-5)
+    world.restore(data)
+    frame.move_to((0.1, 0, 0.2))
+    world.step(DT, 24)
+    assert world.state_hash() == name
+    assert fallen.attachments == second
+    second[0].release()
+    other.remove()
+    assert len(fallen.pinned) == 0
+    assert set(body.vertex_origins[body.pinned]) == set(body.vertex_origins) & set(ends)
+    world.despawn(fallen)
+    assert hold.is_attached
+    world.step(DT, 24)
 
 
 def test_parts_keep_gravity_scale_and_what_pushes_them(swinging):

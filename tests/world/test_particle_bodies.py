@@ -52,23 +52,21 @@ KINDS = ("virial", "neo_hookean", "volume_springs", "cmpm", "best_fitting_plane"
 def test_ropes_and_solids_of_every_kind_of_law_share_a_world(schedule):
     """Each moves as it does alone."""
     ball, material = sphere(0.4, 1), Material(2e5, 0.2, 1000.0, 10.0)
-    together, alone = World(schedule=schedule), []
-    for i, law in enumerate(KINDS):
-        place = (2.0 * i, 0, 0.7)
-        together.add_body(ball, material, law=law, position=place)
-        alone.append(World(schedule=schedule))
-        alone[-1].add_body(ball, material, law=law, position=place)
-    chain, springs = rope(1.0, 5, 0.2), SpringMaterial(50.0, 0.1)
-    for world in (together, World(schedule=schedule)):
-        world.add_body(chain, springs, law="springs", pinned=[0], position=(0, 3, 2))
-        alone.append(world)
-    alone.remove(together)
-    for world in (together, *alone):
+    every = [((ball, material), {"law": law, "position": (2.0 * i, 0, 0.7)}) for i, law in enumerate(KINDS)]
+    chain = rope(1.0, 5, 0.2), SpringMaterial(50.0, 0.1)
+    every.append((chain, {"law": "springs", "pinned": [0], "position": (0, 3, 2)}))
+
+    def moved(*bodies):
+        world = World(schedule=schedule)
+        for made_of, options in bodies:
+            world.add_body(*made_of, **options)
         world.build()
         for _ in range(30):
             world.step(1 / 60, 8)
-    for body, world in zip(together.bodies, alone, strict=True):
-        np.testing.assert_allclose(body.positions(), world.bodies[0].positions(), atol=1e-5)
+        return [body.positions() for body in world.bodies]
+
+    for rows, body in zip(moved(*every), every, strict=True):
+        np.testing.assert_allclose(rows, moved(body)[0], atol=1e-5)
 
 
 @pytest.mark.parametrize("schedule", ["per_body", "flat"])

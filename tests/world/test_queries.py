@@ -214,6 +214,19 @@ def test_only_the_bodies_asked_answer(crowd):
     assert crowd.closest_point((0, -2, 0), bodies=iter([crowd.bodies[BALL]])).body is crowd.bodies[BALL]
 
 
+def test_only_the_bodies_asked_overlap(crowd):
+    ball, cube = crowd.bodies[BALL], crowd.bodies[CUBE]
+    for overlap in (crowd.overlap_sphere((0, 0, 0), 9.0), crowd.overlap_box((0, 0, 0), (18, 18, 18))):
+        assert {ball, cube} < {each.body for each in overlap}
+    for asked in (
+        crowd.overlap_sphere((0, 0, 0), 9.0, bodies=[cube, ball]),
+        crowd.overlap_box((0, 0, 0), (18, 18, 18), bodies=iter([ball, cube])),
+    ):
+        assert [each.body for each in asked] == sorted((ball, cube), key=lambda body: body.index)
+        assert [len(each.vertices) for each in asked] == [each.body.vertex_count for each in asked]
+    assert crowd.overlap_sphere((0, 0, 0), 9.0, bodies=[]) == ()
+
+
 def test_a_rope_has_no_surface_but_nearest_vertices(crowd):
     cord = crowd.bodies[CORD]
     x = cord.positions().astype(float)
@@ -459,6 +472,10 @@ def test_bodies_of_another_world_and_worlds_not_built_are_refused(crowd, jelly):
     stranger = other.add_body(box(cells=(1, 1, 1)), jelly)
     with pytest.raises(OptionError, match="this world's bodies"):
         crowd.raycast((0, 0, 0), UP, bodies=[stranger])
+    with pytest.raises(OptionError, match="this world's bodies"):
+        crowd.overlap_sphere((0, 0, 0), 1.0, bodies=[stranger])
+    with pytest.raises(OptionError, match="this world's bodies"):
+        crowd.overlap_box((0, 0, 0), (1, 1, 1), bodies=[stranger])
     for call in (
         lambda: other.raycast((0, 0, 0), UP),
         lambda: other.raycasts([(0, 0, 0)], [UP]),

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from random_play import DT, SUBSTEPS, make_world, play
+from random_play import DT, SUBSTEPS, act, make_world, play
 
 from taichi_soft import (
     FrozenBodyWarning,
@@ -95,11 +95,33 @@ def test_only_the_first_freeze_is_written(broken):
     assert broken[3]
 
 
-def test_after_a_restore_the_recording_begins_again(game, tmp_path):
+def test_undone_steps_are_not_in_the_recording(game, tmp_path):
+    """Steps undone in every second tick, back to before or after the inputs of the tick."""
+    world, _ = game
+    cube, first = world.bodies[0].asset, world.step_count
+    for tick in range(50):
+        is_late = tick % 2 == 0
+        if is_late and tick % 4:
+            act(world, cube, seed=21)
+        data = world.snapshot()
+        if is_late:
+            play(world, cube, 5, seed=22)
+            world.restore(data)
+        if not (is_late and tick % 4):
+            act(world, cube, seed=21)
+        world.step(DT, SUBSTEPS)
+    report = replay(world.save_recording(tmp_path / "undone.recording"))
+    assert 25 <= report.steps < 60
+    assert report.first_difference is None
+    assert report.world.step_count == first + 50
+    assert report.world.state_hash() == world.state_hash()
+
+
+def test_after_a_state_that_is_not_kept_the_recording_begins_again(game, tmp_path):
     world, _ = game
     data = world.snapshot()
-    world.bodies[0].apply_impulse((0, 0, 5))
-    world.step(DT, SUBSTEPS)
+    for _ in range(60):
+        world.step(DT, SUBSTEPS)
     world.restore(data)
     world.bodies[0].apply_impulse((5, 0, 0))
     world.step(DT, SUBSTEPS)

@@ -26,34 +26,38 @@ def thrown():
 
 @pytest.fixture(scope="module")
 def flights():
-    """Two such worlds after the same steps, when all have left, the second one restored from the first in the
-    midst of the impact; the momentum before, and what colliders took up."""
-    worlds = [thrown(), thrown()]
-    before = np.sum([body.momentum() for body in worlds[0].bodies], axis=0)
+    """A world when all have left, restored in the midst of the impact from one that is gone since; the hash
+    of that one then, the momentum before, what colliders took up."""
+    first = thrown()
+    before = np.sum([body.momentum() for body in first.bodies], axis=0)
     taken = np.zeros(3)
     for step in range(8):
-        worlds[0].step(DT)
+        first.step(DT)
         if step == 0:
-            worlds[1].restore(worlds[0].snapshot())
-        else:
-            worlds[1].step(DT)
-        taken += np.sum([collider.impulse for collider in worlds[0].colliders], axis=0)
-    return worlds, before, taken
+            data = first.snapshot()
+        taken += np.sum([collider.impulse for collider in first.colliders], axis=0)
+    name = first.state_hash()
+    del first  # the next one takes over its kernels
+    second = thrown()
+    second.restore(data)
+    for _ in range(7):
+        second.step(DT)
+    return second, name, before, taken
 
 
 def test_no_body_breaks(flights):
-    for body in flights[0][0].bodies:
+    for body in flights[0].bodies:
         assert not body.is_frozen
         assert np.isfinite(body.positions()).all()
         assert np.linalg.norm(body.momentum()) < SPEED * body.masses.sum()
 
 
 def test_colliders_are_told_what_the_step_gave_that_counts(flights):
-    (world, _), before, taken = flights
+    world, _, before, taken = flights
     after = np.sum([body.momentum() for body in world.bodies], axis=0)
     np.testing.assert_allclose(taken, before - after, atol=1e-5 * np.linalg.norm(before))
 
 
 def test_it_goes_the_same_way_again(flights):
-    first, second = flights[0]
-    assert first.state_hash() == second.state_hash()
+    second, name, _, _ = flights
+    assert second.state_hash() == name

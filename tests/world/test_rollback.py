@@ -1,39 +1,16 @@
-"""Late inputs: steps taken back and made again, against a world in which nothing ever went wrong."""
-
-import subprocess
-import sys
-from pathlib import Path
+"""Late inputs: steps taken back and made again. That they come out the same: see `test_threads.py`."""
 
 import numpy as np
 import pytest
-from random_play import DT, SUBSTEPS, act, check, make_world
+from random_play import DT, SUBSTEPS, act, make_world
 
 from engine_adapter import EngineAdapter, FixedStep, Rollback
 from taichi_soft import OptionError, StateError, World
 
 
 @pytest.fixture(scope="module")
-def straight():
-    """300 ticks with wrong inputs taken back every 20: hashes of a straight run, and how many differ."""
-    return check(300, seed=11)
-
-
-@pytest.fixture(scope="module")
 def game():
     return make_world()
-
-
-def test_every_tick_made_again_is_the_same(straight):
-    hashes, different = straight
-    assert different == 0
-    assert len(set(hashes)) == 300
-
-
-def test_another_number_of_threads_gives_the_same_hashes(straight):
-    script = Path(__file__).with_name("random_play.py")
-    command = [sys.executable, str(script), "--ticks", "100", "--seed", "11", "--threads", "1"]
-    out = subprocess.run(command, check=True, capture_output=True, text=True, timeout=500).stdout
-    assert f"0 hashes differ after rollback; the last is {straight[0][99]};" in out
 
 
 def test_a_ring_keeps_the_last_ticks_and_goes_back_to_any(game):
@@ -96,3 +73,49 @@ def test_an_adapter_rewinds_and_draws_the_same_pictures(game):
         adapter.rewind(3)
     with pytest.raises(StateError, match="rewind_ticks"):
         EngineAdapter(world).rewind(1)
+
+
+def test_a_loaded_game_is_no_past_of_what_a_ring_has_kept(game):
+    """Nor does anything lead from it to the ring's states, silently or at all, until it is kept itself."""
+    world, _ = game
+    adapter = EngineAdapter(world, FixedStep(dt=DT, substeps=SUBSTEPS), rewind_ticks=8)
+    adapter.advance(2.4 * DT)
+    data, loaded = adapter.snapshot(), adapter.state_hash()
+    for _ in range(4):
+        world.bodies[0].apply_impulse((0, 0, 20))
+        adapter.step()
+    world.restore(data)  # behind the adapter's back
+    with pytest.raises(OptionError, match="restored"):
+        adapter.rewind(1)
+    adapter.step()
+    with pytest.raises(OptionError, match="not kept"):
+        adapter.rewind(1)
+    after = adapter.state_hash()
+    adapter.step()
+    adapter.rewind(1)
+    assert adapter.state_hash() == after
+    adapter.advance(0.5 * DT)
+    adapter.restore(data)
+    assert (adapter.state_hash(), adapter.alpha) == (loaded, 0.0)
+    with pytest.raises(OptionError, match="not kept"):
+        adapter.rewind(1)
+    adapter.step()
+    assert adapter.state_hash() == after
+    adapter.rewind(1)
+    assert adapter.state_hash() == loaded
+
+
+def test_the_ring_of_another_notices_that_steps_were_taken_back(game):
+    world, _ = game
+    ours, theirs = Rollback(world, 5), Rollback(world, 5)
+    for _ in range(3):
+        ours.save()
+        theirs.save()
+        world.step(DT, SUBSTEPS)
+    ours.rewind_to(world.step_count - 2)
+    assert len(ours.steps) == 2
+    assert theirs.steps == ()
+    with pytest.raises(OptionError, match="restored"):
+        theirs.rewind_to(world.step_count)
+    theirs.save()
+    assert theirs.steps == (world.step_count,)

@@ -3,17 +3,12 @@
 Without gravity and floor, two bodies and what passes between them are all there is.
 """
 
-import subprocess
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from taichi_soft import Contact, Material, World, beam, box, sphere
 
 DT = 1 / 60
-ROOT = Path(__file__).parents[2]
 SOFT = Material(young=2e5, poisson=0.3, density=1000.0, damping=60.0)
 
 
@@ -65,6 +60,33 @@ def totals(world):
     return momentum, turn
 
 
+# The largest world first: the others take over its kernels.
+FILTERS = [
+    ((1, 1), (1, 1)),
+    ((1, 2), (2, 1)),
+    ((1, 1), (2, 2)),
+    ((1, 3), (2, 2)),
+    ((1, 0), (1, 1)),
+    ((5, 4), (4, 6)),
+]
+
+
+def test_bodies_touch_where_each_ones_mask_has_the_others_group():
+    cube = box((0.3,) * 3, (1, 1, 1))
+    bodies = []
+    for row, pair in enumerate(FILTERS):
+        for side, (group, mask) in zip((-1, 1), pair, strict=True):
+            options = {"position": (0.3 * side, 0, 2 * row), "velocity": (-2.0 * side, 0, 0)}
+            bodies.append((cube, SOFT, {**options, "contact": Contact(group=group, mask=mask)}))
+    world = world_of(*bodies)
+    run(world, 0.6)
+    for pair, left, right in zip(FILTERS, world.bodies[::2], world.bodies[1::2], strict=True):
+        (group, mask), (other_group, other_mask) = pair
+        touch = bool(group & other_mask and other_group & mask)
+        passed = left.center_of_mass()[0] > right.center_of_mass()[0]
+        assert passed != touch, pair
+
+
 @pytest.mark.parametrize("friction", [0.0, 0.8])
 def test_a_collision_keeps_momentum_and_angular_momentum(friction):
     """Two bodies of different size and density, thrown past each other's middle; both spin."""
@@ -90,7 +112,7 @@ def test_a_pile_of_five_blocks_stands_without_creeping():
     """8 s after it was set up, a hundredth of its size in no direction; without sinking into each other."""
     edge = 0.5
     block = box((edge,) * 3, (2, 2, 2))
-    firm = Material(5e6, 0.3, 1000.0, 600.0)  # a tenth of that leans and falls after 4 s
+    firm = Material(5e6, 0.3, 1000.0, 600.0)  # see test_piles for softer ones
     piled = [(block, firm, {"position": (0, 0, edge / 2 + 1.01 * edge * i)}) for i in range(5)]
     world = world_of(*piled, floor=0.0, gravity=(0, 0, -9.81))
     run(world, 2.0)
@@ -165,32 +187,6 @@ def test_the_halves_of_a_folded_strip_meet_where_contact_with_itself_is_on_and_p
     assert folding(False)[0] < 0.0
 
 
-FILTERS = [
-    ((1, 1), (1, 1)),
-    ((1, 2), (2, 1)),
-    ((1, 1), (2, 2)),
-    ((1, 3), (2, 2)),
-    ((1, 0), (1, 1)),
-    ((5, 4), (4, 6)),
-]
-
-
-def test_bodies_touch_where_each_ones_mask_has_the_others_group():
-    cube = box((0.3,) * 3, (1, 1, 1))
-    bodies = []
-    for row, pair in enumerate(FILTERS):
-        for side, (group, mask) in zip((-1, 1), pair, strict=True):
-            options = {"position": (0.3 * side, 0, 2 * row), "velocity": (-2.0 * side, 0, 0)}
-            bodies.append((cube, SOFT, {**options, "contact": Contact(group=group, mask=mask)}))
-    world = world_of(*bodies)
-    run(world, 0.6)
-    for pair, left, right in zip(FILTERS, world.bodies[::2], world.bodies[1::2], strict=True):
-        (group, mask), (other_group, other_mask) = pair
-        touch = bool(group & other_mask and other_group & mask)
-        passed = left.center_of_mass()[0] > right.center_of_mass()[0]
-        assert passed != touch, pair
-
-
 def test_a_body_of_5_cm_rests_on_one_of_2_m():
     """Between its vertices: its own vertices are what the big one's triangles hold."""
     world = world_of(
@@ -234,36 +230,3 @@ def test_where_a_body_explodes_it_is_frozen_alone_and_the_others_go_on():
     for body, place in zip((lower, upper), places, strict=True):
         assert np.abs(body.center_of_mass() - place).max() < 0.5
     assert upper.center_of_mass()[2] > still[:, 2].max() > lower.center_of_mass()[2]
-
-
-SCRIPT = """
-import sys
-import numpy as np
-from taichi_soft import Contact, Material, World, box, init, sphere
-init("cpu", threads=int(sys.argv[1]))
-world = World(soft_contact=True)
-for i in range(6):
-    mesh = sphere(0.3, 2) if i % 2 else box((0.5, 0.5, 0.5), (2, 2, 2))
-    material = Material(2e5, 0.3, 1000.0, 40.0)
-    options = {"contact": Contact(itself=i == 0)}
-    place = (0.1 * i + 3.0 * (i > 3), 0.05 * i, 0.4 + 0.6 * (i % 4))
-    world.add_body(mesh, material, position=place, **options)
-world.build()
-for _ in range(60):
-    world.step(1 / 60)
-np.savez(sys.argv[2], *[rows for b in world.bodies for rows in (b.positions(), b.velocities())])
-"""
-
-
-def test_a_heap_has_the_same_bits_for_one_and_two_threads(tmp_path):
-    found = []
-    for threads in (1, 2):
-        out = tmp_path / f"{threads}.npz"
-        subprocess.run(
-            [sys.executable, "-c", SCRIPT, str(threads), str(out)], cwd=ROOT, check=True, timeout=300
-        )
-        found.append(dict(np.load(out)))
-    assert len(found[0]) == 12
-    for name, rows in found[0].items():
-        assert np.isfinite(rows).all()
-        np.testing.assert_array_equal(rows, found[1][name])

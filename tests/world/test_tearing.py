@@ -10,8 +10,10 @@ from taichi_soft import (
     OptionError,
     SoftBodyAsset,
     Stiffness,
+    StressExceeded,
     Tearing,
     TetMesh,
+    Torn,
     World,
     box,
 )
@@ -35,17 +37,17 @@ ENDS = np.flatnonzero(np.abs(BAR.vertices[:, 0]) > 0.99)
 
 
 def asset(**options):
-    return SoftBodyAsset(
-        BAR, JELLY, pinned=ENDS, **{"spare_vertices": 60, "tearing": Tearing(STRENGTH), **options}
-    )
+    usual = {"pinned": ENDS, "spare_vertices": 60, "tearing": Tearing(STRENGTH)}
+    return SoftBodyAsset(BAR, JELLY, **usual | options)
 
 
 @pytest.fixture(scope="module")
 def world():
     """With a pool of three bars that tear, and one of one that cannot fall apart."""
     world = World(floor=None, gravity=(0, 0, 0))
-    world.assets = asset(), asset(spare_vertices=61)
+    world.assets = asset(), asset(spare_vertices=61), asset(pinned=())
     world.reserve(world.assets[0], 3)
+    world.reserve(world.assets[2], 3)
     world.reserve(world.assets[1], 1)
     world.build()
     return world
@@ -104,6 +106,48 @@ def test_a_bar_tears_through_at_its_waist_and_nowhere_else(world):
         assert np.ptp(x[:, 0]) < 1.9
 
 
+def test_a_bar_between_two_frames_tears_and_each_part_hangs_on_by_its_end(world):
+    """Torn through, neither frame is pulled any more, and each carries its part along."""
+    body = pulled(world, 1.2, kind=2)
+    right = BAR.vertices[:, 0] > 0
+    frames = [world.add_frame(), world.add_frame((2, 0, 0))]
+    holds = [
+        body.attach(ENDS[right[ENDS] == side], frame, two_way=True)
+        for side, frame in zip((False, True), frames, strict=True)
+    ]
+    data = world.snapshot()
+    run(world, 1)
+    pull = [hold.force[0] for hold in holds]
+    assert pull[0] > 500.0
+    assert pull[1] < -500.0
+    run(world, 200)
+    assert len(world.bodies) >= 2
+    first, second = (hold.body for hold in holds)
+    assert first is not second
+    assert {body.index for body in (first, second)} <= {each.index for each in world.bodies}
+    assert first.attachments == (holds[0],)
+    assert second.attachments == (holds[1],)
+    for hold, side in zip(holds, (False, True), strict=True):
+        assert set(hold.body.vertex_origins[hold.particles]) == set(ENDS[right[ENDS] == side])
+        assert len(hold.particles) == 9  # none of them was split
+        assert principal(hold.body).max() < STRENGTH
+    for part in world.bodies:
+        part.set_linear_damping(4.0)
+    run(world, 120)
+    for hold, before in zip(holds, pull, strict=True):
+        assert abs(hold.force[0]) < 0.02 * abs(before)
+    where, names = second.positions(), world.state_hash()
+    frames[1].teleport((2, 0, 3))
+    np.testing.assert_allclose(second.positions(), where + np.array([0, 0, 3]), atol=1e-5)
+    world.restore(data)
+    assert holds[0].body is holds[1].body is body
+    run(world, 201)
+    for part in world.bodies:
+        part.set_linear_damping(4.0)
+    run(world, 120)
+    assert world.state_hash() == names
+
+
 def test_what_falls_off_stays_in_the_body_where_no_slot_is_free(world):
     body = pulled(world, 1.2, kind=1)
     run(world, 240)
@@ -122,6 +166,56 @@ def test_tears_are_the_same_every_time(world):
         run(world, 40)
         told.append(b"".join(part.positions().tobytes() for part in world.bodies))
     assert told[0] == told[1]
+
+
+@pytest.mark.parametrize("kind", [0, 1])  # what falls off the one is a body, and stays in the other
+def test_each_tear_is_told_of_in_its_step(world, kind):
+    pulled(world, 1.2, kind)
+    world.record_events([Torn])
+    told = []
+    for _ in range(30):
+        before = {body: body.topology_version for body in world.bodies}
+        run(world, 1)
+        events = world.drain_events()
+        told += events
+        assert all((event.step, event.time) == (world.step_count - 1, world.time) for event in events)
+        assert [event.body for event in events] == [
+            body for body, version in before.items() if body.topology_version != version
+        ]
+        new = [body for body in world.bodies if body not in before]
+        assert sorted((piece for event in events for piece in event.pieces), key=world.bodies.index) == new
+        for event in events:
+            masses = [piece.masses.sum() for piece in event.pieces]
+            assert masses == sorted(masses, reverse=True)
+    assert told
+    assert any(event.pieces for event in told) == (kind == 0)
+    world.record_events([])
+
+
+def test_of_a_tear_that_is_undone_nothing_is_left(world):
+    """Nor of stress that was over a limit in tetrahedra of what is whole again."""
+    body = pulled(world, 1.2)
+    world.record_events([Torn])
+    body.watch_stress(0.5 * STRENGTH)
+    start, told = world.snapshot(), []
+    for undone in (0, 12, 9):
+        world.restore(start)
+        run(world, 12 - undone)
+        data = world.snapshot()
+        run(world, undone)
+        world.restore(data)
+        run(world, undone)
+        told.append(
+            [
+                (event.step, type(event), event.body.index, [piece.index for piece in event.pieces])
+                if isinstance(event, Torn)
+                else (event.step, type(event), event.body.index, event.tetrahedra.tolist())
+                for event in world.drain_events()
+            ]
+        )
+    assert {kind for _, kind, _, _ in told[0]} == {Torn, StressExceeded}
+    assert told[1:] == [told[0]] * 2
+    world.record_events([])
 
 
 def test_bad_options_are_refused():

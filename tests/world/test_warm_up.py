@@ -1,0 +1,72 @@
+"""`World.warm_up`: nothing is compiled after it, and nothing has happened."""
+
+import inspect
+import warnings
+
+import numpy as np
+import pytest
+import taichi as ti
+from public_face import CALLS, DT, READERS, SUBSTEPS, Game
+
+from taichi_soft import Event, FrozenBodyWarning
+
+
+@pytest.fixture(scope="module")
+def compiled():
+    """Names of the kernels that were compiled since it was cleared."""
+    names, inner = [], ti.lang.kernel_impl._get_tree_and_ctx
+
+    def noted(kernel, *args, **kwargs):
+        names.append(kernel.func.__name__)
+        return inner(kernel, *args, **kwargs)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(ti.lang.kernel_impl, "_get_tree_and_ctx", noted)
+        yield names
+
+
+@pytest.fixture(scope="module")
+def game(tmp_path_factory, compiled):
+    """A game that was warmed up when it had nothing but empty slots, in fields that no other test uses."""
+    return Game(tmp_path_factory.mktemp("game"), slots=66, warm=True)
+
+
+def test_it_leaves_the_world_as_it_is(game):
+    world = game.world
+    before = world.snapshot(), world.state_hash(), world.bodies, world.colliders, world.step_count
+    world.warm_up()
+    assert (world.snapshot(), world.state_hash(), world.bodies, world.colliders, world.step_count) == before
+
+
+NAMES = [f"{kind}.{name}" for kind, calls in CALLS.items() for name in calls]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_nothing_is_compiled_in_the_game(game, compiled, name):
+    kind, _, method = name.partition(".")
+    call = CALLS[kind][method]
+    compiled.clear()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FrozenBodyWarning)
+        for seed in range(3):
+            game.begin()
+            rng = np.random.default_rng(seed)
+            handle = game.receiver = game.handles(kind)[seed % len(game.handles(kind))]
+            given = {argument: takes.sound(game, rng) for argument, takes in call.takes.items()}
+            if call.refused(game, handle, given) is False:
+                getattr(handle, method)(**given)
+                game.world.step(DT, SUBSTEPS)
+    assert compiled == []
+
+
+@pytest.mark.parametrize("kind", READERS)
+def test_nothing_is_compiled_where_the_game_looks(game, compiled, kind):
+    game.begin()
+    game.world.record_events([Event])
+    compiled.clear()
+    game.world.step(DT, SUBSTEPS)
+    for name in set(READERS[kind].split()) - {"at", "failure", "plastic_strains"}:
+        found = getattr(game.handles(kind)[0], name)
+        if inspect.ismethod(found):
+            found()
+    assert compiled == []

@@ -1,0 +1,136 @@
+"""What happens to many bodies, as bits. Started as a program, all of it on so many threads, into a file:
+
+    python tests/world/thread_scenes.py 2 out.json
+
+The scene with the most bodies comes first: the others take over its kernels.
+"""
+
+import hashlib
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).parents[2]
+if __name__ == "__main__":
+    sys.path[:0] = [str(ROOT), str(Path(__file__).parent)]
+
+# ruff: noqa: E402
+import random_play
+
+from taichi_soft import Contact, Material, World, box, init, sphere
+
+CUBE = box(cells=(2, 2, 2))
+TOP = np.flatnonzero(CUBE.vertices[:, 2] > 0.49)
+JELLY = Material(1e5, 0.2, 1000.0, 20.0)
+DT = 1 / 60
+
+
+def motion(world):
+    """Of every body and in every bit, after a check that there is some."""
+    rows = [each for body in world.bodies for each in (body.positions(), body.velocities())]
+    assert all(np.isfinite(each).all() and each.any() for each in rows)
+    return [hashlib.sha256(each.tobytes()).hexdigest() for each in rows]
+
+
+def thrown(recorded=True):
+    """Twelve bodies thrown at each other: the world, what momentum each gains, and the events."""
+    world = World(gravity=(0, 0, 0), floor=None, soft_contact=True)
+    rng = np.random.default_rng(3)
+    mesh, material = sphere(0.3, 2), Material(1e5, 0.2, 1000.0, 2.0)
+    ways = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 0, 1)]) * 0.5
+    for way in ways:
+        world.add_body(mesh, material, position=way + rng.normal(scale=0.02, size=3), velocity=-4 * way)
+    world.build()
+    if recorded:
+        world.record_events()
+        for body in world.bodies:
+            body.watch_stress(1e4)
+    before = np.array([body.momentum() for body in world.bodies])
+    events = []
+    for _ in range(60):
+        world.step(DT, 4)
+        if recorded:
+            events += world.drain_events()
+    return world, np.array([body.momentum() for body in world.bodies]) - before, events
+
+
+def written(event):
+    kind = type(event).__name__
+    if kind.startswith("Contact"):
+        return [event.step, kind, event.a.index, event.b.index, event.impulse.tobytes().hex()]
+    return [event.step, kind, event.body.index, event.tetrahedra.tolist(), event.stress.tobytes().hex()]
+
+
+def crowd():
+    world, _, events = thrown()
+    assert len(events) > 30
+    return [*motion(world), *map(written, events)]
+
+
+def heap():
+    """Six bodies, one of which touches itself too."""
+    world = World(soft_contact=True)
+    for i in range(6):
+        mesh = sphere(0.3, 2) if i % 2 else box((0.5, 0.5, 0.5), (2, 2, 2))
+        place = (0.1 * i + 3.0 * (i > 3), 0.05 * i, 0.4 + 0.6 * (i % 4))
+        contact = Contact(itself=i == 0)
+        world.add_body(mesh, Material(2e5, 0.3, 1000.0, 40.0), position=place, contact=contact)
+    world.build()
+    for _ in range(60):
+        world.step(DT)
+    return motion(world)
+
+
+def joined(options):
+    """Two stacks of three whose bodies are joined, one of them pulled aside; the last joint's force too."""
+    world = World(**options)
+    for i in range(6):
+        world.add_body(CUBE, JELLY, position=(3 * (i // 3), 0, 0.6 + i % 3))
+    world.build()
+    world.step(DT, 6)
+    joints = [world.bodies[i].attach_to(world.bodies[i + 1], TOP) for i in (3, 0, 1, 4)]
+    for step in range(40):
+        world.bodies[1].apply_force((2e4, 0, 1e4))
+        if step == 20:
+            joints[0].release()
+        world.step(DT, 6)
+    assert np.abs(joints[2].force).max() > 100
+    return [*motion(world), joints[2].force.tobytes().hex()]
+
+
+def fallen(schedule):
+    """Three bodies onto the floor."""
+    world = World(schedule=schedule)
+    for i in range(3):
+        mesh = sphere(0.5, 3) if i else CUBE
+        world.add_body(mesh, JELLY, position=(2 * i, 0, 0.51 + 0.02 * i))
+    world.build()
+    for _ in range(25 if schedule == "per_body" else 8):
+        world.step(DT, 6)
+    return motion(world)
+
+
+def played():
+    """300 ticks of anything: hashes of each, after wrong inputs were taken back every 20 ticks."""
+    hashes, different = random_play.check(300, seed=11)
+    assert different == 0
+    assert len(set(hashes)) == 300
+    return hashes
+
+
+SCENES = {
+    "crowd": crowd,
+    "heap": heap,
+    "joined, touching": lambda: joined({"soft_contact": True}),
+    "joined, passing": lambda: joined({"collider_room": 1}),
+    "fallen, per body": lambda: fallen("per_body"),
+    "fallen, flat": lambda: fallen("flat"),
+    "played": played,
+}
+
+if __name__ == "__main__":
+    init("cpu", threads=int(sys.argv[1]))
+    found = {name: scene() for name, scene in SCENES.items()}
+    Path(sys.argv[2]).write_text(json.dumps(found))
