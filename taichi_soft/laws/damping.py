@@ -30,7 +30,12 @@ def tet_mean_damping_forces(v0, v1, v2, v3, damping):
 
 @ti.func
 def tet_edge_damping_forces(x, v, damping):
-    """Forces on four vertices that brake all six edges between them [N]; they sum to zero."""
+    """Forces on four vertices that brake the six edges between them [N]; they sum to zero.
+
+    Args:
+        x, v: four positions [m] and velocities [m/s].
+        damping: b of each edge [N s/m].
+    """
     e01 = edge_damping_force(x[1] - x[0], v[1] - v[0], damping)
     e02 = edge_damping_force(x[2] - x[0], v[2] - v[0], damping)
     e03 = edge_damping_force(x[3] - x[0], v[3] - v[0], damping)

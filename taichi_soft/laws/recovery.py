@@ -7,6 +7,9 @@ their strains, which go on past flat: s2 - 1 for the exact strain; s2 - 1/2 for 
 The laws multiply the stress of each axis by the area across it, and across axes 0 and 1 that area is negative
 in a flipped tetrahedron: what should pull a stretched axis together would tear it apart. So their stress
 changes sign here. At flat these areas are zero, so the force stays continuous.
+
+This force has no energy: a knot of flipped tetrahedra that hold each other back would tremble for ever, driven
+by itself. That is why their edges are braked as well (`kernels.elastic`).
 """
 
 from taichi_soft.laws.strain import from_axes, principal_stretches

@@ -67,6 +67,13 @@ def test_all_come_to_rest_and_none_inside_out(outcomes):
         assert outcome.flipped == 0, outcome
 
 
+def test_a_body_knotted_by_an_impact_above_mach_two_comes_to_rest():
+    """A knot of flipped tetrahedra drives itself, if nothing but the material's damping brakes it."""
+    outcome = next(iter(run_cases([make_case(SEED, 459)])))
+    assert outcome.case.mach > 2.0
+    assert outcome.rest_at is not None
+
+
 def test_a_case_ends_the_same_alone(outcomes):
     """As the command repeats it: other bodies of a world change nothing."""
     alone = next(iter(run_cases([make_case(SEED, 3)])))
