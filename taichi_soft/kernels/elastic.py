@@ -7,16 +7,12 @@ the next lane reads), and index arithmetic must be seen not to overflow, which m
 """
 
 from taichi_soft.constants import LANES
-from taichi_soft.laws.damping import tet_edge_damping_forces, tet_mean_damping_forces
+from taichi_soft.kernels.flips import brake_flipped
+from taichi_soft.laws.damping import tet_mean_damping_forces
 from taichi_soft.laws.model import flipped_forces, upright_forces
 from taichi_soft.math.tensors import widened
 from taichi_soft.runtime import ti
 from taichi_soft.types import DampingModel
-
-FLIP_BRAKE = 0.015
-"""Part of its velocity along one edge that the lightest vertex of a flipped tetrahedron loses in a substep. If
-all tetrahedra round it, some 24, are flipped, that is three quarters of what `stability` allows a damper. A
-third of it leaves some knots trembling."""
 
 BLOCK_BITS = (1 << 22) - 1
 """Mask that leaves every block number unchanged: 33 million tetrahedra are more than fit into memory."""
@@ -86,34 +82,17 @@ def _upright_forces_of(state: ti.template(), model: ti.template(), block, lane):
 
 
 @ti.func
-def _flip_damping_of(state: ti.template(), p0, p1, p2, p3):
-    """What brakes the edges of a flipped tetrahedron [N s/m]: a share of what its lightest vertex would bear
-    in a substep, whatever its material says."""
-    a = ti.max(state.particle_inv_mass[p0], state.particle_inv_mass[p1])
-    b = ti.max(state.particle_inv_mass[p2], state.particle_inv_mass[p3])
-    limit = ti.max(a, b) * state.body_velocity_lag[state.particle_body[p0]]
-    return ti.select(limit > 0.0, FLIP_BRAKE / ti.max(limit, 1e-30), 0.0)
-
-
-@ti.func
 def _flipped_forces_of(state: ti.template(), model: ti.template(), block, lane):
     p0, p1, p2, p3 = particles_of(state, block, lane)
-    x0, x1 = state.particle_position[p0], state.particle_position[p1]
-    x2, x3 = state.particle_position[p2], state.particle_position[p3]
-    inverse = rest_inverse_of(state, block, lane)
-    elasticity = elasticity_of(state, model, block, lane)
-    f0, f1, f2, f3 = flipped_forces(model, x0, x1, x2, x3, inverse, elasticity)
-    d0, d1, d2, d3 = tet_edge_damping_forces(
-        (x0, x1, x2, x3),
-        (
-            state.particle_velocity[p0],
-            state.particle_velocity[p1],
-            state.particle_velocity[p2],
-            state.particle_velocity[p3],
-        ),
-        _flip_damping_of(state, p0, p1, p2, p3),
+    return flipped_forces(
+        model,
+        state.particle_position[p0],
+        state.particle_position[p1],
+        state.particle_position[p2],
+        state.particle_position[p3],
+        rest_inverse_of(state, block, lane),
+        elasticity_of(state, model, block, lane),
     )
-    return f0 + d0, f1 + d1, f2 + d2, f3 + d3
 
 
 @ti.func
@@ -128,7 +107,8 @@ def lane_forces(state: ti.template(), model: ti.template(), block, lane):
 
 @ti.func
 def block_forces(state: ti.template(), model: ti.template(), block):
-    """Forces of a block's tetrahedra on their corners [N]: four matrices (LANES, 4), the last column zero."""
+    """Forces of a block's tetrahedra on their corners [N], four matrices (LANES, 4), the last column zero;
+    and, where flips are repaired, six times the volumes [m^3]."""
     g0 = ti.Matrix.zero(state.real, LANES, 4)
     g1 = ti.Matrix.zero(state.real, LANES, 4)
     g2 = ti.Matrix.zero(state.real, LANES, 4)
@@ -158,12 +138,13 @@ def block_forces(state: ti.template(), model: ti.template(), block):
                     g1[lane, i] = f1[i]
                     g2[lane, i] = f2[i]
                     g3[lane, i] = f3[i]
-    return g0, g1, g2, g3
+    return g0, g1, g2, g3, volumes
 
 
 @ti.func
 def accumulate_elastic_forces(state: ti.template(), model: ti.template(), body):
-    """Add the forces of all tetrahedra of one body to its particles, block by block, in one thread."""
+    """Add the forces of all tetrahedra of one body to its particles, block by block, in one thread, and brake
+    those that are to recover."""
     blocks = state.body_blocks[body]
     for number in range(blocks[0], blocks[1]):
         block = number & BLOCK_BITS
@@ -176,6 +157,10 @@ def accumulate_elastic_forces(state: ti.template(), model: ti.template(), body):
                 force = ti.Vector([forces[corner][lane, i] for i in ti.static(range(4))])
                 # Not `+=`, which Taichi makes atomic: one thread owns the body.
                 state.particle_force[p] = state.particle_force[p] + force
+        if ti.static(model.repairs_flips):
+            for lane in range(LANES):
+                if forces[4][lane] < 0.0:
+                    brake_flipped(state, block, lane)
 
 
 @ti.func

@@ -8,8 +8,7 @@ The laws multiply the stress of each axis by the area across it, and across axes
 in a flipped tetrahedron: what should pull a stretched axis together would tear it apart. So their stress
 changes sign here. At flat these areas are zero, so the force stays continuous.
 
-This force has no energy: a knot of flipped tetrahedra that hold each other back would tremble for ever, driven
-by itself. That is why their edges are braked as well (`kernels.elastic`).
+This force has no energy; `kernels.flips` says what that asks for.
 """
 
 from taichi_soft.laws.strain import from_axes, principal_stretches
