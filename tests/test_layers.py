@@ -35,7 +35,8 @@ LAYERS = """
     render
     engine_adapter
     stages  scenery
-    film  profiling  drops  replay
+    film  profiling  drops  replay  experiments  sweep
+    report
     cli
     __main__
     demos
@@ -48,7 +49,20 @@ LEVEL = {name: level for level, line in enumerate(LAYERS.split("\n")) for name i
 NO_TAICHI = ("errors", "constants", "types", "checks", "materials", "meshing", "contact", "plasticity")
 """Parts that are tested in milliseconds: numpy only."""
 
-FACES = ("render", "stages", "scenery", "film", "profiling", "drops", "replay", "cli", "__main__")
+FACES = (
+    "render",
+    "stages",
+    "scenery",
+    "film",
+    "profiling",
+    "drops",
+    "replay",
+    "experiments",
+    "sweep",
+    "report",
+    "cli",
+    "__main__",
+)
 """Parts of taichi_soft that lie above its public names."""
 
 

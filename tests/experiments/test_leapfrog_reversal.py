@@ -1,0 +1,22 @@
+"""Running backwards."""
+
+from taichi_soft.experiments import EXPERIMENTS, Effort, Result, Results, Verdict, section_of
+
+
+def test_leapfrog_comes_back_and_the_euler_methods_do_not():
+    experiment = EXPERIMENTS["leapfrog-reversal"]
+    rows = [Result(point, experiment.measure(point)) for point in experiment.points(Effort.QUICK)]
+    ways = {row.point["integrator"]: row.numbers["left"] / row.numbers["out"] for row in rows}
+    assert ways["leapfrog"] < 1e-5
+    assert min(ways["explicit_euler"], ways["implicit_euler"], ways["lazy_leapfrog"]) > 0.01
+    (finding,) = section_of(experiment, Results(tuple(rows))).findings
+    assert finding.claim == "leapfrog-reversible"
+    assert finding.verdict is Verdict.AGREES
+
+
+def test_of_what_is_missing_nothing_can_be_told():
+    experiment = EXPERIMENTS["leapfrog-reversal"]
+    rows = [Result(point, None, "lost") for point in experiment.points(Effort.QUICK)]
+    (finding,) = section_of(experiment, Results(tuple(rows))).findings
+    assert finding.verdict is Verdict.UNKNOWN
+    assert "4 of 4 points failed" in finding.why
