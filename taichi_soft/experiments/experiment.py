@@ -1,7 +1,7 @@
 """What an experiment is: points to measure, one by one, and what follows from all of them.
 
-A point is plain data, and so is what is measured at it, so that points can be computed in other processes, kept in
-a file and taken up again. Everything that people look at is made afterwards, in one place, from these numbers.
+A point is plain data, and so is what is measured at it, so that points can be computed in other processes, kept
+in a file and taken up again. All that people look at is made afterwards, in one place, from these numbers.
 """
 
 from __future__ import annotations
@@ -50,8 +50,8 @@ class Finding:
         claim: its key in `CLAIMS`.
         measured: a sentence with the figures and their units.
         verdict: whether they agree with the claim.
-        why: where they differ, or nothing can be told: whether model, mesh or reading of the text is the likely
-            cause, and the evidence.
+        why: where they differ, or nothing can be told: whether model, mesh or reading of the text is the
+            likely cause, and the evidence.
     """
 
     claim: str

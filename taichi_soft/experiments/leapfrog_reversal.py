@@ -1,7 +1,7 @@
-"""Leapfrog runs backwards (thesis section 3.5.2): turn all velocities round, and a body goes back to its start.
+"""Leapfrog runs backwards (thesis section 3.5.2): with all velocities turned round a body goes back to its start.
 
-As a World keeps them, positions and velocities are of one time between steps, so a run may be turned round after
-any step; what is left then is round-off, and what the integrator forgets.
+Between steps a World's positions and velocities are of one time, so that a run may be turned round after any
+step; what is left then is round-off, and what the integrator forgets.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ INTEGRATORS = ("explicit_euler", "lazy_leapfrog", "leapfrog", "implicit_euler")
 MATERIAL = Material(young=1e5, poisson=0.3, density=1000.0)  # undamped: damping has a direction in time
 STRETCH, DT, SUBSTEPS = 1.1, 1 / 60, 8
 REVERSIBLE = 1e-4
-"""Way left, over the way out: round-off leaves a few millionths, the other integrators more than a hundredth."""
+"""Way left, over the way out: round-off leaves a few millionths, other integrators more than a hundredth."""
 
 
 def points(effort: Effort) -> list[Point]:
@@ -75,8 +75,8 @@ def conclude(results: Results) -> Section:
         (
             Finding(
                 "leapfrog-reversible",
-                f"after as many steps back {shares['leapfrog']:.1g} of the way out is left; with other integrators "
-                f"{others:.2g} or more",
+                f"after as many steps back {shares['leapfrog']:.1g} of the way out is left; "
+                f"with other integrators {others:.2g} or more",
                 Verdict.AGREES if agrees else Verdict.DIFFERS,
             ),
         ),
