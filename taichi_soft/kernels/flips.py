@@ -1,9 +1,9 @@
 """A brake for flipped tetrahedra that are to recover.
 
-The force that turns them back has no energy: a knot of them, each in the others' way, can drive itself and would
-tremble for ever. So a flipped tetrahedron loses a share of the speed at which it flips further; what turns it
-back stays free. The impulses, one tetrahedron after the other, add no energy, however short or long the substep
-is, and keep momentum and angular momentum.
+The force that turns them back has no energy: a knot of them, each in the others' way, can drive itself and
+would tremble for ever. So a flipped tetrahedron loses a share of the speed at which it flips further; what
+turns it back stays free. The impulses, one tetrahedron after the other, add no energy, however short or long
+the substep is, and keep momentum and angular momentum. Only the schedule `per_body` has them.
 """
 
 from taichi_soft.constants import LANES

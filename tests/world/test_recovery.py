@@ -33,7 +33,7 @@ def test_a_wrecked_body_finds_its_shape_again(strain, wreck):
 
 
 def volume_rate(x, v):
-    """Six times how fast the volume of a single tetrahedron grows [m^3/s], and what that takes of each vertex."""
+    """Six times how fast the volume of a tetrahedron grows [m^3/s], and the gradient of that volume."""
     a, b, c = x[1:] - x[0]
     gradient = np.array([np.zeros(3), np.cross(b, c), np.cross(c, a), np.cross(a, b)])
     gradient[0] = -gradient.sum(axis=0)
