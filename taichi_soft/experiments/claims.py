@@ -99,7 +99,7 @@ CLAIMS: dict[str, Claim] = {
     "cylinder-negative": Claim("figure 6.3 (b)", "With negative nu it grows wider."),
     "density-bounce": Claim(
         "figure 6.3",
-        "Of a dropped body that is denser on the right, this side is compressed most, bounces last and least.",
+        "Of a dropped body that is denser on the right this side is pressed most, bounces last and least.",
     ),
     "tension-slope": Claim(
         "figure 6.4", "Tension: the slope at zero is E A; nu = 0 is exact at small strain."

@@ -1,7 +1,7 @@
 """What an experiment is: points to measure, one by one, and what follows from all of them.
 
-A point is plain data, and so is what is measured at it, so that points can be computed in other processes, kept
-in a file and taken up again. All that people look at is made afterwards, in one place, from these numbers.
+A point is plain data, and so is what is measured there: points can be computed in other processes, kept in a
+file and taken up again. All that people look at is made afterwards, in one place, from these numbers.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Leapfrog runs backwards (thesis section 3.5.2): with all velocities turned round a body goes back to its start.
+"""Leapfrog runs backwards (thesis section 3.5.2): with all velocities turned round a body goes back.
 
 Between steps a World's positions and velocities are of one time, so that a run may be turned round after any
 step; what is left then is round-off, and what the integrator forgets.
