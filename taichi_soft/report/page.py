@@ -34,7 +34,7 @@ def write_report(
         pictures of a wrong shape, and a directory that takes no files. What was there before is then still
         whole.
     """
-    check_extras()
+    _require_packages()
     require_distinct((experiment.name for experiment, _, _ in sections), "the report")
     judgements = judge(sections)
     exhibits = [exhibit_of(*section) for section in sections]
@@ -58,7 +58,7 @@ def write_report(
     return directory / "report.html"
 
 
-def check_extras() -> None:
+def _require_packages() -> None:
     """Raises: OptionError where a package that the report needs is missing."""
     for name in ("jinja2", "matplotlib"):
         try:

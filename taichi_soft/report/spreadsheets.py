@@ -60,4 +60,4 @@ def _written(rows: Iterable[Sequence[Any]]) -> str:
 def _cell(value: Any) -> Any:
     """Numbers as Python writes them, which is exact; lists and what is true as JSON."""
     value = plain(value)
-    return json.dumps(value) if isinstance(value, (list, tuple, dict, bool)) else value
+    return json.dumps(value, default=plain) if isinstance(value, (list, tuple, dict, bool)) else value

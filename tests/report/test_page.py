@@ -208,6 +208,15 @@ def test_images_are_those_of_the_files_at_the_stated_size(written):
     assert embedded[(directory / "plots/tension-force.png").read_bytes()] == (614, 384)
 
 
+def test_plots_are_not_cut_off_at_their_edges(written):
+    """Labels would be, where the layout of axes of a fixed aspect is left as it is after one pass."""
+    directory, _, _ = written
+    for name in ("force", "map"):
+        image = cv2.imread(str(directory / f"plots/tension-{name}.png"))
+        inner = image[3:-3, 3:-3]
+        assert image.astype(np.int64).sum() - inner.astype(np.int64).sum() == 255 * (image.size - inner.size)
+
+
 def test_tables_in_files_and_in_the_page_hold_every_digit(written):
     directory, page, _ = written
     for table in invented.TENSION_SECTION.tables:
@@ -375,9 +384,10 @@ def test_a_missing_package_is_named_with_its_extra(name, tmp_path, monkeypatch):
     assert not (tmp_path / "new").exists()
 
 
-def test_plots_leave_the_settings_of_matplotlib_alone(tmp_path):
+def test_plots_leave_the_settings_of_matplotlib_alone(tmp_path, monkeypatch):
     import matplotlib
 
+    monkeypatch.setitem(matplotlib.rcParams, "font.size", 7.5)
     before = dict(matplotlib.rcParams)
     write_report(
         [(invented.TRAP, Results(), replace(Section((), ()), plots=invented.TRAP_SECTION.plots))],
