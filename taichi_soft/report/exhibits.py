@@ -28,6 +28,9 @@ from taichi_soft.report.wording import numeric_columns, readable
 LONG = 12
 """Rows; a longer table is folded."""
 
+WIDE = 640
+"""Pixels; two wider images do not lie side by side."""
+
 
 @dataclass(frozen=True)
 class Image:
@@ -40,6 +43,11 @@ class Image:
     width: int
     height: int
     error: str = ""
+
+    @property
+    def is_wide(self) -> bool:
+        """Whether it has a row for itself, so that its words can still be read."""
+        return self.width > WIDE
 
     @property
     def uri(self) -> str:

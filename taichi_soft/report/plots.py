@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import warnings
 
 from taichi_soft.errors import OptionError
 from taichi_soft.experiments import Plot
@@ -50,8 +51,13 @@ def png_of(plot: Plot) -> tuple[bytes, tuple[int, int]]:
         from matplotlib.figure import Figure
     except ImportError:
         raise OptionError("plots need matplotlib: pip install 'taichi-soft[report]'") from None
+    cycle = cycler(linestyle=("-", "--", ":")) * cycler(color=COLOURS)  # the eighth line is dashed
     width, height = (round(96 * inches) for inches in plot.size)
-    with matplotlib.rc_context({**STYLE, "axes.prop_cycle": cycler(color=COLOURS)}):
+    with (
+        matplotlib.rc_context({**STYLE, "axes.prop_cycle": cycle}),
+        warnings.catch_warnings(),
+    ):
+        warnings.filterwarnings("ignore", "The figure layout has changed to tight")  # it may
         figure = Figure(figsize=(width / 96, height / 96), dpi=96 * SCALE, layout="constrained")
         plot.draw(figure)
         for axes in figure.axes:

@@ -19,12 +19,21 @@ def plain(value: Any) -> Any:
 
 
 def numeric_columns(rows: Sequence[Sequence[Any]], count: int) -> tuple[bool, ...]:
-    """Which of `count` columns hold numbers, and nothing else but empty cells: they belong to the right."""
-    columns = [[plain(row[k]) for row in rows if row[k] is not None] for k in range(count)]
-    return tuple(
-        bool(column) and all(isinstance(v, (int, float)) and not isinstance(v, bool) for v in column)
-        for column in columns
-    )
+    """Which of `count` columns hold numbers, in digits or words of digits, and nothing else but empty cells:
+    they belong to the right."""
+    columns = [[plain(row[k]) for row in rows] for k in range(count)]
+    filled = [[value for value in column if value is not None and value != ""] for column in columns]
+    return tuple(bool(column) and all(_is_number(value) for value in column) for column in filled)
+
+
+def _is_number(value: Any) -> bool:
+    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+        return False
+    try:
+        float(value)
+    except ValueError:
+        return False
+    return True
 
 
 def readable(value: Any) -> str:

@@ -46,6 +46,15 @@ def draw_map(figure):
     figure.colorbar(image, label="factor of a step [1]")
 
 
+def draw_many(figure):
+    axes = figure.add_subplot()
+    for k in range(10):
+        axes.plot([0, 1], [k, 2 * k], label=f"line {k}")
+    axes.set_xlabel("time [s]")
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    figure.tight_layout()
+
+
 def draw_nothing(_):
     raise MissingPointError("0 points with {'nu': 0.5}, wanted 1")
 
@@ -98,8 +107,11 @@ TENSION_SECTION = Section(
         Table(
             "slopes",
             "Slope at zero strain",
-            ("nu [1]", "slope [N]", "over E A [1]", "stable", "note"),
-            ((0.0, 1.003e6, 1.003, True, "exact"), (0.2, np.float64(1.1e6), 1.1, False, None)),
+            ("nu [1]", "slope [N]", "over E A [1]", "stable", "note", "spread [1]"),
+            (
+                (0.0, 1.003e6, 1.003, True, "exact", "0.00012"),
+                (0.2, np.float64(1.1e6), 1.1, False, None, ""),
+            ),
         ),
         Table(
             "forces",
@@ -112,6 +124,7 @@ TENSION_SECTION = Section(
     (
         Plot("force", "Force over strain; dashed: E A s. The curves leave the line upwards.", draw_curve),
         Plot("map", "A map with a scale of colours.", draw_map, (5.0, 4.0)),
+        Plot("many", "Many lines in a wide plot.", draw_many, (8.4, 3.0)),
         Plot("lost", "A plot that needs a point that failed.", draw_nothing),
     ),
     (

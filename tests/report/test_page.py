@@ -16,9 +16,10 @@ import numpy as np
 import pytest
 
 from taichi_soft import OptionError
-from taichi_soft.experiments import CLAIMS, Effort, Finding, Picture, Results, Section, Table, Verdict
+from taichi_soft.experiments import CLAIMS, Effort, Finding, Picture, Plot, Results, Section, Table, Verdict
 from taichi_soft.report.markdown import escaped
 from taichi_soft.report.page import write_report
+from taichi_soft.report.plots import png_of
 from taichi_soft.report.wording import duration, readable
 
 VOID = {"meta", "img", "br", "hr", "link", "input"}
@@ -179,6 +180,20 @@ def test_long_tables_are_folded_and_short_ones_are_not(written):
     assert any(words.startswith("Slope at zero strain") for _, words in page.all("h3"))
 
 
+def test_numbers_stand_on_the_right_also_as_words(written):
+    _, page, _ = written
+    headings = {words: attributes.get("class") for attributes, words in page.all("th")}
+    right = {words for words, kind in headings.items() if kind == "right"}
+    assert {"nu [1]", "slope [N]", "over E A [1]", "spread [1]", "n"} <= right
+    assert right.isdisjoint({"stable", "note", "verdict"})
+
+
+def test_a_wide_plot_has_a_row_for_itself(written):
+    _, page, _ = written
+    wide = [words for _, words in page.all("figure", **{"class": "plot wide"})]
+    assert wide == ["Many lines in a wide plot."]
+
+
 def test_any_text_is_shown_as_it_is(written):
     _, page, _ = written
     wanted = " ".join(invented.HOSTILE.split())
@@ -195,7 +210,7 @@ def test_images_are_those_of_the_files_at_the_stated_size(written):
         kind, data = attributes["src"].split(",")
         assert kind == "data:image/png;base64"
         embedded[base64.b64decode(data)] = (int(attributes["width"]), int(attributes["height"]))
-    assert len(files) == len(embedded) == 6
+    assert len(files) == len(embedded) == 7
     for path in files:
         width, height = embedded[path.read_bytes()]
         scale = 2 if path.parent.name == "plots" else 1
@@ -208,10 +223,23 @@ def test_images_are_those_of_the_files_at_the_stated_size(written):
     assert embedded[(directory / "plots/tension-force.png").read_bytes()] == (614, 384)
 
 
+def test_ten_lines_of_a_plot_can_be_told_apart():
+    seen = set()
+
+    def draw(figure):
+        axes = figure.add_subplot()
+        for k in range(10):
+            axes.plot([0, 1], [k, k])
+        seen.update((line.get_color(), line.get_linestyle()) for line in axes.lines)
+
+    png_of(Plot("lines", "", draw, (2.0, 1.5)))
+    assert len(seen) == 10
+
+
 def test_plots_are_not_cut_off_at_their_edges(written):
     """Labels would be, where the layout of axes of a fixed aspect is left as it is after one pass."""
     directory, _, _ = written
-    for name in ("force", "map"):
+    for name in ("force", "map", "many"):
         image = cv2.imread(str(directory / f"plots/tension-{name}.png"))
         inner = image[3:-3, 3:-3]
         assert image.astype(np.int64).sum() - inner.astype(np.int64).sum() == 255 * (image.size - inner.size)
