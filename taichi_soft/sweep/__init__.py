@@ -4,9 +4,9 @@ A point is plain data, and so is what a function measures there. Nothing here kn
 """
 
 from taichi_soft.sweep.cluster import cluster_workers
-from taichi_soft.sweep.origin import origin
 from taichi_soft.sweep.progress import show_progress
 from taichi_soft.sweep.schedule import TIME_LIMIT, compute_all
+from taichi_soft.sweep.sources import origin
 from taichi_soft.sweep.store import Store
 from taichi_soft.sweep.task import Outcome, Task, Worker
 from taichi_soft.sweep.workers import local_workers

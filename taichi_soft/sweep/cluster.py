@@ -12,7 +12,7 @@ from contextlib import contextmanager, suppress
 from typing import Any
 
 from taichi_soft.errors import SweepError
-from taichi_soft.sweep.origin import origin
+from taichi_soft.sweep.sources import origin
 from taichi_soft.sweep.task import Outcome, Task, Worker, compute
 
 TIMEOUTS = TimeoutError, futures.TimeoutError, asyncio.TimeoutError

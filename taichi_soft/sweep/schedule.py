@@ -28,7 +28,8 @@ def compute_all(
     alone = [task for task in tasks if task.is_alone]
     together = [task for task in tasks if not task.is_alone]
     yield from _compute(together, workers, time_limit)
-    yield from _compute(alone, workers[:1], time_limit)
+    first = next((worker for worker in workers if worker.is_ready()), workers[0])
+    yield from _compute(alone, [first], time_limit)
 
 
 class _Waiting:

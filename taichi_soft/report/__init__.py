@@ -1,0 +1,1 @@
+"""Experiments as a page, as files of numbers, and on the terminal."""
