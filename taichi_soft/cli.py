@@ -1,9 +1,10 @@
-"""The command line: demos, what was chosen on this machine, and profiles."""
+"""The command line: demos, what was chosen on this machine, profiles, and the thesis's experiments."""
 
 from __future__ import annotations
 
 import json
 import platform
+import shlex
 import sys
 import warnings
 from dataclasses import asdict
@@ -334,4 +335,76 @@ def drop_test(
         for line in summary.lines(worst):
             _say(escape(line))
     if summary.failed:
+        raise typer.Exit(1)
+
+
+@app.command()
+def report(
+    names: Annotated[list[str] | None, typer.Argument(help="Experiments; all of them by default.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder to write the page into; out/report by default. With names and no folder, tables are "
+            "printed instead."
+        ),
+    ] = None,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="A coarse answer to every claim, within minutes.")
+    ] = False,
+    workers: Annotated[
+        int | None, typer.Option(min=1, max=256, help="Processes; one per core by default.")
+    ] = None,
+    cluster: Annotated[
+        str | None,
+        typer.Option(help="Address of a Dask scheduler, host:port, whose workers compute instead."),
+    ] = None,
+    arch: Arch = "auto",
+    show_list: Annotated[
+        bool, typer.Option("--list", help="List the experiments, and compute nothing.")
+    ] = False,
+) -> None:
+    """Run the thesis's experiments and judge its claims; exit code 1 where a point could not be computed.
+
+    Every number is kept at once, in the folder data beside the page: what was interrupted goes on from there,
+    and points that failed are computed again.
+    """
+    from taichi_soft.experiments import Effort
+    from taichi_soft.report.machine import machine_facts
+    from taichi_soft.report.run import choose_experiments, require_extra, require_writable, run_experiments
+
+    chosen = choose_experiments(names or [])
+    if show_list:
+        for each in chosen:
+            _say(f"[bold]{each.name:24}[/]{escape(f'{each.title} ({each.source})')}")
+        return
+    if cluster is not None and workers is not None:
+        raise OptionError(
+            f"--workers {workers} are processes of this machine: leave out it or --cluster {cluster}"
+        )
+    require_extra()
+    folder = out or Path("out") / "report"
+    require_writable(folder)
+    device = init(arch)
+    if device.is_gpu and workers is None:
+        workers = 1
+    effort = Effort.QUICK if quick else Effort.FULL
+    concluded = run_experiments(
+        chosen, effort, folder / "data", errors, workers=workers, cluster=cluster, arch=device.arch
+    )
+    from taichi_soft.report.judgements import judge  # type: ignore[import-not-found]
+    from taichi_soft.report.page import write_report  # type: ignore[import-not-found]
+    from taichi_soft.report.terminal import print_section, print_verdicts  # type: ignore[import-not-found]
+
+    if names and out is None:
+        for experiment, results, section in concluded:
+            print_section(console, experiment, results, section)
+    else:
+        command = ["taichi-soft", "report", *(names or []), "--out", str(folder), *["--quick"] * quick]
+        facts = machine_facts(device.arch, f"Dask, {cluster}" if cluster else "processes of this machine")
+        page = write_report(concluded, folder, shlex.join(command), effort, facts)
+        print_verdicts(console, judge(concluded))
+        _say(f"wrote {escape(str(page))}")
+    failed = sum(len(results.failed) for _, results, _ in concluded)
+    if failed:
+        _say(f"{failed} points could not be computed: the same command tries them again")
         raise typer.Exit(1)

@@ -36,6 +36,10 @@ class VideoError(TaichiSoftError, OSError):
     """A video or picture could not be written as asked."""
 
 
+class SweepError(TaichiSoftError, RuntimeError):
+    """Points cannot be computed or kept as asked."""
+
+
 class UnstableStepWarning(UserWarning):
     """The substep is larger than the estimate of what stays stable."""
 

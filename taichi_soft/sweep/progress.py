@@ -1,0 +1,53 @@
+"""How far a sweep has come, for people."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, Protocol
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+LINE_EVERY = 30.0
+"""A line where there is no terminal for a bar [s]."""
+
+
+class Advance(Protocol):
+    """One more is done, of the kind `name`."""
+
+    def __call__(self, name: str) -> None: ...
+
+
+@contextmanager
+def show_progress(console: Console, total: int) -> Iterator[Advance]:
+    """A bar with the time left, in a terminal; elsewhere a line now and then."""
+    columns: tuple[Any, ...] = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+    )
+    bar = Progress(
+        *columns,
+        console=console,
+        disable=not console.is_terminal,
+        refresh_per_second=2,  # it is not to disturb what is timed
+        speed_estimate_period=600,
+    )
+    with bar:
+        task = bar.add_task("computing", total=total)
+        done, said, start = 0, time.monotonic(), time.monotonic()
+
+        def advance(name: str) -> None:
+            nonlocal done, said
+            done += 1
+            bar.update(task, advance=1, description=name)
+            now = time.monotonic()
+            if not console.is_terminal and now > said + LINE_EVERY:
+                left = (now - start) / done * (total - done)
+                console.print(f"{done} of {total} points, about {left:.0f} s left", highlight=False)
+                said = now
+
+        yield advance

@@ -1,0 +1,55 @@
+"""Experiments that cost nothing, for worker processes too."""
+
+import os
+from pathlib import Path
+
+from taichi_soft.experiments import Effort, Experiment, Finding, Section, Table, Verdict
+
+
+def points(effort):
+    """Three, or these and two more."""
+    return [{"x": x} for x in range(3 if effort is Effort.QUICK else 5)]
+
+
+def measure(point):
+    """Its square; which points were measured is in a file."""
+    with open(os.environ["FAKES_LOG"], "a") as log:
+        log.write(f"{point['x']} ")
+    return {"square": point["x"] ** 2}
+
+
+def measure_rough(point):
+    """The same, but for points that raise or die, while a file says so."""
+    if Path(os.environ["FAKES_LOG"]).with_name("rough").exists():
+        if point["x"] == 1:
+            raise ValueError("too rough")
+        if point["x"] == 2:
+            os._exit(9)
+    return measure(point)
+
+
+def conclude(results):
+    """Squares are what they are; with all five points one more thing is said."""
+    table = tuple((point["x"], numbers["square"]) for point, numbers in results.where())
+    largest = results.one(x=2)["square"]
+    finding = Finding("wave-speed", f"{largest}", Verdict.AGREES if largest == 4 else Verdict.DIFFERS)
+    return Section(("Squares.",), (finding,), (Table("squares", "Squares", ("x [m]", "x^2 [m^2]"), table),))
+
+
+def conclude_carelessly(results):
+    """Breaks where a point is missing, and not by asking for it."""
+    return Section((str([numbers["square"] for _, numbers in results.where()][2]),), ())
+
+
+SQUARES = Experiment("squares", "Squares", "theory", ("wave-speed",), points, measure, conclude)
+ROUGH = Experiment("rough", "Rough squares", "theory", ("wave-speed",), points, measure_rough, conclude)
+CARELESS = Experiment(
+    "careless",
+    "Squares",
+    "theory",
+    ("wave-speed",),
+    points,
+    measure_rough,
+    conclude_carelessly,
+    is_timing=True,
+)

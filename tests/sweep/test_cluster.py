@@ -1,0 +1,69 @@
+"""A cluster of Dask of two processes on this machine."""
+
+import time
+from contextlib import closing
+
+import pytest
+from acts import act, root
+
+from taichi_soft.errors import SweepError
+from taichi_soft.sweep import Task, cluster_workers, compute_all, local_workers
+
+TIME_LIMIT = 4.0
+
+distributed = pytest.importorskip("distributed")
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+    ) as cluster:
+        yield cluster
+
+
+def outcomes(tasks, crew):
+    with closing(compute_all(tasks, crew, TIME_LIMIT)) as done:
+        return {task.point["x"]: outcome for task, outcome in done}
+
+
+def test_the_same_numbers_come_from_a_cluster_and_from_this_machine(cluster):
+    tasks = [Task("ab"[x % 2], root, {"x": x}, is_alone=x > 8) for x in range(10)]
+    with cluster_workers(cluster.scheduler_address) as crew:
+        assert len(crew) == 2
+        theirs = outcomes(tasks, crew)
+    with local_workers(1) as crew:
+        ours = outcomes(tasks, crew)
+    assert list(theirs)[-1] == list(ours)[-1] == 9
+    for x in range(10):
+        assert theirs[x].numbers == ours[x].numbers == {"root": x**0.5, "kinds": [True, "a", [1e-300]]}
+
+
+def test_a_worker_that_dies_or_hangs_loses_one_point_and_is_replaced(cluster):
+    acts = ("exit", "raise", "sleep", "", "", "")
+    tasks = [Task("a", act, {"x": x, "do": do, "seconds": 600}) for x, do in enumerate(acts)]
+    with cluster_workers(cluster.scheduler_address) as crew:
+        done = outcomes(tasks, crew)
+    assert [done[x].numbers is None for x in range(6)] == [True] * 3 + [False] * 3
+    assert "of the cluster was lost" in done[0].error
+    assert done[1].error.startswith("ValueError: no numbers (acts.py:")
+    assert done[2].error.startswith("stopped: it took longer than 4 s")
+
+
+def test_workers_with_other_code_are_refused(cluster, monkeypatch):
+    monkeypatch.setattr("taichi_soft.sweep.sources._digest", lambda: "another")
+    with (
+        pytest.raises(SweepError, match="install the same versions"),
+        cluster_workers(cluster.scheduler_address),
+    ):
+        pass
+
+
+@pytest.mark.parametrize("address", ["127.0.0.1:1", "nonsense", "moon://x:1", ""])
+def test_no_cluster_is_one_line_within_seconds(address):
+    start = time.monotonic()
+    with pytest.raises(SweepError, match="dask scheduler") as caught, cluster_workers(address):
+        pass
+    assert time.monotonic() - start < 20
+    assert repr(address) in str(caught.value)
+    assert "\n" not in str(caught.value)

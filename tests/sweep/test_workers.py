@@ -1,0 +1,130 @@
+"""Processes of this machine: what goes wrong with a point stays its own."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from contextlib import closing
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+from acts import act
+
+from taichi_soft.sweep import Task, compute_all, local_workers
+
+TIME_LIMIT = 4.0
+
+
+@pytest.fixture(scope="module")
+def crew():
+    with local_workers(2) as crew:
+        yield crew
+
+
+def compute(points, crew):
+    """Outcomes by x, in the order in which they came."""
+    tasks = [Task(p.pop("group", "a"), act, p, p.pop("is_alone", False)) for p in points]
+    with closing(compute_all(tasks, crew, TIME_LIMIT)) as done:
+        return {task.point["x"]: outcome for task, outcome in done}
+
+
+@pytest.fixture(scope="module")
+def rough(crew):
+    """Points of which some raise, die, hang or measure nonsense; one of each kind between sound ones."""
+    acts = ("", "raise", "", "exit", "", "kill", "", "sleep", "", "numpy", "number", "")
+    return compute([{"x": x, "do": do, "seconds": 600} for x, do in enumerate(acts)], crew)
+
+
+def test_every_point_has_an_outcome_whatever_happens_to_others(rough):
+    assert sorted(rough) == list(range(12))
+    for x in (0, 2, 4, 6, 8, 11):
+        assert rough[x].numbers["root"] == len(str(x)) ** 0.5
+        assert rough[x].error == ""
+
+
+@pytest.mark.parametrize(
+    ("x", "error"),
+    [
+        (1, "ValueError: no numbers (acts.py:"),
+        (3, "its process was lost: exit code 7"),
+        (5, "its process was lost: killed by SIGKILL"),
+        (7, "stopped: it took longer than 4 s"),
+        (9, "TypeError: Object of type float32 is not JSON serializable"),
+        (10, "TypeError: measured float"),
+    ],
+)
+def test_a_failed_point_says_why(rough, x, error):
+    assert rough[x].numbers is None
+    assert rough[x].error.startswith(error)
+    assert "\n" not in rough[x].error
+    assert rough[x].seconds < 10
+
+
+def test_numbers_come_as_they_come_from_a_file(rough):
+    pair = rough[0].numbers["pair"]
+    assert pair[0] == 1
+    assert pair[1] != pair[1]
+    assert isinstance(pair, list)
+
+
+def test_points_of_a_group_stay_in_a_process_until_there_is_nothing_else_and_what_times_runs_alone(crew):
+    points = [
+        {"group": group, "x": f"{group}{n}", "do": "sleep", "seconds": 0.1}
+        for group in "ab"
+        for n in range(4)
+    ]
+    timed = [
+        {"group": group, "x": f"{group}{n}", "do": "sleep", "seconds": 0.1, "is_alone": True}
+        for group in "tu"
+        for n in range(2)
+    ]
+    outcomes = compute([*timed, *points], crew)
+    processes = {
+        group: Counter(each.numbers["pid"] for x, each in outcomes.items() if x[0] == group)
+        for group in "abtu"
+    }
+    assert processes["a"].most_common(1)[0][1] >= 3
+    assert processes["b"].most_common(1)[0][1] >= 3
+    assert list(outcomes)[-4:] == ["t0", "t1", "u0", "u1"]
+    begun = [outcomes[x].numbers["begun"] for x in ("t0", "t1", "u0", "u1")]
+    assert min(begun) > max(outcomes[p["x"]].numbers["begun"] + 0.1 for p in points)
+    assert all(later > earlier + 0.1 for earlier, later in pairwise(begun))
+
+
+PROGRAM = """
+import sys
+from contextlib import closing
+from taichi_soft.sweep import Task, compute_all, local_workers
+sys.path.insert(0, {folder!r})
+from acts import act
+
+if __name__ == "__main__":
+    tasks = [Task("a", act, {{"x": x, "do": "sleep", "seconds": 0 if x < 2 else 600}}) for x in range(4)]
+    with local_workers(2) as crew, closing(compute_all(tasks, crew)) as done:
+        for task, outcome in done:
+            print(outcome.numbers["pid"], flush=True)
+"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Ctrl-C of a terminal, as POSIX has it")
+def test_ctrl_c_ends_all_processes_at_once_and_without_their_tracebacks(tmp_path):
+    """The terminal sends it to the workers too."""
+    program = tmp_path / "program.py"
+    program.write_text(PROGRAM.format(folder=str(Path(__file__).parent)))
+    with subprocess.Popen(
+        [sys.executable, str(program)],
+        **{"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "start_new_session": True},
+    ) as process:
+        workers = {int(process.stdout.readline()) for _ in range(2)}
+        start = time.monotonic()
+        os.killpg(process.pid, signal.SIGINT)
+        _, errors = process.communicate(timeout=30)
+        assert time.monotonic() - start < 5
+    assert errors.count("Traceback") == 1  # of the program itself
+    assert errors.rstrip().endswith("KeyboardInterrupt")
+    for pid in workers:
+        with pytest.raises(ProcessLookupError):
+            os.kill(pid, 0)
