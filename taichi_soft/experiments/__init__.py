@@ -19,9 +19,10 @@ from taichi_soft.experiments.experiment import (
     section_of,
 )
 from taichi_soft.experiments.leapfrog_reversal import REVERSAL
+from taichi_soft.experiments.volume_springs_shear import VOLUME_SPRINGS_SHEAR
 
 EXPERIMENTS: dict[str, Experiment] = {
-    experiment.name: experiment for experiment in (REVERSAL, CYLINDER_FORCES)
+    experiment.name: experiment for experiment in (REVERSAL, VOLUME_SPRINGS_SHEAR, CYLINDER_FORCES)
 }
 """By name, in the order of the report."""
 

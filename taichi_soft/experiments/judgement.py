@@ -15,7 +15,7 @@ def judged(claim: str, measured: str, agrees: bool, why: str) -> Finding:
 
 
 def judged_on_meshes(claim: str, measured: str, agrees: Collection[bool], why: str) -> Finding:
-    """Agrees on every mesh, differs on every mesh, or hangs on the mesh, of which the thesis says too little."""
+    """Agrees on every mesh, differs on every mesh, or depends on the mesh, which the thesis leaves open."""
     if all(agrees) or not any(agrees):
         return judged(claim, measured, all(agrees), why)
     on = f"it holds on {sum(agrees)} of {len(agrees)} meshes, and the thesis's is not known: {why}"
