@@ -1,6 +1,7 @@
 """Experiments: those of the thesis, and checks against theory, one file per figure or claim."""
 
 from taichi_soft.experiments.claims import CLAIMS, Claim
+from taichi_soft.experiments.cylinder_forces import CYLINDER_FORCES
 from taichi_soft.experiments.experiment import (
     Effort,
     Experiment,
@@ -18,8 +19,11 @@ from taichi_soft.experiments.experiment import (
     section_of,
 )
 from taichi_soft.experiments.leapfrog_reversal import REVERSAL
+from taichi_soft.experiments.volume_springs_shear import VOLUME_SPRINGS_SHEAR
 
-EXPERIMENTS: dict[str, Experiment] = {experiment.name: experiment for experiment in (REVERSAL,)}
+EXPERIMENTS: dict[str, Experiment] = {
+    experiment.name: experiment for experiment in (REVERSAL, VOLUME_SPRINGS_SHEAR, CYLINDER_FORCES)
+}
 """By name, in the order of the report."""
 
 __all__ = [

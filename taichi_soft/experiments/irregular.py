@@ -1,0 +1,26 @@
+"""Cubes of irregular tetrahedra, as a mesher makes them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from taichi_soft import TetMesh, box, delaunay_mesh
+
+SHAKEN = 0.25
+"""Largest way of a vertex along an axis, over the edge of a cell."""
+
+
+def cube(cells: int, seed: int | None = None) -> TetMesh:
+    """A cube of edge 1 m about the origin.
+
+    Args:
+        cells: along each edge.
+        seed: of the ways by which vertices are moved, those on the surface along it, before they are
+            connected anew by Delaunay's rule; None leaves them in a regular grid.
+    """
+    regular = box((1.0, 1.0, 1.0), (cells, cells, cells))
+    if seed is None:
+        return regular
+    ways = np.random.default_rng(seed).uniform(-SHAKEN, SHAKEN, regular.vertices.shape) / cells
+    is_inside = np.abs(regular.vertices) < 0.5 - 1e-9
+    return delaunay_mesh(TetMesh(regular.vertices + ways * is_inside, regular.tets))
