@@ -17,9 +17,15 @@ from taichi_soft.experiments.experiment import (
     Verdict,
     section_of,
 )
+from taichi_soft.experiments.fig_3_1 import FIG_3_1
+from taichi_soft.experiments.fig_3_2 import FIG_3_2
+from taichi_soft.experiments.fig_3_3 import FIG_3_3
+from taichi_soft.experiments.integrator_orders import INTEGRATOR_ORDERS
 from taichi_soft.experiments.leapfrog_reversal import REVERSAL
 
-EXPERIMENTS: dict[str, Experiment] = {experiment.name: experiment for experiment in (REVERSAL,)}
+EXPERIMENTS: dict[str, Experiment] = {
+    experiment.name: experiment for experiment in (FIG_3_1, FIG_3_2, FIG_3_3, REVERSAL, INTEGRATOR_ORDERS)
+}
 """By name, in the order of the report."""
 
 __all__ = [
