@@ -1,5 +1,6 @@
 """Experiments: those of the thesis, and checks against theory, one file per figure or claim."""
 
+from taichi_soft.experiments.anisotropy import ANISOTROPY
 from taichi_soft.experiments.claims import CLAIMS, Claim
 from taichi_soft.experiments.experiment import (
     Effort,
@@ -20,11 +21,14 @@ from taichi_soft.experiments.experiment import (
 from taichi_soft.experiments.fig_3_1 import FIG_3_1
 from taichi_soft.experiments.fig_3_2 import FIG_3_2
 from taichi_soft.experiments.fig_3_3 import FIG_3_3
+from taichi_soft.experiments.fig_4_3 import FIG_4_3
+from taichi_soft.experiments.fig_4_5 import FIG_4_5
 from taichi_soft.experiments.integrator_orders import INTEGRATOR_ORDERS
 from taichi_soft.experiments.leapfrog_reversal import REVERSAL
 
 EXPERIMENTS: dict[str, Experiment] = {
-    experiment.name: experiment for experiment in (FIG_3_1, FIG_3_2, FIG_3_3, REVERSAL, INTEGRATOR_ORDERS)
+    experiment.name: experiment
+    for experiment in (FIG_3_1, FIG_3_2, FIG_3_3, REVERSAL, INTEGRATOR_ORDERS, FIG_4_3, FIG_4_5, ANISOTROPY)
 }
 """By name, in the order of the report."""
 
