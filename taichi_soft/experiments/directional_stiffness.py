@@ -1,0 +1,36 @@
+"""How stiff a body is against an even stretch along any direction, by the work that the stretch takes."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft import Material, TetMesh, internal_forces
+
+Floats = NDArray[np.float64]
+
+STRETCH = 0.002
+"""Small: the stiffness at rest is wanted."""
+
+
+def directions(count: int) -> Floats:
+    """Unit vectors spread evenly over half a sphere (a Fibonacci lattice), (count, 3)."""
+    i = np.arange(count) + 0.5
+    z, turn = i / count, i * np.pi * (3 - 5**0.5)
+    ring = np.sqrt(1 - z * z)
+    return np.stack([ring * np.cos(turn), ring * np.sin(turn), z], axis=1)
+
+
+def stretch_modulus(mesh: TetMesh, material: Material, law: str, direction: Floats) -> float:
+    """Twice the work per volume and squared strain [Pa]: lambda + 2 mu of an isotropic material.
+
+    Nothing moves across the direction. The work is that of the forces half way.
+    """
+    move = STRETCH * np.outer(mesh.vertices @ direction, direction)
+    forces = internal_forces(mesh, material, mesh.vertices + move / 2, law=law)
+    return float(-2 * np.sum(forces * move) / (STRETCH**2 * mesh.volume))
+
+
+def spread(values: Floats | list[float]) -> float:
+    """Largest less smallest over the mean."""
+    return float(np.ptp(values) / np.mean(values))

@@ -1,0 +1,55 @@
+"""What a law of chapter 4 takes for the strain of one edge, read from how stiff the edge is.
+
+A vertex that moves changes the force at the other end of an edge by a E / l along the direction that the law
+takes for tension, and by a G / l across it: the eigenvectors of that matrix tell the direction.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft import Material, TetMesh, force_gradient
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class EdgeReading:
+    """Of one edge in a deformed body."""
+
+    normal: Floats  # unit vector that the law takes for the direction of tension
+    tension_stiffness: float  # a E / l [N/m]
+    shear_stiffness: float  # a G / l [N/m]
+
+
+def read_edge(mesh: TetMesh, material: Material, positions: Floats, law: str) -> EdgeReading:
+    """Reading of the edge between vertices 0 and 1."""
+    block = force_gradient(mesh, material, positions, law=law)[0, :, 1, :]
+    values, vectors = np.linalg.eigh((block + block.T) / 2)
+    normal = vectors[:, 2]  # E is above G
+    if normal @ (positions[1] - positions[0]) < 0:
+        normal = -normal
+    return EdgeReading(normal, float(values[2]), float(values[0]))
+
+
+def strains(vector: Floats, normal: Floats) -> tuple[float, float]:
+    """Tensile and shear strain, eq. 4.3: of a vector that had length 1 and lay along the normal at rest."""
+    stretch = float(normal @ vector)
+    return stretch - 1, float(np.linalg.norm(vector - stretch * normal))
+
+
+def ringed_edge(count: int, radius: float = 1.0) -> TetMesh:
+    """An edge of length 1 along z between vertices 0 and 1, and vertices evenly round its middle."""
+    turn = 2 * np.pi * np.arange(count) / count
+    return edge_in_ring(radius * np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1))
+
+
+def edge_in_ring(ring: Floats) -> TetMesh:
+    """The same edge and a ring of vertices (n, 3) round it, counterclockwise."""
+    count = len(ring)
+    ends = np.array([[0.0, 0.0, -0.5], [0.0, 0.0, 0.5]])
+    tets = [[0, 1, 2 + i, 2 + (i + 1) % count] for i in range(count)]
+    return TetMesh(np.concatenate([ends, ring]), np.array(tets), fix_orientation=True)

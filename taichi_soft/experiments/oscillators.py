@@ -1,0 +1,68 @@
+"""Particles of 1 kg, each on a spring of its own to a pinned one: u'' = -k u - b u'.
+
+What chapter 3 says about test equations is so measured on the integrators of a world themselves. All
+particles move along their springs, where these are linear.
+"""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taichi_soft import ParticleMesh, SpringMaterial, UnstableStepWarning, World
+
+Floats = NDArray[np.float64]
+
+LENGTH = 1.0
+"""Of the springs [m]: displacements are to be far below."""
+
+SLACK = 1e-9
+"""Stiffness [N/m] of a spring that is there for its damping only: springs need some."""
+
+
+def run_oscillators(
+    integrator: str, stiffness: ArrayLike, damping: ArrayLike, start: tuple[ArrayLike, ArrayLike], steps: int
+) -> tuple[Floats, Floats]:
+    """Displacements [m] and velocities [m/s] at the start and after each step of 1 s, (steps + 1, m) each.
+
+    Steps of 1 s: k is (h w)^2 and b is h times the damping per mass.
+    Args:
+        stiffness: k [N/m], (m,).
+        damping: b [N s/m], (m,).
+        start: displacements and velocities, (m,) each.
+    """
+    k, b, u, v = (np.atleast_1d(np.asarray(rows, float)) for rows in (stiffness, damping, *start))
+    count = len(k)
+    rest = np.zeros((2 * count, 3))
+    rest[0::2, 0] = -LENGTH  # the free ends at 0, where float32 is fine
+    rest[:, 1] = np.repeat(np.arange(count), 2)
+    mesh = ParticleMesh(rest, np.arange(2 * count).reshape(-1, 2), np.ones(2 * count))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UnstableStepWarning)
+        world = World(gravity=(0, 0, 0), floor=None, integrator=integrator, tolerance=1e-6)
+        body = world.add_body(mesh, SpringMaterial(k, b), law="springs", pinned=np.arange(0, 2 * count, 2))
+        world.build()
+        positions, velocities = rest.copy(), np.zeros_like(rest)
+        positions[1::2, 0], velocities[1::2, 0] = u, v
+        body.set_motion(positions, velocities)
+        found = [(u, v)]
+        for _ in range(steps):
+            world.step(1.0, 1)
+            found.append((body.positions()[1::2, 0].astype(float), body.velocities()[1::2, 0].astype(float)))
+    return np.array([row[0] for row in found]), np.array([row[1] for row in found])
+
+
+def step_factors(integrator: str, stiffness: ArrayLike, damping: ArrayLike) -> Floats:
+    """Largest modulus of the eigenvalues of a step of each oscillator, (m,): above 1 it grows.
+
+    From what is left of two different starts after two steps and after three. For methods whose state is
+    position and velocity of one time.
+    """
+    k, b = np.asarray(stiffness, float), np.asarray(damping, float)
+    amount = np.full(len(k), 1e-2 * LENGTH)
+    none = np.zeros(len(k))
+    runs = [run_oscillators(integrator, k, b, start, 3) for start in ((amount, none), (none, amount))]
+    states = np.array([[run[0], run[1]] for run in runs]).transpose(2, 3, 1, 0)  # (steps, m, state, start)
+    return np.asarray(np.abs(np.linalg.eigvals(states[3] @ np.linalg.inv(states[2]))).max(axis=1))
