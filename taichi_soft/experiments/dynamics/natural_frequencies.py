@@ -126,9 +126,9 @@ def conclude(results: Results) -> Section:
             "tetrahedra on the same mesh, with the mass at the vertices.",
             "Linear tetrahedra are too stiff in bending, in finite elements as in the laws of chapter 6: "
             f"with {COARSE} cells along the height a cantilever is {_excess(results, 'cantilever', COARSE)} "
-            f"too fast, with {FINE} ({fine['tets']} tetrahedra) {_excess(results, 'cantilever', FINE)}. Refined "
-            f"without end it would come to {tends['virial']:.2f} of Timoshenko's frequency, one of springs "
-            f"to {tends['springs']:.2f}.",
+            f"too fast, with {FINE} ({fine['tets']} tetrahedra) {_excess(results, 'cantilever', FINE)}. "
+            f"Refined without end it would come to {tends['virial']:.2f} of Timoshenko's frequency, one of "
+            f"springs to {tends['springs']:.2f}.",
         ),
         tuple(findings),
         tuple(tables),
