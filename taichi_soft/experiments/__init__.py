@@ -18,8 +18,9 @@ from taichi_soft.experiments.experiment import (
     section_of,
 )
 from taichi_soft.experiments.leapfrog_reversal import REVERSAL
+from taichi_soft.experiments.stability_map import STABILITY_MAP
 
-EXPERIMENTS: dict[str, Experiment] = {experiment.name: experiment for experiment in (REVERSAL,)}
+EXPERIMENTS: dict[str, Experiment] = {experiment.name: experiment for experiment in (REVERSAL, STABILITY_MAP)}
 """By name, in the order of the report."""
 
 __all__ = [
