@@ -1,6 +1,7 @@
 """Experiments: those of the thesis, and checks against theory, one file per figure or claim."""
 
 from taichi_soft.experiments.claims import CLAIMS, Claim
+from taichi_soft.experiments.energy_drift import ENERGY_DRIFT
 from taichi_soft.experiments.experiment import (
     Effort,
     Experiment,
@@ -20,7 +21,9 @@ from taichi_soft.experiments.experiment import (
 from taichi_soft.experiments.leapfrog_reversal import REVERSAL
 from taichi_soft.experiments.stability_map import STABILITY_MAP
 
-EXPERIMENTS: dict[str, Experiment] = {experiment.name: experiment for experiment in (REVERSAL, STABILITY_MAP)}
+EXPERIMENTS: dict[str, Experiment] = {
+    experiment.name: experiment for experiment in (REVERSAL, ENERGY_DRIFT, STABILITY_MAP)
+}
 """By name, in the order of the report."""
 
 __all__ = [
