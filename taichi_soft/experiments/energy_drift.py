@@ -100,7 +100,7 @@ def damping_ratio(numbers: Numbers) -> float:
     time, kinetic = np.array(numbers["time"]), np.array(numbers["kinetic"])
     early = time < 5.0
     rate = -float(np.polyfit(time[early], np.log(kinetic[early]), 1)[0])
-    return rate / (2 * np.pi * np.sqrt(YOUNG / DENSITY) / EDGE)
+    return rate / (2 * math.pi * math.sqrt(YOUNG / DENSITY) / EDGE)
 
 
 def conclude(results: Results) -> Section:
