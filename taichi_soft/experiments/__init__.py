@@ -1,5 +1,6 @@
 """Experiments: those of the thesis, and checks against theory, one file per figure or claim."""
 
+from taichi_soft.experiments.bars_bounce import BARS_BOUNCE
 from taichi_soft.experiments.claims import CLAIMS, Claim
 from taichi_soft.experiments.energy_drift import ENERGY_DRIFT
 from taichi_soft.experiments.experiment import (
@@ -22,7 +23,7 @@ from taichi_soft.experiments.leapfrog_reversal import REVERSAL
 from taichi_soft.experiments.stability_map import STABILITY_MAP
 
 EXPERIMENTS: dict[str, Experiment] = {
-    experiment.name: experiment for experiment in (REVERSAL, ENERGY_DRIFT, STABILITY_MAP)
+    experiment.name: experiment for experiment in (REVERSAL, ENERGY_DRIFT, STABILITY_MAP, BARS_BOUNCE)
 }
 """By name, in the order of the report."""
 
