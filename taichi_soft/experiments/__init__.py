@@ -2,6 +2,7 @@
 
 from taichi_soft.experiments.bars_bounce import BARS_BOUNCE
 from taichi_soft.experiments.claims import CLAIMS, Claim
+from taichi_soft.experiments.density_bounce import DENSITY_BOUNCE
 from taichi_soft.experiments.energy_drift import ENERGY_DRIFT
 from taichi_soft.experiments.experiment import (
     Effort,
@@ -23,7 +24,8 @@ from taichi_soft.experiments.leapfrog_reversal import REVERSAL
 from taichi_soft.experiments.stability_map import STABILITY_MAP
 
 EXPERIMENTS: dict[str, Experiment] = {
-    experiment.name: experiment for experiment in (REVERSAL, ENERGY_DRIFT, STABILITY_MAP, BARS_BOUNCE)
+    experiment.name: experiment
+    for experiment in (REVERSAL, ENERGY_DRIFT, STABILITY_MAP, BARS_BOUNCE, DENSITY_BOUNCE)
 }
 """By name, in the order of the report."""
 
