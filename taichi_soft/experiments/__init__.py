@@ -20,12 +20,13 @@ from taichi_soft.experiments.experiment import (
     Verdict,
     section_of,
 )
+from taichi_soft.experiments.flips_dent import FLIPS_DENT
 from taichi_soft.experiments.leapfrog_reversal import REVERSAL
 from taichi_soft.experiments.stability_map import STABILITY_MAP
 
 EXPERIMENTS: dict[str, Experiment] = {
     experiment.name: experiment
-    for experiment in (REVERSAL, ENERGY_DRIFT, STABILITY_MAP, BARS_BOUNCE, DENSITY_BOUNCE)
+    for experiment in (REVERSAL, ENERGY_DRIFT, STABILITY_MAP, BARS_BOUNCE, DENSITY_BOUNCE, FLIPS_DENT)
 }
 """By name, in the order of the report."""
 
