@@ -365,8 +365,8 @@ def report(
 ) -> None:
     """Run the thesis's experiments and judge its claims; exit code 1 where a point could not be computed.
 
-    Every number is kept at once, in the folder data beside the page: what was interrupted goes on from there,
-    and points that failed are computed again.
+    Every number is kept at once, in the folder data beside the page. What was interrupted goes on from there,
+    and points that failed are computed again; without that folder everything is.
     """
     from taichi_soft.experiments import Effort
     from taichi_soft.report.machine import machine_facts
@@ -379,7 +379,7 @@ def report(
         return
     if cluster is not None and workers is not None:
         raise OptionError(
-            f"--workers {workers} are processes of this machine: leave out it or --cluster {cluster}"
+            f"--workers {workers} are of this machine, and --cluster {cluster} has its own: leave out one"
         )
     require_extra()
     folder = out or Path("out") / "report"

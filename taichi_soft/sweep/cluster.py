@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent import futures
 from concurrent.futures import CancelledError, Future
 from contextlib import contextmanager, suppress
@@ -23,6 +23,9 @@ CONNECT_LIMIT = 5.0
 
 WORKER_LIMIT = 10.0
 """For its first worker to appear [s]."""
+
+START_LIMIT = 120.0
+"""For a worker to import this package and start Taichi [s]."""
 
 RESTART_LIMIT = 30.0
 """For a worker to be restarted [s]."""
@@ -62,12 +65,14 @@ def cluster_workers(address: str, arch: str = "cpu") -> Iterator[list[Worker]]:
             ) from None
         _require_same_code(client, arch)
         addresses = _Addresses(client)
-        yield [ClusterWorker(client, addresses, arch) for _ in client.nthreads()]
+        yield [ClusterWorker(client, addresses, arch) for _ in addresses.all()]
 
 
 def _require_same_code(client: Any, arch: str) -> None:
     mine = origin(arch)
-    for worker, theirs in client.run(origin, arch, on_error="return").items():
+    with _losses():
+        found = client.run(origin, arch, on_error="return")
+    for worker, theirs in found.items():
         if theirs != mine:
             raise SweepError(
                 f"worker {worker} of the cluster runs other code ({theirs}, wanted {mine}): install the same "
@@ -75,18 +80,34 @@ def _require_same_code(client: Any, arch: str) -> None:
             )
 
 
+@contextmanager
+def _losses() -> Iterator[None]:
+    """Raises: SweepError where the scheduler does not answer any more."""
+    try:
+        yield
+    except (OSError, *TIMEOUTS) as error:
+        raise SweepError(
+            f"the scheduler of the cluster was lost ({error}): start it, and the same command again"
+        ) from error
+
+
 class _Addresses:
-    """Which workers of a cluster nobody uses yet."""
+    """The workers of a cluster, and which of them nobody uses yet."""
 
     def __init__(self, client: Any) -> None:
         self._client = client
         self._claimed: set[str] = set()
         self._lock = threading.Lock()
 
+    def all(self) -> list[str]:
+        """Raises: SweepError."""
+        with _losses():
+            return list(self._client.nthreads())
+
     def claim(self) -> str | None:
         """The address of a worker that was never claimed before."""
         with self._lock:
-            found = next((name for name in self._client.nthreads() if name not in self._claimed), None)
+            found = next((name for name in self.all() if name not in self._claimed), None)
             if found is not None:
                 self._claimed.add(found)
             return found
@@ -98,26 +119,39 @@ class ClusterWorker:
     def __init__(self, client: Any, addresses: _Addresses, arch: str) -> None:
         self._client, self._addresses, self._arch = client, addresses, arch
         self._address: str | None = None
+        self._is_started = False
         self._future: Future[Outcome] | None = None
         self._is_stopped = False
 
     def is_ready(self) -> bool:
-        if self._address not in self._client.nthreads():
-            self._address = self._addresses.claim()
+        if self._address not in self._addresses.all():
+            self._address, self._is_started = self._addresses.claim(), False
         return self._address is not None
 
     def compute(self, task: Task, time_limit: float) -> Outcome:
+        if not self._is_started:
+            outcome = self._run(dict, {}, START_LIMIT)  # imports this package and starts Taichi
+            if outcome.numbers is None:
+                return outcome
+            self._is_started = True
+        return self._run(task.function, task.point, time_limit)
+
+    def _run(
+        self, function: Callable[[dict[str, Any]], dict[str, Any]], point: dict[str, Any], time_limit: float
+    ) -> Outcome:
         start = time.perf_counter()
         executor = self._client.get_executor(
             workers=[self._address], allow_other_workers=False, pure=False, retries=0
         )
-        self._future = executor.submit(compute, self._arch, task.function, task.point)
-        error = "cancelled" if self._is_stopped else ""
+        self._future = executor.submit(compute, self._arch, function, point)
+        error = ""
         while not error:
             try:
                 return self._future.result(timeout=LOOK)
             except TIMEOUTS:
-                if self._address not in self._client.nthreads():
+                if self._is_stopped:
+                    error = "cancelled"
+                elif self._address not in self._addresses.all():
                     error = f"worker {self._address} of the cluster was lost"
                 elif time.perf_counter() > start + time_limit:
                     error = f"stopped: it took longer than {time_limit:g} s"

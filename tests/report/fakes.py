@@ -41,6 +41,11 @@ def conclude_carelessly(results):
     return Section((str([numbers["square"] for _, numbers in results.where()][2]),), ())
 
 
+def measure_nothing(point):
+    """Fails."""
+    raise ValueError("nothing to see")
+
+
 SQUARES = Experiment("squares", "Squares", "theory", ("wave-speed",), points, measure, conclude)
 ROUGH = Experiment("rough", "Rough squares", "theory", ("wave-speed",), points, measure_rough, conclude)
 CARELESS = Experiment(
@@ -53,3 +58,4 @@ CARELESS = Experiment(
     conclude_carelessly,
     is_timing=True,
 )
+NOTHING = Experiment("nothing", "Nothing", "theory", ("hertz",), points, measure_nothing, conclude)

@@ -1,47 +1,16 @@
 """Experiments of which the points are measured, kept, taken up again and concluded."""
 
 import io
-import sys
-from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
+from fakes import CARELESS, ROUGH, SQUARES
 from rich.console import Console
 
 from taichi_soft.errors import OptionError, SweepError
 from taichi_soft.experiments import EXPERIMENTS, Effort, Verdict
 from taichi_soft.report import run
 from taichi_soft.sweep import Store
-
-sys.path.insert(0, str(Path(__file__).parent))  # worker processes take it over
-from fakes import CARELESS, ROUGH, SQUARES
-
-
-@pytest.fixture
-def measured(tmp_path, monkeypatch):
-    """Which points were measured since it was asked last."""
-    log = tmp_path / "log"
-    log.touch()
-    monkeypatch.setenv("FAKES_LOG", str(log))
-    return lambda: (log.read_text().split(), log.write_text(""))[0]
-
-
-class Here:
-    """Computes in this process."""
-
-    def is_ready(self):
-        return True
-
-    def compute(self, task, time_limit):
-        return run.Outcome(task.function(task.point))
-
-    def stop(self):
-        pass
-
-
-@pytest.fixture
-def here(monkeypatch):
-    monkeypatch.setattr(run, "local_workers", lambda workers, arch: nullcontext([Here()]))
 
 
 @pytest.fixture

@@ -42,6 +42,16 @@ def test_one_worker_ends_a_group_before_it_begins_another():
     assert "".join(worker.groups) == "aaaabbbcc"
 
 
+def test_workers_keep_to_their_groups_then_begin_others_then_help_where_most_is_left():
+    waiting = schedule._Waiting(tasks("abbbbcccccc"))
+    known = [[], [], []]
+    taken = [[waiting.take(each) for each in known] for _ in range(4)]
+    assert taken[-1].pop() is None
+    groups = [[task.group for task in row] for row in taken]
+    assert groups == [["a", "b", "c"], ["c", "b", "c"], ["c", "b", "c"], ["c", "b"]]
+    assert sorted(task.point["x"] for row in taken for task in row) == list(range(11))
+
+
 def test_nothing_to_compute():
     assert list(compute_all([], [Pretender()])) == []
 

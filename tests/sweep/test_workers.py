@@ -5,9 +5,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections import Counter
 from contextlib import closing
-from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -26,7 +24,7 @@ def crew():
 
 def compute(points, crew):
     """Outcomes by x, in the order in which they came."""
-    tasks = [Task(p.pop("group", "a"), act, p, p.pop("is_alone", False)) for p in points]
+    tasks = [Task("a", act, p, p.pop("is_alone", False)) for p in points]
     with closing(compute_all(tasks, crew, TIME_LIMIT)) as done:
         return {task.point["x"]: outcome for task, outcome in done}
 
@@ -70,28 +68,13 @@ def test_numbers_come_as_they_come_from_a_file(rough):
     assert isinstance(pair, list)
 
 
-def test_points_of_a_group_stay_in_a_process_until_there_is_nothing_else_and_what_times_runs_alone(crew):
-    points = [
-        {"group": group, "x": f"{group}{n}", "do": "sleep", "seconds": 0.1}
-        for group in "ab"
-        for n in range(4)
-    ]
-    timed = [
-        {"group": group, "x": f"{group}{n}", "do": "sleep", "seconds": 0.1, "is_alone": True}
-        for group in "tu"
-        for n in range(2)
-    ]
-    outcomes = compute([*timed, *points], crew)
-    processes = {
-        group: Counter(each.numbers["pid"] for x, each in outcomes.items() if x[0] == group)
-        for group in "abtu"
-    }
-    assert processes["a"].most_common(1)[0][1] >= 3
-    assert processes["b"].most_common(1)[0][1] >= 3
-    assert list(outcomes)[-4:] == ["t0", "t1", "u0", "u1"]
-    begun = [outcomes[x].numbers["begun"] for x in ("t0", "t1", "u0", "u1")]
-    assert min(begun) > max(outcomes[p["x"]].numbers["begun"] + 0.1 for p in points)
-    assert all(later > earlier + 0.1 for earlier, later in pairwise(begun))
+def test_what_is_timed_runs_alone_after_all_else(crew):
+    points = [{"x": x, "do": "sleep", "seconds": 0.1, "is_alone": x < 4} for x in range(8)]
+    outcomes = compute(points, crew)
+    assert list(outcomes)[4:] == [0, 1, 2, 3]
+    begun = {x: outcomes[x].numbers["begun"] for x in outcomes}
+    assert begun[0] > max(begun[x] + 0.1 for x in range(4, 8))
+    assert all(begun[x + 1] > begun[x] + 0.1 for x in range(3))
 
 
 PROGRAM = """
@@ -102,8 +85,8 @@ sys.path.insert(0, {folder!r})
 from acts import act
 
 if __name__ == "__main__":
-    tasks = [Task("a", act, {{"x": x, "do": "sleep", "seconds": 0 if x < 2 else 600}}) for x in range(4)]
-    with local_workers(2) as crew, closing(compute_all(tasks, crew)) as done:
+    tasks = [Task("a", act, {{"x": x, "do": "sleep", "seconds": 600 * x}}) for x in range(2)]
+    with local_workers(1) as crew, closing(compute_all(tasks, crew)) as done:
         for task, outcome in done:
             print(outcome.numbers["pid"], flush=True)
 """
@@ -118,13 +101,12 @@ def test_ctrl_c_ends_all_processes_at_once_and_without_their_tracebacks(tmp_path
         [sys.executable, str(program)],
         **{"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "start_new_session": True},
     ) as process:
-        workers = {int(process.stdout.readline()) for _ in range(2)}
+        worker = int(process.stdout.readline())
         start = time.monotonic()
         os.killpg(process.pid, signal.SIGINT)
         _, errors = process.communicate(timeout=30)
         assert time.monotonic() - start < 5
     assert errors.count("Traceback") == 1  # of the program itself
     assert errors.rstrip().endswith("KeyboardInterrupt")
-    for pid in workers:
-        with pytest.raises(ProcessLookupError):
-            os.kill(pid, 0)
+    with pytest.raises(ProcessLookupError):
+        os.kill(worker, 0)
