@@ -1,6 +1,7 @@
 """Experiments: those of the thesis, and checks against theory, one file per figure or claim."""
 
 from taichi_soft.experiments.anisotropy import ANISOTROPY
+from taichi_soft.experiments.best_fitting_plane_cost import BEST_FITTING_PLANE_COST
 from taichi_soft.experiments.claims import CLAIMS, Claim
 from taichi_soft.experiments.cylinder_forces import CYLINDER_FORCES
 from taichi_soft.experiments.experiment import (
@@ -24,6 +25,8 @@ from taichi_soft.experiments.fig_3_2 import FIG_3_2
 from taichi_soft.experiments.fig_3_3 import FIG_3_3
 from taichi_soft.experiments.fig_4_3 import FIG_4_3
 from taichi_soft.experiments.fig_4_5 import FIG_4_5
+from taichi_soft.experiments.fig_4_7 import FIG_4_7
+from taichi_soft.experiments.implicit_step import IMPLICIT_STEP
 from taichi_soft.experiments.integrator_orders import INTEGRATOR_ORDERS
 from taichi_soft.experiments.leapfrog_reversal import REVERSAL
 from taichi_soft.experiments.volume_springs_shear import VOLUME_SPRINGS_SHEAR

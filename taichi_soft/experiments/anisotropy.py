@@ -53,6 +53,7 @@ def mesh_of(name: str, size: int) -> TetMesh:
         "cylinder": lambda: cylinder(1.0, 2.0, rings=size - 1, layers=size),
         "ball": lambda: sphere(1.0, size - 1),
         "uneven block": lambda: jittered_block(size),
+        "another uneven block": lambda: jittered_block(size, seed=1),
     }
     return shapes[name]()
 
