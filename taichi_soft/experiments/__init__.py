@@ -19,10 +19,21 @@ from taichi_soft.experiments.experiment import (
     section_of,
 )
 from taichi_soft.experiments.leapfrog_reversal import REVERSAL
+from taichi_soft.experiments.linear_strain import LINEAR_STRAIN
+from taichi_soft.experiments.methods_cost import METHODS_COST
+from taichi_soft.experiments.patch_test import PATCH_TEST
 from taichi_soft.experiments.volume_springs_shear import VOLUME_SPRINGS_SHEAR
 
 EXPERIMENTS: dict[str, Experiment] = {
-    experiment.name: experiment for experiment in (REVERSAL, VOLUME_SPRINGS_SHEAR, CYLINDER_FORCES)
+    experiment.name: experiment
+    for experiment in (
+        REVERSAL,
+        VOLUME_SPRINGS_SHEAR,
+        CYLINDER_FORCES,
+        METHODS_COST,
+        LINEAR_STRAIN,
+        PATCH_TEST,
+    )
 }
 """By name, in the order of the report."""
 
