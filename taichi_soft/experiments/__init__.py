@@ -2,6 +2,7 @@
 
 from taichi_soft.experiments.claims import CLAIMS, Claim
 from taichi_soft.experiments.cylinder_forces import CYLINDER_FORCES
+from taichi_soft.experiments.cylinder_stretch import CYLINDER_STRETCH
 from taichi_soft.experiments.experiment import (
     Effort,
     Experiment,
@@ -29,6 +30,7 @@ EXPERIMENTS: dict[str, Experiment] = {
     for experiment in (
         REVERSAL,
         VOLUME_SPRINGS_SHEAR,
+        CYLINDER_STRETCH,
         CYLINDER_FORCES,
         METHODS_COST,
         LINEAR_STRAIN,
