@@ -4,6 +4,7 @@ from taichi_soft.experiments.anisotropy import ANISOTROPY
 from taichi_soft.experiments.best_fitting_plane_cost import BEST_FITTING_PLANE_COST
 from taichi_soft.experiments.claims import CLAIMS, Claim
 from taichi_soft.experiments.cylinder_forces import CYLINDER_FORCES
+from taichi_soft.experiments.cylinder_stretch import CYLINDER_STRETCH
 from taichi_soft.experiments.experiment import (
     Effort,
     Experiment,
@@ -29,10 +30,22 @@ from taichi_soft.experiments.fig_4_7 import FIG_4_7
 from taichi_soft.experiments.implicit_step import IMPLICIT_STEP
 from taichi_soft.experiments.integrator_orders import INTEGRATOR_ORDERS
 from taichi_soft.experiments.leapfrog_reversal import REVERSAL
+from taichi_soft.experiments.linear_strain import LINEAR_STRAIN
+from taichi_soft.experiments.methods_cost import METHODS_COST
+from taichi_soft.experiments.patch_test import PATCH_TEST
 from taichi_soft.experiments.volume_springs_shear import VOLUME_SPRINGS_SHEAR
 
 EXPERIMENTS: dict[str, Experiment] = {
-    experiment.name: experiment for experiment in (REVERSAL, VOLUME_SPRINGS_SHEAR, CYLINDER_FORCES)
+    experiment.name: experiment
+    for experiment in (
+        REVERSAL,
+        VOLUME_SPRINGS_SHEAR,
+        CYLINDER_STRETCH,
+        CYLINDER_FORCES,
+        METHODS_COST,
+        LINEAR_STRAIN,
+        PATCH_TEST,
+    )
 }
 """By name, in the order of the report."""
 

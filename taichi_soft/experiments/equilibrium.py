@@ -83,14 +83,14 @@ class Plates:
 
         x, f = start, forces(start)
         left, inverse, is_new = np.abs(f.ravel()[self.free]).max(), None, False
-        for _ in range(100):
+        for _ in range(30):
             if left <= SMALLEST * np.abs(f).max():
                 return x
             if inverse is None:
                 inverse, is_new = splu(-self.gradient(forces, x)), True
             way = np.zeros(x.size)
             way[self.free] = inverse.solve(f.ravel()[self.free])
-            for halvings in range(12):
+            for halvings in range(8):
                 trial = x + way.reshape(-1, 3) / 2**halvings
                 trial_f = forces(trial)
                 trial_left = np.abs(trial_f.ravel()[self.free]).max()

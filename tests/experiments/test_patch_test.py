@@ -1,0 +1,29 @@
+"""The patch test: what is left is of second order, and nothing is left inside."""
+
+import numpy as np
+
+from taichi_soft.experiments import EXPERIMENTS, Effort, Result, Results, Verdict, section_of
+from taichi_soft.experiments.patch_test import TETRAHEDRAL
+
+EXPERIMENT = EXPERIMENTS["patch-test"]
+
+
+def test_laws_on_tetrahedra_pass_and_springs_do_not():
+    rows = [Result(point, EXPERIMENT.measure(point)) for point in EXPERIMENT.points(Effort.QUICK)]
+    results = Results(tuple(rows))
+    for law in TETRAHEDRAL:
+        numbers = results.one(law=law)
+        assert max(numbers["inside"]) < 1e-9  # faces of neighbours cancel, at any strain
+        np.testing.assert_allclose(
+            numbers["surface"][2] / np.array(numbers["surface"]), [100, 10, 1], rtol=0.1
+        )
+    springs = results.one(law="springs")
+    assert min(springs["surface"]) > 0.3  # there is no nu and no shear modulus to ask for
+    assert min(springs["inside"]) > 0.1
+    (finding,) = section_of(EXPERIMENT, results).findings
+    assert finding.verdict is Verdict.AGREES
+
+    rows[1] = Result(rows[1].point, springs)
+    (finding,) = section_of(EXPERIMENT, Results(tuple(rows))).findings
+    assert finding.verdict is Verdict.DIFFERS
+    assert rows[1].point["law"] in finding.why
