@@ -22,11 +22,20 @@ from taichi_soft.experiments.experiment import (
 )
 from taichi_soft.experiments.flips_dent import FLIPS_DENT
 from taichi_soft.experiments.leapfrog_reversal import REVERSAL
+from taichi_soft.experiments.mesh_quality import MESH_QUALITY
 from taichi_soft.experiments.stability_map import STABILITY_MAP
 
 EXPERIMENTS: dict[str, Experiment] = {
     experiment.name: experiment
-    for experiment in (REVERSAL, ENERGY_DRIFT, STABILITY_MAP, BARS_BOUNCE, DENSITY_BOUNCE, FLIPS_DENT)
+    for experiment in (
+        REVERSAL,
+        ENERGY_DRIFT,
+        STABILITY_MAP,
+        BARS_BOUNCE,
+        DENSITY_BOUNCE,
+        FLIPS_DENT,
+        MESH_QUALITY,
+    )
 }
 """By name, in the order of the report."""
 
