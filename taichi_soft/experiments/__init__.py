@@ -2,6 +2,7 @@
 
 from taichi_soft.experiments.bars_bounce import BARS_BOUNCE
 from taichi_soft.experiments.claims import CLAIMS, Claim
+from taichi_soft.experiments.damping_rotation import DAMPING_ROTATION
 from taichi_soft.experiments.density_bounce import DENSITY_BOUNCE
 from taichi_soft.experiments.energy_drift import ENERGY_DRIFT
 from taichi_soft.experiments.experiment import (
@@ -23,6 +24,7 @@ from taichi_soft.experiments.experiment import (
 from taichi_soft.experiments.flips_dent import FLIPS_DENT
 from taichi_soft.experiments.leapfrog_reversal import REVERSAL
 from taichi_soft.experiments.mesh_quality import MESH_QUALITY
+from taichi_soft.experiments.sphere_real_time import SPHERE_REAL_TIME
 from taichi_soft.experiments.stability_map import STABILITY_MAP
 
 EXPERIMENTS: dict[str, Experiment] = {
@@ -30,11 +32,13 @@ EXPERIMENTS: dict[str, Experiment] = {
     for experiment in (
         REVERSAL,
         ENERGY_DRIFT,
+        DAMPING_ROTATION,
         STABILITY_MAP,
-        BARS_BOUNCE,
-        DENSITY_BOUNCE,
-        FLIPS_DENT,
         MESH_QUALITY,
+        SPHERE_REAL_TIME,
+        BARS_BOUNCE,
+        FLIPS_DENT,
+        DENSITY_BOUNCE,
     )
 }
 """By name, in the order of the report."""
