@@ -1,0 +1,46 @@
+"""The thesis's sphere against real time. No test asserts how long anything takes."""
+
+import copy
+
+import pytest
+
+from taichi_soft.experiments import EXPERIMENTS, Effort, Result, Results, Verdict, section_of
+from taichi_soft.experiments.sphere_real_time import nanoseconds, real_time_factor
+
+EXPERIMENT = EXPERIMENTS["sphere-real-time"]
+
+
+@pytest.fixture(scope="module")
+def row():
+    (point,) = EXPERIMENT.points(Effort.QUICK)
+    return Result(point, EXPERIMENT.measure(point))
+
+
+def finding_of(row):
+    (finding,) = section_of(EXPERIMENT, Results((row,))).findings
+    return finding
+
+
+def test_it_is_timed_alone_and_all_of_the_fall_and_bounce_is(row):
+    assert EXPERIMENT.is_timing
+    assert len(row.numbers["frames"]) * 0.02 == pytest.approx(row.point["seconds"])
+    assert min(row.numbers["frames"]) > 0
+    assert row.numbers["tets"] == 968
+    assert not row.numbers["frozen"]
+
+
+def test_the_factor_and_the_cost_of_a_tetrahedron():
+    """The thesis: 955 tetrahedra, 700 steps a second at 45 % of real time: 3.3 microseconds each."""
+    assert real_time_factor({"frames": [0.01, 0.03]}) == pytest.approx(1.0)
+    assert nanoseconds(0.45, 955) == pytest.approx(1e9 / (955 * 700 * 0.45))
+
+
+def test_the_verdict_follows_the_numbers(row):
+    fast, slow, broken = (copy.deepcopy(row) for _ in range(3))
+    fast.numbers["frames"] = [0.01] * 10
+    slow.numbers["frames"] = [0.1] * 10
+    broken.numbers["frozen"] = True
+    assert finding_of(fast).verdict is Verdict.AGREES
+    assert "2 times real time" in finding_of(fast).measured
+    assert finding_of(slow).verdict is Verdict.DIFFERS
+    assert finding_of(broken).verdict is Verdict.UNKNOWN
