@@ -1,0 +1,40 @@
+"""A block in tetrahedra of many shapes and directions, which no law finds easier than another mesh."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from taichi_soft import TetMesh
+
+JITTER = 0.12
+"""How far vertices are moved at random, over the edge of a cell."""
+FLAT = 1e-6
+"""Volume over that of a cell, of what Delaunay makes of four points in one face of the block."""
+
+
+def irregular_block(length: float, width: float, cells: int) -> TetMesh:
+    """A block of square section about the origin, its axis along x; the same for the same numbers.
+
+    A body-centred lattice, moved at random within the block's faces and edges, and connected so that all
+    circumspheres are empty. Corners, edges and faces of the block stay exactly where they are.
+    Args:
+        length, width: edges along x, and along y and z [m]; length should be whole cells.
+        cells: across the width.
+    """
+    from scipy.spatial import Delaunay
+
+    cell = width / cells
+    half = np.array([length, width, width]) / 2
+    counts = (round(length / cell), cells, cells)
+    axes = [np.linspace(-h, h, count + 1) for h, count in zip(half, counts, strict=True)]
+    corners = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    middles = [(axis[1:] + axis[:-1]) / 2 for axis in axes]
+    centres = np.stack(np.meshgrid(*middles, indexing="ij"), axis=-1).reshape(-1, 3)
+    points = np.concatenate([corners, centres])
+    inside = half - np.abs(points) > 1e-9 * cell
+    moves = np.random.default_rng(0).uniform(-JITTER, JITTER, points.shape)
+    points += np.where(inside, cell * moves, 0.0)
+    tets = Delaunay(points).simplices.astype(np.int64)
+    arms = points[tets[:, 1:]] - points[tets[:, :1]]
+    solid = np.abs(np.linalg.det(arms)) / 6 > FLAT * cell**3
+    return TetMesh(points, tets[solid], fix_orientation=True)

@@ -1,0 +1,41 @@
+"""Bars against closed forms."""
+
+from copy import deepcopy
+
+import pytest
+
+from taichi_soft.experiments import EXPERIMENTS, Effort, Result, Results, Verdict, section_of
+
+EXPERIMENT = EXPERIMENTS["beams"]
+SOLID = ("virial", "face", "st_venant_kirchhoff", "neo_hookean")
+
+
+def verdicts(rows):
+    findings = section_of(EXPERIMENT, Results(tuple(rows))).findings
+    return {finding.claim: finding.verdict for finding in findings}
+
+
+def test_tension_is_exact_and_torsion_and_bending_go_where_theory_says():
+    rows = [Result(point, EXPERIMENT.measure(point)) for point in EXPERIMENT.points(Effort.QUICK)]
+    by_cells = {row.point["cells"]: row.numbers for row in rows if row.point["law"] == "virial"}
+    for load in ("torsion", "bending", "cantilever"):
+        assert by_cells[2][load] > by_cells[3][load] > by_cells[4][load] > 1.05
+        limit = (16 * by_cells[4][load] - 9 * by_cells[3][load]) / 7
+        assert limit == pytest.approx(1, abs=0.03)
+    for row in rows:
+        if row.point["law"] in SOLID:
+            assert row.numbers["tension"] == pytest.approx(1, abs=5e-4)
+        if row.point["law"] == "quadratic finite elements":
+            assert row.numbers["bending"] == pytest.approx(1, abs=1e-6)
+            assert row.numbers["torsion"] == pytest.approx(1, abs=0.03)
+        if row.point["law"] == "springs":
+            assert 0.4 < row.numbers["tension"] < 0.6  # a uniform, isotropic network: 1/2
+    assert verdicts(rows) == dict.fromkeys(("beam-tension", "beam-torsion", "beam-bending"), Verdict.AGREES)
+
+    for load, claim in (("tension", "tension"), ("torsion", "torsion"), ("cantilever", "bending")):
+        changed = deepcopy(rows)
+        for row in changed:
+            if row.point["law"] in SOLID:
+                row.numbers[load] *= 1.05
+        found = verdicts(changed)
+        assert [name for name, verdict in found.items() if verdict is Verdict.DIFFERS] == [f"beam-{claim}"]

@@ -1,0 +1,35 @@
+"""Laws against finite elements on the same mesh."""
+
+from copy import deepcopy
+
+from taichi_soft.experiments import EXPERIMENTS, Effort, Result, Results, Verdict, section_of
+
+EXPERIMENT = EXPERIMENTS["finite-elements"]
+SOLID = ("virial", "face", "st_venant_kirchhoff", "neo_hookean")
+LOADS = ("tension", "shear", "torsion", "bending", "block")
+
+
+def test_tetrahedral_laws_agree_with_finite_elements_and_springs_do_not():
+    rows = [Result(point, EXPERIMENT.measure(point)) for point in EXPERIMENT.points(Effort.QUICK)]
+    for row in rows:
+        ratios = [row.numbers[load]["stiffness"] / row.numbers[load]["reference"] for load in LOADS]
+        if row.point["law"] in SOLID:
+            assert max(abs(ratio - 1) for ratio in ratios) < 0.002, row.point
+            assert max(row.numbers[load]["apart"] for load in LOADS) < 0.002, row.point
+        else:
+            assert max(abs(ratio - 1) for ratio in ratios) > 0.03, row.point
+    assert {row.point["law"] for row in rows} > {*SOLID, "springs", "volume_springs", "cmpm", "tilted_plane"}
+
+    section = section_of(EXPERIMENT, Results(tuple(rows)))
+    assert [finding.claim for finding in section.findings] == ["finite-elements", "block-shear"]
+    assert {finding.verdict for finding in section.findings} == {Verdict.AGREES}
+    assert len(section.tables[0].rows) == len(rows)
+
+    stiff = deepcopy(rows)
+    stiff[2].numbers["torsion"]["stiffness"] *= 1.02
+    elements, block = section_of(EXPERIMENT, Results(tuple(stiff))).findings
+    assert (elements.verdict, block.verdict) == (Verdict.DIFFERS, Verdict.AGREES)
+    assert "face" in elements.why
+    stiff = deepcopy(rows)
+    stiff[0].numbers["block"]["stiffness"] *= 0.98
+    assert section_of(EXPERIMENT, Results(tuple(stiff))).findings[1].verdict is Verdict.DIFFERS
