@@ -1,0 +1,69 @@
+"""Budgets of energy and momentum: their terms against closed forms, and their verdicts."""
+
+import numpy as np
+import pytest
+
+from taichi_soft import box
+from taichi_soft.experiments import Effort, Result, Results, Verdict, section_of
+from taichi_soft.experiments.dynamics import ENERGY_BUDGET, MOMENTUM_BUDGET
+from taichi_soft.experiments.dynamics.energy_budget import _damping_power, _energy_density
+
+
+@pytest.mark.parametrize("law", ["st_venant_kirchhoff", "neo_hookean"])
+def test_a_small_stretch_holds_half_of_young_times_its_square(law):
+    stretch = 1e-4
+    deformed = np.diag([1 + stretch, 1 - 0.3 * stretch, 1 - 0.3 * stretch])[None]
+    assert _energy_density(law, deformed)[0] == pytest.approx(0.5 * 1e6 * stretch**2, rel=1e-3)
+    turned = np.array([[[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]])
+    assert _energy_density(law, turned)[0] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_dampers_take_power_from_growth_and_none_from_turning():
+    mesh = box((1.0, 0.2, 0.2), (2, 1, 1))
+    lengths = np.linalg.norm(np.diff(mesh.vertices[mesh.edges], axis=1)[:, 0], axis=1)
+    growing = _damping_power(mesh, mesh.vertices, 0.5 * mesh.vertices, 3.0)
+    assert growing == pytest.approx(3.0 * 0.25 * (lengths**2).sum())
+    turning = _damping_power(mesh, mesh.vertices, np.cross((1.0, 2.0, 3.0), mesh.vertices), 3.0)
+    assert turning == pytest.approx(0.0, abs=1e-20)
+
+
+def test_energy_is_where_it_should_be():
+    points = ENERGY_BUDGET.points(Effort.QUICK)
+    measured = [(p, ENERGY_BUDGET.measure(p)) for p in points if p["law"] != "st_venant_kirchhoff"]
+    undamped, damped, virial = (numbers for _, numbers in measured)
+    for numbers in (undamped, damped):
+        assert numbers["error"] < 1e-4 * numbers["given"]
+        kept = np.array([numbers[name] for name in ("kinetic", "elastic", "place", "damped")]).sum(axis=0)
+        assert np.abs(kept).max() < 1e-4 * numbers["given"]
+    assert damped["damped"][-1] > 0.02 * damped["given"]
+    assert virial["error"] > 1e-3 * virial["given"]
+    # Falling as one stiff bar about the clamp, it would give m g L / 2 sin(a): less than 40 kg allow.
+    assert 20 < undamped["given"] < 0.5 * 40 * 9.81
+    same = [(p, damped if p["damping"] else undamped) for p in points if p["law"] == "st_venant_kirchhoff"]
+    assert _verdict(ENERGY_BUDGET, same + measured) is Verdict.AGREES
+    lost = [(points[2], {**undamped, "error": 0.01 * undamped["given"]}), *measured[1:]]
+    assert _verdict(ENERGY_BUDGET, same + lost) is Verdict.DIFFERS
+
+
+def test_a_free_body_keeps_its_momenta_but_under_cmpm():
+    points = MOMENTUM_BUDGET.points(Effort.QUICK)
+    measured = [(p, MOMENTUM_BUDGET.measure(p)) for p in points if p["law"] in ("virial", "springs", "cmpm")]
+    assert all(numbers["momentum"] < 2e-6 for _, numbers in measured)
+    for point, numbers in measured:
+        if point["law"] == "cmpm":
+            assert numbers["angular_momentum"] > (0.2 if point["damping"] else 1e-3)
+        else:
+            assert numbers["angular_momentum"] < 2e-6
+    known = {p["damping"]: n for p, n in measured if p["law"] == "virial"}
+    rest = ("face", "st_venant_kirchhoff", "neo_hookean", "volume_springs")
+    same = [(p, known[p["damping"]]) for p in points if p["law"] in rest]
+    assert _verdict(MOMENTUM_BUDGET, measured + same) is Verdict.AGREES
+    turned = [(p, {**n, "angular_momentum": 1e-3} if p["law"] == "face" else n) for p, n in same]
+    assert _verdict(MOMENTUM_BUDGET, measured + turned) is Verdict.DIFFERS
+    broken = [(p, {**n, "times": []} if p["law"] == "face" else n) for p, n in same]
+    assert _verdict(MOMENTUM_BUDGET, measured + broken) is Verdict.DIFFERS
+
+
+def _verdict(experiment, measured):
+    (finding,) = section_of(experiment, Results(tuple(Result(p, n) for p, n in measured))).findings
+    return finding.verdict
