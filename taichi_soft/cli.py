@@ -391,9 +391,9 @@ def report(
     concluded = run_experiments(
         chosen, effort, folder / "data", errors, workers=workers, cluster=cluster, arch=device.arch
     )
-    from taichi_soft.report.judgements import judge  # type: ignore[import-not-found]
-    from taichi_soft.report.page import write_report  # type: ignore[import-not-found]
-    from taichi_soft.report.terminal import print_section, print_verdicts  # type: ignore[import-not-found]
+    from taichi_soft.report.judgements import judge
+    from taichi_soft.report.page import write_report
+    from taichi_soft.report.terminal import print_section, print_verdicts
 
     if names and out is None:
         for experiment, results, section in concluded:
