@@ -37,7 +37,7 @@ EXPLICIT, IMPLICIT = (0.9, 1.3), (10.0, THESIS_GAIN, 300.0)
 
 def points(effort: Effort) -> list[Point]:
     """Falls with several steps, and the time that both take in turns."""
-    resolution, repeats = (3, 3) if effort is Effort.QUICK else (5, 5)
+    resolution, repeats = (3, 2) if effort is Effort.QUICK else (5, 5)
     falls = [("leapfrog", factor) for factor in EXPLICIT] + [
         ("implicit_euler", factor) for factor in IMPLICIT
     ]
