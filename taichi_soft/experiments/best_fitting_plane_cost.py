@@ -90,7 +90,8 @@ def conclude(results: Results) -> Section:
                 axes.bar(place + (i - 0.5) * 0.4, values, 0.4, label=law)
             axes.set_xticks(place, [mesh.replace(" ", "\n") for mesh in MESHES], fontsize="x-small")
             axes.set_ylabel(label)
-            axes.legend(fontsize="x-small")
+            if key == "step":
+                axes.legend(fontsize="x-small", loc="upper left")
         figure.tight_layout()
 
     return Section(

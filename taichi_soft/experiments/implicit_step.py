@@ -125,7 +125,7 @@ def conclude(results: Results) -> Section:
                 continue
             label = f"{name}, {1e3 * numbers['step']:.3g} ms"
             axes.plot(time, [HEIGHT, *numbers["height"]], "o-", markersize=3, label=label)
-        axes.axhline(RADIUS, color="grey", linestyle=":", label="at rest on the floor")
+        axes.axhline(RADIUS, color="grey", linestyle=":", label="radius of the sphere")
         axes.set_xlabel("time [s]")
         axes.set_ylabel("height of the centre [m]")
         axes.legend(fontsize="small")
