@@ -45,30 +45,38 @@ def vibration(mesh: TetMesh, material: Material, law: str) -> Vibration:
     return Vibration(float(roots.real.max()), float(np.abs(roots.imag).max()))
 
 
-def stays(mesh: TetMesh, material: Material, law: str, h: float) -> bool:
-    """Whether a body that is shaken a little stays near its shape over `STEPS` of leapfrog."""
-    noise = 1e-4 * mesh.edge_lengths.min() * np.random.default_rng(0).normal(size=mesh.vertices.shape)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UnstableStepWarning)
-        warnings.simplefilter("ignore", FrozenBodyWarning)
-        world = World(gravity=(0, 0, 0), floor=None)
-        body = world.add_body(mesh, material, law=law)
-        world.build()
-        body.set_motion(mesh.vertices + noise, np.zeros_like(noise))
-        for _ in range(STEPS // 20):
-            world.step(20 * h, 20)
-            gone = np.abs(body.positions() - mesh.vertices).max()
-            if body.is_frozen or gone > GROWTH * np.abs(noise).max():
-                return False
-    return True
+class ShakenBody:
+    """A body that is shaken a little, again and again."""
 
+    def __init__(self, mesh: TetMesh, material: Material, law: str) -> None:
+        """Float in no gravity."""
+        self.world = World(gravity=(0, 0, 0), floor=None)
+        self.body = self.world.add_body(mesh, material, law=law)
+        self.world.build()
+        self.rest = mesh.vertices
+        size = 1e-4 * mesh.edge_lengths.min()
+        self.noise = size * np.random.default_rng(0).normal(size=self.rest.shape)
 
-def largest_step(mesh: TetMesh, material: Material, law: str, guess: float) -> float:
-    """Largest step with which the body stays [s], 0 where it does not at `SHORTEST` either."""
-    low, high = SHORTEST * guess, LONGEST * guess
-    if not stays(mesh, material, law, low):
-        return 0.0
-    for _ in range(HALVINGS):
-        middle = (low + high) / 2
-        low, high = (middle, high) if stays(mesh, material, law, middle) else (low, middle)
-    return low
+    def stays(self, h: float) -> bool:
+        """Whether it stays near its shape over `STEPS` of leapfrog of h [s]."""
+        far = GROWTH * np.abs(self.noise).max()
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UnstableStepWarning)
+            warnings.simplefilter("ignore", FrozenBodyWarning)
+            self.body.set_motion(self.rest + self.noise, np.zeros_like(self.noise))
+            for _ in range(STEPS // 20):
+                self.world.step(20 * h, 20)
+                if self.body.is_frozen or np.abs(self.body.positions() - self.rest).max() > far:
+                    return False
+        return True
+
+    def largest_step(self) -> float:
+        """Largest step with which it stays [s], 0 where it does not at `SHORTEST` either."""
+        guess = self.body.stable_step.limit
+        low, high = SHORTEST * guess, LONGEST * guess
+        if not self.stays(low):
+            return 0.0
+        for _ in range(HALVINGS):
+            middle = (low + high) / 2
+            low, high = (middle, high) if self.stays(middle) else (low, middle)
+        return low
