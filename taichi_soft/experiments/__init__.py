@@ -23,12 +23,14 @@ from taichi_soft.experiments.leapfrog_reversal import REVERSAL
 from taichi_soft.experiments.linear_strain import LINEAR_STRAIN
 from taichi_soft.experiments.methods_cost import METHODS_COST
 from taichi_soft.experiments.patch_test import PATCH_TEST
+from taichi_soft.experiments.shear_modulus_volume import SHEAR_MODULUS_VOLUME
 from taichi_soft.experiments.volume_springs_shear import VOLUME_SPRINGS_SHEAR
 
 EXPERIMENTS: dict[str, Experiment] = {
     experiment.name: experiment
     for experiment in (
         REVERSAL,
+        SHEAR_MODULUS_VOLUME,
         VOLUME_SPRINGS_SHEAR,
         CYLINDER_STRETCH,
         CYLINDER_FORCES,
