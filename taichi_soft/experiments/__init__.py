@@ -24,6 +24,7 @@ from taichi_soft.experiments.linear_strain import LINEAR_STRAIN
 from taichi_soft.experiments.methods_cost import METHODS_COST
 from taichi_soft.experiments.patch_test import PATCH_TEST
 from taichi_soft.experiments.shear_modulus_volume import SHEAR_MODULUS_VOLUME
+from taichi_soft.experiments.volume_springs_limit import VOLUME_SPRINGS_LIMIT
 from taichi_soft.experiments.volume_springs_shear import VOLUME_SPRINGS_SHEAR
 
 EXPERIMENTS: dict[str, Experiment] = {
@@ -32,6 +33,7 @@ EXPERIMENTS: dict[str, Experiment] = {
         REVERSAL,
         SHEAR_MODULUS_VOLUME,
         VOLUME_SPRINGS_SHEAR,
+        VOLUME_SPRINGS_LIMIT,
         CYLINDER_STRETCH,
         CYLINDER_FORCES,
         METHODS_COST,
