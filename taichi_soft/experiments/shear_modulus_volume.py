@@ -90,8 +90,7 @@ def conclude(results: Results) -> Section:
             axes.plot(list(curve), np.abs(list(curve.values())), color + "o-", ms=3, label=label)
         axes.set_xlabel("shear modulus over E [1]")
         axes.set_ylabel("change of volume over that at rest [1]")
-        axes.set_xscale("log")
-        axes.set_yscale("log")
+        axes.set_ylim(bottom=0.0)
         axes.legend()
 
     return Section(

@@ -128,8 +128,8 @@ def conclude(results: Results) -> Section:
             Finding(
                 "volume-springs-limit",
                 f"largest nu that was tried and below which nothing grows: {told}; undamped, a motion grows "
-                f"at {undamped['growth'][-1]:.0f} 1/s with nu = {point['poisson'][-1]:g}. The largest step "
-                f"of leapfrog falls from {undamped['step'][0]:.1e} to {undamped['step'][-1]:.1e} s on the way",
+                f"at {undamped['growth'][-1]:.0f} 1/s with nu = {point['poisson'][-1]:g}. The largest "
+                f"step of leapfrog falls from {undamped['step'][0]:.1e} to {undamped['step'][-1]:.1e} s",
                 verdict,
                 why,
             ),
