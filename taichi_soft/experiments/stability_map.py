@@ -237,8 +237,7 @@ def _window_finding(results: Results, nu: float) -> Finding:
     if not (lower_agrees and calm):
         reasons.append(
             "the lower edge hangs on the reading: with sigma = 1/(2V) sum x f^T, as printed, forces are "
-            "twice as "
-            f"strong, and the edges half: {low / 2:.2g} to {first / 2:.2g} Pa"
+            f"twice as strong, and the edges half: {low / 2:.2g} to {first / 2:.2g} Pa"
         )
     return Finding(f"sphere-window-{nu}", measured, Verdict.DIFFERS, "; ".join(reasons))
 
