@@ -153,8 +153,7 @@ def conclude(results: Results) -> Section:
     measured = (
         f"on the floor ends deflect by up to {bend:.2f} of their bar's free length while that changes by "
         f"{100 * change:.0f} %; in a flight of {DT * (end - lift):.2f} s up to {100 * vibration:.0f} % of "
-        "the "
-        f"energy of the impact swings at {frequency:.1f} Hz"
+        f"the energy of the impact swings at {frequency:.1f} Hz"
     )
     why = ""
     if not (bends and vibrates):

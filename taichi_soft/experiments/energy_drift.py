@@ -112,17 +112,17 @@ def conclude(results: Results) -> Section:
     grown = {nu: growth(numbers) for nu, numbers in undamped.items()}
     conserved = [undamped[CONSERVATIVE], with_energy]
     drift = max(float(np.ptp(n["total"]) / n["total"][0]) for n in conserved)
-    zeta = damping_ratio(results.one(law="virial", poisson=CONSERVATIVE, damping=10.0))
-    damped = max(growth(n) for p, n in results.where(law="virial", damping=10.0))
+    least = _least_damping(results)
+    zeta = damping_ratio(results.one(law="virial", poisson=CONSERVATIVE, damping=least))
+    after = max(growth(n) for _, n in results.where(law="virial", damping=least))
     accumulates = min(grown[0.1], grown[0.4]) > GROWS
-    stops = damped < 1.0 and zeta < LITTLE
+    stops = after < 1.0 and zeta < LITTLE
     controls = max(growth(n) for n in conserved) < STAYS
     agrees = accumulates and stops and controls
     measured = (
-        f"undamped, kinetic energy of the last quarter over the first is {_words(grown[0.1])} at nu = 0.1 "
-        "and "
-        f"{_words(grown[0.4])} at 0.4; with damping of {100 * zeta:.1f} % of the critical it is {damped:.2g} "
-        "or less"
+        f"undamped, kinetic energy of the last quarter over the first: {_words(undamped[0.1])} at nu = 0.1, "
+        f"{_words(undamped[0.4])} at 0.4; with damping of {100 * zeta:.1f} % of the critical: {after:.2g} or "
+        "less"
     )
     cause = (
         f"the stress is no derivative of an energy: at nu = 1/4, where it is, the ratio is "
@@ -135,7 +135,7 @@ def conclude(results: Results) -> Section:
             p["poisson"],
             p["damping"],
             p["substeps"],
-            _words(growth(n)),
+            _words(n),
             float(f"{n['time'][-1]:.1f}"),
         )
         for p, n in results.where()
@@ -149,7 +149,7 @@ def conclude(results: Results) -> Section:
         (
             "A floating cube is let go stretched and twisted."
             + "".join(
-                f" With steps a quarter as long the ratio at nu = {p['poisson']} is {_words(growth(n))}."
+                f" With steps a quarter as long, at nu = {p['poisson']}: {_words(n)}."
                 for p, n in results.where(law="virial", substeps=24)
             ),
             cause[0].upper() + cause[1:] + ".",
@@ -169,14 +169,23 @@ def conclude(results: Results) -> Section:
     )
 
 
-def _words(ratio: float) -> str:
-    return f"{ratio:.2f}" if math.isfinite(ratio) else "without bound"
+def _least_damping(results: Results) -> float:
+    """The smallest that stops the growth at every Poisson's ratio; else the largest tried [N s/m]."""
+    damped = {p["damping"] for p, _ in results.where(law="virial") if p["damping"] > 0.0}
+    stops = [b for b in damped if max(growth(n) for _, n in results.where(law="virial", damping=b)) < 1.0]
+    return float(min(stops) if stops else max(damped))
+
+
+def _words(numbers: Numbers) -> str:
+    if numbers["frozen"]:
+        return f"runs away after {numbers['time'][-1]:.1f} s"
+    return f"{growth(numbers):.2f}"
 
 
 def _draw(figure: Any, results: Results) -> None:
     axes = figure.add_subplot()
     for p, n in results.where():
-        if p["substeps"] != 6:
+        if p["substeps"] != 6 or (p["damping"] and p["poisson"] not in (0.1, 0.4)):
             continue
         per_second = round(1 / (READ_EVERY * DT))
         count = len(n["kinetic"]) // per_second
@@ -184,9 +193,9 @@ def _draw(figure: Any, results: Results) -> None:
         conserves = p["law"] != "virial" or p["poisson"] == CONSERVATIVE
         name = "St. V.-K." if p["law"] != "virial" else "virial"
         label = f"{name}, nu = {p['poisson']:g}, b = {p['damping']:g} N s/m"
-        style: dict[str, Any] = {"color": "gray"} if conserves and p["damping"] == 0.0 else {}
-        style["linestyle"] = ":" if p["damping"] else "--" if name != "virial" else "-"
-        axes.plot(np.arange(count) + 0.5, means, label=label, **style)
+        color = "gray" if conserves else f"C{round(10 * p['poisson'])}"
+        line = ":" if p["damping"] else "--" if name != "virial" else "-"
+        axes.plot(np.arange(count) + 0.5, means, line, color=color, label=label)
     axes.set_yscale("log")
     axes.set_ylim(bottom=1.0)
     axes.set_xlabel("time [s]")

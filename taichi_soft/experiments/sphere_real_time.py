@@ -77,8 +77,7 @@ def conclude(results: Results) -> Section:
     threads = "one thread" if numbers["threads"] == 1 else f"{numbers['threads']} threads"
     measured = (
         f"{factor:.3g} times real time here on {threads} ({tets} tetrahedra), {factor / THESIS_FACTOR:.3g} "
-        "times "
-        f"the thesis's {THESIS_FACTOR}; compared is only whether it reaches that rate"
+        f"times the thesis's {THESIS_FACTOR}; compared is only whether it reaches that rate"
     )
     reaches = factor >= THESIS_FACTOR and not numbers["frozen"]
     if reaches:
@@ -104,8 +103,7 @@ def conclude(results: Results) -> Section:
     return Section(
         (
             "A processor of 2002 is not at hand: what the method costs there is not tested by this, only "
-            "that "
-            "the sphere runs at the thesis's rate or faster.",
+            "that the sphere runs at the thesis's rate or faster.",
         ),
         (finding,),
         (Table("rates", "Simulated over real time", columns, rows),),
