@@ -17,7 +17,7 @@ LINEAR, QUADRATIC = "linear finite elements", "quadratic finite elements"
 
 
 def stiffness_over_theory(point: Point, length: float, loads: Sequence[str]) -> Numbers:
-    """Ratio by load, and the size of the mesh.
+    """Ratio by load, and the size of the mesh; displacements, (n, 3) [m] by load, where the point is "drawn".
 
     Args:
         point: "law" (or `LINEAR`, `QUADRATIC`), "strain", and "cells" across the bar.
@@ -26,13 +26,16 @@ def stiffness_over_theory(point: Point, length: float, loads: Sequence[str]) -> 
     """
     mesh = irregular_block(length, WIDTH, point["cells"])
     material = Material(YOUNG, POISSON, DENSITY)
+    expected = theory(YOUNG, POISSON, length, WIDTH)
     cases = free_ends(mesh)
+    numbers: Numbers = {"vertices": len(mesh.vertices), "tets": len(mesh.tets)}
     if point["law"] in (LINEAR, QUADRATIC):
         elements = FiniteElements(mesh, material, quadratic=point["law"] == QUADRATIC)
-        found = {name: elements.solve(cases[name])[0] for name in loads}
-    else:
-        body = StaticBody(mesh, material, point["law"], point["strain"])
-        found = {name: cases[name].stiffness(body.equilibrium(cases[name].loading)) for name in loads}
-    expected = theory(YOUNG, POISSON, length, WIDTH)
-    ratios = {name: found[name] / expected[name] for name in loads}
-    return {**ratios, "vertices": len(mesh.vertices), "tets": len(mesh.tets)}
+        return numbers | {name: elements.solve(cases[name])[0] / expected[name] for name in loads}
+    body = StaticBody(mesh, material, point["law"], point["strain"])
+    settled = {name: body.equilibrium(cases[name].loading) for name in loads}
+    if point.get("drawn"):
+        numbers["displacements"] = {
+            name: found.displacement.round(8).tolist() for name, found in settled.items()
+        }
+    return numbers | {name: cases[name].stiffness(settled[name]) / expected[name] for name in loads}

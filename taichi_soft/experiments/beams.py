@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from taichi_soft.experiments.bar_picture import bar_picture
 from taichi_soft.experiments.bar_stiffness import (
     LINEAR,
     POISSON,
@@ -17,6 +18,7 @@ from taichi_soft.experiments.experiment import (
     Experiment,
     Finding,
     Numbers,
+    Picture,
     Plot,
     Point,
     Results,
@@ -28,6 +30,8 @@ from taichi_soft.experiments.law_variants import is_tetrahedral, label, variants
 from taichi_soft.experiments.stiffness_dots import draw_stiffness_dots
 
 LENGTH = 4.0
+EXAGGERATION = 250.0
+"""Of the picture."""
 LOADS = ("tension", "torsion", "bending", "cantilever")
 EXACT = 1e-3
 """Of tension: linear tetrahedra hold a uniform stress exactly, so that only the strain's size is left."""
@@ -54,7 +58,7 @@ def points(effort: Effort) -> list[Point]:
     """Every law and finite elements on one mesh, one law and linear ones on two finer meshes."""
     coarse, middle, fine = (2, 3, 4) if effort is Effort.QUICK else (5, 6, 8)
     laws = variants()
-    finer = [{**laws[0], "cells": cells} for cells in (fine, middle)]
+    finer = [{**laws[0], "cells": fine}, {**laws[0], "cells": middle, "drawn": True}]
     names = ((LINEAR, fine), (LINEAR, middle), (LINEAR, coarse), (QUADRATIC, min(coarse, 4)))
     elements = [{"law": name, "strain": None, "cells": cells} for name, cells in names]
     return [*({**variant, "cells": coarse} for variant in laws), *finer, *elements]
@@ -140,6 +144,14 @@ def conclude(results: Results) -> Section:
                 "that theory is right.",
                 draw,
                 (7.5, 5.6),
+            ),
+        ),
+        (
+            Picture(
+                "bars",
+                f"The loads, displacements {EXAGGERATION:g} times as large, coloured by how far each part "
+                "has moved.",
+                bar_picture(LENGTH, cells[0], middle["displacements"], EXAGGERATION),
             ),
         ),
     )

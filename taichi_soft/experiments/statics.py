@@ -90,11 +90,11 @@ class StaticBody:
             return self._at_rest
         return self._differences(displacement)
 
-    def equilibrium(self, loading: Loading, tolerance: float = 1e-9) -> Equilibrium:
+    def equilibrium(self, loading: Loading, tolerance: float = 1e-7) -> Equilibrium:
         """Where the body settles.
 
         Args:
-            tolerance: of `Equilibrium.residual`.
+            tolerance: of `Equilibrium.residual`; "best_fitting_plane" knows its planes to some 1e-8 only.
         Raises: NoEquilibriumError.
         """
         free = ~loading.driven.ravel()

@@ -79,11 +79,11 @@ def test_reactions_balance_forces_and_large_stretch_converges():
     body = StaticBody(BLOCK, MATERIAL, "virial")
     cantilever = free_ends(BLOCK)["cantilever"]
     settled = body.equilibrium(cantilever.loading)
-    assert settled.residual < 1e-9
+    assert settled.residual < 1e-7
     assert (settled.reactions + cantilever.loading.forces).sum(axis=0) == pytest.approx(0, abs=1e-6)
     far = held_ends(BLOCK)["tension"].loading
     pulled = body.equilibrium(Loading(far.driven, far.displacement * 3000, far.forces))
-    assert pulled.residual < 1e-9
+    assert pulled.residual < 1e-7
     assert np.ptp(pulled.displacement[:, 0]) == pytest.approx(0.6)
 
 
