@@ -161,7 +161,7 @@ def _finding(results: Results, support: str, claim: str) -> Finding:
     worst = max(abs(parts[law]) for law in TETRAHEDRAL)
     expected, promised = theory(support), _extrapolated(results, support)
     agrees = worst < SAME_MESH and abs(promised / expected - 1) < EXTRAPOLATED
-    others = [part for law, part in parts.items() if law not in TETRAHEDRAL]
+    others = [part for law, part in parts.items() if law not in TETRAHEDRAL and part > -1]  # whole ones
     return Finding(
         claim,
         f"the laws on tetrahedra are within {worst:.2%} of finite elements on the same mesh, which is "

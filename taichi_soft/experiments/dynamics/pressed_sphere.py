@@ -1,0 +1,81 @@
+"""An elastic sphere, held by its cap and pressed on a rigid plane."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft import Material, PlaneShape, TetMesh, World, internal_forces, sphere
+
+Floats = NDArray[np.float64]
+
+RADIUS = 0.5  # m
+MATERIAL = Material(young=1e6, poisson=0.3, density=1000.0)
+GRADED = 0.6
+"""By which the mesh is drawn to its lowest point: edges there are (1 - 0.6) / (1 + 0.6) = 1/4 as long."""
+DEPTHS = (0.005, 0.01, 0.02, 0.04)  # over the radius
+FRICTIONLESS, BRAKE = 0.0, 100.0  # 1, 1/s
+DT, LOWERING, RESTING = 0.005, 10, 30  # s; steps to each depth, and at rest there
+
+
+def hertz_force(depth: float) -> float:
+    """4/3 E* sqrt(R) d^(3/2) [N]."""
+    modulus = float(np.unique(MATERIAL.young)[0]) / (1 - float(np.unique(MATERIAL.poisson)[0]) ** 2)
+    return float(4 / 3 * modulus * np.sqrt(RADIUS) * depth**1.5)
+
+
+def graded_sphere(resolution: int, grading: float) -> TetMesh:
+    """A ball, with smaller elements near its lowest point.
+
+    A Moebius map of the ball onto itself draws it down: it keeps spheres spheres and angles as they are.
+    """
+    ball = sphere(1.0, resolution)
+    x, a = ball.vertices, np.array([0.0, 0.0, -grading])
+    square, along = (x**2).sum(axis=1)[:, None], (x @ a)[:, None]
+    drawn = (1 + 2 * along + square) * a + (1 - grading**2) * x
+    return TetMesh(RADIUS * drawn / (1 + 2 * along + grading**2 * square), ball.tets)
+
+
+def cap(mesh: TetMesh) -> NDArray[np.int64]:
+    """Vertices above half of the radius, which are held."""
+    return np.flatnonzero(mesh.vertices[:, 2] > 0.5 * RADIUS)
+
+
+def press_on_floor(mesh: TetMesh, law: str) -> list[float]:
+    """What holds the cap when it was lowered by each depth [N], from the positions in float64."""
+    held, ground = cap(mesh), float(mesh.vertices[:, 2].min())
+    world = World(gravity=(0, 0, 0), floor=ground, friction=FRICTIONLESS)
+    body = world.add_body(mesh, MATERIAL, law=law, pinned=held)
+    world.build()
+    body.set_linear_damping(BRAKE)
+    substeps = 2 * world.stable_substeps(DT)
+    forces, reached = list[float](), 0.0
+    for depth in DEPTHS:
+        for step in range(LOWERING + RESTING):
+            now = min(1.0, (step + 1) / LOWERING) * (depth - reached) + reached
+            body.set_targets(held, mesh.vertices[held] - (0.0, 0.0, now * RADIUS))
+            world.step(DT, substeps)
+        reached = depth
+        pulls = internal_forces(mesh, MATERIAL, body.positions().astype(np.float64), law=law)
+        forces.append(float(pulls[held, 2].sum()))
+    return forces
+
+
+def press_plane(mesh: TetMesh, law: str) -> list[float]:
+    """The same with a plane that rises, from the impulse that it reports."""
+    ground = float(mesh.vertices[:, 2].min())
+    world = World(gravity=(0, 0, 0), floor=None)
+    body = world.add_body(mesh, MATERIAL, law=law, pinned=cap(mesh))
+    plane = world.add_collider(PlaneShape((0, 0, 1)), position=(0, 0, ground), friction=FRICTIONLESS)
+    world.build()
+    body.set_linear_damping(BRAKE)
+    substeps = 2 * world.stable_substeps(DT)
+    forces, reached = list[float](), 0.0
+    for depth in DEPTHS:
+        for step in range(LOWERING + RESTING):
+            now = min(1.0, (step + 1) / LOWERING) * (depth - reached) + reached
+            plane.move_to((0, 0, ground + now * RADIUS))
+            world.step(DT, substeps)
+        reached = depth
+        forces.append(-float(plane.impulse[2]) / DT)
+    return forces
