@@ -10,7 +10,7 @@ from taichi_soft.experiments.cylinder_forces import CYLINDER_FORCES
 from taichi_soft.experiments.cylinder_stretch import CYLINDER_STRETCH
 from taichi_soft.experiments.damping_rotation import DAMPING_ROTATION
 from taichi_soft.experiments.density_bounce import DENSITY_BOUNCE
-from taichi_soft.experiments.dynamics import ENERGY_BUDGET, FREQUENCIES, MOMENTUM_BUDGET, WAVE_SPEED
+from taichi_soft.experiments.dynamics import ENERGY_BUDGET, FREQUENCIES, HERTZ, MOMENTUM_BUDGET, WAVE_SPEED
 from taichi_soft.experiments.energy_drift import ENERGY_DRIFT
 from taichi_soft.experiments.experiment import (
     Effort,
@@ -44,9 +44,11 @@ from taichi_soft.experiments.mesh_convergence import CONVERGENCE
 from taichi_soft.experiments.mesh_quality import MESH_QUALITY
 from taichi_soft.experiments.methods_cost import METHODS_COST
 from taichi_soft.experiments.patch_test import PATCH_TEST
+from taichi_soft.experiments.shear_modulus_volume import SHEAR_MODULUS_VOLUME
 from taichi_soft.experiments.sphere_real_time import SPHERE_REAL_TIME
 from taichi_soft.experiments.stability_map import STABILITY_MAP
 from taichi_soft.experiments.tilted_plane import TILTED_PLANE
+from taichi_soft.experiments.volume_springs_limit import VOLUME_SPRINGS_LIMIT
 from taichi_soft.experiments.volume_springs_shear import VOLUME_SPRINGS_SHEAR
 
 EXPERIMENTS: dict[str, Experiment] = {
@@ -65,7 +67,9 @@ EXPERIMENTS: dict[str, Experiment] = {
         FIG_4_7,
         BEST_FITTING_PLANE_COST,
         TILTED_PLANE,
+        SHEAR_MODULUS_VOLUME,
         VOLUME_SPRINGS_SHEAR,
+        VOLUME_SPRINGS_LIMIT,
         CYLINDER_FORCES,
         CYLINDER_STRETCH,
         LINEAR_STRAIN,
@@ -84,6 +88,7 @@ EXPERIMENTS: dict[str, Experiment] = {
         CONVERGENCE,
         FREQUENCIES,
         WAVE_SPEED,
+        HERTZ,
         ENERGY_BUDGET,
         MOMENTUM_BUDGET,
     )
