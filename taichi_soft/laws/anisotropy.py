@@ -4,9 +4,7 @@ Their stiffness is known in the axes of the rest shape, so the strain has to be 
 the stretch U of F = U R it takes the rotation R, which isotropic laws do not need.
 """
 
-from taichi_soft.laws.strain import from_axes
 from taichi_soft.math.polar import orthogonal_factor
-from taichi_soft.math.svd import signed_svd
 from taichi_soft.math.tensors import (
     inner_square,
     product,
@@ -46,8 +44,7 @@ def green_stress(F, stiffness):
 def turned_stress(model: ti.template(), F, stiffness):
     """Stress R (C : R^T eps R) R^T of the strain that the model names [Pa], as columns.
 
-    In a mirrored tetrahedron R mirrors too, so that its stress is that of the mirror image;
-    `recovered_stress` has the flipped ones of "recover".
+    In a mirrored tetrahedron R mirrors too, so that its stress is that of the mirror image.
     """
     R = orthogonal_factor(F)
     if ti.static(model.strain == Strain.EXACT):
@@ -64,22 +61,12 @@ def _between(M, columns):
 
 
 @ti.func
-def recovered_stress(model: ti.template(), F, stiffness):
-    """Stress of a flipped tetrahedron that is to find back [Pa], as columns: see `laws.recovery`.
-
-    In the axes of the stretches, what pulls axes 0 and 1 together or shears them against each other changes
-    sign, as the areas across them are negative; at flat, where only the area across axis 2 is left, all is as
-    in an upright tetrahedron.
-    """
-    U, s, V = signed_svd(F)
-    strain = s - 1.0
-    if ti.static(model.strain == Strain.LINEAR):
-        strain = 0.5 * (s * s - 1.0)
-        strain.z = s.z - 0.5
-    rest = anisotropic_stress(from_axes(strain, V), stiffness)
-    S = product(transposed(V), product(rest, V))
-    turned = ti.Vector([-S[0].x, -S[0].y, S[0].z]), ti.Vector([-S[1].x, -S[1].y, S[1].z]), S[2]
-    return _between(U, turned)
+def wave_modulus(stiffness):
+    """What pressure waves meet, the mean over all directions [Pa]: 1/15 (C_iijj + 2 C_ijij)."""
+    normal, shear = stiffness[0], stiffness[2]
+    along = normal[0].x + normal[1].y + normal[2].z
+    lateral = normal[1].x + normal[2].x + normal[2].y
+    return (3.0 * along + 2.0 * lateral + 4.0 * (shear[0].x + shear[1].y + shear[2].z)) / 15.0
 
 
 @ti.func

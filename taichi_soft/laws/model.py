@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 from taichi_soft.errors import OptionError
 from taichi_soft.laws import strain as strains
-from taichi_soft.laws.anisotropy import green_stress, recovered_stress, turned_stress
+from taichi_soft.laws.anisotropy import green_stress, turned_stress, wave_modulus
 from taichi_soft.laws.bonds import Ring
 from taichi_soft.laws.energy import energy_forces
 from taichi_soft.laws.hooke import hooke_stress
 from taichi_soft.laws.law import BondLaw, EnergyLaw, Law
-from taichi_soft.laws.recovery import recovering_stress
+from taichi_soft.laws.recovery import recovering_piola
 from taichi_soft.math.tensors import determinant, product
 from taichi_soft.math.tetrahedron import shape
 from taichi_soft.runtime import ti
@@ -124,9 +124,8 @@ def upright_forces(model: ti.template(), x0, x1, x2, x3, rest_inverse, elasticit
 @ti.func
 def flipped_forces(model: ti.template(), x0, x1, x2, x3, rest_inverse, elasticity):
     """Forces of `flips="recover"` on a tetrahedron whose volume is negative [N]."""
-    B = shape(x0, x1, x2, x3)
-    F = product(B, rest_inverse)
+    F = product(shape(x0, x1, x2, x3), rest_inverse)
     if ti.static(model.is_anisotropic):
-        return model.law.forces(B, recovered_stress(model, F, elasticity))
+        return energy_forces(recovering_piola(F, wave_modulus(elasticity)), rest_inverse)
     else:
-        return model.law.forces(B, recovering_stress(model.strain, F, elasticity[0], elasticity[1]))
+        return energy_forces(recovering_piola(F, elasticity[0] + 2.0 * elasticity[1]), rest_inverse)

@@ -36,18 +36,18 @@ def hooke_principal(model: ti.template(), s, lame_lambda, lame_mu):
     strain, rate = 0.5 * (t * t - 1.0), t
     if ti.static(model.strain == Strain.EXACT):
         strain, rate = ti.abs(t) - 1.0, ti.select(t < 0.0, -1.0, 1.0) + t * 0.0
-    turned = s * 0.0 + 1.0
-    if ti.static(model.flips == Flips.RECOVER):
-        if s.z < 0.0:  # as `recovering_stress`
-            strain.z = s.z - (1.0 if ti.static(model.strain == Strain.EXACT) else 0.5)
-            rate.z = mirror
-            turned.x, turned.y = -turned.x, -turned.y
-    stress = (2.0 * lame_mu * strain + lame_lambda * strain.sum()) * turned
+    stress = 2.0 * lame_mu * strain + lame_lambda * strain.sum()
     others, changes = cofactors(t)
     p = stress * others
     signs = s * 0.0 + 1.0
     signs.z = mirror
-    c0 = (lame_lambda + 2.0 * lame_mu * axis_of(s, 0)) * rate.x * turned * others + stress * changes[0]
-    c1 = (lame_lambda + 2.0 * lame_mu * axis_of(s, 1)) * rate.y * turned * others + stress * changes[1]
-    c2 = (lame_lambda + 2.0 * lame_mu * axis_of(s, 2)) * rate.z * turned * others + stress * changes[2]
-    return p * signs, (c0 * signs, c1 * signs, c2 * signs * mirror)
+    c0 = (lame_lambda + 2.0 * lame_mu * axis_of(s, 0)) * rate.x * others + stress * changes[0]
+    c1 = (lame_lambda + 2.0 * lame_mu * axis_of(s, 1)) * rate.y * others + stress * changes[1]
+    c2 = (lame_lambda + 2.0 * lame_mu * axis_of(s, 2)) * rate.z * others + stress * changes[2]
+    p, c0, c1, c2 = p * signs, c0 * signs, c1 * signs, c2 * signs * mirror
+    if ti.static(model.flips == Flips.RECOVER):
+        if s.z < 0.0:  # as `recovering_piola`
+            modulus = lame_lambda + 2.0 * lame_mu
+            p = (s - 1.0) * modulus
+            c0, c1, c2 = axis_of(s, 0) * modulus, axis_of(s, 1) * modulus, axis_of(s, 2) * modulus
+    return p, (c0, c1, c2)

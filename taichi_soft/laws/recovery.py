@@ -1,29 +1,22 @@
-"""Stress that turns a flipped tetrahedron right side out again.
+"""What turns a flipped tetrahedron right side out again.
 
-F has principal stretches s0 >= s1 >= |s2|; where it is flipped, the last counts negative. Hooke's law takes
-their strains, which go on past flat: s2 - 1 for the exact strain; s2 - 1/2 for the linear one, whose square
-(eq. 6.7) has its minimum at zero and would stop pushing back there.
+Hooke's laws lose their hold on a tetrahedron pressed flat: their forces are stress times deformed area, and
+there only the area across the thinnest axis is left. Behind it they would have nothing to go on with. So a
+flipped tetrahedron follows an energy of its own, psi = M/2 |F - R|^2, with R the rotation nearest to F and M the
+modulus of pressure waves, lambda + 2 mu: it draws each vertex straight to where it belongs, is zero at the
+shape at rest only, and its force adds no energy. (Corotated elasticity without lateral contraction, which would
+draw what is stretched along one axis further inside out along another.)
 
-The laws multiply the stress of each axis by the area across it, and across axes 0 and 1 that area is negative
-in a flipped tetrahedron: what should pull a stretched axis together would tear it apart. So their stress
-changes sign here. At flat these areas are zero, so the force stays continuous.
-
-This force has no energy; `kernels.flips` says what that asks for.
+Where a tetrahedron turns over its force jumps: `kernels.flips` says what that asks for.
 """
 
-from taichi_soft.laws.strain import from_axes, principal_stretches
+from taichi_soft.math.svd import signed_svd
+from taichi_soft.math.tensors import plus, product, transposed
 from taichi_soft.runtime import ti
-from taichi_soft.types import Strain
 
 
 @ti.func
-def recovering_stress(kind: ti.template(), F, lame_lambda, lame_mu):
-    """Stress of a flipped tetrahedron [Pa], as columns; `kind` is the strain of the upright ones."""
-    stretch, axes = principal_stretches(F)
-    strain = stretch - 1.0
-    if ti.static(kind == Strain.LINEAR):
-        strain = 0.5 * (stretch * stretch - 1.0)
-        strain.z = stretch.z - 0.5
-    stress = 2.0 * lame_mu * strain + lame_lambda * strain.sum()
-    stress.x, stress.y = -stress.x, -stress.y
-    return from_axes(stress, axes)
+def recovering_piola(F, modulus):
+    """P = M (F - R) [Pa], as columns, of F with a negative determinant."""
+    U, _, V = signed_svd(F)
+    return plus(F, modulus, product(U, transposed(V)), -modulus)

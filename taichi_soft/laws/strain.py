@@ -4,10 +4,8 @@ F = U R carries the rest shape into the deformed one; F F^T = U^2 holds no rotat
 F as columns and return a symmetric 3x3 strain as columns.
 """
 
-from taichi_soft.math.eigen import symmetric_eigen
 from taichi_soft.math.polar import orthogonal_factor
 from taichi_soft.math.tensors import (
-    determinant,
     outer_square,
     product,
     scaled_plus_identity,
@@ -27,22 +25,6 @@ def linear_strain(F):
 def exact_strain(F):
     """U - I with U = sqrt(F F^T) = F R^T, the root that thesis chapter 7 leaves open. Blind to flips."""
     return scaled_plus_identity(symmetric_part(product(F, transposed(orthogonal_factor(F)))), 1.0, -1.0)
-
-
-@ti.func
-def principal_stretches(F):
-    """Stretches, largest first, the last with the sign of det F; and their axes as columns.
-
-    The smallest one is det F / (s0 s1): the root of a small eigenvalue would lose half the digits.
-    """
-    squares, axes = symmetric_eigen(outer_square(F))
-    s0 = ti.sqrt(ti.max(squares.x, 0.0))
-    s1 = ti.sqrt(ti.max(squares.y, 0.0))
-    s2 = s0 * 0.0
-    area = s0 * s1
-    if area > 0.0:
-        s2 = ti.max(ti.min(determinant(F) / area, s1), -s1)
-    return ti.Vector([s0, s1, s2]), axes
 
 
 @ti.func

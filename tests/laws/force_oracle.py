@@ -39,20 +39,26 @@ def hooke(strain, lame_lambda, lame_mu):
     return lame_lambda * np.trace(strain) * np.eye(3) + 2 * lame_mu * strain
 
 
-def stress_of(F, strain, flips, lame_lambda, lame_mu):
-    """Stress from the singular values of F [Pa].
-
-    A flipped tetrahedron that recovers counts its smallest stretch negative; and as the areas across its
-    other two axes are negative, the stresses of these change sign.
-    """
+def stress_of(F, strain, lame_lambda, lame_mu):
+    """Stress from the singular values of F [Pa]."""
     axes, stretches, _ = np.linalg.svd(F)
     strains = (stretches**2 - 1) / 2 if strain == "linear" else stretches - 1
-    signs = np.ones(3)
-    if flips == "recover" and np.linalg.det(F) < 0:
-        strains[2] = -stretches[2] - (0.5 if strain == "linear" else 1.0)
-        signs[:2] = -1
-    stresses = signs * np.diag(hooke(np.diag(strains), lame_lambda, lame_mu))
-    return (axes * stresses) @ axes.T
+    return (axes * np.diag(hooke(np.diag(strains), lame_lambda, lame_mu))) @ axes.T
+
+
+def nearest_rotation(F):
+    """The rotation R for which |F - R| is least."""
+    axes, _, turn = np.linalg.svd(F)
+    axes[:, 2] *= np.linalg.det(axes @ turn)
+    return axes @ turn
+
+
+def recovering_forces(rest, corners, modulus):
+    """Of a flipped tetrahedron that finds back: -d/dx of V M/2 |F - R|^2, whose R may be held fast [N]."""
+    F = deformation(rest, corners)
+    inverse = np.linalg.inv((rest[1:] - rest[0]).T)
+    rows = np.vstack([-inverse.sum(axis=0), inverse])
+    return -signed_volume(rest) * modulus * rows @ (F - nearest_rotation(F)).T
 
 
 def strain_by_root(F, kind):
@@ -95,7 +101,11 @@ def elastic_forces(mesh, young, poisson, positions, strain="linear", flips="tole
         mesh.tets, np.broadcast_to(young, count), np.broadcast_to(poisson, count), strict=True
     ):
         corners = positions[tet]
-        stress = stress_of(deformation(mesh.vertices[tet], corners), strain, flips, *lame(E, nu))
+        lame_lambda, lame_mu = lame(E, nu)
+        if flips == "recover" and signed_volume(corners) < 0:
+            forces[tet] += recovering_forces(mesh.vertices[tet], corners, lame_lambda + 2 * lame_mu)
+            continue
+        stress = stress_of(deformation(mesh.vertices[tet], corners), strain, lame_lambda, lame_mu)
         areas = area_vectors(corners)
         if flips == "tolerant" and signed_volume(corners) < 0:
             areas = -areas  # outward again

@@ -12,18 +12,20 @@ WRECKS = {
     "flattened": BALL.vertices * (1, 1, 0),
     "turned inside out": -BALL.vertices,
     "shrunk to a point": BALL.vertices * 1e-3,
+    "drawn into a line": BALL.vertices * (1, 0, 0),
 }
 
 
 @pytest.mark.parametrize("strain", ["linear", "exact"])
+@pytest.mark.parametrize("poisson", [0.2, 0.45])
 @pytest.mark.parametrize("wreck", WRECKS)
-def test_a_wrecked_body_finds_its_shape_again(strain, wreck):
+def test_a_wrecked_body_finds_its_shape_again(strain, poisson, wreck):
     world = World(gravity=(0, 0, 0), floor=None)
-    body = world.add_body(BALL, Material(1e5, 0.2, 1000, 200), strain=strain, flips="recover")
+    body = world.add_body(BALL, Material(1e5, poisson, 1000, 200), strain=strain, flips="recover")
     world.build()
     start = WRECKS[wreck] + RNG.normal(scale=1e-3, size=BALL.vertices.shape)
     body.set_motion(start, np.zeros_like(start))
-    for _ in range(900):
+    for _ in range(600):
         world.step(1 / 60, 8)
     assert not body.is_frozen
     assert body.flipped_count() == 0
@@ -40,30 +42,20 @@ def volume_rate(x, v):
     return np.sum(gradient * v), gradient
 
 
-def braked(x, v, rest, share):
-    """Velocities after that share of what leads further astray is gone: volume first, then edge by edge."""
-    v = v.copy()
+def braked(x, v, share):
+    """Velocities after that share of the speed at which the volume falls is gone."""
     rate, gradient = volume_rate(x, v)
-    v -= share * min(rate, 0.0) / np.sum(gradient**2) * gradient
-    for p, q in ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)):
-        length = np.linalg.norm(x[q] - x[p])
-        n = (x[q] - x[p]) / length
-        speed = n.dot(v[q] - v[p])
-        if speed * (length - np.linalg.norm(rest[q] - rest[p])) > 0:
-            v[p] += share * speed / 2 * n
-            v[q] -= share * speed / 2 * n
-    return v
+    return v - share * min(rate, 0.0) / np.sum(gradient**2) * gradient
 
 
-@pytest.mark.parametrize("sign", [1, -1])
-def test_a_flipped_tetrahedron_loses_a_tenth_of_what_leads_it_further_astray_in_every_substep(sign):
+def test_a_flipped_tetrahedron_loses_a_tenth_of_the_speed_at_which_its_volume_falls_in_every_substep():
     """Undamped, against leapfrog in NumPy with the brake, and without it."""
     corners = np.array([[0, 0, 0], [1.0, 0, 0], [0, 1.2, 0], [0.1, 0.2, 0.8]])
     mesh = TetMesh(corners, np.array([[0, 1, 2, 3]]))
     material = Material(1e4, 0.3, 1000.0)
     x = corners * (1, 1.1, -0.9)
-    v = sign * volume_rate(x, x)[1] + np.random.default_rng(0).normal(size=(4, 3))
-    assert sign * volume_rate(x, v)[0] > 0
+    v = -volume_rate(x, x)[1] + np.random.default_rng(0).normal(size=(4, 3))
+    assert volume_rate(x, v)[0] < 0
     world = World(gravity=(0, 0, 0), floor=None)
     body = world.add_body(mesh, material, flips="recover")
     world.build()
@@ -75,7 +67,7 @@ def test_a_flipped_tetrahedron_loses_a_tenth_of_what_leads_it_further_astray_in_
         for at, speed, share in ((x, v, 0.1), (free_x, free_v, 0.0)):
             assert np.linalg.det(at[1:] - at[0]) < 0
             force = internal_forces(mesh, material, at, flips="recover")
-            speed[:] = braked(at, speed, corners, share) + force / mass * kick
+            speed[:] = braked(at, speed, share) + force / mass * kick
             at += speed * h
         kick = h
     assert np.abs(free_x - x).max() > 1e-2
@@ -83,7 +75,7 @@ def test_a_flipped_tetrahedron_loses_a_tenth_of_what_leads_it_further_astray_in_
 
 
 def test_a_flipped_tetrahedron_on_its_way_back_is_not_braked():
-    """Mirrored and too large it shrinks: leapfrog in NumPy without any brake."""
+    """Mirrored and shrinking: leapfrog in NumPy without any brake."""
     corners = np.array([[0, 0, 0], [1.0, 0, 0], [0, 1.2, 0], [0.1, 0.2, 0.8]])
     mesh = TetMesh(corners, np.array([[0, 1, 2, 3]]))
     material = Material(1e4, 0.3, 1000.0)
@@ -95,7 +87,7 @@ def test_a_flipped_tetrahedron_on_its_way_back_is_not_braked():
     body.set_motion(x, v)
     h, mass, kick = 1e-4, 1000.0 * mesh.volumes[0] / 4, 5e-5
     for _ in range(30):
-        np.testing.assert_array_equal(braked(x, v, corners, 0.1), v)
+        np.testing.assert_array_equal(braked(x, v, 0.1), v)
         world.step(h, 1)
         v += internal_forces(mesh, material, x, flips="recover") / mass * kick
         x += v * h
