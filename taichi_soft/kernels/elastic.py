@@ -7,7 +7,6 @@ the next lane reads), and index arithmetic must be seen not to overflow, which m
 """
 
 from taichi_soft.constants import LANES
-from taichi_soft.kernels.flips import brake_flipped
 from taichi_soft.laws.damping import tet_mean_damping_forces
 from taichi_soft.laws.model import flipped_forces, upright_forces
 from taichi_soft.math.tensors import widened
@@ -107,8 +106,7 @@ def lane_forces(state: ti.template(), model: ti.template(), block, lane):
 
 @ti.func
 def block_forces(state: ti.template(), model: ti.template(), block):
-    """Forces of a block's tetrahedra on their corners [N], four matrices (LANES, 4), the last column zero;
-    and, where flips are repaired, six times the volumes [m^3]."""
+    """Forces of a block's tetrahedra on their corners [N], four matrices (LANES, 4), the last column zero."""
     g0 = ti.Matrix.zero(state.real, LANES, 4)
     g1 = ti.Matrix.zero(state.real, LANES, 4)
     g2 = ti.Matrix.zero(state.real, LANES, 4)
@@ -138,13 +136,12 @@ def block_forces(state: ti.template(), model: ti.template(), block):
                     g1[lane, i] = f1[i]
                     g2[lane, i] = f2[i]
                     g3[lane, i] = f3[i]
-    return g0, g1, g2, g3, volumes
+    return g0, g1, g2, g3
 
 
 @ti.func
 def accumulate_elastic_forces(state: ti.template(), model: ti.template(), body):
-    """Add the forces of all tetrahedra of one body to its particles, block by block, in one thread, and brake
-    those that are to recover."""
+    """Add the forces of all tetrahedra of one body to its particles, block by block, in one thread."""
     blocks = state.body_blocks[body]
     for number in range(blocks[0], blocks[1]):
         block = number & BLOCK_BITS
@@ -157,10 +154,6 @@ def accumulate_elastic_forces(state: ti.template(), model: ti.template(), body):
                 force = ti.Vector([forces[corner][lane, i] for i in ti.static(range(4))])
                 # Not `+=`, which Taichi makes atomic: one thread owns the body.
                 state.particle_force[p] = state.particle_force[p] + force
-        if ti.static(model.repairs_flips):
-            for lane in range(LANES):
-                if forces[4][lane] < 0.0:
-                    brake_flipped(state, block, lane)
 
 
 @ti.func

@@ -5,6 +5,7 @@ consistent invertible elasticity). The laws of thesis chapter 6 have p_a = sigma
 other two stretches, since forces are stress times deformed area.
 """
 
+from taichi_soft.laws.recovery import recovering_principal
 from taichi_soft.runtime import ti
 from taichi_soft.types import Flips, Strain
 
@@ -46,8 +47,7 @@ def hooke_principal(model: ti.template(), s, lame_lambda, lame_mu):
     c2 = (lame_lambda + 2.0 * lame_mu * axis_of(s, 2)) * rate.z * others + stress * changes[2]
     p, c0, c1, c2 = p * signs, c0 * signs, c1 * signs, c2 * signs * mirror
     if ti.static(model.flips == Flips.RECOVER):
-        if s.z < 0.0:  # as `recovering_piola`
-            modulus = lame_lambda + 2.0 * lame_mu
-            p = (s - 1.0) * modulus
-            c0, c1, c2 = axis_of(s, 0) * modulus, axis_of(s, 1) * modulus, axis_of(s, 2) * modulus
+        if s.z < 0.0:
+            p, rate = recovering_principal(s, lame_lambda + 2.0 * lame_mu)
+            c0, c1, c2 = axis_of(rate, 0) * rate.x, axis_of(rate, 1) * rate.y, axis_of(rate, 2) * rate.z
     return p, (c0, c1, c2)

@@ -54,7 +54,7 @@ def stress_in(frame, matrix, strain):
 
 
 def mean_wave_modulus(matrix):
-    """Mean of n n : C : n n over all directions n [Pa], by the quadrature that is exact for its fourth powers:
+    """Mean of n n : C : n n over all directions n [Pa], by a quadrature that is exact for its fourth powers:
     Lebedev's 14 points, along the axes and the diagonals of a cube."""
     axes, diagonals = np.eye(3), np.array([[1, 1, 1], [1, 1, -1], [1, -1, 1], [-1, 1, 1]]) / np.sqrt(3)
     along = lambda n: n @ stress_in(I3, matrix, np.outer(n, n)) @ n  # noqa: E731
