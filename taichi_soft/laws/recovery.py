@@ -11,8 +11,8 @@ rotation: corotated elasticity without lateral contraction, which would draw wha
 further inside out along another. A force with an energy drives nothing in circles.
 
 The ramp is there because an upright tetrahedron that is stretched enough is drawn flat by its own lateral
-contraction. Against a force that set in at once it would be thrown to and fro through flat, and gain each time
-what that force does in the rest of a substep.
+contraction. Against a force that set in at once it would be thrown to and fro through flat, and gain
+each time what that force does in the rest of a substep.
 """
 
 from taichi_soft.math.svd import signed_svd
@@ -20,7 +20,7 @@ from taichi_soft.math.tensors import product, transposed
 from taichi_soft.runtime import ti
 
 RAMP = 1 / 16
-"""Stretch inside out at which the ramp ends. A wider one leaves more tetrahedra at rest a little inside out."""
+"""Stretch inside out at which the ramp ends. Wider ones leave more tetrahedra at rest a little inside out."""
 
 
 @ti.func

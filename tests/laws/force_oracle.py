@@ -47,8 +47,8 @@ def stress_of(F, strain, lame_lambda, lame_mu):
 
 
 def recovery_energy(rest, corners, modulus):
-    """Of a flipped tetrahedron that finds back [J]: V M/2 |F - R|^2 with R the nearest rotation. Where it is
-    flipped by less than 1/16 of its thickness it falls less: there its slope ends at zero in a straight line."""
+    """Of a flipped tetrahedron that finds back [J]: V M/2 |F - R|^2, R the nearest rotation. Where it is
+    flipped by less than 1/16 of its thickness, it falls less: its slope ends at zero in a straight line."""
     F = deformation(rest, corners)
     axes, stretches, turn = np.linalg.svd(F)
     axes[:, 2] *= np.linalg.det(axes @ turn)
