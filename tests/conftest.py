@@ -24,12 +24,17 @@ LONGEST = (
 RANDOM_GAMES = ("world/test_threads", "world/test_snapshot", "world/test_recorder", "world/test_rollback")
 """Files with the same game, and so with the same kernels: one worker runs them all."""
 
+EXPERIMENTS = "tests/experiments/"
+"""Files that share what they measure, and write it into one report."""
+
 
 class ByKernels(LoadFileScheduling):
     """Whole files to one worker, and those that share their kernels to the same one."""
 
     def _split_scope(self, nodeid):
         file = super()._split_scope(nodeid)
+        if file.startswith(EXPERIMENTS):
+            return EXPERIMENTS
         return "random games" if file in {f"tests/{name}.py" for name in RANDOM_GAMES} else file
 
 
@@ -40,7 +45,12 @@ def pytest_xdist_make_scheduler(config, log):
 
 def pytest_collection_modifyitems(items):
     order = {f"tests/{name}.py": number for number, name in enumerate(LONGEST)}
-    items.sort(key=lambda item: order.get(item.nodeid.split("::")[0], len(order)))
+
+    def place(item):
+        file = item.nodeid.split("::")[0]
+        return -1 if file.startswith(EXPERIMENTS) else order.get(file, len(order))
+
+    items.sort(key=place)
 
 
 @pytest.fixture(autouse=True, scope="session")

@@ -1,12 +1,39 @@
-"""Experiments run for tests: all points at quick effort, and their findings by claim."""
+"""Experiments run for tests: all points at quick effort, each measured once, and their findings by claim."""
+
+import copy
+import json
+import tempfile
+from contextlib import closing
+from functools import cache
+from pathlib import Path
 
 from taichi_soft.experiments import EXPERIMENTS, Effort, Result, Results, section_of
+from taichi_soft.sweep import Outcome, Store, origin
+
+
+@cache
+def quick_folder():
+    """Where `taichi-soft report --quick --out` finds what these tests measured."""
+    kept = tempfile.TemporaryDirectory(prefix="taichi-soft-quick-")
+    quick_folder.kept = kept  # until this process ends
+    return Path(kept.name)
+
+
+@cache
+def _measured(name):
+    experiment = EXPERIMENTS[name]
+    rows = []
+    with closing(Store(quick_folder() / "data" / f"{name}.jsonl", origin("cpu"))) as store:
+        for point in experiment.points(Effort.QUICK):
+            numbers = json.loads(json.dumps(experiment.measure(point)))
+            store.keep(point, Outcome(numbers))
+            rows.append(Result(point, numbers))
+    return Results(tuple(rows))
 
 
 def quick_results(name):
-    """Results of the experiment of that name."""
-    experiment = EXPERIMENTS[name]
-    return Results(tuple(Result(p, experiment.measure(p)) for p in experiment.points(Effort.QUICK)))
+    """Results of the experiment of that name, for the caller to do with as he likes."""
+    return copy.deepcopy(_measured(name))
 
 
 def findings(name, results):

@@ -5,18 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from linear_oracle import force_on_top
+from quick import quick_results
 
 from taichi_soft import cylinder
-from taichi_soft.experiments import EXPERIMENTS, Effort, Result, Results, Verdict, section_of
+from taichi_soft.experiments import EXPERIMENTS, Results, Verdict, section_of
 
 EXPERIMENT = EXPERIMENTS["fig-6.4"]
 
 
 @pytest.fixture(scope="module")
 def results():
-    return Results(
-        tuple(Result(point, EXPERIMENT.measure(point)) for point in EXPERIMENT.points(Effort.QUICK))
-    )
+    return quick_results(EXPERIMENT.name)
 
 
 def curve(results, **values):

@@ -4,17 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from quick import quick_results
 
-from taichi_soft.experiments import EXPERIMENTS, Effort, Result, Results, Verdict, section_of
+from taichi_soft.experiments import EXPERIMENTS, Results, Verdict, section_of
 
 EXPERIMENT = EXPERIMENTS["fig-6.3b"]
 
 
 @pytest.fixture(scope="module")
 def results():
-    return Results(
-        tuple(Result(point, EXPERIMENT.measure(point)) for point in EXPERIMENT.points(Effort.QUICK))
-    )
+    return quick_results(EXPERIMENT.name)
 
 
 def test_with_nu_0_the_volume_grows_with_the_length_alone(results):

@@ -4,8 +4,9 @@ import copy
 
 import numpy as np
 import pytest
+from quick import quick_results
 
-from taichi_soft.experiments import EXPERIMENTS, Effort, Result, Results, Verdict, section_of
+from taichi_soft.experiments import EXPERIMENTS, Results, Verdict, section_of
 from taichi_soft.experiments.damping_rotation import body_mesh, rate
 
 EXPERIMENT = EXPERIMENTS["damping-rotation"]
@@ -13,7 +14,7 @@ EXPERIMENT = EXPERIMENTS["damping-rotation"]
 
 @pytest.fixture(scope="module")
 def rows():
-    return [Result(point, EXPERIMENT.measure(point)) for point in EXPERIMENT.points(Effort.QUICK)]
+    return list(quick_results(EXPERIMENT.name).rows)
 
 
 def finding_of(rows):

@@ -1,11 +1,10 @@
 """A block that grows denser to the right bounces."""
 
-import json
-
 import numpy as np
 import pytest
+from quick import quick_results
 
-from taichi_soft.experiments import EXPERIMENTS, Effort, Result, Results, Verdict, section_of
+from taichi_soft.experiments import EXPERIMENTS, Result, Results, Verdict, section_of
 from taichi_soft.experiments.density_bounce import DT, block, density_of, side
 
 EXPERIMENT = EXPERIMENTS["density-bounce"]
@@ -13,8 +12,7 @@ EXPERIMENT = EXPERIMENTS["density-bounce"]
 
 @pytest.fixture(scope="module")
 def rows():
-    points = EXPERIMENT.points(Effort.QUICK)
-    return [Result(point, json.loads(json.dumps(EXPERIMENT.measure(point)))) for point in points]
+    return list(quick_results(EXPERIMENT.name).rows)
 
 
 def finding_of(rows):

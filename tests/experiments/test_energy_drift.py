@@ -4,9 +4,10 @@ import copy
 
 import numpy as np
 import pytest
+from quick import quick_results
 
 from taichi_soft import Material, box, internal_forces
-from taichi_soft.experiments import EXPERIMENTS, Effort, Result, Results, Verdict, section_of
+from taichi_soft.experiments import EXPERIMENTS, Results, Verdict, section_of
 from taichi_soft.experiments.energy_drift import damping_ratio, growth
 
 EXPERIMENT = EXPERIMENTS["energy-drift"]
@@ -14,7 +15,7 @@ EXPERIMENT = EXPERIMENTS["energy-drift"]
 
 @pytest.fixture(scope="module")
 def rows():
-    return [Result(point, EXPERIMENT.measure(point)) for point in EXPERIMENT.points(Effort.QUICK)]
+    return list(quick_results(EXPERIMENT.name).rows)
 
 
 def finding_of(rows):

@@ -5,8 +5,9 @@ import copy
 import numpy as np
 import pytest
 from linear_motion import quadratic_form
+from quick import quick_results
 
-from taichi_soft.experiments import EXPERIMENTS, Effort, Result, Results, Verdict, section_of
+from taichi_soft.experiments import EXPERIMENTS, Results, Verdict, section_of
 from taichi_soft.experiments.mesh_quality import cubes, spoilt_cube
 
 EXPERIMENT = EXPERIMENTS["mesh-quality"]
@@ -14,7 +15,7 @@ EXPERIMENT = EXPERIMENTS["mesh-quality"]
 
 @pytest.fixture(scope="module")
 def rows():
-    return [Result(point, EXPERIMENT.measure(point)) for point in EXPERIMENT.points(Effort.QUICK)]
+    return list(quick_results(EXPERIMENT.name).rows)
 
 
 def verdict_of(rows):

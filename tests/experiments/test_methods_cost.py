@@ -2,7 +2,9 @@
 
 import copy
 
-from taichi_soft.experiments import EXPERIMENTS, Effort, Result, Results, Verdict, section_of
+from quick import quick_results
+
+from taichi_soft.experiments import EXPERIMENTS, Result, Results, Verdict, section_of
 
 EXPERIMENT = EXPERIMENTS["methods-cost"]
 COST = {
@@ -17,8 +19,7 @@ def verdicts(forces, cost):
 
 
 def test_both_methods_give_the_same_forces_flips_included():
-    (point,) = [p for p in EXPERIMENT.points(Effort.QUICK) if p["kind"] == "forces"]
-    numbers = EXPERIMENT.measure(point)
+    numbers = quick_results(EXPERIMENT.name).one(kind="forces")
     assert numbers["difference"] < 1e-12
     assert 0.05 < numbers["flipped"] / numbers["looked_at"] < 0.5  # half of those that are shaken most
     assert verdicts(numbers, COST)["methods-alike"] is Verdict.AGREES

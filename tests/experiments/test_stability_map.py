@@ -5,8 +5,9 @@ import copy
 import numpy as np
 import pytest
 from linear_motion import quadratic_form
+from quick import quick_results
 
-from taichi_soft.experiments import EXPERIMENTS, Effort, Result, Results, Verdict, section_of
+from taichi_soft.experiments import EXPERIMENTS, Results, Verdict, section_of
 from taichi_soft.experiments.stability_map import outcomes, sphere_mesh, window
 
 EXPERIMENT = EXPERIMENTS["stability-map"]
@@ -14,7 +15,7 @@ EXPERIMENT = EXPERIMENTS["stability-map"]
 
 @pytest.fixture(scope="module")
 def rows():
-    return [Result(point, EXPERIMENT.measure(point)) for point in EXPERIMENT.points(Effort.QUICK)]
+    return list(quick_results(EXPERIMENT.name).rows)
 
 
 def verdicts(rows):

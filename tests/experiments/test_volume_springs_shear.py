@@ -5,8 +5,9 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from quick import quick_results
 
-from taichi_soft.experiments import EXPERIMENTS, Effort, Result, Results, Verdict, section_of
+from taichi_soft.experiments import EXPERIMENTS, Results, Verdict, section_of
 from taichi_soft.experiments.irregular import cube
 
 EXPERIMENT = EXPERIMENTS["fig-5.1-5.2"]
@@ -14,9 +15,7 @@ EXPERIMENT = EXPERIMENTS["fig-5.1-5.2"]
 
 @pytest.fixture(scope="module")
 def results():
-    return Results(
-        tuple(Result(point, EXPERIMENT.measure(point)) for point in EXPERIMENT.points(Effort.QUICK))
-    )
+    return quick_results(EXPERIMENT.name)
 
 
 def edge_areas(mesh):
