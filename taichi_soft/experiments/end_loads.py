@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft import TetMesh
-from taichi_soft.experiments.statics import Equilibrium, Floats, Loading, Mask
+from taichi_soft.experiments.sparse_gradient import Floats
+from taichi_soft.experiments.statics import Equilibrium, Loading, Mask
 
 STRAIN = 1e-4
 

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from taichi_soft.experiments.sparse_gradient import Floats, SparseGradient
 from taichi_soft.meshing import TetMesh
 
-Floats = NDArray[np.float64]
 Forces = Callable[[Floats], Floats]
 """Positions (n, 3) [m] to forces (n, 3) [N]."""
 
@@ -45,8 +45,7 @@ class Plates:
             driven[np.where(bottom, mesh.vertices[:, 0], -np.inf).argmax(), 1] = True
         self.free: NDArray[np.int64] = np.flatnonzero(~driven)
         """Coordinates, 3 vertex + axis."""
-        self._near, self._groups = _groups(mesh)
-        self._step = DIFFERENCE * float(mesh.edge_lengths.mean())
+        self._gradient = SparseGradient(_neighbours(mesh), DIFFERENCE * float(mesh.edge_lengths.mean()))
 
     @property
     def area(self) -> float:
@@ -106,38 +105,14 @@ class Plates:
         return None
 
     def gradient(self, forces: Forces, x: Floats) -> Any:
-        """df/dx of the free coordinates there, a sparse matrix [N/m], by central differences.
-
-        Vertices without a common neighbour are moved together.
-        """
-        from scipy.sparse import csc_matrix
-
-        entries = np.empty((3, len(self._near), 3))  # axis that is moved, pair of vertices, axis of the force
-        for group in range(self._groups.max() + 1):
-            moved, pairs = self._groups == group, self._groups[self._near[:, 1]] == group
-            for axis in range(3):
-                way = np.zeros_like(x)
-                way[moved, axis] = self._step
-                change = forces(x + way) - forces(x - way)
-                entries[axis, pairs] = change[self._near[pairs, 0]] / (2 * self._step)
-        rows = np.broadcast_to(3 * self._near[None, :, None, 0] + np.arange(3), entries.shape)
-        columns = np.broadcast_to((3 * self._near[:, 1] + np.arange(3)[:, None])[..., None], entries.shape)
-        every = csc_matrix((entries.ravel(), (rows.ravel(), columns.ravel())), shape=(x.size, x.size))
-        return every[self.free][:, self.free]
+        """df/dx of the free coordinates there, a sparse matrix [N/m], by central differences."""
+        return self._gradient.at(forces, x)[self.free][:, self.free].tocsc()
 
 
-def _groups(mesh: TetMesh) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Pairs of vertices that are the same or share an edge, (r, 2), and a group for each vertex, (n,).
-
-    No two vertices of a group have a neighbour in common, so that their motions act on different forces.
-    """
+def _neighbours(mesh: TetMesh) -> Any:
+    """Which vertices are the same or share an edge: sparse, symmetric (n, n)."""
     from scipy.sparse import csr_matrix
 
     every = np.arange(len(mesh.vertices))
-    near = np.concatenate([mesh.edges, mesh.edges[:, ::-1], np.column_stack([every, every])]).astype(np.int64)
-    matrix = csr_matrix((np.ones(len(near)), near.T), shape=(len(every), len(every)))
-    common = (matrix @ matrix).tolil().rows
-    groups = np.full(len(every), -1)
-    for vertex, others in enumerate(common):
-        groups[vertex] = np.setdiff1d(np.arange(len(others) + 1), groups[others])[0]
-    return near, groups
+    near = np.concatenate([mesh.edges, mesh.edges[:, ::-1], np.column_stack([every, every])])
+    return csr_matrix((np.ones(len(near)), near.T), shape=(len(every), len(every)))

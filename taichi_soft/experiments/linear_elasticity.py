@@ -8,7 +8,8 @@ import numpy as np
 
 from taichi_soft import Material, TetMesh
 from taichi_soft.experiments.end_loads import EndLoad, ends
-from taichi_soft.experiments.statics import Floats, Mask, factorised
+from taichi_soft.experiments.sparse_gradient import Floats
+from taichi_soft.experiments.statics import Mask, factorised
 
 
 class FiniteElements:

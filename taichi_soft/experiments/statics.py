@@ -1,7 +1,6 @@
 """Equilibria of a body by any law, without time stepping: some coordinates driven, forces on the others.
 
-Newton's method in float64. The stiffness is taken from central differences of the forces, many vertices at
-once where no force depends on two of them, and so serves laws whose gradients are known in part only.
+Newton's method in float64, its stiffness from central differences of the forces.
 """
 
 from __future__ import annotations
@@ -14,10 +13,10 @@ from numpy.typing import NDArray
 
 from taichi_soft import LAWS, Material, TetMesh, internal_forces
 from taichi_soft.errors import TaichiSoftError
+from taichi_soft.experiments.sparse_gradient import Floats, SparseGradient
 from taichi_soft.laws import BondLaw
 from taichi_soft.laws.bonds import Ring
 
-Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 STEP = 1e-5
@@ -70,8 +69,9 @@ class StaticBody:
         """At rest, where the mesh is."""
         self.mesh, self.material = mesh, material
         self._law, self._strain = law, strain
-        self._pattern = _dependence(mesh, material, law)
-        self._colours = _colours(self._pattern)
+        self._gradient = SparseGradient(
+            _dependence(mesh, material, law), STEP * float(mesh.edge_lengths.min())
+        )
         self._at_rest: Any = None
         self._solvers: dict[bytes, Any] = {}
 
@@ -84,11 +84,11 @@ class StaticBody:
 
     def stiffness(self, displacement: Floats | None = None) -> Any:
         """-df/dx there, or at rest, a sparse matrix (3n, 3n) [N/m]."""
-        if displacement is None:
-            if self._at_rest is None:
-                self._at_rest = self._differences(np.zeros_like(self.mesh.vertices))
-            return self._at_rest
-        return self._differences(displacement)
+        if displacement is not None:
+            return -self._gradient.at(self.forces, displacement)
+        if self._at_rest is None:
+            self._at_rest = -self._gradient.at(self.forces, np.zeros_like(self.mesh.vertices))
+        return self._at_rest
 
     def equilibrium(self, loading: Loading, tolerance: float = 1e-7) -> Equilibrium:
         """Where the body settles.
@@ -136,27 +136,6 @@ class StaticBody:
             self._solvers[key] = factorised(self.stiffness()[free][:, free])
         return self._solvers[key]
 
-    def _differences(self, displacement: Floats) -> Any:
-        from scipy.sparse import coo_matrix
-
-        n = len(displacement)
-        h = STEP * float(self.mesh.edge_lengths.min())
-        touched, mover = self._pattern.nonzero()  # forces on `touched` depend on where `mover` is
-        blocks = np.zeros((len(touched), 3, 3))
-        for colour in range(self._colours.max() + 1):
-            moved = self._colours == colour
-            ours = moved[mover]
-            for axis in range(3):
-                shift = np.zeros_like(displacement)
-                shift[moved, axis] = h
-                change = (self.forces(displacement - shift) - self.forces(displacement + shift)) / (2 * h)
-                blocks[ours, :, axis] = change[touched[ours]]
-        three = np.arange(3)
-        rows = np.broadcast_to(3 * touched[:, None, None] + three[:, None], blocks.shape)
-        columns = np.broadcast_to(3 * mover[:, None, None] + three, blocks.shape)
-        whole = coo_matrix((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=(3 * n, 3 * n))
-        return whole.tocsr()
-
 
 def factorised(matrix: Any) -> Any:
     """A function from right-hand sides to solutions. Raises: NoEquilibriumError where there are none."""
@@ -187,13 +166,3 @@ def _dependence(mesh: TetMesh, material: Material, law: str) -> Any:
     shape = (rows.max() + 1, len(mesh.vertices))
     reads = coo_matrix((np.ones(len(rows)), (rows, columns)), shape=shape).tocsr()
     return (reads.T @ reads).tocsr()
-
-
-def _colours(pattern: Any) -> NDArray[np.int64]:
-    """A number for every vertex, such that no force depends on two vertices of the same one."""
-    near = (pattern @ pattern).tocsr()
-    colours = np.full(near.shape[0], -1)
-    for vertex in range(len(colours)):
-        taken = set(colours[near.indices[near.indptr[vertex] : near.indptr[vertex + 1]]].tolist())
-        colours[vertex] = next(number for number in range(len(taken) + 1) if number not in taken)
-    return colours

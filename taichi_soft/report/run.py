@@ -24,6 +24,7 @@ from taichi_soft.experiments import (
     Verdict,
     section_of,
 )
+from taichi_soft.report.judgements import Concluded
 from taichi_soft.sweep import (
     TIME_LIMIT,
     Outcome,
@@ -36,8 +37,6 @@ from taichi_soft.sweep import (
     origin,
     show_progress,
 )
-
-Concluded = tuple[Experiment, Results, Section]
 
 EXTRA = {"jinja2": "jinja2", "matplotlib": "matplotlib", "scipy": "scipy", "skfem": "scikit-fem"}
 """Modules of the extra `report`, and the packages that have them."""
