@@ -5,6 +5,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -25,6 +26,7 @@ from taichi_soft.experiments import (
     section_of,
 )
 from taichi_soft.report.judgements import Concluded
+from taichi_soft.report.wording import legible
 from taichi_soft.sweep import (
     TIME_LIMIT,
     Outcome,
@@ -149,13 +151,25 @@ def _results(points: Sequence[Point], store: Store) -> Results:
 def _conclude(experiment: Experiment, results: Results) -> Concluded:
     """A conclusion that breaks where points are missing has nothing to tell."""
     try:
-        return experiment, results, section_of(experiment, results)
+        return experiment, results, _legible(section_of(experiment, results))
     except Exception as error:
         if not results.failed:
             raise
         why = f"{len(results.failed)} of {len(results.rows)} points failed: {type(error).__name__}: {error}"
         findings = [Finding(claim, "not measured", Verdict.UNKNOWN, why) for claim in experiment.claims]
         return experiment, results, Section((), tuple(findings))
+
+
+def _legible(section: Section) -> Section:
+    return replace(
+        section,
+        text=tuple(map(legible, section.text)),
+        findings=tuple(
+            replace(each, measured=legible(each.measured), why=legible(each.why)) for each in section.findings
+        ),
+        plots=tuple(replace(each, caption=legible(each.caption)) for each in section.plots),
+        pictures=tuple(replace(each, caption=legible(each.caption)) for each in section.pictures),
+    )
 
 
 def _note(console: Console, line: str) -> None:

@@ -57,6 +57,18 @@ def _digits(value: float) -> str:
     return re.sub(r"e([+-])0*(\d)", lambda power: "e" + power[1].strip("+") + power[2], f"{value:.4g}")
 
 
+def legible(text: str) -> str:
+    """A text with the numbers in it as people write them: 8.3e+02 as 830, 1.1e-02 as 0.011, 5.6e+05 as 5.6e5."""
+    return re.sub(r"(?<![\w.])(\d)(?:\.(\d+))?e([+-]\d+)", _plain_power, text)
+
+
+def _plain_power(number: re.Match[str]) -> str:
+    first, rest, power = number[1], number[2] or "", int(number[3])
+    if -3 <= power < 5:
+        return f"{float(number[0]):.{max(0, len(rest) - power)}f}"
+    return f"{first}{'.' * bool(rest)}{rest}e{power}"
+
+
 def point_line(point: Point) -> str:
     """A point in one line: "law = virial, young = 1e6"."""
     return ", ".join(f"{name} = {readable(value)}" for name, value in point.items())

@@ -20,7 +20,7 @@ from taichi_soft.experiments import CLAIMS, Effort, Finding, Picture, Plot, Resu
 from taichi_soft.report.markdown import escaped
 from taichi_soft.report.page import write_report
 from taichi_soft.report.plots import png_of
-from taichi_soft.report.wording import duration, readable
+from taichi_soft.report.wording import duration, legible, readable
 
 VOID = {"meta", "img", "br", "hr", "link", "input"}
 
@@ -349,6 +349,21 @@ def test_markdown_takes_any_text_literally():
 )
 def test_cells_are_read_easily(value, words):
     assert readable(value) == words
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("8.3e+02 times", "830 times"),
+        ("1.1e-02 s, 7.2e+02, 1.25e+04", "0.011 s, 720, 12500"),
+        ("(E = 1e+06 Pa)", "(E = 1e6 Pa)"),
+        ("5.6e+05 to 3e-07", "5.6e5 to 3e-7"),
+        ("1.234e+02 and -2.5e-01", "123.4 and -0.25"),
+        ("figure 6.2e+x, v1e+02, 0.5", "figure 6.2e+x, v1e+02, 0.5"),
+    ],
+)
+def test_numbers_in_sentences_are_read_easily(text, words):
+    assert legible(text) == words
 
 
 def test_durations_are_read_easily():
