@@ -58,7 +58,7 @@ def _digits(value: float) -> str:
 
 
 def legible(text: str) -> str:
-    """A text with the numbers in it as people write them: 8.3e+02 as 830, 1.1e-02 as 0.011, 5.6e+05 as 5.6e5."""
+    """A text with its numbers as people write them: 8.3e+02 as 830, 1.1e-02 as 0.011, 5.6e+05 as 5.6e5."""
     return re.sub(r"(?<![\w.])(\d)(?:\.(\d+))?e([+-]\d+)", _plain_power, text)
 
 
