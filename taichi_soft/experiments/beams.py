@@ -57,7 +57,7 @@ TEXT = (
 def points(effort: Effort) -> list[Point]:
     """Every law and finite elements on one mesh, one law and linear ones on two finer meshes."""
     coarse, middle, fine = (2, 3, 4) if effort is Effort.QUICK else (5, 6, 8)
-    laws = variants()
+    laws = variants(effort)
     finer = [{**laws[0], "cells": fine}, {**laws[0], "cells": middle, "drawn": True}]
     names = ((LINEAR, fine), (LINEAR, middle), (LINEAR, coarse), (QUADRATIC, min(coarse, 4)))
     elements = [{"law": name, "strain": None, "cells": cells} for name, cells in names]

@@ -36,7 +36,7 @@ BEAM = ("tension", "shear", "torsion", "bending")
 def points(effort: Effort) -> list[Point]:
     """Every law at nu = 0.3 on a coarse mesh; or at three ratios on a finer one."""
     cells, ratios = (2, (0.3,)) if effort is Effort.QUICK else (5, (0.0, 0.25, 0.4))
-    return [{**variant, "poisson": nu, "cells": cells} for nu in ratios for variant in variants()]
+    return [{**variant, "poisson": nu, "cells": cells} for nu in ratios for variant in variants(effort)]
 
 
 def measure(point: Point) -> Numbers:

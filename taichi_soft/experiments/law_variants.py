@@ -1,19 +1,24 @@
-"""Every law with every strain that it takes, as points of experiments name them."""
+"""Laws with the strains that they take, as points of experiments name them."""
 
 from __future__ import annotations
 
 from taichi_soft import LAWS
-from taichi_soft.experiments.experiment import Point
+from taichi_soft.experiments.experiment import Effort, Point
 from taichi_soft.laws import BondLaw
+from taichi_soft.types import Strain
 
 
-def variants() -> list[Point]:
-    """{"law": name, "strain": name or None}, those on tetrahedra first."""
-    return [
+def variants(effort: Effort) -> list[Point]:
+    """{"law": name, "strain": name or None}, those on tetrahedra first; when it must be quick, without the
+    exact strain by the faces, whose forces are those of the virial theorem."""
+    every = [
         {"law": law.name, "strain": strain and strain.value}
         for law in LAWS.values()
         for strain in (law.strains if len(law.strains) > 1 else (None,))
     ]
+    if effort is Effort.QUICK:
+        every.remove({"law": "face", "strain": Strain.EXACT.value})
+    return every
 
 
 def is_tetrahedral(law: str) -> bool:
