@@ -133,8 +133,30 @@ def keep_residual(state: ti.template(), body, residual, is_first):
 
 
 @ti.func
-def keeps_shape(state: ti.template(), body):
-    """Whether no edge has changed by more than `FARTHEST` since particles were where `direction` says."""
+def _slow_down(state: ti.template(), body, h, share):
+    """Leave a piece of `h` [s] a share of its motion, but all of what the body's particles have in common.
+
+    What even the finest piece cannot follow loses speed: left to itself it would throw the body apart.
+    """
+    momentum, mass = ti.Vector.zero(state.real, 3), ti.cast(1e-30, state.real)
+    particles = state.body_particles[body]
+    for p in range(particles[0], particles[1]):
+        if state.particle_inv_mass[p] > 0.0:
+            momentum += state.particle_mass[p] * state.particle_velocity[p]
+            mass += state.particle_mass[p]
+    for p in range(particles[0], particles[1]):
+        if state.particle_inv_mass[p] > 0.0:
+            common = momentum / mass
+            if state.particle_contact[p] == 1:
+                common.z = 0.0
+            v = common + share * (state.particle_velocity[p] - common)
+            state.particle_position[p] = state.direction[p] + h * v
+            state.particle_velocity[p] = v
+
+
+@ti.func
+def _largest_change(state: ti.template(), body):
+    """Of an edge since particles were where `direction` says, over its length."""
     edges = state.body_edges[body]
     mean = ti.cast(0.0, state.real)
     for e in range(edges[0], edges[1]):
@@ -147,7 +169,13 @@ def keeps_shape(state: ti.template(), body):
         r = state.direction[q] - state.direction[p]
         change = state.particle_position[q] - state.particle_position[p] - r
         worst = ti.max(worst, change.dot(change) / ti.max(r.dot(r), least))
-    return worst <= FARTHEST * FARTHEST
+    return ti.sqrt(worst)
+
+
+@ti.func
+def keeps_shape(state: ti.template(), body):
+    """Whether no edge has changed by more than `FARTHEST` since particles were where `direction` says."""
+    return _largest_change(state, body) <= FARTHEST
 
 
 @ti.func
@@ -165,10 +193,13 @@ def implicit_substep(state: ti.template(), program: ti.template(), body, h, is_f
         particles = state.body_particles[body]
         for p in range(particles[0], particles[1]):
             _move(state, program, p, piece)
-        if not keeps_shape(state, body) and piece > h / MOST_PIECES:
+        change = _largest_change(state, body)
+        if change > FARTHEST and piece > h / MOST_PIECES:
             _take_back(state, body)
             piece, left = 0.5 * piece, 2 * left
         else:
+            if change > FARTHEST:
+                _slow_down(state, body, piece, FARTHEST / change)
             largest = ti.max(largest, residual)
             left -= 1
             add_pin_reactions(state, body, piece)
