@@ -13,19 +13,22 @@ from taichi_soft import init
 settings.register_profile("same every time", derandomize=True, deadline=None)
 settings.load_profile("same every time")
 
-LONGEST = (
-    *("cli/test_cli", "world/test_threads", "demos/test_demos", "world/test_joints", "world/test_plasticity"),
-    *("integrators/test_implicit_euler", "laws/test_gradients", "laws/test_anisotropy"),
-    *("laws/test_evaluation", "laws/test_inside_out", "world/test_colliders", "world/test_cutting"),
-    *("world/test_particle_bodies", "profiling/test_profiling", "drops/test_drops"),
+TOGETHER = (
+    *("tests/experiments/", "tests/integrators/", "tests/laws/", "tests/demos/"),
+    *("tests/world/test_cut", "tests/world/test_control"),
 )
-"""Files that take longest where nothing is compiled yet. They begin first, so that no worker ends alone."""
+"""Files that begin alike share most of their kernels, which one worker compiles for all of them; experiments
+share what they measure, too."""
 
 RANDOM_GAMES = ("world/test_threads", "world/test_snapshot", "world/test_recorder", "world/test_rollback")
-"""Files with the same game, and so with the same kernels: one worker runs them all."""
+"""Files with the same game: the same again."""
 
-EXPERIMENTS = "tests/experiments/"
-"""Files that share what they measure, and write it into one report."""
+LONGEST = (
+    *("world/test_threads", "cli/test_cli", "world/test_implicit_contact", "world/test_joints"),
+    *("world/test_plasticity", "world/test_bodies", "world/test_colliders", "world/test_states"),
+    *("world/test_particle_bodies", "profiling/test_profiling", "drops/test_drops", "test_readme"),
+)
+"""Files that take longest where nothing is compiled yet. They begin first, so that no worker ends alone."""
 
 
 class ByKernels(LoadFileScheduling):
@@ -33,9 +36,9 @@ class ByKernels(LoadFileScheduling):
 
     def _split_scope(self, nodeid):
         file = super()._split_scope(nodeid)
-        if file.startswith(EXPERIMENTS):
-            return EXPERIMENTS
-        return "random games" if file in {f"tests/{name}.py" for name in RANDOM_GAMES} else file
+        if file in {f"tests/{name}.py" for name in RANDOM_GAMES}:
+            return "random games"
+        return next((start for start in TOGETHER if file.startswith(start)), file)
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -44,11 +47,10 @@ def pytest_xdist_make_scheduler(config, log):
 
 
 def pytest_collection_modifyitems(items):
-    order = {f"tests/{name}.py": number for number, name in enumerate(LONGEST)}
+    first = [*TOGETHER, *(f"tests/{name}.py" for name in LONGEST)]
 
     def place(item):
-        file = item.nodeid.split("::")[0]
-        return -1 if file.startswith(EXPERIMENTS) else order.get(file, len(order))
+        return next((n for n, start in enumerate(first) if item.nodeid.startswith(start)), len(first))
 
     items.sort(key=place)
 
