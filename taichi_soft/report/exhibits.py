@@ -148,7 +148,9 @@ def _encoded(picture: Picture, path: str) -> Image:
     image = picture.image
     if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3 or image.size == 0:
         raise OptionError(f"picture {picture.name!r} must be uint8 (height, width, 3), got {image.shape}")
-    done, png = cv2.imencode(".png", np.ascontiguousarray(image[:, :, ::-1]))
+    done, png = cv2.imencode(
+        ".png", np.ascontiguousarray(image[:, :, ::-1]), [cv2.IMWRITE_PNG_COMPRESSION, 9]
+    )
     if not done:
         raise OptionError(f"picture {picture.name!r} of shape {image.shape} cannot be written as PNG")
     return Image(path, picture.caption, png.tobytes(), image.shape[1], image.shape[0])
