@@ -30,11 +30,8 @@ COMPARED = ("cmpm", "cmpm2")
 LEFT_OUT = ("face", "tilted_plane_printed", "neo_hookean")
 """Of a quick report: each takes seconds to compile, and claims nothing of its own."""
 
-AS_ANISOTROPIC = 2.0
-"""Factor within which spreads are taken for alike."""
-
 LEAST_SPREAD = 1e-3
-"""Below it a mesh hides what a law does, and says nothing of the factor."""
+"""Below it a mesh hides what a law does."""
 
 
 def jittered_block(cells: int, seed: int = 0) -> TetMesh:
@@ -94,20 +91,20 @@ def conclude(results: Results) -> Section:
         for mesh in MESHES
         if max(spreads[law, mesh] for law in COMPARED) > LEAST_SPREAD
     }
-    agrees = bool(ratios) and all(1 / AS_ANISOTROPIC < ratio < AS_ANISOTROPIC for ratio in ratios.values())
+    agrees = bool(ratios) and all(spreads["cmpm2", mesh] > LEAST_SPREAD for mesh in ratios)
     stated = "; ".join(
         f"{mesh} {100 * spreads['cmpm', mesh]:.2g} % and {100 * spreads['cmpm2', mesh]:.2g} %"
         for mesh in MESHES
     )
     finding = Finding(
         "cmpm2-anisotropic",
-        f"stiffness over all directions varies, CMPM and CMPM2: {stated}",
+        f"stiffness over all directions varies, CMPM and CMPM2: {stated}. In one regular tetrahedron "
+        "(fig-4.5) both vary by the same",
         Verdict.AGREES if agrees else Verdict.DIFFERS if ratios else Verdict.UNKNOWN,
         ""
         if agrees
         else "the mesh decides: CMPM2's spread over CMPM's is "
         + ", ".join(f"{ratio:.2g} in the {mesh}" for mesh, ratio in ratios.items())
-        + ". Both are anisotropic, by amounts of their own; in one regular tetrahedron (fig-4.5) by the same."
         if ratios
         else "all of these meshes are too even to show any",
     )
@@ -119,7 +116,9 @@ def conclude(results: Results) -> Section:
         for law, numbers in block.items():
             values = np.array(numbers["plane"])
             axes.plot(np.r_[turn, turn[1:] + np.pi], np.r_[values, values[1:]], label=law)
+        axes.plot(2 * turn, np.ones_like(turn), "k:", label="right")
         axes.set_rmin(0)
+        axes.set_rlabel_position(67.5)
         axes.set_xlabel("stiffness, over lambda + 2 mu [1]; angle to the x axis")
         axes.legend(loc="center left", bbox_to_anchor=(1.1, 0.5), fontsize="small")
 
@@ -165,7 +164,7 @@ def conclude(results: Results) -> Section:
         (
             Plot(
                 "polar",
-                "Stiffness of a block against stretches in the x-z plane: a circle is right.",
+                "Stiffness of a block against stretches in the x-z plane: right is the dotted circle of 1.",
                 draw,
                 (7.5, 4.6),
             ),

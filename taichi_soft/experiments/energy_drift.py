@@ -161,7 +161,7 @@ def conclude(results: Results) -> Section:
                 Verdict.AGREES if agrees else Verdict.DIFFERS,
                 ""
                 if agrees
-                else f"limits for growth, rest and damping are {GROWS}, {STAYS}, {LITTLE}; {{cause}}",
+                else f"limits for growth, rest and damping are {GROWS}, {STAYS}, {LITTLE}; {cause}",
             ),
         ),
         (Table("growth", "Kinetic energy, late over early", columns, rows),),

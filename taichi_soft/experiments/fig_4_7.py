@@ -91,6 +91,7 @@ def conclude(results: Results) -> Section:
                 showfliers=False,
                 patch_artist=True,
                 manage_ticks=False,
+                medianprops={"color": "black"},
             )
             for patch in drawn["boxes"]:
                 patch.set_facecolor(f"C{i}")
@@ -105,7 +106,7 @@ def conclude(results: Results) -> Section:
         (
             "For every edge with more than two particles round it, the angle between the edge and the normal "
             "of the plane that fits these particles best. The Voronoi faces of CMPM have 0 degrees by "
-            "construction. The barycentric subfaces of CMPM2 are off as well, but less.",
+            "construction. The barycentric subfaces of CMPM2 are off by about as much.",
         ),
         (finding,),
         (

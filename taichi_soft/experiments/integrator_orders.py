@@ -36,8 +36,8 @@ STEPS = (32, 64, 128, 256)
 LONG_ANGLE, LONG_PERIODS = 0.1, 10
 """h w and length of the long run."""
 
-NEARLY = 0.9
-"""Of the way from explicit Euler's error to leapfrog's, in the long run."""
+NEARLY = 5.0
+"""Times leapfrog's error, in the long run."""
 
 
 def points(effort: Effort) -> list[Point]:
@@ -80,7 +80,7 @@ def conclude(results: Results) -> Section:
     named = [name for name in ORDERS if name != "lazy_leapfrog"]
     has_orders = all(abs(slopes[name] - ORDERS[name]) < ORDER_TOLERANCE for name in named)
     ratio, euler = (lasting[name] / lasting["leapfrog"] for name in ("lazy_leapfrog", "explicit_euler"))
-    is_good = euler - ratio > NEARLY * (euler - 1) and euler > 1
+    is_good = ratio < NEARLY < euler
     fine = errors["lazy_leapfrog"][-1] / errors["leapfrog"][-1]
     findings = (
         Finding(

@@ -78,6 +78,9 @@ def conclude(results: Results) -> Section:
                 f"after as many steps back {shares['leapfrog']:.1g} of the way out is left; "
                 f"with other integrators {others:.2g} or more",
                 Verdict.AGREES if agrees else Verdict.DIFFERS,
+                ""
+                if agrees
+                else "the implementation: leapfrog's equations are the same with time turned round",
             ),
         ),
         (

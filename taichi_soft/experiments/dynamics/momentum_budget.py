@@ -120,7 +120,8 @@ def conclude(results: Results) -> Section:
                 axes.plot(numbers["times"], numbers["turning"], style, label=name)
         axes.set_xlabel("time [s]")
         axes.set_ylabel("angular momentum, over that at the start [1]")
-        axes.legend(fontsize=8)
+        axes.set_ylim(-0.1, 2.0)  # what goes beyond has run away
+        figure.legend(loc="outside right upper")
 
     return Section(
         (
@@ -139,7 +140,7 @@ def conclude(results: Results) -> Section:
                 tuple((p["law"], p["damping"], n["momentum"], n["angular_momentum"]) for p, n in rows),
             ),
         ),
-        (Plot("turning", "Angular momentum about the axis that it had at the start.", draw),),
+        (Plot("turning", "Angular momentum about the axis that it had at the start.", draw, (8.5, 4.2)),),
     )
 
 
