@@ -113,7 +113,7 @@ def exhibit_of(experiment: Experiment, results: Results, section: Section) -> Ex
         section,
         tuple(_drawn(plot, f"plots/{name}-{file_name(plot.name)}.png") for plot in section.plots),
         tuple(_encoded(each, f"pictures/{name}-{file_name(each.name)}.png") for each in section.pictures),
-        tuple(_sheet(table, f"tables/{name}-{file_name(table.name)}.csv") for table in section.tables),
+        tuple(sheet_of(table, f"tables/{name}-{file_name(table.name)}.csv") for table in section.tables),
         len(results.rows),
         tuple(results.failed),
         sum(row.seconds for row in results.rows),
@@ -156,7 +156,8 @@ def _encoded(picture: Picture, path: str) -> Image:
     return Image(path, picture.caption, png.tobytes(), image.shape[1], image.shape[0])
 
 
-def _sheet(table: Table, path: str) -> Sheet:
+def sheet_of(table: Table, path: str) -> Sheet:
+    """A table in words. Raises: OptionError for rows of a wrong length."""
     for row in table.rows:
         if len(row) != len(table.columns):
             raise OptionError(

@@ -10,8 +10,9 @@ from typing import Any
 
 from taichi_soft.errors import OptionError
 from taichi_soft.experiments import CLAIMS, Effort
-from taichi_soft.report.exhibits import Exhibit, exhibit_of, file_name, require_distinct
+from taichi_soft.report.exhibits import Exhibit, Sheet, exhibit_of, file_name, require_distinct, sheet_of
 from taichi_soft.report.judgements import OF_MANY, Concluded, Judgement, counts, judge
+from taichi_soft.report.law_checks import law_table
 from taichi_soft.report.markdown import Literal, escaped
 from taichi_soft.report.spreadsheets import csv_of_judgements
 from taichi_soft.report.wording import duration, point_line
@@ -38,7 +39,9 @@ def write_report(
     require_distinct((experiment.name for experiment, _, _ in sections), "the report")
     judgements = judge(sections)
     exhibits = [exhibit_of(*section) for section in sections]
-    files = _data_files(exhibits, judgements)
+    laws = law_table(sections)
+    sheets = [sheet_of(laws, "tables/laws.csv")] if laws else []
+    files = _data_files(exhibits, judgements, sheets)
     values: dict[str, Any] = {
         "claims": CLAIMS,
         "judgements": judgements,
@@ -46,6 +49,7 @@ def write_report(
         "counts": counts(judgements),
         "plural": OF_MANY,
         "exhibits": exhibits,
+        "sheets": sheets,
         "seconds": sum(each.seconds for each in exhibits),
         "date": datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z"),
         "command": command,
@@ -85,9 +89,11 @@ def _filled(name: str, values: dict[str, Any]) -> str:
     return environment.get_template(name).render(values)
 
 
-def _data_files(exhibits: Sequence[Exhibit], judgements: Sequence[Judgement]) -> dict[str, bytes]:
+def _data_files(
+    exhibits: Sequence[Exhibit], judgements: Sequence[Judgement], sheets: Sequence[Sheet]
+) -> dict[str, bytes]:
     """All files but the pages, by their paths in the directory."""
-    texts = {"verdicts.csv": csv_of_judgements(judgements)}
+    texts = {"verdicts.csv": csv_of_judgements(judgements)} | {sheet.path: sheet.csv for sheet in sheets}
     files: dict[str, bytes] = {}
     for each in exhibits:
         texts[each.points_path] = each.points_csv
