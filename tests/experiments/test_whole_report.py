@@ -14,6 +14,7 @@ TIMED = {claim for each in EXPERIMENTS.values() if each.is_timing for claim in e
 
 DIFFERING = {
     *("strain-misread-edge", "cmpm2-step", "tilted-plane", "sphere-window-0.4"),
+    "volume-springs-drop",  # on the one irregular mesh that is quick; on others it holds
 }
 UNTOLD = {"volume-springs-limit", "shear-modulus-volume"}
 
