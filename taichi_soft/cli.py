@@ -369,8 +369,9 @@ def report(
     and points that failed are computed again; without that folder everything is.
     """
     from taichi_soft.experiments import Effort
+    from taichi_soft.report.extra import require_extra
     from taichi_soft.report.machine import machine_facts
-    from taichi_soft.report.run import choose_experiments, require_extra, require_writable, run_experiments
+    from taichi_soft.report.run import choose_experiments, require_writable, run_experiments
 
     chosen = choose_experiments(names or [])
     if show_list:

@@ -11,6 +11,7 @@ from typing import Any
 from taichi_soft.errors import OptionError
 from taichi_soft.experiments import CLAIMS, Effort
 from taichi_soft.report.exhibits import Exhibit, Sheet, exhibit_of, file_name, require_distinct, sheet_of
+from taichi_soft.report.extra import require_extra
 from taichi_soft.report.judgements import OF_MANY, Concluded, Judgement, counts, judge
 from taichi_soft.report.law_checks import law_table
 from taichi_soft.report.markdown import Literal, escaped
@@ -35,7 +36,7 @@ def write_report(
         pictures of a wrong shape, and a directory that takes no files. What was there before is then still
         whole.
     """
-    _require_packages()
+    require_extra()
     require_distinct((experiment.name for experiment, _, _ in sections), "the report")
     judgements = judge(sections)
     exhibits = [exhibit_of(*section) for section in sections]
@@ -60,15 +61,6 @@ def write_report(
         files[name] = _filled(name, values).encode("utf-8", "backslashreplace")
     _replace(directory, files)
     return directory / "report.html"
-
-
-def _require_packages() -> None:
-    """Raises: OptionError where a package that the report needs is missing."""
-    for name in ("jinja2", "matplotlib"):
-        try:
-            __import__(name)
-        except ImportError:
-            raise OptionError(f"the report needs {name}: pip install 'taichi-soft[report]'") from None
 
 
 def _filled(name: str, values: dict[str, Any]) -> str:

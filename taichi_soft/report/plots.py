@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import warnings
 
-from taichi_soft.errors import OptionError
 from taichi_soft.experiments import Plot
 
 SCALE = 2
@@ -46,14 +45,12 @@ STYLE = {
 def png_of(plot: Plot) -> tuple[bytes, tuple[int, int]]:
     """A plot as PNG, and its size on the page [pixels].
 
-    Raises: OptionError without matplotlib, MissingPointError where a point that it needs is missing.
+    Raises: MissingPointError where a point that it needs is missing.
     """
-    try:
-        import matplotlib
-        from cycler import cycler
-        from matplotlib.figure import Figure
-    except ImportError:
-        raise OptionError("plots need matplotlib: pip install 'taichi-soft[report]'") from None
+    import matplotlib
+    from cycler import cycler
+    from matplotlib.figure import Figure
+
     cycle = cycler(linestyle=("-", "--", ":")) * cycler(color=COLOURS)  # the eighth line is dashed
     width, height = (round(96 * inches) for inches in plot.size)
     with (

@@ -6,7 +6,6 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import replace
-from importlib.util import find_spec
 from pathlib import Path
 
 from rich.console import Console
@@ -40,9 +39,6 @@ from taichi_soft.sweep import (
     show_progress,
 )
 
-EXTRA = {"jinja2": "jinja2", "matplotlib": "matplotlib", "scipy": "scipy", "skfem": "scikit-fem"}
-"""Modules of the extra `report`, and the packages that have them."""
-
 
 def choose_experiments(names: Sequence[str]) -> list[Experiment]:
     """Experiments in the order of the report, all of them where no name is given. Raises: OptionError."""
@@ -50,15 +46,6 @@ def choose_experiments(names: Sequence[str]) -> list[Experiment]:
         if name not in EXPERIMENTS:
             raise OptionError(f"unknown experiment {name!r}: choose from {', '.join(EXPERIMENTS)}")
     return [experiment for name, experiment in EXPERIMENTS.items() if name in names or not names]
-
-
-def require_extra() -> None:
-    """Raises: OptionError where packages are missing that experiments and their page need."""
-    missing = [package for module, package in EXTRA.items() if find_spec(module) is None]
-    if missing:
-        raise OptionError(
-            f"a report needs {', '.join(missing)}, not installed here: run pip install 'taichi-soft[report]'"
-        )
 
 
 def require_writable(folder: Path) -> None:

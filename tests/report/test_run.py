@@ -9,7 +9,7 @@ from rich.console import Console
 
 from taichi_soft.errors import OptionError, SweepError
 from taichi_soft.experiments import EXPERIMENTS, Effort, Verdict
-from taichi_soft.report import run
+from taichi_soft.report import extra, run
 from taichi_soft.sweep import Store
 
 
@@ -112,10 +112,10 @@ def test_an_unknown_experiment_is_refused_with_the_names_there_are():
 
 
 def test_missing_packages_are_named_with_the_way_to_get_them(monkeypatch):
-    run.require_extra()
-    monkeypatch.setattr(run, "find_spec", lambda name: None if name in ("jinja2", "skfem") else name)
+    extra.require_extra()
+    monkeypatch.setattr(extra, "find_spec", lambda name: None if name in ("jinja2", "skfem") else name)
     with pytest.raises(OptionError, match=r"jinja2, scikit-fem.*pip install 'taichi-soft\[report\]'"):
-        run.require_extra()
+        extra.require_extra()
 
 
 def test_a_folder_that_takes_no_files_is_refused(tmp_path):
