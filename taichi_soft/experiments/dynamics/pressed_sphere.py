@@ -49,13 +49,11 @@ def press_on_floor(mesh: TetMesh, law: str) -> list[float]:
     world.build()
     body.set_linear_damping(BRAKE)
     substeps = 2 * world.stable_substeps(DT)
-    forces, reached = list[float](), 0.0
-    for depth in DEPTHS:
-        for step in range(LOWERING + RESTING):
-            now = min(1.0, (step + 1) / LOWERING) * (depth - reached) + reached
-            body.set_targets(held, mesh.vertices[held] - (0.0, 0.0, now * RADIUS))
+    forces = list[float]()
+    for ways in _descent():
+        for way in ways:
+            body.set_targets(held, mesh.vertices[held] - (0.0, 0.0, way))
             world.step(DT, substeps)
-        reached = depth
         pulls = internal_forces(mesh, MATERIAL, body.positions().astype(np.float64), law=law)
         forces.append(float(pulls[held, 2].sum()))
     return forces
@@ -70,12 +68,22 @@ def press_plane(mesh: TetMesh, law: str) -> list[float]:
     world.build()
     body.set_linear_damping(BRAKE)
     substeps = 2 * world.stable_substeps(DT)
-    forces, reached = list[float](), 0.0
-    for depth in DEPTHS:
-        for step in range(LOWERING + RESTING):
-            now = min(1.0, (step + 1) / LOWERING) * (depth - reached) + reached
-            plane.move_to((0, 0, ground + now * RADIUS))
+    forces = list[float]()
+    for ways in _descent():
+        for way in ways:
+            plane.move_to((0, 0, ground + way))
             world.step(DT, substeps)
-        reached = depth
         forces.append(-float(plane.impulse[2]) / DT)
     return forces
+
+
+def _descent() -> list[list[float]]:
+    """How far down in each step [m], for each depth: on the way there, and at rest."""
+    starts = (0.0, *DEPTHS[:-1])
+    return [
+        [
+            RADIUS * (start + min(1.0, (step + 1) / LOWERING) * (depth - start))
+            for step in range(LOWERING + RESTING)
+        ]
+        for start, depth in zip(starts, DEPTHS, strict=True)
+    ]
