@@ -76,6 +76,9 @@ class ContactFields:
         self.calm = ti.field(ti.f32, bodies)  # time since a body was faster [s]
         self.is_wild = ti.field(ti.i32, bodies)  # 1 where it flies apart, and must not take others with it
         self.body_filter = ti.Vector.field(2, ti.i32, bodies)  # group, mask
+        self.is_gentle = ti.field(ti.i32, bodies)  # 0 where forces moved a particle too far in one substep
+        self.body_speed = ti.field(ti.f32, bodies)  # of its fastest particle in this substep [m/s]
+        self.body_speed_beside = ti.field(ti.f32, bodies)  # beside the velocity that its island shares [m/s]
         self.body_edge = ti.field(ti.f32, bodies)  # mean edge of its surface [m]
         self.prev_reaction = ti.Vector.field(3, ti.f32, particles)  # `particle_reaction` before the step
         self.particle_clearance = ti.field(ti.f32, particles)  # [m] from all that is near, at that time
@@ -86,6 +89,13 @@ class ContactFields:
         self.island_body = ti.field(ti.i32, bodies)  # bodies that may touch or are joined, island by island
         self.body_island = ti.field(ti.i32, bodies)
         self.parent = ti.field(ti.i32, bodies)  # in the forest of islands
+        # What threads do together for the bodies of an island: see `kernels/teamwork.py`.
+        self.unfinished_islands = ti.field(ti.i32, ())
+        self.task = ti.field(ti.i32, bodies)  # of each island
+        self.task_numbers = ti.Vector.field(4, ti.f32, bodies)
+        self.task_common = ti.Vector.field(3, ti.f32, bodies)  # velocity that its bodies share [m/s]
+        self.untaken = ti.field(ti.i32, bodies)  # bodies that no thread has taken yet
+        self.unfinished = ti.field(ti.i32, bodies)
 
 
 @ti.data_oriented

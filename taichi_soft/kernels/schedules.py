@@ -49,13 +49,15 @@ def make_launch(schedule: Schedule, state: State, program: Program, scene: Scene
     blocks, edges = scene.block_count, scene.edge_count
 
     step_bodies = step_in_turn if bodies == 1 or device.threads == 1 else step_per_body
-    if program.has_contact:
-        step_bodies = step_islands
+    helpers = 0 if device.is_gpu or bodies == 1 else device.threads - 1
 
     def per_body(substeps: int, h: float) -> int:
+        return int(step_bodies(state, program, bodies, substeps, h))
+
+    def by_islands(substeps: int, h: float) -> int:
         if program.has_soft_contact:
             prepare_islands(state, bodies, substeps * h)
-        return int(step_bodies(state, program, bodies, substeps, h))
+        return int(step_islands(state, program, bodies, helpers, substeps, h))
 
     def flat_cpu(substeps: int, h: float) -> int:
         return int(step_flat_cpu(state, program, bodies, blocks, edges, particles, substeps, h))
@@ -67,5 +69,5 @@ def make_launch(schedule: Schedule, state: State, program: Program, scene: Scene
         return int(end_flat(state, program, bodies, blocks, particles, substeps, h))
 
     if schedule is Schedule.PER_BODY:
-        return per_body
+        return by_islands if program.has_contact else per_body
     return flat_gpu if device.is_gpu else flat_cpu

@@ -95,7 +95,7 @@ def _drop_twins(soft: ti.template(), first, slot):
 
 
 @ti.func
-def _find_gaps(state: ti.template(), k, gone, way):
+def _find_gaps_of(state: ti.template(), k, gone, way):
     """Which candidates of a vertex count: those in front of it, and the one it is least deep behind.
 
     Args:
@@ -248,21 +248,25 @@ def _solve_vertex(state: ti.template(), k, h, sweep):
 
 
 @ti.func
-def solve_island(state: ti.template(), island, h, gone, way):
+def find_gaps(state: ti.template(), body, gone, way):
+    """Which candidates of a body's vertices count; `gone` and `way` as in `_find_gaps_of`."""
+    outer = state.body_outer[body]
+    for k in range(outer[0], outer[1]):
+        _find_gaps_of(state, k, gone, way)
+
+
+@ti.func
+def solve_island(state: ti.template(), island, h):
     """Take from the velocities of an island what would bring its bodies too near within `h` [s].
 
-    `gone` and `way` as in `_find_gaps`.
     Returns: the way [m] by which a pair was moved apart, at most.
     """
     farthest = ti.cast(0.0, ti.f32)
     first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
-    for sweep in range(-1, SWEEPS + 1):
+    for sweep in range(SWEEPS + 1):
         for i in range(first, last):
             outer = state.body_outer[state.contact.island_body[i]]
             for k in range(outer[0], outer[1]):
                 if state.soft.slot_count[k] > 0:
-                    if sweep < 0:
-                        _find_gaps(state, k, gone, way)
-                    else:
-                        farthest = ti.max(farthest, _solve_vertex(state, k, h, sweep))
+                    farthest = ti.max(farthest, _solve_vertex(state, k, h, sweep))
     return farthest

@@ -245,11 +245,8 @@ def island_margin(state: ti.template(), island):
 
 
 @ti.func
-def search_island(state: ti.template(), island, margin):
-    """Find the candidates of all vertices of an island, within `margin` [m]."""
-    first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
-    for i in range(first, last):
+def begin_search(state: ti.template(), island):
+    """Forget the candidates of an island, and find the boxes that `search_body` looks at."""
+    for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
         forget_candidates(state, state.contact.island_body[i])
         find_box(state, state.contact.island_body[i])
-    for i in range(first, last):
-        search_body(state, state.contact.island_body[i], island, margin)

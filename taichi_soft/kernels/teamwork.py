@@ -1,0 +1,87 @@
+"""Bodies of an island shared among threads, one task after the other.
+
+One thread owns an island: it does what passes between bodies, and calls for what each body does by itself.
+Threads without an island of their own take bodies where some are waiting, and where no thread is free the
+owner takes them all. It waits for bodies which others have taken, and those are at work on them; nobody waits
+for a thread that has not begun. What becomes of a body does not depend on who took it.
+"""
+
+from taichi_soft.kernels.contact_substep import drift_body, push_body
+from taichi_soft.kernels.soft_contact import find_gaps
+from taichi_soft.kernels.soft_search import search_body
+from taichi_soft.runtime import ti
+from taichi_soft.state import ACTIVE
+
+HELP = -1
+"""Whatever its owner has called for."""
+
+PUSH, SEARCH, GAPS, DRIFT = range(4)
+"""Tasks. Their numbers: h, since, way; margin; gone, way; h, since, left, fastest."""
+
+
+@ti.func
+def _now(counter: ti.template()):
+    """What a counter is that other threads change.
+
+    A maximum with -1 changes nothing that matters; it cannot be optimised into a plain load.
+    """
+    return ti.atomic_max(counter, -1)
+
+
+@ti.func
+def _do_task(state: ti.template(), program: ti.template(), island, body):
+    task, numbers = state.contact.task[island], state.contact.task_numbers[island]
+    common = state.contact.task_common[island]
+    is_active = state.body_status[body] == ACTIVE
+    if task == PUSH and is_active:
+        push_body(state, program, body, numbers[0], numbers[1], numbers[2], common)
+    if task == DRIFT and is_active:
+        drift_body(state, body, numbers[0], numbers[1], numbers[2], numbers[3], common)
+    if ti.static(program.has_soft_contact):
+        if task == SEARCH:
+            search_body(state, body, island, numbers[0])
+        if task == GAPS:
+            find_gaps(state, body, numbers[0], numbers[1])
+
+
+@ti.real_func
+def work_on(
+    state: ti.template(),
+    program: ti.template(),
+    island: ti.i32,
+    task: ti.i32,
+    numbers: ti.math.vec4,
+    common: ti.math.vec3,
+):
+    """Take bodies of an island until none is waiting. The owner calls for a task first, and waits for all.
+
+    What is called for is written here, because to Taichi no call reads what was written before it: it drops
+    what is written again before the kernel itself reads it.
+    """
+    first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
+    if task != HELP:
+        state.contact.task[island] = task
+        state.contact.task_numbers[island] = numbers
+        state.contact.task_common[island] = common
+        state.contact.unfinished[island] = last - first
+        ti.atomic_max(state.contact.untaken[island], last - first)
+    place = 0
+    if _now(state.contact.untaken[island]) > 0:
+        place = ti.atomic_sub(state.contact.untaken[island], 1)
+    while place > 0:
+        _do_task(state, program, island, state.contact.island_body[first + place - 1])
+        ti.atomic_sub(state.contact.unfinished[island], 1)
+        place = ti.atomic_sub(state.contact.untaken[island], 1)
+    if task != HELP:
+        while _now(state.contact.unfinished[island]) > 0:
+            pass
+
+
+@ti.func
+def help_others(state: ti.template(), program: ti.template()):
+    """Work on islands of several bodies until all are finished."""
+    nothing = ti.Vector.zero(ti.f32, 4)
+    while _now(state.contact.unfinished_islands[None]) > 0:
+        for island in range(state.contact.island_count[None]):
+            if state.contact.island_first[island + 1] - state.contact.island_first[island] > 1:
+                work_on(state, program, island, HELP, nothing, nothing.xyz)
