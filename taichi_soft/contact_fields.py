@@ -123,6 +123,23 @@ class SoftContactFields:
         self.slot_normal = ti.Vector.field(3, ti.f32, outer * SLOTS)  # from the triangle to the vertex
         self.slot_press = ti.field(ti.f32, outer * SLOTS)  # impulse along it in this substep [N s]
         self.slot_rub = ti.Vector.field(3, ti.f32, outer * SLOTS)  # friction on the vertex [N s]
+        self.contact_count = ti.field(
+            ti.i32, bodies
+        )  # slots in contact in this substep, of each body's vertices
+        self.contact_slot = ti.field(ti.i32, outer * SLOTS)  # those, from the first slot of each body on
+        self.slot_mobility = ti.Vector.field(
+            4, ti.f32, outer * SLOTS
+        )  # [1/kg], of the vertex and the corners
+        self.slot_moves = ti.Vector.field(
+            2, ti.f32, outer * SLOTS
+        )  # 1 where the one's, the other's body moves
+        self.slot_face = ti.Vector.field(3, ti.f32, outer * SLOTS)  # normal of the triangle
+        self.slot_shares = ti.Vector.field(
+            3, ti.f32, outer * SLOTS
+        )  # of the corners in what the vertex feels
+        self.slot_levers = ti.Matrix.field(
+            3, 3, ti.f32, outer * SLOTS
+        )  # height times gradients of the weights
         # The contact in which a particle was pressed most at the end of the last step.
         self.kept_triangle = ti.field(ti.i32, particles)
         self.kept_press = ti.field(ti.f32, particles)  # as `slot_press`; 0 for none

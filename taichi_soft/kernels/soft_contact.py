@@ -31,17 +31,21 @@ met once, however it is cut into triangles; a corner twice."""
 
 
 @ti.func
+def _moves(state: ti.template(), p):
+    """1 where the body of a particle moves, or 0."""
+    return ti.select(state.body_status[state.particle_body[p]] == ACTIVE, 1.0, 0.0)
+
+
+@ti.func
 def mobility(state: ti.template(), p):
     """Inverse mass [1/kg]; zero where the body does not move."""
-    free = state.body_status[state.particle_body[p]] == ACTIVE
-    return state.particle_inv_mass[p] * ti.select(free, 1.0, 0.0)
+    return state.particle_inv_mass[p] * _moves(state, p)
 
 
 @ti.func
 def velocity(state: ti.template(), p):
     """[m/s]; zero where the body does not move: a frozen one keeps those that broke it."""
-    moves = state.body_status[state.particle_body[p]] == ACTIVE
-    return state.particle_velocity[p] * ti.select(moves, 1.0, 0.0)
+    return state.particle_velocity[p] * _moves(state, p)
 
 
 @ti.func
@@ -128,76 +132,57 @@ def _find_gaps_of(state: ti.template(), k, gone, way):
 
 
 @ti.func
-def _press(state: ti.template(), p, corners, slot, h, is_first):
-    """Impulse along the normal that leaves no approach which would close the gap within `h` [s]."""
-    normal, weights = state.soft.slot_normal[slot], state.soft.slot_weights[slot]
-    before = state.soft.slot_press[slot]
-    total, approach = mobility(state, p), velocity(state, p).dot(normal)
-    for i in range(3):
-        total += weights[i] * weights[i] * mobility(state, corners[i])
-        approach -= weights[i] * velocity(state, corners[i]).dot(normal)
-    change = before
-    if is_first == 0:
-        allowed = -ti.max(state.soft.slot_gap[slot], 0.0) / h
-        change = ti.max(before + (allowed - approach) / ti.max(total, 1e-30), 0.0) - before
-        state.soft.slot_press[slot] = before + change
-    if change != 0.0 and is_finite(change * normal):
-        state.particle_velocity[p] = state.particle_velocity[p] + mobility(state, p) * change * normal
-        for i in range(3):
-            q = corners[i]
-            pull = weights[i] * mobility(state, q) * change
-            state.particle_velocity[q] = state.particle_velocity[q] - pull * normal
+def _note_levers(state: ti.template(), p, slot):
+    """What stays the same while a contact is solved again and again.
 
-
-@ti.func
-def _rub(state: ti.template(), p, corners, slot, friction, is_first):
-    """Friction at the vertex, as if the triangle reached up to it.
-
-    With b and g the vertex's barycentric coordinates and their gradients, n the triangle's normal and s the
-    height above it, the triangle's velocity there is sum b v - s sum g (n.v): what a rigid turn gives. Taking
-    the impulse up in the same proportions keeps the angular momentum of the two, whatever lies between them.
+    Friction acts at the vertex, as if the triangle reached up to it. With b and g the vertex's barycentric
+    coordinates and their gradients, n the triangle's normal and s the height above it, the triangle's
+    velocity there is sum b v - s sum g (n.v): what a rigid turn gives. Taking the impulse up in the same
+    proportions keeps the angular momentum of the two, whatever lies between them.
     """
+    corners = state.triangle_vertices[state.soft.slot_triangle[slot]]
     a, b, c = (
         state.particle_position[corners[0]],
         state.particle_position[corners[1]],
         state.particle_position[corners[2]],
     )
-    normal, weights = state.soft.slot_normal[slot], state.soft.slot_weights[slot]
+    weights = state.soft.slot_weights[slot]
     face = (b - a).cross(c - a)
     area2 = ti.max(face.norm(), 1e-30)
     n = face / area2
     way = state.particle_position[p] - weights.x * a - weights.y * b - weights.z * c
-    height = way.dot(n)
     gradients = ti.Matrix.rows([n.cross(c - b) / area2, n.cross(a - c) / area2, n.cross(b - a) / area2])
-    shares = weights + gradients @ way
-    before = state.soft.slot_rub[slot]
-    change = before
-    if is_first == 0:
-        relative = velocity(state, p)
-        for i in ti.static(range(3)):
-            v = velocity(state, corners[i])
-            gradient = ti.Vector([gradients[i, 0], gradients[i, 1], gradients[i, 2]])
-            relative -= shares[i] * v - height * gradient * n.dot(v)
-        sliding = relative - relative.dot(normal) * normal
-        slide = sliding.norm()
-        tilt = gradients @ (sliding / ti.max(slide, 1e-30))
-        total = mobility(state, p)
-        for i in ti.static(range(3)):
-            total += mobility(state, corners[i]) * (
-                shares[i] * shares[i] + height * height * tilt[i] * tilt[i]
-            )
-        wanted = before - sliding / ti.max(total, 1e-30)
-        most = friction * state.soft.slot_press[slot]
-        wanted = wanted * ti.min(1.0, most / ti.max(wanted.norm(), 1e-30))
-        change = wanted - before
-        state.soft.slot_rub[slot] = wanted
-    if is_finite(change):
-        state.particle_velocity[p] = state.particle_velocity[p] + mobility(state, p) * change
-        tilt = gradients @ change
-        for i in ti.static(range(3)):
-            q = corners[i]
-            impulse = shares[i] * change - height * tilt[i] * n
-            state.particle_velocity[q] = state.particle_velocity[q] - mobility(state, q) * impulse
+    state.soft.slot_face[slot] = n
+    state.soft.slot_shares[slot] = weights + gradients @ way
+    state.soft.slot_levers[slot] = way.dot(n) * gradients
+    state.soft.slot_mobility[slot] = ti.Vector(
+        [
+            mobility(state, p),
+            mobility(state, corners[0]),
+            mobility(state, corners[1]),
+            mobility(state, corners[2]),
+        ]
+    )
+    state.soft.slot_moves[slot] = ti.Vector([_moves(state, p), _moves(state, corners[0])])
+
+
+@ti.func
+def find_gaps(state: ti.template(), body, gone, way):
+    """List the contacts of a body's vertices; `gone` and `way` as in `_find_gaps_of`."""
+    outer = state.body_outer[body]
+    count = 0
+    for k in range(outer[0], outer[1]):
+        if state.soft.slot_count[k] > 0:
+            _find_gaps_of(state, k, gone, way)
+            for slot in range(k * SLOTS, k * SLOTS + state.soft.slot_count[k]):
+                if state.soft.slot_gap[slot] < NO_CONTACT:
+                    _note_levers(state, state.outer_particle[k], slot)
+                    state.soft.contact_slot[outer[0] * SLOTS + count] = slot
+                    count += 1
+                else:
+                    state.soft.slot_press[slot] = 0.0
+                    state.soft.slot_rub[slot] = ti.Vector.zero(ti.f32, 3)
+    state.soft.contact_count[body] = count
 
 
 @ti.func
@@ -217,42 +202,84 @@ def _push_apart(state: ti.template(), p, corners, slot, depth):
 
 
 @ti.func
-def _solve_vertex(state: ti.template(), k, h, sweep):
-    """One vertex against its candidates. The first sweep repeats the last substep's impulses.
+def _solve_contact(state: ti.template(), soft: ti.template(), slot, p, corners, friction, h, is_first):
+    """Impulses between a vertex and a triangle: along the normal, so that no approach is left which would
+    close the gap within `h` [s], and of friction. The first sweep repeats those of the last substep.
 
-    Returns: the way [m] by which the last one moved a pair apart, at most.
+    Returns: whether the two are pressed together (1).
     """
-    p, farthest = state.outer_particle[k], ti.cast(0.0, ti.f32)
-    mine = state.soft.body_surface[state.particle_body[p]]
-    for slot in range(k * SLOTS, k * SLOTS + state.soft.slot_count[k]):
-        if state.soft.slot_gap[slot] < NO_CONTACT:
-            corners = state.triangle_vertices[state.soft.slot_triangle[slot]]
-            theirs = state.soft.body_surface[state.particle_body[corners[0]]]
-            _press(state, p, corners, slot, h, int(sweep == 0))
-            is_pressed = state.soft.slot_press[slot] > 0.0
-            # Where no press is left, friction takes back what it gave in an earlier sweep.
-            if is_pressed or ti.abs(state.soft.slot_rub[slot]).max() > 0.0:
-                _rub(state, p, corners, slot, ti.sqrt(mine.x * theirs.x), int(sweep == 0))
-            if is_pressed:
-                state.contact.particle_touches[p] = 1
-                for i in ti.static(range(3)):
-                    state.contact.particle_touches[corners[i]] = 1
-            depth = -state.soft.slot_gap[slot] - SLACK * 0.5 * (mine.y + theirs.y)
-            if sweep == SWEEPS and depth > 0.0:
-                _push_apart(state, p, corners, slot, depth)
-                farthest = ti.max(farthest, PUSH_OUT * depth)
-        else:
-            state.soft.slot_press[slot] = 0.0
-            state.soft.slot_rub[slot] = ti.Vector.zero(ti.f32, 3)
-    return farthest
+    normal, weights, shares = soft.slot_normal[slot], soft.slot_weights[slot], soft.slot_shares[slot]
+    face, levers, moves = soft.slot_face[slot], soft.slot_levers[slot], soft.slot_moves[slot]
+    m, corner_m = soft.slot_mobility[slot][0], soft.slot_mobility[slot].yzw
+    v = moves[0] * state.particle_velocity[p]
+    corner_v = moves[1] * ti.Matrix.rows(
+        [
+            state.particle_velocity[corners[0]],
+            state.particle_velocity[corners[1]],
+            state.particle_velocity[corners[2]],
+        ]
+    )
+
+    before = soft.slot_press[slot]
+    press = before
+    if is_first == 0:
+        allowed = -ti.max(soft.slot_gap[slot], 0.0) / h
+        approach = v.dot(normal) - weights.dot(corner_v @ normal)
+        total = m + (weights * weights).dot(corner_m)
+        press = ti.max(before + (allowed - approach) / ti.max(total, 1e-30), 0.0)
+        soft.slot_press[slot] = press
+        before = press - before
+    if is_finite(before * normal):
+        v += m * before * normal
+        corner_v -= (before * weights * corner_m).outer_product(normal)
+
+    rub = soft.slot_rub[slot]
+    # Where no press is left, friction takes back what it gave in an earlier sweep.
+    if press > 0.0 or ti.abs(rub).max() > 0.0:
+        change = rub
+        if is_first == 0:
+            relative = v - corner_v.transpose() @ shares + levers.transpose() @ (corner_v @ face)
+            sliding = relative - relative.dot(normal) * normal
+            tilt = levers @ (sliding / ti.max(sliding.norm(), 1e-30))
+            total = m + corner_m.dot(shares * shares + tilt * tilt)
+            wanted = rub - sliding / ti.max(total, 1e-30)
+            wanted *= ti.min(1.0, friction * press / ti.max(wanted.norm(), 1e-30))
+            soft.slot_rub[slot] = wanted
+            change = wanted - rub
+        if is_finite(change):
+            v += m * change
+            taken = (corner_m * shares).outer_product(change)
+            corner_v -= taken - (corner_m * (levers @ change)).outer_product(face)
+
+    if moves[0] > 0.0:
+        state.particle_velocity[p] = v
+    if moves[1] > 0.0:
+        for i in ti.static(range(3)):
+            state.particle_velocity[corners[i]] = ti.Vector([corner_v[i, 0], corner_v[i, 1], corner_v[i, 2]])
+    return int(press > 0.0)
 
 
 @ti.func
-def find_gaps(state: ti.template(), body, gone, way):
-    """Which candidates of a body's vertices count; `gone` and `way` as in `_find_gaps_of`."""
-    outer = state.body_outer[body]
-    for k in range(outer[0], outer[1]):
-        _find_gaps_of(state, k, gone, way)
+def _solve_slot(state: ti.template(), slot, h, sweep):
+    """One contact in one sweep. Returns the way [m] by which the last one moved the pair apart."""
+    p, corners = (
+        state.outer_particle[slot // SLOTS],
+        state.triangle_vertices[state.soft.slot_triangle[slot]],
+    )
+    mine = state.soft.body_surface[state.particle_body[p]]
+    theirs = state.soft.body_surface[state.particle_body[corners[0]]]
+    if (
+        _solve_contact(state, state.soft, slot, p, corners, ti.sqrt(mine.x * theirs.x), h, int(sweep == 0))
+        == 1
+    ):
+        state.contact.particle_touches[p] = 1
+        for i in ti.static(range(3)):
+            state.contact.particle_touches[corners[i]] = 1
+    depth, way = -state.soft.slot_gap[slot] - SLACK * 0.5 * (mine.y + theirs.y), ti.cast(0.0, ti.f32)
+    if sweep == SWEEPS and depth > 0.0:
+        way = PUSH_OUT * depth
+        _push_apart(state, p, corners, slot, depth)
+    return way
 
 
 @ti.func
@@ -265,8 +292,8 @@ def solve_island(state: ti.template(), island, h):
     first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
     for sweep in range(SWEEPS + 1):
         for i in range(first, last):
-            outer = state.body_outer[state.contact.island_body[i]]
-            for k in range(outer[0], outer[1]):
-                if state.soft.slot_count[k] > 0:
-                    farthest = ti.max(farthest, _solve_vertex(state, k, h, sweep))
+            body = state.contact.island_body[i]
+            row = state.body_outer[body][0] * SLOTS
+            for k in range(row, row + state.soft.contact_count[body]):
+                farthest = ti.max(farthest, _solve_slot(state, state.soft.contact_slot[k], h, sweep))
     return farthest
