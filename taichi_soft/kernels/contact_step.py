@@ -23,11 +23,9 @@ from taichi_soft.kernels.sleep import settle_island, wake_by_colliders, wake_isl
 from taichi_soft.kernels.soft_contact import solve_island
 from taichi_soft.kernels.soft_search import (
     begin_search,
-    find_box,
     forget_candidates,
     is_social,
     island_margin,
-    search_body,
 )
 from taichi_soft.kernels.teamwork import DRIFT, GAPS, PUSH, SEARCH, help_others, work_on
 from taichi_soft.kernels.touches import add_touches, forget_touches
@@ -37,6 +35,9 @@ from taichi_soft.types import Integrator
 
 ALL_SLEEP = -1
 """Instead of a number of bodies: none is awake, and the next step would find all as it is."""
+
+NOT_SEARCHED = -2
+"""Instead of a way for which candidates hold, where the last step has forgotten its own."""
 
 MOST_FINER = 8
 """Times as many substeps as asked for, at most."""
@@ -117,7 +118,7 @@ def _touch_each_other(state: ti.template(), program: ti.template(), island, reac
         if not (used <= holds):
             least, thickness = island_margin(state, island)
             holds, gone_now, used = ti.max(way, least), ti.cast(0.0, ti.f32), way
-            begin_search(state, island)
+            begin_search(state, island, int(reach != NOT_SEARCHED))
             work_on(state, program, island, SEARCH, ti.Vector([thickness + holds, 0.0, 0.0, 0.0]), common)
         work_on(state, program, island, GAPS, ti.Vector([used, way, 0.0, 0.0]), common)
         gone_now += 2.0 * solve_island(state, island, h)
@@ -193,17 +194,16 @@ def _common_velocity(state: ti.template(), island):
 
 
 @ti.func
-def _move_island(state: ti.template(), program: ti.template(), island, substeps, h, age):
-    """All substeps of an island that is awake, from `age` [m] of way since candidates were looked for.
+def _move_island(state: ti.template(), program: ti.template(), island, substeps, h, is_again):
+    """All substeps of an island that is awake, for the first time in this step or again (1).
 
     Returns: whether forces moved no particle too far at once (1).
     """
     first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
     first_body = state.contact.island_body[first]
-    reach, gone, is_gentle = ti.cast(0.0, ti.f32), age, 1
+    reach, gone, is_gentle = ti.cast(NOT_SEARCHED + is_again, ti.f32), ti.cast(0.0, ti.f32), 1
     common = ti.Vector.zero(ti.f32, 3)
     if ti.static(program.has_soft_contact):
-        reach, _ = island_margin(state, island)
         common = _common_velocity(state, island)
     is_alone, fastest = _is_alone(state, program, island), ti.cast(0.0, ti.f32)
     for s in range(substeps):
@@ -234,16 +234,15 @@ def _step_awake_island(state: ti.template(), program: ti.template(), island, sub
     first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
     for i in range(first, last):
         _begin_body(state, state.contact.island_body[i])
-    finer, is_open, age = 1, 1, ti.cast(0.0, ti.f32)
+    finer, is_open = 1, 1
     while is_open == 1:
-        is_gentle = _move_island(state, program, island, finer * substeps, h / finer, age)
+        is_gentle = _move_island(state, program, island, finer * substeps, h / finer, int(finer > 1))
         most = MOST_PIECES if ti.static(program.integrator == Integrator.IMPLICIT_EULER) else MOST_FINER
         if finer == most or (is_gentle & _island_is_sound(state, island)) == 1:
             is_open = 0
         else:
             _take_back(state, program, island)
             finer *= 2
-            age = 1e30  # the candidates are those of where it went
     failed = 0
     for i in range(first, last):
         body = state.contact.island_body[i]
@@ -268,41 +267,6 @@ def _step_island(state: ti.template(), program: ti.template(), island, substeps,
     return failed, is_awake
 
 
-@ti.func
-def _is_to_be_searched(state: ti.template(), body):
-    """Whether a body is awake, or will be, and may be touched (1)."""
-    found = 0
-    if state.body_status[body] != ABSENT:
-        island = state.contact.body_island[body]
-        if is_social(state, island) == 1:
-            for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
-                found = found | int(state.body_status[state.contact.island_body[i]] == ACTIVE)
-    return found
-
-
-@ti.kernel
-def prepare_islands(state: ti.template(), body_count: ti.i32, dt: ti.f32):
-    """Find the islands of a step of `dt` [s], and what is near what in them, on all threads.
-
-    A kernel of its own, because a kernel may call one real function only, or Taichi's cache does not find it
-    again. What comes nearer within the step is looked for by the island.
-    """
-    ti.loop_config(serialize=True)
-    for _ in range(1):
-        wake_by_colliders(state, body_count)
-        find_islands(state, body_count, dt)
-    ti.loop_config(block_dim=1)
-    for body in range(body_count):
-        if _is_to_be_searched(state, body) == 1:
-            find_box(state, body)
-    ti.loop_config(block_dim=1)
-    for body in range(body_count):
-        if _is_to_be_searched(state, body) == 1:
-            island = state.contact.body_island[body]
-            holds, thickness = island_margin(state, island)
-            search_body(state, body, island, holds + thickness)
-
-
 @ti.kernel
 def step_islands(
     state: ti.template(),
@@ -314,14 +278,17 @@ def step_islands(
 ) -> ti.i32:
     """One fixed step of every active body. Returns how many failed, or `ALL_SLEEP`.
 
+    One kernel, which calls one real function, because Taichi's cache would not find it again otherwise.
+
     Args:
         helpers: threads that may work on islands of others when there is none left for themselves.
     """
     failed, awake = 0, 0
     ti.loop_config(serialize=True)
     for _ in range(1):
-        if ti.static(not program.has_soft_contact):
-            wake_by_colliders(state, body_count)
+        wake_by_colliders(state, body_count)
+        if ti.static(program.has_soft_contact):
+            find_islands(state, body_count, substeps * h)
         state.contact.unfinished_islands[None] = state.contact.island_count[None]
     ti.loop_config(block_dim=1)
     for i in range(state.contact.island_count[None] + helpers):

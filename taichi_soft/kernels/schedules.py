@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from taichi_soft.kernels.contact_step import prepare_islands, step_islands
+from taichi_soft.kernels.contact_step import step_islands
 from taichi_soft.kernels.flat import begin_flat, end_flat, step_flat_cpu, substep_flat
 from taichi_soft.kernels.per_body import step_in_turn, step_per_body
 from taichi_soft.kernels.program import Program
@@ -55,8 +55,6 @@ def make_launch(schedule: Schedule, state: State, program: Program, scene: Scene
         return int(step_bodies(state, program, bodies, substeps, h))
 
     def by_islands(substeps: int, h: float) -> int:
-        if program.has_soft_contact:
-            prepare_islands(state, bodies, substeps * h)
         return int(step_islands(state, program, bodies, helpers, substeps, h))
 
     def flat_cpu(substeps: int, h: float) -> int:

@@ -40,7 +40,7 @@ def _boxes_overlap(lower, upper, other_lower, other_upper):
 
 
 @ti.func
-def find_box(state: ti.template(), body):
+def _find_box(state: ti.template(), body):
     """Boxes round the surface of a body, and round each of its triangles, as they are now."""
     outer = state.body_outer[body]
     lower = state.particle_position[state.outer_particle[outer[0]]]
@@ -213,7 +213,7 @@ def _search_pair(state: ti.template(), body, other, margin):
 
 @ti.real_func
 def search_body(state: ti.template(), body: ti.i32, island: ti.i32, margin: ti.f32):
-    """Find the candidates of a body's vertices, within `margin` [m], after `find_box` of all its island."""
+    """Find the candidates of a body's vertices, within `margin` [m], after `_find_box` of all its island."""
     lower, upper = state.contact.body_lower[body] - margin, state.contact.body_upper[body] + margin
     for j in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
         other = state.contact.island_body[j]
@@ -245,8 +245,9 @@ def island_margin(state: ti.template(), island):
 
 
 @ti.func
-def begin_search(state: ti.template(), island):
-    """Forget the candidates of an island, and find the boxes that `search_body` looks at."""
+def begin_search(state: ti.template(), island, forgets):
+    """Forget (1) the candidates of an island, and find the boxes that `search_body` looks at."""
     for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
-        forget_candidates(state, state.contact.island_body[i])
-        find_box(state, state.contact.island_body[i])
+        if forgets == 1:
+            forget_candidates(state, state.contact.island_body[i])
+        _find_box(state, state.contact.island_body[i])

@@ -28,20 +28,27 @@ def _now(counter: ti.template()):
     return ti.atomic_max(counter, -1)
 
 
-@ti.func
-def _do_task(state: ti.template(), program: ti.template(), island, body):
+@ti.real_func
+def _do_contact_task(state: ti.template(), program: ti.template(), island: ti.i32, body: ti.i32):
+    """All tasks but the push; by itself, because Taichi takes more than twice as long for twice the code."""
     task, numbers = state.contact.task[island], state.contact.task_numbers[island]
-    common = state.contact.task_common[island]
-    is_active = state.body_status[body] == ACTIVE
-    if task == PUSH and is_active:
-        push_body(state, program, body, numbers[0], numbers[1], numbers[2], common)
-    if task == DRIFT and is_active:
+    if task == DRIFT and state.body_status[body] == ACTIVE:
+        common = state.contact.task_common[island]
         drift_body(state, body, numbers[0], numbers[1], numbers[2], numbers[3], common)
     if ti.static(program.has_soft_contact):
         if task == SEARCH:
             search_body(state, body, island, numbers[0])
         if task == GAPS:
             find_gaps(state, body, numbers[0], numbers[1])
+
+
+@ti.func
+def _do_task(state: ti.template(), program: ti.template(), island, body):
+    if state.contact.task[island] != PUSH:
+        _do_contact_task(state, program, island, body)
+    elif state.body_status[body] == ACTIVE:
+        numbers = state.contact.task_numbers[island]
+        push_body(state, program, body, numbers[0], numbers[1], numbers[2], state.contact.task_common[island])
 
 
 @ti.real_func
