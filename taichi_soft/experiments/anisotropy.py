@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft import LAWS, Material, TetMesh, box, cylinder, delaunay_mesh, sphere
+from taichi_soft import LAWS, Material, TetMesh, box, cylinder, delaunay_mesh, load_mesh, sphere
 from taichi_soft.experiments.directional_stiffness import directions, spread, stretch_modulus
 from taichi_soft.experiments.experiment import (
     Effort,
@@ -21,6 +21,7 @@ from taichi_soft.experiments.experiment import (
     Table,
     Verdict,
 )
+from taichi_soft.stages import ASSETS
 
 MATERIAL = Material(1e6, 0.25, 1000.0)
 RIGHT = float(MATERIAL.lame_lambda + 2 * MATERIAL.lame_mu)
@@ -43,13 +44,15 @@ def jittered_block(cells: int, seed: int = 0) -> TetMesh:
 
 
 def mesh_of(name: str, size: int) -> TetMesh:
-    """The body of that name; `size` counts what it is long in elements."""
+    """The body of that name; `size` counts what it is long in elements, but of the last two."""
     shapes = {
         "block": lambda: box((1.0, 1.0, 1.0), (size,) * 3),
         "cylinder": lambda: cylinder(1.0, 2.0, rings=size - 1, layers=size),
         "ball": lambda: sphere(1.0, size - 1),
         "uneven block": lambda: jittered_block(size),
         "another uneven block": lambda: jittered_block(size, seed=1),
+        "meshed sphere": lambda: load_mesh(ASSETS / "sphere.npz"),
+        "beam with hole": lambda: load_mesh(ASSETS / "beam_with_hole.npz"),
     }
     return shapes[name]()
 

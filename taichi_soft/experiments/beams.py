@@ -32,9 +32,10 @@ from taichi_soft.experiments.stiffness_dots import draw_stiffness_dots
 LENGTH = 4.0
 EXAGGERATION = 250.0
 """Of the picture."""
-LOADS = ("tension", "torsion", "bending", "cantilever")
+LOADS = ("tension", "shear", "torsion", "bending", "cantilever")
 EXACT = 1e-3
-"""Of tension: linear tetrahedra hold a uniform stress exactly, so that only the strain's size is left."""
+"""Of tension and shear: linear tetrahedra hold a uniform stress exactly, so that only the strain's size is
+left."""
 SAME = 0.01
 """Between laws on tetrahedra and linear finite elements on one mesh."""
 LIMIT = 0.03
@@ -42,10 +43,11 @@ LIMIT = 0.03
 
 TEXT = (
     f"A bar of {LENGTH:g} x {WIDTH:g} x {WIDTH:g} m (E = {YOUNG:g} Pa, nu = {POISSON:g}) is drawn out, "
-    "twisted and bent by its ends, strains 1e-4 at most, and loaded at its free end as a cantilever. "
-    "Theory: E A / L; G J / L with Saint-Venant's J = 0.1406 b^4 of a square; E I / L; and Timoshenko's "
-    "cantilever. In the first three the ends are free to contract or to warp, so that theory is exact; a "
-    "cantilever's root is clamped, and stiffer by a percent or two, as quadratic elements show.",
+    "sheared, twisted and bent, strains 1e-4 at most, and loaded at its free end as a cantilever. Theory: "
+    "E A / L; G A / L; G J / L with Saint-Venant's J = 0.1406 b^4 of a square; E I / L; and Timoshenko's "
+    "cantilever. In tension, torsion and bending the ends are free to contract or to warp, and in shear all "
+    "of the surface slides uniformly, so that theory is exact; a cantilever's root is clamped, and stiffer "
+    "by a percent or two, as quadratic elements show.",
     "Linear tetrahedra lock: constant strain within each cannot follow bending and warping, and a coarse "
     "mesh is too stiff, alike with every law on tetrahedra and with linear finite elements. The error "
     "falls with the square of the cells' size (see mesh-convergence), so two meshes tell where it goes, "
@@ -106,17 +108,17 @@ def conclude(results: Results) -> Section:
             why,
         )
 
-    stretch = max(abs(numbers["tension"] - 1) for numbers in solid)
-    pulled = [numbers["tension"] for point, numbers in laws if not is_tetrahedral(point["law"])]
-    tension = Finding(
-        "beam-tension",
-        f"tetrahedral laws pull with E A s to {stretch:.1g}; laws along edges with {min(pulled):.2f} to "
-        f"{max(pulled):.2f} of it",
-        Verdict.AGREES if stretch < EXACT else Verdict.DIFFERS,
-        ""
-        if stretch < EXACT
-        else f"model: linear finite elements reach {linear['tension']:.5f} on this mesh",
-    )
+    def held(claim: str, load: str, law: str) -> Finding:
+        away = max(abs(numbers[load] - 1) for numbers in solid)
+        others = [numbers[load] for point, numbers in laws if not is_tetrahedral(point["law"])]
+        return Finding(
+            claim,
+            f"tetrahedral laws resist with {law} to {away:.1g}; laws along edges with {min(others):.2f} to "
+            f"{max(others):.2f} of it",
+            Verdict.AGREES if away < EXACT else Verdict.DIFFERS,
+            "" if away < EXACT else f"model: linear finite elements reach {linear[load]:.5f} on this mesh",
+        )
+
     compared = {label(point): numbers for point, numbers in laws} | {LINEAR: linear, QUADRATIC: quadratic}
     shown = {name: {load: numbers[load] for load in LOADS} for name, numbers in compared.items()}
     extrapolated = (f"{label(fine_point)}, extrapolated", "", *(round(limit[load], 4) for load in LOADS))
@@ -127,7 +129,12 @@ def conclude(results: Results) -> Section:
 
     return Section(
         TEXT,
-        (tension, judged("beam-torsion", ("torsion",)), judged("beam-bending", ("bending", "cantilever"))),
+        (
+            held("beam-tension", "tension", "E A s"),
+            held("beam-shear", "shear", "G A s"),
+            judged("beam-torsion", ("torsion",)),
+            judged("beam-bending", ("bending", "cantilever")),
+        ),
         (
             Table(
                 "beams",
@@ -167,7 +174,7 @@ BEAMS = Experiment(
     "beams",
     "Beams",
     "beyond the thesis: theory of beams",
-    ("beam-tension", "beam-torsion", "beam-bending"),
+    ("beam-tension", "beam-shear", "beam-torsion", "beam-bending"),
     points,
     measure,
     conclude,

@@ -132,6 +132,7 @@ CLAIMS: dict[str, Claim] = {
         "patch test", "A body under uniform strain has the uniform stress of Hooke's law, on any mesh."
     ),
     "beam-tension": Claim("theory of beams", "A bar in tension pulls with E A s at small strain."),
+    "beam-shear": Claim("linear elasticity", "A bar in uniform shear resists with G A s at small strain."),
     "beam-torsion": Claim("Saint-Venant's torsion", "A twisted bar resists with G J per unit twist."),
     "beam-bending": Claim(
         "Timoshenko's beam", "A loaded cantilever sinks by F L^3 / 3 E I, and what shear adds."

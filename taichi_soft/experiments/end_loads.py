@@ -67,7 +67,8 @@ def free_ends(mesh: TetMesh) -> dict[str, EndLoad]:
     """Loads of which theory knows the answer: ends that are free to contract, or to warp; and a cantilever.
 
     Tension and bending drive the ends along x alone, torsion across x alone: with the stresses of a uniform
-    bar, and of Saint-Venant's, these are exact solutions of linear elasticity up to the ends.
+    bar, and of Saint-Venant's, these are exact solutions of linear elasticity up to the ends. In shear the
+    whole surface slides uniformly along z, as free sides would bulge.
     """
     left, right = ends(mesh)
     length, width = np.ptp(mesh.vertices, axis=0)[:2]
@@ -81,12 +82,16 @@ def free_ends(mesh: TetMesh) -> dict[str, EndLoad]:
     across = np.zeros(mesh.vertices.shape, bool)
     across[left | right, 1:] = True
     across[low, 0] = True
+    surface = np.zeros(mesh.vertices.shape, bool)
+    surface[mesh.surface] = True
+    beyond = mesh.vertices[:, 0] - mesh.vertices[:, 0].min()
     root = np.repeat(left[:, None], 3, axis=1)
     pressure = STRAIN * 1e6 * width / length
     traction = np.array([0.0, 0.0, -pressure])
     loading = Loading(root, np.zeros(root.shape), end_forces(mesh, traction))
     return {
         "tension": _driven(mesh, along, STRAIN * length, side, none, none),
+        "shear": _driven(mesh, surface, STRAIN * length, none, none, beyond / length),
         "torsion": _driven(mesh, across, 2 * STRAIN * length / width, none, -z * right, y * right),
         "bending": _driven(mesh, along, 2 * STRAIN * length / width, z * side, none, none),
         "cantilever": EndLoad(loading, pressure * width**2, traction),
@@ -107,7 +112,7 @@ def end_forces(mesh: TetMesh, traction: Floats) -> Floats:
 def theory(young: float, poisson: float, length: float, width: float) -> dict[str, float]:
     """Stiffness of `free_ends` on a bar of square section.
 
-    E A / L; G J / L with Saint-Venant's J; E I / L; and Timoshenko's cantilever, with Cowper's shear
+    E A / L; G A / L; G J / L with Saint-Venant's J; E I / L; and Timoshenko's cantilever, with Cowper's shear
     coefficient (1966) of a rectangle.
     """
     shear, area, inertia = young / (2 * (1 + poisson)), width**2, width**4 / 12
@@ -117,6 +122,7 @@ def theory(young: float, poisson: float, length: float, width: float) -> dict[st
     sag = length**3 / (3 * young * inertia) + length / (coefficient * shear * area)
     return {
         "tension": young * area / length,
+        "shear": shear * area / length,
         "torsion": shear * torsion / length,
         "bending": young * inertia / length,
         "cantilever": 1 / sag,

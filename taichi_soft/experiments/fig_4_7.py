@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from taichi_soft import TetMesh, load_mesh, plane_angles
+from taichi_soft import plane_angles
 from taichi_soft.experiments.anisotropy import mesh_of
 from taichi_soft.experiments.experiment import (
     Effort,
@@ -21,7 +21,6 @@ from taichi_soft.experiments.experiment import (
     Verdict,
 )
 from taichi_soft.meshing import EdgeRings
-from taichi_soft.stages import ASSETS
 
 BEAM = "beam with hole"
 THESIS_COUNTS = {2: 140, 3: 1386, 4: 2091, 5: 1874, 6: 1820, 7: 1449, 8: 753, 9: 250, 10: 60, 11: 10, 12: 2}
@@ -39,14 +38,9 @@ def points(effort: Effort) -> list[Point]:
     return [{"mesh": name, "size": size} for name in (BEAM, "ball", "block", "uneven block")]
 
 
-def body(name: str, size: int) -> TetMesh:
-    """The mesh of that name; the beam is made after the thesis's, of 1662 particles."""
-    return load_mesh(ASSETS / "beam_with_hole.npz") if name == BEAM else mesh_of(name, size)
-
-
 def measure(point: Point) -> Numbers:
     """Angles between edges and normals [degrees] in percentiles, without edges of two particles."""
-    mesh = body(point["mesh"], point["size"])
+    mesh = mesh_of(point["mesh"], point["size"])
     edge, _ = EdgeRings.of(mesh).neighbours
     around = np.bincount(edge)
     sizes, counts = np.unique(around, return_counts=True)

@@ -1,10 +1,23 @@
-"""A finding from a yes or no, or from one on each of several meshes."""
+"""A finding from a yes or no, or from one on each of several meshes; and how several numbers are told."""
 
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import dataclass
 
 from taichi_soft.experiments.experiment import Finding, Verdict
+
+
+@dataclass(frozen=True)
+class Span:
+    """Several numbers, which an f-string tells as one, or as the least and the largest."""
+
+    values: Collection[float]
+
+    def __format__(self, how: str) -> str:
+        """As each number alone; one where they look alike."""
+        low, high = format(min(self.values), how), format(max(self.values), how)
+        return low if low == high else f"{low} to {high}"
 
 
 def judged(claim: str, measured: str, agrees: bool, why: str) -> Finding:

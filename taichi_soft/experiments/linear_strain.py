@@ -90,12 +90,17 @@ def conclude(results: Results) -> Section:
     small, last = int(np.argmin(np.abs(amount - SMALL))), len(amount) - 1
 
     def draw(figure: Any) -> None:
-        for axes, (kind, n) in zip(figure.subplots(1, 2), numbers.items(), strict=True):
+        *panels, off = figure.subplots(1, 3)
+        for axes, (kind, n) in zip(panels, numbers.items(), strict=True):
             axes.plot(amount, n["linear"], label="linearised, eq. 6.7")
             axes.plot(amount, n["exact"], label="exact, root of F F^T")
             axes.set_xlabel(f"{kind} [1]")
             axes.set_ylabel("strain [1]")
             axes.legend()
+            off.loglog(amount, errors[kind], label=kind)
+        off.set_xlabel("stretch or shear [1]")
+        off.set_ylabel("error over the exact strain [1]")
+        off.legend()
 
     first, end = ({kind: error[row] for kind, error in errors.items()} for row in (small, last))
     return Section(
@@ -125,7 +130,7 @@ def conclude(results: Results) -> Section:
                 ),
             ),
         ),
-        (Plot("strains", "Linearised and exact strain.", draw, (9.0, 3.5)),),
+        (Plot("strains", "Linearised and exact strain, and the error of the first.", draw, (11.0, 3.5)),),
     )
 
 

@@ -322,7 +322,8 @@ def _draw(figure: Any, results: Results, names: list[str]) -> None:
                 for E, each in zip(n["young"], outcomes(n), strict=True)
                 if each == end
             ]
-            axes.scatter(*zip(*dots, strict=True) if dots else ([], []), s=30, color=colors[end], label=end)
+            places = zip(*dots, strict=True) if dots else ([], [])
+            axes.scatter(*places, s=90, marker="s", color=colors[end], label=end)
         for nu, (low, high) in WINDOWS.items():
             axes.plot([low, low, high, high], [nu + 0.01, nu + 0.025, nu + 0.025, nu + 0.01], color="black")
         limits = sorted((p["poisson"], n["young"]) for p, n in results.where(part="limit", mesh="thesis"))

@@ -20,6 +20,7 @@ from taichi_soft.experiments.experiment import (
     Table,
     Verdict,
 )
+from taichi_soft.experiments.judgement import Span
 
 MATERIAL = Material(1e6, 0.25, 1000.0)
 LAWS = {"tilted_plane_printed": "as printed", "tilted_plane": "c = beta / pi"}
@@ -78,20 +79,17 @@ def conclude(results: Results) -> Section:
     missed = max(abs(share["tilted_plane", ring] - 1) for ring in uneven)
     finding = Finding(
         "tilted-plane",
-        f"on even rings the plane of eq. 4.12 as printed tilts by {min(printed):.3f} to "
-        f"{max(printed):.3f} of "
-        f"a small shear; with c = beta / pi by {min(right):.3f} to {max(right):.3f}",
+        f"on even rings the plane of eq. 4.12 as printed tilts by {Span(printed):.3f} of a small shear; with "
+        f"c = beta / pi by {Span(right):.3f}",
         Verdict.AGREES if agrees else Verdict.DIFFERS,
         ""
         if agrees
-        else "reading of the text: eq. 4.11 sums what every particle adds, but leaves out that it tilts "
-        "about "
-        "an axis of its own, of which only a part lies along the shear's: sin^2 t stands there, not abs(sin "
-        "t), and the integral is pi; and eq. 4.12 divides by 2 pi once more. c = beta / pi follows from the "
-        f"first and is measured to be off by {max(abs(value - 1) for value in right):.1g} on even rings, "
-        "by up "
-        f"to {missed:.2f} on uneven ones, with up to {max(aside[ring] for ring in uneven):.2f} to the side: "
-        "the doubt of section 4.4.3 about rings at random is well founded",
+        else "reading of the text: eq. 4.11 sums what every particle adds, but leaves out that each tilts it "
+        "about an axis of its own, of which only a part lies along the shear's: sin^2 t stands there, not "
+        "abs(sin t), and the integral is pi; and eq. 4.12 divides by 2 pi once more. c = beta / pi follows "
+        f"from the first and is measured to be off by {max(abs(value - 1) for value in right):.1g} on even "
+        f"rings, by up to {missed:.2f} on uneven ones, with up to {max(aside[ring] for ring in uneven):.2f} "
+        "to the side: the doubt of section 4.4.3 about rings at random is well founded",
     )
 
     def draw(figure: Any) -> None:

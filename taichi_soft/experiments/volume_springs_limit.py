@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -22,6 +21,7 @@ from taichi_soft.experiments.experiment import (
     Verdict,
 )
 from taichi_soft.experiments.irregular import cube
+from taichi_soft.experiments.judgement import Span
 from taichi_soft.meshing.arrays import FloatArray
 
 YOUNG, DENSITY = 3e6, 4e3  # the thesis's; it tells neither damping nor step
@@ -101,12 +101,24 @@ def conclude(results: Results) -> Section:
     else:
         verdict, why = Verdict.DIFFERS, "the limit lies elsewhere for each damping that was tried"
     ((point, undamped),) = results.where(seed=1, damping=0.0)
-    by_mesh: dict[int | None, dict[float, float]] = {}
-    for (seed, damping), limit in limits.items():
-        by_mesh.setdefault(seed, {})[damping] = limit
-    told = "; ".join(
-        f"{_mesh(seed)}: {_list(row.values())} with b = {_list(row)} N s/m" for seed, row in by_mesh.items()
-    )
+    dampings = sorted({damping for _, damping in limits})
+
+    def listed(is_regular: bool) -> str:
+        by_damping = (
+            Span(
+                [
+                    limit
+                    for (seed, b), limit in limits.items()
+                    if b == damping and (seed is None) == is_regular
+                ]
+            )
+            for damping in dampings
+        )
+        return ", ".join(f"{span:g}" for span in by_damping)
+
+    told = f"with b = {', '.join(f'{b:g}' for b in dampings)} N s/m {listed(False)} on irregular meshes"
+    if any(seed is None for seed, _ in limits):
+        told += f", {listed(True)} on a regular grid"
 
     def draw(figure: Any) -> None:
         axes = figure.add_subplot()
@@ -154,10 +166,6 @@ def conclude(results: Results) -> Section:
             ),
         ),
     )
-
-
-def _list(values: Iterable[float]) -> str:
-    return ", ".join(f"{value:g}" for value in values)
 
 
 def _mesh(seed: int | None) -> str:

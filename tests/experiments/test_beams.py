@@ -16,7 +16,7 @@ def verdicts(rows):
     return {finding.claim: finding.verdict for finding in findings}
 
 
-def test_tension_is_exact_and_torsion_and_bending_go_where_theory_says():
+def test_tension_and_shear_are_exact_and_torsion_and_bending_go_where_theory_says():
     rows = list(quick_results(EXPERIMENT.name).rows)
     by_cells = {row.point["cells"]: row.numbers for row in rows if row.point["law"] == "virial"}
     for load in ("torsion", "bending", "cantilever"):
@@ -26,14 +26,22 @@ def test_tension_is_exact_and_torsion_and_bending_go_where_theory_says():
     for row in rows:
         if row.point["law"] in SOLID:
             assert row.numbers["tension"] == pytest.approx(1, abs=5e-4)
+            assert row.numbers["shear"] == pytest.approx(1, abs=5e-4)
         if row.point["law"] == "quadratic finite elements":
             assert row.numbers["bending"] == pytest.approx(1, abs=1e-6)
+            assert row.numbers["shear"] == pytest.approx(1, abs=1e-6)
             assert row.numbers["torsion"] == pytest.approx(1, abs=0.03)
         if row.point["law"] == "springs":
             assert 0.4 < row.numbers["tension"] < 0.6  # a uniform, isotropic network: 1/2
-    assert verdicts(rows) == dict.fromkeys(("beam-tension", "beam-torsion", "beam-bending"), Verdict.AGREES)
+    claims = ("beam-tension", "beam-shear", "beam-torsion", "beam-bending")
+    assert verdicts(rows) == dict.fromkeys(claims, Verdict.AGREES)
 
-    for load, claim in (("tension", "tension"), ("torsion", "torsion"), ("cantilever", "bending")):
+    for load, claim in (
+        ("tension", "tension"),
+        ("shear", "shear"),
+        ("torsion", "torsion"),
+        ("cantilever", "bending"),
+    ):
         changed = deepcopy(rows)
         for row in changed:
             if row.point["law"] in SOLID:

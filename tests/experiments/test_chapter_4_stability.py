@@ -7,7 +7,6 @@ from quick import altered, findings, quick_results, verdicts
 from taichi_soft import Material, box, load_mesh
 from taichi_soft.experiments import Verdict
 from taichi_soft.experiments.anisotropy import mesh_of
-from taichi_soft.experiments.fig_4_7 import body
 from taichi_soft.experiments.law_stability import ShakenBody, vibration
 from taichi_soft.stages import ASSETS
 
@@ -33,7 +32,8 @@ def test_angles_of_best_fitting_planes_are_numpys():
     np.testing.assert_allclose(numbers["best_fitting_plane"]["percentiles"], expected, atol=0.1)
     counts = dict(zip(numbers["sizes"], numbers["counts"], strict=True))
     assert counts == {n: sum(count == n for count, _, _ in found) for n in counts}
-    assert len(body("beam with hole", 4).vertices) == len(load_mesh(ASSETS / "beam_with_hole.npz").vertices)
+    beam = load_mesh(ASSETS / "beam_with_hole.npz")
+    assert len(mesh_of("beam with hole", 4).vertices) == len(beam.vertices)
     assert verdicts("fig-4.7", results) == {"best-fitting-plane-angles": Verdict.AGREES}
 
     def straight(point, numbers):

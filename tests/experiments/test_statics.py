@@ -106,6 +106,7 @@ def test_quadratic_finite_elements_meet_theory():
 def test_theory_of_a_square_bar():
     expected = theory(2.6, 0.3, 10.0, 1.0)
     assert expected["tension"] == pytest.approx(0.26)
+    assert expected["shear"] == pytest.approx(0.1)
     assert expected["torsion"] == pytest.approx(0.14058 / 10, rel=1e-4)  # Timoshenko and Goodier, table of k1
     assert expected["bending"] == pytest.approx(0.26 / 12)
     assert 1 / expected["cantilever"] == pytest.approx(1000 / (3 * 2.6 / 12) + 10 * 15.3 / 13, rel=1e-9)

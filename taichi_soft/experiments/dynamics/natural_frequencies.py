@@ -122,7 +122,8 @@ def conclude(results: Results) -> Section:
             f"A beam of {LENGTH} x {WIDTH} x {HEIGHT} m (E = {YOUNG:g} Pa, nu = {POISSON}, {DENSITY:g} "
             "kg/m^3), held at one end or free, is given the velocity of its first bending mode, and its "
             "frequency is read from zero crossings. Laws on tetrahedra and springs are undamped; the others "
-            "belong to no energy and get what damping they need. Finite elements: scikit-fem, linear "
+            "belong to no energy and get what damping they need, which the table tells; with up to four times "
+            "as much their frequencies stay within half a percent. Finite elements: scikit-fem, linear "
             "tetrahedra on the same mesh, with the mass at the vertices.",
             "Linear tetrahedra are too stiff in bending, in finite elements as in the laws of chapter 6: "
             f"with {COARSE} cells along the height a cantilever is {_excess(results, 'cantilever', COARSE)} "
@@ -164,7 +165,7 @@ def _finding(results: Results, support: str, claim: str) -> Finding:
     others = [part for law, part in parts.items() if law not in TETRAHEDRAL and part > -1]  # whole ones
     return Finding(
         claim,
-        f"the laws on tetrahedra are within {worst:.2%} of finite elements on the same mesh, which is "
+        f"the laws on tetrahedra are within {worst:.1g} of finite elements on the same mesh, which is "
         f"{elements / expected - 1:+.0%} above Timoshenko's {expected:.4g} Hz, and tend to {promised:.4g} Hz "
         f"({promised / expected - 1:+.1%}) as it is refined; laws along edges differ from finite elements on "
         f"the same mesh by {min(others):+.0%} to {max(others):+.0%}",
@@ -172,7 +173,7 @@ def _finding(results: Results, support: str, claim: str) -> Finding:
         ""
         if agrees
         else f"the model, where it is not within {SAME_MESH:.0%} of finite elements on the same mesh "
-        f"({worst:.1%}); the mesh, where it is, and the extrapolation misses by more than {EXTRAPOLATED:.0%}",
+        f"({worst:.2g}); the mesh, where it is, and the extrapolation misses by more than {EXTRAPOLATED:.0%}",
     )
 
 
