@@ -122,9 +122,8 @@ def conclude(results: Results) -> Section:
             f"A beam of {LENGTH} x {WIDTH} x {HEIGHT} m (E = {YOUNG:g} Pa, nu = {POISSON}, {DENSITY:g} "
             "kg/m^3), held at one end or free, is given the velocity of its first bending mode, and its "
             "frequency is read from zero crossings. Laws on tetrahedra and springs are undamped; the others "
-            "belong to no energy and get what damping they need, which the table tells; with up to four times "
-            "as much their frequencies stay within half a percent. Finite elements: scikit-fem, linear "
-            "tetrahedra on the same mesh, with the mass at the vertices.",
+            "belong to no energy and get what damping they need, which the tables tell. Finite elements: "
+            "scikit-fem, linear tetrahedra on the same mesh, with the mass at the vertices.",
             "Linear tetrahedra are too stiff in bending, in finite elements as in the laws of chapter 6: "
             f"with {COARSE} cells along the height a cantilever is {_excess(results, 'cantilever', COARSE)} "
             f"too fast, with {FINE} ({fine['tets']} tetrahedra) {_excess(results, 'cantilever', FINE)}. "
