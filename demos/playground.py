@@ -42,7 +42,7 @@ class Course:
         for side in (-1.2, 1.2):
             place = top + tilt @ (0.0, side, 0.15)
             world.add_collider(CapsuleShape(0.14, 3.6), position=place, rotation=_turn(SLOPE + np.pi / 2))
-        self.paddles = [world.add_collider(BoxShape((1.2, 2.4, 0.12)), position=HUB) for _ in range(2)]
+        self.paddles = [world.add_collider(BoxShape((1.2, 2.4, 0.24)), position=HUB) for _ in range(2)]
         world.add_collider(MeshShape(_funnel()), position=HOLLOW + 1.75 * UP, friction=0.1)
         lying = _turn(0.0, about_x=np.pi / 2)
         self.bars = [world.add_collider(CapsuleShape(0.13, 2.4), rotation=lying) for _ in range(2)]
