@@ -27,7 +27,16 @@ from taichi_soft.kernels.soft_search import (
     is_social,
     island_margin,
 )
-from taichi_soft.kernels.teamwork import DRIFT, GAPS, PUSH, SEARCH, help_others, work_on
+from taichi_soft.kernels.teamwork import (
+    DRIFT,
+    GAPS,
+    PUSH,
+    SEARCH,
+    help_others,
+    is_crowd,
+    open_crowds,
+    work_on,
+)
 from taichi_soft.kernels.touches import add_touches, forget_touches
 from taichi_soft.runtime import ti
 from taichi_soft.state import ABSENT, ACTIVE, FEELS_REACTION, JOINED
@@ -289,14 +298,15 @@ def step_islands(
         wake_by_colliders(state, body_count)
         if ti.static(program.has_soft_contact):
             find_islands(state, body_count, substeps * h)
-        state.contact.unfinished_islands[None] = state.contact.island_count[None]
+        open_crowds(state)
     ti.loop_config(block_dim=1)
     for i in range(state.contact.island_count[None] + helpers):
         if i < state.contact.island_count[None]:
             failed_here, is_awake = _step_island(state, program, i, substeps, h)
             failed += failed_here
             awake += is_awake
-            ti.atomic_sub(state.contact.unfinished_islands[None], 1)
+            if is_crowd(state, i):
+                ti.atomic_sub(state.contact.unfinished_crowds[None], 1)
         else:
             help_others(state, program)
     return ti.select(failed + awake == 0, ALL_SLEEP, failed)

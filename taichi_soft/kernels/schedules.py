@@ -49,7 +49,7 @@ def make_launch(schedule: Schedule, state: State, program: Program, scene: Scene
     blocks, edges = scene.block_count, scene.edge_count
 
     step_bodies = step_in_turn if bodies == 1 or device.threads == 1 else step_per_body
-    helpers = 0 if device.is_gpu or bodies == 1 else device.threads - 1
+    helpers = 0 if device.is_gpu else min(device.threads, bodies) - 1
 
     def per_body(substeps: int, h: float) -> int:
         return int(step_bodies(state, program, bodies, substeps, h))

@@ -85,10 +85,25 @@ def work_on(
 
 
 @ti.func
+def is_crowd(state: ti.template(), island):
+    """Whether an island has several bodies, and is worth helping with."""
+    return state.contact.island_first[island + 1] - state.contact.island_first[island] > 1
+
+
+@ti.func
+def open_crowds(state: ti.template()):
+    """Before the islands are stepped: how many there are to help with, for `help_others`."""
+    count = 0
+    for island in range(state.contact.island_count[None]):
+        count += int(is_crowd(state, island))
+    state.contact.unfinished_crowds[None] = count
+
+
+@ti.func
 def help_others(state: ti.template(), program: ti.template()):
     """Work on islands of several bodies until all are finished."""
     nothing = ti.Vector.zero(ti.f32, 4)
-    while _now(state.contact.unfinished_islands[None]) > 0:
+    while _now(state.contact.unfinished_crowds[None]) > 0:
         for island in range(state.contact.island_count[None]):
-            if state.contact.island_first[island + 1] - state.contact.island_first[island] > 1:
+            if is_crowd(state, island):
                 work_on(state, program, island, HELP, nothing, nothing.xyz)
