@@ -91,6 +91,7 @@ class ContactFields:
         self.parent = ti.field(ti.i32, bodies)  # in the forest of islands
         # What threads do together for the bodies of an island: see `kernels/teamwork.py`.
         self.unfinished_crowds = ti.field(ti.i32, ())  # islands of several bodies
+        self.useful_helpers = ti.field(ti.i32, ())  # threads beside their owners that could find a body there
         self.task = ti.field(ti.i32, bodies)  # of each island
         self.task_numbers = ti.Vector.field(4, ti.f32, bodies)
         self.task_common = ti.Vector.field(3, ti.f32, bodies)  # velocity that its bodies share [m/s]

@@ -19,7 +19,7 @@ from taichi_soft.errors import OptionError
 from taichi_soft.forces import StillBody
 from taichi_soft.laws import ElementModel, fit_model
 from taichi_soft.laws.bonds import Bonds
-from taichi_soft.materials import AnisotropicMaterial, AnyMaterial, Material, voigt_stress
+from taichi_soft.materials import AnisotropicMaterial, AnyMaterial, Material
 from taichi_soft.meshing import BodyMesh, TetMesh
 from taichi_soft.scene import BodyDescription, edge_damping, rest_inverses, vertex_masses
 from taichi_soft.types import DampingModel
@@ -133,10 +133,12 @@ class _ElasticOperator:
         self.tets = mesh.tets
         self.root_mass = np.sqrt(mass)[:, None]
         inverse = rest_inverses(mesh)
-        self.gradients = np.concatenate([-inverse.sum(axis=1, keepdims=True), inverse], axis=1)  # (m, 4, 3)
-        self.volumes = mesh.volumes
+        gradients = np.concatenate([-inverse.sum(axis=1, keepdims=True), inverse], axis=1)  # (m, 4, 3)
+        self.strains = _strains(gradients)
         self.stiffness = material.stiffness_matrices(count)
         self.density = material.per_tet("density", count)
+        volumes = mesh.volumes[:, None, None]
+        self.matrices = np.swapaxes(self.strains, 1, 2) @ (volumes * self.stiffness @ self.strains)
 
     def element_bounds(self) -> Floats:
         """Largest w^2 of every tetrahedron on its own quarter masses, (m,) [1/s^2].
@@ -144,28 +146,28 @@ class _ElasticOperator:
         K_e = V b^T C b, where b maps displacements to strain in Voigt's order, has the spectrum of the 6x6
         matrix L^T (b b^T) L with L L^T = C.
         """
-        g = self.gradients
-        b = np.zeros((len(g), 6, 4, 3))
-        for axis in range(3):
-            b[:, axis, :, axis] = g[:, :, axis]
-        for row, (p, q) in enumerate(((1, 2), (0, 2), (0, 1)), start=3):
-            b[:, row, :, p] = g[:, :, q]
-            b[:, row, :, q] = g[:, :, p]
-        rows = b.reshape(len(g), 6, 12)
         # Nothing beside the largest entry, but it keeps ratios near -1 and 1/2 from failing by round-off.
         floor = 1e-12 * np.abs(self.stiffness).max(axis=(1, 2))
         root = np.linalg.cholesky(self.stiffness + floor[:, None, None] * np.eye(6))
-        gram = np.swapaxes(root, 1, 2) @ (rows @ np.swapaxes(rows, 1, 2)) @ root
+        gram = np.swapaxes(root, 1, 2) @ (self.strains @ np.swapaxes(self.strains, 1, 2)) @ root
         return np.asarray(np.linalg.eigvalsh(gram)[:, -1] * 4.0 / self.density)
 
     def apply(self, u: Floats) -> Floats:
         """M^-1/2 K M^-1/2 u for (n, 3) u."""
-        displaced = (u / self.root_mass)[self.tets]
-        gradient = np.einsum("mia,mib->mab", displaced, self.gradients)
-        strain = (gradient + np.swapaxes(gradient, 1, 2)) / 2
-        stress = voigt_stress(self.stiffness, strain)
-        forces = np.einsum("mab,mib->mia", stress * self.volumes[:, None, None], self.gradients)
+        displaced = (u / self.root_mass)[self.tets].reshape(-1, 12)
+        forces = np.einsum("mij,mj->mi", self.matrices, displaced).reshape(-1, 4, 3)
         return _summed(self.tets, forces, len(u)) / self.root_mass
+
+
+def _strains(gradients: Floats) -> Floats:
+    """b of each tetrahedron, from the displacements of its corners to strain in Voigt's order, (m, 6, 12)."""
+    b = np.zeros((len(gradients), 6, 4, 3))
+    for axis in range(3):
+        b[:, axis, :, axis] = gradients[:, :, axis]
+    for row, (p, q) in enumerate(((1, 2), (0, 2), (0, 1)), start=3):
+        b[:, row, :, p] = gradients[:, :, q]
+        b[:, row, :, q] = gradients[:, :, p]
+    return b.reshape(len(gradients), 6, 12)
 
 
 def _damping_operator(

@@ -278,6 +278,21 @@ class World(Handle):
         return self._colliders.handles
 
     @property
+    def frames(self) -> Sequence[Frame]:
+        """All frames that bodies are, or can be, attached to."""
+        return self._frames.handles
+
+    @property
+    def grabs(self) -> Sequence[Grab]:
+        """All grabs that hold a body, also those that `restore` brought along."""
+        return [grab for _, grab in sorted(self._grabs.items())]
+
+    @property
+    def joints(self) -> Sequence[Joint]:
+        """All joints between bodies (`Body.attach_to`), also those that `restore` brought along."""
+        return [joint for _, joint in sorted(self._joints.items())]
+
+    @property
     def floor_collider(self) -> Collider | None:
         """The floor where there are colliders, from `build` on: to read what bodies do to it."""
         return self._floor_collider

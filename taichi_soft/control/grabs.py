@@ -40,8 +40,8 @@ class Grab(Handle):
 
     @property
     def is_held(self) -> bool:
-        """False once released."""
-        return self.body._world._grabs.get(self._number) is self
+        """False once released, and once the body was removed."""
+        return self.body.is_alive and self.body._world._grabs.get(self._number) is self
 
     @property
     def point(self) -> NDArray[np.float64]:

@@ -308,5 +308,5 @@ def step_islands(
             if is_crowd(state, i):
                 ti.atomic_sub(state.contact.unfinished_crowds[None], 1)
         else:
-            help_others(state, program)
+            help_others(state, program, i - state.contact.island_count[None])
     return ti.select(failed + awake == 0, ALL_SLEEP, failed)

@@ -92,18 +92,21 @@ def is_crowd(state: ti.template(), island):
 
 @ti.func
 def open_crowds(state: ti.template()):
-    """Before the islands are stepped: how many there are to help with, for `help_others`."""
-    count = 0
+    """Before the islands are stepped: what there is to help with."""
+    crowds, members = 0, 0
     for island in range(state.contact.island_count[None]):
-        count += int(is_crowd(state, island))
-    state.contact.unfinished_crowds[None] = count
+        if is_crowd(state, island):
+            crowds += 1
+            members += state.contact.island_first[island + 1] - state.contact.island_first[island]
+    state.contact.unfinished_crowds[None] = crowds
+    state.contact.useful_helpers[None] = members - crowds
 
 
 @ti.func
-def help_others(state: ti.template(), program: ti.template()):
-    """Work on islands of several bodies until all are finished."""
+def help_others(state: ti.template(), program: ti.template(), helper):
+    """Work on crowds until all are finished, as one of the first helpers; others would only be in the way."""
     nothing = ti.Vector.zero(ti.f32, 4)
-    while _now(state.contact.unfinished_crowds[None]) > 0:
+    while helper < state.contact.useful_helpers[None] and _now(state.contact.unfinished_crowds[None]) > 0:
         for island in range(state.contact.island_count[None]):
             if is_crowd(state, island):
                 work_on(state, program, island, HELP, nothing, nothing.xyz)

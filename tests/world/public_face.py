@@ -121,7 +121,7 @@ class Game:
 
     @property
     def grabs(self):
-        return [grab for _, grab in sorted(self.world._grabs.items())]
+        return self.world.grabs
 
     @property
     def holds(self):
@@ -129,11 +129,11 @@ class Game:
 
     @property
     def joints(self):
-        return [joint for _, joint in sorted(self.world._joints.items())]
+        return self.world.joints
 
     @property
     def frames(self):
-        return list(self.world._frames.handles)
+        return self.world.frames
 
     def handles(self, kind):
         """Those alive that a call of a class can go to."""
@@ -379,12 +379,12 @@ def _has_no_pins(game, body, given):
 
 
 def _has_full_hands(game, handle, given):
-    return len(game.world._grabs) == 16
+    return len(game.world.grabs) == 16
 
 
 def _is_sound_grab(game, world, given):
     ray = {name: given[name] for name in ("origin", "direction", "max_distance")}
-    return len(world._grabs) == 16 and world.raycast(**ray) is not None
+    return len(world.grabs) == 16 and world.raycast(**ray) is not None
 
 
 def _is_full(game, world, given):
@@ -531,7 +531,7 @@ CALLS: dict[str, dict[str, Call]] = {
 }  # fmt: skip
 
 READERS: dict[str, str] = {
-    "World": """bodies colliders dropped_events floor_collider is_built last_dt restore_count settings slot_count step_count
+    "World": """bodies colliders dropped_events floor_collider frames grabs is_built joints last_dt restore_count settings slot_count step_count
         time""",
     "Body": """aabb angular_momentum asset attachments center_of_mass deformations elastic_energy failure flipped_count flipped_tets
         gravitational_energy gravity_scale index is_alive is_asleep is_cut is_frozen is_held is_sheltered
@@ -559,7 +559,7 @@ READABLE_WHEN_DEAD: dict[str, str] = {
     "Collider": """angular_velocity friction group index is_alive mask position restitution rotation shape thickness
         velocity""",
     "Frame": "is_alive",
-    "Grab": "body point",
+    "Grab": "body is_held point",
     "Attachment": "body frame is_attached particles two_way",
     "Joint": "body is_attached other particles",
 }

@@ -105,12 +105,12 @@ def _unpin(world, cube, rng):
 
 def _grab(world, cube, rng):
     body = _body(world, rng)
-    if len(world._grabs) < 3 and not body.is_held and not len(body.pinned):
+    if len(world.grabs) < 3 and not body.is_held and not len(body.pinned):
         body.grab(rng.integers(len(body.surface)), max_force=400.0)
 
 
 def _pick(world, cube, rng):
-    if len(world._grabs) < 3:
+    if len(world.grabs) < 3:
         world.grab(rng.uniform((-1, -1, 3), (1, 1, 4)), (0, 0, -1), max_force=400.0)
 
 
@@ -121,35 +121,35 @@ def _cut(world, cube, rng):
 
 
 def _move_grabs(world, cube, rng):
-    for _, grab in sorted(world._grabs.items()):
+    for grab in world.grabs:
         grab.move(rng.uniform((-1, -1, 0.5), (1, 1, 2)))
 
 
 def _release(world, cube, rng):
-    for _, grab in sorted(world._grabs.items())[:1]:
+    for grab in world.grabs[:1]:
         grab.release()
 
 
 def _attach(world, cube, rng):
     body = _body(world, rng)
-    if not body.is_held and not len(body.pinned) and len(world._frames.handles) < 5:
+    if not body.is_held and not len(body.pinned) and len(world.frames) < 5:
         frame = world.add_frame(body.center_of_mass())
         body.attach(_some(body, rng, 3), frame, two_way=bool(rng.integers(2)))
 
 
 def _move_frames(world, cube, rng):
-    for frame in world._frames.handles:
+    for frame in world.frames:
         frame.move_to(frame.position + rng.uniform(-0.03, 0.03, 3))
 
 
 def _jump_frame(world, cube, rng):
-    for frame in world._frames.handles[:1]:
+    for frame in world.frames[:1]:
         if all(len({each.frame for each in body._attachments}) < 2 for body in world.bodies):
             frame.teleport(rng.uniform((-1, -1, 1), (1, 1, 2)), rng.permutation(np.eye(4))[0])
 
 
 def _remove_frame(world, cube, rng):
-    for frame in world._frames.handles[:1]:
+    for frame in world.frames[:1]:
         frame.remove()
 
 

@@ -7,6 +7,7 @@ from taichi_soft import (
     Material,
     MeshError,
     OptionError,
+    SoftBodyAsset,
     SpringMaterial,
     StateError,
     World,
@@ -248,6 +249,20 @@ def test_a_released_grab_is_spent(plain):
             use()
     assert other.is_held
     assert not grab.is_held
+
+
+def test_a_grab_of_a_body_that_went_holds_nothing(cube, jelly):
+    world = World(floor=None)
+    asset = SoftBodyAsset(cube, jelly)
+    world.reserve(asset, 1)
+    world.build()
+    body = world.spawn(asset)
+    hand = body.grab(0)
+    world.despawn(body)
+    assert not hand.is_held
+    assert repr(hand) == "Grab(body 0, released)"
+    with pytest.raises(StateError, match="released"):
+        hand.move((0, 0, 0))
 
 
 def test_what_cannot_be_grabbed_says_so(cube, jelly):

@@ -74,8 +74,8 @@ def readings(world):
         *((body.index, body.is_frozen, body.is_asleep, body.pinned.tolist()) for body in bodies),
         *(each.position.tolist() for each in world.colliders),
         *((each.impulse.tolist(), each.angular_impulse.tolist()) for each in world.colliders),
-        *(grab.force.tolist() for _, grab in sorted(world._grabs.items())),
-        *(joint.force.tolist() for _, joint in sorted(world._joints.items())),
+        *(grab.force.tolist() for grab in world.grabs),
+        *(joint.force.tolist() for joint in world.joints),
         *(a.force.tolist() for body in bodies for a in body._attachments if a.two_way),
         *(world.read_positions(body, 0.25).tobytes() for body in bodies),
         (world.step_count, world.time, world.last_dt),
@@ -122,7 +122,7 @@ def test_the_hash_changes_with_the_state(small):
 
 def tidy(world):
     """Leave one body, free, and the first colliders."""
-    for _, grab in sorted(world._grabs.items()):
+    for grab in world.grabs:
         grab.release()
     for body in world.bodies[1:]:
         world.despawn(body)
@@ -182,6 +182,36 @@ def test_a_new_handle_where_nobody_holds_one(played):
     found = next(each for each in world.bodies if each.index == slot)
     assert (found.positions() == place).all()
     world.despawn(found)
+
+
+def test_what_holds_a_body_has_handles_after_restore(played):
+    world, cube = played
+    tidy(world)
+    body, other = (world.spawn(cube, position=(x, 0, 2)) for x in (3.0, 3.4))
+    others = [len(each) for each in (world.grabs, world.joints, world.frames)]
+    hand, joint, frame = body.grab(0), body.attach_to(other, [0], onto=[0]), world.add_frame()
+    other.attach([1], frame)
+    slots, data = (body.index, other.index), world.snapshot()
+    for each in (hand, joint, *other.attachments):
+        each.release()
+    frame.remove()
+    del hand, joint, frame, body, other
+    world.restore(data)
+    body, other = (next(each for each in world.bodies if each.index == slot) for slot in slots)
+    assert body.is_held
+    assert [len(each) for each in (world.grabs, world.joints, world.frames)] == [n + 1 for n in others]
+    (hand,) = (each for each in world.grabs if each.body is body)
+    (joint,) = (each for each in world.joints if each.body is body)
+    hand.release()
+    joint.release()
+    assert not body.is_held
+    (hold,) = other.attachments
+    assert hold.frame in world.frames
+    hold.release()
+    hold.frame.remove()
+    assert [len(each) for each in (world.grabs, world.joints, world.frames)] == others
+    for each in (body, other):
+        world.despawn(each)
 
 
 def test_a_frozen_body_and_its_failure_come_back(small):
