@@ -20,7 +20,7 @@ class Failure:
     body: int
     tetrahedron: int | None  # that broke first, in the caller's order; None if it cannot be told
     step: int  # of the world, counted from 0, which was undone for this body
-    substep: int | None  # within that step
+    substep: int | None  # within that step, or the finest attempt at it
     time: float  # [s], of the last sound state, in which the body now rests
     edge: tuple[int, int] | None = None  # instead of a tetrahedron where forces act along edges
 
@@ -31,7 +31,7 @@ class FailedStep:
 
     step: int
     time: float  # [s], before it
-    substeps: int
+    substeps: int  # of the last attempt at it
     h: float  # [s]
 
 

@@ -20,6 +20,7 @@ from taichi_soft.handles import CALLS, Handle
 from taichi_soft.plain import from_plain
 from taichi_soft.recorder import read_recording
 from taichi_soft.render import FLIPPED, PALETTE, Camera, Renderer, Surface, draw_text, highlight
+from taichi_soft.scenery import Scenery
 from taichi_soft.tearing import Tearing
 from taichi_soft.world import World
 
@@ -156,7 +157,7 @@ def _draw(world: World, failures: tuple[Failure, ...], path: Path) -> None:
         camera=Camera.framing(lower, upper, aspect=1280 / 720, margin=1.5),
         floor=world.settings.floor,
     )
-    image = renderer.render(surfaces)
+    image = renderer.render([*Scenery(world).at(1.0), *surfaces])
     draw_text(image, [f"step {world.step_count}, t = {world.time:.3f} s", *map(failure_line, failures)])
     path.parent.mkdir(parents=True, exist_ok=True)
     if path.suffix.lower() != ".png" or not cv2.imwrite(str(path), np.ascontiguousarray(image[:, :, ::-1])):
