@@ -22,7 +22,8 @@ from taichi_soft.drops.trial import (
 CRITERION = (
     f"at rest: slower than {CALM_SPEED:g} sizes per second or {LEAST_CALM_SPEED * 1000:g} mm/s, or within "
     f"{TREMBLE:g} sizes of one place (root mean squares over vertices), for {CALM_TIME:g} s; within "
-    f"{PATIENCE:g} T, T = sqrt(size / g) being 0.07 to 1 s; after {FREE_TIME:g} T velocities fade at {BRAKE:g} / T, or balls would roll on"
+    f"{PATIENCE:g} T, T = sqrt(size / g) being 0.07 to 1 s; after {FREE_TIME:g} T velocities fade at "
+    f"{BRAKE:g} / T, or balls would roll on"
 )
 
 
