@@ -445,6 +445,8 @@ class World(Handle):
     ) -> Grab | None:
         """Take hold of the first body that a ray hits: as `raycast`, and `Body.grab` there.
 
+        Colliders do not stop the ray: `max_distance` does, where your level is in the way.
+
         Args:
             origin, direction, max_distance, bodies: of the ray.
             frequency: of the spring, critically damped [Hz].

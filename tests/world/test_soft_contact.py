@@ -230,3 +230,46 @@ def test_where_a_body_explodes_it_is_frozen_alone_and_the_others_go_on():
     for body, place in zip((lower, upper), places, strict=True):
         assert np.abs(body.center_of_mass() - place).max() < 0.5
     assert upper.center_of_mass()[2] > still[:, 2].max() > lower.center_of_mass()[2]
+
+
+@pytest.mark.parametrize(("slope", "slides"), [(0.48, False), (0.6, True)])
+def test_a_block_slides_on_another_where_the_slope_exceeds_the_mean_friction(slope, slides):
+    """Coulomb: sqrt(0.25 x 1) = 0.5, and g (sin - 0.5 cos) of acceleration beyond it."""
+    plate = box((3.0, 0.5, 0.1), (12, 2, 1))
+    block = box((0.4, 0.3, 0.1), (3, 2, 1))
+    stiff = Material(2e6, 0.2, 1000.0, 200.0)
+    angle = np.arctan(slope)
+    world = world_of(
+        (plate, stiff, {"pinned": np.arange(len(plate.vertices)), "contact": Contact(friction=0.25)}),
+        (block, stiff, {"position": (-0.8, 0, 0.101), "contact": Contact(friction=1.0)}),
+        gravity=(9.81 * np.sin(angle), 0.0, -9.81 * np.cos(angle)),
+    )
+    body = world.bodies[1]
+    run(world, 1.25)  # it comes down by a millimetre, and slides until friction has stopped it
+    start, speed = body.center_of_mass()[0], body.momentum()[0] / body.masses.sum()
+    run(world, 0.5)
+    way = body.center_of_mass()[0] - start
+    if slides:
+        expected = 9.81 * (np.sin(angle) - 0.5 * np.cos(angle))
+        assert (way - 0.5 * speed) / 0.125 == pytest.approx(expected, rel=0.05)
+    else:
+        assert abs(way) < 1e-5
+
+
+@pytest.mark.parametrize("size", [0.1, 0.3])
+def test_what_is_thrown_at_a_thin_soft_plate_at_30_m_s_does_not_pass_it(size):
+    """Half a metre a frame, ten times the plate's thickness."""
+    plate = box((1.5, 0.05, 1.5), (8, 1, 8))
+    rim = np.flatnonzero(np.abs(plate.vertices[:, [0, 2]]).max(axis=1) > 0.74)
+    ball = sphere(size / 2, 3)
+    world = world_of(
+        (plate, Material(1e6, 0.3, 1000.0, 100.0), {"pinned": rim}),
+        (ball, Material(1e6, 0.3, 300.0, 20.0), {"position": (0.02, 1.0, 0.03), "velocity": (0, -30, 0)}),
+    )
+    target, thrown = world.bodies
+    for _ in range(30):
+        world.step(DT)
+        assert thrown.positions()[:, 1].mean() > target.positions()[:, 1].min()
+    assert thrown.momentum()[1] > 0  # thrown back
+    assert not thrown.is_frozen
+    assert not target.is_frozen
