@@ -64,7 +64,8 @@ def conclude(results: Results) -> Section:
     finding = Finding(
         "best-fitting-plane-angles",
         f"in the beam with a hole half of the planes are {beam['percentiles'][2]:.0f} degrees off or more, a "
-        f"quarter {beam['percentiles'][3]:.0f} degrees; beyond {FAR:.0f} degrees: {shares}",
+        f"quarter {beam['percentiles'][3]:.0f} degrees; beyond {FAR:.0f} degrees: {shares}; many is "
+        f"called what is more than {MANY:.0%}",
         Verdict.AGREES if agrees else Verdict.DIFFERS,
         "" if agrees else "the mesh: that of the thesis is not known, and the shares above differ by mesh",
     )
