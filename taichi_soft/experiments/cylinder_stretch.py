@@ -93,8 +93,8 @@ def conclude(results: Results) -> Section:
             judged(
                 "cylinder-0.4",
                 f"volume over that at rest {tell('volume', kept, 0.4)}; with the exact strain "
-                f"{_at(exact, 'volume', MODERATE):.3f} and {exact['volume'][-1]:.3f}; kept is called what changes by "
-                f"less than {KEPT:.0%} at {MODERATE:.0%}",
+                f"{_at(exact, 'volume', MODERATE):.3f} and {exact['volume'][-1]:.3f}; kept is called what "
+                f"changes by less than {KEPT:.0%} at {MODERATE:.0%}",
                 abs(_at(kept, "volume", MODERATE) - 1) < KEPT,
                 "the model: the strain of eq. 6.7 makes the cylinder too slim; the exact one keeps more",
             ),
