@@ -51,7 +51,7 @@ def mesh_of(name: str, size: int) -> TetMesh:
         "ball": lambda: sphere(1.0, size - 1),
         "uneven block": lambda: jittered_block(size),
         "another uneven block": lambda: jittered_block(size, seed=1),
-        "meshed sphere": lambda: load_mesh(ASSETS / "sphere.npz"),
+        "meshed sphere": lambda: delaunay_mesh(load_mesh(ASSETS / "sphere.npz")),
         "beam with hole": lambda: load_mesh(ASSETS / "beam_with_hole.npz"),
     }
     return shapes[name]()
