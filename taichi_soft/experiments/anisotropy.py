@@ -44,14 +44,13 @@ def jittered_block(cells: int, seed: int = 0) -> TetMesh:
 
 
 def mesh_of(name: str, size: int) -> TetMesh:
-    """The body of that name; `size` counts what it is long in elements, but of the last two."""
+    """The body of that name; `size` counts what it is long in elements, but of the last."""
     shapes = {
         "block": lambda: box((1.0, 1.0, 1.0), (size,) * 3),
         "cylinder": lambda: cylinder(1.0, 2.0, rings=size - 1, layers=size),
         "ball": lambda: sphere(1.0, size - 1),
         "uneven block": lambda: jittered_block(size),
         "another uneven block": lambda: jittered_block(size, seed=1),
-        "meshed sphere": lambda: delaunay_mesh(load_mesh(ASSETS / "sphere.npz")),
         "beam with hole": lambda: load_mesh(ASSETS / "beam_with_hole.npz"),
     }
     return shapes[name]()
