@@ -95,10 +95,10 @@ def conclude(results: Results) -> Section:
     def draw(figure: Any) -> None:
         axes = figure.add_subplot()
         for law, (error, _) in worst.items():
-            axes.loglog(STRAINS, error, "o-", label=law, ms=3)
+            axes.loglog(STRAINS, error, "o-" if law in TETRAHEDRAL else "s--", label=law, ms=3)
         axes.set_xlabel("strain [1]")
         axes.set_ylabel("error of forces, over the largest [1]")
-        axes.legend(fontsize="small", ncols=2)
+        axes.legend(fontsize="small", loc="center left", bbox_to_anchor=(1.02, 0.5))
 
     return Section(
         (
@@ -124,7 +124,7 @@ def conclude(results: Results) -> Section:
                 tuple((law, *(float(e) for e in error)) for law, (error, _) in worst.items()),
             ),
         ),
-        (Plot("errors", "What is left is of second order for laws on tetrahedra.", draw),),
+        (Plot("errors", "What is left is of second order for laws on tetrahedra.", draw, (7.5, 4.0)),),
     )
 
 
