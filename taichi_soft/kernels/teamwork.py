@@ -29,11 +29,17 @@ def _now(counter: ti.template()):
 
 
 @ti.real_func
-def _do_contact_task(state: ti.template(), program: ti.template(), island: ti.i32, body: ti.i32):
+def _do_contact_task(
+    state: ti.template(),
+    program: ti.template(),
+    island: ti.i32,
+    body: ti.i32,
+    task: ti.i32,
+    numbers: ti.math.vec4,
+    common: ti.math.vec3,
+):
     """All tasks but the push; by itself, because Taichi takes more than twice as long for twice the code."""
-    task, numbers = state.contact.task[island], state.contact.task_numbers[island]
     if task == DRIFT and state.body_status[body] == ACTIVE:
-        common = state.contact.task_common[island]
         drift_body(state, body, numbers[0], numbers[1], numbers[2], numbers[3], common)
     if ti.static(program.has_soft_contact):
         if task == SEARCH:
@@ -43,12 +49,11 @@ def _do_contact_task(state: ti.template(), program: ti.template(), island: ti.i3
 
 
 @ti.func
-def _do_task(state: ti.template(), program: ti.template(), island, body):
-    if state.contact.task[island] != PUSH:
-        _do_contact_task(state, program, island, body)
+def _do_task(state: ti.template(), program: ti.template(), island, body, task, numbers, common):
+    if task != PUSH:
+        _do_contact_task(state, program, island, body, task, numbers, common)
     elif state.body_status[body] == ACTIVE:
-        numbers = state.contact.task_numbers[island]
-        push_body(state, program, body, numbers[0], numbers[1], numbers[2], state.contact.task_common[island])
+        push_body(state, program, body, numbers[0], numbers[1], numbers[2], common)
 
 
 @ti.real_func
@@ -63,23 +68,32 @@ def work_on(
     """Take bodies of an island until none is waiting. The owner calls for a task first, and waits for all.
 
     What is called for is written here, because to Taichi no call reads what was written before it: it drops
-    what is written again before the kernel itself reads it.
+    what is written again before the kernel itself reads it. A body alone is nobody else's business: what its
+    thread wrote here would take the cache line from those of its neighbours.
     """
     first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
-    if task != HELP:
-        state.contact.task[island] = task
-        state.contact.task_numbers[island] = numbers
-        state.contact.task_common[island] = common
-        state.contact.unfinished[island] = last - first
-        ti.atomic_max(state.contact.untaken[island], last - first)
-    place = 0
-    if _now(state.contact.untaken[island]) > 0:
-        place = ti.atomic_sub(state.contact.untaken[island], 1)
+    what, how, shared = task, numbers, common
+    is_crowd_here = int(last - first > 1)
+    place = 1 - is_crowd_here
+    if is_crowd_here == 1:
+        if task != HELP:
+            state.contact.task[island] = task
+            state.contact.task_numbers[island] = numbers
+            state.contact.task_common[island] = common
+            state.contact.unfinished[island] = last - first
+            ti.atomic_max(state.contact.untaken[island], last - first)
+        if _now(state.contact.untaken[island]) > 0:
+            place = ti.atomic_sub(state.contact.untaken[island], 1)
     while place > 0:
-        _do_task(state, program, island, state.contact.island_body[first + place - 1])
-        ti.atomic_sub(state.contact.unfinished[island], 1)
-        place = ti.atomic_sub(state.contact.untaken[island], 1)
-    if task != HELP:
+        if task == HELP:
+            what, how = state.contact.task[island], state.contact.task_numbers[island]
+            shared = state.contact.task_common[island]
+        _do_task(state, program, island, state.contact.island_body[first + place - 1], what, how, shared)
+        place = 0
+        if is_crowd_here == 1:
+            ti.atomic_sub(state.contact.unfinished[island], 1)
+            place = ti.atomic_sub(state.contact.untaken[island], 1)
+    if is_crowd_here == 1 and task != HELP:
         while _now(state.contact.unfinished[island]) > 0:
             pass
 
