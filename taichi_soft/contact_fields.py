@@ -124,23 +124,17 @@ class SoftContactFields:
         self.slot_normal = ti.Vector.field(3, ti.f32, outer * SLOTS)  # from the triangle to the vertex
         self.slot_press = ti.field(ti.f32, outer * SLOTS)  # impulse along it in this substep [N s]
         self.slot_rub = ti.Vector.field(3, ti.f32, outer * SLOTS)  # friction on the vertex [N s]
-        self.contact_count = ti.field(
-            ti.i32, bodies
-        )  # slots in contact in this substep, of each body's vertices
-        self.contact_slot = ti.field(ti.i32, outer * SLOTS)  # those, from the first slot of each body on
-        self.slot_mobility = ti.Vector.field(
-            4, ti.f32, outer * SLOTS
-        )  # [1/kg], of the vertex and the corners
-        self.slot_moves = ti.Vector.field(
-            2, ti.f32, outer * SLOTS
-        )  # 1 where the one's, the other's body moves
-        self.slot_face = ti.Vector.field(3, ti.f32, outer * SLOTS)  # normal of the triangle
-        self.slot_shares = ti.Vector.field(
-            3, ti.f32, outer * SLOTS
-        )  # of the corners in what the vertex feels
-        self.slot_levers = ti.Matrix.field(
-            3, 3, ti.f32, outer * SLOTS
-        )  # height times gradients of the weights
+        # Of what is in contact in this substep, slots of each body's vertices from its first slot on, and for
+        # each what its solves share: inverse masses of the vertex and the corners [1/kg]; whether the bodies
+        # of the two move (1); normal of the triangle; shares of the corners in what the vertex feels, and
+        # height over the triangle times the gradients of the weights.
+        self.contact_count = ti.field(ti.i32, bodies)
+        self.contact_slot = ti.field(ti.i32, outer * SLOTS)
+        self.slot_mobility = ti.Vector.field(4, ti.f32, outer * SLOTS)
+        self.slot_moves = ti.Vector.field(2, ti.f32, outer * SLOTS)
+        self.slot_face = ti.Vector.field(3, ti.f32, outer * SLOTS)
+        self.slot_shares = ti.Vector.field(3, ti.f32, outer * SLOTS)
+        self.slot_levers = ti.Matrix.field(3, 3, ti.f32, outer * SLOTS)
         # The contact in which a particle was pressed most at the end of the last step.
         self.kept_triangle = ti.field(ti.i32, particles)
         self.kept_press = ti.field(ti.f32, particles)  # as `slot_press`; 0 for none

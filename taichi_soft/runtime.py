@@ -137,7 +137,7 @@ def init(arch: str = "auto", threads: int | None = None) -> Device:
                 << 29,  # a game of many kinds of worlds fills the default 100 MB
                 enable_fallback=False,
                 cfg_optimization=False,  # halves the compile time; the kernels run as fast without it
-                detect_read_only=False,  # a GPU would not see what a real function wrote
+                detect_read_only=False,  # a GPU might not see what a real function wrote; untried
                 make_cpu_multithreading_loop=False,  # it would put up to 512 bodies into one thread
                 unrolling_limit=0,  # no warning
                 log_level=ti.ERROR,

@@ -220,18 +220,19 @@ def _solve_contact(state: ti.template(), soft: ti.template(), slot, p, corners, 
         ]
     )
 
-    before = soft.slot_press[slot]
-    press = before
+    press = soft.slot_press[slot]
+    push = press
     if is_first == 0:
         allowed = -ti.max(soft.slot_gap[slot], 0.0) / h
         approach = v.dot(normal) - weights.dot(corner_v @ normal)
         total = m + (weights * weights).dot(corner_m)
-        press = ti.max(before + (allowed - approach) / ti.max(total, 1e-30), 0.0)
+        wanted_press = ti.max(press + (allowed - approach) / ti.max(total, 1e-30), 0.0)
+        push = wanted_press - press
+        press = wanted_press
         soft.slot_press[slot] = press
-        before = press - before
-    if is_finite(before * normal):
-        v += m * before * normal
-        corner_v -= (before * weights * corner_m).outer_product(normal)
+    if is_finite(push * normal):
+        v += m * push * normal
+        corner_v -= (push * weights * corner_m).outer_product(normal)
 
     rub = soft.slot_rub[slot]
     # Where no press is left, friction takes back what it gave in an earlier sweep.

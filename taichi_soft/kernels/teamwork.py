@@ -56,6 +56,12 @@ def _do_task(state: ti.template(), program: ti.template(), island, body, task, n
         push_body(state, program, body, numbers[0], numbers[1], numbers[2], common)
 
 
+@ti.func
+def is_crowd(state: ti.template(), island):
+    """Whether an island has several bodies, and is worth helping with."""
+    return state.contact.island_first[island + 1] - state.contact.island_first[island] > 1
+
+
 @ti.real_func
 def work_on(
     state: ti.template(),
@@ -72,10 +78,10 @@ def work_on(
     thread wrote here would take the cache line from those of its neighbours.
     """
     first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
-    what, how, shared = task, numbers, common
-    is_crowd_here = int(last - first > 1)
-    place = 1 - is_crowd_here
-    if is_crowd_here == 1:
+    what, how, velocity = task, numbers, common
+    is_shared = int(is_crowd(state, island))
+    place = 1 - is_shared
+    if is_shared == 1:
         if task != HELP:
             state.contact.task[island] = task
             state.contact.task_numbers[island] = numbers
@@ -87,21 +93,15 @@ def work_on(
     while place > 0:
         if task == HELP:
             what, how = state.contact.task[island], state.contact.task_numbers[island]
-            shared = state.contact.task_common[island]
-        _do_task(state, program, island, state.contact.island_body[first + place - 1], what, how, shared)
+            velocity = state.contact.task_common[island]
+        _do_task(state, program, island, state.contact.island_body[first + place - 1], what, how, velocity)
         place = 0
-        if is_crowd_here == 1:
+        if is_shared == 1:
             ti.atomic_sub(state.contact.unfinished[island], 1)
             place = ti.atomic_sub(state.contact.untaken[island], 1)
-    if is_crowd_here == 1 and task != HELP:
+    if is_shared == 1 and task != HELP:
         while _now(state.contact.unfinished[island]) > 0:
             pass
-
-
-@ti.func
-def is_crowd(state: ti.template(), island):
-    """Whether an island has several bodies, and is worth helping with."""
-    return state.contact.island_first[island + 1] - state.contact.island_first[island] > 1
 
 
 @ti.func
