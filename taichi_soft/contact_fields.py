@@ -78,7 +78,8 @@ class ContactFields:
         self.body_filter = ti.Vector.field(2, ti.i32, bodies)  # group, mask
         self.is_gentle = ti.field(ti.i32, bodies)  # 0 where forces moved a particle too far in one substep
         self.body_speed = ti.field(ti.f32, bodies)  # of its fastest particle in this substep [m/s]
-        self.body_speed_beside = ti.field(ti.f32, bodies)  # beside the velocity that its island shares [m/s]
+        # Beside the velocity that its island shares [m/s]; of what was touched just now, before the push.
+        self.body_speed_beside = ti.field(ti.f32, bodies)
         self.body_edge = ti.field(ti.f32, bodies)  # mean edge of its surface [m]
         self.prev_reaction = ti.Vector.field(3, ti.f32, particles)  # `particle_reaction` before the step
         self.particle_clearance = ti.field(ti.f32, particles)  # [m] from all that is near, at that time
@@ -116,6 +117,13 @@ class SoftContactFields:
         self.cell_item = ti.field(ti.i32, outer)  # the same, cell by cell
         self.triangle_lower = ti.Vector.field(3, ti.f32, triangles)  # corners of a box [m], at the search
         self.triangle_upper = ti.Vector.field(3, ti.f32, triangles)
+        self.searched_position = ti.Vector.field(3, ti.f32, outer)  # [m], at the search
+        # Beside what the bodies of an island share: ways [m] for which a search holds, and how far each body
+        # and each vertex is from where it was then; speeds before contact [m/s].
+        self.body_reach = ti.field(ti.f32, bodies)
+        self.body_gone = ti.field(ti.f32, bodies)
+        self.particle_gone = ti.field(ti.f32, particles)
+        self.particle_speed = ti.field(ti.f32, particles)
         self.slot_count = ti.field(ti.i32, outer)
         self.slot_triangle = ti.field(ti.i32, outer * SLOTS)
         self.slot_distance = ti.field(ti.f32, outer * SLOTS)  # [m], at the search

@@ -21,13 +21,9 @@ from taichi_soft.kernels.per_body import body_is_sound, end_body
 from taichi_soft.kernels.rebound import begin_rebounds, take_back_rebounds
 from taichi_soft.kernels.sleep import settle_island, wake_by_colliders, wake_island
 from taichi_soft.kernels.soft_contact import solve_island
-from taichi_soft.kernels.soft_search import (
-    begin_search,
-    forget_candidates,
-    is_social,
-    island_margin,
-)
+from taichi_soft.kernels.soft_search import forget_candidates, is_outdated, is_social
 from taichi_soft.kernels.teamwork import (
+    BOXES,
     DRIFT,
     GAPS,
     PUSH,
@@ -45,15 +41,15 @@ from taichi_soft.types import Integrator
 ALL_SLEEP = -1
 """Instead of a number of bodies: none is awake, and the next step would find all as it is."""
 
-NOT_SEARCHED = -2
-"""Instead of a way for which candidates hold, where the last step has forgotten its own."""
+NONE, OUTDATED, VALID = range(3)
+"""Candidates of an island: the last step has forgotten its own; those of an attempt at this one; usable."""
 
 MOST_FINER = 8
 """Times as many substeps as asked for, at most."""
 
 
 @ti.func
-def _begin_body(state: ti.template(), body):
+def _begin_body(state: ti.template(), program: ti.template(), body):
     if state.body_status[body] != ABSENT:
         particles = state.body_particles[body]
         for p in range(particles[0], particles[1]):
@@ -66,6 +62,11 @@ def _begin_body(state: ti.template(), body):
         begin_rebounds(state, body)
         forget_contacts(state, body)
         state.contact.is_wild[body] = 0
+        if ti.static(program.has_soft_contact):
+            if state.body_status[body] != ACTIVE:
+                state.contact.body_speed_beside[body] = 0.0
+                for p in range(particles[0], particles[1]):
+                    state.soft.particle_speed[p] = 0.0
 
 
 @ti.func
@@ -113,27 +114,31 @@ def _is_alone(state: ti.template(), program: ti.template(), island):
 
 
 @ti.func
-def _touch_each_other(state: ti.template(), program: ti.template(), island, reach, gone, fastest, h, common):
+def _touch_each_other(
+    state: ti.template(), program: ti.template(), island, candidates, shared, held, h, left
+):
     """Contact between bodies of one island in a substep; looks for candidates again where they have aged.
 
     Args:
-        reach, gone: way [m] for which the candidates hold, and how much of it may be gone.
-        fastest: speed [m/s] before contact, beside what all have in common.
-    Returns: `reach` and `gone` as they are now.
+        candidates: NONE, OUTDATED or VALID.
+        shared: way [m] that all of the island have gone since these were looked for.
+        held: highest speed [m/s] that joints gave, beside what all have in common.
+        left: time until the end of the step [s].
+    Returns: `shared` as it is now.
     """
-    way = 2.0 * fastest * h
-    holds, gone_now, used = reach, gone, gone + way
+    shared_now = shared
     if is_social(state, island) == 1:
-        if not (used <= holds):
-            least, thickness = island_margin(state, island)
-            holds, gone_now, used = ti.max(way, least), ti.cast(0.0, ti.f32), way
-            begin_search(state, island, int(reach != NOT_SEARCHED))
-            work_on(state, program, island, SEARCH, ti.Vector([thickness + holds, 0.0, 0.0, 0.0]), common)
-        work_on(state, program, island, GAPS, ti.Vector([used, way, 0.0, 0.0]), common)
-        gone_now += 2.0 * solve_island(state, island, h)
+        nothing = ti.Vector.zero(ti.f32, 4)
+        if candidates != VALID or is_outdated(state, island, held, h) == 1:
+            shared_now = nothing.xyz
+            forgets = ti.cast(candidates != NONE, ti.f32)
+            work_on(state, program, island, BOXES, ti.Vector([held, h, left, forgets]), nothing.xyz)
+            work_on(state, program, island, SEARCH, nothing, nothing.xyz)
+        work_on(state, program, island, GAPS, ti.Vector([2.0 * held, h, 0.0, 0.0]), nothing.xyz)
+        solve_island(state, island, h)
         if state.soft.records_touches[None] == 1:
             add_touches(state, island)
-    return holds, gone_now
+    return shared_now
 
 
 @ti.func
@@ -145,61 +150,63 @@ def _end_substep(
     since,
     left,
     fastest,
-    fastest_beside,
     common,
-    reach,
-    gone,
+    candidates,
+    shared,
 ):
     """What joints and contact make of new velocities, and the new positions.
 
     Args:
         since, left: time since the start of the step, and until its end [s].
-        fastest, fastest_beside: highest speed in the island [m/s], and the highest beside `common`.
-        reach, gone: way [m] for which candidates hold, and how much of it may be gone.
-    Returns: `reach` and `gone` after the substep.
+        fastest: highest speed in the island [m/s].
+        common: velocity that its bodies share [m/s].
+        candidates, shared: as `_touch_each_other` takes them.
+    Returns: `shared` after the substep.
     """
     held, held_beside = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32)
     if ti.static(program.integrator != Integrator.IMPLICIT_EULER):
         held, held_beside = solve_joints(state, island, h, int(since == 0.0), common)
-    holds, used = reach, gone
+    way = shared
     if ti.static(program.has_soft_contact):
-        before = ti.max(fastest_beside, held_beside)
-        holds, used = _touch_each_other(state, program, island, reach, gone, before, h, common)
+        way = _touch_each_other(state, program, island, candidates, shared, held_beside, h, left)
+    way += h * common
     numbers = ti.Vector([h, since, left, ti.max(fastest, held)])
-    work_on(state, program, island, DRIFT, numbers, common)
-    _, farthest, _ = _compare_speeds(state, island)
-    return holds, used + 2.0 * h * farthest
+    work_on(state, program, island, DRIFT, numbers, way)
+    return way
 
 
 @ti.func
 def _compare_speeds(state: ti.template(), island):
-    """After a task: what the bodies of an island have noted.
+    """After the push: what the bodies of an island have noted.
 
-    Returns: the highest speed [m/s], the highest beside what they share, and whether no force moved a
-    particle too far at once (1). What explodes is not counted in the second: the candidates of others would
-    age by its speed.
+    Returns: the highest speed [m/s], and whether no force moved a particle too far at once (1).
     """
-    highest, highest_beside, is_gentle = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32), 1
+    highest, is_gentle = ti.cast(0.0, ti.f32), 1
     for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
         body = state.contact.island_body[i]
         if state.body_status[body] == ACTIVE:
             highest = ti.max(highest, state.contact.body_speed[body])
-            if state.contact.is_wild[body] == 0:
-                highest_beside = ti.max(highest_beside, state.contact.body_speed_beside[body])
             is_gentle = is_gentle & state.contact.is_gentle[body]
-    return highest, highest_beside, is_gentle
+    return highest, is_gentle
 
 
 @ti.func
 def _common_velocity(state: ti.template(), island):
-    """Mean velocity of the particles of an island [m/s]: what its bodies share brings none nearer."""
-    total, count = ti.Vector.zero(ti.f32, 3), 0
+    """Mean velocity of the particles of an island [m/s]: what its bodies share brings none nearer.
+
+    Zero where one of them does not move.
+    """
+    total, count, moves = ti.Vector.zero(ti.f32, 3), 0, ti.cast(1.0, ti.f32)
     for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
-        particles = state.body_particles[state.contact.island_body[i]]
-        for p in range(particles[0], particles[1]):
-            total += state.particle_velocity[p]
-        count += particles[1] - particles[0]
-    return total / count
+        body = state.contact.island_body[i]
+        if state.body_status[body] == ACTIVE:
+            particles = state.body_particles[body]
+            for p in range(particles[0], particles[1]):
+                total += state.particle_velocity[p]
+            count += particles[1] - particles[0]
+        else:
+            moves = 0.0
+    return moves * total / ti.max(count, 1)
 
 
 @ti.func
@@ -210,25 +217,23 @@ def _move_island(state: ti.template(), program: ti.template(), island, substeps,
     """
     first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
     first_body = state.contact.island_body[first]
-    reach, gone, is_gentle = ti.cast(NOT_SEARCHED + is_again, ti.f32), ti.cast(0.0, ti.f32), 1
-    common = ti.Vector.zero(ti.f32, 3)
+    candidates, is_gentle = NONE + is_again, 1
+    common, shared = ti.Vector.zero(ti.f32, 3), ti.Vector.zero(ti.f32, 3)
     if ti.static(program.has_soft_contact):
         common = _common_velocity(state, island)
     is_alone, fastest = _is_alone(state, program, island), ti.cast(0.0, ti.f32)
     for s in range(substeps):
         since, left = s * h, h * (substeps - s)
         way = h * ti.cast(is_alone & is_clear(state, first_body, fastest * h), ti.f32)
-        common += h * state.gravity[None]
         work_on(state, program, island, PUSH, ti.Vector([h, since, way, 0.0]), common)
-        fastest, fastest_beside, gently = _compare_speeds(state, island)
+        fastest, gently = _compare_speeds(state, island)
         is_gentle = is_gentle & gently
         has_moved = 0
         if way > 0.0 and state.body_status[first_body] == ACTIVE:
             has_moved = has_drifted(state, first_body, fastest, h)
         if has_moved == 0:
-            reach, gone = _end_substep(
-                state, program, island, h, since, left, fastest, fastest_beside, common, reach, gone
-            )
+            shared = _end_substep(state, program, island, h, since, left, fastest, common, candidates, shared)
+            candidates = VALID
         if ti.static(program.integrator == Integrator.IMPLICIT_EULER):
             for i in range(first, last):
                 body = state.contact.island_body[i]
@@ -242,7 +247,7 @@ def _step_awake_island(state: ti.template(), program: ti.template(), island, sub
     """One fixed step of an island, as fine as it needs. Returns how many of its bodies failed."""
     first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
     for i in range(first, last):
-        _begin_body(state, state.contact.island_body[i])
+        _begin_body(state, program, state.contact.island_body[i])
     finer, is_open = 1, 1
     while is_open == 1:
         is_gentle = _move_island(state, program, island, finer * substeps, h / finer, int(finer > 1))

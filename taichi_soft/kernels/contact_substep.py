@@ -38,16 +38,17 @@ def _kick_body(state: ti.template(), program: ti.template(), body, kick, way, co
         inv_mass = state.particle_inv_mass[p]
         acceleration = state.particle_force[p].xyz * inv_mass + gravity
         acceleration *= ti.select(inv_mass > 0.0, 1.0, 0.0)
-        x, v = program.advance(
-            state.particle_position[p], state.particle_velocity[p], acceleration, way, kick
-        )
+        v_before, was_touched = state.particle_velocity[p], state.contact.particle_touches[p]
+        x, v = program.advance(state.particle_position[p], v_before, acceleration, way, kick)
         state.particle_position[p] = x
         state.particle_velocity[p] = v
         state.contact.particle_touches[p] = 0
         state.particle_force[p] = ti.Vector.zero(state.real, 4)
         highest = ti.max(highest, v.dot(v))
-        if ti.static(program.has_soft_contact) and way == 0.0:
-            beside = v - common
+        if ti.static(program.has_soft_contact):
+            state.soft.particle_speed[p] = (v - common).norm()
+            # What presses against others gains speed only to lose it to them.
+            beside = ti.select(was_touched == 1, v_before, v) - common
             highest_beside = ti.max(highest_beside, beside.dot(beside))
         largest = ti.max(largest, acceleration.dot(acceleration))
     return ti.sqrt(highest), ti.sqrt(highest_beside), kick * ti.sqrt(largest)
@@ -107,13 +108,12 @@ def has_drifted(state: ti.template(), body, speed, h):
 
 
 @ti.func
-def drift_body(state: ti.template(), body, h, since, left, fastest, common):
+def drift_body(state: ti.template(), body, h, since, left, fastest):
     """New positions, and what colliders in the way make of velocities.
 
     Args:
         since, left: time since the start of the step, and until its end [s].
         fastest: speed of what is fastest in the island [m/s].
-    Notes the highest speed beside the `common` velocity [m/s].
     """
     gone = state.contact.gone[body] + fastest * h
     if not (state.contact.reach[body] >= gone):
@@ -122,7 +122,7 @@ def drift_body(state: ti.template(), body, h, since, left, fastest, common):
         gone = fastest * h
     state.contact.gone[body] = gone
     particles = state.body_particles[body]
-    farthest2, farthest_beside2 = ti.cast(0.0, state.real), ti.cast(0.0, state.real)
+    farthest2 = ti.cast(0.0, state.real)
     for p in range(particles[0], particles[1]):
         x, v = state.particle_position[p], state.particle_velocity[p]
         way = h * v
@@ -132,8 +132,5 @@ def drift_body(state: ti.template(), body, h, since, left, fastest, common):
             way = x_new - x
         state.particle_position[p] = x + way
         farthest2 = ti.max(farthest2, way.dot(way))
-        beside = way - h * common
-        farthest_beside2 = ti.max(farthest_beside2, beside.dot(beside))
     limit_rebounds(state, body, since + h)
     note_motion(state, body, ti.sqrt(farthest2) / h)
-    state.contact.body_speed_beside[body] = ti.sqrt(farthest_beside2) / h

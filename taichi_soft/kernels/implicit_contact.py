@@ -122,6 +122,8 @@ def kick_implicitly(state: ti.template(), program: ti.template(), body, h, since
         state.direction[p] = state.particle_position[p]
         state.particle_force[p] = ti.Vector.zero(state.real, 4)
         highest = ti.max(highest, v.dot(v))
-        highest_beside = ti.max(highest_beside, (v - common).dot(v - common))
+        if ti.static(program.has_soft_contact):
+            state.soft.particle_speed[p] = (v - common).norm()
+            highest_beside = ti.max(highest_beside, (v - common).dot(v - common))
     add_pin_reactions(state, body, h)
     return ti.sqrt(highest), ti.sqrt(highest_beside)

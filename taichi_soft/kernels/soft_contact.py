@@ -99,12 +99,12 @@ def _drop_twins(soft: ti.template(), first, slot):
 
 
 @ti.func
-def _find_gaps_of(state: ti.template(), k, gone, way):
+def _find_gaps_of(state: ti.template(), k, held, h):
     """Which candidates of a vertex count: those in front of it, and the one it is least deep behind.
 
     Args:
-        gone: way [m] by which a pair may come nearer from the search to the end of this substep.
-        way: the same within this substep.
+        held: what joints may add to the speed at which a pair comes nearer [m/s].
+        h: substep [s].
     """
     p = state.outer_particle[k]
     mine = state.soft.body_surface[state.particle_body[p]]
@@ -114,7 +114,13 @@ def _find_gaps_of(state: ti.template(), k, gone, way):
         other = state.particle_body[corners[0]]
         thickness = 0.5 * (mine.y + state.soft.body_surface[other].y)
         state.soft.slot_gap[slot] = NO_CONTACT
-        if state.soft.slot_distance[slot] - gone < thickness:
+        gone, speed = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32)
+        for i in ti.static(range(3)):
+            gone = ti.max(gone, state.soft.particle_gone[corners[i]])
+            speed = ti.max(speed, state.soft.particle_speed[corners[i]])
+        gone += state.soft.particle_gone[p]
+        way = h * (held + speed + state.soft.particle_speed[p])
+        if state.soft.slot_distance[slot] - gone - way < thickness:
             distance, normal, weights, can_touch = _gap(state, p, corners)
             state.soft.slot_normal[slot] = normal
             state.soft.slot_weights[slot] = weights
@@ -167,13 +173,13 @@ def _note_levers(state: ti.template(), p, slot):
 
 
 @ti.func
-def find_gaps(state: ti.template(), body, gone, way):
-    """List the contacts of a body's vertices; `gone` and `way` as in `_find_gaps_of`."""
+def find_gaps(state: ti.template(), body, held, h):
+    """List the contacts of a body's vertices; `held` and `h` as in `_find_gaps_of`."""
     outer = state.body_outer[body]
     count = 0
     for k in range(outer[0], outer[1]):
         if state.soft.slot_count[k] > 0:
-            _find_gaps_of(state, k, gone, way)
+            _find_gaps_of(state, k, held, h)
             for slot in range(k * SLOTS, k * SLOTS + state.soft.slot_count[k]):
                 if state.soft.slot_gap[slot] < NO_CONTACT:
                     _note_levers(state, state.outer_particle[k], slot)
@@ -262,7 +268,7 @@ def _solve_contact(state: ti.template(), soft: ti.template(), slot, p, corners, 
 
 @ti.func
 def _solve_slot(state: ti.template(), slot, h, sweep):
-    """One contact in one sweep. Returns the way [m] by which the last one moved the pair apart."""
+    """One contact in one sweep; the last one moves apart what is too near."""
     p, corners = (
         state.outer_particle[slot // SLOTS],
         state.triangle_vertices[state.soft.slot_triangle[slot]],
@@ -276,25 +282,18 @@ def _solve_slot(state: ti.template(), slot, h, sweep):
         state.contact.particle_touches[p] = 1
         for i in ti.static(range(3)):
             state.contact.particle_touches[corners[i]] = 1
-    depth, way = -state.soft.slot_gap[slot] - SLACK * 0.5 * (mine.y + theirs.y), ti.cast(0.0, ti.f32)
+    depth = -state.soft.slot_gap[slot] - SLACK * 0.5 * (mine.y + theirs.y)
     if sweep == SWEEPS and depth > 0.0:
-        way = PUSH_OUT * depth
         _push_apart(state, p, corners, slot, depth)
-    return way
 
 
 @ti.func
 def solve_island(state: ti.template(), island, h):
-    """Take from the velocities of an island what would bring its bodies too near within `h` [s].
-
-    Returns: the way [m] by which a pair was moved apart, at most.
-    """
-    farthest = ti.cast(0.0, ti.f32)
+    """Take from the velocities of an island what would bring its bodies too near within `h` [s]."""
     first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
     for sweep in range(SWEEPS + 1):
         for i in range(first, last):
             body = state.contact.island_body[i]
             row = state.body_outer[body][0] * SLOTS
             for k in range(row, row + state.soft.contact_count[body]):
-                farthest = ti.max(farthest, _solve_slot(state, state.soft.contact_slot[k], h, sweep))
-    return farthest
+                _solve_slot(state, state.soft.contact_slot[k], h, sweep)

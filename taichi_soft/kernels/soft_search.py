@@ -6,10 +6,17 @@ which it was looked for.
 """
 
 from taichi_soft.contact_fields import SLOTS
-from taichi_soft.kernels.islands import may_touch, search_margin
+from taichi_soft.kernels.islands import may_touch
 from taichi_soft.kernels.joints import are_joined
 from taichi_soft.math.triangle import closest_point_on_triangle
 from taichi_soft.runtime import ti
+
+FORESIGHT = 1.25
+"""Part of the way that a body's fastest vertex would go on until the end of the step for which a search is to
+hold: so that few steps need a second one."""
+
+SHORTEST, LONGEST = 0.1, 0.5
+"""Mean edges: the least and the greatest such way."""
 
 SELF_DISTANCE = 1.5
 """Mean edges: what is nearer at rest belongs together, and is no contact of a body with itself."""
@@ -47,6 +54,8 @@ def _find_box(state: ti.template(), body):
     upper = lower
     for k in range(outer[0], outer[1]):
         x = state.particle_position[state.outer_particle[k]]
+        state.soft.searched_position[k] = x
+        state.soft.particle_gone[state.outer_particle[k]] = 0.0
         lower, upper = ti.min(lower, x), ti.max(upper, x)
     state.contact.body_lower[body] = lower
     state.contact.body_upper[body] = upper
@@ -212,15 +221,18 @@ def _search_pair(state: ti.template(), body, other, margin):
 
 
 @ti.real_func
-def search_body(state: ti.template(), body: ti.i32, island: ti.i32, margin: ti.f32):
-    """Find the candidates of a body's vertices, within `margin` [m], after `_find_box` of all its island."""
-    lower, upper = state.contact.body_lower[body] - margin, state.contact.body_upper[body] + margin
+def search_body(state: ti.template(), body: ti.i32, island: ti.i32):
+    """Find the candidates of a body's vertices, after `begin_search` of all its island."""
+    lower, upper = state.contact.body_lower[body], state.contact.body_upper[body]
     for j in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
         other = state.contact.island_body[j]
+        thickness = 0.5 * (state.soft.body_surface[body].y + state.soft.body_surface[other].y)
+        margin = thickness + state.soft.body_reach[body] + state.soft.body_reach[other]
         wanted = state.soft.body_touches_itself[body] == 1
         if other != body:
+            their_lower, their_upper = state.contact.body_lower[other], state.contact.body_upper[other]
             wanted = may_touch(state, body, other) and _boxes_overlap(
-                lower, upper, state.contact.body_lower[other], state.contact.body_upper[other]
+                lower - margin, upper + margin, their_lower, their_upper
             )
         if wanted:
             _search_pair(state, body, other, margin)
@@ -234,20 +246,53 @@ def is_social(state: ti.template(), island):
 
 
 @ti.func
-def island_margin(state: ti.template(), island):
-    """Way [m] for which candidates are to hold, at least, and the greatest thickness [m]."""
-    holds, thickness = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32)
+def is_outdated(state: ti.template(), island, held, h):
+    """Whether a body of an island may have gone farther than it was searched for after a substep (1).
+
+    What explodes does not count, or others would be searched again because of it.
+    Args:
+        held: what joints may have added to speeds [m/s].
+        h: substep [s].
+    """
+    outdated = 0
     for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
-        surface = state.soft.body_surface[state.contact.island_body[i]]
-        holds = ti.max(holds, search_margin(surface))
-        thickness = ti.max(thickness, surface.y)
-    return holds, thickness
+        body = state.contact.island_body[i]
+        gone = state.soft.body_gone[body] + h * (held + state.contact.body_speed_beside[body])
+        if state.contact.is_wild[body] == 0 and not (gone <= state.soft.body_reach[body]):
+            outdated = 1
+    return outdated
 
 
 @ti.func
-def begin_search(state: ti.template(), island, forgets):
-    """Forget (1) the candidates of an island, and find the boxes that `search_body` looks at."""
-    for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
-        if forgets == 1:
-            forget_candidates(state, state.contact.island_body[i])
-        _find_box(state, state.contact.island_body[i])
+def begin_search(state: ti.template(), body, held, h, left, forgets):
+    """Forget (1) the candidates of a body, and find the boxes that `search_body` looks at.
+
+    Args:
+        held: what joints may have added to its speed [m/s].
+        h, left: substep, and time until the end of the step [s].
+    """
+    if forgets > 0.0:
+        forget_candidates(state, body)
+    _find_box(state, body)
+    speed, edge = held + state.contact.body_speed_beside[body], state.soft.body_surface[body].z
+    way = ti.min(ti.max(FORESIGHT * left * speed, SHORTEST * edge), LONGEST * edge)
+    if state.contact.is_wild[body] == 0:
+        way = ti.max(way, h * speed)
+    state.soft.body_reach[body] = way
+    state.soft.body_gone[body] = 0.0
+
+
+@ti.func
+def note_way(state: ti.template(), body, shared):
+    """Note how far a body is from where it was searched, beside the way [m] that its island `shared`.
+
+    The length of its path would be much more: a pile of soft bodies is never quite still.
+    """
+    outer = state.body_outer[body]
+    farthest = ti.cast(0.0, ti.f32)
+    for k in range(outer[0], outer[1]):
+        p = state.outer_particle[k]
+        gone = (state.particle_position[p] - state.soft.searched_position[k] - shared).norm()
+        state.soft.particle_gone[p] = gone
+        farthest = ti.max(farthest, gone)
+    state.soft.body_gone[body] = farthest

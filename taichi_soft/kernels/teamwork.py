@@ -8,15 +8,16 @@ for a thread that has not begun. What becomes of a body does not depend on who t
 
 from taichi_soft.kernels.contact_substep import drift_body, push_body
 from taichi_soft.kernels.soft_contact import find_gaps
-from taichi_soft.kernels.soft_search import search_body
+from taichi_soft.kernels.soft_search import begin_search, is_social, note_way, search_body
 from taichi_soft.runtime import ti
 from taichi_soft.state import ACTIVE
 
 HELP = -1
 """Whatever its owner has called for."""
 
-PUSH, SEARCH, GAPS, DRIFT = range(4)
-"""Tasks. Their numbers: h, since, way; margin; gone, way; h, since, left, fastest."""
+PUSH, BOXES, SEARCH, GAPS, DRIFT = range(5)
+"""Tasks. Their numbers: h, since, way; held, h, left, forgets; none; held, h; h, since, left, fastest. What
+the bodies of an island share is a velocity [m/s] in the push, and in the drift a way [m]."""
 
 
 @ti.func
@@ -40,10 +41,14 @@ def _do_contact_task(
 ):
     """All tasks but the push; by itself, because Taichi takes more than twice as long for twice the code."""
     if task == DRIFT and state.body_status[body] == ACTIVE:
-        drift_body(state, body, numbers[0], numbers[1], numbers[2], numbers[3], common)
+        drift_body(state, body, numbers[0], numbers[1], numbers[2], numbers[3])
     if ti.static(program.has_soft_contact):
+        if task == DRIFT and is_social(state, island) == 1:
+            note_way(state, body, common)
+        if task == BOXES:
+            begin_search(state, body, numbers[0], numbers[1], numbers[2], numbers[3])
         if task == SEARCH:
-            search_body(state, body, island, numbers[0])
+            search_body(state, body, island)
         if task == GAPS:
             find_gaps(state, body, numbers[0], numbers[1])
 
