@@ -289,7 +289,7 @@ def profile(
         if game:
             status.update("measuring what a game does")
             found["features"] = profiling.measure_features(max(3, repeats // 3))
-            found["heap"] = [profiling.measure_heap(device.threads, max(3, repeats // 2))]
+            found["heap"] = profiling.measure_heaps(device.threads, max(3, repeats // 2))
             found["moments"] = profiling.measure_moments(max(3, repeats // 2))
     if as_json:
         rows = {key: [asdict(row) for row in value] for key, value in found.items()}

@@ -9,7 +9,7 @@ from taichi_soft.profiling.game import (
     Heap,
     Moments,
     measure_features,
-    measure_heap,
+    measure_heaps,
     measure_moments,
 )
 from taichi_soft.profiling.implicit import ImplicitGain, measure_implicit
@@ -39,7 +39,7 @@ __all__ = [
     "measure_budget",
     "measure_crossover",
     "measure_features",
-    "measure_heap",
+    "measure_heaps",
     "measure_implicit",
     "measure_laws",
     "measure_moments",

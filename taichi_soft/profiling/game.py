@@ -14,9 +14,10 @@ from taichi_soft.assets import SoftBodyAsset
 from taichi_soft.body import Body
 from taichi_soft.contact import DEFAULT_CONTACT, Contact
 from taichi_soft.materials import preset
-from taichi_soft.meshing import TetMesh, box, sphere
+from taichi_soft.meshing import TetMesh, box, load_mesh, sphere
 from taichi_soft.profiling.spread import Spread, compare, time_calls
 from taichi_soft.shapes import BoxShape
+from taichi_soft.stages import ASSETS
 from taichi_soft.world import World
 
 DT, SUBSTEPS = 1 / 60, 12  # 720 steps a second, the thesis's for its sphere
@@ -40,6 +41,7 @@ class FeatureCost:
 class Heap:
     """A fixed step of a heap of spheres, all threads."""
 
+    mesh: str
     bodies: int
     tets: int
     threads: int
@@ -135,7 +137,15 @@ def _settled(world: World, frames: int = SETTLING) -> World:
     return world
 
 
-def measure_heap(threads: int, repeats: int = 61) -> Heap:
+def measure_heaps(threads: int, repeats: int = 61) -> list[Heap]:
+    """Measure heaps of the thesis's own sphere, where the source of the package is at hand, and of ours."""
+    meshes = {"regular": _mesh()}
+    if (ASSETS / "sphere.npz").exists():
+        meshes = {"the thesis's": load_mesh(ASSETS / "sphere.npz"), **meshes}
+    return [measure_heap(name, mesh, threads, repeats) for name, mesh in meshes.items()]
+
+
+def measure_heap(name: str, mesh: TetMesh, threads: int, repeats: int = 61) -> Heap:
     """Drop 32 spheres into a pit, and time them against as many free ones when they lie there."""
     world = World(collider_room=8, soft_contact=True, sleep_speed=0.0)
     free = World(floor=None)
@@ -144,11 +154,11 @@ def measure_heap(threads: int, repeats: int = 61) -> Heap:
         world.add_collider(BoxShape((20.0, 1.0, 6.0)), position=(0.0, side * 5.1, 3.0))
     for x, y, z in product(range(4), range(4), range(2)):
         place = (2.2 * (x - 1.5) + 0.1 * z, 2.2 * (y - 1.5) + 0.05 * z, 1.2 + 2.3 * z)
-        world.add_body(_mesh(), preset("thesis_sphere"), position=place)
-        free.add_body(_mesh(), preset("thesis_sphere"), position=(SPACING * x, SPACING * y, SPACING * z))
+        world.add_body(mesh, preset("thesis_sphere"), position=place)
+        free.add_body(mesh, preset("thesis_sphere"), position=(SPACING * x, SPACING * y, SPACING * z))
     step, _, ratio = compare(_stepping(_settled(world)), _stepping(free), repeats, 1e3)
     tets = sum(len(body.tets) for body in world.bodies)
-    return Heap(len(world.bodies), tets, threads, step, DT * 1e3 / step.median, ratio)
+    return Heap(name, len(world.bodies), tets, threads, step, DT * 1e3 / step.median, ratio)
 
 
 def measure_moments(repeats: int = 61) -> list[Moments]:

@@ -64,11 +64,14 @@ def tables(found: dict[str, Any]) -> Iterator[tuple[str, Table]]:
             table.add_row(row.name, used, f"{row.shortest:.2f}", *_ratios(row.ratio))
         yield "What features cost: a step over that of as many bodies that fall freely", table
     if "heap" in found:
-        table = _table("spheres", "tetrahedra", "threads", "step [ms]", "x real", "least", "of free", "most")
+        table = _table(
+            "mesh", "tetrahedra", "step [ms]", "median", "most", "x real", "of free", "median", "most"
+        )
         for row in found["heap"]:
-            step = f"{row.step.median:.2f}", f"{row.real_time:.2f}"
-            table.add_row(str(row.bodies), f"{row.tets:,}", str(row.threads), *step, *_ratios(row.ratio))
-        yield "A heap in a pit, 12 substeps for 1/60 s", table
+            step = [f"{each:.2f}" for each in (row.step.least, row.step.median, row.step.most, row.real_time)]
+            table.add_row(row.mesh, f"{row.tets:,}", *step, *_ratios(row.ratio))
+        bodies, threads = found["heap"][0].bodies, found["heap"][0].threads
+        yield f"{bodies} spheres in a pit, {threads} threads, 12 substeps for 1/60 s", table
     if "moments" in found:
         table = _table("", "least", "median", "p99", "most")
         for row in found["moments"]:

@@ -14,7 +14,7 @@ from taichi_soft.profiling import (
     game,
     measure_budget,
     measure_crossover,
-    measure_heap,
+    measure_heaps,
     measure_moments,
     scaling,
 )
@@ -59,13 +59,14 @@ def test_the_crossover_times_both_schedules():
 def test_a_heap_is_timed_against_as_many_free_bodies(monkeypatch):
     monkeypatch.setattr(game, "_mesh", lambda: box((1.6, 1.6, 1.6), (1, 1, 1)))
     monkeypatch.setattr(game, "SETTLING", 3)
-    heap = measure_heap(1, 3)
-    assert (heap.bodies, heap.tets) == (32, 32 * 5)
-    assert heap.real_time * heap.step.median == pytest.approx(1e3 / 60)
-    assert heap.ratio.least > 0
-    ((title, table),) = tables({"heap": [heap]})
-    assert "heap" in title
-    assert table.row_count == 1
+    heaps = measure_heaps(1, 3)
+    assert [(heap.bodies, heap.tets) for heap in heaps] == [(32, 32 * 968), (32, 32 * 5)]
+    for heap in heaps:
+        assert heap.real_time * heap.step.median == pytest.approx(1e3 / 60)
+        assert heap.ratio.least > 0
+    ((title, table),) = tables({"heap": heaps})
+    assert "32 spheres in a pit" in title
+    assert table.row_count == 2
 
 
 def test_a_frame_with_a_spawn_is_timed_against_the_others(monkeypatch):
