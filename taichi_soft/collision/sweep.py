@@ -9,7 +9,8 @@ from taichi_soft.collision.kinds import ShapeKind
 from taichi_soft.runtime import ti
 
 TOUCHING = 1e-5
-"""Distance [m] within which a particle counts as on the surface: some steps of float32 at ten metres."""
+"""Distance [m] within which a particle counts as on the surface: some steps of float32 at ten metres. What
+rests there lies up to so deep behind it."""
 
 MOST_MARCHES = 16
 """Steps along one path: none is shorter than this part of it, so that one along the surface ends too. At
@@ -55,7 +56,7 @@ def first_touch(contact: ti.template(), c, start, end, slack):
         distance = to_shape - thickness
         climb = way.dot(normal)
         beyond = distance + (1.0 - part) * climb
-        is_clear = beyond >= -slack
+        is_clear = beyond >= -slack or (climb >= 0.0 and distance >= -TOUCHING)
         if distance <= TOUCHING and not is_clear:
             is_open = 0
         elif is_clear and is_convex:

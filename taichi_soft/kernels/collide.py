@@ -83,8 +83,7 @@ def collided(state: ti.template(), body, p, start, way_velocity, h, since):
         h: substep [s].
         since: time since the start of the fixed step [s], to which the colliders' poses belong.
     """
-    x0, v = start, way_velocity
-    x1 = start + h * v
+    x, v, way = start, way_velocity, h * way_velocity
     row = body * state.contact.capacity.colliders
     left = ti.cast(1.0, ti.f32)  # part of the substep still to go
     touches, is_open = 0, 1
@@ -95,8 +94,8 @@ def collided(state: ti.template(), body, p, start, way_velocity, h, since):
         slack = ti.select(touches == 0, 0.0, TOUCHING)
         for k in range(state.contact.near_count[body]):
             c = state.contact.near[row + k]
-            a = _in_frame(state.contact, c, x0, since + (1.0 - left) * h)
-            b = _in_frame(state.contact, c, x1, since + h)
+            a = _in_frame(state.contact, c, x, since + (1.0 - left) * h)
+            b = _in_frame(state.contact, c, x + way, since + h)
             part, near, far, n = first_touch(state.contact, c, a, b, slack)
             if part < earliest:
                 earliest, which, distance, beyond, normal = part, k, near, far, n
@@ -108,31 +107,36 @@ def collided(state: ti.template(), body, p, start, way_velocity, h, since):
             centre = state.contact.collider_position[c] + state.contact.collider_velocity[c] * after
             spin = state.contact.collider_spin[c]
             n = turned(spun(state.contact.collider_rotation[c], spin * after), normal)
-            place = x1 - beyond * n
+            place = x + way - beyond * n
             surface_velocity = state.contact.collider_velocity[c] + spin.cross(place - centre)
             surface = state.contact.collider_surface[c]
             v_out = resolved_velocity(v, n, surface_velocity, surface.x, surface.y)
             push = v_out - v
             left = left * (1.0 - earliest)
-            # What contact takes from the velocity it takes from the way left, or what friction holds
-            # would creep.
-            x0 = x0 + earliest * (x1 - x0) - ti.min(distance, 0.0) * n
-            end = place + left * h * (push - n * push.dot(n))
+            # Down to `TOUCHING` behind the surface a particle stays as deep as it is. To be put back onto the
+            # surface again and again would move it along as well, by rounding, and feed vibrations.
+            depth = ti.select(distance <= 0.0 and distance >= -TOUCHING, distance, -0.5 * TOUCHING)
+            lift = ti.max(depth - distance, 0.0)
+            before = x + way
+            x += earliest * way + lift * n
+            # What contact takes from the velocity it takes from the way left.
+            way = (1.0 - earliest) * way + (depth - beyond - lift) * n + left * h * (push - n * push.dot(n))
             touches += 1
             if touches == MOST_TOUCHES:
-                end = x0
+                way = ti.Vector.zero(ti.f32, 3)
                 is_open = 0
+            end = x + way
             mass = 1.0 / ti.max(state.particle_inv_mass[p], 1e-30)
             impulse = -mass * push
             if surface.y >= 0.0:
                 add_press(state.contact, row + c, -n.dot(impulse), n, n.dot(v), n.dot(surface_velocity))
             # With what the shift of the path, which v takes no part in, does to the angular momentum.
-            angular_impulse = (end - centre).cross(impulse) - mass * (end - x1).cross(v)
+            angular_impulse = (end - centre).cross(impulse) - mass * (end - before).cross(v)
             state.contact.impulse[row + c] = state.contact.impulse[row + c] + impulse
             state.contact.angular_impulse[row + c] = state.contact.angular_impulse[row + c] + angular_impulse
             state.contact.particle_touches[p] = 1
             if ti.static(state.capacity.implicit):
                 if state.particle_contact[p] == 0:
                     state.particle_contact[p] = c + 1
-            x1, v = end, v_out
-    return x1, v
+            v = v_out
+    return x + way, v
