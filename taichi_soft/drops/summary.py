@@ -16,14 +16,12 @@ from taichi_soft.drops.trial import (
     FREE_TIME,
     LEAST_CALM_SPEED,
     PATIENCE,
-    TREMBLE,
 )
 
 CRITERION = (
-    f"at rest: slower than {CALM_SPEED:g} sizes per second or {LEAST_CALM_SPEED * 1000:g} mm/s, or within "
-    f"{TREMBLE:g} sizes of one place (root mean squares over vertices), for {CALM_TIME:g} s; within "
-    f"{PATIENCE:g} T, T = sqrt(size / g) being 0.07 to 1 s; after {FREE_TIME:g} T velocities fade at "
-    f"{BRAKE:g} / T, or balls would roll on"
+    f"at rest: slower than {CALM_SPEED:g} sizes per second or {LEAST_CALM_SPEED * 1000:g} mm/s (root mean "
+    f"square over vertices) for {CALM_TIME:g} s, within {PATIENCE:g} T, T = sqrt(size / g) being 0.07 "
+    f"to 1 s; after {FREE_TIME:g} T velocities fade at {BRAKE:g} / T, or balls would roll on"
 )
 
 

@@ -27,10 +27,6 @@ CALM_SPEED, LEAST_CALM_SPEED, CALM_TIME = 0.01, 0.005, 0.5
 what is smaller than half a metre the second counts [m/s], half of the speed at which Box2D's bodies fall
 asleep: a small ball in a corner goes on rocking from facet to facet at some mm/s."""
 
-TREMBLE = 0.001
-"""In sizes: who stays so near a place (root mean square over vertices) for that time is at rest as well. A
-stiff ball that is wedged in trembles by less than a pixel, and none too slowly for the speeds above."""
-
 PATIENCE = 150.0
 """Time in which a body must have come to rest, in that in which it falls half its size: sqrt(size / g)."""
 
@@ -60,9 +56,9 @@ class _Run:
     def __init__(self, case: Case, body: Body) -> None:
         self.case, self.body = case, body
         self.outer = np.unique(case.mesh.surface)
-        self.before = self.place = body.positions()
+        self.before = body.positions()
         self.out, self.out_through = -np.inf, None  # type: float, str | None
-        self.calm = self.still = 0  # steps
+        self.calm = 0  # steps
         self.speed = np.inf
 
     def note_step(self) -> None:
@@ -73,10 +69,6 @@ class _Run:
         is_calm = self.speed < max(CALM_SPEED, LEAST_CALM_SPEED / self.case.size)
         self.calm = self.calm + 1 if is_calm else 0
         self.before = now
-        away = np.linalg.norm(now - self.place, axis=1).astype(np.float64)
-        self.still += 1
-        if not float(np.sqrt((away**2).mean())) < TREMBLE * self.case.size:
-            self.place, self.still = now, 0
         outer = now[self.outer].astype(np.float64)
         for solid in self.case.course:
             if solid.is_room:
@@ -87,9 +79,8 @@ class _Run:
 
     @property
     def is_at_rest(self) -> bool:
-        """Whether it was slow, or in its place, for long enough."""
-        is_calm = max(self.calm, self.still) >= CALM_TIME * STEPS_PER_SECOND
-        return is_calm and not self.body.is_frozen
+        """Whether it was slow for long enough."""
+        return self.calm >= CALM_TIME * STEPS_PER_SECOND and not self.body.is_frozen
 
     def outcome(self, time: float, *, is_at_rest: bool) -> Outcome:
         """How it ended after `time` [s]."""

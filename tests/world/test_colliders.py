@@ -90,6 +90,27 @@ def test_a_sliding_block_is_as_fast_as_the_book_says(slides):
         assert found == pytest.approx(book, abs=2e-3 * G * np.sin(SLOPE))
 
 
+def test_what_friction_holds_does_not_creep_while_it_is_shaken():
+    """In 3,840 substeps a second, each of which rounds its position."""
+    tilt = turn(SLOPE, np.array([0.3, 1.0, 0.2]) / np.linalg.norm([0.3, 1.0, 0.2]))
+    world = room()
+    size = (60.0, 4.0, 0.1)
+    world.add_collider(BoxShape(size), rotation=tilt, position=-0.05 * tilt[:, 2], friction=0.8)
+    place = tilt @ [0.9, 0.3, 0.125]
+    body = world.add_body(box((0.5, 0.5, 0.25), (2, 2, 1)), FIRM, position=place, rotation=tilt)
+    world.build()
+    for _ in range(300):
+        world.step(DT, 64)
+    before = body.positions().astype(np.float64)
+    weight = G * body.masses.sum()
+    for step in range(60):
+        body.apply_force((-1) ** step * 0.1 * weight * tilt[:, 1])
+        world.step(DT, 64)
+    ways = (body.positions() - before)[before @ tilt[:, 2] < 1e-3] @ tilt
+    assert len(ways) == 9
+    assert np.abs(ways[:, :2]).max() < 5e-6
+
+
 def test_a_moving_belt_carries_a_body_along_once_friction_has_brought_it_to_speed():
     """Way v t - v^2 / (2 mu g), the second part lost while it slides."""
     world = room()
