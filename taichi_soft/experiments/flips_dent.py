@@ -33,7 +33,7 @@ SPEED, HEIGHT = 20.0, 1.05  # of the sphere that is thrown down, of radius 1 m
 STEP = 1 / 700  # the thesis's [s]
 SECONDS = 5.0
 FLIPS = ("tolerant", "off", "recover")
-MANY, STAYS, PLACED, APART = 0.01, 0.8, 0.35, 1.5
+MANY, STAYS, PLACED, APART = 0.01, 0.8, 0.5, 1.5
 """Share of all tetrahedra that makes a dent; of those flipped at half-time that are so at the end; of these
 in the quarter that was pressed most (by chance 0.25); extent over that at rest of what runs away."""
 
@@ -95,29 +95,32 @@ def conclude(results: Results) -> Section:
     """Whether flips make dents in the pressed region that stay, and whether the rest is sound."""
     by_flips = {flips: results.one(flips=flips, speed=SPEED) for flips in FLIPS}
     thesis = {point["speed"]: numbers for point, numbers in results.where(flips="tolerant")}
-    least = {name: min(numbers[name] for numbers in thesis.values()) for name in ("kept", "in_pressed")} | {
-        "flipped": min(numbers["flipped"][-1] for numbers in thesis.values())
-    }
+    dented = [speed for speed, numbers in thesis.items() if _is_dented(numbers)]
     sound = not any(numbers["frozen"] or numbers["extent"] >= APART for numbers in thesis.values())
-    dents = least["flipped"] > MANY and least["kept"] > STAYS and least["in_pressed"] > PLACED
 
-    def listed(shares: Iterable[float]) -> str:
-        return ", ".join(f"{100 * share:.0f}" for share in shares)
+    def percent(shares: Iterable[float]) -> str:
+        return _listed(round(100 * share) for share in shares)
 
     measured = (
-        f"thrown down at {', '.join(f'{speed:g}' for speed in thesis)} m/s, "
-        f"{listed(n['flipped'][-1] for n in thesis.values())} % of the tetrahedra are inside out in the end, "
-        f"{listed(n['in_pressed'] for n in thesis.values())} % of these in the quarter that was pressed most "
-        f"just before the first flip; {listed(n['kept'] for n in thesis.values())} % of those flipped at "
-        "half-time stay; the body never is longer than "
+        f"thrown down at {_listed(thesis)} m/s, "
+        f"{percent(n['flipped'][-1] for n in thesis.values())} % of the tetrahedra are inside out in the "
+        f"end, {percent(n['in_pressed'] for n in thesis.values())} % of these in the quarter that was pressed "
+        f"most just before the first flip; {percent(n['kept'] for n in thesis.values())} % of those flipped "
+        "at half-time stay; the body never is longer than "
         f"{max(numbers['extent'] for numbers in thesis.values()):.2f} times its size"
     )
     if not sound:
         verdict, why = Verdict.DIFFERS, "the model: the body runs away"
     elif max(max(numbers["flipped"]) for numbers in thesis.values()) <= MANY:
         verdict, why = Verdict.UNKNOWN, "nothing flips: the impact is not strong enough"
-    elif dents:
+    elif len(dented) == len(thesis):
         verdict, why = Verdict.AGREES, ""
+    elif dented:
+        verdict = Verdict.UNKNOWN
+        why = (
+            f"at {_listed(dented)} m/s they stay, more than half of them where most was pressed; not so at the "
+            "other speeds, and the thesis does not say how hard its body hit the floor"
+        )
     else:
         verdict, why = Verdict.DIFFERS, "the model: flips do not stay, or not where most is pressed"
     said = {name: _fate(numbers) for name, numbers in by_flips.items()}
@@ -158,6 +161,16 @@ def conclude(results: Results) -> Section:
         ),
         tuple(_pictures(by_flips)),
     )
+
+
+def _listed(values: Iterable[float]) -> str:
+    return ", ".join(f"{value:g}" for value in values)
+
+
+def _is_dented(numbers: Numbers) -> bool:
+    """Whether flips stay, and where most was pressed."""
+    stays = numbers["flipped"][-1] > MANY and numbers["kept"] > STAYS
+    return stays and numbers["in_pressed"] > PLACED
 
 
 def _fate(numbers: Numbers) -> str:

@@ -1,6 +1,7 @@
 """A hard impact turns tetrahedra inside out."""
 
 import copy
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -68,3 +69,11 @@ def test_the_verdict_follows_the_numbers(rows):
         other = copy.deepcopy(rows)
         other[0].numbers.update(change)
         assert finding_of(other).verdict is verdict
+
+
+def test_where_some_speeds_dent_what_was_pressed_and_others_do_not_the_page_cannot_tell(rows):
+    elsewhere = [replace(row, point=row.point | {"speed": 30.0}) for row in copy.deepcopy(rows)]
+    elsewhere[0].numbers["in_pressed"] = 0.3
+    finding = finding_of([*rows, *elsewhere])
+    assert finding.verdict is Verdict.UNKNOWN
+    assert "at 20 m/s they stay" in finding.why
