@@ -101,13 +101,13 @@ def conclude(results: Results) -> Section:
     def percent(shares: Iterable[float]) -> str:
         return _listed(round(100 * share) for share in shares)
 
+    all_numbers = thesis.values()
     measured = (
-        f"thrown down at {_listed(thesis)} m/s, "
-        f"{percent(n['flipped'][-1] for n in thesis.values())} % of the tetrahedra are inside out in the "
-        f"end, {percent(n['in_pressed'] for n in thesis.values())} % of these in the quarter that was pressed "
-        f"most just before the first flip; {percent(n['kept'] for n in thesis.values())} % of those flipped "
-        "at half-time stay; the body never is longer than "
-        f"{max(numbers['extent'] for numbers in thesis.values()):.2f} times its size"
+        f"thrown down at {_listed(thesis)} m/s, {percent(n['flipped'][-1] for n in all_numbers)} % of the "
+        f"tetrahedra are inside out in the end, {percent(n['in_pressed'] for n in all_numbers)} % of these "
+        "in the quarter that was pressed most just before the first flip; "
+        f"{percent(n['kept'] for n in all_numbers)} % of those flipped at half-time stay; the body never is "
+        f"longer than {max(numbers['extent'] for numbers in thesis.values()):.2f} times its size"
     )
     if not sound:
         verdict, why = Verdict.DIFFERS, "the model: the body runs away"
@@ -118,8 +118,8 @@ def conclude(results: Results) -> Section:
     elif dented:
         verdict = Verdict.UNKNOWN
         why = (
-            f"at {_listed(dented)} m/s they stay, more than half of them where most was pressed; not so at the "
-            "other speeds, and the thesis does not say how hard its body hit the floor"
+            f"at {_listed(dented)} m/s they stay, more than half of them where most was pressed; not so at "
+            "the other speeds, and the thesis does not say how hard its body hit the floor"
         )
     else:
         verdict, why = Verdict.DIFFERS, "the model: flips do not stay, or not where most is pressed"
@@ -169,8 +169,7 @@ def _listed(values: Iterable[float]) -> str:
 
 def _is_dented(numbers: Numbers) -> bool:
     """Whether flips stay, and where most was pressed."""
-    stays = numbers["flipped"][-1] > MANY and numbers["kept"] > STAYS
-    return stays and numbers["in_pressed"] > PLACED
+    return bool(numbers["flipped"][-1] > MANY and numbers["kept"] > STAYS and numbers["in_pressed"] > PLACED)
 
 
 def _fate(numbers: Numbers) -> str:
