@@ -1,8 +1,8 @@
 """Which vertices of an island are near which triangles of other bodies, or of their own.
 
 For two bodies whose boxes overlap, the vertices of one that may be near the other go into a spatial hash, and
-the triangles of the other look round in it. What is found holds until bodies have moved by the margin with
-which it was looked for.
+the triangles of the other look round in it. Each body has a margin, and what is found holds until one of its
+vertices is farther than that from where it was.
 """
 
 from taichi_soft.contact_fields import SLOTS
