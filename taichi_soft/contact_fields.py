@@ -8,7 +8,7 @@ from taichi_soft.runtime import ti
 NO_COLLIDER = -1
 """Kind of a row of which the collider was removed."""
 
-SLOTS = 6
+SLOTS = 8
 """Triangles that one vertex may touch at once: where three bodies meet, and their triangles beside."""
 
 PAIR_ROWS = 32
@@ -78,8 +78,9 @@ class ContactFields:
         self.body_filter = ti.Vector.field(2, ti.i32, bodies)  # group, mask
         self.is_gentle = ti.field(ti.i32, bodies)  # 0 where forces moved a particle too far in one substep
         self.body_speed = ti.field(ti.f32, bodies)  # of its fastest particle in this substep [m/s]
-        # Beside the velocity that its island shares [m/s]; of what was touched just now, before the push.
-        self.body_speed_beside = ti.field(ti.f32, bodies)
+        # Beside the velocity that its island shares [m/s]; by leapfrog of what was touched before the push.
+        self.body_speed_beside = ti.field(ti.f32, bodies)  # of its fastest particle
+        self.body_mean_beside = ti.field(ti.f32, bodies)  # root mean square over particles
         self.body_edge = ti.field(ti.f32, bodies)  # mean edge of its surface [m]
         self.prev_reaction = ti.Vector.field(3, ti.f32, particles)  # `particle_reaction` before the step
         self.particle_clearance = ti.field(ti.f32, particles)  # [m] from all that is near, at that time
@@ -95,7 +96,7 @@ class ContactFields:
         self.useful_helpers = ti.field(ti.i32, ())  # threads beside their owners that could find a body there
         self.task = ti.field(ti.i32, bodies)  # of each island
         self.task_numbers = ti.Vector.field(4, ti.f32, bodies)
-        self.task_common = ti.Vector.field(3, ti.f32, bodies)  # velocity that its bodies share [m/s]
+        self.task_common = ti.Vector.field(3, ti.f32, bodies)  # velocity or way that its bodies share
         self.untaken = ti.field(ti.i32, bodies)  # bodies that no thread has taken yet
         self.unfinished = ti.field(ti.i32, bodies)
 
@@ -121,6 +122,7 @@ class SoftContactFields:
         # Beside what the bodies of an island share: ways [m] for which a search holds, and how far each body
         # and each vertex is from where it was then; speeds before contact [m/s].
         self.body_reach = ti.field(ti.f32, bodies)
+        self.body_lost = ti.field(ti.f32, bodies)  # way of a pair for which its vertices had `SLOTS` enough
         self.body_gone = ti.field(ti.f32, bodies)
         self.particle_gone = ti.field(ti.f32, particles)
         self.particle_speed = ti.field(ti.f32, particles)

@@ -9,8 +9,7 @@ from taichi_soft.collision.kinds import ShapeKind
 from taichi_soft.runtime import ti
 
 TOUCHING = 1e-5
-"""Distance [m] within which a particle counts as on the surface: some steps of float32 at ten metres. What
-rests there lies up to so deep behind it."""
+"""Distance [m] from a surface within which a particle rests on it: some steps of float32 at ten metres."""
 
 MOST_MARCHES = 16
 """Steps along one path: none is shorter than this part of it, so that one along the surface ends too. At
@@ -18,6 +17,16 @@ MOST_MARCHES = 16
 
 NEVER = 2.0
 """Part of the way at which what is not touched is touched."""
+
+
+@ti.func
+def rests_at(distance):
+    """Whether a particle may stay at a distance from a surface [m] and count as on it.
+
+    To be put onto the surface itself, again and again, would move it along as well, by rounding. What
+    friction holds would creep, and feed vibrations.
+    """
+    return distance >= 0.0 and distance <= TOUCHING
 
 
 @ti.func
@@ -34,7 +43,7 @@ def first_touch(contact: ti.template(), c, start, end, slack):
     """How a path meets a collider. All in the collider's frame [m].
 
     Args:
-        slack: how far beyond the surface the path may end without touching it.
+        slack: how far behind where it rests the path may end without touching.
     Returns:
         part: of the way, 0 to 1, at which it touches, or `NEVER`.
         distance: from the surface there, negative where the path starts inside [m].
@@ -56,7 +65,7 @@ def first_touch(contact: ti.template(), c, start, end, slack):
         distance = to_shape - thickness
         climb = way.dot(normal)
         beyond = distance + (1.0 - part) * climb
-        is_clear = beyond >= -slack or (climb >= 0.0 and distance >= -TOUCHING)
+        is_clear = beyond > ti.select(rests_at(distance), distance, 0.0) - slack
         if distance <= TOUCHING and not is_clear:
             is_open = 0
         elif is_clear and is_convex:

@@ -1,7 +1,7 @@
 """Particles of one body against the colliders, in one thread."""
 
 from taichi_soft.collision.response import resolved_velocity
-from taichi_soft.collision.sweep import NEVER, TOUCHING, distance_from, first_touch
+from taichi_soft.collision.sweep import NEVER, TOUCHING, distance_from, first_touch, rests_at
 from taichi_soft.contact_fields import NO_COLLIDER
 from taichi_soft.kernels.rebound import add_press
 from taichi_soft.math.quaternion import spun, turned, turned_back
@@ -113,14 +113,12 @@ def collided(state: ti.template(), body, p, start, way_velocity, h, since):
             v_out = resolved_velocity(v, n, surface_velocity, surface.x, surface.y)
             push = v_out - v
             left = left * (1.0 - earliest)
-            # Down to `TOUCHING` behind the surface a particle stays as deep as it is. To be put back onto the
-            # surface again and again would move it along as well, by rounding, and feed vibrations.
-            depth = ti.select(distance <= 0.0 and distance >= -TOUCHING, distance, -0.5 * TOUCHING)
-            lift = ti.max(depth - distance, 0.0)
+            rest = ti.select(rests_at(distance), distance, 0.5 * TOUCHING)
+            lift = ti.max(rest - distance, 0.0)
             before = x + way
             x += earliest * way + lift * n
             # What contact takes from the velocity it takes from the way left.
-            way = (1.0 - earliest) * way + (depth - beyond - lift) * n + left * h * (push - n * push.dot(n))
+            way = (1.0 - earliest) * way + (rest - beyond - lift) * n + left * h * (push - n * push.dot(n))
             touches += 1
             if touches == MOST_TOUCHES:
                 way = ti.Vector.zero(ti.f32, 3)

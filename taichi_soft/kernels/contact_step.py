@@ -10,6 +10,7 @@ is put back to where it was, and makes the step again with twice as many substep
 as many.
 """
 
+from taichi_soft.contact_fields import NO_CONTACT
 from taichi_soft.kernels.collide import forget_contacts
 from taichi_soft.kernels.contact_substep import has_drifted, is_clear
 from taichi_soft.kernels.implicit_euler import MOST_PIECES, keeps_shape
@@ -43,6 +44,10 @@ ALL_SLEEP = -1
 
 NONE, OUTDATED, VALID = range(3)
 """Candidates of an island: the last step has forgotten its own; those of an attempt at this one; usable."""
+
+BLOW = 0.1
+"""Mean edges within a substep from which a body that is struck may strike the next one in the same substep.
+Less far it may go into that, and is put out of it again."""
 
 MOST_FINER = 8
 """Times as many substeps as asked for, at most."""
@@ -115,26 +120,26 @@ def _is_alone(state: ti.template(), program: ti.template(), island):
 
 @ti.func
 def _touch_each_other(
-    state: ti.template(), program: ti.template(), island, candidates, shared, held, h, left
+    state: ti.template(), program: ti.template(), island, candidates, shared, given, h, left
 ):
     """Contact between bodies of one island in a substep; looks for candidates again where they have aged.
 
     Args:
         candidates: NONE, OUTDATED or VALID.
         shared: way [m] that all of the island have gone since these were looked for.
-        held: highest speed [m/s] that joints gave, beside what all have in common.
+        given: speed [m/s] that joints gave, or that others may give, beside what all have in common.
         left: time until the end of the step [s].
     Returns: `shared` as it is now.
     """
     shared_now = shared
     if is_social(state, island) == 1:
         nothing = ti.Vector.zero(ti.f32, 4)
-        if candidates != VALID or is_outdated(state, island, held, h) == 1:
+        if candidates != VALID or is_outdated(state, island, given, h) == 1:
             shared_now = nothing.xyz
             forgets = ti.cast(candidates != NONE, ti.f32)
-            work_on(state, program, island, BOXES, ti.Vector([held, h, left, forgets]), nothing.xyz)
+            work_on(state, program, island, BOXES, ti.Vector([given, h, left, forgets]), nothing.xyz)
             work_on(state, program, island, SEARCH, nothing, nothing.xyz)
-        work_on(state, program, island, GAPS, ti.Vector([2.0 * held, h, 0.0, 0.0]), nothing.xyz)
+        work_on(state, program, island, GAPS, ti.Vector([given, h, 0.0, 0.0]), nothing.xyz)
         solve_island(state, island, h)
         if state.soft.records_touches[None] == 1:
             add_touches(state, island)
@@ -150,6 +155,7 @@ def _end_substep(
     since,
     left,
     fastest,
+    striking,
     common,
     candidates,
     shared,
@@ -158,7 +164,7 @@ def _end_substep(
 
     Args:
         since, left: time since the start of the step, and until its end [s].
-        fastest: highest speed in the island [m/s].
+        fastest, striking: highest speed in the island, and that which a body may give to another [m/s].
         common: velocity that its bodies share [m/s].
         candidates, shared: as `_touch_each_other` takes them.
     Returns: `shared` after the substep.
@@ -168,7 +174,8 @@ def _end_substep(
         held, held_beside = solve_joints(state, island, h, int(since == 0.0), common)
     way = shared
     if ti.static(program.has_soft_contact):
-        way = _touch_each_other(state, program, island, candidates, shared, held_beside, h, left)
+        given = ti.max(striking, held_beside)
+        way = _touch_each_other(state, program, island, candidates, shared, given, h, left)
     way += h * common
     numbers = ti.Vector([h, since, left, ti.max(fastest, held)])
     work_on(state, program, island, DRIFT, numbers, way)
@@ -176,18 +183,24 @@ def _end_substep(
 
 
 @ti.func
-def _compare_speeds(state: ti.template(), island):
+def _compare_speeds(state: ti.template(), island, h):
     """After the push: what the bodies of an island have noted.
 
-    Returns: the highest speed [m/s], and whether no force moved a particle too far at once (1).
+    Returns: the highest speed [m/s]; that which a body may give to another that it strikes, beside what they
+    share; and whether no force moved a particle too far at once (1). What explodes is not counted in the
+    second: others would be searched again and again because of it.
     """
-    highest, is_gentle = ti.cast(0.0, ti.f32), 1
+    highest, striking, is_gentle = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32), 1
+    least_edge = ti.cast(NO_CONTACT, ti.f32)
     for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
         body = state.contact.island_body[i]
         if state.body_status[body] == ACTIVE:
             highest = ti.max(highest, state.contact.body_speed[body])
+            if state.contact.is_wild[body] == 0:
+                striking = ti.max(striking, 2.0 * state.contact.body_mean_beside[body])
             is_gentle = is_gentle & state.contact.is_gentle[body]
-    return highest, is_gentle
+        least_edge = ti.min(least_edge, state.contact.body_edge[body])
+    return highest, ti.select(striking * h > BLOW * least_edge, striking, 0.0), is_gentle
 
 
 @ti.func
@@ -226,13 +239,25 @@ def _move_island(state: ti.template(), program: ti.template(), island, substeps,
         since, left = s * h, h * (substeps - s)
         way = h * ti.cast(is_alone & is_clear(state, first_body, fastest * h), ti.f32)
         work_on(state, program, island, PUSH, ti.Vector([h, since, way, 0.0]), common)
-        fastest, gently = _compare_speeds(state, island)
+        fastest, striking, gently = _compare_speeds(state, island, h)
         is_gentle = is_gentle & gently
         has_moved = 0
         if way > 0.0 and state.body_status[first_body] == ACTIVE:
             has_moved = has_drifted(state, first_body, fastest, h)
         if has_moved == 0:
-            shared = _end_substep(state, program, island, h, since, left, fastest, common, candidates, shared)
+            shared = _end_substep(
+                state,
+                program,
+                island,
+                h,
+                since,
+                left,
+                fastest,
+                striking,
+                common,
+                candidates,
+                shared,
+            )
             candidates = VALID
         if ti.static(program.integrator == Integrator.IMPLICIT_EULER):
             for i in range(first, last):

@@ -28,11 +28,13 @@ surface. Vibrations of a stable substep stay below it."""
 def _kick_body(state: ti.template(), program: ti.template(), body, kick, way, common):
     """New velocities from the forces, which are cleared, and positions after `way` [s] with them.
 
-    Returns: the highest speed [m/s], the highest beside the `common` velocity, and the largest change.
+    Returns: the highest speed [m/s], the highest and the mean beside the `common` velocity, and the largest
+    change.
     """
     particles = state.body_particles[body]
     gravity = gravity_on(state, body)
     highest, highest_beside = ti.cast(0.0, state.real), ti.cast(0.0, state.real)
+    total_beside = ti.cast(0.0, state.real)
     largest = ti.cast(0.0, state.real)
     for p in range(particles[0], particles[1]):
         inv_mass = state.particle_inv_mass[p]
@@ -45,40 +47,45 @@ def _kick_body(state: ti.template(), program: ti.template(), body, kick, way, co
         state.contact.particle_touches[p] = 0
         state.particle_force[p] = ti.Vector.zero(state.real, 4)
         highest = ti.max(highest, v.dot(v))
-        if ti.static(program.has_soft_contact):
+        if ti.static(program.has_soft_contact) and way == 0.0:
             state.soft.particle_speed[p] = (v - common).norm()
             # What presses against others gains speed only to lose it to them.
             beside = ti.select(was_touched == 1, v_before, v) - common
             highest_beside = ti.max(highest_beside, beside.dot(beside))
+            total_beside += beside.dot(beside)
         largest = ti.max(largest, acceleration.dot(acceleration))
-    return ti.sqrt(highest), ti.sqrt(highest_beside), kick * ti.sqrt(largest)
+    mean_beside = ti.sqrt(total_beside / (particles[1] - particles[0]))
+    return ti.sqrt(highest), ti.sqrt(highest_beside), mean_beside, kick * ti.sqrt(largest)
 
 
 @ti.func
 def push_body(state: ti.template(), program: ti.template(), body, h, since, way, common):
     """New velocities from all but contact and joints; leapfrog also moves particles for `way` [s].
 
-    Notes the highest speed [m/s], the highest beside the `common` velocity, and whether forces moved no
-    particle too far at once.
+    Notes the highest speed [m/s], the highest and the mean beside the `common` velocity, and whether forces
+    moved no particle too far at once.
     """
     kick, is_first = h, int(since == 0.0)
     if is_first == 1:
         kick = 0.5 * (state.body_velocity_lag[body] + h)
-    speed, speed_beside, is_gentle = ti.cast(0.0, state.real), ti.cast(0.0, state.real), 1
+    speed, is_gentle = ti.cast(0.0, state.real), 1
+    speed_beside, mean_beside = ti.cast(0.0, state.real), ti.cast(0.0, state.real)
     edge = state.contact.body_edge[body]
     blow_on(state, body, h)
     push_particles(state, body, before_kick(program, h, is_first))
     if ti.static(program.integrator == Integrator.IMPLICIT_EULER):
         speed, speed_beside = kick_implicitly(state, program, body, h, since, is_first, common)
+        mean_beside = speed_beside
     else:
         lasting = kick if ti.static(program.integrator == Integrator.LEAPFROG) else h
         accumulate_forces(state, program, body)
         add_reactions(state, body, lasting)
         pull_grabs(state, body, h, lasting)
-        speed, speed_beside, change = _kick_body(state, program, body, kick, way, common)
+        speed, speed_beside, mean_beside, change = _kick_body(state, program, body, kick, way, common)
         is_gentle = int(change * h <= JOLT * edge)
     state.contact.body_speed[body] = speed
     state.contact.body_speed_beside[body] = speed_beside
+    state.contact.body_mean_beside[body] = mean_beside
     state.contact.is_gentle[body] = is_gentle
     state.contact.is_wild[body] = 0
     if ti.static(program.has_soft_contact):

@@ -63,7 +63,7 @@ def _lay_on_colliders(state: ti.template(), body, h, since):
             is_near = distance + h * leaving <= TOUCHING + h * fall
             if state.contact.collider_kind[c] != NO_COLLIDER and (mine[0] & theirs[1]) != 0 and is_near:
                 if (theirs[0] & mine[1]) != 0:
-                    change = -ti.max(distance, 0.0) / h - leaving
+                    change = -ti.max(distance - TOUCHING, 0.0) / h - leaving
                     state.particle_contact[p] = c + 1
                     state.particle_velocity[p] = v + change * n
                     state.particle_hold[p] = ti.Vector([n.x, n.y, n.z, state.particle_mass[p] * change])

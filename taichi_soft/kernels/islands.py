@@ -10,6 +10,9 @@ from taichi_soft.kernels.motion import gravity_on
 from taichi_soft.runtime import ti
 from taichi_soft.state import ABSENT, ASLEEP
 
+SPARE = 0.25
+"""Mean edges by which bodies may come nearer than their velocities say, and still be in one island."""
+
 
 @ti.func
 def _find_boxes(state: ti.template(), body_count, dt):
@@ -32,15 +35,9 @@ def _find_boxes(state: ti.template(), body_count, dt):
         surface = state.soft.body_surface[body]
         # What its parts do beside each other, they may do otherwise before the step is over.
         fall = gravity_on(state, body).norm() * dt * dt
-        reach = 0.5 * (fast - slow) * dt + fall + surface.y + search_margin(surface)
+        reach = 0.5 * (fast - slow) * dt + fall + surface.y + SPARE * surface.z
         state.contact.body_lower[body] = lower - reach
         state.contact.body_upper[body] = upper + reach
-
-
-@ti.func
-def search_margin(surface):
-    """Distance [m] from a body's triangles within which vertices are looked for, at least."""
-    return 0.25 * surface.z
 
 
 @ti.func

@@ -99,11 +99,11 @@ def _drop_twins(soft: ti.template(), first, slot):
 
 
 @ti.func
-def _find_gaps_of(state: ti.template(), k, held, h):
+def _find_gaps_of(state: ti.template(), k, given, h):
     """Which candidates of a vertex count: those in front of it, and the one it is least deep behind.
 
     Args:
-        held: what joints may add to the speed at which a pair comes nearer [m/s].
+        given: speed that either may get from others [m/s].
         h: substep [s].
     """
     p = state.outer_particle[k]
@@ -114,12 +114,12 @@ def _find_gaps_of(state: ti.template(), k, held, h):
         other = state.particle_body[corners[0]]
         thickness = 0.5 * (mine.y + state.soft.body_surface[other].y)
         state.soft.slot_gap[slot] = NO_CONTACT
-        gone, speed = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32)
+        gone, speed = ti.cast(0.0, ti.f32), ti.cast(given, ti.f32)
         for i in ti.static(range(3)):
             gone = ti.max(gone, state.soft.particle_gone[corners[i]])
             speed = ti.max(speed, state.soft.particle_speed[corners[i]])
         gone += state.soft.particle_gone[p]
-        way = h * (held + speed + state.soft.particle_speed[p])
+        way = h * (speed + ti.max(given, state.soft.particle_speed[p]))
         if state.soft.slot_distance[slot] - gone - way < thickness:
             distance, normal, weights, can_touch = _gap(state, p, corners)
             state.soft.slot_normal[slot] = normal
@@ -173,13 +173,13 @@ def _note_levers(state: ti.template(), p, slot):
 
 
 @ti.func
-def find_gaps(state: ti.template(), body, held, h):
-    """List the contacts of a body's vertices; `held` and `h` as in `_find_gaps_of`."""
+def find_gaps(state: ti.template(), body, given, h):
+    """List the contacts of a body's vertices; `given` and `h` as in `_find_gaps_of`."""
     outer = state.body_outer[body]
     count = 0
     for k in range(outer[0], outer[1]):
         if state.soft.slot_count[k] > 0:
-            _find_gaps_of(state, k, held, h)
+            _find_gaps_of(state, k, given, h)
             for slot in range(k * SLOTS, k * SLOTS + state.soft.slot_count[k]):
                 if state.soft.slot_gap[slot] < NO_CONTACT:
                     _note_levers(state, state.outer_particle[k], slot)

@@ -5,7 +5,7 @@ the triangles of the other look round in it. Each body has a margin, and what is
 vertices is farther than that from where it was.
 """
 
-from taichi_soft.contact_fields import SLOTS
+from taichi_soft.contact_fields import NO_CONTACT, SLOTS
 from taichi_soft.kernels.islands import may_touch
 from taichi_soft.kernels.joints import are_joined
 from taichi_soft.math.triangle import closest_point_on_triangle
@@ -15,7 +15,7 @@ FORESIGHT = 1.25
 """Part of the way that a body's fastest vertex would go on until the end of the step for which a search is to
 hold: so that few steps need a second one."""
 
-SHORTEST, LONGEST = 0.1, 0.5
+SHORTEST, LONGEST = 0.1, 0.3
 """Mean edges: the least and the greatest such way."""
 
 SELF_DISTANCE = 1.5
@@ -131,13 +131,17 @@ def forget_candidates(state: ti.template(), body):
 
 @ti.func
 def _keep(soft: ti.template(), k, p, triangle, distance):
-    """Put a triangle among the nearest of a vertex, which is particle `p`."""
+    """Put a triangle among the nearest of a vertex, which is particle `p`.
+
+    Returns: the distance of the one that found no place [m].
+    """
     count = soft.slot_count[k]
-    at = count
+    at, lost = count, ti.cast(NO_CONTACT, ti.f32)
     if count == SLOTS:
         for i in range(SLOTS):
             if at == SLOTS or soft.slot_distance[k * SLOTS + i] > soft.slot_distance[k * SLOTS + at]:
                 at = i
+        lost = ti.max(soft.slot_distance[k * SLOTS + at], distance)
         if soft.slot_distance[k * SLOTS + at] <= distance:
             at = SLOTS
     else:
@@ -148,6 +152,7 @@ def _keep(soft: ti.template(), k, p, triangle, distance):
         goes_on = ti.select(soft.kept_triangle[p] == triangle and soft.kept_press[p] > 0.0, 1.0, 0.0)
         soft.slot_press[k * SLOTS + at] = goes_on * soft.kept_press[p]
         soft.slot_rub[k * SLOTS + at] = goes_on * soft.kept_rub[p]
+    return lost
 
 
 @ti.func
@@ -163,7 +168,18 @@ def _is_self_neighbour(state: ti.template(), p, corners, edge):
 
 @ti.func
 def _search_triangle(
-    state: ti.template(), table, size, lowest, highest, body, other, is_joined, triangle, cell, margin
+    state: ti.template(),
+    table,
+    size,
+    lowest,
+    highest,
+    body,
+    other,
+    is_joined,
+    triangle,
+    cell,
+    margin,
+    thickness,
 ):
     """Give a triangle of `other` to the vertices of `body` within `margin` [m] of it.
 
@@ -203,12 +219,14 @@ def _search_triangle(
                             weights = closest_point_on_triangle(x, a, b, c)
                             gap = (x - weights.x * a - weights.y * b - weights.z * c).norm()
                             if gap < margin:
-                                _keep(state.soft, k, p, triangle, gap)
+                                lost = _keep(state.soft, k, p, triangle, gap) - thickness
+                                lost = ti.max(lost, 2.0 * SHORTEST * state.soft.body_surface[body].z)
+                                state.soft.body_lost[body] = ti.min(state.soft.body_lost[body], lost)
 
 
 @ti.func
-def _search_pair(state: ti.template(), body, other, margin):
-    """Vertices of `body` near triangles of `other`, within `margin` [m]."""
+def _search_pair(state: ti.template(), body, other, margin, thickness):
+    """Vertices of `body` near triangles of `other`, within `margin` [m]; they touch at `thickness` [m]."""
     outer = state.body_outer[body]
     table = ti.Vector([4 * outer[0] + body, outer[0]])  # first row of the cells and of the items
     cell = ti.max(CELL * state.soft.body_surface[other].z, 1e-6)
@@ -217,7 +235,9 @@ def _search_pair(state: ti.template(), body, other, margin):
         is_joined = are_joined(state, body, other)
         triangles = state.body_triangles[other]
         for t in range(triangles[0], triangles[1]):
-            _search_triangle(state, table, size, lowest, highest, body, other, is_joined, t, cell, margin)
+            _search_triangle(
+                state, table, size, lowest, highest, body, other, is_joined, t, cell, margin, thickness
+            )
 
 
 @ti.real_func
@@ -235,7 +255,7 @@ def search_body(state: ti.template(), body: ti.i32, island: ti.i32):
                 lower - margin, upper + margin, their_lower, their_upper
             )
         if wanted:
-            _search_pair(state, body, other, margin)
+            _search_pair(state, body, other, margin, thickness)
 
 
 @ti.func
@@ -246,40 +266,44 @@ def is_social(state: ti.template(), island):
 
 
 @ti.func
-def is_outdated(state: ti.template(), island, held, h):
-    """Whether a body of an island may have gone farther than it was searched for after a substep (1).
+def is_outdated(state: ti.template(), island, given, h):
+    """Whether a body of an island may be farther than it was searched for after another substep (1).
 
     What explodes does not count, or others would be searched again because of it.
     Args:
-        held: what joints may have added to speeds [m/s].
+        given: speed that its bodies may get from others [m/s].
         h: substep [s].
     """
-    outdated = 0
+    outdated, farthest, nearest_lost = 0, ti.cast(0.0, ti.f32), ti.cast(NO_CONTACT, ti.f32)
     for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
         body = state.contact.island_body[i]
-        gone = state.soft.body_gone[body] + h * (held + state.contact.body_speed_beside[body])
-        if state.contact.is_wild[body] == 0 and not (gone <= state.soft.body_reach[body]):
-            outdated = 1
-    return outdated
+        if state.contact.is_wild[body] == 0:
+            speed = ti.max(given, state.contact.body_speed_beside[body])
+            gone = state.soft.body_gone[body] + h * speed
+            farthest = ti.max(farthest, gone)
+            nearest_lost = ti.min(nearest_lost, state.soft.body_lost[body] - gone)
+            if not (gone <= state.soft.body_reach[body]):
+                outdated = 1
+    return outdated | int(nearest_lost < farthest)
 
 
 @ti.func
-def begin_search(state: ti.template(), body, held, h, left, forgets):
+def begin_search(state: ti.template(), body, given, h, left, forgets):
     """Forget (1) the candidates of a body, and find the boxes that `search_body` looks at.
 
     Args:
-        held: what joints may have added to its speed [m/s].
+        given: speed that it may get from others [m/s].
         h, left: substep, and time until the end of the step [s].
     """
     if forgets > 0.0:
         forget_candidates(state, body)
     _find_box(state, body)
-    speed, edge = held + state.contact.body_speed_beside[body], state.soft.body_surface[body].z
+    speed, edge = state.contact.body_speed_beside[body], state.soft.body_surface[body].z
+    speed *= 1.0 - state.contact.is_wild[body]
     way = ti.min(ti.max(FORESIGHT * left * speed, SHORTEST * edge), LONGEST * edge)
-    if state.contact.is_wild[body] == 0:
-        way = ti.max(way, h * speed)
-    state.soft.body_reach[body] = way
+    state.soft.body_reach[body] = ti.max(way, h * speed) + h * given
     state.soft.body_gone[body] = 0.0
+    state.soft.body_lost[body] = NO_CONTACT
 
 
 @ti.func

@@ -43,6 +43,9 @@ def spawn_body(state: ti.template(), body: ti.i32, rows: ti.types.ndarray(dtype=
             restore_shape(state, body)
         if ti.static(state.capacity.contact.colliders > 0):
             state.contact.calm[body] = 0.0
+            particles = state.body_particles[body]
+            for p in range(particles[0], particles[1]):
+                state.contact.particle_touches[p] = 0
         state.body_status[body] = ACTIVE
 
 

@@ -16,8 +16,8 @@ HELP = -1
 """Whatever its owner has called for."""
 
 PUSH, BOXES, SEARCH, GAPS, DRIFT = range(5)
-"""Tasks. Their numbers: h, since, way; held, h, left, forgets; none; held, h; h, since, left, fastest. What
-the bodies of an island share is a velocity [m/s] in the push, and in the drift a way [m]."""
+"""Tasks. Their numbers: h, since, way; given, h, left, forgets; none; given, h; h, since, left, fastest.
+What the bodies of an island share is a velocity [m/s] in the push, and in the drift a way [m]."""
 
 
 @ti.func
