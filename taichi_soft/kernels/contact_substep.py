@@ -47,12 +47,13 @@ def _kick_body(state: ti.template(), program: ti.template(), body, kick, way, co
         state.contact.particle_touches[p] = 0
         state.particle_force[p] = ti.Vector.zero(state.real, 4)
         highest = ti.max(highest, v.dot(v))
-        if ti.static(program.has_soft_contact) and way == 0.0:
-            state.soft.particle_speed[p] = (v - common).norm()
-            # What presses against others gains speed only to lose it to them.
-            beside = ti.select(was_touched == 1, v_before, v) - common
-            highest_beside = ti.max(highest_beside, beside.dot(beside))
-            total_beside += beside.dot(beside)
+        if ti.static(program.has_soft_contact):
+            if way == 0.0:
+                state.soft.particle_speed[p] = (v - common).norm()
+                # What presses against others gains speed only to lose it to them.
+                beside = ti.select(was_touched == 1, v_before, v) - common
+                highest_beside = ti.max(highest_beside, beside.dot(beside))
+                total_beside += beside.dot(beside)
         largest = ti.max(largest, acceleration.dot(acceleration))
     mean_beside = ti.sqrt(total_beside / (particles[1] - particles[0]))
     return ti.sqrt(highest), ti.sqrt(highest_beside), mean_beside, kick * ti.sqrt(largest)
