@@ -65,7 +65,7 @@ def first_touch(contact: ti.template(), c, start, end, slack):
         distance = to_shape - thickness
         climb = way.dot(normal)
         beyond = distance + (1.0 - part) * climb
-        is_clear = beyond > ti.select(rests_at(distance), distance, 0.0) - slack
+        is_clear = beyond >= ti.select(rests_at(distance), distance, 0.0) - slack
         if distance <= TOUCHING and not is_clear:
             is_open = 0
         elif is_clear and is_convex:
