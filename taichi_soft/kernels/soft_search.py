@@ -12,8 +12,7 @@ from taichi_soft.math.triangle import closest_point_on_triangle
 from taichi_soft.runtime import ti
 
 FORESIGHT = 1.25
-"""Part of the way that a body's fastest vertex would go on until the end of the step for which a search is to
-hold: so that few steps need a second one."""
+"""A search is to hold for so many times the way of a body's fastest vertex until the end of the step."""
 
 SHORTEST, LONGEST = 0.1, 0.3
 """Mean edges: the least and the greatest such way."""
