@@ -141,7 +141,7 @@ def measure_heaps(threads: int, repeats: int = 61) -> list[Heap]:
     """Measure heaps of the thesis's own sphere, where the source of the package is at hand, and of ours."""
     meshes = {"regular": _mesh()}
     if (ASSETS / "sphere.npz").exists():
-        meshes = {"the thesis's": load_mesh(ASSETS / "sphere.npz"), **meshes}
+        meshes = {"thesis": load_mesh(ASSETS / "sphere.npz"), **meshes}
     return [measure_heap(name, mesh, threads, repeats) for name, mesh in meshes.items()]
 
 
