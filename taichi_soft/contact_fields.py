@@ -8,8 +8,11 @@ from taichi_soft.runtime import ti
 NO_COLLIDER = -1
 """Kind of a row of which the collider was removed."""
 
+FOUND = 16
+"""Triangles that a search may find for one vertex: where three bodies meet, and their triangles beside."""
+
 SLOTS = 8
-"""Triangles that one vertex may touch at once: where three bodies meet, and their triangles beside."""
+"""Room for what is found for the vertices of a body, for each of them. Most have nothing near."""
 
 PAIR_ROWS = 32
 """Pairs of bodies whose impulses can be recorded, per body of an island: room for all pairs of 65 bodies, and
@@ -116,17 +119,23 @@ class SoftContactFields:
         self.cell_first = ti.field(ti.i32, 4 * outer + bodies)
         self.item = ti.field(ti.i32, outer)  # rows of `outer_particle` that may be near the other body
         self.cell_item = ti.field(ti.i32, outer)  # the same, cell by cell
+        self.cell_position = ti.Vector.field(3, ti.f32, outer)  # of these [m]
         self.triangle_lower = ti.Vector.field(3, ti.f32, triangles)  # corners of a box [m], at the search
         self.triangle_upper = ti.Vector.field(3, ti.f32, triangles)
         self.searched_position = ti.Vector.field(3, ti.f32, outer)  # [m], at the search
         # Beside what the bodies of an island share: ways [m] for which a search holds, and how far each body
         # and each vertex is from where it was then; speeds before contact [m/s].
         self.body_reach = ti.field(ti.f32, bodies)
-        self.body_lost = ti.field(ti.f32, bodies)  # way of a pair for which its vertices had `SLOTS` enough
+        self.body_lost = ti.field(ti.f32, bodies)  # way of a pair for which its vertices had room enough
         self.body_gone = ti.field(ti.f32, bodies)
         self.particle_gone = ti.field(ti.f32, particles)
         self.particle_speed = ti.field(ti.f32, particles)
-        self.slot_count = ti.field(ti.i32, outer)
+        self.found_count = ti.field(ti.i32, outer)
+        self.found_triangle = ti.field(ti.i32, outer * FOUND)
+        self.found_distance = ti.field(ti.f32, outer * FOUND)  # [m], at the search
+        # Candidates: of each body vertex by vertex, without gaps.
+        self.slot_count = ti.field(ti.i32, bodies)
+        self.slot_particle = ti.field(ti.i32, outer * SLOTS)
         self.slot_triangle = ti.field(ti.i32, outer * SLOTS)
         self.slot_distance = ti.field(ti.f32, outer * SLOTS)  # [m], at the search
         self.slot_gap = ti.field(ti.f32, outer * SLOTS)  # [m], beyond the thickness; NO_CONTACT where idle
@@ -134,7 +143,7 @@ class SoftContactFields:
         self.slot_normal = ti.Vector.field(3, ti.f32, outer * SLOTS)  # from the triangle to the vertex
         self.slot_press = ti.field(ti.f32, outer * SLOTS)  # impulse along it in this substep [N s]
         self.slot_rub = ti.Vector.field(3, ti.f32, outer * SLOTS)  # friction on the vertex [N s]
-        # Of what is in contact in this substep, slots of each body's vertices from its first slot on, and for
+        # Of what is in contact in this substep, slots of each body from its first slot on, and for
         # each what its solves share: inverse masses of the vertex and the corners [1/kg]; whether the bodies
         # of the two move (1); normal of the triangle; shares of the corners in what the vertex feels, and
         # height over the triangle times the gradients of the weights.

@@ -99,17 +99,17 @@ def _drop_twins(soft: ti.template(), first, slot):
 
 
 @ti.func
-def _find_gaps_of(state: ti.template(), k, given, h):
+def _find_gaps_of(state: ti.template(), p, first, last, given, h):
     """Which candidates of a vertex count: those in front of it, and the one it is least deep behind.
 
     Args:
+        first, last: the slots of the vertex, which is particle `p`.
         given: speed that either may get from others [m/s].
         h: substep [s].
     """
-    p = state.outer_particle[k]
     mine = state.soft.body_surface[state.particle_body[p]]
     shallowest, behind = ti.cast(-1e30, ti.f32), -1
-    for slot in range(k * SLOTS, k * SLOTS + state.soft.slot_count[k]):
+    for slot in range(first, last):
         corners = state.triangle_vertices[state.soft.slot_triangle[slot]]
         other = state.particle_body[corners[0]]
         thickness = 0.5 * (mine.y + state.soft.body_surface[other].y)
@@ -129,7 +129,7 @@ def _find_gaps_of(state: ti.template(), k, given, h):
                 can_touch = 0
             if can_touch == 1 and distance >= 0.0:
                 state.soft.slot_gap[slot] = distance - thickness
-                _drop_twins(state.soft, k * SLOTS, slot)
+                _drop_twins(state.soft, first, slot)
             elif can_touch == 1 and other != state.particle_body[p] and distance > shallowest:
                 if behind >= 0:
                     state.soft.slot_gap[behind] = NO_CONTACT
@@ -175,19 +175,23 @@ def _note_levers(state: ti.template(), p, slot):
 @ti.func
 def find_gaps(state: ti.template(), body, given, h):
     """List the contacts of a body's vertices; `given` and `h` as in `_find_gaps_of`."""
-    outer = state.body_outer[body]
-    count = 0
-    for k in range(outer[0], outer[1]):
-        if state.soft.slot_count[k] > 0:
-            _find_gaps_of(state, k, given, h)
-            for slot in range(k * SLOTS, k * SLOTS + state.soft.slot_count[k]):
-                if state.soft.slot_gap[slot] < NO_CONTACT:
-                    _note_levers(state, state.outer_particle[k], slot)
-                    state.soft.contact_slot[outer[0] * SLOTS + count] = slot
-                    count += 1
-                else:
-                    state.soft.slot_press[slot] = 0.0
-                    state.soft.slot_rub[slot] = ti.Vector.zero(ti.f32, 3)
+    first_slot, count = state.body_outer[body][0] * SLOTS, 0
+    last_slot = first_slot + state.soft.slot_count[body]
+    first = first_slot
+    while first < last_slot:
+        p, last = state.soft.slot_particle[first], first + 1
+        while last < last_slot and state.soft.slot_particle[last] == p:
+            last += 1
+        _find_gaps_of(state, p, first, last, given, h)
+        for slot in range(first, last):
+            if state.soft.slot_gap[slot] < NO_CONTACT:
+                _note_levers(state, p, slot)
+                state.soft.contact_slot[first_slot + count] = slot
+                count += 1
+            else:
+                state.soft.slot_press[slot] = 0.0
+                state.soft.slot_rub[slot] = ti.Vector.zero(ti.f32, 3)
+        first = last
     state.soft.contact_count[body] = count
 
 
@@ -269,10 +273,7 @@ def _solve_contact(state: ti.template(), soft: ti.template(), slot, p, corners, 
 @ti.func
 def _solve_slot(state: ti.template(), slot, h, sweep):
     """One contact in one sweep; the last one moves apart what is too near."""
-    p, corners = (
-        state.outer_particle[slot // SLOTS],
-        state.triangle_vertices[state.soft.slot_triangle[slot]],
-    )
+    p, corners = state.soft.slot_particle[slot], state.triangle_vertices[state.soft.slot_triangle[slot]]
     mine = state.soft.body_surface[state.particle_body[p]]
     theirs = state.soft.body_surface[state.particle_body[corners[0]]]
     if (

@@ -5,7 +5,7 @@ the triangles of the other look round in it. Each body has a margin, and what is
 vertices is farther than that from where it was.
 """
 
-from taichi_soft.contact_fields import NO_CONTACT, SLOTS
+from taichi_soft.contact_fields import FOUND, NO_CONTACT, SLOTS
 from taichi_soft.kernels.islands import may_touch
 from taichi_soft.kernels.joints import are_joined
 from taichi_soft.math.triangle import closest_point_on_triangle
@@ -54,6 +54,7 @@ def _find_box(state: ti.template(), body):
     for k in range(outer[0], outer[1]):
         x = state.particle_position[state.outer_particle[k]]
         state.soft.searched_position[k] = x
+        state.soft.found_count[k] = 0
         state.soft.particle_gone[state.outer_particle[k]] = 0.0
         lower, upper = ti.min(lower, x), ti.max(upper, x)
     state.contact.body_lower[body] = lower
@@ -101,6 +102,7 @@ def _fill_table(state: ti.template(), table, body, other, cell, margin):
                 state.soft.cell_first[row] = at
                 if pass_number == 1:
                     state.soft.cell_item[at] = k
+                    state.soft.cell_position[at] = x
             if pass_number == 0:
                 total = table[1]
                 for row in range(table[0], table[0] + size + 1):
@@ -120,38 +122,84 @@ def forget_candidates(state: ti.template(), body):
     for k in range(outer[0], outer[1]):
         p = state.outer_particle[k]
         state.soft.kept_press[p] = 0.0
-        for slot in range(k * SLOTS, k * SLOTS + state.soft.slot_count[k]):
-            if state.soft.slot_press[slot] > state.soft.kept_press[p]:
-                state.soft.kept_triangle[p] = state.soft.slot_triangle[slot]
-                state.soft.kept_press[p] = state.soft.slot_press[slot]
-                state.soft.kept_rub[p] = state.soft.slot_rub[slot]
-        state.soft.slot_count[k] = 0
+    for slot in range(outer[0] * SLOTS, outer[0] * SLOTS + state.soft.slot_count[body]):
+        p = state.soft.slot_particle[slot]
+        if state.soft.slot_press[slot] > state.soft.kept_press[p]:
+            state.soft.kept_triangle[p] = state.soft.slot_triangle[slot]
+            state.soft.kept_press[p] = state.soft.slot_press[slot]
+            state.soft.kept_rub[p] = state.soft.slot_rub[slot]
+    state.soft.slot_count[body] = 0
 
 
 @ti.func
-def _keep(soft: ti.template(), k, p, triangle, distance):
-    """Put a triangle among the nearest of a vertex, which is particle `p`.
+def _farthest_found(soft: ti.template(), k):
+    """Row of what is farthest of all that was found for a vertex."""
+    farthest = k * FOUND
+    for row in range(k * FOUND + 1, k * FOUND + soft.found_count[k]):
+        if soft.found_distance[row] > soft.found_distance[farthest]:
+            farthest = row
+    return farthest
+
+
+@ti.func
+def _keep(soft: ti.template(), k, triangle, distance):
+    """Put a triangle among the nearest of a vertex.
 
     Returns: the distance of the one that found no place [m].
     """
-    count = soft.slot_count[k]
-    at, lost = count, ti.cast(NO_CONTACT, ti.f32)
-    if count == SLOTS:
-        for i in range(SLOTS):
-            if at == SLOTS or soft.slot_distance[k * SLOTS + i] > soft.slot_distance[k * SLOTS + at]:
-                at = i
-        lost = ti.max(soft.slot_distance[k * SLOTS + at], distance)
-        if soft.slot_distance[k * SLOTS + at] <= distance:
-            at = SLOTS
+    row, lost = k * FOUND + soft.found_count[k], ti.cast(NO_CONTACT, ti.f32)
+    if soft.found_count[k] == FOUND:
+        row = _farthest_found(soft, k)
+        lost = ti.max(soft.found_distance[row], distance)
     else:
-        soft.slot_count[k] = count + 1
-    if at < SLOTS:
-        soft.slot_triangle[k * SLOTS + at] = triangle
-        soft.slot_distance[k * SLOTS + at] = distance
-        goes_on = ti.select(soft.kept_triangle[p] == triangle and soft.kept_press[p] > 0.0, 1.0, 0.0)
-        soft.slot_press[k * SLOTS + at] = goes_on * soft.kept_press[p]
-        soft.slot_rub[k * SLOTS + at] = goes_on * soft.kept_rub[p]
+        soft.found_count[k] = soft.found_count[k] + 1
+    if distance < lost:
+        soft.found_triangle[row] = triangle
+        soft.found_distance[row] = distance
     return lost
+
+
+@ti.func
+def _note_lost(state: ti.template(), body, distance, thickness):
+    """Note that something `distance` [m] from a vertex of a body found no room.
+
+    What touches at `thickness` [m] need not be looked for again before that is used up."""
+    way = ti.max(distance - thickness, 2.0 * SHORTEST * state.soft.body_surface[body].z)
+    state.soft.body_lost[body] = ti.min(state.soft.body_lost[body], way)
+
+
+@ti.func
+def _list_candidates(state: ti.template(), body, thickness):
+    """Make candidates of what was found for the vertices of a body, which go on with their contacts.
+
+    Where that is more than there is room for, those that found most give up what is farthest.
+    Args:
+        thickness: the greatest at which it touches another body [m].
+    """
+    outer = state.body_outer[body]
+    total = 0
+    for k in range(outer[0], outer[1]):
+        total += state.soft.found_count[k]
+    is_too_much = total > (outer[1] - outer[0]) * SLOTS
+    slot = outer[0] * SLOTS
+    for k in range(outer[0], outer[1]):
+        while is_too_much and state.soft.found_count[k] > SLOTS:
+            row, last = _farthest_found(state.soft, k), k * FOUND + state.soft.found_count[k] - 1
+            _note_lost(state, body, state.soft.found_distance[row], thickness)
+            state.soft.found_triangle[row] = state.soft.found_triangle[last]
+            state.soft.found_distance[row] = state.soft.found_distance[last]
+            state.soft.found_count[k] = state.soft.found_count[k] - 1
+        p = state.outer_particle[k]
+        for row in range(k * FOUND, k * FOUND + state.soft.found_count[k]):
+            triangle = state.soft.found_triangle[row]
+            goes_on = ti.select(state.soft.kept_triangle[p] == triangle and state.soft.kept_press[p] > 0.0, 1.0, 0.0)
+            state.soft.slot_particle[slot] = p
+            state.soft.slot_triangle[slot] = triangle
+            state.soft.slot_distance[slot] = state.soft.found_distance[row]
+            state.soft.slot_press[slot] = goes_on * state.soft.kept_press[p]
+            state.soft.slot_rub[slot] = goes_on * state.soft.kept_rub[p]
+            slot += 1
+    state.soft.slot_count[body] = slot - outer[0] * SLOTS
 
 
 @ti.func
@@ -203,13 +251,13 @@ def _search_triangle(
                     here = ti.Vector([cx, cy, cz])
                     row = table[0] + _bucket(here, size)
                     for item in range(state.soft.cell_first[row], state.soft.cell_first[row + 1]):
-                        k = state.soft.cell_item[item]
-                        p = state.outer_particle[k]
-                        x = state.particle_position[p]
+                        x = state.soft.cell_position[item]
                         # Cells may share a bucket: each vertex counts in its own cell only.
                         wanted = (
                             ti.max(lower - x, x - upper).max() <= 0.0 and (_cell_of(x, cell) == here).all()
                         )
+                        k = state.soft.cell_item[item]
+                        p = state.outer_particle[k]
                         if wanted and is_joined == 1:
                             wanted = is_held | state.joints.is_held[p] == 0
                         if wanted and other == body:
@@ -218,9 +266,9 @@ def _search_triangle(
                             weights = closest_point_on_triangle(x, a, b, c)
                             gap = (x - weights.x * a - weights.y * b - weights.z * c).norm()
                             if gap < margin:
-                                lost = _keep(state.soft, k, p, triangle, gap) - thickness
-                                lost = ti.max(lost, 2.0 * SHORTEST * state.soft.body_surface[body].z)
-                                state.soft.body_lost[body] = ti.min(state.soft.body_lost[body], lost)
+                                lost = _keep(state.soft, k, triangle, gap)
+                                if lost < NO_CONTACT:
+                                    _note_lost(state, body, lost, thickness)
 
 
 @ti.func
@@ -243,9 +291,11 @@ def _search_pair(state: ti.template(), body, other, margin, thickness):
 def search_body(state: ti.template(), body: ti.i32, island: ti.i32):
     """Find the candidates of a body's vertices, after `begin_search` of all its island."""
     lower, upper = state.contact.body_lower[body], state.contact.body_upper[body]
+    thickest = ti.cast(0.0, ti.f32)
     for j in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
         other = state.contact.island_body[j]
         thickness = 0.5 * (state.soft.body_surface[body].y + state.soft.body_surface[other].y)
+        thickest = ti.max(thickest, thickness)
         margin = thickness + state.soft.body_reach[body] + state.soft.body_reach[other]
         wanted = state.soft.body_touches_itself[body] == 1
         if other != body:
@@ -255,6 +305,7 @@ def search_body(state: ti.template(), body: ti.i32, island: ti.i32):
             )
         if wanted:
             _search_pair(state, body, other, margin, thickness)
+    _list_candidates(state, body, thickest)
 
 
 @ti.func

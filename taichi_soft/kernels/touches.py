@@ -36,20 +36,19 @@ def add_touches(state: ti.template(), island):
     first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
     for i in range(first, last):
         body = state.contact.island_body[i]
-        outer = state.body_outer[body]
-        for k in range(outer[0], outer[1]):
-            for slot in range(k * SLOTS, k * SLOTS + state.soft.slot_count[k]):
-                press = state.soft.slot_press[slot]
-                other = state.particle_body[state.triangle_vertices[state.soft.slot_triangle[slot]][0]]
-                if press > 0.0 and other != body:
-                    a, b = ti.min(body, other), ti.max(body, other)
-                    row = _find_pair(state.soft, first * PAIR_ROWS, (last - first) * PAIR_ROWS, a, b)
-                    if row < 0:
-                        state.soft.pairs_lost[None] = 1  # the same from whichever thread
-                    else:
-                        on_vertex = press * state.soft.slot_normal[slot] + state.soft.slot_rub[slot]
-                        on_b = ti.select(body == b, 1.0, -1.0) * on_vertex
-                        state.soft.pair_impulse[row] = state.soft.pair_impulse[row] + on_b
+        first_slot = state.body_outer[body][0] * SLOTS
+        for slot in range(first_slot, first_slot + state.soft.slot_count[body]):
+            press = state.soft.slot_press[slot]
+            other = state.particle_body[state.triangle_vertices[state.soft.slot_triangle[slot]][0]]
+            if press > 0.0 and other != body:
+                a, b = ti.min(body, other), ti.max(body, other)
+                row = _find_pair(state.soft, first * PAIR_ROWS, (last - first) * PAIR_ROWS, a, b)
+                if row < 0:
+                    state.soft.pairs_lost[None] = 1  # the same from whichever thread
+                else:
+                    on_vertex = press * state.soft.slot_normal[slot] + state.soft.slot_rub[slot]
+                    on_b = ti.select(body == b, 1.0, -1.0) * on_vertex
+                    state.soft.pair_impulse[row] = state.soft.pair_impulse[row] + on_b
 
 
 @ti.func
