@@ -9,6 +9,10 @@ LANES = 8
 """Tetrahedra per block. Eight float32 fill one AVX register: the compiler then computes a block in
 vector instructions. Four were 1.3 times slower, sixteen compiled ten times longer for no gain."""
 
+ROW_BITS = (1 << 28) - 1
+"""Mask that leaves every row of a field unchanged, and shows the compiler that adding a lane to it does not
+overflow: without it nothing becomes vector instructions."""
+
 POSITION_LIMIT = 1.0e7
 """Farthest coordinate [m] that still counts as finite. Beyond it float32 cannot resolve a body at all
 (its spacing is 1 m), so a particle out there has been thrown by an explosion."""

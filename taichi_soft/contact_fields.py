@@ -122,7 +122,7 @@ class SoftContactFields:
         self.cell_position = ti.Vector.field(3, ti.f32, outer)  # of these [m]
         self.triangle_lower = ti.Vector.field(3, ti.f32, triangles)  # corners of a box [m], at the search
         self.triangle_upper = ti.Vector.field(3, ti.f32, triangles)
-        self.searched_position = ti.Vector.field(3, ti.f32, outer)  # [m], at the search
+        self.searched_position = ti.Vector.field(3, ti.f32, particles)  # [m], at the search
         # Beside what the bodies of an island share: ways [m] for which a search holds, and how far each body
         # and each vertex is from where it was then; speeds before contact [m/s].
         self.body_reach = ti.field(ti.f32, bodies)

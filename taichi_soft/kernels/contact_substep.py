@@ -3,6 +3,7 @@
 Between the two its island takes velocities away, in joints and in contact of bodies with each other.
 """
 
+from taichi_soft.constants import LANES, ROW_BITS
 from taichi_soft.kernels.collide import collided, find_near_colliders
 from taichi_soft.kernels.drives import add_reactions, blow_on, push_particles
 from taichi_soft.kernels.grabs import pull_grabs
@@ -25,38 +26,65 @@ surface. Vibrations of a stable substep stay below it."""
 
 
 @ti.func
+def _kick_block(state: ti.template(), program: ti.template(), first, count, gravity, kick, way, common):
+    """New velocities from the forces, which are cleared, of up to `LANES` particles from `first` on, and
+    positions after `way` [s] with them. What lies behind them is computed too, and counts nothing.
+
+    Returns: of each the square of its speed, of that beside the `common` velocity, and of its acceleration.
+    """
+    positions = ti.Matrix.zero(state.real, LANES, 4)
+    velocities = ti.Matrix.zero(state.real, LANES, 4)
+    speed2, beside2 = ti.Vector.zero(state.real, LANES), ti.Vector.zero(state.real, LANES)
+    acceleration2 = ti.Vector.zero(state.real, LANES)
+    # It reads fields and stores here only: whether field and field overlap, the compiler could not tell.
+    for lane in range(LANES):
+        p = first + lane
+        inv_mass = state.particle_inv_mass[p]
+        acceleration = state.particle_force[p].xyz * inv_mass + gravity
+        acceleration *= ti.select(inv_mass > 0.0, 1.0, 0.0)
+        v_before = state.particle_velocity[p]
+        x, v = program.advance(state.particle_position[p], v_before, acceleration, way, kick)
+        for i in ti.static(range(3)):
+            positions[lane, i] = x[i]
+            velocities[lane, i] = v[i]
+        positions[lane, 3] = 0.0  # written as well, or the rows would have gaps, which no vector store leaves
+        velocities[lane, 3] = (v - common).norm()
+        # What presses against others gains speed only to lose it to them.
+        was_touched = state.contact.particle_touches[p] == 1
+        beside = ti.select(was_touched, v_before, v) - common
+        speed2[lane] = ti.select(lane < count, v.dot(v), 0.0)
+        beside2[lane] = ti.select(lane < count, beside.dot(beside), 0.0)
+        acceleration2[lane] = ti.select(lane < count, acceleration.dot(acceleration), 0.0)
+    for lane in range(ti.min(count, LANES)):
+        p = first + lane
+        for i in ti.static(range(3)):
+            state.particle_position[p][i] = positions[lane, i]
+            state.particle_velocity[p][i] = velocities[lane, i]
+        if ti.static(program.has_soft_contact):
+            state.soft.particle_speed[p] = velocities[lane, 3]
+        state.contact.particle_touches[p] = 0
+        state.particle_force[p] = ti.Vector.zero(state.real, 4)
+    return speed2, beside2, acceleration2
+
+
+@ti.func
 def _kick_body(state: ti.template(), program: ti.template(), body, kick, way, common):
     """New velocities from the forces, which are cleared, and positions after `way` [s] with them.
 
     Returns: the highest speed [m/s], the highest and the mean beside the `common` velocity, and the largest
     change.
     """
-    particles = state.body_particles[body]
-    gravity = gravity_on(state, body)
-    highest, highest_beside = ti.cast(0.0, state.real), ti.cast(0.0, state.real)
-    total_beside = ti.cast(0.0, state.real)
-    largest = ti.cast(0.0, state.real)
-    for p in range(particles[0], particles[1]):
-        inv_mass = state.particle_inv_mass[p]
-        acceleration = state.particle_force[p].xyz * inv_mass + gravity
-        acceleration *= ti.select(inv_mass > 0.0, 1.0, 0.0)
-        v_before, was_touched = state.particle_velocity[p], state.contact.particle_touches[p]
-        x, v = program.advance(state.particle_position[p], v_before, acceleration, way, kick)
-        state.particle_position[p] = x
-        state.particle_velocity[p] = v
-        state.contact.particle_touches[p] = 0
-        state.particle_force[p] = ti.Vector.zero(state.real, 4)
-        highest = ti.max(highest, v.dot(v))
-        if ti.static(program.has_soft_contact):
-            if way == 0.0:
-                state.soft.particle_speed[p] = (v - common).norm()
-                # What presses against others gains speed only to lose it to them.
-                beside = ti.select(was_touched == 1, v_before, v) - common
-                highest_beside = ti.max(highest_beside, beside.dot(beside))
-                total_beside += beside.dot(beside)
-        largest = ti.max(largest, acceleration.dot(acceleration))
-    mean_beside = ti.sqrt(total_beside / (particles[1] - particles[0]))
-    return ti.sqrt(highest), ti.sqrt(highest_beside), mean_beside, kick * ti.sqrt(largest)
+    particles, gravity = state.body_particles[body], gravity_on(state, body)
+    count = particles[1] - particles[0]
+    speed2, beside2 = ti.Vector.zero(state.real, LANES), ti.Vector.zero(state.real, LANES)
+    acceleration2, total2 = ti.Vector.zero(state.real, LANES), ti.Vector.zero(state.real, LANES)
+    for block in range((count + LANES - 1) // LANES):
+        first = (particles[0] + block * LANES) & ROW_BITS
+        v2, b2, a2 = _kick_block(state, program, first, particles[1] - first, gravity, kick, way, common)
+        speed2, beside2 = ti.max(speed2, v2), ti.max(beside2, b2)
+        acceleration2, total2 = ti.max(acceleration2, a2), total2 + b2
+    change = kick * ti.sqrt(acceleration2.max())
+    return ti.sqrt(speed2.max()), ti.sqrt(beside2.max()), ti.sqrt(total2.sum() / count), change
 
 
 @ti.func
@@ -116,6 +144,36 @@ def has_drifted(state: ti.template(), body, speed, h):
 
 
 @ti.func
+def _drift_block(state: ti.template(), body, first, count, h, since, gone):
+    """New positions of up to `LANES` particles from `first` on, one by one of those that may meet a collider.
+
+    Returns: the square of the way of each [m^2].
+    """
+    positions, way2 = ti.Matrix.zero(state.real, LANES, 4), ti.Vector.zero(state.real, LANES)
+    for lane in range(LANES):
+        p = first + lane
+        way = h * state.particle_velocity[p]
+        x = state.particle_position[p] + way
+        is_clear = state.contact.particle_clearance[p] > gone or state.particle_inv_mass[p] <= 0.0
+        for i in ti.static(range(3)):
+            positions[lane, i] = x[i]
+        positions[lane, 3] = ti.select(is_clear, 1.0, 0.0)
+        way2[lane] = ti.select(lane < count, way.dot(way), 0.0)
+    for lane in range(ti.min(count, LANES)):
+        p = first + lane
+        if positions[lane, 3] > 0.0:
+            for i in ti.static(range(3)):
+                state.particle_position[p][i] = positions[lane, i]
+        else:
+            x = state.particle_position[p]
+            x_new, v_new = collided(state, body, p, x, state.particle_velocity[p], h, since)
+            state.particle_position[p] = x + (x_new - x)
+            state.particle_velocity[p] = v_new
+            way2[lane] = (x_new - x).dot(x_new - x)
+    return way2
+
+
+@ti.func
 def drift_body(state: ti.template(), body, h, since, left, fastest):
     """New positions, and what colliders in the way make of velocities.
 
@@ -130,15 +188,9 @@ def drift_body(state: ti.template(), body, h, since, left, fastest):
         gone = fastest * h
     state.contact.gone[body] = gone
     particles = state.body_particles[body]
-    farthest2 = ti.cast(0.0, state.real)
-    for p in range(particles[0], particles[1]):
-        x, v = state.particle_position[p], state.particle_velocity[p]
-        way = h * v
-        if state.contact.particle_clearance[p] <= gone and state.particle_inv_mass[p] > 0.0:
-            x_new, v_new = collided(state, body, p, x, v, h, since)
-            state.particle_velocity[p] = v_new
-            way = x_new - x
-        state.particle_position[p] = x + way
-        farthest2 = ti.max(farthest2, way.dot(way))
+    way2 = ti.Vector.zero(state.real, LANES)
+    for block in range((particles[1] - particles[0] + LANES - 1) // LANES):
+        first = (particles[0] + block * LANES) & ROW_BITS
+        way2 = ti.max(way2, _drift_block(state, body, first, particles[1] - first, h, since, gone))
     limit_rebounds(state, body, since + h)
-    note_motion(state, body, ti.sqrt(farthest2) / h)
+    note_motion(state, body, ti.sqrt(way2.max()) / h)

@@ -1,14 +1,11 @@
 """Forces between the two ends of each edge, of pairwise laws or of damping alone: loads, calls, stores."""
 
-from taichi_soft.constants import LANES
+from taichi_soft.constants import LANES, ROW_BITS
 from taichi_soft.kernels.bonds import bond_force_of, ring_tension
 from taichi_soft.laws.damping import edge_damping_force
 from taichi_soft.laws.springs import damped_pull, spring_tension
 from taichi_soft.math.tensors import widened
 from taichi_soft.runtime import ti
-
-EDGE_BITS = (1 << 28) - 1
-"""Mask that leaves every row unchanged, and shows that adding a lane does not overflow."""
 
 
 @ti.func
@@ -78,7 +75,7 @@ def accumulate_edge_forces(state: ti.template(), model: ti.template(), body):
     if ti.static(model.has_simple_edges):
         blocks = state.body_edge_blocks[body]
         for block in range(blocks[0], blocks[1]):
-            first = state.edge_blocks[block][0] & EDGE_BITS
+            first = state.edge_blocks[block][0] & ROW_BITS
             _accumulate_block(state, model, first, state.edge_blocks[block][1])
     else:
         edges = state.body_edges[body]

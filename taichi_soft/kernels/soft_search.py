@@ -5,6 +5,7 @@ the triangles of the other look round in it. Each body has a margin, and what is
 vertices is farther than that from where it was.
 """
 
+from taichi_soft.constants import LANES, ROW_BITS
 from taichi_soft.contact_fields import FOUND, NO_CONTACT, SLOTS
 from taichi_soft.kernels.islands import may_touch
 from taichi_soft.kernels.joints import are_joined
@@ -53,10 +54,12 @@ def _find_box(state: ti.template(), body):
     upper = lower
     for k in range(outer[0], outer[1]):
         x = state.particle_position[state.outer_particle[k]]
-        state.soft.searched_position[k] = x
         state.soft.found_count[k] = 0
-        state.soft.particle_gone[state.outer_particle[k]] = 0.0
         lower, upper = ti.min(lower, x), ti.max(upper, x)
+    particles = state.body_particles[body]
+    for p in range(particles[0], particles[1]):
+        state.soft.searched_position[p] = state.particle_position[p]
+        state.soft.particle_gone[p] = 0.0
     state.contact.body_lower[body] = lower
     state.contact.body_upper[body] = upper
     triangles = state.body_triangles[body]
@@ -192,7 +195,9 @@ def _list_candidates(state: ti.template(), body, thickness):
         p = state.outer_particle[k]
         for row in range(k * FOUND, k * FOUND + state.soft.found_count[k]):
             triangle = state.soft.found_triangle[row]
-            goes_on = ti.select(state.soft.kept_triangle[p] == triangle and state.soft.kept_press[p] > 0.0, 1.0, 0.0)
+            goes_on = ti.select(
+                state.soft.kept_triangle[p] == triangle and state.soft.kept_press[p] > 0.0, 1.0, 0.0
+            )
             state.soft.slot_particle[slot] = p
             state.soft.slot_triangle[slot] = triangle
             state.soft.slot_distance[slot] = state.soft.found_distance[row]
@@ -362,11 +367,15 @@ def note_way(state: ti.template(), body, shared):
 
     The length of its path would be much more: a pile of soft bodies is never quite still.
     """
-    outer = state.body_outer[body]
-    farthest = ti.cast(0.0, ti.f32)
-    for k in range(outer[0], outer[1]):
-        p = state.outer_particle[k]
-        gone = (state.particle_position[p] - state.soft.searched_position[k] - shared).norm()
-        state.soft.particle_gone[p] = gone
+    particles = state.body_particles[body]
+    farthest = ti.Vector.zero(ti.f32, LANES)
+    for block in range((particles[1] - particles[0] + LANES - 1) // LANES):
+        first = (particles[0] + block * LANES) & ROW_BITS
+        count, gone = particles[1] - first, ti.Vector.zero(ti.f32, LANES)
+        for lane in range(LANES):
+            way = state.particle_position[first + lane] - state.soft.searched_position[first + lane] - shared
+            gone[lane] = ti.select(lane < count, way.norm(), 0.0)
+        for lane in range(ti.min(count, LANES)):
+            state.soft.particle_gone[first + lane] = gone[lane]
         farthest = ti.max(farthest, gone)
-    state.soft.body_gone[body] = farthest
+    state.soft.body_gone[body] = farthest.max()
