@@ -106,9 +106,9 @@ class ContactFields:
 
 @ti.data_oriented
 class SoftContactFields:
-    """What bodies need to touch each other: a hash of vertices, and candidates.
+    """What bodies need to touch each other: a grid of vertices, and candidates.
 
-    Each body has a piece of the hash, in which it looks at one other body after the next.
+    Each body has a piece of it, in which it looks at one other body after the next.
     """
 
     def __init__(self, particles: int, bodies: int, outer: int, triangles: int) -> None:

@@ -1,7 +1,7 @@
 """Which vertices of an island are near which triangles of other bodies, or of their own.
 
-For two bodies whose boxes overlap, the vertices of one that may be near the other go into a spatial hash, and
-the triangles of the other look round in it. Each body has a margin, and what is found holds until one of its
+For two bodies whose boxes overlap, the vertices of one that may be near the other go into a grid, and the
+triangles of the other look round in it. Each body has a margin, and what is found holds until one of its
 vertices is farther than that from where it was.
 """
 
@@ -21,8 +21,8 @@ SHORTEST, LONGEST = 0.1, 0.3
 SELF_DISTANCE = 1.5
 """Mean edges: what is nearer at rest belongs together, and is no contact of a body with itself."""
 
-CELL = 2.0
-"""Edge of a cell of the hash over the mean edge of the triangles that look round in it. From 1 to 4 makes no
+CELL = 1.5
+"""Edge of a cell of the grid over the mean edge of the triangles that look round in it. From 1 to 4 makes no
 difference in a heap."""
 
 MOST_CELLS = 32.0
@@ -31,14 +31,14 @@ is left out, or the step that ends with that body frozen would take hours."""
 
 
 @ti.func
-def _cell_of(x, cell):
-    return ti.cast(ti.floor(x / cell), ti.i32)
+def _cell_of(x, lowest, cells, cell):
+    """Cell of a grid which a point lies in, or the nearest, whatever the point."""
+    return ti.min(ti.max(ti.cast((x - lowest) / cell, ti.i32), 0), cells - 1)
 
 
 @ti.func
-def _bucket(cell, size):
-    """Row of a cell in a table of `size` rows, a power of two (Teschner et al. 2003)."""
-    return ((cell.x * 73856093) ^ (cell.y * 19349663) ^ (cell.z * 83492791)) & (size - 1)
+def _row_of(at, cells):
+    return (at.z * cells.y + at.y) * cells.x + at.x
 
 
 @ti.func
@@ -73,10 +73,29 @@ def _find_box(state: ti.template(), body):
 
 
 @ti.func
-def _fill_table(state: ti.template(), table, body, other, cell, margin):
-    """Put the vertices of a body that are within `margin` [m] of another's box into the hash.
+def _choose_cells(size, count, smallest):
+    """Cells along each axis of a grid of some `size` [m], at most four for each of `count` points; their edge [m].
 
-    Returns: the rows of the hash, a power of two, 0 where there is no such vertex; the box round them.
+    Args:
+        smallest: edge that is wanted [m].
+    """
+    cell = smallest
+    cells = size / cell + 1.0
+    while cells.x * cells.y * cells.z > 4.0 * count:
+        cell *= 1.25
+        cells = size / cell + 1.0
+    found = ti.cast(cells, ti.i32)
+    # What explodes may be anywhere, and what is not finite nowhere.
+    if found.min() < 1 or not cells.x * cells.y * cells.z <= 4.0 * count:
+        found = ti.Vector.one(ti.i32, 3)
+    return found, cell
+
+
+@ti.func
+def _fill_grid(state: ti.template(), table, body, other, margin):
+    """Put the vertices of a body that are within `margin` [m] of another's box into a grid.
+
+    Returns: how many there are; the box round them; cells along each axis, and their edge [m].
     """
     lower, upper = state.contact.body_lower[other] - margin, state.contact.body_upper[other] + margin
     lowest, highest = upper, lower
@@ -88,18 +107,17 @@ def _fill_table(state: ti.template(), table, body, other, cell, margin):
             state.soft.item[table[1] + count] = k
             count += 1
             lowest, highest = ti.min(lowest, x), ti.max(highest, x)
-    size = 0
+    edge = CELL * state.soft.body_surface[other].z
+    cells, cell = _choose_cells(highest - lowest, count, ti.max(edge, 1e-6))
     if count > 0:
-        size = 1
-        while size < 2 * count:
-            size *= 2
-        for row in range(table[0], table[0] + size + 1):
+        last = table[0] + cells.x * cells.y * cells.z
+        for row in range(table[0], last + 1):
             state.soft.cell_first[row] = 0
         for pass_number in range(2):
             for i in range(table[1], table[1] + count):
                 k = state.soft.item[i]
                 x = state.particle_position[state.outer_particle[k]]
-                row = table[0] + _bucket(_cell_of(x, cell), size)
+                row = table[0] + _row_of(_cell_of(x, lowest, cells, cell), cells)
                 # It counts up, and then down again to the first.
                 at = state.soft.cell_first[row] + 1 - 2 * pass_number
                 state.soft.cell_first[row] = at
@@ -108,10 +126,10 @@ def _fill_table(state: ti.template(), table, body, other, cell, margin):
                     state.soft.cell_position[at] = x
             if pass_number == 0:
                 total = table[1]
-                for row in range(table[0], table[0] + size + 1):
+                for row in range(table[0], last + 1):
                     total += state.soft.cell_first[row]
                     state.soft.cell_first[row] = total
-    return size, lowest, highest
+    return count, lowest, highest, cells, cell
 
 
 @ti.func
@@ -222,26 +240,25 @@ def _is_self_neighbour(state: ti.template(), p, corners, edge):
 def _search_triangle(
     state: ti.template(),
     table,
-    size,
     lowest,
     highest,
+    cells,
+    cell,
     body,
     other,
     is_joined,
     triangle,
-    cell,
     margin,
     thickness,
 ):
     """Give a triangle of `other` to the vertices of `body` within `margin` [m] of it.
 
-    Those in the hash lie between `lowest` and `highest`. Where the two are joined, what the joint holds is
+    Those in the grid lie between `lowest` and `highest`. Where the two are joined, what the joint holds is
     left out: it is to stay where it is.
     """
     lower = ti.max(state.soft.triangle_lower[triangle] - margin, lowest)
     upper = ti.min(state.soft.triangle_upper[triangle] + margin, highest)
-    widest = (upper - lower).max()
-    if (upper - lower).min() >= 0.0 and widest <= MOST_CELLS * cell:
+    if (upper - lower).max() <= MOST_CELLS * cell:
         corners = state.triangle_vertices[triangle]
         a = state.particle_position[corners[0]]
         b = state.particle_position[corners[1]]
@@ -249,31 +266,28 @@ def _search_triangle(
         is_held = 0
         for i in ti.static(range(3)):
             is_held = is_held | state.joints.is_held[corners[i]]
-        low, high = _cell_of(lower, cell), _cell_of(upper, cell)
-        for cx in range(low.x, high.x + 1):
+        low, high = _cell_of(lower, lowest, cells, cell), _cell_of(upper, lowest, cells, cell)
+        for cz in range(low.z, high.z + 1):
             for cy in range(low.y, high.y + 1):
-                for cz in range(low.z, high.z + 1):
-                    here = ti.Vector([cx, cy, cz])
-                    row = table[0] + _bucket(here, size)
-                    for item in range(state.soft.cell_first[row], state.soft.cell_first[row + 1]):
-                        x = state.soft.cell_position[item]
-                        # Cells may share a bucket: each vertex counts in its own cell only.
-                        wanted = (
-                            ti.max(lower - x, x - upper).max() <= 0.0 and (_cell_of(x, cell) == here).all()
-                        )
-                        k = state.soft.cell_item[item]
-                        p = state.outer_particle[k]
-                        if wanted and is_joined == 1:
-                            wanted = is_held | state.joints.is_held[p] == 0
-                        if wanted and other == body:
-                            wanted = not _is_self_neighbour(state, p, corners, cell / CELL)
-                        if wanted:
-                            weights = closest_point_on_triangle(x, a, b, c)
-                            gap = (x - weights.x * a - weights.y * b - weights.z * c).norm()
-                            if gap < margin:
-                                lost = _keep(state.soft, k, triangle, gap)
-                                if lost < NO_CONTACT:
-                                    _note_lost(state, body, lost, thickness)
+                row = table[0] + (cz * cells.y + cy) * cells.x  # cells along x lie side by side
+                first, last = state.soft.cell_first[row + low.x], state.soft.cell_first[row + high.x + 1]
+                for item in range(first, last):
+                    x = state.soft.cell_position[item]
+                    wanted = ti.max(lower - x, x - upper).max() <= 0.0
+                    k = state.soft.cell_item[item]
+                    p = state.outer_particle[k]
+                    if wanted and is_joined == 1:
+                        wanted = is_held | state.joints.is_held[p] == 0
+                    if wanted and other == body:
+                        edge = state.soft.body_surface[other].z
+                        wanted = not _is_self_neighbour(state, p, corners, edge)
+                    if wanted:
+                        weights = closest_point_on_triangle(x, a, b, c)
+                        gap = (x - weights.x * a - weights.y * b - weights.z * c).norm()
+                        if gap < margin:
+                            lost = _keep(state.soft, k, triangle, gap)
+                            if lost < NO_CONTACT:
+                                _note_lost(state, body, lost, thickness)
 
 
 @ti.func
@@ -281,15 +295,34 @@ def _search_pair(state: ti.template(), body, other, margin, thickness):
     """Vertices of `body` near triangles of `other`, within `margin` [m]; they touch at `thickness` [m]."""
     outer = state.body_outer[body]
     table = ti.Vector([4 * outer[0] + body, outer[0]])  # first row of the cells and of the items
-    cell = ti.max(CELL * state.soft.body_surface[other].z, 1e-6)
-    size, lowest, highest = _fill_table(state, table, body, other, cell, margin)
-    if size > 0:
+    count, lowest, highest, cells, cell = _fill_grid(state, table, body, other, margin)
+    if count > 0:
         is_joined = are_joined(state, body, other)
         triangles = state.body_triangles[other]
-        for t in range(triangles[0], triangles[1]):
-            _search_triangle(
-                state, table, size, lowest, highest, body, other, is_joined, t, cell, margin, thickness
-            )
+        near_lowest, near_highest = lowest - margin, highest + margin
+        for block in range((triangles[1] - triangles[0] + LANES - 1) // LANES):
+            first = (triangles[0] + block * LANES) & ROW_BITS
+            is_near = ti.Vector.zero(ti.i32, LANES)
+            for lane in range(LANES):
+                lower = state.soft.triangle_lower[first + lane] - near_highest
+                upper = near_lowest - state.soft.triangle_upper[first + lane]
+                is_near[lane] = ti.cast(ti.max(lower, upper).max() <= 0.0, ti.i32)
+            for lane in range(ti.min(LANES, triangles[1] - first)):
+                if is_near[lane] == 1:
+                    _search_triangle(
+                        state,
+                        table,
+                        lowest,
+                        highest,
+                        cells,
+                        cell,
+                        body,
+                        other,
+                        is_joined,
+                        first + lane,
+                        margin,
+                        thickness,
+                    )
 
 
 @ti.real_func
