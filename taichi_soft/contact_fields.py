@@ -18,6 +18,9 @@ PAIR_ROWS = 32
 """Pairs of bodies whose impulses can be recorded, per body of an island: room for all pairs of 65 bodies, and
 for each of more to touch 64 others."""
 
+MOST_PARTS = 16
+"""Parts of an island's bodies: threads beyond these share theirs."""
+
 NO_CONTACT = 1e30
 """Gap of a candidate that is out of reach."""
 
@@ -100,7 +103,10 @@ class ContactFields:
         self.task = ti.field(ti.i32, bodies)  # of each island
         self.task_numbers = ti.Vector.field(4, ti.f32, bodies)
         self.task_common = ti.Vector.field(3, ti.f32, bodies)  # velocity or way that its bodies share
-        self.untaken = ti.field(ti.i32, bodies)  # bodies that no thread has taken yet
+        self.parts = ti.field(ti.i32, ())  # of the bodies of an island, one for each thread
+        self.untaken = ti.field(
+            ti.i32, MOST_PARTS * bodies
+        )  # bodies of each part that no thread has taken yet
         self.unfinished = ti.field(ti.i32, bodies)
 
 

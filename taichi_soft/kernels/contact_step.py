@@ -27,6 +27,7 @@ from taichi_soft.kernels.teamwork import (
     BOXES,
     DRIFT,
     GAPS,
+    OWNER,
     PUSH,
     SEARCH,
     help_others,
@@ -137,9 +138,9 @@ def _touch_each_other(
         if candidates != VALID or is_outdated(state, island, given, h) == 1:
             shared_now = nothing.xyz
             forgets = ti.cast(candidates != NONE, ti.f32)
-            work_on(state, program, island, BOXES, ti.Vector([given, h, left, forgets]), nothing.xyz)
-            work_on(state, program, island, SEARCH, nothing, nothing.xyz)
-        work_on(state, program, island, GAPS, ti.Vector([given, h, 0.0, 0.0]), nothing.xyz)
+            work_on(state, program, island, OWNER, BOXES, ti.Vector([given, h, left, forgets]), nothing.xyz)
+            work_on(state, program, island, OWNER, SEARCH, nothing, nothing.xyz)
+        work_on(state, program, island, OWNER, GAPS, ti.Vector([given, h, 0.0, 0.0]), nothing.xyz)
         solve_island(state, island, h)
         if state.soft.records_touches[None] == 1:
             add_touches(state, island)
@@ -178,7 +179,7 @@ def _end_substep(
         way = _touch_each_other(state, program, island, candidates, shared, given, h, left)
     way += h * common
     numbers = ti.Vector([h, since, left, ti.max(fastest, held)])
-    work_on(state, program, island, DRIFT, numbers, way)
+    work_on(state, program, island, OWNER, DRIFT, numbers, way)
     return way
 
 
@@ -238,7 +239,7 @@ def _move_island(state: ti.template(), program: ti.template(), island, substeps,
     for s in range(substeps):
         since, left = s * h, h * (substeps - s)
         way = h * ti.cast(is_alone & is_clear(state, first_body, fastest * h), ti.f32)
-        work_on(state, program, island, PUSH, ti.Vector([h, since, way, 0.0]), common)
+        work_on(state, program, island, OWNER, PUSH, ti.Vector([h, since, way, 0.0]), common)
         fastest, striking, gently = _compare_speeds(state, island, h)
         is_gentle = is_gentle & gently
         has_moved = 0
@@ -328,7 +329,7 @@ def step_islands(
         wake_by_colliders(state, body_count)
         if ti.static(program.has_soft_contact):
             find_islands(state, body_count, substeps * h)
-        open_crowds(state)
+        open_crowds(state, helpers)
     ti.loop_config(block_dim=1)
     for i in range(state.contact.island_count[None] + helpers):
         if i < state.contact.island_count[None]:

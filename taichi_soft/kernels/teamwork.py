@@ -6,11 +6,15 @@ owner takes them all. It waits for bodies which others have taken, and those are
 for a thread that has not begun. What becomes of a body does not depend on who took it.
 """
 
+from taichi_soft.contact_fields import MOST_PARTS
 from taichi_soft.kernels.contact_substep import drift_body, push_body
 from taichi_soft.kernels.soft_contact import find_gaps
 from taichi_soft.kernels.soft_search import begin_search, is_social, note_way, search_body
 from taichi_soft.runtime import ti
 from taichi_soft.state import ACTIVE
+
+OWNER = 0
+"""Number of the worker that owns an island; its helpers are numbered on."""
 
 HELP = -1
 """Whatever its owner has called for."""
@@ -62,9 +66,15 @@ def _do_task(state: ti.template(), program: ti.template(), island, body, task, n
 
 
 @ti.func
+def _size_of(state: ti.template(), island):
+    """Bodies of an island."""
+    return state.contact.island_first[island + 1] - state.contact.island_first[island]
+
+
+@ti.func
 def is_crowd(state: ti.template(), island):
     """Whether an island has several bodies, and is worth helping with."""
-    return state.contact.island_first[island + 1] - state.contact.island_first[island] > 1
+    return _size_of(state, island) > 1
 
 
 @ti.real_func
@@ -72,51 +82,70 @@ def work_on(
     state: ti.template(),
     program: ti.template(),
     island: ti.i32,
+    worker: ti.i32,
     task: ti.i32,
     numbers: ti.math.vec4,
     common: ti.math.vec3,
 ):
     """Take bodies of an island until none is waiting. The owner calls for a task first, and waits for all.
 
+    Each worker begins with its own part of the bodies, and takes from those of others when that is done: what
+    a body reads and writes then stays in the cache of one core from task to task.
+
     What is called for is written here, because to Taichi no call reads what was written before it: it drops
     what is written again before the kernel itself reads it. A body alone is nobody else's business: what its
     thread wrote here would take the cache line from those of its neighbours.
+
+    Args:
+        worker: OWNER, or a helper's number; the owner alone may call for anything but HELP.
     """
-    first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
+    first, count = state.contact.island_first[island], _size_of(state, island)
     what, how, velocity = task, numbers, common
-    is_shared = int(is_crowd(state, island))
-    place = 1 - is_shared
+    is_shared = int(count > 1)
+    parts, rows = 1, state.contact.island_body.shape[0]
     if is_shared == 1:
+        parts = state.contact.parts[None]
         if task != HELP:
             state.contact.task[island] = task
             state.contact.task_numbers[island] = numbers
             state.contact.task_common[island] = common
-            state.contact.unfinished[island] = last - first
-            ti.atomic_max(state.contact.untaken[island], last - first)
-        if _now(state.contact.untaken[island]) > 0:
-            place = ti.atomic_sub(state.contact.untaken[island], 1)
-    while place > 0:
-        if task == HELP:
-            what, how = state.contact.task[island], state.contact.task_numbers[island]
-            velocity = state.contact.task_common[island]
-        _do_task(state, program, island, state.contact.island_body[first + place - 1], what, how, velocity)
-        place = 0
-        if is_shared == 1:
-            ti.atomic_sub(state.contact.unfinished[island], 1)
-            place = ti.atomic_sub(state.contact.untaken[island], 1)
+            state.contact.unfinished[island] = count
+            for part in range(parts):
+                size = count * (part + 1) // parts - count * part // parts
+                ti.atomic_max(state.contact.untaken[part * rows + island], size)
+    for turn in range(parts):
+        part = (worker + turn) % parts
+        row, place, done = part * rows + island, 1 - is_shared, 0
+        before = first + count * part // parts - 1
+        if is_shared == 0:
+            before = first - 1
+        elif _now(state.contact.untaken[row]) > 0:
+            place = ti.atomic_sub(state.contact.untaken[row], 1)
+        while place > 0:
+            if task == HELP:
+                what, how = state.contact.task[island], state.contact.task_numbers[island]
+                velocity = state.contact.task_common[island]
+            _do_task(state, program, island, state.contact.island_body[before + place], what, how, velocity)
+            done += 1
+            place = 0
+            if is_shared == 1:
+                place = ti.atomic_sub(state.contact.untaken[row], 1)
+        if is_shared == 1 and done > 0:
+            ti.atomic_sub(state.contact.unfinished[island], done)
     if is_shared == 1 and task != HELP:
         while _now(state.contact.unfinished[island]) > 0:
             pass
 
 
 @ti.func
-def open_crowds(state: ti.template()):
+def open_crowds(state: ti.template(), helpers):
     """Before the islands are stepped: what there is to help with."""
     crowds, members = 0, 0
     for island in range(state.contact.island_count[None]):
         if is_crowd(state, island):
             crowds += 1
-            members += state.contact.island_first[island + 1] - state.contact.island_first[island]
+            members += _size_of(state, island)
+    state.contact.parts[None] = ti.min(helpers + 1, MOST_PARTS)
     state.contact.unfinished_crowds[None] = crowds
     state.contact.useful_helpers[None] = members - crowds
 
@@ -128,4 +157,4 @@ def help_others(state: ti.template(), program: ti.template(), helper):
     while helper < state.contact.useful_helpers[None] and _now(state.contact.unfinished_crowds[None]) > 0:
         for island in range(state.contact.island_count[None]):
             if is_crowd(state, island):
-                work_on(state, program, island, HELP, nothing, nothing.xyz)
+                work_on(state, program, island, helper + 1, HELP, nothing, nothing.xyz)
