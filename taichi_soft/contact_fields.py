@@ -83,6 +83,7 @@ class ContactFields:
         self.is_wild = ti.field(ti.i32, bodies)  # 1 where it flies apart, and must not take others with it
         self.body_filter = ti.Vector.field(2, ti.i32, bodies)  # group, mask
         self.is_gentle = ti.field(ti.i32, bodies)  # 0 where forces moved a particle too far in one substep
+        self.has_failed = ti.field(ti.i32, bodies)  # 1 where it broke or was not solved well in this step
         self.body_speed = ti.field(ti.f32, bodies)  # of its fastest particle in this substep [m/s]
         # Beside the velocity that its island shares [m/s]; by leapfrog of what was touched before the push.
         self.body_speed_beside = ti.field(ti.f32, bodies)  # of its fastest particle

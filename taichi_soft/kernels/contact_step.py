@@ -17,15 +17,17 @@ from taichi_soft.kernels.implicit_euler import MOST_PIECES, keeps_shape
 from taichi_soft.kernels.internal_forces import clear_forces
 from taichi_soft.kernels.islands import find_islands
 from taichi_soft.kernels.joints import solve_joints
-from taichi_soft.kernels.motion import remember_particle, restore_particle
-from taichi_soft.kernels.per_body import body_is_sound, end_body
-from taichi_soft.kernels.rebound import begin_rebounds, take_back_rebounds
+from taichi_soft.kernels.motion import restore_particle
+from taichi_soft.kernels.per_body import body_is_sound
+from taichi_soft.kernels.rebound import take_back_rebounds
 from taichi_soft.kernels.sleep import settle_island, wake_by_colliders, wake_island
 from taichi_soft.kernels.soft_contact import solve_island
 from taichi_soft.kernels.soft_search import forget_candidates, is_outdated, is_social
 from taichi_soft.kernels.teamwork import (
+    BEGIN,
     BOXES,
     DRIFT,
+    FINISH,
     GAPS,
     OWNER,
     PUSH,
@@ -37,7 +39,7 @@ from taichi_soft.kernels.teamwork import (
 )
 from taichi_soft.kernels.touches import add_touches, forget_touches
 from taichi_soft.runtime import ti
-from taichi_soft.state import ABSENT, ACTIVE, FEELS_REACTION, JOINED
+from taichi_soft.state import ACTIVE, FEELS_REACTION, JOINED
 from taichi_soft.types import Integrator
 
 ALL_SLEEP = -1
@@ -52,27 +54,6 @@ Less far it may go into that, and is put out of it again."""
 
 MOST_FINER = 8
 """Times as many substeps as asked for, at most."""
-
-
-@ti.func
-def _begin_body(state: ti.template(), program: ti.template(), body):
-    if state.body_status[body] != ABSENT:
-        particles = state.body_particles[body]
-        for p in range(particles[0], particles[1]):
-            remember_particle(state, p)
-            if ti.static(state.capacity.implicit):
-                state.prev_contact[p] = state.particle_contact[p]
-        if state.body_drives[body] & FEELS_REACTION != 0:
-            for p in range(particles[0], particles[1]):
-                state.contact.prev_reaction[p] = state.particle_reaction[p]
-        begin_rebounds(state, body)
-        forget_contacts(state, body)
-        state.contact.is_wild[body] = 0
-        if ti.static(program.has_soft_contact):
-            if state.body_status[body] != ACTIVE:
-                state.contact.body_speed_beside[body] = 0.0
-                for p in range(particles[0], particles[1]):
-                    state.soft.particle_speed[p] = 0.0
 
 
 @ti.func
@@ -272,8 +253,8 @@ def _move_island(state: ti.template(), program: ti.template(), island, substeps,
 def _step_awake_island(state: ti.template(), program: ti.template(), island, substeps, h):
     """One fixed step of an island, as fine as it needs. Returns how many of its bodies failed."""
     first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
-    for i in range(first, last):
-        _begin_body(state, program, state.contact.island_body[i])
+    nothing = ti.Vector.zero(ti.f32, 4)
+    work_on(state, program, island, OWNER, BEGIN, nothing, nothing.xyz)
     finer, is_open = 1, 1
     while is_open == 1:
         is_gentle = _move_island(state, program, island, finer * substeps, h / finer, int(finer > 1))
@@ -283,17 +264,11 @@ def _step_awake_island(state: ti.template(), program: ti.template(), island, sub
         else:
             _take_back(state, program, island)
             finer *= 2
+    numbers = ti.Vector([finer * substeps, h / finer, 0.0, 0.0])
+    work_on(state, program, island, OWNER, FINISH, numbers, nothing.xyz)
     failed = 0
     for i in range(first, last):
-        body = state.contact.island_body[i]
-        if state.body_status[body] == ACTIVE:
-            if end_body(state, program, body, finer * substeps, h / finer) == 1:
-                forget_contacts(state, body)  # it was put back: nothing has touched it
-                failed += 1
-            elif ti.static(program.integrator == Integrator.IMPLICIT_EULER):
-                failed += int(state.body_residual[body] > state.solver[None][0])
-        if ti.static(program.has_soft_contact):
-            forget_candidates(state, body)
+        failed += state.contact.has_failed[state.contact.island_body[i]]
     return failed
 
 

@@ -7,6 +7,7 @@ for a thread that has not begun. What becomes of a body does not depend on who t
 """
 
 from taichi_soft.contact_fields import MOST_PARTS
+from taichi_soft.kernels.contact_body import begin_body, finish_body
 from taichi_soft.kernels.contact_substep import drift_body, push_body
 from taichi_soft.kernels.soft_contact import find_gaps
 from taichi_soft.kernels.soft_search import begin_search, is_social, note_way, search_body
@@ -19,8 +20,9 @@ OWNER = 0
 HELP = -1
 """Whatever its owner has called for."""
 
-PUSH, BOXES, SEARCH, GAPS, DRIFT = range(5)
-"""Tasks. Their numbers: h, since, way; given, h, left, forgets; none; given, h; h, since, left, fastest.
+BEGIN, PUSH, BOXES, SEARCH, GAPS, DRIFT, FINISH = range(7)
+"""Tasks. Their numbers: none; h, since, way; given, h, left, forgets; none; given, h; h, since, left, fastest;
+substeps, h.
 What the bodies of an island share is a velocity [m/s] in the push, and in the drift a way [m]."""
 
 
@@ -44,6 +46,10 @@ def _do_contact_task(
     common: ti.math.vec3,
 ):
     """All tasks but the push; by itself, because Taichi takes more than twice as long for twice the code."""
+    if task == BEGIN:
+        begin_body(state, program, body)
+    if task == FINISH:
+        finish_body(state, program, body, ti.cast(ti.round(numbers[0]), ti.i32), numbers[1])
     if task == DRIFT and state.body_status[body] == ACTIVE:
         drift_body(state, body, numbers[0], numbers[1], numbers[2], numbers[3])
     if ti.static(program.has_soft_contact):
