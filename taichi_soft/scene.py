@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.constants import LANES
+from taichi_soft.constants import HALF, LANES
 from taichi_soft.errors import MeshError
 from taichi_soft.laws import BondLaw, ElementModel
 from taichi_soft.laws.bonds import Bonds, Ring
@@ -128,7 +128,7 @@ class BodyArrays:
     tet_edges: Ints  # (m, 6) edges of each, in the order of `LOCAL_EDGES`
     edge_vertices: Ints  # (k, 2)
     edge_order: Ints  # (k,) caller's index of each edge
-    edge_blocks: Ints  # (c, 2) first row and number, at most `LANES`, of edges with the same first end
+    edge_blocks: Ints  # (c, 2) first row and number, at most `LANES`, of edges; a half has one first end
     edge_damping: Floats  # (k,) [N s/m]
     bonds: BondArrays | None  # of a pairwise law
     pinned: Ints  # particles that do not move
@@ -230,7 +230,7 @@ def room_of(body: BodyArrays, spare_vertices: int) -> tuple[int, int, int, int, 
         return particles, edges, blocks, triangles, outer
     particles = len(body.mass) + spare_vertices
     edges = len(body.edge_vertices) + 6 * spare_vertices
-    # Every block but the last of a particle is full.
+    # Every block is full, but for those with the last edges of a particle.
     blocks = (edges + (LANES - 1) * particles) // LANES
     return particles, edges, blocks, len(body.triangles) + 12 * spare_vertices, particles
 
@@ -351,23 +351,31 @@ def rearrange(arrays: BodyArrays, description: BodyDescription) -> BodyArrays:
 
 
 def _led_by_owners(edges: Ints, particle_count: int) -> Ints:
-    """The same edges, turned so that most particles come first in a multiple of `LANES` of them."""
+    """The same edges, turned so that most particles come first in a multiple of `HALF` of them."""
     in_order = edges[np.lexsort((edges[:, 1], edges[:, 0]))]
     keys = in_order[:, 0].astype(np.int64) * particle_count + in_order[:, 1]
-    owner = edge_owners(in_order, particle_count, LANES)
+    owner = edge_owners(in_order, particle_count, HALF)
     own = owner[np.searchsorted(keys, edges[:, 0].astype(np.int64) * particle_count + edges[:, 1])]
     return np.asarray(np.where(edges[:, :1] == own[:, None], edges, edges[:, ::-1]))
 
 
 def _edge_blocks(first_ends: Ints) -> Ints:
-    """First row and number of edges, at most `LANES`, that share their first end; rows come ordered by it."""
+    """First row and number of edges, at most `LANES`, of which each half shares its first end.
+
+    Rows come ordered by it. A half that is not full ends its block, so that rows lie side by side.
+    """
     starts = np.flatnonzero(np.r_[True, first_ends[1:] != first_ends[:-1]])
     counts = np.diff(np.r_[starts, len(first_ends)])
-    blocks = -(-counts // LANES)
-    number = np.arange(blocks.sum()) - np.repeat(np.cumsum(blocks) - blocks, blocks)  # within its first end
-    rows = np.repeat(starts, blocks) + number * LANES
-    left = np.repeat(counts, blocks) - number * LANES
-    return np.stack([rows, np.minimum(left, LANES)], axis=1).astype(np.int32)
+    halves = -(-counts // HALF)
+    number = np.arange(halves.sum()) - np.repeat(np.cumsum(halves) - halves, halves)  # within its first end
+    rows = np.repeat(starts, halves) + number * HALF
+    sizes = np.minimum(np.repeat(counts, halves) - number * HALF, HALF)
+    ends_block = np.r_[True, sizes[:-1] < HALF][: len(sizes)]
+    since = np.arange(len(sizes)) - np.maximum.accumulate(np.where(ends_block, np.arange(len(sizes)), 0))
+    leads = since % 2 == 0
+    follows = np.r_[~leads[1:], False][: len(sizes)]  # whether the next half belongs to the same block
+    both = sizes + np.where(follows, np.r_[sizes[1:], 0][: len(sizes)], 0)
+    return np.stack([rows[leads], both[leads]], axis=1).astype(np.int32)
 
 
 def _arrange_tet_edges(mesh: BodyMesh, tets: Ints, edge_order: Ints) -> Ints:

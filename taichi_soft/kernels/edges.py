@@ -1,6 +1,6 @@
 """Forces between the two ends of each edge, of pairwise laws or of damping alone: loads, calls, stores."""
 
-from taichi_soft.constants import LANES, ROW_BITS
+from taichi_soft.constants import HALF, LANES, ROW_BITS
 from taichi_soft.kernels.bonds import bond_force_of, ring_tension
 from taichi_soft.laws.damping import edge_damping_force
 from taichi_soft.laws.springs import damped_pull, spring_tension
@@ -40,13 +40,15 @@ def edge_force_of(state: ti.template(), model: ti.template(), e):
 
 @ti.func
 def _accumulate_block(state: ti.template(), model: ti.template(), first, count):
-    """Up to `LANES` edges that share their first end, side by side as the tetrahedra in `elastic`.
+    """Up to `LANES` edges, each half with one first end, side by side as the tetrahedra in `elastic`.
 
     What lies behind them is computed too, and counts nothing: other edges of the same body, or its spare
     rows.
     """
     p = state.edge_vertices[first][0]
+    p_later = state.edge_vertices[first + ti.select(count > HALF, HALF, 0)][0]
     x, v = state.particle_position[p], state.particle_velocity[p]
+    x_later, v_later = state.particle_position[p_later], state.particle_velocity[p_later]
     forces = ti.Matrix.zero(state.real, LANES, 4)
     for lane in range(LANES):
         e = first + lane
@@ -54,19 +56,23 @@ def _accumulate_block(state: ti.template(), model: ti.template(), first, count):
         tension = state.edge_damping[e] * 0.0
         if ti.static(model.reads_expansion):
             tension = state.edge_pressure[e] * state.edge_bond[e].z
-        r, relative_velocity = state.particle_position[q] - x, state.particle_velocity[q] - v
+        r = state.particle_position[q] - ti.select(lane < HALF, x, x_later)
+        relative_velocity = state.particle_velocity[q] - ti.select(lane < HALF, v, v_later)
         force = _simple_force(state, model, e, r, relative_velocity, tension)
         for i in ti.static(range(3)):
             forces[lane, i] = ti.select(lane < count, force[i], 0.0)
         forces[lane, 3] = 0.0  # written as well, or the rows would have gaps, which no vector store leaves
-    total = ti.Vector.zero(state.real, 4)
-    for lane in range(LANES):
-        q = state.edge_vertices[first + lane][1]
-        force = ti.Vector([forces[lane, i] for i in ti.static(range(4))])
-        total += force
-        # Not `+=`, which Taichi makes atomic: one thread owns the body.
-        state.particle_force[q] = state.particle_force[q] - force
-    state.particle_force[p] = state.particle_force[p] + total
+    for half in ti.static(range(2)):
+        total = ti.Vector.zero(state.real, 4)
+        for i in range(HALF):
+            lane = half * HALF + i
+            q = state.edge_vertices[first + lane][1]
+            force = ti.Vector([forces[lane, axis] for axis in ti.static(range(4))])
+            total += force
+            # Not `+=`, which Taichi makes atomic: one thread owns the body.
+            state.particle_force[q] = state.particle_force[q] - force
+        first_end = (p, p_later)[half]
+        state.particle_force[first_end] = state.particle_force[first_end] + total
 
 
 @ti.func

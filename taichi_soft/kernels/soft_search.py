@@ -74,9 +74,10 @@ def _find_box(state: ti.template(), body):
 
 @ti.func
 def _choose_cells(size, count, smallest):
-    """Cells along each axis of a grid of some `size` [m], at most four for each of `count` points; their edge [m].
+    """Cells along each axis of a grid, at most four for each of `count` points, and their edge [m].
 
     Args:
+        size: of the grid, vec3 [m].
         smallest: edge that is wanted [m].
     """
     cell = smallest
@@ -184,7 +185,8 @@ def _keep(soft: ti.template(), k, triangle, distance):
 def _note_lost(state: ti.template(), body, distance, thickness):
     """Note that something `distance` [m] from a vertex of a body found no room.
 
-    What touches at `thickness` [m] need not be looked for again before that is used up."""
+    What touches at `thickness` [m] need not be looked for again before that is used up.
+    """
     way = ti.max(distance - thickness, 2.0 * SHORTEST * state.soft.body_surface[body].z)
     state.soft.body_lost[body] = ti.min(state.soft.body_lost[body], way)
 

@@ -21,9 +21,8 @@ HELP = -1
 """Whatever its owner has called for."""
 
 BEGIN, PUSH, BOXES, SEARCH, GAPS, DRIFT, FINISH = range(7)
-"""Tasks. Their numbers: none; h, since, way; given, h, left, forgets; none; given, h; h, since, left, fastest;
-substeps, h.
-What the bodies of an island share is a velocity [m/s] in the push, and in the drift a way [m]."""
+"""Tasks. Their numbers: none; h, since, way; given, h, left, forgets; none; given, h; h, since, left and
+fastest; substeps, h. What an island shares is a velocity [m/s] in the push, and in the drift a way [m]."""
 
 
 @ti.func

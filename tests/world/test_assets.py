@@ -25,6 +25,29 @@ def cube(**options):
     return SoftBodyAsset(MESH, JELLY, **options)
 
 
+@pytest.mark.parametrize("cells", [(1, 1, 1), (2, 2, 2), (3, 4, 5)])
+def test_blocks_hold_every_edge_once_and_each_half_of_one_first_end(cells):
+    mesh = box(cells=cells)
+    world = World(floor=None)
+    arrays = world.add_body(mesh, JELLY).asset.arrays
+    held = []
+    for first, count in arrays.edge_blocks:
+        rows = range(first, first + count)
+        assert 1 <= count <= 8
+        for half in (rows[:4], rows[4:]):
+            assert len({int(arrays.edge_vertices[row, 0]) for row in half}) <= 1
+        held += rows
+    assert held == list(range(len(mesh.edges)))
+    pairs = np.sort(arrays.order[arrays.edge_vertices], axis=1)
+    assert {tuple(pair) for pair in pairs.tolist()} == {tuple(sorted(pair)) for pair in mesh.edges.tolist()}
+
+
+def test_blocks_of_edges_are_nearly_full():
+    """Shares of places taken, where each particle has some nine edges."""
+    arrays = World(floor=None).add_body(box(cells=(5, 5, 5)), JELLY).asset.arrays
+    assert arrays.edge_blocks[:, 1].mean() > 0.85 * 8
+
+
 def test_copies_are_arranged_once(monkeypatch):
     made = []
 

@@ -207,6 +207,26 @@ def test_a_body_of_5_cm_rests_on_one_of_2_m():
 
 
 @pytest.mark.filterwarnings("ignore::taichi_soft.FrozenBodyWarning")
+def test_a_coarse_plate_rests_on_a_mesh_that_has_far_more_triangles_near_each_of_its_vertices():
+    """More than a search has room for: 16 per vertex, and 8 per vertex of the whole body."""
+    block, plate = box((0.4, 0.4, 0.1), (24, 24, 3)), box((0.3, 0.3, 0.02), (1, 1, 1))
+    world = world_of(
+        (block, SOFT, {"position": (0, 0, 0.05)}),
+        (plate, SOFT, {"position": (0, 0, 0.113)}),
+        gravity=(0, 0, -9.81),
+        floor=0.0,
+    )
+    run(world, 1.5)
+    below, above = world.bodies
+    state = world._built.state
+    found = state.soft.found_count.to_numpy()[state.body_outer.to_numpy()[above.index][0] :][:8]
+    assert (found == 8).any()  # the nearest 8 of what was found
+    assert state.soft.body_lost.to_numpy()[above.index] < 1.0
+    assert deepest(above, below) < 1e-3
+    assert np.linalg.norm(above.velocities(), axis=1).max() < 0.05
+    assert below.positions()[:, 2].max() - 2e-3 < above.positions()[:, 2].min()
+
+
 def test_where_a_body_explodes_it_is_frozen_alone_and_the_others_go_on():
     cube = box((0.5,) * 3, (2, 2, 2))
     world = world_of(
