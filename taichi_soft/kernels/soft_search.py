@@ -25,9 +25,9 @@ CELL = 1.5
 """Edge of a cell of the grid over the mean edge of the triangles that look round in it. From 1 to 4 makes no
 difference in a heap."""
 
-MOST_CELLS = 32.0
-"""Cells along one axis that one triangle looks into. One that an exploding body has drawn out over kilometres
-is left out, or the step that ends with that body frozen would take hours."""
+MOST_EDGES = 64.0
+"""Mean edges along one axis through which one triangle looks round. One that an exploding body has drawn out
+over kilometres is left out, or the step that ends with that body frozen would take hours."""
 
 
 @ti.func
@@ -74,10 +74,11 @@ def _find_box(state: ti.template(), body):
 
 @ti.func
 def _choose_cells(size, count, smallest):
-    """Cells along each axis of a grid, at most four for each of `count` points, and their edge [m].
+    """Cells along each axis of a grid, at most four for each of one or more points, and their edge [m].
 
     Args:
-        size: of the grid, vec3 [m].
+        size: of the grid, vec3 [m], not negative: it would have no end.
+        count: of the points.
         smallest: edge that is wanted [m].
     """
     cell = smallest
@@ -108,9 +109,9 @@ def _fill_grid(state: ti.template(), table, body, other, margin):
             state.soft.item[table[1] + count] = k
             count += 1
             lowest, highest = ti.min(lowest, x), ti.max(highest, x)
-    edge = CELL * state.soft.body_surface[other].z
-    cells, cell = _choose_cells(highest - lowest, count, ti.max(edge, 1e-6))
+    cells, cell = ti.Vector.one(ti.i32, 3), ti.max(CELL * state.soft.body_surface[other].z, 1e-6)
     if count > 0:
+        cells, cell = _choose_cells(highest - lowest, count, cell)
         last = table[0] + cells.x * cells.y * cells.z
         for row in range(table[0], last + 1):
             state.soft.cell_first[row] = 0
@@ -260,7 +261,7 @@ def _search_triangle(
     """
     lower = ti.max(state.soft.triangle_lower[triangle] - margin, lowest)
     upper = ti.min(state.soft.triangle_upper[triangle] + margin, highest)
-    if (upper - lower).max() <= MOST_CELLS * cell:
+    if (upper - lower).max() <= MOST_EDGES * ti.max(state.soft.body_surface[other].z, 1e-6):
         corners = state.triangle_vertices[triangle]
         a = state.particle_position[corners[0]]
         b = state.particle_position[corners[1]]

@@ -227,6 +227,23 @@ def test_a_coarse_plate_rests_on_a_mesh_that_has_far_more_triangles_near_each_of
     assert below.positions()[:, 2].max() - 2e-3 < above.positions()[:, 2].min()
 
 
+APART = [
+    # The corner of a thin sheet, and a turned cube beside it, of which no vertex is in the sheet's box.
+    (box((0.3, 0.3, 0.02), (8, 8, 1)), box((0.1,) * 3, (3, 3, 3)), (0.2107, 0.2107, 0)),
+    (box((0.3,) * 3, (1, 1, 1)), box((0.3,) * 3, (1, 1, 1)), (0.35, 0.35, 0)),
+]
+
+
+@pytest.mark.parametrize(("mesh", "beside", "position"), APART)
+def test_bodies_whose_boxes_meet_where_neither_has_a_vertex_pass_each_other(mesh, beside, position):
+    turn = (0, 0, np.sin(np.pi / 8), np.cos(np.pi / 8))
+    world = world_of((mesh, SOFT, {}), (beside, SOFT, {"position": position, "rotation": turn}))
+    start = [body.positions() for body in world.bodies]
+    run(world, 0.1)
+    for body, before in zip(world.bodies, start, strict=True):
+        assert np.abs(body.positions() - before).max() < 1e-5
+
+
 def test_where_a_body_explodes_it_is_frozen_alone_and_the_others_go_on():
     cube = box((0.5,) * 3, (2, 2, 2))
     world = world_of(
