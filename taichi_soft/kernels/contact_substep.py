@@ -48,12 +48,14 @@ def _kick_block(state: ti.template(), program: ti.template(), first, count, grav
             positions[lane, i] = x[i]
             velocities[lane, i] = v[i]
         positions[lane, 3] = 0.0  # written as well, or the rows would have gaps, which no vector store leaves
-        velocities[lane, 3] = (v - common).norm()
-        # What presses against others gains speed only to lose it to them.
-        was_touched = state.contact.particle_touches[p] == 1
-        beside = ti.select(was_touched, v_before, v) - common
+        velocities[lane, 3] = 0.0
+        if ti.static(program.has_soft_contact):
+            velocities[lane, 3] = (v - common).norm()
+            # What presses against others gains speed only to lose it to them.
+            was_touched = state.contact.particle_touches[p] == 1
+            beside = ti.select(was_touched, v_before, v) - common
+            beside2[lane] = ti.select(lane < count, beside.dot(beside), 0.0)
         speed2[lane] = ti.select(lane < count, v.dot(v), 0.0)
-        beside2[lane] = ti.select(lane < count, beside.dot(beside), 0.0)
         acceleration2[lane] = ti.select(lane < count, acceleration.dot(acceleration), 0.0)
     for lane in range(ti.min(count, LANES)):
         p = first + lane
