@@ -105,9 +105,7 @@ class ContactFields:
         self.task_numbers = ti.Vector.field(4, ti.f32, bodies)
         self.task_common = ti.Vector.field(3, ti.f32, bodies)  # velocity or way that its bodies share
         self.parts = ti.field(ti.i32, ())  # of the bodies of an island, one for each thread
-        self.untaken = ti.field(
-            ti.i32, MOST_PARTS * bodies
-        )  # bodies of each part that no thread has taken yet
+        self.untaken = ti.field(ti.i32, MOST_PARTS * bodies)  # bodies of each part that wait for a thread
         self.unfinished = ti.field(ti.i32, bodies)
 
 

@@ -91,7 +91,10 @@ def test_a_sliding_block_is_as_fast_as_the_book_says(slides):
 
 
 def test_what_friction_holds_does_not_creep_while_it_is_shaken():
-    """In 3,840 substeps a second, each of which rounds its position."""
+    """In 3,840 substeps a second, each of which rounds its position.
+
+    A corner that hardly bears anything slips by some micrometres in the first two seconds, and then no more.
+    """
     tilt = turn(SLOPE, np.array([0.3, 1.0, 0.2]) / np.linalg.norm([0.3, 1.0, 0.2]))
     world = room()
     size = (60.0, 4.0, 0.1)
@@ -101,14 +104,15 @@ def test_what_friction_holds_does_not_creep_while_it_is_shaken():
     world.build()
     for _ in range(300):
         world.step(DT, 64)
-    before = body.positions().astype(np.float64)
     weight = G * body.masses.sum()
-    for step in range(60):
+    for step in range(240):
+        if step == 120:
+            before = body.positions().astype(np.float64)
         body.apply_force((-1) ** step * 0.1 * weight * tilt[:, 1])
         world.step(DT, 64)
     ways = (body.positions() - before)[before @ tilt[:, 2] < 1e-3] @ tilt
     assert len(ways) == 9
-    assert np.abs(ways[:, :2]).max() < 5e-6
+    assert np.abs(ways[:, :2]).max() < 5e-7
 
 
 def test_a_moving_belt_carries_a_body_along_once_friction_has_brought_it_to_speed():
