@@ -114,13 +114,17 @@ def push_body(state: ti.template(), program: ti.template(), body, h, since, way,
         pull_grabs(state, body, h, lasting)
         speed, speed_beside, mean_beside, change = _kick_body(state, program, body, kick, way, common)
         is_gentle = int(change * h <= JOLT * edge)
+    # Bodies beside each other in a field share a cache line, which every write takes from other threads: what
+    # is as it was is not written.
     state.contact.body_speed[body] = speed
-    state.contact.body_speed_beside[body] = speed_beside
-    state.contact.body_mean_beside[body] = mean_beside
-    state.contact.is_gentle[body] = is_gentle
-    state.contact.is_wild[body] = 0
+    if state.contact.is_gentle[body] != is_gentle:
+        state.contact.is_gentle[body] = is_gentle
     if ti.static(program.has_soft_contact):
-        state.contact.is_wild[body] = int(not (speed * h <= WILD * edge))
+        state.contact.body_speed_beside[body] = speed_beside
+        state.contact.body_mean_beside[body] = mean_beside
+        is_wild = int(not (speed * h <= WILD * edge))
+        if state.contact.is_wild[body] != is_wild:
+            state.contact.is_wild[body] = is_wild
 
 
 @ti.func

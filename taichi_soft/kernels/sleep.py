@@ -50,7 +50,7 @@ def wake_island(state: ti.template(), island):
 @ti.func
 def note_motion(state: ti.template(), body, speed):
     """Start to count anew where a body is fast."""
-    if not (speed <= state.contact.sleep_speed[None]):
+    if not (speed <= state.contact.sleep_speed[None]) and state.contact.calm[body] != 0.0:
         state.contact.calm[body] = 0.0
 
 
