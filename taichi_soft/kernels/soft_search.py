@@ -22,7 +22,7 @@ SELF_DISTANCE = 1.5
 """Mean edges: what is nearer at rest belongs together, and is no contact of a body with itself."""
 
 CELL = 1.5
-"""Edge of a cell of the grid over the mean edge of the triangles that look round in it. From 1 to 4 makes no
+"""Edge of a cell of the grid over the mean edge of the triangles that look round in it. From 1 to 2 makes no
 difference in a heap."""
 
 MOST_EDGES = 64.0
