@@ -26,46 +26,71 @@ surface. Vibrations of a stable substep stay below it."""
 
 
 @ti.func
+def _put_block(
+    state: ti.template(),
+    program: ti.template(),
+    first,
+    count,
+    positions: ti.template(),
+    velocities: ti.template(),
+    speeds_beside: ti.template(),
+):
+    """Write what a kick made of `count` particles from `first` on, and clear what the next one begins with.
+
+    Field by field: a loop over one field, of a length that the compiler knows, becomes a few wide stores.
+    """
+    for lane in range(count):
+        for i in ti.static(range(3)):
+            state.particle_position[first + lane][i] = positions[lane, i]
+    for lane in range(count):
+        for i in ti.static(range(3)):
+            state.particle_velocity[first + lane][i] = velocities[lane, i]
+    if ti.static(program.has_soft_contact):
+        for lane in range(count):
+            state.soft.particle_speed[first + lane] = speeds_beside[lane]
+    for lane in range(count):
+        state.contact.particle_touches[first + lane] = 0
+    for lane in range(count):
+        state.particle_force[first + lane] = ti.Vector.zero(state.real, 4)
+
+
+@ti.func
 def _kick_block(state: ti.template(), program: ti.template(), first, count, gravity, kick, way, common):
     """New velocities from the forces, which are cleared, of up to `LANES` particles from `first` on, and
     positions after `way` [s] with them. What lies behind them is computed too, and counts nothing.
 
     Returns: of each the square of its speed, of that beside the `common` velocity, and of its acceleration.
     """
-    positions = ti.Matrix.zero(state.real, LANES, 4)
-    velocities = ti.Matrix.zero(state.real, LANES, 4)
+    positions = ti.Matrix.zero(state.real, LANES, 3)
+    velocities = ti.Matrix.zero(state.real, LANES, 3)
+    speeds_beside = ti.Vector.zero(state.real, LANES)
     speed2, beside2 = ti.Vector.zero(state.real, LANES), ti.Vector.zero(state.real, LANES)
     acceleration2 = ti.Vector.zero(state.real, LANES)
+    weight = ti.Vector([gravity.x, gravity.y, gravity.z, 0.0])
     # It reads fields and stores here only: whether field and field overlap, the compiler could not tell.
     for lane in range(LANES):
         p = first + lane
         inv_mass = state.particle_inv_mass[p]
-        acceleration = state.particle_force[p].xyz * inv_mass + gravity
+        # All four numbers of a force, of which the last is 0: wide loads leave no gaps.
+        acceleration = state.particle_force[p] * inv_mass + weight
         acceleration *= ti.select(inv_mass > 0.0, 1.0, 0.0)
         v_before = state.particle_velocity[p]
-        x, v = program.advance(state.particle_position[p], v_before, acceleration, way, kick)
+        x, v = program.advance(state.particle_position[p], v_before, acceleration.xyz, way, kick)
         for i in ti.static(range(3)):
             positions[lane, i] = x[i]
             velocities[lane, i] = v[i]
-        positions[lane, 3] = 0.0  # written as well, or the rows would have gaps, which no vector store leaves
-        velocities[lane, 3] = 0.0
         if ti.static(program.has_soft_contact):
-            velocities[lane, 3] = (v - common).norm()
+            speeds_beside[lane] = (v - common).norm()
             # What presses against others gains speed only to lose it to them.
             was_touched = state.contact.particle_touches[p] == 1
             beside = ti.select(was_touched, v_before, v) - common
             beside2[lane] = ti.select(lane < count, beside.dot(beside), 0.0)
         speed2[lane] = ti.select(lane < count, v.dot(v), 0.0)
         acceleration2[lane] = ti.select(lane < count, acceleration.dot(acceleration), 0.0)
-    for lane in range(ti.min(count, LANES)):
-        p = first + lane
-        for i in ti.static(range(3)):
-            state.particle_position[p][i] = positions[lane, i]
-            state.particle_velocity[p][i] = velocities[lane, i]
-        if ti.static(program.has_soft_contact):
-            state.soft.particle_speed[p] = velocities[lane, 3]
-        state.contact.particle_touches[p] = 0
-        state.particle_force[p] = ti.Vector.zero(state.real, 4)
+    if count >= LANES:
+        _put_block(state, program, first, LANES, positions, velocities, speeds_beside)
+    else:
+        _put_block(state, program, first, count, positions, velocities, speeds_beside)
     return speed2, beside2, acceleration2
 
 
@@ -155,27 +180,33 @@ def _drift_block(state: ti.template(), body, first, count, h, since, gone):
 
     Returns: the square of the way of each [m^2].
     """
-    positions, way2 = ti.Matrix.zero(state.real, LANES, 4), ti.Vector.zero(state.real, LANES)
+    positions = ti.Matrix.zero(state.real, LANES, 3)
+    way2, is_clear = ti.Vector.zero(state.real, LANES), ti.Vector.zero(state.real, LANES)
     for lane in range(LANES):
         p = first + lane
         way = h * state.particle_velocity[p]
         x = state.particle_position[p] + way
-        is_clear = state.contact.particle_clearance[p] > gone or state.particle_inv_mass[p] <= 0.0
+        clear = state.contact.particle_clearance[p] > gone or state.particle_inv_mass[p] <= 0.0
         for i in ti.static(range(3)):
             positions[lane, i] = x[i]
-        positions[lane, 3] = ti.select(is_clear, 1.0, 0.0)
+        is_clear[lane] = ti.select(clear, 1.0, 0.0)
         way2[lane] = ti.select(lane < count, way.dot(way), 0.0)
-    for lane in range(ti.min(count, LANES)):
-        p = first + lane
-        if positions[lane, 3] > 0.0:
+    if count >= LANES and is_clear.min() > 0.0:
+        for lane in range(LANES):
             for i in ti.static(range(3)):
-                state.particle_position[p][i] = positions[lane, i]
-        else:
-            x = state.particle_position[p]
-            x_new, v_new = collided(state, body, p, x, state.particle_velocity[p], h, since)
-            state.particle_position[p] = x + (x_new - x)
-            state.particle_velocity[p] = v_new
-            way2[lane] = (x_new - x).dot(x_new - x)
+                state.particle_position[first + lane][i] = positions[lane, i]
+    else:
+        for lane in range(ti.min(count, LANES)):
+            p = first + lane
+            if is_clear[lane] > 0.0:
+                for i in ti.static(range(3)):
+                    state.particle_position[p][i] = positions[lane, i]
+            else:
+                x = state.particle_position[p]
+                x_new, v_new = collided(state, body, p, x, state.particle_velocity[p], h, since)
+                state.particle_position[p] = x + (x_new - x)
+                state.particle_velocity[p] = v_new
+                way2[lane] = (x_new - x).dot(x_new - x)
     return way2
 
 
