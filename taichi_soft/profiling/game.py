@@ -27,7 +27,7 @@ SETTLING = 180
 """Frames in which a heap comes down, or bodies on the floor fall asleep."""
 
 UNUSED_PAIRS = 25
-"""Times as many pairs of steps for what is not used: medians of 300 tell 1.01 from 1.03, those of 30 do not."""
+"""Times as many pairs of steps for what is not used: a median of 300 tells 1.01 from 1.03, of 30 not."""
 
 
 @dataclass(frozen=True)
