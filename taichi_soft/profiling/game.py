@@ -37,7 +37,6 @@ class FeatureCost:
     name: str
     is_used: bool
     ratio: Spread
-    shortest: float  # the shortest step over the shortest one without: what other programs delayed least
 
 
 @dataclass(frozen=True)
@@ -88,8 +87,8 @@ def measure_features(repeats: int = 41) -> list[FeatureCost]:
 
     def against(other: Callable[[], object], name: str, is_used: bool, world: World) -> None:
         pairs = repeats if is_used else UNUSED_PAIRS * repeats
-        with_it, without, ratio = compare(_stepping(world), other, pairs, 1e3)
-        found.append(FeatureCost(name, is_used, ratio, with_it.least / without.least))
+        _, _, ratio = compare(_stepping(world), other, pairs, 1e3)
+        found.append(FeatureCost(name, is_used, ratio))
 
     against(free, "nothing: the same again", False, _spheres(high, floor=None))
     against(free, "room for colliders", False, _spheres(high, floor=None, collider_room=8))

@@ -58,10 +58,10 @@ def tables(found: dict[str, Any]) -> Iterator[tuple[str, Table]]:
         table.add_row("full", f"{found['startup'][0].warm:.2f}")
         yield "A new process to its first frame [s]", table
     if "features" in found:
-        table = _table("a step with", "used", "shortest", "least", "median", "most")
+        table = _table("a step with", "used", "least", "median", "most")
         for row in found["features"]:
             used = "yes" if row.is_used else "no"
-            table.add_row(row.name, used, f"{row.shortest:.2f}", *_ratios(row.ratio))
+            table.add_row(row.name, used, *_ratios(row.ratio))
         yield "What features cost: a step over that of as many bodies that fall freely", table
     if "heap" in found:
         table = _table(
