@@ -16,6 +16,7 @@ from taichi_soft.contact import DEFAULT_CONTACT, Contact
 from taichi_soft.materials import preset
 from taichi_soft.meshing import TetMesh, box, load_mesh, sphere
 from taichi_soft.profiling.spread import Spread, compare, time_calls
+from taichi_soft.profiling.stolen import processor_ticks, stolen_since
 from taichi_soft.shapes import BoxShape
 from taichi_soft.stages import ASSETS
 from taichi_soft.world import World
@@ -50,6 +51,7 @@ class Heap:
     step: Spread  # [ms]
     real_time: float  # simulated time over what it took, median
     ratio: Spread  # over as many free bodies, pair by pair
+    stolen: float | None  # part of the processors' time meanwhile that the host gave to other machines
 
 
 @dataclass(frozen=True)
@@ -159,9 +161,11 @@ def measure_heap(name: str, mesh: TetMesh, threads: int, repeats: int = 61) -> H
         place = (2.2 * (x - 1.5) + 0.1 * z, 2.2 * (y - 1.5) + 0.05 * z, 1.2 + 2.3 * z)
         world.add_body(mesh, preset("thesis_sphere"), position=place)
         free.add_body(mesh, preset("thesis_sphere"), position=(SPACING * x, SPACING * y, SPACING * z))
-    step, _, ratio = compare(_stepping(_settled(world)), _stepping(free), repeats, 1e3)
-    tets = sum(len(body.tets) for body in world.bodies)
-    return Heap(name, len(world.bodies), tets, threads, step, DT * 1e3 / step.median, ratio)
+    heaped, apart = _stepping(_settled(world)), _stepping(free)
+    before = processor_ticks()
+    step, _, ratio = compare(heaped, apart, repeats, 1e3)
+    stolen, tets = stolen_since(before), sum(len(body.tets) for body in world.bodies)
+    return Heap(name, len(world.bodies), tets, threads, step, DT * 1e3 / step.median, ratio, stolen)
 
 
 def measure_moments(repeats: int = 61) -> list[Moments]:

@@ -65,11 +65,12 @@ def tables(found: dict[str, Any]) -> Iterator[tuple[str, Table]]:
         yield "What features cost: a step over that of as many bodies that fall freely", table
     if "heap" in found:
         table = _table(
-            "mesh", "tetrahedra", "step [ms]", "median", "most", "x real", "of free", "median", "most"
+            "mesh", "tets", "step [ms]", "median", "most", "x real", "of free", "median", "most", "stolen"
         )
         for row in found["heap"]:
             step = [f"{each:.2f}" for each in (row.step.least, row.step.median, row.step.most, row.real_time)]
-            table.add_row(row.mesh, f"{row.tets:,}", *step, *_ratios(row.ratio))
+            stolen = "?" if row.stolen is None else f"{row.stolen:.0%}"
+            table.add_row(row.mesh, f"{row.tets:,}", *step, *_ratios(row.ratio), stolen)
         bodies, threads = found["heap"][0].bodies, found["heap"][0].threads
         yield f"{bodies} spheres in a pit, {threads} threads, 12 substeps for 1/60 s", table
     if "moments" in found:

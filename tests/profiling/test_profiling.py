@@ -20,6 +20,7 @@ from taichi_soft.profiling import (
 )
 from taichi_soft.profiling.report import tables
 from taichi_soft.profiling.spread import Spread
+from taichi_soft.profiling.stolen import processor_ticks, stolen_since
 
 needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler here")
 
@@ -64,6 +65,7 @@ def test_a_heap_is_timed_against_as_many_free_bodies(monkeypatch):
     for heap in heaps:
         assert heap.real_time * heap.step.median == pytest.approx(1e3 / 60)
         assert heap.ratio.least > 0
+        assert heap.stolen is None or 0 <= heap.stolen < 1
     ((title, table),) = tables({"heap": heaps})
     assert "32 spheres in a pit" in title
     assert table.row_count == 2
@@ -95,3 +97,13 @@ def test_scaling_says_which_process_failed(monkeypatch):
     monkeypatch.setattr(scaling, "_PROGRAM", "raise SystemExit({threads})")
     with pytest.raises(DeviceError, match=r"process of 1 threads failed: try .*--threads 1"):
         scaling.measure_scaling(2, 3)
+
+
+def test_stolen_time_is_told_of_what_the_processors_were_wanted_for(monkeypatch, tmp_path):
+    times = tmp_path / "stat"
+    monkeypatch.setattr("taichi_soft.profiling.stolen.TIMES", times)
+    assert stolen_since(processor_ticks()) is None
+    times.write_text("cpu  100 0 20 5000 30 0 0 10 0 0\ncpu0 1 2 3 4 5 6 7 8 0 0\n")
+    before = processor_ticks()
+    times.write_text("cpu  150 5 25 9000 90 2 8 40 0 0\ncpu0 1 2 3 4 5 6 7 8 0 0\n")
+    assert stolen_since(before) == pytest.approx(30 / (50 + 5 + 5 + 2 + 8 + 30))

@@ -1,0 +1,31 @@
+"""Processor time that this machine wanted and did not get, because its host gave it to other machines."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+TIMES = Path("/proc/stat")
+
+
+class Ticks(NamedTuple):
+    """Time of all processors since the machine started [ticks]."""
+
+    wanted: int
+    stolen: int
+
+
+def processor_ticks() -> Ticks | None:
+    """As proc(5) lists them: user, nice, system, idle, iowait, irq, softirq, steal; None on other systems."""
+    if not TIMES.exists():
+        return None
+    times = [int(number) for number in TIMES.read_text().split("\n", 1)[0].split()[1:9]]
+    return Ticks(sum(times) - sum(times[3:5]), times[7])
+
+
+def stolen_since(before: Ticks | None) -> float | None:
+    """Part of what was wanted since then; None where the system does not tell."""
+    now = processor_ticks()
+    if before is None or now is None:
+        return None
+    return (now.stolen - before.stolen) / max(now.wanted - before.wanted, 1)
