@@ -64,15 +64,16 @@ def tables(found: dict[str, Any]) -> Iterator[tuple[str, Table]]:
             table.add_row(row.name, used, *_ratios(row.ratio))
         yield "What features cost: a step over that of as many bodies that fall freely", table
     if "heap" in found:
-        table = _table(
-            "mesh", "tets", "step [ms]", "median", "most", "x real", "of free", "median", "most", "stolen"
-        )
+        table = _table("mesh", "tets", "step [ms]", "x real", "of free", "stolen")
         for row in found["heap"]:
-            step = [f"{each:.2f}" for each in (row.step.least, row.step.median, row.step.most, row.real_time)]
+            step, ratio = (" / ".join(_ratios(spread)) for spread in (row.step, row.ratio))
             stolen = "?" if row.stolen is None else f"{row.stolen:.0%}"
-            table.add_row(row.mesh, f"{row.tets:,}", *step, *_ratios(row.ratio), stolen)
+            table.add_row(row.mesh, f"{row.tets:,}", step, f"{row.real_time:.2f}", ratio, stolen)
         bodies, threads = found["heap"][0].bodies, found["heap"][0].threads
-        yield f"{bodies} spheres in a pit, {threads} threads, 12 substeps for 1/60 s", table
+        yield (
+            f"{bodies} spheres in a pit, {threads} threads, 12 substeps for 1/60 s: least, median, most",
+            table,
+        )
     if "moments" in found:
         table = _table("", "least", "median", "p99", "most")
         for row in found["moments"]:
