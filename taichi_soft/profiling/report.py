@@ -66,7 +66,7 @@ def tables(found: dict[str, Any]) -> Iterator[tuple[str, Table]]:
     if "heap" in found:
         table = _table("mesh", "tets", "step [ms]", "x real", "of free", "stolen")
         for row in found["heap"]:
-            step, ratio = (" / ".join(_ratios(spread)) for spread in (row.step, row.ratio))
+            step, ratio = (" ".join(_ratios(spread)) for spread in (row.step, row.ratio))
             stolen = "?" if row.stolen is None else f"{row.stolen:.0%}"
             table.add_row(row.mesh, f"{row.tets:,}", step, f"{row.real_time:.2f}", ratio, stolen)
         bodies, threads = found["heap"][0].bodies, found["heap"][0].threads
