@@ -13,6 +13,7 @@ from taichi_soft.kernels.motion import gravity_on
 from taichi_soft.kernels.per_body import before_kick
 from taichi_soft.kernels.rebound import limit_rebounds
 from taichi_soft.kernels.sleep import note_motion
+from taichi_soft.math.tensors import widened
 from taichi_soft.runtime import ti
 from taichi_soft.types import Integrator
 
@@ -66,13 +67,12 @@ def _kick_block(state: ti.template(), program: ti.template(), first, count, grav
     speeds_beside = ti.Vector.zero(state.real, LANES)
     speed2, beside2 = ti.Vector.zero(state.real, LANES), ti.Vector.zero(state.real, LANES)
     acceleration2 = ti.Vector.zero(state.real, LANES)
-    weight = ti.Vector([gravity.x, gravity.y, gravity.z, 0.0])
     # It reads fields and stores here only: whether field and field overlap, the compiler could not tell.
     for lane in range(LANES):
         p = first + lane
         inv_mass = state.particle_inv_mass[p]
         # All four numbers of a force, of which the last is 0: wide loads leave no gaps.
-        acceleration = state.particle_force[p] * inv_mass + weight
+        acceleration = state.particle_force[p] * inv_mass + widened(gravity)
         acceleration *= ti.select(inv_mass > 0.0, 1.0, 0.0)
         v_before = state.particle_velocity[p]
         x, v = program.advance(state.particle_position[p], v_before, acceleration.xyz, way, kick)
@@ -181,24 +181,24 @@ def _drift_block(state: ti.template(), body, first, count, h, since, gone):
     Returns: the square of the way of each [m^2].
     """
     positions = ti.Matrix.zero(state.real, LANES, 3)
-    way2, is_clear = ti.Vector.zero(state.real, LANES), ti.Vector.zero(state.real, LANES)
+    way2, passes = ti.Vector.zero(state.real, LANES), ti.Vector.zero(state.real, LANES)
     for lane in range(LANES):
         p = first + lane
         way = h * state.particle_velocity[p]
         x = state.particle_position[p] + way
-        clear = state.contact.particle_clearance[p] > gone or state.particle_inv_mass[p] <= 0.0
+        is_far = state.contact.particle_clearance[p] > gone or state.particle_inv_mass[p] <= 0.0
         for i in ti.static(range(3)):
             positions[lane, i] = x[i]
-        is_clear[lane] = ti.select(clear, 1.0, 0.0)
+        passes[lane] = ti.select(is_far, 1.0, 0.0)
         way2[lane] = ti.select(lane < count, way.dot(way), 0.0)
-    if count >= LANES and is_clear.min() > 0.0:
+    if count >= LANES and passes.min() > 0.0:
         for lane in range(LANES):
             for i in ti.static(range(3)):
                 state.particle_position[first + lane][i] = positions[lane, i]
     else:
         for lane in range(ti.min(count, LANES)):
             p = first + lane
-            if is_clear[lane] > 0.0:
+            if passes[lane] > 0.0:
                 for i in ti.static(range(3)):
                     state.particle_position[p][i] = positions[lane, i]
             else:

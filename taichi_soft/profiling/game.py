@@ -27,7 +27,7 @@ SPACING = 3.0  # [m], of spheres of radius 1
 SETTLING = 180
 """Frames in which a heap comes down, or bodies on the floor fall asleep."""
 
-UNUSED_PAIRS = 25
+UNUSED_FACTOR = 25
 """Times as many pairs of steps for what is not used: a median of 300 tells 1.01 from 1.03, of 30 not."""
 
 
@@ -88,7 +88,7 @@ def measure_features(repeats: int = 41) -> list[FeatureCost]:
     found = []
 
     def against(other: Callable[[], object], name: str, is_used: bool, world: World) -> None:
-        pairs = repeats if is_used else UNUSED_PAIRS * repeats
+        pairs = repeats if is_used else UNUSED_FACTOR * repeats
         _, _, ratio = compare(_stepping(world), other, pairs, 1e3)
         found.append(FeatureCost(name, is_used, ratio))
 
