@@ -18,8 +18,8 @@ from taichi_soft.sweep.task import Outcome, Task, Worker, compute
 TIMEOUTS = TimeoutError, futures.TimeoutError, asyncio.TimeoutError
 """They are one only since Python 3.11."""
 
-CONNECT_LIMIT = 5.0
-"""For the scheduler to answer [s]."""
+CONNECT_LIMIT = 15.0
+"""For the scheduler to answer [s]: a shared machine may stand still for ten."""
 
 WORKER_LIMIT = 10.0
 """For its first worker to appear [s]."""
@@ -50,8 +50,11 @@ def cluster_workers(address: str, arch: str = "cpu") -> Iterator[list[Worker]]:
             "a cluster needs Dask distributed: run pip install 'taichi-soft[cluster]', or leave out --cluster"
         ) from None
     try:
-        client = Client(address, timeout=CONNECT_LIMIT, set_as_default=False)
-    except (OSError, ValueError, ImportError) as error:
+        try:
+            client = Client(address, timeout=CONNECT_LIMIT, set_as_default=False)
+        except AssertionError:  # Dask's own thread did not begin within ten seconds
+            client = Client(address, timeout=CONNECT_LIMIT, set_as_default=False)
+    except (OSError, ValueError, ImportError, AssertionError) as error:
         raise SweepError(
             f"no scheduler of Dask answers at {address!r} ({error}): start one with 'dask scheduler'"
         ) from error

@@ -58,6 +58,21 @@ def test_a_worker_that_dies_or_hangs_loses_one_point_and_is_replaced(cluster):
     assert done[2].error.startswith("stopped: it took longer than 4 s")
 
 
+def test_a_client_whose_thread_is_late_is_started_again(cluster, monkeypatch):
+    start, starts = distributed.Client, []
+
+    def start_late(*arguments, **options):
+        starts.append(arguments)
+        if len(starts) == 1:
+            raise AssertionError
+        return start(*arguments, **options)
+
+    monkeypatch.setattr(distributed, "Client", start_late)
+    with cluster_workers(cluster.scheduler_address) as crew:
+        assert len(crew) == 2
+    assert len(starts) == 2
+
+
 @pytest.mark.parametrize("address", ["127.0.0.1:1", "nonsense", "moon://x:1", ""])
 def test_no_cluster_is_one_line(address, monkeypatch):
     monkeypatch.setattr("taichi_soft.sweep.cluster.CONNECT_LIMIT", 1.0)
