@@ -137,6 +137,15 @@ def _size_of(text: str) -> tuple[int, int]:
     return int(width), int(height)
 
 
+def _cores_of(text: str | None) -> tuple[int, ...] | None:
+    if text is None:
+        return None
+    numbers = text.split(",")
+    if not all(number.strip().isdecimal() for number in numbers):
+        raise OptionError(f"cores must be numbers of processor cores, such as 0,1, got {text!r}")
+    return tuple(map(int, numbers))
+
+
 @app.command()
 def info(
     laws: Annotated[bool, typer.Option("--laws", help="Measure what each force law costs.")] = False,
@@ -195,7 +204,8 @@ def _material_line(material: Material) -> str:
 
 
 def _device_facts(device: Device) -> dict[str, Any]:
-    return {"device": device.arch, "threads": device.threads, "chosen because": device.reason}
+    facts = {"device": device.arch, "threads": device.threads, "chosen because": device.reason}
+    return {**facts, "bound to cores": list(device.cores)} if device.cores else facts
 
 
 def _version_of(name: str) -> str:
@@ -262,9 +272,12 @@ def profile(
     as_json: AsJson = False,
     arch: Arch = "auto",
     threads: Threads = None,
+    cores: Annotated[
+        str | None, typer.Option(help="Processor cores to bind a thread each to, as 0,1 (Linux).")
+    ] = None,
 ) -> None:
     """Measure what a frame costs and how many bodies fit one of 60 Hz and of 120 Hz."""
-    device = init(arch, threads)
+    device = init(arch, threads, _cores_of(cores))
     from taichi_soft import profiling
     from taichi_soft.profiling import report
 
@@ -295,7 +308,8 @@ def profile(
         rows = {key: [asdict(row) for row in value] for key, value in found.items()}
         print(json.dumps({"device": _device_facts(device), **rows}, indent=2))
         return
-    _say(f"{device.arch}, {device.threads} threads ({device.reason})")
+    where = f", bound to cores {', '.join(map(str, device.cores))}" if device.cores else ""
+    _say(f"{device.arch}, {device.threads} threads ({device.reason}){where}")
     for title, table in report.tables(found):
         _say(f"\n[bold]{escape(title)}[/]")  # not the table's own title, which breaks at the table's width
         console.print(table)

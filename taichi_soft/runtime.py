@@ -13,7 +13,7 @@ import os
 import textwrap
 import types
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,6 +22,7 @@ os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
 
 import taichi as ti
 
+from taichi_soft.cores import available_cores, bind_youngest, require_cores, thread_ids
 from taichi_soft.errors import DeviceError, OptionError
 
 __all__ = ["Device", "device", "init", "is_initialized", "ti"]
@@ -72,6 +73,7 @@ class Device:
     arch: str  # "cpu", "cuda", "vulkan" or "metal"
     threads: int  # CPU worker threads (1 on a GPU: the host side is serial)
     reason: str  # one line for people
+    cores: tuple[int, ...] = ()  # to which the worker threads are bound, one each; none where they are free
 
     @property
     def is_gpu(self) -> bool:
@@ -82,7 +84,7 @@ class Device:
 _device: Device | None = None
 
 
-def init(arch: str = "auto", threads: int | None = None) -> Device:
+def init(arch: str = "auto", threads: int | None = None, cores: Sequence[int] | None = None) -> Device:
     """Start Taichi for this process and say what was chosen.
 
     Entry points call this; a library that embeds taichi-soft may call it first with its own choice.
@@ -93,8 +95,12 @@ def init(arch: str = "auto", threads: int | None = None) -> Device:
             kernels have been tested on a CPU only, and games want their GPU for pictures.
         threads: CPU worker threads, 1 or more, of which no more are used than there are cores available to
             this process; None takes as many as there are cores.
+        cores: on Linux, numbers of processor cores: as many CPU worker threads, each bound to one of them.
+            None leaves the choice to the system, which now and then wakes two on one core, and a frame takes
+            up to twice as long. Take cores on which the game leaves something to spare: a bound thread
+            cannot go elsewhere.
     Returns: the device in use.
-    Raises: OptionError for an unknown arch or thread count, or if already started differently;
+    Raises: OptionError for an unknown arch, thread count or core, or if already started differently;
         DeviceError if the device asked for is missing.
     """
     global _device
@@ -106,8 +112,15 @@ def init(arch: str = "auto", threads: int | None = None) -> Device:
         raise OptionError(
             f"threads must be None or a whole number from 1 to {_MOST_THREADS}, got {threads!r}"
         )
-    cores = _available_cores()
-    count = min(threads or cores, cores)  # Taichi starts no more, and the flat schedule waits for all of them
+    bound = () if cores is None else require_cores(cores)
+    if bound and (arch not in ("auto", "cpu") or threads not in (None, len(bound))):
+        raise OptionError(
+            f"cores {list(bound)} are for {len(bound)} CPU threads, got arch={arch!r}, threads={threads}: "
+            "leave out one or the other"
+        )
+    available = len(available_cores())
+    # Taichi starts no more than there are, and the flat schedule waits for all of them.
+    count = len(bound) or min(threads or available, available)
     if _device is not None:
         if arch not in ("auto", _device.arch):
             raise OptionError(
@@ -117,6 +130,9 @@ def init(arch: str = "auto", threads: int | None = None) -> Device:
             raise OptionError(
                 f"Taichi already runs with {_device.threads} threads: call init(threads={threads}) first"
             )
+        if bound not in ((), _device.cores):
+            where = f"on cores {list(_device.cores)}" if _device.cores else "on any core"
+            raise OptionError(f"Taichi already runs {where}: call init(cores={list(bound)}) first")
         return _device
 
     chosen, reason = ("cpu", "the default") if arch == "auto" else (arch, "asked for by name")
@@ -125,6 +141,7 @@ def init(arch: str = "auto", threads: int | None = None) -> Device:
             "Taichi was started by ti.init, and starting it again would destroy the fields made since: call "
             "taichi_soft.init() instead, first in the process"
         )
+    before = thread_ids() if bound else set()
     try:
         with contextlib.redirect_stdout(io.StringIO()):  # Taichi announces itself
             ti.init(
@@ -144,7 +161,9 @@ def init(arch: str = "auto", threads: int | None = None) -> Device:
             )
     except RuntimeError as error:
         raise DeviceError(f"cannot start Taichi on {chosen!r}: {error}. Use init('cpu')") from error
-    _device = Device(arch=chosen, threads=count if chosen == "cpu" else 1, reason=reason)
+    if bound:
+        bind_youngest(thread_ids() - before, bound)  # Taichi starts its workers after those that compile
+    _device = Device(arch=chosen, threads=count if chosen == "cpu" else 1, reason=reason, cores=bound)
     return _device
 
 
@@ -158,9 +177,3 @@ def device() -> Device:
 def is_initialized() -> bool:
     """True once `init` has run in this process."""
     return _device is not None
-
-
-def _available_cores() -> int:
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1

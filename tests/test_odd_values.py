@@ -158,6 +158,7 @@ CALLS = {
     **keywords(FixedStep, "dt", "substeps", "max_steps"),
     "init arch": lambda v, _: ts.init(v),
     "init threads": lambda v, _: ts.init("cpu", v),
+    "init cores": lambda v, _: ts.init("cpu", cores=v),
     **keywords(framing, "aspect", "azimuth", "elevation"),
     "framing lower": lambda v, _: Camera.framing(v, (1, 1, 1)),
     "project": lambda v, _: CAMERA.project(v, 100, 100),

@@ -1,9 +1,11 @@
 """Taichi is started once per process, as asked, or not at all. In processes of their own."""
 
 import inspect
+import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -23,6 +25,63 @@ def test_unknown_archs(arch):
 def test_thread_counts_that_are_none(threads):
     with pytest.raises(OptionError, match="threads"):
         init("cpu", threads=threads)
+
+
+@pytest.mark.parametrize("cores", [[], [0, 0], [-1], [100_000], ["0"], [0.0], "0", 0, [True]])
+def test_cores_that_are_none_to_bind_to(cores):
+    with pytest.raises(OptionError, match="cores must be different ones of"):
+        init("cpu", cores=cores)
+
+
+def test_cores_are_for_as_many_threads_of_the_cpu():
+    first = min(os.sched_getaffinity(0))
+    with pytest.raises(OptionError, match="1 CPU threads"):
+        init("cpu", threads=2, cores=[first])
+    with pytest.raises(OptionError, match="arch='cuda'"):
+        init("cuda", cores=[first])
+
+
+def test_threads_are_bound_to_cores_only_where_the_system_can(monkeypatch):
+    monkeypatch.setattr("taichi_soft.cores.sys", SimpleNamespace(platform="win32"))
+    with pytest.raises(OptionError, match="on Linux only, not on win32"):
+        init("cpu", cores=[0])
+
+
+def test_the_threads_that_work_are_bound_to_a_core_each():
+    """The system says where each thread may run, and which of them worked."""
+    script = """
+import os
+from pathlib import Path
+from taichi_soft import Material, OptionError, World, box, device, init
+cores = sorted(os.sched_getaffinity(0), reverse=True)
+init(cores=cores)
+assert init() is init(cores=cores) and device().cores == tuple(cores) and device().threads == len(cores)
+try:
+    init(cores=[*cores[1:], cores[0]][: max(1, len(cores) - 1)])
+except OptionError as error:
+    assert len(cores) == 1 or "already runs on cores" in str(error)
+world = World()
+for i in range(8 * len(cores)):
+    world.add_body(box(cells=(4, 4, 4)), Material(1e5, 0.2, 1000.0), position=(2 * i, 0, 1))
+world.build()
+world.step(1 / 60)
+tasks = Path("/proc/self/task")
+def worked():  # [ns]
+    return {int(task.name): int((task / "schedstat").read_text().split()[0]) for task in tasks.iterdir()}
+before = worked()
+for _ in range(50):
+    world.step(1 / 60, 100)
+after = worked()
+most = sorted((task for task in before if task != os.getpid()), key=lambda task: before[task] - after[task])
+places = [os.sched_getaffinity(task) for task in most[: len(cores)]]
+assert sorted(map(sorted, places)) == [[core] for core in sorted(cores)], places
+assert os.sched_getaffinity(0) == set(cores)
+print("done")
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, timeout=120
+    )
+    assert done.stdout == "done\n", done.stderr
 
 
 def test_starting_again_otherwise():

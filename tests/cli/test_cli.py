@@ -67,6 +67,8 @@ def test_demo_writes_a_film_and_says_how_much_faster_than_real_time_it_ran(tmp_p
         (("info", "--arch", "abacus"), "'abacus'"),
         (("info", "--threads", "0"), "0"),
         (("info", "--law", "none"), "'none'"),
+        (("profile", "--cores", "first"), "'first'"),
+        (("profile", "--cores", "0,4095"), "4095"),
     ],
 )
 def test_a_wrong_argument_gives_one_line_that_names_it_and_exit_code_1(arguments, named, tmp_path):
