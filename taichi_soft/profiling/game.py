@@ -48,10 +48,10 @@ class Heap:
     bodies: int
     tets: int
     threads: int
-    step: Spread  # [ms]
+    step: Spread  # [ms], one after the other
     real_time: float  # simulated time over what it took, median
     ratio: Spread  # over as many free bodies, pair by pair
-    stolen: float | None  # part of the processors' time meanwhile that the host gave to other machines
+    stolen: float | None  # part of the processors' time that the host gave to other machines, in those steps
 
 
 @dataclass(frozen=True)
@@ -151,7 +151,8 @@ def measure_heaps(threads: int, repeats: int = 61) -> list[Heap]:
 
 
 def measure_heap(name: str, mesh: TetMesh, threads: int, repeats: int = 61) -> Heap:
-    """Drop 32 spheres into a pit, and time them against as many free ones when they lie there."""
+    """Drop 32 spheres into a pit, and time them when they lie there: alone, as a game has one world, and then
+    in turns with as many free ones, which take the processor's caches from them."""
     world = World(collider_room=8, soft_contact=True, sleep_speed=0.0)
     free = World(floor=None)
     for side in (-1, 1):
@@ -162,9 +163,11 @@ def measure_heap(name: str, mesh: TetMesh, threads: int, repeats: int = 61) -> H
         world.add_body(mesh, preset("thesis_sphere"), position=place)
         free.add_body(mesh, preset("thesis_sphere"), position=(SPACING * x, SPACING * y, SPACING * z))
     heaped, apart = _stepping(_settled(world)), _stepping(free)
+    time_calls(heaped, 2)
     before = processor_ticks()
-    step, _, ratio = compare(heaped, apart, repeats, 1e3)
+    step = Spread.of(time_calls(heaped, repeats)).scaled(1e3)
     stolen, tets = stolen_since(before), sum(len(body.tets) for body in world.bodies)
+    _, _, ratio = compare(heaped, apart, repeats, 1e3)
     return Heap(name, len(world.bodies), tets, threads, step, DT * 1e3 / step.median, ratio, stolen)
 
 
