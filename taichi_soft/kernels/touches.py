@@ -37,7 +37,8 @@ def add_touches(state: ti.template(), island):
     for i in range(first, last):
         body = state.contact.island_body[i]
         first_slot = state.body_outer[body][0] * SLOTS
-        for slot in range(first_slot, first_slot + state.soft.slot_count[body]):
+        for k in range(first_slot, first_slot + state.soft.contact_count[body]):
+            slot = state.soft.contact_slot[k]
             press = state.soft.slot_press[slot]
             other = state.particle_body[state.triangle_vertices[state.soft.slot_triangle[slot]][0]]
             if press > 0.0 and other != body:
