@@ -8,7 +8,8 @@ from acts import act, root
 from taichi_soft.errors import SweepError
 from taichi_soft.sweep import Task, cluster_workers, compute_all, local_workers
 
-TIME_LIMIT = 4.0
+TIME_LIMIT = 12.0
+"""For a point that hangs [s]: longer than a shared machine stands still now and then."""
 
 distributed = pytest.importorskip("distributed")
 
@@ -55,7 +56,7 @@ def test_a_worker_that_dies_or_hangs_loses_one_point_and_is_replaced(cluster):
     assert [done[x].numbers is None for x in range(6)] == [True] * 3 + [False] * 3
     assert "of the cluster was lost" in done[0].error
     assert done[1].error.startswith("ValueError: no numbers (acts.py:")
-    assert done[2].error.startswith("stopped: it took longer than 4 s")
+    assert done[2].error.startswith("stopped: it took longer than 12 s")
 
 
 def test_a_client_whose_thread_is_late_is_started_again(cluster, monkeypatch):

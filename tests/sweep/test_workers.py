@@ -12,7 +12,8 @@ from acts import act
 
 from taichi_soft.sweep import Task, compute_all, local_workers
 
-TIME_LIMIT = 4.0
+TIME_LIMIT = 12.0
+"""For a point that hangs [s]: longer than a shared machine stands still now and then."""
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +49,7 @@ def test_every_point_has_an_outcome_whatever_happens_to_others(rough):
         (1, "ValueError: no numbers (acts.py:"),
         (3, "its process was lost: exit code 7"),
         (5, "its process was lost: killed by SIGKILL"),
-        (7, "stopped: it took longer than 4 s"),
+        (7, "stopped: it took longer than 12 s"),
         (9, "TypeError: Object of type float32 is not JSON serializable"),
         (10, "TypeError: measured float"),
     ],
@@ -57,7 +58,7 @@ def test_a_failed_point_says_why(rough, x, error):
     assert rough[x].numbers is None
     assert rough[x].error.startswith(error)
     assert "\n" not in rough[x].error
-    assert rough[x].seconds < 10
+    assert rough[x].seconds < 30
 
 
 def test_numbers_come_as_they_come_from_a_file(rough):
@@ -102,7 +103,7 @@ def test_ctrl_c_ends_all_processes_at_once_and_without_their_tracebacks(tmp_path
     ) as process:
         worker = int(process.stdout.readline())
         os.killpg(process.pid, signal.SIGINT)
-        _, errors = process.communicate(timeout=30)  # their points take longer
+        _, errors = process.communicate(timeout=120)  # their points take longer
     assert errors.count("Traceback") == 1  # of the program itself
     assert errors.rstrip().endswith("KeyboardInterrupt")
     with pytest.raises(ProcessLookupError):
