@@ -273,7 +273,8 @@ def profile(
     arch: Arch = "auto",
     threads: Threads = None,
     cores: Annotated[
-        str | None, typer.Option(help="Processor cores to bind a thread each to, as 0,1 (Linux).")
+        str | None,
+        typer.Option(help="Cores to bind a thread each to, as 0,1 (Linux); not in --scaling, --startup."),
     ] = None,
 ) -> None:
     """Measure what a frame costs and how many bodies fit one of 60 Hz and of 120 Hz."""

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import os
 import sys
+import threading
+from pathlib import Path
 from typing import Any
 
-from taichi_soft.errors import OptionError
+from taichi_soft.errors import DeviceError, OptionError
 
 _TASKS = "/proc/self/task"
 
@@ -18,13 +20,12 @@ def available_cores() -> list[int]:
     return list(range(os.cpu_count() or 1))
 
 
-def require_cores(cores: Any) -> tuple[int, ...]:
-    """Different cores that threads can be bound to, in the order given. Raises: OptionError."""
+def require_cores(cores: Any, there: list[int]) -> tuple[int, ...]:
+    """Different ones of the cores that are `there`, in the order given. Raises: OptionError."""
     if not sys.platform.startswith("linux"):
         raise OptionError(
             f"threads can be bound to cores on Linux only, not on {sys.platform}: leave cores out"
         )
-    there = available_cores()
     try:
         found = tuple(cores)
     except TypeError:
@@ -40,7 +41,26 @@ def thread_ids() -> set[int]:
     return {int(name) for name in os.listdir(_TASKS)}
 
 
-def bind_youngest(threads: set[int], cores: tuple[int, ...]) -> None:
-    """Bind the threads that were started last to a core each, to the first core the oldest of them."""
-    for thread, core in zip(sorted(threads)[-len(cores) :], cores, strict=True):
-        os.sched_setaffinity(thread, {core})
+def number_now() -> int:
+    """The number of a thread that began just now: the system gives them in turn, and again from the first."""
+    thread = threading.Thread(target=int)
+    thread.start()
+    thread.join()
+    assert thread.native_id is not None
+    return thread.native_id
+
+
+def bind_youngest(threads: set[int], since: int, cores: tuple[int, ...]) -> None:
+    """Bind the threads that were started last to a core each, to the first core the oldest of them.
+
+    Args:
+        threads: started after the one of number `since`.
+    Raises: DeviceError where the system does not let us.
+    """
+    try:
+        numbers = int(Path("/proc/sys/kernel/pid_max").read_text())
+        in_turn = sorted(threads, key=lambda thread: (thread - since) % numbers)
+        for thread, core in zip(in_turn[-len(cores) :], cores, strict=True):
+            os.sched_setaffinity(thread, {core})
+    except (OSError, ValueError) as error:
+        raise DeviceError(f"cannot bind threads to cores {list(cores)}: {error}. Leave cores out") from error

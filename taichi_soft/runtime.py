@@ -14,7 +14,7 @@ import textwrap
 import types
 import weakref
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 os.environ.setdefault("TI_SKIP_VERSION_CHECK", "ON")
@@ -22,7 +22,7 @@ os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
 
 import taichi as ti
 
-from taichi_soft.cores import available_cores, bind_youngest, require_cores, thread_ids
+from taichi_soft.cores import available_cores, bind_youngest, number_now, require_cores, thread_ids
 from taichi_soft.errors import DeviceError, OptionError
 
 __all__ = ["Device", "device", "init", "is_initialized", "ti"]
@@ -97,11 +97,11 @@ def init(arch: str = "auto", threads: int | None = None, cores: Sequence[int] | 
             this process; None takes as many as there are cores.
         cores: on Linux, numbers of processor cores: as many CPU worker threads, each bound to one of them.
             None leaves the choice to the system, which now and then wakes two on one core, and a frame takes
-            up to twice as long. Take cores on which the game leaves something to spare: a bound thread
-            cannot go elsewhere.
+            twice as long or more. Take cores that the rest of the game leaves alone, as a bound thread cannot
+            go elsewhere, and call this before others start threads.
     Returns: the device in use.
     Raises: OptionError for an unknown arch, thread count or core, or if already started differently;
-        DeviceError if the device asked for is missing.
+        DeviceError if the device asked for is missing, or threads cannot be bound.
     """
     global _device
     if not isinstance(arch, str) or arch not in ("auto", *_ARCHS):
@@ -112,15 +112,16 @@ def init(arch: str = "auto", threads: int | None = None, cores: Sequence[int] | 
         raise OptionError(
             f"threads must be None or a whole number from 1 to {_MOST_THREADS}, got {threads!r}"
         )
-    bound = () if cores is None else require_cores(cores)
+    there = available_cores()
+    taken = () if _device is None else _device.cores  # the caller may have left them to our threads since
+    bound = () if cores is None else require_cores(cores, sorted({*there, *taken}))
     if bound and (arch not in ("auto", "cpu") or threads not in (None, len(bound))):
         raise OptionError(
             f"cores {list(bound)} are for {len(bound)} CPU threads, got arch={arch!r}, threads={threads}: "
             "leave out one or the other"
         )
-    available = len(available_cores())
     # Taichi starts no more than there are, and the flat schedule waits for all of them.
-    count = len(bound) or min(threads or available, available)
+    count = len(bound) or min(threads or len(there), len(there))
     if _device is not None:
         if arch not in ("auto", _device.arch):
             raise OptionError(
@@ -141,7 +142,7 @@ def init(arch: str = "auto", threads: int | None = None, cores: Sequence[int] | 
             "Taichi was started by ti.init, and starting it again would destroy the fields made since: call "
             "taichi_soft.init() instead, first in the process"
         )
-    before = thread_ids() if bound else set()
+    before, since = (thread_ids(), number_now()) if bound else (set(), 0)
     try:
         with contextlib.redirect_stdout(io.StringIO()):  # Taichi announces itself
             ti.init(
@@ -161,9 +162,10 @@ def init(arch: str = "auto", threads: int | None = None, cores: Sequence[int] | 
             )
     except RuntimeError as error:
         raise DeviceError(f"cannot start Taichi on {chosen!r}: {error}. Use init('cpu')") from error
+    _device = Device(arch=chosen, threads=count if chosen == "cpu" else 1, reason=reason)
     if bound:
-        bind_youngest(thread_ids() - before, bound)  # Taichi starts its workers after those that compile
-    _device = Device(arch=chosen, threads=count if chosen == "cpu" else 1, reason=reason, cores=bound)
+        bind_youngest(thread_ids() - before, since, bound)  # workers are started after threads that compile
+        _device = replace(_device, cores=bound)
     return _device
 
 

@@ -56,10 +56,16 @@ from taichi_soft import Material, OptionError, World, box, device, init
 cores = sorted(os.sched_getaffinity(0), reverse=True)
 init(cores=cores)
 assert init() is init(cores=cores) and device().cores == tuple(cores) and device().threads == len(cores)
-try:
-    init(cores=[*cores[1:], cores[0]][: max(1, len(cores) - 1)])
-except OptionError as error:
-    assert len(cores) == 1 or "already runs on cores" in str(error)
+if len(cores) > 1:
+    try:
+        init(cores=cores[1:])
+    except OptionError as error:
+        assert "already runs on cores" in str(error)
+    else:
+        raise AssertionError(cores[1:])
+    os.sched_setaffinity(0, {cores[0]})  # the caller's thread alone
+    assert init(cores=cores) is device()
+    os.sched_setaffinity(0, set(cores))
 world = World()
 for i in range(8 * len(cores)):
     world.add_body(box(cells=(4, 4, 4)), Material(1e5, 0.2, 1000.0), position=(2 * i, 0, 1))

@@ -1,4 +1,4 @@
-"""What a game's features cost: unused, used, and in a heap. Always in turns with bodies that do without."""
+"""What a game's features cost: unused, used, and in a heap. In turns with bodies that do without."""
 
 from __future__ import annotations
 

@@ -56,7 +56,8 @@ def cluster_workers(address: str, arch: str = "cpu") -> Iterator[list[Worker]]:
             client = Client(address, timeout=CONNECT_LIMIT, set_as_default=False)
     except (OSError, ValueError, ImportError, AssertionError) as error:
         raise SweepError(
-            f"no scheduler of Dask answers at {address!r} ({error}): start one with 'dask scheduler'"
+            f"no scheduler of Dask answers at {address!r} ({error or 'a thread of ours did not begin'}): "
+            "start one with 'dask scheduler'"
         ) from error
     with client:
         try:

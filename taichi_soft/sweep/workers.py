@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import multiprocessing
-import os
 import signal
 import time
 from collections.abc import Iterator
@@ -12,6 +11,7 @@ from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
 
+from taichi_soft.cores import available_cores
 from taichi_soft.sweep.task import Outcome, Task, Worker, compute
 
 CONTEXT = multiprocessing.get_context("spawn")
@@ -26,16 +26,12 @@ END_LIMIT = 10.0
 @contextmanager
 def local_workers(count: int | None = None, arch: str = "cpu") -> Iterator[list[Worker]]:
     """Processes of one thread each, started when they are needed; None: one for each core."""
-    workers = [LocalWorker(arch) for _ in range(count or _cores())]
+    workers = [LocalWorker(arch) for _ in range(count or len(available_cores()))]
     try:
         yield list(workers)
     finally:
         for worker in workers:
             worker.end()
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 class LocalWorker:
