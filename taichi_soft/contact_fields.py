@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from taichi_soft.constants import LANES
 from taichi_soft.loading import Loader
 from taichi_soft.runtime import ti
 
@@ -140,9 +141,11 @@ class SoftContactFields:
         self.found_distance = ti.field(ti.f32, outer * FOUND)  # [m], at the search
         # Candidates: of each body vertex by vertex, without gaps.
         self.slot_count = ti.field(ti.i32, bodies)
-        self.slot_particle = ti.field(ti.i32, outer * SLOTS)
+        slots = outer * SLOTS + LANES  # the last ones are read and never used
+        self.slot_vertices = ti.Vector.field(4, ti.i32, slots)  # the vertex, and the triangle's corners
         self.slot_triangle = ti.field(ti.i32, outer * SLOTS)
-        self.slot_distance = ti.field(ti.f32, outer * SLOTS)  # [m], at the search
+        self.slot_spare = ti.field(ti.f32, slots)  # distance at the search beyond the thickness [m]
+        self.near_slot = ti.field(ti.i32, slots)  # those that may touch in this substep, as `contact_slot`
         self.slot_gap = ti.field(ti.f32, outer * SLOTS)  # [m], beyond the thickness; NO_CONTACT where idle
         self.slot_weights = ti.Vector.field(3, ti.f32, outer * SLOTS)  # barycentric, of the nearest point
         self.slot_normal = ti.Vector.field(3, ti.f32, outer * SLOTS)  # from the triangle to the vertex

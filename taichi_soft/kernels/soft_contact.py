@@ -5,9 +5,8 @@ with it of its sliding: projected Gauss-Seidel over velocities, begun with the i
 Impulses are equal and opposite. What is too near already is moved apart without giving it a velocity.
 """
 
-from taichi_soft.contact_fields import NO_CONTACT, SLOTS
+from taichi_soft.contact_fields import SLOTS
 from taichi_soft.math.finite import is_finite
-from taichi_soft.math.triangle import closest_point_on_triangle
 from taichi_soft.runtime import ti
 from taichi_soft.state import ACTIVE
 
@@ -21,13 +20,6 @@ PUSH_OUT = 0.2
 SLACK = 0.25
 """Part of the thickness that pairs may be too near without being moved apart. Contact ends within it; to move
 at once what a sweep has left, step by step against what presses it together, feeds vibrations."""
-
-OUTSIDE = 1e-4
-"""Least barycentric weight at which the nearest point counts as inside the triangle."""
-
-SAME = 0.7
-"""Cosine between the directions of two contacts of a vertex from which they count as one: a flat surface is
-met once, however it is cut into triangles; a corner twice."""
 
 
 @ti.func
@@ -49,96 +41,7 @@ def velocity(state: ti.template(), p):
 
 
 @ti.func
-def _gap(state: ti.template(), p, corners):
-    """How a vertex lies to a triangle.
-
-    Returns: distance [m], negative behind it; direction from the triangle; weights of the nearest point;
-    whether it may be in contact (1): what is behind an edge belongs to another triangle, or is outside.
-    """
-    a, b, c = (
-        state.particle_position[corners[0]],
-        state.particle_position[corners[1]],
-        state.particle_position[corners[2]],
-    )
-    x = state.particle_position[p]
-    weights = closest_point_on_triangle(x, a, b, c)
-    way = x - weights.x * a - weights.y * b - weights.z * c
-    face = (b - a).cross(c - a)
-    length = face.norm()
-    face = face / ti.max(length, 1e-30)
-    side = way.dot(face)
-    distance = way.norm()
-    normal = face
-    can_touch = int(length > 0.0) & int(is_finite(x)) & int(is_finite(way)) & int(is_finite(face))
-    if weights.min() > OUTSIDE:
-        distance = side
-    elif side < 0.0:
-        can_touch = 0
-    elif distance > 1e-9:
-        normal = way / distance
-    return distance, normal, weights, can_touch
-
-
-@ti.func
-def _drop_twins(soft: ti.template(), first, slot):
-    """Of contacts that push a vertex the same way keep the nearest: this one, or one of those before.
-
-    It goes on with the impulses of the other: a vertex that crosses an edge is borne there as well.
-    """
-    for other in range(first, slot):
-        if soft.slot_gap[other] < NO_CONTACT:
-            if soft.slot_normal[other].dot(soft.slot_normal[slot]) > SAME:
-                kept, lost = other, slot
-                if soft.slot_gap[other] > soft.slot_gap[slot]:
-                    kept, lost = slot, other
-                soft.slot_gap[lost] = NO_CONTACT
-                soft.slot_press[kept] = soft.slot_press[kept] + soft.slot_press[lost]
-                soft.slot_rub[kept] = soft.slot_rub[kept] + soft.slot_rub[lost]
-                soft.slot_press[lost] = 0.0
-                soft.slot_rub[lost] = ti.Vector.zero(ti.f32, 3)
-
-
-@ti.func
-def _find_gaps_of(state: ti.template(), p, first, last, given, h):
-    """Which candidates of a vertex count: those in front of it, and the one it is least deep behind.
-
-    Args:
-        first, last: the slots of the vertex, which is particle `p`.
-        given: speed that either may get from others [m/s].
-        h: substep [s].
-    """
-    mine = state.soft.body_surface[state.particle_body[p]]
-    shallowest, behind = ti.cast(-1e30, ti.f32), -1
-    for slot in range(first, last):
-        corners = state.triangle_vertices[state.soft.slot_triangle[slot]]
-        other = state.particle_body[corners[0]]
-        thickness = 0.5 * (mine.y + state.soft.body_surface[other].y)
-        state.soft.slot_gap[slot] = NO_CONTACT
-        gone, speed = ti.cast(0.0, ti.f32), ti.cast(given, ti.f32)
-        for i in ti.static(range(3)):
-            gone = ti.max(gone, state.soft.particle_gone[corners[i]])
-            speed = ti.max(speed, state.soft.particle_speed[corners[i]])
-        gone += state.soft.particle_gone[p]
-        way = h * (speed + ti.max(given, state.soft.particle_speed[p]))
-        if state.soft.slot_distance[slot] - gone - way < thickness:
-            distance, normal, weights, can_touch = _gap(state, p, corners)
-            state.soft.slot_normal[slot] = normal
-            state.soft.slot_weights[slot] = weights
-            is_wild = state.contact.is_wild[state.particle_body[p]] + state.contact.is_wild[other]
-            if distance > thickness + way or is_wild > 0:
-                can_touch = 0
-            if can_touch == 1 and distance >= 0.0:
-                state.soft.slot_gap[slot] = distance - thickness
-                _drop_twins(state.soft, first, slot)
-            elif can_touch == 1 and other != state.particle_body[p] and distance > shallowest:
-                if behind >= 0:
-                    state.soft.slot_gap[behind] = NO_CONTACT
-                state.soft.slot_gap[slot] = distance - thickness
-                shallowest, behind = distance, slot
-
-
-@ti.func
-def _note_levers(state: ti.template(), p, slot):
+def note_levers(state: ti.template(), slot):
     """What stays the same while a contact is solved again and again.
 
     Friction acts at the vertex, as if the triangle reached up to it. With b and g the vertex's barycentric
@@ -146,7 +49,7 @@ def _note_levers(state: ti.template(), p, slot):
     velocity there is sum b v - s sum g (n.v): what a rigid turn gives. Taking the impulse up in the same
     proportions keeps the angular momentum of the two, whatever lies between them.
     """
-    corners = state.triangle_vertices[state.soft.slot_triangle[slot]]
+    p, corners = state.soft.slot_vertices[slot].x, state.soft.slot_vertices[slot].yzw
     a, b, c = (
         state.particle_position[corners[0]],
         state.particle_position[corners[1]],
@@ -170,29 +73,6 @@ def _note_levers(state: ti.template(), p, slot):
         ]
     )
     state.soft.slot_moves[slot] = ti.Vector([_moves(state, p), _moves(state, corners[0])])
-
-
-@ti.func
-def find_gaps(state: ti.template(), body, given, h):
-    """List the contacts of a body's vertices; `given` and `h` as in `_find_gaps_of`."""
-    first_slot, count = state.body_outer[body][0] * SLOTS, 0
-    last_slot = first_slot + state.soft.slot_count[body]
-    first = first_slot
-    while first < last_slot:
-        p, last = state.soft.slot_particle[first], first + 1
-        while last < last_slot and state.soft.slot_particle[last] == p:
-            last += 1
-        _find_gaps_of(state, p, first, last, given, h)
-        for slot in range(first, last):
-            if state.soft.slot_gap[slot] < NO_CONTACT:
-                _note_levers(state, p, slot)
-                state.soft.contact_slot[first_slot + count] = slot
-                count += 1
-            else:
-                state.soft.slot_press[slot] = 0.0
-                state.soft.slot_rub[slot] = ti.Vector.zero(ti.f32, 3)
-        first = last
-    state.soft.contact_count[body] = count
 
 
 @ti.func
@@ -273,7 +153,7 @@ def _solve_contact(state: ti.template(), soft: ti.template(), slot, p, corners, 
 @ti.func
 def _solve_slot(state: ti.template(), slot, h, sweep):
     """One contact in one sweep; the last one moves apart what is too near."""
-    p, corners = state.soft.slot_particle[slot], state.triangle_vertices[state.soft.slot_triangle[slot]]
+    p, corners = state.soft.slot_vertices[slot].x, state.soft.slot_vertices[slot].yzw
     mine = state.soft.body_surface[state.particle_body[p]]
     theirs = state.soft.body_surface[state.particle_body[corners[0]]]
     if (

@@ -145,13 +145,16 @@ def forget_candidates(state: ti.template(), body):
     for k in range(outer[0], outer[1]):
         p = state.outer_particle[k]
         state.soft.kept_press[p] = 0.0
-    for slot in range(outer[0] * SLOTS, outer[0] * SLOTS + state.soft.slot_count[body]):
-        p = state.soft.slot_particle[slot]
+    first_slot = outer[0] * SLOTS
+    for k in range(first_slot, first_slot + state.soft.contact_count[body]):
+        slot = state.soft.contact_slot[k]
+        p = state.soft.slot_vertices[slot].x
         if state.soft.slot_press[slot] > state.soft.kept_press[p]:
             state.soft.kept_triangle[p] = state.soft.slot_triangle[slot]
             state.soft.kept_press[p] = state.soft.slot_press[slot]
             state.soft.kept_rub[p] = state.soft.slot_rub[slot]
     state.soft.slot_count[body] = 0
+    state.soft.contact_count[body] = 0
 
 
 @ti.func
@@ -205,7 +208,7 @@ def _list_candidates(state: ti.template(), body, thickness):
     for k in range(outer[0], outer[1]):
         total += state.soft.found_count[k]
     is_too_much = total > (outer[1] - outer[0]) * SLOTS
-    slot = outer[0] * SLOTS
+    slot, contacts = outer[0] * SLOTS, 0
     for k in range(outer[0], outer[1]):
         while is_too_much and state.soft.found_count[k] > SLOTS:
             row, last = _farthest_found(state.soft, k), k * FOUND + state.soft.found_count[k] - 1
@@ -216,16 +219,22 @@ def _list_candidates(state: ti.template(), body, thickness):
         p = state.outer_particle[k]
         for row in range(k * FOUND, k * FOUND + state.soft.found_count[k]):
             triangle = state.soft.found_triangle[row]
-            goes_on = ti.select(
-                state.soft.kept_triangle[p] == triangle and state.soft.kept_press[p] > 0.0, 1.0, 0.0
-            )
-            state.soft.slot_particle[slot] = p
+            corners = state.triangle_vertices[triangle]
+            other = state.particle_body[corners[0]]
+            mutual = 0.5 * (state.soft.body_surface[body].y + state.soft.body_surface[other].y)
+            state.soft.slot_vertices[slot] = ti.Vector([p, corners[0], corners[1], corners[2]])
             state.soft.slot_triangle[slot] = triangle
-            state.soft.slot_distance[slot] = state.soft.found_distance[row]
-            state.soft.slot_press[slot] = goes_on * state.soft.kept_press[p]
-            state.soft.slot_rub[slot] = goes_on * state.soft.kept_rub[p]
+            state.soft.slot_spare[slot] = state.soft.found_distance[row] - mutual
+            state.soft.slot_press[slot] = 0.0
+            state.soft.slot_rub[slot] = ti.Vector.zero(ti.f32, 3)
+            if state.soft.kept_triangle[p] == triangle and state.soft.kept_press[p] > 0.0:
+                state.soft.slot_press[slot] = state.soft.kept_press[p]
+                state.soft.slot_rub[slot] = state.soft.kept_rub[p]
+                state.soft.contact_slot[outer[0] * SLOTS + contacts] = slot
+                contacts += 1
             slot += 1
     state.soft.slot_count[body] = slot - outer[0] * SLOTS
+    state.soft.contact_count[body] = contacts
 
 
 @ti.func

@@ -9,7 +9,7 @@ for a thread that has not begun. What becomes of a body does not depend on who t
 from taichi_soft.contact_fields import MOST_PARTS
 from taichi_soft.kernels.contact_body import begin_body, finish_body
 from taichi_soft.kernels.contact_substep import drift_body, push_body
-from taichi_soft.kernels.soft_contact import find_gaps
+from taichi_soft.kernels.soft_gaps import find_gaps
 from taichi_soft.kernels.soft_search import begin_search, is_social, note_way, search_body
 from taichi_soft.runtime import ti
 from taichi_soft.state import ACTIVE

@@ -31,10 +31,10 @@ def closest_point_on_triangle(x, a, b, c):
         t = ti.min(ti.max(away.dot(along) / ti.max(along.dot(along), _TINY), 0.0), 1.0)
         gap = away - along * t
         distance = gap.dot(gap)
-        if distance < best:
-            best = distance
-            v = (t, 1.0 - t, 0.0)[edge]
-            w = (0.0, t, t)[edge]
+        is_nearer = distance < best
+        best = ti.select(is_nearer, distance, best)
+        v = ti.select(is_nearer, (t, 1.0 - t, 0.0)[edge], v)
+        w = ti.select(is_nearer, (0.0, t, t)[edge], w)
     return ti.Vector([ti.max(1.0 - v - w, 0.0), v, w])
 
 
