@@ -14,7 +14,7 @@ MATERIAL = Material(young=3.0e5, poisson=0.3, density=500.0, damping=40.0)
 THICKNESS = 0.02  # of the skins of the bodies [m]
 RADIUS, WALL = 2.0, 0.2  # of the inside of the bowl, and how thick it is [m]
 BODIES = 20
-SLEEP_SPEED = 0.05  # [m/s]
+SLEEP_SPEED = 0.02  # [m/s]
 DRAG = 1.0  # [1/s]: nothing else stops a ball that rolls to and fro between others
 STEP = FixedStep(dt=1 / 50)
 

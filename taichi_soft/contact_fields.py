@@ -145,16 +145,17 @@ class SoftContactFields:
         self.slot_vertices = ti.Vector.field(4, ti.i32, slots)  # the vertex, and the triangle's corners
         self.slot_triangle = ti.field(ti.i32, outer * SLOTS)
         self.slot_spare = ti.field(ti.f32, slots)  # distance at the search beyond the thickness [m]
-        self.near_slot = ti.field(ti.i32, slots)  # those that may touch in this substep, as `contact_slot`
-        self.slot_gap = ti.field(ti.f32, outer * SLOTS)  # [m], beyond the thickness; NO_CONTACT where idle
+        self.near_slot = ti.field(ti.i32, slots)  # those near in this substep; behind them, old ones
+        self.slot_gap = ti.field(ti.f32, outer * SLOTS)  # [m], beyond the thickness; or NO_CONTACT
         self.slot_weights = ti.Vector.field(3, ti.f32, outer * SLOTS)  # barycentric, of the nearest point
         self.slot_normal = ti.Vector.field(3, ti.f32, outer * SLOTS)  # from the triangle to the vertex
         self.slot_press = ti.field(ti.f32, outer * SLOTS)  # impulse along it in this substep [N s]
         self.slot_rub = ti.Vector.field(3, ti.f32, outer * SLOTS)  # friction on the vertex [N s]
-        # Of what is in contact in this substep, slots of each body from its first slot on, and for
-        # each what its solves share: inverse masses of the vertex and the corners [1/kg]; whether the bodies
-        # of the two move (1); normal of the triangle; shares of the corners in what the vertex feels, and
-        # height over the triangle times the gradients of the weights.
+        # What is in contact in this substep, or before its first one was in the last: slots of each body
+        # from its first slot on. No other slot has an impulse. Of each what its solves share: inverse masses
+        # of the vertex and the corners [1/kg]; whether the bodies of the two move (1); normal of the
+        # triangle; shares of the corners in what the vertex feels, and height over the triangle times the
+        # gradients of the weights.
         self.contact_count = ti.field(ti.i32, bodies)
         self.contact_slot = ti.field(ti.i32, outer * SLOTS)
         self.slot_mobility = ti.Vector.field(4, ti.f32, outer * SLOTS)

@@ -18,6 +18,13 @@ SAME = 0.7
 """Cosine between the directions of two contacts of a vertex from which they count as one: a flat surface is
 met once, however it is cut into triangles; a corner twice."""
 
+SAME_INSIDE = 0.95
+"""The same for a vertex that is inside both triangles, which only valleys and dents give. It lies on both
+sides of a valley; in a dent, to hold it by more than one would make it swing."""
+
+LEAD = 0.01
+"""Part of the thickness by which a contact at an edge has to be nearer to follow one that bears."""
+
 
 @ti.func
 def _list_near(state: ti.template(), body, given, h):
@@ -77,7 +84,7 @@ def _gap(state: ti.template(), slot):
 @ti.func
 def _reach_of(state: ti.template(), slot, given, h):
     """Thickness [m] at which a vertex and a triangle touch, and the way [m] that they may come nearer within
-    the substep: so far below zero that they never touch where one of their bodies explodes.
+    the substep. Where one of their bodies explodes the way is -NO_CONTACT, and they never touch.
     """
     who = state.soft.slot_vertices[slot]
     mine, other = state.particle_body[who[0]], state.particle_body[who[1]]
@@ -91,26 +98,40 @@ def _reach_of(state: ti.template(), slot, given, h):
 
 
 @ti.func
-def _drop_twins(soft: ti.template(), first, at):
+def _clear_impulses(soft: ti.template(), slot):
+    soft.slot_press[slot] = 0.0
+    soft.slot_rub[slot] = ti.Vector.zero(ti.f32, 3)
+
+
+@ti.func
+def _drop_twins(soft: ti.template(), first, at, lead):
     """Of contacts that push a vertex the same way keep the nearest: this one, or one of those before.
 
-    It goes on with the impulses of the other: a vertex that crosses an edge is borne there as well.
+    It goes on with the impulses of the other: a vertex that crosses an edge is borne there as well. In front
+    of an edge both triangles are as near but for rounding, and the one that bears the vertex keeps it: as
+    each shares out friction to other corners, every change is a jolt, and heaps would tremble for ever.
+
     Args:
         first, at: rows of `near_slot`, that of the vertex's first and of this one.
+        lead: by which another has to be nearer at an edge [m].
     """
     slot = soft.near_slot[at]
+    is_inside = int(soft.slot_weights[slot].min() > OUTSIDE)
     for row in range(first, at):
         other = soft.near_slot[row]
         if soft.slot_gap[other] < NO_CONTACT:
-            if soft.slot_normal[other].dot(soft.slot_normal[slot]) > SAME:
+            inside = is_inside + int(soft.slot_weights[other].min() > OUTSIDE)
+            same = ti.select(inside == 2, SAME_INSIDE, SAME)
+            if soft.slot_normal[other].dot(soft.slot_normal[slot]) > same:
+                bears = int(soft.slot_press[other] > 0.0) - int(soft.slot_press[slot] > 0.0)
+                ahead = ti.select(inside == 0, bears * lead, 0.0)
                 kept, lost = other, slot
-                if soft.slot_gap[other] > soft.slot_gap[slot]:
+                if soft.slot_gap[other] > soft.slot_gap[slot] + ahead:
                     kept, lost = slot, other
                 soft.slot_gap[lost] = NO_CONTACT
                 soft.slot_press[kept] = soft.slot_press[kept] + soft.slot_press[lost]
                 soft.slot_rub[kept] = soft.slot_rub[kept] + soft.slot_rub[lost]
-                soft.slot_press[lost] = 0.0
-                soft.slot_rub[lost] = ti.Vector.zero(ti.f32, 3)
+                _clear_impulses(soft, lost)
 
 
 @ti.func
@@ -148,7 +169,7 @@ def _find_near_gaps(state: ti.template(), body, count, given, h):
                         state.soft.slot_normal[slot][i] = normals[lane, i]
                         state.soft.slot_weights[slot][i] = feet[lane, i]
                     state.soft.slot_gap[slot] = distance - thickness
-                    _drop_twins(state.soft, first_row, first + lane)
+                    _drop_twins(state.soft, first_row, first + lane, LEAD * thickness)
                 elif state.particle_body[other] != body and distance > shallowest:
                     for i in ti.static(range(3)):
                         state.soft.slot_normal[slot][i] = normals[lane, i]
@@ -167,11 +188,11 @@ def find_gaps(state: ti.template(), body, given, h):
     for k in range(first_slot, first_slot + before):
         state.soft.slot_gap[state.soft.contact_slot[k]] = NO_CONTACT
     _find_near_gaps(state, body, near, given, h)
+    # None but the contacts may keep an impulse: it would begin the next one there, whenever that is.
     for k in range(first_slot, first_slot + before):
         slot = state.soft.contact_slot[k]
         if state.soft.slot_gap[slot] >= NO_CONTACT:
-            state.soft.slot_press[slot] = 0.0
-            state.soft.slot_rub[slot] = ti.Vector.zero(ti.f32, 3)
+            _clear_impulses(state.soft, slot)
     count = 0
     for k in range(first_slot, first_slot + near):
         slot = state.soft.near_slot[k]
@@ -179,4 +200,6 @@ def find_gaps(state: ti.template(), body, given, h):
             note_levers(state, slot)
             state.soft.contact_slot[first_slot + count] = slot
             count += 1
+        else:
+            _clear_impulses(state.soft, slot)  # a twin's, before another took the place of both
     state.soft.contact_count[body] = count

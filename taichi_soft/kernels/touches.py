@@ -40,7 +40,7 @@ def add_touches(state: ti.template(), island):
         for k in range(first_slot, first_slot + state.soft.contact_count[body]):
             slot = state.soft.contact_slot[k]
             press = state.soft.slot_press[slot]
-            other = state.particle_body[state.triangle_vertices[state.soft.slot_triangle[slot]][0]]
+            other = state.particle_body[state.soft.slot_vertices[slot].y]
             if press > 0.0 and other != body:
                 a, b = ti.min(body, other), ti.max(body, other)
                 row = _find_pair(state.soft, first * PAIR_ROWS, (last - first) * PAIR_ROWS, a, b)
