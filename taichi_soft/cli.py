@@ -34,7 +34,9 @@ console = Console()
 errors = Console(stderr=True)
 
 Arch = Annotated[str, typer.Option(help="Device: auto (the CPU), cpu; untried: cuda, vulkan, metal.")]
-Threads = Annotated[int | None, typer.Option(help="CPU threads; one per core by default.")]
+Threads = Annotated[
+    int | None, typer.Option(help="CPU threads; by default one per core, bound to it on Linux.")
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")]
 
 
@@ -274,7 +276,7 @@ def profile(
     threads: Threads = None,
     cores: Annotated[
         str | None,
-        typer.Option(help="Cores to bind a thread each to, as 0,1 (Linux); not in --scaling, --startup."),
+        typer.Option(help="Cores to bind a thread each to, as 0,1 (Linux); with --threads none is bound."),
     ] = None,
 ) -> None:
     """Measure what a frame costs and how many bodies fit one of 60 Hz and of 120 Hz."""
@@ -293,13 +295,13 @@ def profile(
             found["crossover"] = profiling.measure_crossover(max(3, repeats // 6))
         if scaling:
             status.update("measuring threads")
-            found["scaling"] = profiling.measure_scaling(device.threads, max(3, repeats // 3))
+            found["scaling"] = profiling.measure_scaling(device.threads, device.cores, max(3, repeats // 3))
         if implicit:
             status.update("measuring implicit steps")
             found["implicit"] = profiling.measure_implicit(max(3, repeats // 12))
         if startup:
             status.update("starting new processes")
-            found["startup"] = [profiling.measure_startup(device.arch, device.threads)]
+            found["startup"] = [profiling.measure_startup(device.arch, device.threads, device.cores)]
         if game:
             status.update("measuring what a game does")
             found["features"] = profiling.measure_features(max(3, repeats // 3))

@@ -20,9 +20,14 @@ def available_cores() -> list[int]:
     return list(range(os.cpu_count() or 1))
 
 
+def can_bind() -> bool:
+    """Whether threads can be bound to cores on this system."""
+    return sys.platform.startswith("linux")
+
+
 def require_cores(cores: Any, there: list[int]) -> tuple[int, ...]:
     """Different ones of the cores that are `there`, in the order given. Raises: OptionError."""
-    if not sys.platform.startswith("linux"):
+    if not can_bind():
         raise OptionError(
             f"threads can be bound to cores on Linux only, not on {sys.platform}: leave cores out"
         )

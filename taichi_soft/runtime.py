@@ -22,7 +22,14 @@ os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
 
 import taichi as ti
 
-from taichi_soft.cores import available_cores, bind_youngest, number_now, require_cores, thread_ids
+from taichi_soft.cores import (
+    available_cores,
+    bind_youngest,
+    can_bind,
+    number_now,
+    require_cores,
+    thread_ids,
+)
 from taichi_soft.errors import DeviceError, OptionError
 
 __all__ = ["Device", "device", "init", "is_initialized", "ti"]
@@ -94,11 +101,13 @@ def init(arch: str = "auto", threads: int | None = None, cores: Sequence[int] | 
         arch: "auto" or "cpu"; or a GPU by name, "cuda", "vulkan" or "metal". "auto" takes the CPU: the GPU
             kernels have been tested on a CPU only, and games want their GPU for pictures.
         threads: CPU worker threads, 1 or more, of which no more are used than there are cores available to
-            this process; None takes as many as there are cores.
+            this process. The system moves them from core to core, and often wakes two on one: short frames
+            then take nearly as long as with one thread.
         cores: on Linux, numbers of processor cores: as many CPU worker threads, each bound to one of them.
-            None leaves the choice to the system, which now and then wakes two on one core, and a frame takes
-            twice as long or more. Take cores that the rest of the game leaves alone, as a bound thread cannot
-            go elsewhere, and call this before others start threads.
+            Take cores that the rest of the game leaves alone, as a bound thread cannot go elsewhere, and call
+            this before others start threads.
+            With neither `threads` nor `cores` there is a thread for each core available to this process, on
+            Linux bound to it where the system allows that.
     Returns: the device in use.
     Raises: OptionError for an unknown arch, thread count or core, or if already started differently;
         DeviceError if the device asked for is missing, or threads cannot be bound.
@@ -142,7 +151,9 @@ def init(arch: str = "auto", threads: int | None = None, cores: Sequence[int] | 
             "Taichi was started by ti.init, and starting it again would destroy the fields made since: call "
             "taichi_soft.init() instead, first in the process"
         )
-    before, since = (thread_ids(), number_now()) if bound else (set(), 0)
+    is_left_to_us = threads is None and cores is None and chosen == "cpu" and count > 1 and can_bind()
+    wanted = tuple(there) if is_left_to_us else bound
+    before, since = (thread_ids(), number_now()) if wanted else (set(), 0)
     try:
         with contextlib.redirect_stdout(io.StringIO()):  # Taichi announces itself
             ti.init(
@@ -163,10 +174,28 @@ def init(arch: str = "auto", threads: int | None = None, cores: Sequence[int] | 
     except RuntimeError as error:
         raise DeviceError(f"cannot start Taichi on {chosen!r}: {error}. Use init('cpu')") from error
     _device = Device(arch=chosen, threads=count if chosen == "cpu" else 1, reason=reason)
-    if bound:
-        bind_youngest(thread_ids() - before, since, bound)  # workers are started after threads that compile
-        _device = replace(_device, cores=bound)
+    if wanted:
+        _device = _bound(_device, thread_ids() - before, since, wanted, is_left_to_us)
     return _device
+
+
+def _bound(
+    chosen: Device, started: set[int], since: int, cores: tuple[int, ...], is_left_to_us: bool
+) -> Device:
+    """The device with its workers, which Taichi starts after the threads that compile, bound to cores.
+
+    Where the choice is ours they stay free if the system does not let us, or if somebody else has started
+    threads meanwhile, which we must leave alone.
+    """
+    if is_left_to_us and len(started) != ti.lang.impl.current_cfg().num_compile_threads + chosen.threads:
+        return chosen
+    try:
+        bind_youngest(started, since, cores)
+    except DeviceError:
+        if not is_left_to_us:
+            raise
+        return chosen
+    return replace(chosen, cores=cores)
 
 
 def device() -> Device:

@@ -90,6 +90,57 @@ print("done")
     assert done.stdout == "done\n", done.stderr
 
 
+def test_left_alone_each_core_has_a_thread_bound_to_it_and_a_number_of_threads_is_free():
+    """As the system has it; what was there before, such as the caller's own thread, stays as it was."""
+    script = """
+import os, sys
+from taichi_soft import init
+from taichi_soft.cores import thread_ids
+there, before = os.sched_getaffinity(0), thread_ids()
+device = init(**eval(sys.argv[1]))
+places = [os.sched_getaffinity(thread) for thread in thread_ids() - before]
+print(device.cores, sorted(min(place) for place in places if place != there))
+assert all(os.sched_getaffinity(thread) == there for thread in before)
+assert device.threads == len(there) and init() is init(threads=len(there)) is device
+"""
+    cores = sorted(os.sched_getaffinity(0))
+    bound = cores if len(cores) > 1 else []  # on a single core there is nothing to choose
+    for options, expected in (({}, bound), ({"threads": len(cores)}, [])):
+        done = subprocess.run(
+            [sys.executable, "-c", script, repr(options)],
+            cwd=ROOT,
+            capture_output=True,
+            text=True,
+            timeout=120,
+        )
+        assert done.stdout == f"{tuple(expected)} {expected}\n", done.stderr
+
+
+@pytest.mark.parametrize(
+    "prevention",
+    [
+        "def refuse(*_): raise PermissionError(1, 'Operation not permitted')\nos.sched_setaffinity = refuse",
+        "runtime.thread_ids = lambda: next(calls)\ncalls = iter([set(), set(range(900000, 900100))])",
+    ],
+    ids=["refused by the system", "threads of somebody else"],
+)
+def test_where_threads_cannot_be_bound_they_are_free_unless_cores_were_asked_for(prevention):
+    script = f"""
+import os
+from taichi_soft import DeviceError, init, runtime
+{prevention}
+assert init().cores == () and init().threads == len(os.sched_getaffinity(0))
+print("done")
+"""
+    asked = script.replace("assert init().cores == ()", "init(cores=os.sched_getaffinity(0))  #")
+    for program, said in ((script, "done\n"), (asked, "")):
+        done = subprocess.run(
+            [sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, timeout=120
+        )
+        assert done.stdout == said, done.stderr
+        assert said or "DeviceError: cannot bind threads to cores" in done.stderr
+
+
 def test_starting_again_otherwise():
     """In a process of its own: the first start fixes arch and threads, the second is a no-op or refused."""
     script = """

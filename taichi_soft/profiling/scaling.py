@@ -20,7 +20,7 @@ _PROGRAM = """
 import sys
 from functools import partial
 from taichi_soft import init
-init("cpu", {threads})
+init("cpu", {threads}, {cores})
 from taichi_soft.profiling.phases import spheres
 from taichi_soft.profiling.spread import Spread, time_calls
 step = partial(spheres({bodies}).step, 1e-3)
@@ -43,8 +43,8 @@ class Scaling:
 class _Stepper:
     """A process of its own that makes steps when asked."""
 
-    def __init__(self, threads: int) -> None:
-        program = _PROGRAM.format(threads=threads, bodies=BODIES, steps=STEPS_PER_TURN)
+    def __init__(self, threads: int, cores: tuple[int, ...] = ()) -> None:
+        program = _PROGRAM.format(threads=threads, cores=cores or None, bodies=BODIES, steps=STEPS_PER_TURN)
         self._threads = threads
         self._process = subprocess.Popen(
             [sys.executable, "-c", program],
@@ -75,12 +75,14 @@ class _Stepper:
             ) from None
 
 
-def measure_scaling(threads: int, repeats: int) -> list[Scaling]:
+def measure_scaling(threads: int, cores: tuple[int, ...], repeats: int) -> list[Scaling]:
     """Time one thread and `threads`, in turns: a machine that slows down for a while slows both.
 
+    Args:
+        cores: to which the latter are bound, or none.
     Raises: DeviceError if a process fails.
     """
-    with _Stepper(1) as single, _Stepper(threads) as parallel:
+    with _Stepper(1) as single, _Stepper(threads, cores) as parallel:
         return [_compare(single, parallel, threads, substeps, repeats) for substeps in SUBSTEPS]
 
 

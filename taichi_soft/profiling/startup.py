@@ -15,7 +15,7 @@ _PROGRAM = """
 import numpy as np
 from engine_adapter import EngineAdapter, FixedStep
 from taichi_soft import World, init, preset, sphere
-init({arch!r}, {threads!r})
+init({arch!r}, {threads!r}, {cores!r})
 world = World()
 body = world.add_body(sphere(radius=1.0), preset("thesis_sphere"), position=(0, 0, 3))
 world.build()
@@ -33,12 +33,14 @@ class Startup:
     warm: float  # kernels in Taichi's offline cache
 
 
-def measure_startup(arch: str, threads: int) -> Startup:
+def measure_startup(arch: str, threads: int, cores: tuple[int, ...]) -> Startup:
     """Run a small game twice in processes of their own, with a cache of their own.
 
+    Args:
+        cores: to which the threads are bound, or none.
     Raises: DeviceError if such a process fails.
     """
-    program = _PROGRAM.format(arch=arch, threads=threads)
+    program = _PROGRAM.format(arch=arch, threads=threads, cores=cores or None)
     with tempfile.TemporaryDirectory(prefix="taichi-soft-") as folder:
         environment = {**os.environ, "TI_OFFLINE_CACHE_FILE_PATH": folder}
         return Startup(_time_process(program, environment), _time_process(program, environment))

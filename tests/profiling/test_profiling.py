@@ -96,7 +96,7 @@ def test_a_missing_compiler_gives_one_line():
 def test_scaling_says_which_process_failed(monkeypatch):
     monkeypatch.setattr(scaling, "_PROGRAM", "raise SystemExit({threads})")
     with pytest.raises(DeviceError, match=r"process of 1 threads failed: try .*--threads 1"):
-        scaling.measure_scaling(2, 3)
+        scaling.measure_scaling(2, (), 3)
 
 
 def test_stolen_time_is_told_of_what_the_processors_were_wanted_for(monkeypatch, tmp_path):
