@@ -276,7 +276,7 @@ def profile(
     threads: Threads = None,
     cores: Annotated[
         str | None,
-        typer.Option(help="Cores to bind a thread each to, as 0,1 (Linux); with --threads none is bound."),
+        typer.Option(help="Cores to bind a thread each to, as 0,1 (Linux); --threads alone binds none."),
     ] = None,
 ) -> None:
     """Measure what a frame costs and how many bodies fit one of 60 Hz and of 120 Hz."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import sys
 import threading
@@ -21,15 +22,15 @@ def available_cores() -> list[int]:
 
 
 def can_bind() -> bool:
-    """Whether threads can be bound to cores on this system."""
-    return sys.platform.startswith("linux")
+    """Whether threads can be told apart and bound to cores on this system."""
+    return sys.platform.startswith("linux") and Path(_TASKS).is_dir()
 
 
 def require_cores(cores: Any, there: list[int]) -> tuple[int, ...]:
     """Different ones of the cores that are `there`, in the order given. Raises: OptionError."""
     if not can_bind():
         raise OptionError(
-            f"threads can be bound to cores on Linux only, not on {sys.platform}: leave cores out"
+            f"threads can be bound to cores on Linux with /proc only, not on {sys.platform}: leave cores out"
         )
     try:
         found = tuple(cores)
@@ -60,12 +61,18 @@ def bind_youngest(threads: set[int], since: int, cores: tuple[int, ...]) -> None
 
     Args:
         threads: started after the one of number `since`.
-    Raises: DeviceError where the system does not let us.
+    Raises: DeviceError where the system does not let us; then all are as they were.
     """
+    masks: dict[int, set[int]] = {}
     try:
         numbers = int(Path("/proc/sys/kernel/pid_max").read_text())
         in_turn = sorted(threads, key=lambda thread: (thread - since) % numbers)
         for thread, core in zip(in_turn[-len(cores) :], cores, strict=True):
+            mask = os.sched_getaffinity(thread)
             os.sched_setaffinity(thread, {core})
+            masks[thread] = mask
     except (OSError, ValueError) as error:
+        with contextlib.suppress(OSError):
+            for thread, mask in masks.items():
+                os.sched_setaffinity(thread, mask)
         raise DeviceError(f"cannot bind threads to cores {list(cores)}: {error}. Leave cores out") from error

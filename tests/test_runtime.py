@@ -10,9 +10,24 @@ from types import SimpleNamespace
 import pytest
 
 from taichi_soft import OptionError, init
+from taichi_soft.cores import available_cores, can_bind
 from taichi_soft.runtime import ti
 
 ROOT = Path(__file__).parents[1]
+CORES = available_cores()
+
+binding = pytest.mark.skipif(
+    not can_bind() or len(CORES) < 2, reason="threads are bound on Linux, with two cores or more"
+)
+
+
+def run(script, *arguments):
+    """What a process of its own prints."""
+    done = subprocess.run(
+        [sys.executable, "-c", script, *arguments], cwd=ROOT, capture_output=True, text=True, timeout=120
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
 
 
 @pytest.mark.parametrize("arch", ["gpu", "CPU", "", None, 3])
@@ -43,10 +58,11 @@ def test_cores_are_for_as_many_threads_of_the_cpu():
 
 def test_threads_are_bound_to_cores_only_where_the_system_can(monkeypatch):
     monkeypatch.setattr("taichi_soft.cores.sys", SimpleNamespace(platform="win32"))
-    with pytest.raises(OptionError, match="on Linux only, not on win32"):
+    with pytest.raises(OptionError, match="on Linux with /proc only, not on win32"):
         init("cpu", cores=[0])
 
 
+@binding
 def test_the_threads_that_work_are_bound_to_a_core_each():
     """The system says where each thread may run, and which of them worked."""
     script = """
@@ -90,6 +106,7 @@ print("done")
     assert done.stdout == "done\n", done.stderr
 
 
+@binding
 def test_left_alone_each_core_has_a_thread_bound_to_it_and_a_number_of_threads_is_free():
     """As the system has it; what was there before, such as the caller's own thread, stays as it was."""
     script = """
@@ -103,42 +120,61 @@ print(device.cores, sorted(min(place) for place in places if place != there))
 assert all(os.sched_getaffinity(thread) == there for thread in before)
 assert device.threads == len(there) and init() is init(threads=len(there)) is device
 """
-    cores = sorted(os.sched_getaffinity(0))
-    bound = cores if len(cores) > 1 else []  # on a single core there is nothing to choose
-    for options, expected in (({}, bound), ({"threads": len(cores)}, [])):
-        done = subprocess.run(
-            [sys.executable, "-c", script, repr(options)],
-            cwd=ROOT,
-            capture_output=True,
-            text=True,
-            timeout=120,
-        )
-        assert done.stdout == f"{tuple(expected)} {expected}\n", done.stderr
+    for options, bound in (({}, CORES), ({"threads": len(CORES)}, [])):
+        assert run(script, repr(options)) == f"{tuple(bound)} {bound}\n"
 
 
-@pytest.mark.parametrize(
-    "prevention",
-    [
-        "def refuse(*_): raise PermissionError(1, 'Operation not permitted')\nos.sched_setaffinity = refuse",
-        "runtime.thread_ids = lambda: next(calls)\ncalls = iter([set(), set(range(900000, 900100))])",
-    ],
-    ids=["refused by the system", "threads of somebody else"],
-)
-def test_where_threads_cannot_be_bound_they_are_free_unless_cores_were_asked_for(prevention):
-    script = f"""
-import os
-from taichi_soft import DeviceError, init, runtime
-{prevention}
-assert init().cores == () and init().threads == len(os.sched_getaffinity(0))
-print("done")
+@binding
+def test_where_the_system_refuses_no_thread_is_bound_and_cores_that_were_asked_for_are_an_error():
+    """It refuses the second thread; the first is freed again."""
+    script = """
+import os, sys
+from taichi_soft import DeviceError, init
+from taichi_soft.cores import thread_ids
+inner, asked = os.sched_setaffinity, []
+def refuse(thread, cores):
+    asked.append(thread)
+    if len(asked) == 2:
+        raise PermissionError(1, "Operation not permitted")
+    inner(thread, cores)
+os.sched_setaffinity = refuse
+there = os.sched_getaffinity(0)
+try:
+    device = init(**eval(sys.argv[1]))
+    print(device.cores, device.threads == len(there))
+except DeviceError as error:
+    print(error)
+assert len(asked) > 2 and all(os.sched_getaffinity(thread) == there for thread in thread_ids())
 """
-    asked = script.replace("assert init().cores == ()", "init(cores=os.sched_getaffinity(0))  #")
-    for program, said in ((script, "done\n"), (asked, "")):
-        done = subprocess.run(
-            [sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, timeout=120
-        )
-        assert done.stdout == said, done.stderr
-        assert said or "DeviceError: cannot bind threads to cores" in done.stderr
+    refusal = f"cannot bind threads to cores {CORES}: [Errno 1] Operation not permitted. Leave cores out"
+    for options, said in (({}, "() True"), ({"cores": CORES}, refusal)):
+        assert run(script, repr(options)) == f"{said}\n"
+
+
+@binding
+def test_left_alone_a_thread_that_somebody_else_starts_meanwhile_is_not_bound():
+    script = """
+import os, threading, time
+from taichi_soft import init, runtime
+inner, other = runtime.ti.init, threading.Thread(target=time.sleep, args=(60,), daemon=True)
+def crowded(**options):
+    inner(**options)
+    other.start()
+runtime.ti.init = crowded
+print(init().cores)
+assert os.sched_getaffinity(other.native_id) == os.sched_getaffinity(0)
+"""
+    assert run(script) == "()\n"
+
+
+@binding
+def test_left_alone_threads_are_free_where_the_system_does_not_list_them():
+    script = """
+from taichi_soft import cores, init
+cores._TASKS = "/nowhere"
+print(init().cores)
+"""
+    assert run(script) == "()\n"
 
 
 def test_starting_again_otherwise():

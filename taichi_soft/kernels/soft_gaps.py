@@ -19,8 +19,8 @@ SAME = 0.7
 met once, however it is cut into triangles; a corner twice."""
 
 SAME_INSIDE = 0.95
-"""The same for a vertex that is inside both triangles, which only valleys and dents give. It lies on both
-sides of a valley; in a dent, to hold it by more than one would make it swing."""
+"""The same for a vertex that is inside both triangles: it lies in a valley or a dent, or on two bodies. It is
+held by both sides of a valley; in a dent, to hold it by more than one would make it swing."""
 
 LEAD = 0.01
 """Part of the thickness by which a contact at an edge has to be nearer to follow one that bears."""
@@ -104,6 +104,15 @@ def _clear_impulses(soft: ti.template(), slot):
 
 
 @ti.func
+def _give_way(soft: ti.template(), lost, kept):
+    """One contact ends, and another goes on with its impulses."""
+    soft.slot_gap[lost] = NO_CONTACT
+    soft.slot_press[kept] = soft.slot_press[kept] + soft.slot_press[lost]
+    soft.slot_rub[kept] = soft.slot_rub[kept] + soft.slot_rub[lost]
+    _clear_impulses(soft, lost)
+
+
+@ti.func
 def _drop_twins(soft: ti.template(), first, at, lead):
     """Of contacts that push a vertex the same way keep the nearest: this one, or one of those before.
 
@@ -128,10 +137,7 @@ def _drop_twins(soft: ti.template(), first, at, lead):
                 kept, lost = other, slot
                 if soft.slot_gap[other] > soft.slot_gap[slot] + ahead:
                     kept, lost = slot, other
-                soft.slot_gap[lost] = NO_CONTACT
-                soft.slot_press[kept] = soft.slot_press[kept] + soft.slot_press[lost]
-                soft.slot_rub[kept] = soft.slot_rub[kept] + soft.slot_rub[lost]
-                _clear_impulses(soft, lost)
+                _give_way(soft, lost, kept)
 
 
 @ti.func
@@ -175,6 +181,8 @@ def _find_near_gaps(state: ti.template(), body, count, given, h):
                         state.soft.slot_normal[slot][i] = normals[lane, i]
                         state.soft.slot_weights[slot][i] = feet[lane, i]
                     if behind >= 0:
+                        if state.soft.slot_normal[behind].dot(state.soft.slot_normal[slot]) > SAME:
+                            _give_way(state.soft, behind, slot)
                         state.soft.slot_gap[behind] = NO_CONTACT
                     state.soft.slot_gap[slot] = distance - thickness
                     shallowest, behind = distance, slot
@@ -201,5 +209,5 @@ def find_gaps(state: ti.template(), body, given, h):
             state.soft.contact_slot[first_slot + count] = slot
             count += 1
         else:
-            _clear_impulses(state.soft, slot)  # a twin's, before another took the place of both
+            _clear_impulses(state.soft, slot)  # a twin's, before one pushing elsewhere took its place
     state.soft.contact_count[body] = count

@@ -79,14 +79,19 @@ def level(z):
 
 
 def test_none_but_the_contacts_keep_an_impulse(candidates):
-    """A twin goes on with the impulse of what bears, and then gives way to one that is less far behind."""
+    """Behind two triangles and before one: its impulse goes to the nearer of those that the vertex is behind,
+    or is lost where that one pushes elsewhere."""
     candidates.place((0, 0, 0), [level(0.02), level(-0.001), level(0.01)])
     candidates.bear(1, 5.0, [1.0, 2.0, 0.0])
-    contacts = candidates.contacts()
-    assert contacts == [2]  # of what the vertex is behind, the nearest
-    for row in {0, 1, 2} - set(contacts):
-        assert candidates.press()[row] == 0.0
-        assert candidates.rub()[row] == [0.0, 0.0, 0.0]
+    assert candidates.contacts() == [2]
+    assert candidates.press() == [0.0, 0.0, 5.0]
+    assert candidates.rub() == [[0.0] * 3, [0.0] * 3, [1.0, 2.0, 0.0]]
+    wall = level(0.01)[:, [2, 0, 1]]
+    candidates.place((0, 0, 0), [level(0.02), level(-0.001), wall])
+    candidates.bear(1, 5.0, [1.0, 2.0, 0.0])
+    assert candidates.contacts() == [2]
+    assert candidates.press() == [0.0] * 3
+    assert candidates.rub() == [[0.0] * 3] * 3
 
 
 @pytest.mark.parametrize("bears", [0, 1])
@@ -99,7 +104,7 @@ def test_in_front_of_an_edge_the_triangle_that_bears_goes_on_whatever_rounding_s
         np.array([ridge[0], ridge[1], [-0.1, 0.0, -0.08]]),
         np.array([ridge[1], ridge[0], [0.1, 0.0, -0.08]]),
     ]
-    rng, seen = np.random.default_rng(1), set()
+    rng = np.random.default_rng(1)
     for _ in range(40):
         vertex = np.array([0.0, 0.01, 0.98 * THICKNESS]) + rng.uniform(-1, 1, 3) * [1e-3, 1e-3, 1e-4]
         away = rng.uniform(-1, 1, 3)  # elsewhere in the world numbers are rounded in another way
@@ -107,9 +112,6 @@ def test_in_front_of_an_edge_the_triangle_that_bears_goes_on_whatever_rounding_s
         candidates.bear(bears, 2.0, [0.1, 0.0, 0.0])
         assert candidates.contacts() == [bears]
         assert candidates.press()[bears] == 2.0
-        candidates.bear(2, 0.0, [0.0, 0.0, 0.0])
-        seen |= set(candidates.contacts())
-    assert seen == {0, 1}  # which of them without, is chance
 
 
 def test_on_a_flat_surface_the_nearest_triangle_bears_however_it_was_before(candidates):
