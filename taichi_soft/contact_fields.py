@@ -151,8 +151,8 @@ class SoftContactFields:
         self.slot_normal = ti.Vector.field(3, ti.f32, outer * SLOTS)  # from the triangle to the vertex
         self.slot_press = ti.field(ti.f32, outer * SLOTS)  # impulse along it in this substep [N s]
         self.slot_rub = ti.Vector.field(3, ti.f32, outer * SLOTS)  # friction on the vertex [N s]
-        # What is in contact in this substep, or before its first one was in the last: slots of each body
-        # from its first slot on. No other slot has an impulse. Of each what its solves share: inverse masses
+        # Contacts of this substep; between a search and the gaps, those of the last one. Slots of each body
+        # from its first slot on; no other slot has an impulse. Of each what its solves share: inverse masses
         # of the vertex and the corners [1/kg]; whether the bodies of the two move (1); normal of the
         # triangle; shares of the corners in what the vertex feels, and height over the triangle times the
         # gradients of the weights.

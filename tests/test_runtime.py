@@ -1,7 +1,6 @@
 """Taichi is started once per process, as asked, or not at all. In processes of their own."""
 
 import inspect
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -42,18 +41,19 @@ def test_thread_counts_that_are_none(threads):
         init("cpu", threads=threads)
 
 
+@binding
 @pytest.mark.parametrize("cores", [[], [0, 0], [-1], [100_000], ["0"], [0.0], "0", 0, [True]])
 def test_cores_that_are_none_to_bind_to(cores):
     with pytest.raises(OptionError, match="cores must be different ones of"):
         init("cpu", cores=cores)
 
 
+@binding
 def test_cores_are_for_as_many_threads_of_the_cpu():
-    first = min(os.sched_getaffinity(0))
     with pytest.raises(OptionError, match="1 CPU threads"):
-        init("cpu", threads=2, cores=[first])
+        init("cpu", threads=2, cores=CORES[:1])
     with pytest.raises(OptionError, match="arch='cuda'"):
-        init("cuda", cores=[first])
+        init("cuda", cores=CORES[:1])
 
 
 def test_threads_are_bound_to_cores_only_where_the_system_can(monkeypatch):
@@ -100,10 +100,7 @@ assert sorted(map(sorted, places)) == [[core] for core in sorted(cores)], places
 assert os.sched_getaffinity(0) == set(cores)
 print("done")
 """
-    done = subprocess.run(
-        [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, timeout=120
-    )
-    assert done.stdout == "done\n", done.stderr
+    assert run(script) == "done\n"
 
 
 @binding
@@ -206,10 +203,7 @@ assert body.positions().tobytes() == before
 world.step(1 / 60)
 print("done")
 """
-    done = subprocess.run(
-        [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, timeout=120
-    )
-    assert done.stdout == "done\n", done.stderr
+    assert run(script) == "done\n"
 
 
 def test_no_device_before_the_start():
@@ -225,9 +219,9 @@ def test_more_threads_than_cores_are_not_waited_for():
     """The flat schedule's threads wait for each other, so there must be no more than run."""
     script = """
 from taichi_soft import Material, World, box, device, init
-import os
+from taichi_soft.cores import available_cores
 init("cpu", threads=64)
-assert device().threads == min(64, len(os.sched_getaffinity(0)))
+assert device().threads == min(64, len(available_cores()))
 init("cpu", threads=64)
 world = World(schedule="flat")
 world.add_body(box(cells=(4, 4, 4)), Material(1e5, 0.2, 1000.0), position=(0, 0, 1))
@@ -235,10 +229,7 @@ world.build()
 world.step(1 / 60, 4)
 print("done")
 """
-    done = subprocess.run(
-        [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, timeout=120
-    )
-    assert done.stdout == "done\n", done.stderr
+    assert run(script) == "done\n"
 
 
 def test_a_taichi_that_someone_else_started_is_left_alone():
@@ -255,10 +246,7 @@ except DeviceError as error:
 assert x[0] == 5.0
 print("done")
 """
-    done = subprocess.run(
-        [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, timeout=120
-    )
-    assert done.stdout.endswith("done\n"), done.stderr
+    assert run(script).endswith("done\n")
 
 
 @ti.func

@@ -31,7 +31,7 @@ def closest_point_on_triangle(x, a, b, c):
         t = ti.min(ti.max(away.dot(along) / ti.max(along.dot(along), _TINY), 0.0), 1.0)
         gap = away - along * t
         distance = gap.dot(gap)
-        is_nearer = distance < best
+        is_nearer = distance < best  # no branch: it would keep lanes from running side by side
         best = ti.select(is_nearer, distance, best)
         v = ti.select(is_nearer, (t, 1.0 - t, 0.0)[edge], v)
         w = ti.select(is_nearer, (0.0, t, t)[edge], w)

@@ -151,6 +151,21 @@ def test_bodies_heaped_in_a_bowl_sleep_outside_each_other_and_stay_where_they_ar
     assert all(body.is_asleep for body in stage.world.bodies)
 
 
+def test_a_heap_that_never_sleeps_comes_to_lie_still_and_does_not_tremble(monkeypatch):
+    """From this start a vertex in front of an edge was thrown to and fro for ever, at 20 mm/s."""
+    demo = load_demo("bowl")
+    monkeypatch.setattr(demo, "SLEEP_SPEED", 0.0)
+    world = demo.stage().world
+    for body in world.bodies:
+        body.set_velocity((7e-4, 0, 0))
+    while world.time < 14.0:
+        world.step(demo.STEP.dt)
+    for _ in range(50):
+        world.step(demo.STEP.dt)
+        fastest = max(np.linalg.norm(body.velocities(), axis=1).max() for body in world.bodies)
+        assert fastest < 1e-3  # [m/s]
+
+
 def test_all_bodies_come_through_the_course_into_the_hollow():
     arrived, stage = run("playground", 12.0)
     assert arrived == len(stage.actors) == 16
