@@ -21,6 +21,7 @@ LAYERS = """
     state  integrators
     kernels
     forces  shapes
+    vibration
     plain  parts
     stability  failures  colliders  control  queries  events  cutting
     measures

@@ -1,9 +1,14 @@
-"""Worlds without floor, one body each."""
+"""Worlds without floor, one body each; and makes `step_oracle` importable."""
+
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from taichi_soft import World
+
+sys.path.insert(0, str(Path(__file__).parent))
 
 
 @pytest.fixture
