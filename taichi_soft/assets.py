@@ -12,9 +12,10 @@ from taichi_soft.checks import as_count, as_indices, as_rotation, as_vector
 from taichi_soft.constants import POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.contact import DEFAULT_CONTACT, THIN, Contact
 from taichi_soft.errors import MaterialError, OptionError
+from taichi_soft.first_mode import first_frequency
 from taichi_soft.laws import ElementModel, element_model, fit_model
-from taichi_soft.materials import AnyMaterial
-from taichi_soft.meshing import BodyMesh
+from taichi_soft.materials import AnyMaterial, Material, SpringMaterial
+from taichi_soft.meshing import BodyMesh, ParticleMesh
 from taichi_soft.meshing.arrays import read_only
 from taichi_soft.plasticity import Plasticity
 from taichi_soft.scene import BodyArrays, BodyDescription, arrange, require_size
@@ -24,6 +25,10 @@ from taichi_soft.types import DampingModel, Flips, Strain
 
 Floats = NDArray[np.float64]
 Floats32 = NDArray[np.float32]
+
+DAMPING_INTERVAL = 0.2
+"""Between two times that vibrations are damped, over the time in which the first mode turns by a radian: 30
+times in its period."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,6 +119,38 @@ class SoftBodyAsset:
     def stable_step(self) -> StableStep:
         """Estimate of the largest stable substep."""
         return stable_step(self.mesh, self.material, self.description.model)
+
+    @cached_property
+    def first_frequency(self) -> float:
+        """Angular frequency of the body's slowest vibration where nothing holds it [rad/s], a little above the
+        true one; 0 for ropes and cloth, which bend freely."""
+        return 0.0 if isinstance(self.mesh, ParticleMesh) else first_frequency(self.description)
+
+    def vibration_row(self, material: AnyMaterial) -> tuple[float, float]:
+        """How vibrations of a body of this asset fade if it is made of a material: at what rate [1/s], and after
+        what time at most they are damped again [s].
+
+        Of another material the frequency goes with the root of its mean stiffness over its mass.
+        """
+        if (
+            isinstance(material, SpringMaterial)
+            or material.damping_ratio == 0.0
+            or self.first_frequency == 0.0
+        ):
+            return 0.0, 1.0
+        frequency = self.first_frequency
+        if material is not self.material:
+            frequency *= float(np.sqrt(self._stiffness(material) / self._stiffness(self.material)))
+        return 2.0 * material.damping_ratio * frequency, DAMPING_INTERVAL / max(frequency, 1e-6)
+
+    def _stiffness(self, material: AnyMaterial) -> float:
+        """Mean stiffness of a material over its mean density, but for a factor [m^2/s^2]."""
+        count, volumes = len(self.mesh.tets), self.mesh.volumes
+        if isinstance(material, Material):
+            stiffness = material.per_tet("young", count)
+        else:
+            stiffness = np.trace(material.stiffness_matrices(count), axis1=1, axis2=2)
+        return float(volumes @ stiffness / (volumes @ material.per_tet("density", count)))
 
     @cached_property
     def surface_row(self) -> tuple[float, float, float]:

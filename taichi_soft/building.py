@@ -72,7 +72,7 @@ def build(world: World) -> Simulation:
         contact.sleep_speed > 0.0,
         state,
         program,
-        make_launch(settings.schedule, state, program, scene, device),
+        make_launch(settings.schedule, state, program, scene, device, settings.retries),
         EventLog(Witness(state, scene, pools.slots, colliders if has_contact else None)),
         tears,
     )
@@ -150,11 +150,12 @@ def _fill(world: World, state: State, program: Program) -> None:
         fill(state.body_plasticity, np.array(flows))
     if program.has_contact:
         fill(state.contact.body_filter, np.array([(a.contact.group, a.contact.mask) for a in assets]))
-        fill(state.contact.body_edge, np.array([a.surface_row[2] for a in assets]))
     if program.has_soft_contact:
         fill(state.soft.body_surface, np.array([a.surface_row for a in assets]))
         fill(state.soft.body_touches_itself, np.array([a.contact.itself for a in assets]))
-    state.load(world._scene, [program.models.index(asset.description.model) for asset in assets])
+    models = [program.models.index(asset.description.model) for asset in assets]
+    kinds = np.array([(a.surface_row[2], *a.vibration_row(a.material)) for a in assets])
+    state.load(world._scene, models, kinds)
 
 
 def _warm_up(world: World, state: State) -> None:
@@ -170,6 +171,7 @@ def _warm_up(world: World, state: State) -> None:
 def _set(settings: Settings, state: State) -> None:
     """Write the numbers that hold for all bodies."""
     state.gravity[None] = settings.gravity.tolist()
+    state.retries[None] = settings.retries
     state.floor[None] = [settings.floor or 0.0, settings.restitution or 0.0, settings.friction]
     if settings.is_implicit:
         state.solver[None] = [settings.tolerance, settings.most_iterations]

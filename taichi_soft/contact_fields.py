@@ -89,8 +89,6 @@ class ContactFields:
         # Beside the velocity that its island shares [m/s]; by leapfrog of what was touched before the push.
         self.body_speed_beside = ti.field(ti.f32, bodies)  # of its fastest particle
         self.body_mean_beside = ti.field(ti.f32, bodies)  # root mean square over particles
-        self.body_edge = ti.field(ti.f32, bodies)  # mean edge of its surface [m]
-        self.prev_reaction = ti.Vector.field(3, ti.f32, particles)  # `particle_reaction` before the step
         self.particle_clearance = ti.field(ti.f32, particles)  # [m] from all that is near, at that time
         self.particle_touches = ti.field(ti.i32, particles)  # 1 where something held it in the last substep
 

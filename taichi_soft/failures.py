@@ -33,12 +33,13 @@ class FailedStep:
     time: float  # [s], before it
     substeps: int  # of the last attempt at it
     h: float  # [s]
+    is_braked: bool  # whether vibrations were braked in it
 
 
 def find_failure(state: State, program: Program, scene: Scene, body: int, failed: FailedStep) -> Failure:
     """Make the step that froze a body again and see where it breaks; the body stays as it is."""
     found = np.full(2, -1, dtype=np.int32)
-    find_broken_element(state, program, body, failed.substeps, failed.h, found)
+    find_broken_element(state, program, body, failed.substeps, failed.h, int(failed.is_braked), found)
     element, substep = found.tolist()
     if element < 0:
         return Failure(body, None, failed.step, None, failed.time)

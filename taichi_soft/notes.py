@@ -61,7 +61,7 @@ def _body_note(body: Body) -> list[Any]:
     return [
         body._serial,
         body._first_step,
-        None if failed is None else [failed.step, failed.time, failed.substeps, failed.h],
+        None if failed is None else [failed.step, failed.time, failed.substeps, failed.h, failed.is_braked],
         _material_note(body._description) if is_own else None,
         [[a._serial, a.frame._number, a.two_way, a.particles.tolist()] for a in body._attachments],
         None if body._part is None else body._part.note,
@@ -209,7 +209,7 @@ def _read_body(
         int(first_step),
         None
         if failed is None
-        else FailedStep(int(failed[0]), float(failed[1]), int(failed[2]), float(failed[3])),
+        else FailedStep(int(failed[0]), float(failed[1]), int(failed[2]), float(failed[3]), bool(failed[4])),
         part,
         description,
         arrays,

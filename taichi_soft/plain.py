@@ -25,10 +25,10 @@ from taichi_soft.shapes import BoxShape, CapsuleShape, HeightFieldShape, MeshSha
 FIELDS: dict[type, tuple[str, ...]] = {
     TetMesh: ("vertices", "tets"),
     ParticleMesh: ("vertices", "edges", "masses", "surface"),
-    Material: ("young", "poisson", "density", "damping", "shear_modulus", "shear_damping"),
+    Material: ("young", "poisson", "density", "damping", "shear_modulus", "shear_damping", "damping_ratio"),
     SpringMaterial: ("stiffness", "damping", "rest_length"),
     Stiffness: ("matrix",),
-    AnisotropicMaterial: ("stiffness", "density", "damping", "frame"),
+    AnisotropicMaterial: ("stiffness", "density", "damping", "frame", "damping_ratio"),
     Contact: ("friction", "thickness", "itself", "group", "mask"),
     Plasticity: ("yield_stress", "yield_strain", "creep", "maximum"),
     PlaneShape: ("normal",),

@@ -21,6 +21,7 @@ class Settings:
     integrator: Integrator
     tolerance: float  # of implicit solves: residual over right-hand side
     most_iterations: int  # of an implicit solve
+    retries: int  # how often a step that fails is made again, twice as fine each time
     schedule: Schedule  # as chosen by `World.build`; AUTO before where it is left open
 
     @property

@@ -17,7 +17,7 @@ from taichi_soft.control.frames import Frames
 from taichi_soft.errors import DroppedEventsWarning, OptionError, SolverWarning, StateError
 from taichi_soft.events import EventLog
 from taichi_soft.failures import FailedStep, Failure, find_failure
-from taichi_soft.kernels.contact_step import ALL_SLEEP, MOST_FINER
+from taichi_soft.kernels.contact_step import ALL_SLEEP
 from taichi_soft.kernels.implicit_euler import MOST_PIECES
 from taichi_soft.kernels.program import Program
 from taichi_soft.kernels.readout import write_motion
@@ -95,15 +95,15 @@ class Simulation:
     def _note_failures(self, substeps: int, h: float) -> list[str]:
         """Mark the bodies that the last step froze; a line about each."""
         clock, reports = self.clock, []
-        # Among colliders what freezes a body is the finest of several attempts.
-        finer = 1
-        if self.program.has_contact:
-            finer = MOST_PIECES if self.settings.is_implicit else MOST_FINER
+        # What freezes a body is the last of several attempts.
+        finer, is_braked = 1 << self.settings.retries, self.settings.retries > 0
+        if self.settings.is_implicit:
+            finer, is_braked = MOST_PIECES if self.program.has_contact else 1, False
         status = self.state.body_status.to_numpy()
         for body in self.pools.living:
             if status[body.index] != FROZEN or body.is_frozen:
                 continue
-            body._frozen_in = FailedStep(clock.steps, clock.time, finer * substeps, h / finer)
+            body._frozen_in = FailedStep(clock.steps, clock.time, finer * substeps, h / finer, is_braked)
             self.events.note_frozen(body)
             reports.append(
                 f"body {body.index} went non-finite in step {clock.steps}: put back to t = "

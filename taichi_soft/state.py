@@ -134,6 +134,7 @@ class State:
         self.particle_target = ti.Vector.field(3, real, n)  # there [m], or in the axes of a frame
         self.particle_push = ti.Vector.field(3, real, n)  # [N], where the body is `PUSHED`
         self.particle_reaction = ti.Vector.field(3, real, n)  # [N s] on what holds it, in the last step
+        self.prev_reaction = ti.Vector.field(3, real, n)  # the same before the step
 
         self.tet_vertices = ti.field(ti.i32, b * 4 * LANES)
         self.tet_rest_inverse = ti.field(real, b * 9 * LANES)  # [1/m], column by column
@@ -203,6 +204,16 @@ class State:
         self.body_drives = ti.field(ti.i32, bodies)  # bits: what a game does to the body
         self.body_gravity_scale = ti.field(real, bodies)
         self.body_damping = ti.field(real, bodies)  # of velocities against the world [1/s]
+        self.body_fading = ti.field(real, bodies)  # of vibrations [1/s]
+        self.body_fading_interval = ti.field(
+            real, bodies
+        )  # after which they are damped again at the latest [s]
+        self.body_is_braked = ti.field(ti.i32, bodies)  # 1 while a step is made for the last time
+        self.body_jolted = ti.field(ti.i32, bodies)  # 1 where forces moved a particle too far at once (flat)
+        self.body_edge = ti.field(real, bodies)  # mean edge of its surface [m]
+        self.retries = ti.field(
+            ti.i32, ()
+        )  # how often a step that fails is made again, twice as fine each time
         self.block_model = ti.field(ti.i32, b)
 
         self.grab_body = ti.field(ti.i32, MOST_GRABS)  # its number plus 1, 0 where nothing is held
@@ -226,10 +237,11 @@ class State:
         self.wind = ti.Vector.field(4, real, ())  # [m/s], density times drag coefficient [kg/m^3]
         self.floor = ti.Vector.field(3, real, ())  # height [m], restitution, friction
 
-    def load(self, scene: Scene, models: list[int]) -> None:
+    def load(self, scene: Scene, models: list[int], kinds: NDArray[np.float64] | None = None) -> None:
         """Fill every field from `scene`, and those that `loader` has rows for already.
 
-        `models[i]` is the number of body i's force model.
+        `models[i]` is the number of body i's force model, `kinds[i]` its `body_edge`, `body_fading` and
+        `body_fading_interval`.
 
         All bodies are absent, and their particles where their meshes are, until `spawn_body` places them.
         """
@@ -292,6 +304,12 @@ class State:
         fill(self.body_drives, np.zeros(0))
         fill(self.grab_body, np.zeros(0))
         fill(self.body_damping, np.zeros(0))
+        fill(self.body_is_braked, np.zeros(0))
+        fill(self.body_jolted, np.zeros(0))
+        rows = np.zeros((len(bodies), 3)) if kinds is None else kinds
+        fill(self.body_edge, rows[:, 0])
+        fill(self.body_fading, rows[:, 1])
+        fill(self.body_fading_interval, rows[:, 2])
         self.wind[None] = [0.0, 0.0, 0.0, 0.0]
         fill(self.body_gravity_scale, np.ones(self.capacity.bodies))
         fill(self.block_model, np.repeat(models, [r.blocks[1] - r.blocks[0] for r in ranges]))

@@ -31,6 +31,10 @@ class Vibration(ABC):
     def is_damped(self) -> bool:
         """Whether C is not zero."""
 
+    def diagonal(self) -> Floats:
+        """About the diagonal of K, (3 n,) [1/s^2], up to a factor: to precondition with."""
+        return np.ones(3 * len(self.root_mass))
+
     @abstractmethod
     def apply(self, u: Floats, h: float | None = None) -> Floats:
         """K u [1/s^2]; with `h` [s] what decides a substep of that length, (h^2 K + 2 h C) u."""
@@ -78,6 +82,11 @@ class TetVibration(Vibration):
         if h is not None and self._dampers is not None:
             total += 2 * h * self._dampers.apply(displaced)
         return np.asarray(total / self.root_mass)
+
+    def diagonal(self) -> Floats:
+        """As `Vibration.diagonal`."""
+        own = np.diagonal(self._matrices, axis1=1, axis2=2).reshape(-1, 4, 3, 1)
+        return np.asarray(self._tets.sum(own) / self.root_mass**2).ravel()
 
     def element_bounds(self) -> Floats:
         """Largest w^2 of every tetrahedron on its own quarter masses, (m,) [1/s^2]: none of the body is above

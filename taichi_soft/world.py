@@ -57,6 +57,9 @@ from taichi_soft.substeps import Substeps
 from taichi_soft.tearing import Tearing
 from taichi_soft.types import DampingModel, Flips, Integrator, Schedule, Strain
 
+MOST_RETRIES = 10
+"""A thousand times as many substeps as were asked for."""
+
 Happened = TypeVar("Happened", bound=Event)
 
 
@@ -84,6 +87,9 @@ class World(Handle):
         collider_room: colliders that may be added after `build`, beside those added before.
         sample_room: samples of their grids, beside those of colliders added before: a `HeightFieldShape` or
             `MeshShape` takes `len(shape.samples)`, as long as its collider is there.
+        retries: how often a step that fails for a body is made again, twice as fine each time, and then once
+            more with its vibrations braked; 0 freezes the body at once, to see what a law does at a given
+            step. Implicit Euler cuts its steps by itself.
         record: steps that a flight recorder keeps, with all calls between them; 0 keeps nothing. See
             `save_recording`.
         record_to: file that it writes when a body freezes, the first time that this happens.
@@ -105,6 +111,7 @@ class World(Handle):
         sleep_speed: float = 0.0,
         collider_room: int = 0,
         sample_room: int = 0,
+        retries: int = 3,
         record: int = 0,
         record_to: str | Path = "frozen.recording",
     ) -> None:
@@ -120,6 +127,7 @@ class World(Handle):
             integrator=Integrator.parse(integrator),
             tolerance=as_number(tolerance, "tolerance", 1e-6, 0.5),
             most_iterations=as_count(most_iterations, "most_iterations"),
+            retries=as_count(retries, "retries", 0, MOST_RETRIES),
             schedule=Schedule.parse(schedule),
         )
         if self.settings.is_implicit and self.settings.schedule is Schedule.FLAT:

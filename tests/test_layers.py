@@ -23,7 +23,7 @@ LAYERS = """
     forces  shapes
     vibration
     plain  parts
-    stability  failures  colliders  control  queries  events  cutting
+    stability  first_mode  failures  colliders  control  queries  events  cutting
     measures
     tearing  readout  substeps
     body  assets  pools

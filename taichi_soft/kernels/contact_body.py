@@ -1,12 +1,11 @@
 """What a fixed step does to one body among colliders before its first substep, and after its last."""
 
 from taichi_soft.kernels.collide import forget_contacts
-from taichi_soft.kernels.motion import remember_particle
-from taichi_soft.kernels.per_body import end_body
+from taichi_soft.kernels.per_body import end_body, remember_body
 from taichi_soft.kernels.rebound import begin_rebounds
 from taichi_soft.kernels.soft_search import forget_candidates
 from taichi_soft.runtime import ti
-from taichi_soft.state import ABSENT, ACTIVE, FEELS_REACTION
+from taichi_soft.state import ABSENT, ACTIVE
 from taichi_soft.types import Integrator
 
 
@@ -14,14 +13,11 @@ from taichi_soft.types import Integrator
 def begin_body(state: ti.template(), program: ti.template(), body):
     """Remember how a body is, to put it back there, and forget what it touched in the last step."""
     if state.body_status[body] != ABSENT:
+        remember_body(state, body)
         particles = state.body_particles[body]
-        for p in range(particles[0], particles[1]):
-            remember_particle(state, p)
-            if ti.static(state.capacity.implicit):
-                state.prev_contact[p] = state.particle_contact[p]
-        if state.body_drives[body] & FEELS_REACTION != 0:
+        if ti.static(state.capacity.implicit):
             for p in range(particles[0], particles[1]):
-                state.contact.prev_reaction[p] = state.particle_reaction[p]
+                state.prev_contact[p] = state.particle_contact[p]
         begin_rebounds(state, body)
         forget_contacts(state, body)
         state.contact.is_wild[body] = 0

@@ -6,19 +6,17 @@ move anything, and what it changes of joints they make good in the next substep.
 
 Substeps are chosen for small deformation; an impact faster than sound flattens tetrahedra, which are stiffer
 then. Where a step ends non-finite, or forces moved a particle by more than `JOLT` edges at once, the island
-is put back to where it was, and makes the step again with twice as many substeps, up to `MOST_FINER` times
-as many.
+is put back to where it was, and makes the step again with twice as many substeps, and so on, as a body alone
+does in `per_body`.
 """
 
 from taichi_soft.contact_fields import NO_CONTACT
 from taichi_soft.kernels.collide import forget_contacts
 from taichi_soft.kernels.contact_substep import has_drifted, is_clear
 from taichi_soft.kernels.implicit_euler import MOST_PIECES, keeps_shape
-from taichi_soft.kernels.internal_forces import clear_forces
 from taichi_soft.kernels.islands import find_islands
 from taichi_soft.kernels.joints import solve_joints
-from taichi_soft.kernels.motion import restore_particle
-from taichi_soft.kernels.per_body import body_is_sound
+from taichi_soft.kernels.per_body import body_is_sound, fineness, last_attempt, put_back_body
 from taichi_soft.kernels.rebound import take_back_rebounds
 from taichi_soft.kernels.sleep import settle_island, wake_by_colliders, wake_island
 from taichi_soft.kernels.soft_contact import solve_island
@@ -39,7 +37,7 @@ from taichi_soft.kernels.teamwork import (
 )
 from taichi_soft.kernels.touches import add_touches, forget_touches
 from taichi_soft.runtime import ti
-from taichi_soft.state import ACTIVE, FEELS_REACTION, JOINED
+from taichi_soft.state import ACTIVE, JOINED
 from taichi_soft.types import Integrator
 
 ALL_SLEEP = -1
@@ -52,29 +50,30 @@ BLOW = 0.1
 """Mean edges within a substep from which a body that is struck may strike the next one in the same substep.
 Less far it may go into that, and is put out of it again."""
 
-MOST_FINER = 8
-"""Times as many substeps as asked for, at most."""
-
 
 @ti.func
 def _take_back(state: ti.template(), program: ti.template(), island):
     """Put an island back to where it was before the step."""
     for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
         body = state.contact.island_body[i]
+        put_back_body(state, body)
         particles = state.body_particles[body]
-        for p in range(particles[0], particles[1]):
-            restore_particle(state, p)
-            if ti.static(state.capacity.implicit):
+        if ti.static(state.capacity.implicit):
+            for p in range(particles[0], particles[1]):
                 state.particle_contact[p] = state.prev_contact[p]
-            if state.body_drives[body] & FEELS_REACTION != 0:
-                state.particle_reaction[p] = state.contact.prev_reaction[p]
-        clear_forces(state, body)
         take_back_rebounds(state, body)
         forget_contacts(state, body)
         if ti.static(program.has_soft_contact):
             forget_candidates(state, body)  # for good, as the island looks for others before it goes on
     if ti.static(program.has_soft_contact):
         forget_touches(state, island)
+
+
+@ti.func
+def _brake(state: ti.template(), island, is_braked):
+    """Brake the vibrations of all that is in an island sharply (1), or no longer (0)."""
+    for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
+        state.body_is_braked[state.contact.island_body[i]] = is_braked
 
 
 @ti.func
@@ -181,7 +180,7 @@ def _compare_speeds(state: ti.template(), island, h):
             if state.contact.is_wild[body] == 0:
                 striking = ti.max(striking, 2.0 * state.contact.body_mean_beside[body])
             is_gentle = is_gentle & state.contact.is_gentle[body]
-        least_edge = ti.min(least_edge, state.contact.body_edge[body])
+        least_edge = ti.min(least_edge, state.body_edge[body])
     return highest, ti.select(striking * h > BLOW * least_edge, striking, 0.0), is_gentle
 
 
@@ -220,7 +219,7 @@ def _move_island(state: ti.template(), program: ti.template(), island, substeps,
     for s in range(substeps):
         since, left = s * h, h * (substeps - s)
         way = h * ti.cast(is_alone & is_clear(state, first_body, fastest * h), ti.f32)
-        work_on(state, program, island, OWNER, PUSH, ti.Vector([h, since, way, 0.0]), common)
+        work_on(state, program, island, OWNER, PUSH, ti.Vector([h, since, way, h * substeps]), common)
         fastest, striking, gently = _compare_speeds(state, island, h)
         is_gentle = is_gentle & gently
         has_moved = 0
@@ -255,15 +254,23 @@ def _step_awake_island(state: ti.template(), program: ti.template(), island, sub
     first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
     nothing = ti.Vector.zero(ti.f32, 4)
     work_on(state, program, island, OWNER, BEGIN, nothing, nothing.xyz)
-    finer, is_open = 1, 1
+    attempt, finer, is_open = 0, 1, 1
+    retries, last_one = state.retries[None], last_attempt(state.retries[None])
+    if ti.static(program.integrator == Integrator.IMPLICIT_EULER):
+        retries = ti.static(MOST_PIECES.bit_length() - 1)
+        last_one = retries
     while is_open == 1:
-        is_gentle = _move_island(state, program, island, finer * substeps, h / finer, int(finer > 1))
-        most = MOST_PIECES if ti.static(program.integrator == Integrator.IMPLICIT_EULER) else MOST_FINER
-        if finer == most or (is_gentle & _island_is_sound(state, island)) == 1:
+        finer = fineness(retries, attempt)
+        is_gentle = _move_island(state, program, island, finer * substeps, h / finer, int(attempt > 0))
+        if attempt == last_one or (is_gentle & _island_is_sound(state, island)) == 1:
             is_open = 0
         else:
             _take_back(state, program, island)
-            finer *= 2
+            attempt += 1
+            if attempt > retries:
+                _brake(state, island, 1)
+    if attempt > retries:
+        _brake(state, island, 0)
     numbers = ti.Vector([finer * substeps, h / finer, 0.0, 0.0])
     work_on(state, program, island, OWNER, FINISH, numbers, nothing.xyz)
     failed = 0

@@ -10,9 +10,10 @@ from taichi_soft.kernels.grabs import pull_grabs
 from taichi_soft.kernels.implicit_contact import kick_implicitly
 from taichi_soft.kernels.internal_forces import accumulate_forces
 from taichi_soft.kernels.motion import gravity_on
-from taichi_soft.kernels.per_body import before_kick
+from taichi_soft.kernels.per_body import JOLT, before_kick
 from taichi_soft.kernels.rebound import limit_rebounds
 from taichi_soft.kernels.sleep import note_motion
+from taichi_soft.kernels.vibration import damp_vibration
 from taichi_soft.math.tensors import widened
 from taichi_soft.runtime import ti
 from taichi_soft.types import Integrator
@@ -20,10 +21,6 @@ from taichi_soft.types import Integrator
 WILD = 20.0
 """Way of a particle within one substep, over the mean edge of its body's surface, from which the body is
 taken to be exploding: others pass through it until it is frozen or calm."""
-
-JOLT = 1.0
-"""Way by which the forces of one substep may move a particle within it, over the mean edge of its body's
-surface. Vibrations of a stable substep stay below it."""
 
 
 @ti.func
@@ -115,8 +112,10 @@ def _kick_body(state: ti.template(), program: ti.template(), body, kick, way, co
 
 
 @ti.func
-def push_body(state: ti.template(), program: ti.template(), body, h, since, way, common):
-    """New velocities from all but contact and joints; leapfrog also moves particles for `way` [s].
+def push_body(state: ti.template(), program: ti.template(), body, h, since, way, whole, common):
+    """New velocities from all but contact and joints, in one substep of a step of `whole` [s].
+
+    Leapfrog also moves particles for `way` [s].
 
     Notes the highest speed [m/s], the highest and the mean beside the `common` velocity, and whether forces
     moved no particle too far at once.
@@ -126,10 +125,12 @@ def push_body(state: ti.template(), program: ti.template(), body, h, since, way,
         kick = 0.5 * (state.body_velocity_lag[body] + h)
     speed, is_gentle = ti.cast(0.0, state.real), 1
     speed_beside, mean_beside = ti.cast(0.0, state.real), ti.cast(0.0, state.real)
-    edge = state.contact.body_edge[body]
+    edge = state.body_edge[body]
     blow_on(state, body, h)
     push_particles(state, body, before_kick(program, h, is_first))
+    s, substeps = ti.cast(ti.round(since / h), ti.i32), ti.cast(ti.round(whole / h), ti.i32)
     if ti.static(program.integrator == Integrator.IMPLICIT_EULER):
+        damp_vibration(state, body, 0.0, h, s, substeps)
         speed, speed_beside = kick_implicitly(state, program, body, h, since, is_first, common)
         mean_beside = speed_beside
     else:
@@ -137,6 +138,7 @@ def push_body(state: ti.template(), program: ti.template(), body, h, since, way,
         accumulate_forces(state, program, body)
         add_reactions(state, body, lasting)
         pull_grabs(state, body, h, lasting)
+        damp_vibration(state, body, lasting, h, s, substeps)
         speed, speed_beside, mean_beside, change = _kick_body(state, program, body, kick, way, common)
         is_gentle = int(change * h <= JOLT * edge)
     # Bodies beside each other in a field share a cache line, which every write takes from other threads: what

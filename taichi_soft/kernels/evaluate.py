@@ -84,6 +84,7 @@ def find_broken_element(
     body: ti.i32,
     substeps: ti.i32,
     h: ti.f32,
+    is_braked: ti.i32,
     found: ti.types.ndarray(dtype=ti.i32, ndim=1),
 ):
     """Make the last step of a frozen body again, up to the substep in which it breaks, and undo it.
@@ -96,6 +97,7 @@ def find_broken_element(
     for _ in range(1):
         kick = 0.5 * (state.body_velocity_lag[body] + h)
         is_open = 1
+        state.body_is_braked[body] = is_braked
         for s in range(substeps + 1):
             if is_open == 1:
                 broken = accumulate_forces_one_by_one(state, program, body)
@@ -105,8 +107,9 @@ def find_broken_element(
                     is_open = 0
                 else:
                     clear_forces(state, body)
-                    advance_body(state, program, body, h, kick, int(s == 0))
+                    advance_body(state, program, body, h, kick, s, substeps)
                     kick = h
+        state.body_is_braked[body] = 0
         particles = state.body_particles[body]
         for p in range(particles[0], particles[1]):
             restore_particle(state, p)

@@ -14,18 +14,22 @@ from taichi_soft.constants import LANES
 from taichi_soft.kernels.bonds import lane_pressure, store_block_pressures
 from taichi_soft.kernels.edges import edge_force_of
 from taichi_soft.kernels.elastic import store_block_forces, store_lane_forces
+from taichi_soft.kernels.internal_forces import clear_forces
 from taichi_soft.kernels.motion import (
     gravity_on,
-    move_particle,
+    moved_particle,
     particle_is_sound,
     remember_particle,
     restore_particle,
 )
+from taichi_soft.kernels.per_body import JOLT
 from taichi_soft.kernels.plasticity import flow_block
+from taichi_soft.kernels.vibration import damp_vibration, kept_vibration
+from taichi_soft.math.tensors import widened
 from taichi_soft.runtime import ti
 from taichi_soft.state import ABSENT, ACTIVE, FROZEN
 
-_FAILING = 4  # above the status of any body
+_FAILING, _DONE = 4, 5  # above the status of any body: the step is made again, or need not be
 
 
 @ti.func
@@ -83,19 +87,56 @@ def gathered_force(state: ti.template(), p):
 
 
 @ti.func
-def _move_phase(state: ti.template(), program: ti.template(), p, h, is_first):
-    body = state.particle_body[p]
-    if state.body_status[body] == ACTIVE:
-        kick = h
-        if is_first:
-            kick = 0.5 * (state.body_velocity_lag[body] + h)
-        move_particle(state, program, p, gathered_force(state, p), gravity_on(state, body), h, kick)
+def _kick_of(state: ti.template(), body, h, s):
+    return ti.select(s == 0, 0.5 * (state.body_velocity_lag[body] + h), h)
 
 
 @ti.func
-def _check_phase(state: ti.template(), p):
-    if _status_of(state, p) == ACTIVE and particle_is_sound(state, p) == 0:
-        ti.atomic_max(state.body_status[state.particle_body[p]], _FAILING)
+def _move_phase(state: ti.template(), program: ti.template(), p, h, s):
+    body = state.particle_body[p]
+    if state.body_status[body] == ACTIVE:
+        kick = _kick_of(state, body, h, s)
+        force, gravity = gathered_force(state, p), gravity_on(state, body)
+        x, v, a = moved_particle(state, program, p, force, gravity, h, kick)
+        state.particle_position[p] = x
+        state.particle_velocity[p] = v
+        if not (kick * a.norm() * h <= JOLT * state.body_edge[body]):
+            state.body_jolted[body] = 1
+
+
+@ti.func
+def _is_damped_now(state: ti.template(), body, h, s, substeps):
+    return state.body_status[body] == ACTIVE and kept_vibration(state, body, h, s, substeps) < 1.0
+
+
+@ti.func
+def _gather_phase(state: ti.template(), p, h, s, substeps):
+    """Forces of bodies whose vibrations are damped now, to where damping reads them."""
+    if _is_damped_now(state, state.particle_body[p], h, s, substeps):
+        state.particle_force[p] = widened(gathered_force(state, p))
+
+
+@ti.func
+def _damp_phase(state: ti.template(), body, h, s, substeps):
+    if _is_damped_now(state, body, h, s, substeps):
+        damp_vibration(state, body, _kick_of(state, body, h, s), h, s, substeps)
+        clear_forces(state, body)
+
+
+@ti.func
+def _begin_phase(state: ti.template(), p, is_again):
+    """Remember a particle; where its body makes the step again, it was put back."""
+    if is_again == 0:
+        _remember_phase(state, p)
+
+
+@ti.func
+def _check_phase(state: ti.template(), p, is_last):
+    body = state.particle_body[p]
+    if state.body_status[body] == ACTIVE:
+        is_jolted = is_last == 0 and state.body_jolted[body] == 1
+        if is_jolted or particle_is_sound(state, p) == 0:
+            ti.atomic_max(state.body_status[body], _FAILING)
 
 
 @ti.func
@@ -112,14 +153,27 @@ def _flow_phase(state: ti.template(), block, dt):
 
 
 @ti.func
-def _settle_body(state: ti.template(), body, h):
+def _settle_body(state: ti.template(), body, h, is_braked, is_last):
+    """Returns 1 for a body that failed: it makes the step again, or is frozen after the last attempt."""
     failed = 0
+    state.body_jolted[body] = 0
     if state.body_status[body] == _FAILING:
-        state.body_status[body] = FROZEN
+        state.body_status[body] = ti.select(is_last == 1, FROZEN, ACTIVE)
+        state.body_is_braked[body] = is_braked
         failed = 1
     elif state.body_status[body] == ACTIVE:
         state.body_velocity_lag[body] = h
+        state.body_status[body] = _DONE
     return failed
+
+
+@ti.func
+def _end_step(state: ti.template(), body_count):
+    """After the last attempt: bodies for which the step is done can make the next one."""
+    for body in range(body_count):
+        state.body_is_braked[body] = 0
+        if state.body_status[body] == _DONE:
+            state.body_status[body] = ACTIVE
 
 
 @ti.func
@@ -142,8 +196,11 @@ def step_flat_cpu(
     particle_count: ti.i32,
     substeps: ti.i32,
     h: ti.f32,
+    attempt: ti.i32,
+    attempts: ti.i32,
 ) -> ti.i32:
-    """One fixed step of all bodies by `program.worker_count` threads. Returns how many failed."""
+    """One attempt, of `attempts`, at a fixed step of all bodies that have not made it yet, by
+    `program.worker_count` threads. Returns how many failed."""
     failed = 0
     state.barrier[0] = 0
     ti.loop_config(block_dim=1)
@@ -153,7 +210,7 @@ def step_flat_cpu(
         b0, b1 = block_count * worker // workers, block_count * (worker + 1) // workers
         e0, e1 = edge_count * worker // workers, edge_count * (worker + 1) // workers
         for p in range(p0, p1):
-            _remember_phase(state, p)
+            _begin_phase(state, p, attempt)
         for s in range(substeps):
             for block in range(b0, b1):
                 _block_phase(state, program, block)
@@ -162,11 +219,21 @@ def step_flat_cpu(
             for e in range(e0, e1):
                 _edge_phase(state, program, e)
             _meet(state, workers)
+            is_damped = 0
+            for body in range(body_count):
+                is_damped = is_damped | int(_is_damped_now(state, body, h, s, substeps))
+            if is_damped == 1:
+                for p in range(p0, p1):
+                    _gather_phase(state, p, h, s, substeps)
+                _meet(state, workers)
+                for i in range((body_count - worker + workers - 1) // workers):
+                    _damp_phase(state, worker + i * workers, h, s, substeps)
+                _meet(state, workers)
             for p in range(p0, p1):
-                _move_phase(state, program, p, h, s == 0)
+                _move_phase(state, program, p, h, s)
             _meet(state, workers)
         for p in range(p0, p1):
-            _check_phase(state, p)
+            _check_phase(state, p, int(attempt == attempts - 1))
         _meet(state, workers)
         for p in range(p0, p1):
             _fall_back_phase(state, p)
@@ -174,8 +241,12 @@ def step_flat_cpu(
             for block in range(b0, b1):
                 _flow_phase(state, block, substeps * h)
     ti.loop_config(serialize=True)
-    for body in range(body_count):
-        failed += _settle_body(state, body, h)
+    for _ in range(1):
+        for body in range(body_count):
+            is_last = int(attempt == attempts - 1)
+            failed += _settle_body(state, body, h, int(attempt == attempts - 2), is_last)
+        if failed == 0 or attempt == attempts - 1:
+            _end_step(state, body_count)
     return failed
 
 
@@ -190,11 +261,13 @@ def begin_flat(state: ti.template(), particle_count: ti.i32):
 def substep_flat(
     state: ti.template(),
     program: ti.template(),
+    body_count: ti.i32,
     block_count: ti.i32,
     edge_count: ti.i32,
     particle_count: ti.i32,
+    substeps: ti.i32,
     h: ti.f32,
-    is_first: ti.i32,
+    s: ti.i32,
 ):
     """One substep with one tetrahedron, edge or particle per thread."""
     for t in range(block_count * LANES):
@@ -209,7 +282,11 @@ def substep_flat(
     for e in range(edge_count):
         _edge_phase(state, program, e)
     for p in range(particle_count):
-        _move_phase(state, program, p, h, is_first)
+        _gather_phase(state, p, h, s, substeps)
+    for body in range(body_count):
+        _damp_phase(state, body, h, s, substeps)
+    for p in range(particle_count):
+        _move_phase(state, program, p, h, s)
 
 
 @ti.kernel
@@ -221,16 +298,27 @@ def end_flat(
     particle_count: ti.i32,
     substeps: ti.i32,
     h: ti.f32,
+    attempt: ti.i32,
+    attempts: ti.i32,
 ) -> ti.i32:
-    """Freeze what went non-finite. Returns how many bodies failed."""
+    """After the substeps of an attempt at a step: put back what failed. Returns how many bodies did."""
     failed = 0
     for p in range(particle_count):
-        _check_phase(state, p)
+        _check_phase(state, p, int(attempt == attempts - 1))
     for p in range(particle_count):
         _fall_back_phase(state, p)
     if ti.static(program.has_plasticity):
         for block in range(block_count):
             _flow_phase(state, block, substeps * h)
     for body in range(body_count):
-        failed += _settle_body(state, body, h)
+        is_last = int(attempt == attempts - 1)
+        failed += _settle_body(state, body, h, int(attempt == attempts - 2), is_last)
     return failed
+
+
+@ti.kernel
+def finish_flat(state: ti.template(), body_count: ti.i32):
+    """After the last attempt."""
+    ti.loop_config(serialize=True)
+    for _ in range(1):
+        _end_step(state, body_count)

@@ -27,8 +27,11 @@ def gravity_on(state: ti.template(), body):
 
 
 @ti.func
-def move_particle(state: ti.template(), program: ti.template(), p, force, gravity, h, kick):
-    """One substep of one particle under the internal force on it [N]; a pinned one keeps its velocity."""
+def moved_particle(state: ti.template(), program: ti.template(), p, force, gravity, h, kick):
+    """One substep of one particle under the internal force on it [N]; a pinned one keeps its velocity.
+
+    Returns: its new position [m] and velocity [m/s], and its acceleration [m/s^2].
+    """
     inv_mass = state.particle_inv_mass[p]
     is_free = inv_mass > 0.0
     acceleration = (force * inv_mass + gravity) * ti.select(is_free, 1.0, 0.0)
@@ -36,8 +39,7 @@ def move_particle(state: ti.template(), program: ti.template(), p, force, gravit
     if ti.static(program.has_floor):
         if is_free:
             x, v = resolve_floor(x, v, h, state.floor[None])
-    state.particle_position[p] = x
-    state.particle_velocity[p] = v
+    return x, v, acceleration
 
 
 @ti.func

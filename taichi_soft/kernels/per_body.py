@@ -2,48 +2,108 @@
 
 Nothing waits between substeps and a body stays in one core's cache. The result does not depend on the number
 of threads.
+
+Substeps are chosen for small deformation; what is flattened is stiffer. Where a step ends non-finite, or
+forces moved a particle by more than `JOLT` edges at once, the body is put back and makes the step again with
+twice as many substeps, and so on. The last attempt brakes its vibrations sharply: momentum and spin stay.
 """
 
+from taichi_soft.constants import LANES, ROW_BITS
 from taichi_soft.kernels.drives import add_reactions, blow_on, push_particles
 from taichi_soft.kernels.grabs import pull_grabs
 from taichi_soft.kernels.implicit_euler import implicit_substep
 from taichi_soft.kernels.internal_forces import accumulate_forces, clear_forces
 from taichi_soft.kernels.motion import (
     gravity_on,
-    move_particle,
+    moved_particle,
     particle_is_sound,
     remember_particle,
     restore_particle,
 )
 from taichi_soft.kernels.plasticity import flow_body
+from taichi_soft.kernels.vibration import damp_vibration
 from taichi_soft.runtime import ti
-from taichi_soft.state import ABSENT, ACTIVE, FROZEN, PUSHED
+from taichi_soft.state import ABSENT, ACTIVE, FEELS_REACTION, FROZEN, PUSHED
 from taichi_soft.types import Integrator
+
+JOLT = 1.0
+"""Way by which the forces of one substep may move a particle within it, over the mean edge of its body's
+surface. Vibrations of a stable substep stay below it."""
+
+
+@ti.func
+def _move_block(state: ti.template(), program: ti.template(), first, count, gravity, h, kick):
+    """New positions and velocities of up to `LANES` particles from `first` on; their forces are cleared. What
+    lies behind them is computed too, and counts nothing.
+
+    Returns: of each the square of its acceleration.
+    """
+    positions = ti.Matrix.zero(state.real, LANES, 3)
+    velocities = ti.Matrix.zero(state.real, LANES, 3)
+    acceleration2 = ti.Vector.zero(state.real, LANES)
+    # It reads fields and stores here only: whether field and field overlap, the compiler could not tell.
+    for lane in range(LANES):
+        p = first + lane
+        x, v, a = moved_particle(state, program, p, state.particle_force[p].xyz, gravity, h, kick)
+        for i in ti.static(range(3)):
+            positions[lane, i] = x[i]
+            velocities[lane, i] = v[i]
+        acceleration2[lane] = ti.select(lane < count, a.dot(a), 0.0)
+    if count >= LANES:
+        _put_block(state, first, LANES, positions, velocities)
+    else:
+        _put_block(state, first, count, positions, velocities)
+    return acceleration2
+
+
+@ti.func
+def _put_block(state: ti.template(), first, count, positions: ti.template(), velocities: ti.template()):
+    """Field by field: a loop over one field, of a length that is known, becomes a few wide stores."""
+    for lane in range(count):
+        for i in ti.static(range(3)):
+            state.particle_position[first + lane][i] = positions[lane, i]
+    for lane in range(count):
+        for i in ti.static(range(3)):
+            state.particle_velocity[first + lane][i] = velocities[lane, i]
+    for lane in range(count):
+        state.particle_force[first + lane] = ti.Vector.zero(state.real, 4)
 
 
 @ti.func
 def move_body(state: ti.template(), program: ti.template(), body, h, kick):
-    """Move all particles of one body and clear their forces."""
-    particles = state.body_particles[body]
-    gravity = gravity_on(state, body)
-    for p in range(particles[0], particles[1]):
-        move_particle(state, program, p, state.particle_force[p].xyz, gravity, h, kick)
-        state.particle_force[p] = ti.Vector.zero(state.real, 4)
+    """Move all particles of one body and clear their forces.
+
+    Returns: whether these moved no particle too far at once (1).
+    """
+    particles, gravity = state.body_particles[body], gravity_on(state, body)
+    acceleration2 = ti.Vector.zero(state.real, LANES)
+    for block in range((particles[1] - particles[0] + LANES - 1) // LANES):
+        first = (particles[0] + block * LANES) & ROW_BITS
+        a2 = _move_block(state, program, first, particles[1] - first, gravity, h, kick)
+        acceleration2 = ti.max(acceleration2, a2)
+    return int(kick * ti.sqrt(acceleration2.max()) * h <= JOLT * state.body_edge[body])
 
 
 @ti.func
-def advance_body(state: ti.template(), program: ti.template(), body, h, kick, is_first):
-    """One substep of one body."""
+def advance_body(state: ti.template(), program: ti.template(), body, h, kick, s, substeps):
+    """Substep `s` of `substeps` of one body.
+
+    Returns: whether forces moved no particle too far at once (1); by implicit Euler always.
+    """
+    is_gentle, is_first = 1, int(s == 0)
     blow_on(state, body, h)
     push_particles(state, body, before_kick(program, h, is_first))
     if ti.static(program.integrator == Integrator.IMPLICIT_EULER):
+        damp_vibration(state, body, 0.0, h, s, substeps)
         implicit_substep(state, program, body, h, is_first)
     else:
         lasting = kick if ti.static(program.integrator == Integrator.LEAPFROG) else h
         accumulate_forces(state, program, body)
         add_reactions(state, body, lasting)
         pull_grabs(state, body, h, lasting)
-        move_body(state, program, body, h, kick)
+        damp_vibration(state, body, lasting, h, s, substeps)
+        is_gentle = move_body(state, program, body, h, kick)
+    return is_gentle
 
 
 @ti.func
@@ -90,19 +150,74 @@ def end_body(state: ti.template(), program: ti.template(), body, substeps, h):
 
 
 @ti.func
-def _step_body(state: ti.template(), program: ti.template(), body, substeps, h):
-    """One fixed step of one body. Returns 1 where it failed, or was not solved as exactly as asked."""
-    if state.body_status[body] != ABSENT:
-        particles = state.body_particles[body]
+def remember_body(state: ti.template(), body):
+    """Keep how a body is before the step: to interpolate from, and to fall back to."""
+    particles = state.body_particles[body]
+    for p in range(particles[0], particles[1]):
+        remember_particle(state, p)
+    if state.body_drives[body] & FEELS_REACTION != 0:
         for p in range(particles[0], particles[1]):
-            remember_particle(state, p)
+            state.prev_reaction[p] = state.particle_reaction[p]
+
+
+@ti.func
+def put_back_body(state: ti.template(), body):
+    """Put a body back to where it was before the step."""
+    particles = state.body_particles[body]
+    for p in range(particles[0], particles[1]):
+        restore_particle(state, p)
+        if state.body_drives[body] & FEELS_REACTION != 0:
+            state.particle_reaction[p] = state.prev_reaction[p]
+    clear_forces(state, body)
+
+
+@ti.func
+def fineness(retries, attempt):
+    """Into how many pieces a substep is cut in an attempt at a step: the last is no finer than the one before."""
+    return 1 << ti.min(attempt, retries)
+
+
+@ti.func
+def last_attempt(retries):
+    """Number of the last attempt at a step that fails, from 0."""
+    return ti.select(retries > 0, retries + 1, 0)
+
+
+@ti.func
+def _attempt_body(state: ti.template(), program: ti.template(), body, substeps, h):
+    """All substeps of one body. Returns whether forces moved no particle too far at once (1)."""
+    is_gentle, kick = 1, 0.5 * (state.body_velocity_lag[body] + h)
+    for s in range(substeps):
+        is_gentle = is_gentle & advance_body(state, program, body, h, kick, s, substeps)
+        kick = h
+    return is_gentle
+
+
+@ti.func
+def _step_body(state: ti.template(), program: ti.template(), body, substeps, h):
+    """One fixed step of one body, as fine as it needs.
+
+    Returns: 1 where it failed, or was not solved as exactly as asked.
+    """
+    if state.body_status[body] != ABSENT:
+        remember_body(state, body)
     failed = 0
     if state.body_status[body] == ACTIVE:
-        kick = 0.5 * (state.body_velocity_lag[body] + h)
-        for s in range(substeps):
-            advance_body(state, program, body, h, kick, int(s == 0))
-            kick = h
-        failed = end_body(state, program, body, substeps, h)
+        retries = state.retries[None]
+        if ti.static(program.integrator == Integrator.IMPLICIT_EULER):
+            retries = 0  # it cuts its substeps by itself
+        attempt, finer, is_open = 0, 1, 1
+        while is_open == 1:
+            finer = fineness(retries, attempt)
+            state.body_is_braked[body] = int(attempt > retries)
+            is_gentle = _attempt_body(state, program, body, finer * substeps, h / finer)
+            if attempt == last_attempt(retries) or is_gentle & body_is_sound(state, body) == 1:
+                is_open = 0
+            else:
+                put_back_body(state, body)
+                attempt += 1
+        state.body_is_braked[body] = 0
+        failed = end_body(state, program, body, finer * substeps, h / finer)
         if failed == 0:
             if ti.static(program.integrator == Integrator.IMPLICIT_EULER):
                 failed = int(state.body_residual[body] > state.solver[None][0])

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from taichi_soft.kernels.contact_step import step_islands
-from taichi_soft.kernels.flat import begin_flat, end_flat, step_flat_cpu, substep_flat
+from taichi_soft.kernels.flat import begin_flat, end_flat, finish_flat, step_flat_cpu, substep_flat
 from taichi_soft.kernels.per_body import step_in_turn, step_per_body
 from taichi_soft.kernels.program import Program
 from taichi_soft.runtime import Device
@@ -43,8 +43,13 @@ def choose_schedule(asked: Schedule, scene: Scene, device: Device, *, needs_bodi
     return Schedule.FLAT
 
 
-def make_launch(schedule: Schedule, state: State, program: Program, scene: Scene, device: Device) -> Launch:
-    """A function (substeps, h) -> number of bodies that failed, which makes one fixed step."""
+def make_launch(
+    schedule: Schedule, state: State, program: Program, scene: Scene, device: Device, retries: int
+) -> Launch:
+    """A function (substeps, h) -> number of bodies that failed, which makes one fixed step.
+
+    `retries`: how often a step that fails is made again.
+    """
     bodies, particles = len(scene.bodies), scene.particle_count
     blocks, edges = scene.block_count, scene.edge_count
 
@@ -57,14 +62,31 @@ def make_launch(schedule: Schedule, state: State, program: Program, scene: Scene
     def by_islands(substeps: int, h: float) -> int:
         return int(step_islands(state, program, bodies, helpers, substeps, h))
 
+    attempts = retries + 2 if retries else 1  # the last as fine as the one before it
+
     def flat_cpu(substeps: int, h: float) -> int:
-        return int(step_flat_cpu(state, program, bodies, blocks, edges, particles, substeps, h))
+        failed, attempt = 1, 0
+        while failed and attempt < attempts:
+            finer = 1 << min(attempt, retries)
+            counts = bodies, blocks, edges, particles, finer * substeps
+            failed = int(step_flat_cpu(state, program, *counts, h / finer, attempt, attempts))
+            attempt += 1
+        return failed
 
     def flat_gpu(substeps: int, h: float) -> int:
         begin_flat(state, particles)
-        for s in range(substeps):
-            substep_flat(state, program, blocks, edges, particles, h, int(s == 0))
-        return int(end_flat(state, program, bodies, blocks, particles, substeps, h))
+        failed, attempt = 1, 0
+        while failed and attempt < attempts:
+            finer = 1 << min(attempt, retries)
+            count = finer * substeps
+            for s in range(count):
+                substep_flat(state, program, bodies, blocks, edges, particles, count, h / finer, s)
+            failed = int(
+                end_flat(state, program, bodies, blocks, particles, count, h / finer, attempt, attempts)
+            )
+            attempt += 1
+        finish_flat(state, bodies)
+        return failed
 
     if schedule is Schedule.PER_BODY:
         return by_islands if program.has_contact else per_body

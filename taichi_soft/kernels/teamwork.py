@@ -21,8 +21,8 @@ HELP = -1
 """Whatever its owner has called for."""
 
 BEGIN, PUSH, BOXES, SEARCH, GAPS, DRIFT, FINISH = range(7)
-"""Tasks. Their numbers: none; h, since, way; given, h, left, forgets; none; given, h; h, since, left and
-fastest; substeps, h. What an island shares is a velocity [m/s] in the push, and in the drift a way [m]."""
+"""Tasks. Their numbers: none; h, since, way, length of the step; given, h, left, forgets; none; given, h; h,
+since, left and fastest; substeps, h. What an island shares is a velocity [m/s] in the push, and in the drift a way [m]."""
 
 
 @ti.func
@@ -67,7 +67,7 @@ def _do_task(state: ti.template(), program: ti.template(), island, body, task, n
     if task != PUSH:
         _do_contact_task(state, program, island, body, task, numbers, common)
     elif state.body_status[body] == ACTIVE:
-        push_body(state, program, body, numbers[0], numbers[1], numbers[2], common)
+        push_body(state, program, body, numbers[0], numbers[1], numbers[2], numbers[3], common)
 
 
 @ti.func

@@ -133,6 +133,8 @@ def write_body(
         state.body_drives[body] = state.body_drives[model_of]
         state.body_gravity_scale[body] = state.body_gravity_scale[model_of]
         state.body_damping[body] = state.body_damping[model_of]
+        state.body_fading[body] = state.body_fading[model_of]
+        state.body_fading_interval[body] = state.body_fading_interval[model_of]
         if ti.static(state.capacity.has_contact):
             state.contact.calm[body] = 0.0
         if ti.static(state.capacity.implicit):

@@ -15,11 +15,13 @@ from taichi_soft.materials.constants import (
     POSITIVE,
     Array,
     as_constant,
+    as_ratio,
     is_damping,
     is_positive,
     require_one_length,
     spread,
 )
+from taichi_soft.materials.material import DAMPING_RATIO
 from taichi_soft.materials.stiffness import Stiffness, turned
 
 
@@ -34,6 +36,7 @@ class AnisotropicMaterial:
         frame: the material's axes in the mesh, as columns: a rotation matrix (3, 3) or a quaternion
             (x, y, z, w) for the whole body, or one per tetrahedron, (m, 3, 3) or (m, 4), such as
             `frames_along` gives. None: those of the mesh.
+        damping_ratio: as of a `Material`.
     Raises: MaterialError or OptionError with the first value out of range.
     """
 
@@ -41,6 +44,7 @@ class AnisotropicMaterial:
     density: float | Array
     damping: float | Array = 0.0
     frame: Any = None
+    damping_ratio: float = DAMPING_RATIO
 
     def __post_init__(self) -> None:
         if not isinstance(self.stiffness, Stiffness):
@@ -56,6 +60,7 @@ class AnisotropicMaterial:
         )
         object.__setattr__(self, "density", density)
         object.__setattr__(self, "damping", damping)
+        object.__setattr__(self, "damping_ratio", as_ratio(self.damping_ratio))
         object.__setattr__(self, "frame", _frame(self.frame))
         frames = self.frame if np.ndim(self.frame) == 3 else None
         require_one_length({"density": density, "damping": damping, "frame": frames}, "tetrahedron")

@@ -15,6 +15,9 @@ Array = NDArray[np.float64]
 SMALLEST, LARGEST = 1e-9, 1e20
 """Constants beyond overflow float32 on their way to a force or an acceleration."""
 
+MOST_DAMPING_RATIO = 1000.0
+"""A body then moves as if it were rigid, and keeps its deformation for seconds."""
+
 POSITIVE = f"from {SMALLEST:g} to {LARGEST:g}"
 
 
@@ -26,6 +29,17 @@ def is_positive(x: Array) -> NDArray[np.bool_]:
 def is_damping(x: Array) -> NDArray[np.bool_]:
     """Which values are 0 or more and can be computed with."""
     return np.asarray((x >= 0) & (x < LARGEST))
+
+
+def as_ratio(given: Any) -> float:
+    """A damping ratio. Raises: MaterialError."""
+    if isinstance(given, (bool, np.bool_)) or not isinstance(given, (int, float, np.integer, np.floating)):
+        raise MaterialError(f"damping_ratio must be one number for the whole body, got {given!r}")
+    if not 0.0 <= given <= MOST_DAMPING_RATIO:
+        raise MaterialError(
+            f"damping_ratio is {given:g}: it must be from 0 (undamped) to {MOST_DAMPING_RATIO:g}, 1 is critical"
+        )
+    return float(given)
 
 
 def as_constant(

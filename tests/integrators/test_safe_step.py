@@ -1,6 +1,6 @@
 """The automatic step is never above the limit of linear stability at rest, and at most 15 % below it.
 
-The oracle: stiffness and damping assembled here from the shape functions of linear tetrahedra and from the edges,
+The oracle: stiffness and damping assembled here from shape functions of linear tetrahedra and from the edges,
 and ARPACK's largest eigenvalue of h^2 K + 2 h C, which is 4 at the limit of leapfrog and its lazy variant.
 """
 

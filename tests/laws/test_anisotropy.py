@@ -346,7 +346,7 @@ def test_the_stable_step_is_that_of_the_stiffest_direction():
     root = np.sqrt(np.repeat(mass, 3))
     expected = 2 / np.sqrt(np.linalg.eigvalsh(K / np.outer(root, root))[-1])
     found = stable_step(mesh, material, element_model("virial")).limit
-    assert expected * 0.999 < found < expected * 1.1
+    assert expected * 0.85 < found <= expected
 
 
 def test_a_beam_of_oblique_fibres_twists_aside_as_it_is_pulled_down():

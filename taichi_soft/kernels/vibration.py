@@ -1,0 +1,153 @@
+"""Damping of vibrations: of all motion of a body beside its rigid one.
+
+Velocities v become P v + k (v - P v): P v is the rigid motion with the momentum and angular momentum of v,
+and k = exp(-2 zeta w seconds), w being the angular frequency of the body's first mode and zeta its damping
+ratio. The factor is a contraction that is symmetric in the mass: where it acts on the velocities after a kick
+and before they move anything, leapfrog stays stable for every step for which it is without. With D the factor,
+
+    D^-1 (x_(n+1) - x_n) = x_n - x_(n-1) - h^2 K x_n,
+
+which is leapfrog with the mass D^-1 >= 1 but for a damper that only takes energy.
+"""
+
+from taichi_soft.constants import LANES, ROW_BITS
+from taichi_soft.kernels.motion import gravity_on
+from taichi_soft.runtime import ti
+
+SHARP_BRAKE = 0.5
+"""Of the vibration that a substep leaves where a step that failed is made for the last time."""
+
+THIN_BODY = 1e-6
+"""Product of the principal moments over the cube of their sum, below which a body is taken for a straight
+line: it does not feel a turn about that."""
+
+
+@ti.func
+def _solved(rows: ti.template(), b):
+    """x of rows x = b for a symmetric matrix given by its rows, scaled so that their trace is 1."""
+    a0, a1, a2 = rows
+    c0, c1, c2 = a1.cross(a2), a2.cross(a0), a0.cross(a1)
+    det = a0.dot(c0)
+    if det < THIN_BODY:
+        more = 1e-3
+        a0, a1, a2 = a0 + ti.Vector([more, 0, 0]), a1 + ti.Vector([0, more, 0]), a2 + ti.Vector([0, 0, more])
+        c0, c1, c2 = a1.cross(a2), a2.cross(a0), a0.cross(a1)
+        det = a0.dot(c0)
+    return ti.Vector([c0.dot(b), c1.dot(b), c2.dot(b)]) / det
+
+
+@ti.func
+def _kicked_velocity(state: ti.template(), p, gravity, kick):
+    """What a kick of the forces [s] will make of a particle's velocity [m/s]; a pinned one keeps its own."""
+    inv_mass = state.particle_inv_mass[p]
+    change = kick * (state.particle_force[p].xyz * inv_mass + gravity)
+    return state.particle_velocity[p] + ti.select(inv_mass > 0.0, 1.0, 0.0) * change
+
+
+@ti.func
+def _column_sums(rows: ti.template()):
+    total = ti.Vector([rows[0, i] * 0.0 for i in ti.static(range(3))])
+    for lane in ti.static(range(LANES)):
+        for i in ti.static(range(3)):
+            total[i] += rows[lane, i]
+    return total
+
+
+@ti.func
+def _rigid_motion(state: ti.template(), body, kick, x0, v0):
+    """Of a body after a kick of its forces [s].
+
+    Returns: its centre beside x0 [m], velocity beside v0 [m/s] and angular velocity [rad/s].
+    """
+    particles, gravity = state.body_particles[body], gravity_on(state, body)
+    masses = ti.Vector.zero(state.real, LANES)
+    arms, momenta = ti.Matrix.zero(state.real, LANES, 3), ti.Matrix.zero(state.real, LANES, 3)
+    turns = ti.Matrix.zero(state.real, LANES, 3)
+    squares, products = ti.Matrix.zero(state.real, LANES, 3), ti.Matrix.zero(state.real, LANES, 3)
+    count = particles[1] - particles[0]
+    for block in range((count + LANES - 1) // LANES):
+        first = (particles[0] + block * LANES) & ROW_BITS
+        for lane in range(LANES):
+            p = first + lane
+            mass = ti.select(block * LANES + lane < count, state.particle_mass[p], 0.0)
+            x = state.particle_position[p] - x0
+            v = _kicked_velocity(state, p, gravity, kick) - v0
+            arm, momentum = mass * x, mass * v
+            turn = x.cross(momentum)
+            masses[lane] += mass
+            for i in ti.static(range(3)):
+                arms[lane, i] += arm[i]
+                momenta[lane, i] += momentum[i]
+                turns[lane, i] += turn[i]
+                squares[lane, i] += arm[i] * x[i]
+                products[lane, i] += arm[i] * x[(i + 1) % 3]
+    share = 1.0 / masses.sum()
+    center, velocity = share * _column_sums(arms), share * _column_sums(momenta)
+    spin = share * _column_sums(turns) - center.cross(velocity)
+    s = share * _column_sums(squares) - center * center  # xx, yy, zz
+    d = share * _column_sums(products) - center * ti.Vector([center.y, center.z, center.x])  # xy, yz, zx
+    trace = 2.0 * s.sum()
+    angular_velocity = ti.Vector.zero(state.real, 3)
+    if trace > 0.0:
+        rows = (
+            ti.Vector([s.y + s.z, -d.x, -d.z]) / trace,
+            ti.Vector([-d.x, s.z + s.x, -d.y]) / trace,
+            ti.Vector([-d.z, -d.y, s.x + s.y]) / trace,
+        )
+        angular_velocity = _solved(rows, spin / trace)
+    return center, velocity, angular_velocity
+
+
+@ti.func
+def _fade(state: ti.template(), body, kick, keep):
+    """Leave a body the share `keep` of the vibration that it has after a kick of its forces [s]."""
+    particles, gravity = state.body_particles[body], gravity_on(state, body)
+    x0, v0 = state.particle_position[particles[0]], state.particle_velocity[particles[0]]
+    center, velocity, angular_velocity = _rigid_motion(state, body, kick, x0, v0)
+    count = particles[1] - particles[0]
+    for block in range((count + LANES - 1) // LANES):
+        first = (particles[0] + block * LANES) & ROW_BITS
+        changes = ti.Matrix.zero(state.real, LANES, 3)
+        for lane in range(LANES):
+            p = first + lane
+            inv_mass = state.particle_inv_mass[p]
+            x = state.particle_position[p] - x0
+            kicked = (
+                state.particle_velocity[p] - v0 + kick * (state.particle_force[p].xyz * inv_mass + gravity)
+            )
+            rigid = velocity + angular_velocity.cross(x - center)
+            change = ti.select(inv_mass > 0.0, 1.0 - keep, 0.0) * (rigid - kicked)
+            for i in ti.static(range(3)):
+                changes[lane, i] = change[i]
+        for lane in range(ti.min(LANES, count - block * LANES)):
+            for i in ti.static(range(3)):
+                velocity_now = state.particle_velocity[first + lane][i]
+                state.particle_velocity[first + lane][i] = velocity_now + changes[lane, i]
+
+
+@ti.func
+def kept_vibration(state: ti.template(), body, h, s, substeps):
+    """The share of its vibration that a body keeps in substep `s` of `substeps` of `h` [s] each.
+
+    Below 1 every few substeps only, but many times in a period of the first mode.
+    """
+    keep, rate, interval = 1.0, state.body_fading[body], state.body_fading_interval[body]
+    if state.body_is_braked[body] == 1:
+        keep = SHARP_BRAKE
+    elif rate > 0.0:
+        times = ti.min(substeps, ti.cast(ti.ceil(ti.min(substeps * h / interval, 1e6)), ti.i32))
+        if (s + 1) * times // substeps > s * times // substeps:
+            keep = ti.exp(-rate * substeps * h / times)
+    return keep
+
+
+@ti.func
+def damp_vibration(state: ti.template(), body, kick, h, s, substeps):
+    """What damping takes from a body in substep `s` of `substeps` of `h` [s] each.
+
+    It comes before the kick of `kick` [s] by the forces that the body feels, and takes its share of what that
+    will make of the velocities.
+    """
+    keep = kept_vibration(state, body, h, s, substeps)
+    if keep < 1.0:
+        _fade(state, body, kick, keep)
