@@ -360,9 +360,13 @@ def drop_test(
     With --sweep: bodies of many meshes and materials onto a floor, and wrecked ones, each as a game gets it
     by default and by every law. What was interrupted goes on from there.
     """
+    if not sweep and (only or damping or wrecks or workers):
+        raise OptionError("--only, --damping, --wrecks and --workers belong to a sweep: add --sweep")
     if sweep:
+        if seed or first or threads:
+            raise OptionError("--seed, --first and --threads belong to random cases: leave out --sweep")
         asked = {"law": law, "flips": flips, "damping": damping, "count": cases, "wrecks": wrecks}
-        _sweep(asked, only, out, worst, workers, arch)
+        _sweep(asked, only, out, worst, workers, arch, as_json=as_json)
         return
     init(arch, threads)
     from taichi_soft.drops import Summary, make_case, run_cases
@@ -388,7 +392,14 @@ def drop_test(
 
 
 def _sweep(
-    asked: dict[str, Any], groups: list[str] | None, out: Path, worst: int, workers: int | None, arch: str
+    asked: dict[str, Any],
+    groups: list[str] | None,
+    out: Path,
+    worst: int,
+    workers: int | None,
+    arch: str,
+    *,
+    as_json: bool,
 ) -> None:
     from taichi_soft.drops.robustness import choose_cells
     from taichi_soft.report import robustness
@@ -398,9 +409,12 @@ def _sweep(
     require_writable(out.parent)
     device = init(arch)
     rows = robustness.run_sweep(cells, Path("out") / "sweep", errors, workers=workers, arch=device.arch)
-    robustness.print_sweep(console, rows, worst)
     robustness.write_page(rows, out, shlex.join(["taichi-soft", *sys.argv[1:]]), device.arch)
-    _say(f"wrote {escape(str(out))}")
+    if as_json:
+        print(json.dumps([{**row.point, **(row.numbers or {"reason": row.error})} for row in rows], indent=2))
+    else:
+        robustness.print_sweep(console, rows, worst)
+        _say(f"wrote {escape(str(out))}")
     if any(robustness.is_broken(row) for row in rows):
         raise typer.Exit(1)
 

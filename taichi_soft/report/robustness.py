@@ -38,12 +38,12 @@ COLUMNS = (
 CRITERION = (
     "Every body is built with what its row names and nothing else. It is dropped from "
     f"{DROP:g} m and watched for {DROP_TIME:g} s, or wrecked and given {RECOVERY_TIME:g} s in which to have "
-    f"no tetrahedron inside out for {CALM_TIME:g} s; then gravity ends and it comes to rest, braked. Frozen: it says so, or its "
-    "positions are not finite. Inverted: tetrahedra inside out at the end. Runaway: faster at the end than "
-    f"{SPEED_TOLERANCE:g} times what the fall can give. Misshapen: farther from its rest shape than "
-    f"{100 * SHAPE_TOLERANCE:g} % of its size, as root mean square with rigid motion taken out. Too slow, "
-    f"and not tried: more than {MOST_SUBSTEPS} substeps for 1/60 s, or {MOST_WORK:.0e} substeps of "
-    "tetrahedra in all. Refused: the library raised an error when it was built."
+    f"no tetrahedron inside out for {CALM_TIME:g} s; then gravity ends and it comes to rest, braked. "
+    "Frozen: it says so, or its positions are not finite. Inverted: tetrahedra inside out at the end. "
+    f"Runaway: faster at the end than {SPEED_TOLERANCE:g} times what the fall can give. Misshapen: farther "
+    f"from its rest shape than {100 * SHAPE_TOLERANCE:g} % of its size, as root mean square with rigid "
+    f"motion taken out. Too slow, and not tried: more than {MOST_SUBSTEPS} substeps for 1/60 s, or "
+    f"{MOST_WORK:.0e} substeps of tetrahedra in all. Refused: the library raised an error when it was built."
 )
 
 

@@ -37,20 +37,24 @@ MOST_WORK = 2e9
 def run_cell(cell: Cell) -> dict[str, Any]:
     """What became of a cell: verdict and reason, and the facts of its mesh and its step. Plain data."""
     mesh = cell_mesh(cell["mesh"], cell["scale"])
-    facts: dict[str, Any] = {
-        "tets": len(mesh.tets),
-        "min_dihedral": float(mesh.quality.min_dihedral.min()),  # [degrees]
-        "substeps": None,  # of 1/60 s
-        "said": [],
-    }
-    with warnings.catch_warnings(record=True) as said:
+    angle = float(mesh.quality.min_dihedral.min())
+    facts = {"tets": len(mesh.tets), "min_dihedral": angle, "substeps": None}  # [degrees]; of 1/60 s
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        warnings.simplefilter("ignore", FrozenBodyWarning)
         try:
-            verdict, reason = _try(cell, mesh, facts)
+            world, body = _build(cell, mesh)
+            facts["substeps"] = world.stable_substeps(1 / 60)
         except TaichiSoftError as error:
-            verdict, reason = Verdict.REFUSED, f"{type(error).__name__}: {error}"
-    facts["said"] = sorted({f"{each.category.__name__}: {each.message}" for each in said})
+            reason = f"{type(error).__name__}: {error}"
+            return {**facts, "verdict": Verdict.REFUSED.value, "reason": reason}
+    said = sorted({f"{each.category.__name__}: {each.message}" for each in caught})
+    slow = _too_slow(cell, world, body)
+    if slow is not None:
+        reason = "; ".join([slow, *said]) if said else f"{slow}; nothing was said when it was built"
+        return {**facts, "verdict": Verdict.TOO_SLOW.value, "reason": reason}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FrozenBodyWarning)
+        verdict, reason = judge(_try(cell, world, body))
     return {**facts, "verdict": verdict.value, "reason": reason}
 
 
@@ -61,35 +65,49 @@ def cell_mesh(name: str, scale: float) -> TetMesh:
     return mesh if scale == 1.0 else TetMesh(mesh.vertices * scale, mesh.tets)
 
 
-def _try(cell: Cell, mesh: TetMesh, facts: dict[str, Any]) -> tuple[Verdict, str]:
-    material = Material(
-        cell["young"], cell["poisson"], cell["density"], **DAMPINGS[cell["damping"]](mesh, cell)
-    )
+def _build(cell: Cell, mesh: TetMesh) -> tuple[World, Body]:
+    """A world with nothing but the body, high above the floor."""
+    damping = DAMPINGS[cell["damping"]](mesh, cell)
+    material = Material(cell["young"], cell["poisson"], cell["density"], **damping)
     named = {option: cell[option] for option in ("law", "flips") if cell[option] is not None}
-    rest = mesh.vertices - (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
-    size = float(np.ptp(rest, axis=0).max())
-    start = rest if cell["wreck"] is None else wrecked(rest, cell["wreck"], cell["seed"])
-    height = (DROP if cell["wreck"] is None else 0.1 * size) - float(min(rest[:, 2].min(), start[:, 2].min()))
     world = World()
-    body = world.add_body(mesh, material, position=(0.0, 0.0, size + DROP), **named)
+    height = DROP + float(np.ptp(mesh.vertices, axis=0).max())
+    body = world.add_body(mesh, material, position=(0.0, 0.0, height), **named)
     world.build()
-    steps = round((DROP_TIME if cell["wreck"] is None else RECOVERY_TIME) / cell["dt"])
-    facts["substeps"] = world.stable_substeps(1 / 60)
-    work = steps * world.stable_substeps(cell["dt"]) * len(mesh.tets)
-    if facts["substeps"] > MOST_SUBSTEPS:
-        return Verdict.TOO_SLOW, f"{facts['substeps']} substeps for 1/60 s ({body.stable_step.stiffest})"
-    if work > MOST_WORK:
-        return Verdict.TOO_SLOW, f"{work:.2g} substeps of tetrahedra for {steps} steps"
+    return world, body
+
+
+def _too_slow(cell: Cell, world: World, body: Body) -> str | None:
+    """Why it is not worth trying, None where it is."""
+    substeps = world.stable_substeps(1 / 60)
+    if substeps > MOST_SUBSTEPS:
+        return f"{substeps} substeps for 1/60 s ({body.stable_step.stiffest})"
+    steps = _steps(cell)
+    work = steps * world.stable_substeps(cell["dt"]) * len(body.tets)
+    return f"{work:.2g} substeps of tetrahedra in {steps} steps" if work > MOST_WORK else None
+
+
+def _steps(cell: Cell) -> int:
+    dt: float = cell["dt"]
+    return round((DROP_TIME if cell["wreck"] is None else RECOVERY_TIME) / dt)
+
+
+def _try(cell: Cell, world: World, body: Body) -> Ending:
+    """Put the body where it begins, and see."""
+    x = body.mesh.vertices
+    rest = x - (x.min(axis=0) + x.max(axis=0)) / 2
+    size = float(np.ptp(rest, axis=0).max())
+    is_wrecked = cell["wreck"] is not None
+    start = wrecked(rest, cell["wreck"], cell["seed"]) if is_wrecked else rest
+    gap = 0.1 * size if is_wrecked else DROP
+    height = gap - float(min(rest[:, 2].min(), start[:, 2].min()))
     body.set_motion(start + np.array([0.0, 0.0, height]), np.zeros_like(start))
     run = _Run(world, body, rest, size, cell["dt"])
-    if cell["wreck"] is None:
-        run.fall(steps)
-        fastest = math.sqrt(2 * GRAVITY_EARTH * (height + size))
+    if is_wrecked:
+        run.recover(_steps(cell), size * math.sqrt(cell["density"] / cell["young"]))
     else:
-        run.recover(steps, material)
-        fastest = math.inf
-    end = run.ending(fastest, is_wrecked=cell["wreck"] is not None)
-    return judge(end)
+        run.fall(_steps(cell))
+    return run.ending(math.inf if is_wrecked else math.sqrt(2 * GRAVITY_EARTH * (height + size)))
 
 
 @dataclass
@@ -109,8 +127,12 @@ class _Run:
                 return
             self.world.step(self.dt)
 
-    def recover(self, steps: int, material: Material) -> None:
-        """Until no tetrahedron is inside out; then without gravity, braked, until it is at rest."""
+    def recover(self, steps: int, crossing: float) -> None:
+        """Until no tetrahedron is inside out; then without gravity, braked, until it is at rest.
+
+        Args:
+            crossing: time in which a wave goes once through the body [s].
+        """
         calm = 0
         for _ in range(steps):
             self.world.step(self.dt)
@@ -121,7 +143,6 @@ class _Run:
                 break
         else:
             return
-        crossing = self.size * math.sqrt(float(material.density) / float(material.young))
         self.body.set_gravity_scale(0.0)
         self.body.set_linear_damping(1.0 / crossing)
         for step in range(math.ceil(min(REST_CROSSINGS * crossing, LONGEST_REST) / self.dt)):
@@ -135,8 +156,8 @@ class _Run:
         velocities, masses = self.body.velocities().astype(np.float64), self.body.masses
         return float(np.sqrt(masses @ (velocities**2).sum(axis=1) / masses.sum()))
 
-    def ending(self, fastest: float, *, is_wrecked: bool) -> Ending:
-        """What is to be judged."""
+    def ending(self, fastest: float) -> Ending:
+        """What is to be judged; `fastest` is infinite where the body was wrecked."""
         body = self.body
         now = body.positions().astype(np.float64)
         is_finite = bool(np.isfinite(now).all())
@@ -147,7 +168,9 @@ class _Run:
             flipped=body.flipped_count(),
             speed=self.speed if is_finite else math.inf,
             fastest=fastest,
-            distance=distance_from_rest(self.rest, now, body.masses) if is_wrecked and is_finite else 0.0,
+            distance=distance_from_rest(self.rest, now, body.masses)
+            if is_finite and math.isinf(fastest)
+            else 0.0,
         )
 
 
