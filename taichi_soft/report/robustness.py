@@ -24,6 +24,9 @@ from taichi_soft.sweep import origin
 TIME_LIMIT = 600.0
 """Of a cell [s]; one that takes longer has no result, and is tried again."""
 
+SOFT_MACH, SOFT_SAG = 0.5, 0.1
+"""Above which it is said beside a verdict: what hits the floor at its own speed of sound must be crushed."""
+
 COLUMNS = (
     Verdict.OK,
     Verdict.FROZEN,
@@ -137,7 +140,13 @@ def line_of(row: Result) -> str:
     cell, numbers = row.point, row.numbers or {}
     law = " ".join(word for word in (cell["law"] or "default", cell["flips"], cell["damping"]) if word)
     reason = numbers.get("reason", row.error)
-    return f"{verdict_of(row).value}: {cell['group']}, {cell['name']} ({law}): {reason}"
+    line = f"{verdict_of(row).value}: {cell['group']}, {cell['name']} ({law}): {reason}"
+    soft = []
+    if cell["wreck"] is None and numbers.get("mach", 0.0) > SOFT_MACH:
+        soft.append(f"hits the floor at Mach {numbers['mach']:.2g}")
+    if numbers.get("sag", 0.0) > SOFT_SAG:
+        soft.append(f"its own weight is worth a strain of {numbers['sag']:.2g}")
+    return f"{line} [{', '.join(soft)}]" if soft else line
 
 
 def write_page(rows: Sequence[Result], path: Path, command: str, arch: str) -> None:

@@ -126,6 +126,8 @@ def test_a_stiff_ball_is_fine_a_mirrored_one_stays_so_and_one_without_flips_free
     """A mirrored tetrahedron is at rest for tolerant flips; without, nothing holds one."""
     fine = run_cell({**PLAIN, "young": 1e7, "damping": "edges 0.2"})
     assert (fine["verdict"], fine["reason"], fine["tets"]) == ("ok", "", 160)
+    assert fine["mach"] == pytest.approx(np.sqrt(2 * 9.81 * 2) / 100, rel=1e-3)  # sound at 100 m/s
+    assert fine["sag"] == pytest.approx(1000 * 9.81 / 1e7, rel=0.06)
     virial = {**PLAIN, "law": "virial", "damping": "edges 0.2"}
     mirrored = run_cell({**virial, "flips": "tolerant", "wreck": "inside out"})
     assert mirrored["verdict"] == "inverted"

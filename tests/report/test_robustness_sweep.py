@@ -69,6 +69,7 @@ def test_a_sweep_that_was_interrupted_ends_with_the_table_of_one_that_was_not(
 
 def row(group, law, flips, verdict, name="a cell", damping="default"):
     cell = {
+        "wreck": None,
         "group": group,
         "name": name,
         "mesh": name,
@@ -77,7 +78,7 @@ def row(group, law, flips, verdict, name="a cell", damping="default"):
         "flips": flips,
         "damping": damping,
     }
-    facts = {"tets": 7, "min_dihedral": 12.34, "substeps": 9}
+    facts = {"tets": 7, "min_dihedral": 12.34, "substeps": 9, "mach": 0.1, "sag": 0.01}
     return Result(cell, {**facts, "verdict": verdict, "reason": "" if verdict == "ok" else "why | it is"})
 
 
@@ -108,6 +109,14 @@ def test_a_terminal_shows_the_table_and_the_first_that_do_not_hold(console):
     assert "frozen: own, bad one (default default): why | it is" in text
     assert "another one" not in text
     assert "misshapen: wrecked, third one" in text
+
+
+def test_a_body_that_no_material_could_save_is_told_apart():
+    crushed = row("cells", None, None, "inverted")
+    crushed.numbers.update(mach=6.26, sag=9.81)
+    line = robustness.line_of(crushed)
+    assert line.endswith("[hits the floor at Mach 6.3, its own weight is worth a strain of 9.8]")
+    assert "Mach" not in robustness.line_of(row("cells", None, None, "inverted"))
 
 
 def test_only_what_a_game_gets_by_default_counts_as_broken():

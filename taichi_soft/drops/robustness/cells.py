@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from taichi_soft import TetMesh
-from taichi_soft.drops.case import edge_damping
+from taichi_soft.constants import GRAVITY_EARTH
+from taichi_soft.drops.case import MOST_SAG, edge_damping
 from taichi_soft.drops.robustness.foreign_meshes import FOREIGN_MESHES
 from taichi_soft.drops.robustness.own_meshes import OWN_MESHES
 from taichi_soft.drops.robustness.wrecks import WRECKS
@@ -159,25 +160,20 @@ def _wrecked() -> Iterator[Cell]:
 
 
 def random_wreck(number: int) -> Cell:
-    """A box or sphere of some size and material, wrecked somehow."""
+    """A box or sphere of some size and material, wrecked somehow; stiff enough to bear its own weight."""
     rng = np.random.default_rng([number, 22])
     mesh, wreck = str(rng.choice(WRECKED_MESHES)), str(rng.choice(list(WRECKS)))
+    scale, density = (float(np.exp(rng.uniform(*np.log(ends)))) for ends in ((0.1, 3.0), (100.0, 3000.0)))
+    stiffness = float(np.exp(rng.uniform(np.log(1 / MOST_SAG), np.log(100 / MOST_SAG))))
     values = {
-        "scale": float(np.exp(rng.uniform(np.log(0.1), np.log(3.0)))),
-        "young": float(np.exp(rng.uniform(np.log(1e5), np.log(1e8)))),
+        "scale": scale,
+        "young": stiffness * density * GRAVITY_EARTH * scale,
         "poisson": float(rng.uniform(0.0, 0.45)),
-        "density": float(np.exp(rng.uniform(np.log(100.0), np.log(3000.0)))),
+        "density": density,
     }
-    name = f"random {number}: {mesh}, {wreck}, {values['scale']:.2g} m, E {values['young']:.1e}"
-    return {
-        "group": "random wrecks",
-        "name": name,
-        "mesh": mesh,
-        **USUAL,
-        **values,
-        "wreck": wreck,
-        "seed": number,
-    }
+    name = f"random {number}: {mesh}, {wreck}, {scale:.2g} m, E {values['young']:.1e}"
+    body = {"group": "random wrecks", "name": name, "mesh": mesh, **USUAL, **values}
+    return {**body, "wreck": wreck, "seed": number}
 
 
 GROUPS: dict[str, Callable[[], Iterator[Cell]]] = {

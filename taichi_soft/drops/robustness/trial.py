@@ -37,8 +37,14 @@ MOST_WORK = 2e9
 def run_cell(cell: Cell) -> dict[str, Any]:
     """What became of a cell: verdict and reason, and the facts of its mesh and its step. Plain data."""
     mesh = cell_mesh(cell["mesh"], cell["scale"])
-    angle = float(mesh.quality.min_dihedral.min())
-    facts = {"tets": len(mesh.tets), "min_dihedral": angle, "substeps": None}  # [degrees]; of 1/60 s
+    squared_sound = cell["young"] / cell["density"]
+    facts = {
+        "tets": len(mesh.tets),
+        "min_dihedral": float(mesh.quality.min_dihedral.min()),  # [degrees]
+        "substeps": None,  # of 1/60 s
+        "mach": math.sqrt(2 * GRAVITY_EARTH * DROP / squared_sound),  # of the impact
+        "sag": GRAVITY_EARTH * float(np.ptp(mesh.vertices, axis=0).max()) / squared_sound,  # in its size
+    }
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         try:
