@@ -82,9 +82,7 @@ def make_case(seed: int, number: int, law: str = "virial", flips: str | None = N
     """Case `number` of `seed`, by a law and its treatment of flips: "recover" where none is given and the law
     lets one choose.
 
-    Damping b of an edge is a share of 0.1 to 0.5, evenly, of l^2 sqrt(E density), l being the mean edge:
-    about that share of critical damping for the fastest vibrations; for the slowest, of wave length L, l/L
-    of it.
+    Damping is `edge_damping` with a share of 0.1 to 0.5, evenly.
     """
     if flips is None and law in LAWS and Flips.RECOVER in LAWS[law].flips:
         flips = Flips.RECOVER.value
@@ -96,7 +94,7 @@ def make_case(seed: int, number: int, law: str = "virial", flips: str | None = N
     softest = max(SOFTEST, density * GRAVITY_EARTH * size / MOST_SAG)
     young = float(np.exp(rng.uniform(np.log(softest), np.log(STIFFEST))))
     ratio = float(rng.uniform(0.1, 0.5))
-    damping = ratio * float(mesh.edge_lengths.mean()) ** 2 * math.sqrt(young * density)
+    damping = edge_damping(mesh, young, density, ratio)
     material = Material(young, float(rng.uniform(0.1, 0.45)), density, damping)
     place = size * np.array([*rng.uniform(1.0 - HALF, HALF - 1.0, 2), rng.uniform(5.0, 6.5)])
     longest = stable_step(mesh, material, element_model(law, flips=flips)).recommended
@@ -118,6 +116,12 @@ def make_case(seed: int, number: int, law: str = "virial", flips: str | None = N
         flips,
         _rounded(1 / STEPS_PER_SECOND / longest),
     )
+
+
+def edge_damping(mesh: TetMesh, young: float, density: float, share: float) -> float:
+    """Damping b of an edge [N s/m]: a share of l^2 sqrt(E density), l being the mean edge. That is about so
+    much of critical damping for the fastest vibrations; for the slowest, of wave length L, l/L of it."""
+    return share * float(mesh.edge_lengths.mean()) ** 2 * math.sqrt(young * density)
 
 
 def shape_mesh(shape: str, size: float, parts: Floats) -> TetMesh:
