@@ -37,7 +37,8 @@ def mesh_sections(path: Path, content: bytes) -> bytes:
     found = list(zip(words[::2], (body.split() for body in words[1::2]), strict=True))
     dimension = next((body[0] for word, body in found if word == b"Dimension" and body), b"?")
     if dimension != b"3":
-        raise MeshError(f"{path.name}: has dimension {dimension.decode()}: a body needs 3")
+        got = dimension.decode("ascii", "replace")
+        raise MeshError(f"{path.name}: has dimension {got}: a body needs 3")
     lines = [b"MeshVersionFormatted 2", b"Dimension 3"]
     for word, body in found:
         columns = 1 + (3 if word == b"Vertices" else NODES.get(word, 0))  # the last one is a mark

@@ -205,12 +205,13 @@ def test_gmsh_files_that_do_not_hold_what_they_say_are_refused(tmp_path, text, r
             "Tetrahedra announces 3 rows of 5 and holds 10 numbers",
         ),
         (MEDIT.replace("Dimension\n3", "Dimension 2"), "has dimension 2: a body needs 3"),
+        (MEDIT.replace("Dimension\n3", "Dimension 3\xac"), "has dimension 3.*: a body needs 3"),
         ("MFEM mesh v1.0\n", "not a Medit text file: it begins with 'MFEM mesh v1.0"),
     ],
-    ids=["short", "flat", "mfem"],
+    ids=["short", "flat", "no number", "mfem"],
 )
 def test_medit_files_that_do_not_hold_what_they_say_are_refused(tmp_path, text, reason):
-    (tmp_path / "x.mesh").write_text(text)
+    (tmp_path / "x.mesh").write_bytes(text.encode("latin-1"))
     with pytest.raises(MeshError, match=rf"^x\.mesh: {reason}"):
         load_mesh(tmp_path / "x.mesh")
 
