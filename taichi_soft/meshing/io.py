@@ -26,7 +26,7 @@ import numpy as np
 
 from taichi_soft.checks import as_path
 from taichi_soft.errors import MeshError
-from taichi_soft.meshing.advice import filling
+from taichi_soft.meshing.advice import filling, needing
 from taichi_soft.meshing.interchange import FORMATS, read_interchange, write_interchange
 from taichi_soft.meshing.tet_mesh import TetMesh
 from taichi_soft.meshing.tetgen import read_tetgen, write_elements, write_nodes
@@ -58,7 +58,8 @@ def load_mesh(path: str | os.PathLike[str], *, fix_orientation: bool = True) -> 
     if suffix in SURFACES:
         surface = f"trimesh.load_mesh({source.name!r})"
         raise MeshError(f"{source.name}: a surface, which has no tetrahedra: {filling(surface)}")
-    _require_format(source)
+    converted = needing(f"`meshio convert {source.name} {source.stem}.vtu`", "meshio")
+    _require_format(source, f"; of many others {converted} makes one of these")
     read = _read_npz if suffix == ".npz" else read_interchange if suffix in FORMATS else read_tetgen
     try:
         _refuse_stand_in(source)
@@ -113,9 +114,11 @@ def save_mesh(mesh: TetMesh, path: str | os.PathLike[str]) -> None:
                 temporary.unlink(missing_ok=True)
 
 
-def _require_format(path: Path) -> None:
+def _require_format(path: Path, way_out: str = "") -> None:
     if path.suffix.lower() not in SUFFIXES:
-        raise MeshError(f"{path.name}: unknown mesh format {path.suffix!r}: use {', '.join(SUFFIXES)}")
+        raise MeshError(
+            f"{path.name}: unknown mesh format {path.suffix!r}: use {', '.join(SUFFIXES)}{way_out}"
+        )
 
 
 def _refuse_stand_in(source: Path) -> None:

@@ -3,6 +3,7 @@
 import contextlib
 import importlib
 import io
+import re
 import struct
 import warnings
 from types import SimpleNamespace
@@ -316,6 +317,15 @@ def test_archives_under_other_names_are_told_theirs_and_the_wanted_ones(tmp_path
 
 
 POLYDATA = "# vtk DataFile Version 3.0\nby hand\nASCII\nDATASET POLYDATA\nPOINTS 0 float\n"
+
+
+def test_the_command_that_an_unknown_format_is_refused_with_makes_a_known_one(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write(tmp_path / "x.inp", "abaqus", {}, meshio.Mesh(PAIR.vertices, [("tetra", PAIR.tets)]))
+    (command,) = re.findall("`meshio (.*?)`", refusal(tmp_path / "x.inp"))
+    with contextlib.redirect_stdout(io.StringIO()):
+        assert not importlib.import_module("meshio._cli").main(command.split())
+    assert same(load_mesh(tmp_path / "x.vtu"), PAIR)
 
 
 def test_surfaces_are_refused_with_the_way_to_fill_them(tmp_path):
