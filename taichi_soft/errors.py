@@ -54,3 +54,7 @@ class DroppedEventsWarning(UserWarning):
 
 class SolverWarning(UserWarning):
     """An implicit solve stopped before it was as exact as asked for."""
+
+
+class SkippedCellsWarning(UserWarning):
+    """A mesh file holds cells that are not tetrahedra, and the body is without them."""

@@ -23,6 +23,7 @@ from taichi_soft.laws.virial import virial_forces
 from taichi_soft.laws.volume_springs import volume_spring_bonds
 from taichi_soft.materials import CONSTANTS, AnisotropicMaterial, AnyMaterial, SpringMaterial
 from taichi_soft.meshing import BodyMesh, ParticleMesh, TetMesh
+from taichi_soft.meshing.advice import filling, joining
 from taichi_soft.types import ChoiceT, DampingModel, Flips, Strain
 
 __all__ = [
@@ -149,7 +150,8 @@ def fit_model(model: ElementModel, mesh: BodyMesh, material: AnyMaterial) -> Ele
     """
     law = model.law
     if not isinstance(mesh, BodyMesh):
-        raise MeshError(f"mesh must be a TetMesh or a ParticleMesh, got {type(mesh).__name__}")
+        advice = f": {filling('mesh')}" if hasattr(mesh, "faces") else joining(mesh)
+        raise MeshError(f"mesh must be a TetMesh or a ParticleMesh, got {type(mesh).__name__}{advice}")
     if not isinstance(material, AnyMaterial):
         raise MaterialError(f"material must be a taichi_soft.Material, got {type(material).__name__}")
     if isinstance(material, SpringMaterial) and law.name == "springs":

@@ -2,16 +2,22 @@
 
     .npz          this package's own: arrays `vertices` and `tets`, compressed
     .node, .ele   TetGen, a pair of files; name either
-    .msh          Gmsh 2.2 and 4.1 (written as 4.1 text)
+    .msh          Gmsh 1, 2, 4.0 and 4.1, text or binary (written as 4.1 text)
     .vtk, .vtu    VTK unstructured grids (.vtk written as text)
+    .mesh         Medit, text
 
-Gmsh and VTK files need the extra `taichi-soft[io]`.
+Gmsh, VTK and Medit files need the extra `taichi-soft[io]`. A surface (.obj, .stl and the like) is no body;
+this fills it:
+
+    surface = trimesh.load_mesh("wheel.stl")
+    wheel = MeshShape(surface, cell=0.05).voxel_mesh()
 """
 
 from __future__ import annotations
 
 import contextlib
 import os
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -20,31 +26,43 @@ import numpy as np
 
 from taichi_soft.checks import as_path
 from taichi_soft.errors import MeshError
+from taichi_soft.meshing.advice import filling, needing
 from taichi_soft.meshing.interchange import FORMATS, read_interchange, write_interchange
 from taichi_soft.meshing.tet_mesh import TetMesh
 from taichi_soft.meshing.tetgen import read_tetgen, write_elements, write_nodes
 
 SUFFIXES = (".npz", ".node", ".ele", *FORMATS)
+SURFACES = (".stl", ".obj", ".ply", ".off", ".glb", ".gltf")
+"""Triangles only, which trimesh reads by itself."""
 
 
 def load_mesh(path: str | os.PathLike[str], *, fix_orientation: bool = True) -> TetMesh:
     """Read a tetrahedral mesh.
 
     Vertices that no tetrahedron uses (Gmsh files hold the construction points) are dropped and the rest
-    renumbered in their order. All blocks of tetrahedra become one mesh; other cells are left out.
+    renumbered in their order. All blocks of tetrahedra become one mesh; of tetrahedra with more than four
+    nodes the corners are taken. Cells of other kinds are left out, with a SkippedCellsWarning that counts
+    them, unless they are points, edges or faces of the body.
 
     Args:
-        path: file whose suffix is one of .npz, .node, .ele, .msh, .vtk, .vtu. Coordinates are metres.
+        path: file whose suffix is one of .npz, .node, .ele, .msh, .vtk, .vtu, .mesh. Coordinates are metres.
         fix_orientation: turn tetrahedra of negative volume round. True by default, unlike in `TetMesh`,
             because programs do not agree on the sense; neighbours that overlap are refused either way.
     Raises: MeshError, in one line that starts with the file's name, if the file is missing, of another kind,
-        cut short, without tetrahedra, not a sound mesh (see `TetMesh`), or if meshio is needed and missing;
+        cut short, without tetrahedra (where it is a surface, with how to fill it), not a sound mesh (see
+        `TetMesh`), or if meshio is needed and missing;
         OptionError for a path that names no file.
     """
-    source = _checked_path(path)
+    source = as_path(path)
     suffix = source.suffix.lower()
+    if suffix in SURFACES:
+        surface = f"trimesh.load_mesh({source.name!r})"
+        raise MeshError(f"{source.name}: a surface, which has no tetrahedra: {filling(surface)}")
+    converted = needing(f"`meshio convert {source.name} {source.stem}.vtu`", "meshio")
+    _require_format(source, f"; of many others {converted} makes one of these")
     read = _read_npz if suffix == ".npz" else read_interchange if suffix in FORMATS else read_tetgen
     try:
+        _refuse_stand_in(source)
         vertices, tets = read(source)
     except OSError as error:
         raise MeshError(f"{_named(error, source)}: cannot be read ({error.strerror or error})") from None
@@ -64,7 +82,8 @@ def save_mesh(mesh: TetMesh, path: str | os.PathLike[str]) -> None:
     """
     if not isinstance(mesh, TetMesh):
         raise MeshError(f"save_mesh got a {type(mesh).__name__}: only a TetMesh has a file format")
-    target = _checked_path(path)
+    target = as_path(path)
+    _require_format(target)
     suffix = target.suffix.lower()
     writers: dict[Path, Callable[[Path], None]]
     if suffix == ".npz":
@@ -95,11 +114,26 @@ def save_mesh(mesh: TetMesh, path: str | os.PathLike[str]) -> None:
                 temporary.unlink(missing_ok=True)
 
 
-def _checked_path(path: str | os.PathLike[str]) -> Path:
-    checked = as_path(path)
-    if checked.suffix.lower() not in SUFFIXES:
-        raise MeshError(f"{checked.name}: unknown mesh format {checked.suffix!r}: use {', '.join(SUFFIXES)}")
-    return checked
+def _require_format(path: Path, way_out: str = "") -> None:
+    if path.suffix.lower() not in SUFFIXES:
+        raise MeshError(
+            f"{path.name}: unknown mesh format {path.suffix!r}: use {', '.join(SUFFIXES)}{way_out}"
+        )
+
+
+def _refuse_stand_in(source: Path) -> None:
+    """Raises: MeshError where git or a browser has put something else in the place of the file."""
+    pair = source.suffix.lower() in (".node", ".ele")
+    for path in (source.with_suffix(".node"), source.with_suffix(".ele")) if pair else (source,):
+        with path.open("rb") as file:
+            start = file.read(200).lstrip().lower()
+        if start.startswith(b"version https://git-lfs.github.com/spec/"):
+            raise MeshError(
+                f"{path.name}: a Git LFS pointer, not the file itself: run `git lfs pull` in its repository "
+                "(with the program of https://git-lfs.com), or download the file from its web page"
+            )
+        if start.startswith((b"<!doctype html", b"<html")):
+            raise MeshError(f"{path.name}: a web page, not the file that it shows: download the raw file")
 
 
 def _named(error: OSError, source: Path) -> str:
@@ -108,20 +142,30 @@ def _named(error: OSError, source: Path) -> str:
 
 
 def _read_npz(path: Path) -> tuple[Any, Any]:
+    if not zipfile.is_zipfile(path):
+        raise MeshError(
+            f"{path.name}: not a .npz file, or cut short: numpy.savez and save_mesh write such files"
+        )
     try:
         with np.load(path, allow_pickle=False) as contents:
-            missing = {"vertices", "tets"} - set(contents.files)
-            arrays = None if missing else (contents["vertices"], contents["tets"])
+            names = sorted(contents.files)
+            whole = {"vertices", "tets"} <= set(names)
+            arrays = (contents["vertices"], contents["tets"]) if whole else None
     except OSError:
         raise
-    # Not a zip file, cut short, damaged inside, holding Python objects: each raises something else.
+    # Damaged inside, of other things than arrays, holding Python objects: each raises something else.
     except Exception as error:
         reason = " ".join(str(error).split())[:200]
         raise MeshError(f"{path.name}: not a mesh file, or damaged ({reason})") from None
     if arrays is None:
-        raise MeshError(f"{path.name}: has no array {min(missing)!r}, so it is not a mesh")
+        held = ", ".join(repr(name) for name in names[:10]) + (", ..." if len(names) > 10 else "")
+        raise MeshError(
+            f"{path.name}: wanted are arrays 'vertices' (n, 3) and 'tets' (m, 4), and the file has "
+            f"{held or 'none'}: give TetMesh(vertices, tets) the two that are them, and save_mesh that"
+        )
     if any(array.ndim != 2 for array in arrays):
-        raise MeshError(f"{path.name}: vertices and tets must be tables, so it is not a mesh")
+        shapes = " and ".join(str(array.shape) for array in arrays)
+        raise MeshError(f"{path.name}: vertices and tets must be tables (n, 3) and (m, 4), got {shapes}")
     return arrays
 
 

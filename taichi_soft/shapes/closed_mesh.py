@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from taichi_soft.errors import MeshError
 from taichi_soft.meshing import TetMesh
+from taichi_soft.meshing.advice import joining, needing
 from taichi_soft.meshing.arrays import FloatArray, IntArray, as_indices, as_points, name_vertices
 from taichi_soft.shapes.shape import LONGEST, SHORTEST
 
@@ -58,8 +59,8 @@ def _arrays(source: Any) -> tuple[Any, Any]:
     if hasattr(source, "vertices") and hasattr(source, "faces"):
         return source.vertices, source.faces
     raise MeshError(
-        f"a mesh shape is made of a trimesh.Trimesh, a TetMesh or (vertices, triangles), got "
-        f"{type(source).__name__}"
+        "a mesh shape is made of a trimesh.Trimesh, a TetMesh or (vertices, triangles), got "
+        f"{type(source).__name__}{joining(source)}"
     )
 
 
@@ -74,13 +75,14 @@ def _require_closed(triangles: IntArray, numbers: NDArray[Any]) -> None:
         raise MeshError(
             f"the mesh is open: {odd.sum()} edges such as that of vertices "
             f"{name_vertices(numbers[pairs[odd.argmax()]])} belong to one triangle only. Close it, for "
-            "example by trimesh.repair.fill_holes(mesh), or give a sheet a thickness"
+            f"example by {needing('trimesh.repair.fill_holes(mesh)', 'networkx')}, or give a sheet a "
+            "thickness"
         )
     bad = balance != 0
     if bad.any():
         raise MeshError(
             f"triangles at the edge of vertices {name_vertices(numbers[pairs[bad.argmax()]])} face opposite "
-            "ways: turn them by mesh.fix_normals()"
+            f"ways: turn them by {needing('mesh.fix_normals()', 'networkx', 'scipy')}"
         )
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from taichi_soft.collision.mesh import MARGIN
 from taichi_soft.errors import MeshError
 from taichi_soft.kernels.distance_grid import STEPS, accumulate_crossings, compute_grid_distances
+from taichi_soft.meshing.advice import needing
 from taichi_soft.runtime import init
 from taichi_soft.shapes.closed_mesh import ClosedMesh
 from taichi_soft.shapes.shape import as_length
@@ -89,7 +90,7 @@ def distance_grid(mesh: ClosedMesh, grid: Grid) -> NDArray[np.float32]:
     if windings.min() < 0:
         raise MeshError(
             f"a part of the mesh is inside out, round {_place(windings, grid)} m: turn it by "
-            "mesh.fix_normals()"
+            f"{needing('mesh.fix_normals()', 'networkx', 'scipy')}"
         )
     _require_thickness(corners, distances, grid)
     metres: NDArray[np.float32] = distances * np.float32(grid.cell)

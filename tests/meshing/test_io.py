@@ -11,7 +11,7 @@ from taichi_soft.meshing import ParticleMesh, TetMesh, load_mesh, save_mesh, sph
 
 MESH = sphere(1.0, 2).translated([0.1, 1 / 3, -1e-7])
 OWN = [".npz", ".node", ".ele"]
-WITH_MESHIO = [".msh", ".vtk", ".vtu"]
+WITH_MESHIO = [".msh", ".vtk", ".vtu", ".mesh"]
 
 
 def needs(suffix):
@@ -200,7 +200,7 @@ def test_the_other_half_of_a_pair_is_named_when_missing(tmp_path):
         load_mesh(tmp_path / "ball.node")
 
 
-@pytest.mark.parametrize("name", ["x.obj", "x", "x.stl", ".npz"])
+@pytest.mark.parametrize("name", ["x.inp", "x", ".npz"])
 def test_unknown_formats_are_refused(tmp_path, name):
     for call in (lambda p: load_mesh(p), lambda p: save_mesh(MESH, p)):
         with pytest.raises(MeshError, match=r"unknown mesh format.*\.npz.*\.vtu"):
@@ -227,13 +227,13 @@ def test_files_without_tetrahedra_are_refused(tmp_path):
     pytest.importorskip("meshio")
     text = VTK.replace("4 0 1 3 4\n", "").replace("4 3 1 4 5\n", "").replace("10\n5\n10", "5")
     (tmp_path / "x.vtk").write_text(text.replace("CELLS 3 14", "CELLS 1 4").replace("TYPES 3", "TYPES 1"))
-    with pytest.raises(MeshError, match=r"x\.vtk: holds no tetrahedra, only triangle"):
+    with pytest.raises(MeshError, match=r"x\.vtk: holds no tetrahedra, only 1 triangle"):
         load_mesh(tmp_path / "x.vtk")
 
 
 def test_archives_of_other_things_are_refused(tmp_path):
     np.savez(tmp_path / "x.npz", vertices=np.eye(3))
-    with pytest.raises(MeshError, match=r"x\.npz: has no array 'tets', so it is not"):
+    with pytest.raises(MeshError, match=r"x\.npz: wanted are arrays.* and the file has 'vertices'"):
         load_mesh(tmp_path / "x.npz")
     np.savez(tmp_path / "y.npz", vertices=np.array([{}], dtype=object), tets=np.eye(4))
     with pytest.raises(MeshError, match=r"y\.npz: not a mesh file"):

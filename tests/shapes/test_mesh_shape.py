@@ -1,5 +1,6 @@
 """What becomes a solid, and what is refused with the way out."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -8,7 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from taichi_soft import MeshError, MeshShape, OptionError, rope, sphere, torus
+from taichi_soft import MeshError, MeshShape, OptionError, World, load_mesh, preset, rope, sphere, torus
 
 CUBE = trimesh.creation.box((1, 1, 1))
 COARSE = 0.1
@@ -186,3 +187,63 @@ sys.stdout.buffer.write(MeshShape(torus(0.8, 0.25), cell=0.04, cache=False).samp
         [sys.executable, "-c", script], cwd=Path(__file__).parents[2], capture_output=True, timeout=120
     )
     assert done.stdout == MeshShape(torus(0.8, 0.25), cell=0.04, cache=False).samples.tobytes()
+
+
+def test_a_body_of_cells_fills_a_surface_where_it_is():
+    """Two boxes that do not touch, each filled to within a cell."""
+    mesh = trimesh.util.concatenate([box_at((1, 0.5, 2), (3, 0, -1)), box_at((0.3, 0.3, 0.3), (5, 0, 0))])
+    body = MeshShape(mesh, cell=0.1).voxel_mesh()
+    cells = body.volume / 0.1**3
+    assert cells == pytest.approx(round(cells), abs=1e-6)
+    assert 0.7 * mesh.volume < body.volume < 1.3 * mesh.volume
+    np.testing.assert_allclose([body.vertices.min(axis=0), body.vertices.max(axis=0)], mesh.bounds, atol=0.1)
+    apart = body.vertices[:, 0] > 4
+    np.testing.assert_allclose(body.vertices[apart].mean(axis=0), (5, 0, 0), atol=0.05)
+
+
+def test_finer_cells_fill_a_ball_better():
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.5)
+    missing = [
+        abs(MeshShape(ball, cell=cell).voxel_mesh().volume / ball.volume - 1) for cell in (0.2, 0.1, 0.05)
+    ]
+    assert missing[0] > missing[1] > missing[2]
+    assert missing[2] < 0.02
+
+
+def test_the_way_to_a_body_that_a_refused_surface_names_runs_as_it_stands(tmp_path, monkeypatch):
+    box_at((1, 1, 1), (0, 0, 0.5)).export(tmp_path / "wheel.stl")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(MeshError) as caught:
+        load_mesh("wheel.stl")
+    (call,) = re.findall(r"(MeshShape\(.*?\.voxel_mesh\(\))", str(caught.value))
+    assert eval(call).volume == pytest.approx(1.0, rel=0.2)
+
+
+def test_a_surface_or_a_scene_in_the_place_of_a_body_is_told_the_way():
+    with pytest.raises(
+        MeshError, match=r"got Trimesh: MeshShape\(mesh, cell=0\.05\)\.voxel_mesh\(\) fills it"
+    ):
+        World().add_body(CUBE, preset("cork"))
+    for take in (MeshShape, lambda scene: World().add_body(scene, preset("cork"))):
+        with pytest.raises(
+            MeshError, match=r'got Scene: read the file by trimesh\.load\(path, force="mesh"\)'
+        ) as caught:
+            take(trimesh.Scene([CUBE]))
+        (call,) = re.findall(r"scene\.(.*)$", str(caught.value))
+        joined = eval(f"trimesh.Scene([CUBE]).{call}")
+        assert MeshShape(joined, cell=COARSE).bounds.tolist() == MeshShape(CUBE, cell=COARSE).bounds.tolist()
+
+
+@pytest.mark.parametrize("installed", [False, True])
+def test_ways_out_say_what_has_to_be_installed_for_them(monkeypatch, installed):
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: "spec" if installed else None)
+    notes = r" \(which needs {}, not installed here: pip install {}\)" if not installed else "{:.0}{:.0}"
+    hole = re.escape("trimesh.repair.fill_holes(mesh)") + notes.format("networkx", "networkx") + ", or"
+    with pytest.raises(MeshError, match=hole):
+        MeshShape((CUBE.vertices, CUBE.faces[1:]))
+    turned = CUBE.faces.copy()
+    turned[0] = turned[0][::-1]
+    with pytest.raises(
+        MeshError, match=r"fix_normals\(\)" + notes.format("networkx and scipy", "networkx scipy") + "$"
+    ):
+        MeshShape((CUBE.vertices, turned))

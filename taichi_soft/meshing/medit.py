@@ -1,0 +1,55 @@
+"""What a mesh is made of in Medit's text files (.mesh), whatever else they hold."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from taichi_soft.errors import MeshError
+
+NODES = {
+    b"Edges": 2,
+    b"Triangles": 3,
+    b"Quadrilaterals": 4,
+    b"Tetrahedra": 4,
+    b"Prisms": 6,
+    b"Pyramids": 5,
+    b"Hexahedra": 8,
+    b"Hexaedra": 8,
+}
+"""Of each kind of cell."""
+
+KEYWORD = re.compile(rb"(?<![\w.+-])([A-Za-z]\w*)")
+
+
+def mesh_sections(path: Path, content: bytes) -> bytes:
+    """A Medit file of the same vertices and cells, laid out as meshio wants it; what marks them is left out.
+
+    Raises: MeshError for what is no such file, or a section of another length than it announces.
+    """
+    _, *words = KEYWORD.split(re.sub(rb"#[^\n]*", b"", content))
+    if not words or words[0] != b"MeshVersionFormatted":
+        start = content[:20].decode("ascii", "replace")
+        raise MeshError(
+            f"{path.name}: not a Medit text file: it begins with {start!r}, not with MeshVersionFormatted. "
+            "Other programs give their files the same suffix: have them write .vtu"
+        )
+    found = list(zip(words[::2], (body.split() for body in words[1::2]), strict=True))
+    dimension = next((body[0] for word, body in found if word == b"Dimension" and body), b"?")
+    if dimension != b"3":
+        got = dimension.decode("ascii", "replace")
+        raise MeshError(f"{path.name}: has dimension {got}: a body needs 3")
+    lines = [b"MeshVersionFormatted 2", b"Dimension 3"]
+    for word, body in found:
+        columns = 1 + (3 if word == b"Vertices" else NODES.get(word, 0))  # the last one is a mark
+        if columns == 1:
+            continue
+        count = int(body[0]) if body and body[0].isdigit() else -1
+        if len(body) != 1 + count * columns:
+            raise MeshError(
+                f"{path.name}: {word.decode()} announces {count} rows of {columns} and holds {len(body) - 1} "
+                "numbers: the file is cut short or damaged"
+            )
+        if count:
+            lines += [word, body[0], b" ".join(body[1:])]
+    return b"\n".join([*lines, b"End\n"])
