@@ -17,6 +17,9 @@ from taichi_soft.runtime import ti
 SHARP_BRAKE = 0.5
 """Of the vibration that a substep leaves where a step that failed is made for the last time."""
 
+FARTHEST = 0.1
+"""Way of a particle in a substep of such a step, beside the rigid motion, over the mean edge of the surface."""
+
 THIN_BODY = 1e-6
 """Product of the principal moments over the cube of their sum, below which a body is taken for a straight
 line: it does not feel a turn about that."""
@@ -126,6 +129,31 @@ def _fade(state: ti.template(), body, kick, keep):
 
 
 @ti.func
+def _limit_vibration(state: ti.template(), body, kick, farthest):
+    """Let no particle be faster beside the rigid motion than `farthest` [m/s] after a kick, nor the body lose or
+    gain momentum or spin by that."""
+    particles, gravity = state.body_particles[body], gravity_on(state, body)
+    x0, v0 = state.particle_position[particles[0]], state.particle_velocity[particles[0]]
+    center, velocity, spin = _rigid_motion(state, body, kick, x0, v0)
+    for p in range(particles[0], particles[1]):
+        if state.particle_inv_mass[p] > 0.0:
+            kicked = _kicked_velocity(state, p, gravity, kick)
+            rigid = v0 + velocity + spin.cross(state.particle_position[p] - x0 - center)
+            beside = kicked - rigid
+            speed = beside.norm()
+            slower = ti.select(speed < farthest, beside, beside * (farthest / ti.max(speed, 1e-30)))
+            if not speed < 1e18:  # whose square overflows: its direction is not known
+                slower = beside * 0.0
+            state.particle_velocity[p] = state.particle_velocity[p] + (rigid + slower - kicked)
+    _, velocity_now, spin_now = _rigid_motion(state, body, kick, x0, v0)
+    for p in range(particles[0], particles[1]):
+        if state.particle_inv_mass[p] > 0.0:
+            arm = state.particle_position[p] - x0 - center
+            back = velocity - velocity_now + (spin - spin_now).cross(arm)
+            state.particle_velocity[p] = state.particle_velocity[p] + back
+
+
+@ti.func
 def kept_vibration(state: ti.template(), body, h, s, substeps):
     """The share of its vibration that a body keeps in substep `s` of `substeps` of `h` [s] each.
 
@@ -151,3 +179,5 @@ def damp_vibration(state: ti.template(), body, kick, h, s, substeps):
     keep = kept_vibration(state, body, h, s, substeps)
     if keep < 1.0:
         _fade(state, body, kick, keep)
+    if state.body_is_braked[body] == 1:
+        _limit_vibration(state, body, kick, FARTHEST * state.body_edge[body] / h)
