@@ -13,7 +13,7 @@ from taichi_soft.constants import POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.contact import DEFAULT_CONTACT, THIN, Contact
 from taichi_soft.errors import MaterialError, OptionError
 from taichi_soft.first_mode import first_frequency
-from taichi_soft.laws import ElementModel, element_model, fit_model
+from taichi_soft.laws import ElementModel, default_law, element_model, fit_model
 from taichi_soft.materials import AnyMaterial, Material, SpringMaterial
 from taichi_soft.meshing import BodyMesh, ParticleMesh
 from taichi_soft.meshing.arrays import read_only
@@ -40,7 +40,9 @@ class SoftBodyAsset:
         material: constants in SI units; a `SpringMaterial` for a `ParticleMesh`.
         law: one of `LAWS`: "virial" (thesis 6.3), "face" (6.2), "st_venant_kirchhoff", "neo_hookean"; and
             along edges "springs" (3.4), "volume_springs" (chapter 5), "cmpm", "cmpm2",
-            "best_fitting_plane", "tilted_plane" and "tilted_plane_printed" (chapter 4).
+            "best_fitting_plane", "tilted_plane" and "tilted_plane_printed" (chapter 4). None takes
+            "neo_hookean"; "virial" where strain or another way with flips is chosen, or for an
+            `AnisotropicMaterial`; "springs" for a `SpringMaterial`.
         strain: "linear" (eq. 6.7) or "exact" (square root of U^2); None takes the law's own.
         flips: "tolerant" (the thesis: a mirrored tetrahedron is at rest too), "recover" or "off"; None
             takes the law's own. A law with an energy does what follows from it, and takes no other.
@@ -59,7 +61,7 @@ class SoftBodyAsset:
     mesh: BodyMesh
     material: AnyMaterial
     _: KW_ONLY
-    law: str = "virial"
+    law: str | None = None
     strain: str | Strain | None = None
     flips: str | Flips | None = None
     damping_model: str | DampingModel = DampingModel.EDGE
@@ -71,6 +73,9 @@ class SoftBodyAsset:
     description: BodyDescription = field(init=False)
 
     def __post_init__(self) -> None:
+        if self.law is None:
+            object.__setattr__(self, "law", default_law(self.material, self.strain, self.flips))
+        assert self.law is not None
         model = element_model(self.law, self.strain, self.flips, self.damping_model)
         model = fit_model(model, self.mesh, self.material)
         if not isinstance(self.contact, Contact):

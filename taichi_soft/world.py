@@ -197,7 +197,7 @@ class World(Handle):
         mesh: BodyMesh,
         material: AnyMaterial,
         *,
-        law: str = "virial",
+        law: str | None = None,
         strain: str | Strain | None = None,
         flips: str | Flips | None = None,
         damping_model: str | DampingModel = DampingModel.EDGE,

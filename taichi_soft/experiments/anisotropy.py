@@ -23,7 +23,7 @@ from taichi_soft.experiments.experiment import (
 )
 from taichi_soft.stages import ASSETS
 
-MATERIAL = Material(1e6, 0.25, 1000.0)
+MATERIAL = Material(1e6, 0.25, 1000.0, damping_ratio=0.0)
 RIGHT = float(MATERIAL.lame_lambda + 2 * MATERIAL.lame_mu)
 """Of an isotropic material [Pa]."""
 

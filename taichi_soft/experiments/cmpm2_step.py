@@ -22,8 +22,8 @@ from taichi_soft.experiments.experiment import (
 )
 from taichi_soft.experiments.law_stability import ShakenBody, vibration
 
-UNDAMPED = Material(1e6, 0.25, 1000.0)
-DAMPED = Material(1e6, 0.25, 1000.0, 30.0)
+UNDAMPED = Material(1e6, 0.25, 1000.0, damping_ratio=0.0)
+DAMPED = Material(1e6, 0.25, 1000.0, 30.0, damping_ratio=0.0)
 """So much that it shortens the step by a tenth, and stops most of what grows at every step."""
 
 LAWS = ("cmpm", "cmpm2")

@@ -49,7 +49,7 @@ def measure(point: Point) -> Numbers:
     """Forces on the top as it goes half the height; fewer where there is no state of rest."""
     mesh = cylinder(RADIUS, HEIGHT, *point["mesh"])
     plates = Plates(mesh, slide=point["slide"])
-    material = Material(point["young"], point["poisson"], 1000.0)
+    material = Material(point["young"], point["poisson"], 1000.0, damping_ratio=0.0)
     strain = [0.01, *(0.5 * (k + 1) / point["count"] for k in range(point["count"]))]
     states = plates.path(lambda x: internal_forces(mesh, material, x), WAYS[point["way"]], strain)
     pulls = [plates.pull(internal_forces(mesh, material, x)) for x in states]

@@ -29,10 +29,10 @@ APART = "nu = 0.25, G = E / 20"
 
 PLAIN, JUDGED = "nu = 0", "nu = 0.25"
 MATERIALS = {
-    PLAIN: Material(YOUNG, 0.0, 1000.0),
-    JUDGED: Material(YOUNG, 0.25, 1000.0),
-    "nu = 0.4": Material(YOUNG, 0.4, 1000.0),
-    APART: Material(YOUNG, 0.25, 1000.0, shear_modulus=YOUNG / 20),
+    PLAIN: Material(YOUNG, 0.0, 1000.0, damping_ratio=0.0),
+    JUDGED: Material(YOUNG, 0.25, 1000.0, damping_ratio=0.0),
+    "nu = 0.4": Material(YOUNG, 0.4, 1000.0, damping_ratio=0.0),
+    APART: Material(YOUNG, 0.25, 1000.0, shear_modulus=YOUNG / 20, damping_ratio=0.0),
 }
 COMBINATIONS = [
     (law, name)

@@ -68,9 +68,12 @@ def cubes() -> list[tuple[str, float, TetMesh]]:
 def measure(point: Point) -> Numbers:
     """Smallest dihedral angle, largest stable step as estimated, and the steps that held and broke."""
     meshes = [mesh for _, _, mesh in cubes()]
-    material = Material(YOUNG, point["poisson"], DENSITY)
-    world = World(gravity=(0, 0, 0))
-    bodies = [world.add_body(mesh, material, position=(3.0 * i, 0, 3.0)) for i, mesh in enumerate(meshes)]
+    material = Material(YOUNG, point["poisson"], DENSITY, damping_ratio=0.0)
+    world = World(gravity=(0, 0, 0), retries=0)
+    bodies = [
+        world.add_body(mesh, material, position=(3.0 * i, 0, 3.0), law="virial")
+        for i, mesh in enumerate(meshes)
+    ]
     world.build()
     starts = [body.positions() for body in bodies]
     pushes = [1e-3 * np.random.default_rng(0).normal(size=start.shape) for start in starts]

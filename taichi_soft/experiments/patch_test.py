@@ -46,7 +46,7 @@ def measure(point: Point) -> Numbers:
     rest, over the largest of these. `inside`: the largest force on a vertex inside, where none should be.
     """
     mesh, rng = cube(3, point["seed"]), np.random.default_rng(point["seed"])
-    material = Material(YOUNG, POISSON, 1000.0)
+    material = Material(YOUNG, POISSON, 1000.0, damping_ratio=0.0)
     is_inside = np.ones(len(mesh.vertices), dtype=bool)
     is_inside[mesh.surface_vertices] = False
     surface, inside = [0.0] * len(STRAINS), [0.0] * len(STRAINS)

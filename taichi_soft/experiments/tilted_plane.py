@@ -22,7 +22,7 @@ from taichi_soft.experiments.experiment import (
 )
 from taichi_soft.experiments.judgement import Span
 
-MATERIAL = Material(1e6, 0.25, 1000.0)
+MATERIAL = Material(1e6, 0.25, 1000.0, damping_ratio=0.0)
 LAWS = {"tilted_plane_printed": "as printed", "tilted_plane": "c = beta / pi"}
 ANGLES = (0.01, 0.05, 0.1, 0.2, 0.4)
 """Of shear [rad]."""

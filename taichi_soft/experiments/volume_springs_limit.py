@@ -61,7 +61,7 @@ def measure(point: Point) -> Numbers:
 
 
 def _gradient(plates: Plates, nu: float) -> FloatArray:
-    material = Material(YOUNG, nu, DENSITY)
+    material = Material(YOUNG, nu, DENSITY, damping_ratio=0.0)
 
     def forces(x: FloatArray) -> FloatArray:
         return internal_forces(plates.mesh, material, x, law="volume_springs")

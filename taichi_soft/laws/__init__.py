@@ -33,6 +33,7 @@ __all__ = [
     "EnergyLaw",
     "Law",
     "StressLaw",
+    "default_law",
     "element_model",
     "fit_model",
 ]
@@ -141,6 +142,19 @@ def element_model(
         _one_of(chosen, "flips", None if flips is None else Flips.parse(flips), chosen.flips),
         damping,
     )
+
+
+def default_law(material: AnyMaterial, strain: str | Strain | None, flips: str | Flips | None) -> str:
+    """Name of the law that a body has where none is named.
+
+    Neo-Hookean: of the laws it broke least, and came back from most wrecks (docs/sweep.md). The virial one for
+    options that only the thesis's laws have, and for an `AnisotropicMaterial`; springs for a `SpringMaterial`.
+    """
+    if isinstance(material, SpringMaterial):
+        return "springs"
+    if isinstance(material, AnisotropicMaterial) or strain is not None:
+        return "virial"
+    return "neo_hookean" if flips in (None, Flips.RECOVER, Flips.RECOVER.value) else "virial"
 
 
 def fit_model(model: ElementModel, mesh: BodyMesh, material: AnyMaterial) -> ElementModel:

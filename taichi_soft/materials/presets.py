@@ -2,9 +2,8 @@
 
 Moduli and densities from M. F. Ashby, Materials Selection in Mechanical Design (property tables);
 gelatine from the stiff end of its usual range of 1 to 100 kPa (dropped by metres it dents for good, unless
-added with flips="recover"); `thesis_sphere` from thesis section 6.6. Damping is
-no material constant in this model (b is per edge and depends on the mesh); the values keep a body of
-about a metre and a thousand tetrahedra from ringing.
+added with flips="recover"); damping ratios are half of usual loss factors at a few hertz, rounded;
+`thesis_sphere` from thesis section 6.6, with its damping of edges and no other.
 """
 
 from __future__ import annotations
@@ -13,12 +12,12 @@ from taichi_soft.errors import OptionError
 from taichi_soft.materials.material import Material
 
 PRESETS = {
-    "thesis_sphere": Material(young=1.0e6, poisson=0.1, density=1000.0, damping=100.0),
-    "gelatine": Material(young=1.0e5, poisson=0.45, density=1050.0, damping=60.0),
-    "soft_rubber": Material(young=2.0e6, poisson=0.47, density=1100.0, damping=100.0),
-    "foam": Material(young=1.0e6, poisson=0.3, density=60.0, damping=5.0),
-    "cork": Material(young=2.0e7, poisson=0.0, density=180.0, damping=50.0),
-    "auxetic_foam": Material(young=5.0e5, poisson=-0.5, density=80.0, damping=5.0),
+    "thesis_sphere": Material(young=1.0e6, poisson=0.1, density=1000.0, damping=100.0, damping_ratio=0.0),
+    "gelatine": Material(young=1.0e5, poisson=0.45, density=1050.0, damping_ratio=0.08),
+    "soft_rubber": Material(young=2.0e6, poisson=0.47, density=1100.0, damping_ratio=0.05),
+    "foam": Material(young=1.0e6, poisson=0.3, density=60.0, damping_ratio=0.1),
+    "cork": Material(young=2.0e7, poisson=0.0, density=180.0, damping_ratio=0.05),
+    "auxetic_foam": Material(young=5.0e5, poisson=-0.5, density=80.0, damping_ratio=0.1),
 }
 
 

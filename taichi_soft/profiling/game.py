@@ -71,7 +71,7 @@ def _spheres(height: float, contact: Contact = DEFAULT_CONTACT, **options: Any) 
     world = World(**options)
     for i in range(COUNT):
         place = (SPACING * (i % 4), SPACING * (i // 4), height)
-        world.add_body(_mesh(), preset("thesis_sphere"), position=place, contact=contact)
+        world.add_body(_mesh(), preset("thesis_sphere"), position=place, contact=contact, law="virial")
     return world
 
 
@@ -160,8 +160,10 @@ def measure_heap(name: str, mesh: TetMesh, threads: int, repeats: int = 61) -> H
         world.add_collider(BoxShape((20.0, 1.0, 6.0)), position=(0.0, side * 5.1, 3.0))
     for x, y, z in product(range(4), range(4), range(2)):
         place = (2.2 * (x - 1.5) + 0.1 * z, 2.2 * (y - 1.5) + 0.05 * z, 1.2 + 2.3 * z)
-        world.add_body(mesh, preset("thesis_sphere"), position=place)
-        free.add_body(mesh, preset("thesis_sphere"), position=(SPACING * x, SPACING * y, SPACING * z))
+        world.add_body(mesh, preset("thesis_sphere"), position=place, law="virial")
+        free.add_body(
+            mesh, preset("thesis_sphere"), position=(SPACING * x, SPACING * y, SPACING * z), law="virial"
+        )
     heaped, apart = _stepping(_settled(world)), _stepping(free)
     time_calls(heaped, 2)
     before = processor_ticks()
@@ -174,7 +176,7 @@ def measure_heap(name: str, mesh: TetMesh, threads: int, repeats: int = 61) -> H
 def measure_moments(repeats: int = 61) -> list[Moments]:
     """What a snapshot takes, and what a frame takes in which a body comes or goes."""
     big = World(floor=None)
-    big.add_body(box((1.0, 1.0, 1.0), (10, 10, 10)), preset("thesis_sphere"))
+    big.add_body(box((1.0, 1.0, 1.0), (10, 10, 10)), preset("thesis_sphere"), law="virial")
     big.build()
     snapshot = Spread.of(_warm(big.snapshot, repeats)).scaled(1e3)
     pool = World(floor=None)

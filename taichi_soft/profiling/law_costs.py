@@ -14,7 +14,7 @@ from taichi_soft.world import World
 
 MESH = box((1.0, 1.0, 1.0), (10, 10, 10))
 TETS, EDGES = len(MESH.tets), len(MESH.edges)
-MATERIAL = Material(young=1.0e5, poisson=0.3, density=1000.0, damping=0.1)
+MATERIAL = Material(young=1.0e5, poisson=0.3, density=1000.0, damping=0.1, damping_ratio=0.0)
 WOODEN = AnisotropicMaterial(Stiffness.isotropic(1.0e5, 0.3), density=1000.0, damping=0.1)
 SUBSTEPS = 40
 SUBSTEP = 1.0e-5  # [s], far below every limit: the bodies just fall

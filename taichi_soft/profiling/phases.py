@@ -14,7 +14,7 @@ from taichi_soft.meshing import TetMesh, sphere
 from taichi_soft.profiling.spread import Spread, time_calls
 from taichi_soft.world import World
 
-MATERIAL = Material(young=1.0e6, poisson=0.1, density=1000.0, damping=100.0)
+MATERIAL = Material(young=1.0e6, poisson=0.1, density=1000.0, damping=100.0, damping_ratio=0.0)
 SPACING = 3.0  # of spheres of radius 1 [m]
 TINY_H = 1.0e-6  # [s], so that phases run by themselves move nothing
 
@@ -38,7 +38,9 @@ def spheres(count: int, schedule: str = "auto", mesh: TetMesh | None = None) -> 
     world = World(schedule=schedule)
     side = int(np.ceil(np.sqrt(count)))
     for i in range(count):
-        world.add_body(mesh, MATERIAL, position=(SPACING * (i % side), SPACING * (i // side), 50.0))
+        world.add_body(
+            mesh, MATERIAL, position=(SPACING * (i % side), SPACING * (i // side), 50.0), law="virial"
+        )
     world.build()
     return world
 

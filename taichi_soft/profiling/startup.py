@@ -17,7 +17,7 @@ from engine_adapter import EngineAdapter, FixedStep
 from taichi_soft import World, init, preset, sphere
 init({arch!r}, {threads!r}, {cores!r})
 world = World()
-body = world.add_body(sphere(radius=1.0), preset("thesis_sphere"), position=(0, 0, 3))
+body = world.add_body(sphere(radius=1.0), preset("thesis_sphere"), position=(0, 0, 3), law="virial")
 world.build()
 game = EngineAdapter(world, FixedStep(dt=1 / 60))
 game.step()
