@@ -165,7 +165,6 @@ class SoftContactFields:
         self.kept_triangle = ti.field(ti.i32, particles)
         self.kept_press = ti.field(ti.f32, particles)  # as `slot_press`; 0 for none
         self.kept_rub = ti.Vector.field(3, ti.f32, particles)
-        self.rest_position = ti.Vector.field(3, ti.f32, particles)  # [m]
         self.records_touches = ti.field(ti.i32, ())  # 1 where the rows below are filled
         # Two bodies, the smaller index first; both 0 in a free row. Island by island, as in `island_body`.
         self.pair_bodies = ti.Vector.field(2, ti.i32, bodies * PAIR_ROWS)

@@ -130,6 +130,7 @@ class State:
         self.particle_of_vertex = ti.field(ti.i32, n)  # where the caller's next vertex lies
         self.prev_position = ti.Vector.field(3, real, n)  # before the last fixed step
         self.prev_velocity = ti.Vector.field(3, real, n)
+        self.rest_position = ti.Vector.field(3, real, n)  # [m]
         self.particle_aim = ti.field(ti.i32, n)  # where a pinned particle goes: see `kernels.pins`
         self.particle_target = ti.Vector.field(3, real, n)  # there [m], or in the axes of a frame
         self.particle_push = ti.Vector.field(3, real, n)  # [N], where the body is `PUSHED`
@@ -209,6 +210,7 @@ class State:
             real, bodies
         )  # after which they are damped again at the latest [s]
         self.body_is_braked = ti.field(ti.i32, bodies)  # 1 while a step is made for the last time
+        self.body_patience = ti.field(ti.i32, bodies)  # steps since nothing was inside out, of every few
         self.body_jolted = ti.field(ti.i32, bodies)  # 1 where forces moved a particle too far at once (flat)
         self.body_edge = ti.field(real, bodies)  # mean edge of its surface [m]
         self.retries = ti.field(
@@ -306,6 +308,8 @@ class State:
         fill(self.body_damping, np.zeros(0))
         fill(self.body_is_braked, np.zeros(0))
         fill(self.body_jolted, np.zeros(0))
+        fill(self.body_patience, np.zeros(0))
+        fill(self.rest_position, position)
         rows = np.zeros((len(bodies), 3)) if kinds is None else kinds
         fill(self.body_edge, rows[:, 0])
         fill(self.body_fading, rows[:, 1])
@@ -339,7 +343,6 @@ class State:
             self.soft.pairs_lost[None] = 0
             fill(self.soft.pair_bodies, np.zeros((0, 2)))
             fill(self.soft.pair_impulse, np.zeros((0, 3)))
-            fill(self.soft.rest_position, _laid_out(scene, "particles", lambda b: b.rest_position))
 
     def _load_bonds(self, scene: Scene) -> None:
         """What the pairwise laws know of their edges; zeros for the edges of other bodies."""

@@ -21,6 +21,7 @@ from taichi_soft.kernels.motion import (
     restore_particle,
 )
 from taichi_soft.kernels.plasticity import flow_body
+from taichi_soft.kernels.untangling import untangle_body
 from taichi_soft.kernels.vibration import damp_vibration
 from taichi_soft.runtime import ti
 from taichi_soft.state import ABSENT, ACTIVE, FEELS_REACTION, FROZEN, PUSHED
@@ -146,6 +147,7 @@ def end_body(state: ti.template(), program: ti.template(), body, substeps, h):
         state.body_drives[body] = state.body_drives[body] & ~PUSHED
         if ti.static(program.has_plasticity):
             flow_body(state, body, substeps * h)
+        untangle_body(state, program, body)
     return failed
 
 

@@ -240,10 +240,10 @@ def _list_candidates(state: ti.template(), body, thickness):
 @ti.func
 def _is_self_neighbour(state: ti.template(), p, corners, edge):
     """Whether a vertex and a triangle of one body are near each other at rest."""
-    a = state.soft.rest_position[corners[0]]
-    b = state.soft.rest_position[corners[1]]
-    c = state.soft.rest_position[corners[2]]
-    x = state.soft.rest_position[p]
+    a = state.rest_position[corners[0]]
+    b = state.rest_position[corners[1]]
+    c = state.rest_position[corners[2]]
+    x = state.rest_position[p]
     weights = closest_point_on_triangle(x, a, b, c)
     return (x - weights.x * a - weights.y * b - weights.z * c).norm() < SELF_DISTANCE * edge
 

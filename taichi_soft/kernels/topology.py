@@ -95,8 +95,7 @@ def write_body(
             if ti.static(state.capacity.has_contact):
                 state.contact.particle_touches[p] = int(motion[i, 14])
                 state.contact.particle_clearance[p] = NO_CONTACT
-            if ti.static(state.capacity.contact.soft):
-                state.soft.rest_position[p0 + i] = _three(rest, i, 0)
+            state.rest_position[p0 + i] = _three(rest, i, 0)
         for i in range(tet_vertices.shape[0]):
             state.tet_vertices[b0 * 4 * LANES + i] = p0 + tet_vertices[i]
         for i in range(rest_inverses.shape[1]):
@@ -133,6 +132,7 @@ def write_body(
         state.body_drives[body] = state.body_drives[model_of]
         state.body_gravity_scale[body] = state.body_gravity_scale[model_of]
         state.body_damping[body] = state.body_damping[model_of]
+        state.body_patience[body] = state.body_patience[model_of]
         state.body_fading[body] = state.body_fading[model_of]
         state.body_fading_interval[body] = state.body_fading_interval[model_of]
         if ti.static(state.capacity.has_contact):

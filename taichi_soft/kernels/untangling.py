@@ -1,0 +1,102 @@
+"""What brings back a body that is caught inside out.
+
+Forces drive nearly all tetrahedra that are turned inside out back by themselves. A few may hold each other: in
+a coarse mesh they find a balance that is not the rest shape; and what has shrunk to a point has no direction in
+which to open. So every `PATIENCE` steps it is looked whether any is flat or inside out. Where that was so the
+time before, too, its corners go half of the way to where they lie in the rest shape, as that fits best to where
+all of the body is now.
+"""
+
+from taichi_soft.constants import LANES
+from taichi_soft.kernels.elastic import particles_of, rest_inverse_of
+from taichi_soft.math.svd import signed_svd
+from taichi_soft.math.tensors import determinant
+from taichi_soft.math.tetrahedron import shape
+from taichi_soft.runtime import ti
+from taichi_soft.types import Flips
+
+PATIENCE = 15
+"""Fixed steps between two looks: a quarter of a second."""
+
+FLAT = 1e-5
+"""Volume over that at rest, from which down a tetrahedron counts as caught."""
+
+
+@ti.func
+def _is_caught(state: ti.template(), t):
+    """Whether tetrahedron `t`, a block times `LANES` plus a lane, is flat or inside out."""
+    block, lane = t // LANES, t % LANES
+    p0, p1, p2, p3 = particles_of(state, block, lane)
+    B = shape(
+        state.particle_position[p0],
+        state.particle_position[p1],
+        state.particle_position[p2],
+        state.particle_position[p3],
+    )
+    inverse = determinant(rest_inverse_of(state, block, lane))  # 0 in the lanes that pad a last block
+    return inverse != 0.0 and determinant(B) * inverse < FLAT
+
+
+@ti.func
+def _caught_count(state: ti.template(), body):
+    count, blocks = 0, state.body_blocks[body]
+    for t in range(blocks[0] * LANES, blocks[1] * LANES):
+        count += int(_is_caught(state, t))
+    return count
+
+
+@ti.func
+def _best_fit(state: ti.template(), body):
+    """The centre of a body at rest and now [m], and the rotation, as rows, that fits the one best to the other."""
+    particles = state.body_particles[body]
+    x0, r0 = state.particle_position[particles[0]], state.rest_position[particles[0]]
+    total, now, rest = x0.x * 0.0, x0 * 0.0, x0 * 0.0
+    for p in range(particles[0], particles[1]):
+        mass = state.particle_mass[p]
+        total += mass
+        now += mass * (state.particle_position[p] - x0)
+        rest += mass * (state.rest_position[p] - r0)
+    now, rest = x0 + now / total, r0 + rest / total
+    a, b, c, size = x0 * 0.0, x0 * 0.0, x0 * 0.0, 1e-30
+    for p in range(particles[0], particles[1]):
+        share = state.particle_mass[p] / total
+        x, r = state.particle_position[p] - now, state.rest_position[p] - rest
+        a, b, c = a + share * r.x * x, b + share * r.y * x, c + share * r.z * x
+        size += share * r.dot(r)
+    U, _, V = signed_svd((a / size, b / size, c / size))
+    rows = (
+        U[0].x * V[0] + U[1].x * V[1] + U[2].x * V[2],
+        U[0].y * V[0] + U[1].y * V[1] + U[2].y * V[2],
+        U[0].z * V[0] + U[1].z * V[1] + U[2].z * V[2],
+    )
+    return rest, now, rows
+
+
+@ti.func
+def _free(state: ti.template(), body):
+    """Move the corners of what is caught half of the way to where they fit best."""
+    rest, now, rows = _best_fit(state, body)
+    blocks = state.body_blocks[body]
+    for t in range(blocks[0] * LANES, blocks[1] * LANES):
+        if _is_caught(state, t):
+            for corner in ti.static(range(4)):
+                p = particles_of(state, t // LANES, t % LANES)[corner]
+                if state.particle_inv_mass[p] > 0.0:
+                    r = state.rest_position[p] - rest
+                    goal = now + ti.Vector([rows[0].dot(r), rows[1].dot(r), rows[2].dot(r)])
+                    state.particle_position[p] = 0.5 * (state.particle_position[p] + goal)
+
+
+@ti.func
+def untangle_body(state: ti.template(), program: ti.template(), body):
+    """At the end of a step: look after what is caught, of bodies whose law brings back what is inside out."""
+    for m, model in ti.static(enumerate(program.models)):
+        if ti.static(model.flips == Flips.RECOVER):
+            if state.body_model[body] == m:
+                age = state.body_patience[body] + 1
+                if age % PATIENCE == 0:
+                    if _caught_count(state, body) == 0:
+                        age = 0
+                    elif age >= 2 * PATIENCE:
+                        _free(state, body)
+                state.body_patience[body] = age
