@@ -36,6 +36,7 @@ def build(world: World) -> Simulation:
     pools, scene, colliders, contact = world._pools, world._scene, world._colliders, world._contact
     if not pools.slots:
         raise StateError("the world is empty: call add_body or reserve before build")
+    world._substeps.review()
     device = init()
     world._built_with = [digest_of(handle.shape) for handle in colliders.all_handles]
     has_contact = (

@@ -40,6 +40,10 @@ class SweepError(TaichiSoftError, RuntimeError):
     """Points cannot be computed or kept as asked."""
 
 
+class SlowStepWarning(UserWarning):
+    """A world needs so many substeps that a game will not keep up."""
+
+
 class UnstableStepWarning(UserWarning):
     """The substep is larger than the estimate of what stays stable."""
 

@@ -51,6 +51,9 @@ class StableStep:
     period: float  # [s] of the fastest vibration
     stiffest_edge: tuple[int, int] | None = None  # instead of a tetrahedron where forces act along edges
     undamped: float = 0.0  # [s], the limit if nothing were damped
+    slivers: int = 0  # tetrahedra whose own limit is below half of what 99 of 100 others have
+    without_slivers: float = 0.0  # [s], about the limit if there were none
+    tets: int = 0
 
     @property
     def stiffest(self) -> str:
@@ -58,6 +61,22 @@ class StableStep:
         if self.stiffest_edge is not None:
             return f"stiffest edge from vertex {self.stiffest_edge[0]} to {self.stiffest_edge[1]}"
         return f"stiffest tetrahedron {self.stiffest_tet}"
+
+    @property
+    def reason(self) -> str:
+        """Why it is as short as it is, and the way out, in words."""
+        if self.limit < 0.5 * self.undamped:
+            return (
+                f"damping asks for {100 * (1 - self.limit / self.undamped):.3g} % of them: give the material a "
+                "damping_ratio instead of damping, which takes none"
+            )
+        if self.slivers:
+            share = 100 * (1 - self.limit / self.without_slivers)
+            return (
+                f"{self.slivers:,} of {self.tets:,} tetrahedra are slivers, which ask for {share:.3g} % of them: "
+                "mesh.improved() does away with those"
+            )
+        return f"it has small or stiff elements ({self.stiffest}): take a coarser mesh or a softer material"
 
     @property
     def recommended(self) -> float:
@@ -77,11 +96,13 @@ def stable_step(mesh: BodyMesh, material: AnyMaterial, model: ElementModel) -> S
         raise OptionError(f"model must come from element_model(...), got {model!r}")
     body = BodyDescription(mesh, material, fit_model(model, mesh, material))
     vibration = vibration_of(body)
-    most, stiffest_tet, stiffest_edge = np.inf, None, None
+    most, stiffest_tet, stiffest_edge, slivers, usual = np.inf, None, None, 0, np.inf
     start = np.random.default_rng(0).normal(size=(*mesh.vertices.shape, 1))
     if isinstance(vibration, TetVibration):
         bounds = vibration.element_bounds()
         most, stiffest_tet = float(bounds.max()), int(bounds.argmax())
+        usual = float(np.quantile(bounds, 0.99, method="lower"))
+        slivers = int((bounds > 4.0 * usual).sum())
     elif body.bonds is not None:
         stiffest_edge = _stiffest_edge(body, body.bonds)
     frequency2, u = largest_eigenvalue(vibration.apply, start)
@@ -89,7 +110,14 @@ def stable_step(mesh: BodyMesh, material: AnyMaterial, model: ElementModel) -> S
     undamped = 2.0 / np.sqrt(frequency2)
     limit = _damped_limit(vibration, undamped, u, start) if vibration.is_damped else undamped
     return StableStep(
-        float(limit), stiffest_tet, float(2 * np.pi / np.sqrt(frequency2)), stiffest_edge, float(undamped)
+        float(limit),
+        stiffest_tet,
+        float(2 * np.pi / np.sqrt(frequency2)),
+        stiffest_edge,
+        float(undamped),
+        slivers,
+        float(limit * max(1.0, np.sqrt(frequency2 / usual))),
+        len(mesh.tets),
     )
 
 

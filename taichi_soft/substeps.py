@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from taichi_soft.checks import as_count, as_step
-from taichi_soft.errors import StateError, UnstableStepWarning
+from taichi_soft.errors import OptionError, SlowStepWarning, StateError, UnstableStepWarning
 from taichi_soft.scene import BodyDescription
 from taichi_soft.stability import StableStep, stable_step
 
@@ -28,17 +28,28 @@ blocks of half a metre (1 MPa) are lower than by leapfrog by 3 to 9 mm so, and b
 60 Hz the pile falls."""
 
 
+MANY_SUBSTEPS = 500
+"""Of a step: a world that needs more says so. A body of 1,000 tetrahedra then takes 8 ms a step."""
+
+FRAME = 1 / 60
+"""Step [s] for which a world is judged when it is built."""
+
+TET_TIME = 15e-9
+"""Of a tetrahedron and substep on one thread [s], about (docs: `taichi-soft profile --baseline`)."""
+
+
 class Substeps:
     """How long the substeps of one world can be, and how long they are."""
 
-    def __init__(self, pools: Pools, *, is_implicit: bool, soft_contact: bool) -> None:
-        """`is_implicit`: its integrator takes substeps of any length."""
+    def __init__(self, pools: Pools, *, is_implicit: bool, soft_contact: bool, most: int | None) -> None:
+        """`is_implicit`: its integrator takes substeps of any length. `most`: as `World(max_substeps=)`."""
         self._pools = pools
         self._is_implicit, self._soft_contact = is_implicit, soft_contact
         self._estimates: dict[BodyDescription, StableStep] = {}  # of bodies with another material
         self._asked: tuple[Any, ...] = ()
         self._chosen = (0.0, 0, 0.0)  # for what was asked last
         self._warned: set[float] = set()
+        self._most, self._is_said = most, False
 
     def stable_step(self, body: Body) -> StableStep:
         """As `World.stable_step`."""
@@ -62,6 +73,30 @@ class Substeps:
                 longest = min(longest, self.stable_step(body).recommended)
         return max(1, math.ceil(as_step(dt) / longest))
 
+    def review(self) -> None:
+        """Before a world is built: say how many substeps a frame will take, where these are many.
+
+        Raises: OptionError where they are more than the world may take.
+        """
+        if self._pools.slots and not self._is_implicit:
+            self._require_few(FRAME, self.stable_count(FRAME))
+
+    def _require_few(self, dt: float, count: int) -> None:
+        is_refused = self._most is not None and count > self._most
+        if not is_refused and (count <= MANY_SUBSTEPS or self._is_said):
+            return
+        stiffest = min(self._pools.kinds, key=lambda asset: asset.stable_step.limit)
+        step = stiffest.stable_step
+        cost = count * TET_TIME * sum(len(asset.mesh.tets) for asset in self._pools.assets)
+        said = (
+            f"a step of {dt:.4g} s takes {count:,} substeps, about {cost:.2g} s of one thread, because of body "
+            f"{self._pools.assets.index(stiffest)}: {step.reason}"
+        )
+        if is_refused:
+            raise OptionError(f"{said}; the world takes max_substeps={self._most:,}")
+        self._is_said = True
+        warnings.warn(said, SlowStepWarning, stacklevel=5)
+
     def choose(self, dt: float, substeps: int | None) -> tuple[float, int, float]:
         """Length of a step [s], number of its substeps and their length [s], as `World.step` takes them.
 
@@ -76,6 +111,8 @@ class Substeps:
     def _check(self, dt: float, substeps: int | None) -> tuple[float, int, float]:
         seconds = as_step(dt)
         count = as_count(self.stable_count(seconds) if substeps is None else substeps, "substeps")
+        if not self._is_implicit and (substeps is None or self._most is not None):
+            self._require_few(seconds, count)
         h = seconds / count
         if self._is_implicit:
             return seconds, count, h

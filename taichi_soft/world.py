@@ -90,6 +90,8 @@ class World(Handle):
         retries: how often a step that fails for a body is made again, twice as fine each time, and then once
             more with its vibrations braked; 0 freezes the body at once, to see what a law does at a given
             step. Implicit Euler cuts its steps by itself.
+        max_substeps: of one step, of 1/60 s when the world is built; a world that needs more refuses to be
+            built, or to make the step. None: it only warns, above 500.
         record: steps that a flight recorder keeps, with all calls between them; 0 keeps nothing. See
             `save_recording`.
         record_to: file that it writes when a body freezes, the first time that this happens.
@@ -112,6 +114,7 @@ class World(Handle):
         collider_room: int = 0,
         sample_room: int = 0,
         retries: int = 3,
+        max_substeps: int | None = None,
         record: int = 0,
         record_to: str | Path = "frozen.recording",
     ) -> None:
@@ -145,7 +148,10 @@ class World(Handle):
         self._clock = Clock()
         self._pools, self._scene = Pools(), Scene()
         self._substeps = Substeps(
-            self._pools, is_implicit=self.settings.is_implicit, soft_contact=self._contact.soft
+            self._pools,
+            is_implicit=self.settings.is_implicit,
+            soft_contact=self._contact.soft,
+            most=None if max_substeps is None else as_count(max_substeps, "max_substeps"),
         )
         self._colliders = Colliders()
         self._floor_collider: Collider | None = None
