@@ -29,13 +29,24 @@ for _face in range(4):
 
 
 class Cavities(NamedTuple):
-    """Sets of tetrahedra that give way to others with the same faces towards the rest; rows sorted by cavity."""
+    """Sets of tetrahedra, and others with the same faces outwards to replace them; rows sorted by cavity."""
 
     removed: Ints  # (r,) rows of the mesh
     removed_of: Ints  # (r,) cavity of each
     added: Ints  # (a, 4) vertices
     added_of: Ints  # (a,)
     parent: Ints  # (a,) row whose place each takes, -1 where it has no single one
+
+    @property
+    def total(self) -> int:
+        """How many cavities."""
+        return int(self.removed_of[-1]) + 1 if len(self.removed_of) else 0
+
+    def in_rows(self, rows: Ints) -> Cavities:
+        """The same where row i of a part of the mesh is `rows[i]` of the whole."""
+        return self._replace(
+            removed=rows[self.removed], parent=np.where(self.parent < 0, -1, rows[self.parent])
+        )
 
     def kept(self, keep: Bools) -> Cavities:
         """Those of `keep`, (number of cavities,), renumbered."""
@@ -51,7 +62,7 @@ class Cavities(NamedTuple):
 
 
 class Closed:
-    """A mesh at one moment: its tetrahedra, those beyond the surface among them, and who is whose neighbour."""
+    """A mesh at one moment: its tetrahedra, also those beyond the surface, and who is whose neighbour."""
 
     def __init__(self, tets: Ints, keys: NDArray[np.uint64]) -> None:
         self.tets = tets
@@ -99,7 +110,7 @@ def sizes(x: FloatArray, tets: Ints) -> FloatArray:
     """
     p = x.T[:, tets.T]
     a, b, c = (p[:, i] - p[:, 0] for i in (1, 2, 3))
-    normals = cross(b, c), cross(c, a), cross(a, b)
+    normals = _cross(b, c), _cross(c, a), _cross(a, b)
     volume = (a * normals[0]).sum(axis=0)
     areas = sum((n * n).sum(axis=0) for n in (*normals, normals[0] + normals[1] + normals[2]))
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -107,9 +118,25 @@ def sizes(x: FloatArray, tets: Ints) -> FloatArray:
     return np.where((tets == OUTSIDE).any(axis=1), np.inf, size)
 
 
-def cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Cross products of columns, (3, k)."""
-    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+def size_slopes(x: FloatArray, tets: Ints, vertices: Ints) -> FloatArray:
+    """How fast each tetrahedron's size grows as one of its corners (k,) moves, by differences, (k, 3)."""
+    rows, corner = np.arange(len(tets)), (tets == vertices[:, None]).argmax(axis=1)
+    own = 1 + np.arange(4 * len(tets)).reshape(-1, 4)
+    step = 1e-6 * np.linalg.norm(np.ptp(x[tets], axis=1), axis=1)
+
+    def at(axis: int, side: int) -> FloatArray:
+        p = x[tets]
+        p[rows, corner, axis] += side * step
+        return sizes(np.concatenate([np.zeros((1, 3)), p.reshape(-1, 3)]), own)
+
+    return np.stack([(at(axis, 1) - at(axis, -1)) / (2 * step) for axis in range(3)], axis=1)
+
+
+def volumes(x: FloatArray, tets: Ints) -> FloatArray:
+    """Signed volumes (k,) [m^3], 0 beyond the surface."""
+    p = x[tets]
+    six = np.einsum("ij,ij->i", p[:, 1] - p[:, 0], np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 0]))
+    return np.where((tets == OUTSIDE).any(axis=1), 0.0, six / 6.0)
 
 
 def collapses(mesh: Closed, gone: Ints, into: Ints) -> Cavities:
@@ -122,7 +149,7 @@ def collapses(mesh: Closed, gone: Ints, into: Ints) -> Cavities:
 
 
 def meets_link_condition(mesh: Closed, gone: Ints, into: Ints) -> Bools:
-    """Whether what both ends of each edge touch is what the edge touches, so that the collapse keeps the topology."""
+    """Whether all that `gone` and `into` touch touches their edge, so that a collapse keeps the topology."""
     rows, of = mesh.star(gone)
     tets = mesh.tets[rows]
     far = ~(tets == into[of, None]).any(axis=1)
@@ -134,7 +161,7 @@ def meets_link_condition(mesh: Closed, gone: Ints, into: Ints) -> Bools:
         vertex, edge = link[:, [i]], np.delete(link, i, axis=1)
         wrong |= mesh.has(np.hstack([v, vertex])) & ~mesh.has(np.hstack([u, v, vertex]))
         wrong |= mesh.has(np.hstack([v, edge])) & ~mesh.has(np.hstack([u, v, edge]))
-    return np.bincount(of[wrong], minlength=len(gone)) == 0
+    return np.asarray(np.bincount(of[wrong], minlength=len(gone)) == 0)
 
 
 def face_flips(mesh: Closed, rows: Ints) -> Cavities:
@@ -153,7 +180,7 @@ def face_flips(mesh: Closed, rows: Ints) -> Cavities:
 
 
 def edge_removals(x: FloatArray, mesh: Closed, edges: Ints) -> list[Cavities]:
-    """The tetrahedra round each edge (k, 2) give way to the best that their outer corners allow without it."""
+    """The tetrahedra round each edge (k, 2) give way to the best that their other corners can make."""
     rows, of = mesh.star(edges[:, 0])
     hit = (mesh.tets[rows] == edges[of, 1, None]).any(axis=1)
     rows, of = rows[hit], of[hit]
@@ -196,15 +223,13 @@ def _ring_fills(x: FloatArray, mesh: Closed, edges: Ints, rows: Ints) -> Cavitie
     best = worst[:, fills].min(axis=2).argmax(axis=1)
     added = tips[np.arange(count)[:, None], fills[best]].reshape(-1, 4)
     of = np.arange(count)
-    good = Cavities(
-        rows.ravel(), of.repeat(n), added, of.repeat(2 * (n - 2)), np.full(len(added), -1)
-    )
+    good = Cavities(rows.ravel(), of.repeat(n), added, of.repeat(2 * (n - 2)), np.full(len(added), -1))
     return good.kept(worst[of[:, None], fills[best]].min(axis=1) > 0)
 
 
 @cache
 def _triangulations(n: int) -> tuple[Ints, Ints, Ints]:
-    """Of a ring of n: all triples (t, 3), the ways to fill it as rows of them (w, n - 2), all chords (c, 2)."""
+    """Of a ring of n: all triples (t, 3), ways to fill it by them (w, n - 2), its chords (c, 2)."""
 
     def fill(i: int, j: int) -> list[list[tuple[int, int, int]]]:
         return [
@@ -225,5 +250,10 @@ def joined(parts: list[Cavities]) -> Cavities:
         shifted.append(
             (part.removed, part.removed_of + shift, part.added, part.added_of + shift, part.parent)
         )
-        shift += int(part.removed_of[-1]) + 1 if len(part.removed_of) else 0
+        shift += part.total
     return Cavities(*(np.concatenate(column) for column in zip(*shifted, strict=True)))
+
+
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Cross products of columns, (3, k)."""
+    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
