@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.meshing.arrays import FloatArray
+from taichi_soft.meshing.quality import FLATTEST
 from taichi_soft.meshing.topology import LOCAL_EDGES, LOCAL_FACES
 
 Ints = NDArray[np.int64]
@@ -137,6 +138,14 @@ def volumes(x: FloatArray, tets: Ints) -> FloatArray:
     p = x[tets]
     six = np.einsum("ij,ij->i", p[:, 1] - p[:, 0], np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 0]))
     return np.where((tets == OUTSIDE).any(axis=1), 0.0, six / 6.0)
+
+
+def is_flat(x: FloatArray, tets: Ints) -> Bools:
+    """Which tetrahedra (k, 4) a mesh would refuse, or nearly so."""
+    ends = x[tets[:, LOCAL_EDGES]]
+    longest = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2).max(axis=1)
+    flat = volumes(x, tets) <= 2 * FLATTEST * longest**3
+    return np.asarray(flat & (tets != OUTSIDE).all(axis=1))
 
 
 def collapses(mesh: Closed, gone: Ints, into: Ints) -> Cavities:

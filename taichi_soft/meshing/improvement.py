@@ -103,7 +103,7 @@ class _Work:
         ready = cavity.joined(found).in_rows(rows)
         gain = self._gain(ready)
         ready, gain = ready.kept(gain > 0), gain[gain > 0]
-        drift, fits = self._surface_drift(ready)
+        drift, fits = self._fits(ready)
         ready, gain, drift = ready.kept(fits), gain[fits], drift[fits]
         # How far the surface may still move is not spent where as much can be had without.
         worth = gain * (1 - _THRIFT * drift / self.tolerance)
@@ -167,13 +167,14 @@ class _Work:
         free = axis * (value <= _FLAT * value[:, 2:])[:, None, :]
         return np.asarray(free @ np.swapaxes(free, 1, 2))
 
-    def _surface_drift(self, cavities: Cavities) -> tuple[FloatArray, Bools]:
-        """How far the surface will have moved at most at each cavity [m], and whether it may."""
+    def _fits(self, cavities: Cavities) -> tuple[FloatArray, Bools]:
+        """How far the surface will have moved at most at each cavity [m], and whether it may be filled."""
         count = cavities.total
         old, old_of = patches.outer_faces(self.tets[cavities.removed], cavities.removed_of)
         new, new_of = patches.outer_faces(cavities.added, cavities.added_of)
         fits = patches.largest_turn(self.x[old], old_of, self.x[new], new_of, count) > _TURN
         fits[np.setdiff1d(old_of, new_of)] = False  # a part must not vanish
+        fits[cavities.added_of[cavity.is_flat(self.x, cavities.added)]] = False
         old, old_of, new, new_of = (
             old[fits[old_of]],
             old_of[fits[old_of]],

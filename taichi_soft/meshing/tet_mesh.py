@@ -13,12 +13,8 @@ from taichi_soft.errors import MeshError
 from taichi_soft.meshing.arrays import FloatArray, IntArray, as_indices, as_points, name_vertices, read_only
 from taichi_soft.meshing.body_mesh import BodyMesh
 from taichi_soft.meshing.improvement import improve
-from taichi_soft.meshing.quality import MeshQuality, measure_quality
+from taichi_soft.meshing.quality import FLATTEST, MeshQuality, measure_quality
 from taichi_soft.meshing.topology import LOCAL_EDGES, edges_of, first_duplicate, surface_of
-
-# A tetrahedron flatter than this (volume over longest edge cubed; 0.118 if regular) has lost its shape in
-# float32, in which it will be simulated (rounding 1.2e-7).
-FLATTEST = 1e-7
 
 
 class TetMesh(BodyMesh):
