@@ -116,8 +116,7 @@ class TetMesh(BodyMesh):
         smaller size than this mesh, the same parts and holes, and is the same on every run. Some small
         tetrahedra may be left where the surface allows nothing else.
         Args:
-            min_size: below which a tetrahedron is improved [m]; None takes 0.3 of the median. A larger one
-                makes the mesh coarser.
+            min_size: below which a tetrahedron is improved [m]; None takes 0.3 of the median.
             tolerance: how far the surface may move [m]; None takes a quarter of the mean edge, at most 1 % of
                 the diagonal of the bounding box. The volume changes by at most 1 % in any case.
             return_source: also give the tetrahedron of this mesh whose place each new one has, int32 (m,):
