@@ -181,6 +181,19 @@ def test_four_points_in_a_plane_lose_their_sliver_and_nothing_else_moves():
     np.testing.assert_array_equal(above[0][source[source > 0]], above[1][source > 0])
 
 
+def test_holes_and_slits_far_narrower_than_the_tolerance_stay_open():
+    """Collapses of the short edges round a narrow tunnel, and across slits, would close them."""
+    turn = 2 * np.pi / 3 * np.arange(3)
+    ring = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    flat = np.concatenate([0.05 * ring, ring, -ring])
+    points = np.concatenate([np.c_[flat, np.full(9, z)] for z in np.linspace(0, 1, 6)])
+    points += 1e-3 * np.random.default_rng(0).random(points.shape)
+    mesh = delaunay(points, lambda centres: np.linalg.norm(centres[:, :2], axis=1) > 0.02)
+    better = mesh.improved(min_size=0.3, tolerance=0.1)
+    assert len(better.tets) < 0.7 * len(mesh.tets)
+    assert euler_characteristics(better) == euler_characteristics(mesh)
+
+
 def test_a_smaller_least_size_and_a_tighter_tolerance_are_kept():
     mesh = MESHES["ball"](np.random.default_rng(1))
     size = np.sqrt(6 / (gradients(mesh) ** 2).sum(axis=(1, 2)))  # the edge, for a regular tetrahedron
