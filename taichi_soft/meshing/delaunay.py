@@ -8,7 +8,8 @@ import numpy as np
 
 from taichi_soft.errors import MeshError, OptionError
 from taichi_soft.meshing.arrays import FloatArray
-from taichi_soft.meshing.tet_mesh import FLATTEST, TetMesh
+from taichi_soft.meshing.quality import FLATTEST
+from taichi_soft.meshing.tet_mesh import TetMesh
 
 TOLERANCE = 1e-6
 """How far a vertex may be inside a sphere, as its power over the square of the longest edge: a cube's eight

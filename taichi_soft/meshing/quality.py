@@ -9,6 +9,10 @@ import numpy as np
 from taichi_soft.meshing.arrays import FloatArray, IntArray, read_only
 from taichi_soft.meshing.topology import LOCAL_EDGES, LOCAL_FACES
 
+# A tetrahedron flatter than this (volume over longest edge cubed; 0.118 if regular) has lost its shape in
+# float32, in which it will be simulated (rounding 1.2e-7).
+FLATTEST = 1e-7
+
 
 @dataclass(frozen=True, eq=False)
 class MeshQuality:

@@ -1,0 +1,268 @@
+"""Cavities of a tetrahedral mesh and what may fill them instead: flips, collapses and moves of one vertex.
+
+The mesh is closed by one vertex OUTSIDE, with a tetrahedron on each triangle of the surface. So a vertex of
+the surface has a star like any other, and changes of the surface are flips and collapses like any other.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from itertools import combinations
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.meshing.arrays import FloatArray
+from taichi_soft.meshing.quality import FLATTEST
+from taichi_soft.meshing.topology import LOCAL_EDGES, LOCAL_FACES
+
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+OUTSIDE = 0
+LARGEST_RING = 7  # tetrahedra round an edge that a flip removes; 42 ways to fill the ring
+# The two corners left by corners i and j, in the order in which (i, j, k, l) is an even permutation.
+_OPPOSITE = np.zeros((4, 4, 2), dtype=np.int64)
+for _face in range(4):
+    for _turn in range(3):
+        _OPPOSITE[_face, np.roll(LOCAL_FACES[_face], _turn)[0]] = np.roll(LOCAL_FACES[_face], _turn)[1:]
+
+
+class Cavities(NamedTuple):
+    """Sets of tetrahedra, and others with the same faces outwards to replace them; rows sorted by cavity."""
+
+    removed: Ints  # (r,) rows of the mesh
+    removed_of: Ints  # (r,) cavity of each
+    added: Ints  # (a, 4) vertices
+    added_of: Ints  # (a,)
+    parent: Ints  # (a,) row whose place each takes, -1 where it has no single one
+
+    @property
+    def total(self) -> int:
+        """How many cavities."""
+        return int(self.removed_of[-1]) + 1 if len(self.removed_of) else 0
+
+    def in_rows(self, rows: Ints) -> Cavities:
+        """The same where row i of a part of the mesh is `rows[i]` of the whole."""
+        return self._replace(
+            removed=rows[self.removed], parent=np.where(self.parent < 0, -1, rows[self.parent])
+        )
+
+    def kept(self, keep: Bools) -> Cavities:
+        """Those of `keep`, (number of cavities,), renumbered."""
+        name = np.cumsum(keep) - 1
+        gone, new = keep[self.removed_of], keep[self.added_of]
+        return Cavities(
+            self.removed[gone],
+            name[self.removed_of[gone]],
+            self.added[new],
+            name[self.added_of[new]],
+            self.parent[new],
+        )
+
+
+class Closed:
+    """A mesh at one moment: its tetrahedra, also those beyond the surface, and who is whose neighbour."""
+
+    def __init__(self, tets: Ints, keys: NDArray[np.uint64]) -> None:
+        self.tets = tets
+        self.keys = keys
+        self._by_vertex = np.argsort(tets.ravel(), kind="stable") // 4
+        self._counts = np.bincount(tets.ravel(), minlength=len(keys))
+        self._starts = np.cumsum(self._counts) - self._counts
+        corner = keys[tets]
+        whole = corner.sum(axis=1)
+        self._faces = whole[:, None] - corner
+        pairs = corner[:, LOCAL_EDGES].sum(axis=2)
+        self._simplices = np.unique(np.concatenate([whole, self._faces.ravel(), pairs.ravel()]))
+
+    def star(self, vertices: Ints) -> tuple[Ints, Ints]:
+        """Rows round each vertex, one after the other, and which entry of `vertices` each belongs to."""
+        counts = self._counts[vertices]
+        of = np.repeat(np.arange(len(vertices)), counts)
+        return self._by_vertex[ranges(self._starts[vertices], counts)], of
+
+    def has(self, simplices: Ints) -> Bools:
+        """Whether edges (k, 2), triangles (k, 3) or tetrahedra (k, 4) are part of the mesh."""
+        key = self.keys[simplices].sum(axis=1)
+        place = np.minimum(np.searchsorted(self._simplices, key), len(self._simplices) - 1)
+        return np.asarray(self._simplices[place] == key)
+
+    def neighbours(self) -> Ints:
+        """Row beyond each face, (m, 4)."""
+        order = np.argsort(self._faces.ravel(), kind="stable")
+        key = self._faces.ravel()[order]
+        first = np.flatnonzero(key[1:] == key[:-1])
+        rows = np.zeros(len(order), dtype=np.int64)
+        rows[order[first]], rows[order[first + 1]] = order[first + 1] // 4, order[first] // 4
+        return rows.reshape(-1, 4)
+
+
+def ranges(starts: Ints, counts: Ints) -> Ints:
+    """start, start + 1, ... of each entry, `counts` of them, one entry after the other."""
+    return np.repeat(starts - (np.cumsum(counts) - counts), counts) + np.arange(counts.sum())
+
+
+def sizes(x: FloatArray, tets: Ints) -> FloatArray:
+    """Edge of the regular tetrahedron with the same sum of squared shape gradients, (k,) [m].
+
+    Negative for a tetrahedron inside out, infinite beyond the surface.
+    """
+    p = x.T[:, tets.T]
+    a, b, c = (p[:, i] - p[:, 0] for i in (1, 2, 3))
+    normals = _cross(b, c), _cross(c, a), _cross(a, b)
+    volume = (a * normals[0]).sum(axis=0)
+    areas = sum((n * n).sum(axis=0) for n in (*normals, normals[0] + normals[1] + normals[2]))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        size = np.where(areas > 0, np.sqrt(6.0) * volume / np.sqrt(areas), -np.inf)
+    return np.where((tets == OUTSIDE).any(axis=1), np.inf, size)
+
+
+def size_slopes(x: FloatArray, tets: Ints, vertices: Ints) -> FloatArray:
+    """How fast each tetrahedron's size grows as one of its corners (k,) moves, by differences, (k, 3)."""
+    rows, corner = np.arange(len(tets)), (tets == vertices[:, None]).argmax(axis=1)
+    own = 1 + np.arange(4 * len(tets)).reshape(-1, 4)
+    step = 1e-6 * np.linalg.norm(np.ptp(x[tets], axis=1), axis=1)
+
+    def at(axis: int, side: int) -> FloatArray:
+        p = x[tets]
+        p[rows, corner, axis] += side * step
+        return sizes(np.concatenate([np.zeros((1, 3)), p.reshape(-1, 3)]), own)
+
+    return np.stack([(at(axis, 1) - at(axis, -1)) / (2 * step) for axis in range(3)], axis=1)
+
+
+def volumes(x: FloatArray, tets: Ints) -> FloatArray:
+    """Signed volumes (k,) [m^3], 0 beyond the surface."""
+    p = x[tets]
+    six = np.einsum("ij,ij->i", p[:, 1] - p[:, 0], np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 0]))
+    return np.where((tets == OUTSIDE).any(axis=1), 0.0, six / 6.0)
+
+
+def is_flat(x: FloatArray, tets: Ints) -> Bools:
+    """Which tetrahedra (k, 4) a mesh would refuse, or nearly so."""
+    ends = x[tets[:, LOCAL_EDGES]]
+    longest = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2).max(axis=1)
+    flat = volumes(x, tets) <= 2 * FLATTEST * longest**3
+    return np.asarray(flat & (tets != OUTSIDE).all(axis=1))
+
+
+def collapses(mesh: Closed, gone: Ints, into: Ints) -> Cavities:
+    """Each vertex of `gone` (k,) becomes one of `into`: a neighbour, or a new vertex where it moves to."""
+    rows, of = mesh.star(gone)
+    tets = mesh.tets[rows]
+    stay = ~(tets == into[of, None]).any(axis=1)
+    added = np.where(tets[stay] == gone[of[stay], None], into[of[stay], None], tets[stay])
+    return Cavities(rows, of, added, of[stay], rows[stay])
+
+
+def meets_link_condition(mesh: Closed, gone: Ints, into: Ints) -> Bools:
+    """Whether all that `gone` and `into` touch touches their edge, so that a collapse keeps the topology."""
+    rows, of = mesh.star(gone)
+    tets = mesh.tets[rows]
+    far = ~(tets == into[of, None]).any(axis=1)
+    tets, of = tets[far], of[far]
+    link = tets[tets != gone[of, None]].reshape(-1, 3)
+    u, v = gone[of, None], into[of, None]
+    wrong = mesh.has(np.hstack([v, link]))
+    for i in range(3):
+        vertex, edge = link[:, [i]], np.delete(link, i, axis=1)
+        wrong |= mesh.has(np.hstack([v, vertex])) & ~mesh.has(np.hstack([u, v, vertex]))
+        wrong |= mesh.has(np.hstack([v, edge])) & ~mesh.has(np.hstack([u, v, edge]))
+    return np.asarray(np.bincount(of[wrong], minlength=len(gone)) == 0)
+
+
+def face_flips(mesh: Closed, rows: Ints) -> Cavities:
+    """Two tetrahedra on a face of `rows` become three round the edge between their far corners."""
+    row, corner = np.repeat(rows, 4), np.tile(np.arange(4), len(rows))
+    beyond = mesh.neighbours()[row, corner]
+    near = mesh.tets[row, corner]
+    far = mesh.tets[beyond].sum(axis=1) - (mesh.tets[row].sum(axis=1) - near)
+    new = ~mesh.has(np.stack([near, far], axis=1))
+    row, corner, beyond, far = row[new], corner[new], beyond[new], far[new]
+    added = np.repeat(mesh.tets[row], 3, axis=0)
+    added[np.arange(len(added)), ((corner[:, None] + [1, 2, 3]) % 4).ravel()] = np.repeat(far, 3)
+    of = np.arange(len(row))
+    removed = np.stack([row, beyond], axis=1).ravel()
+    return Cavities(removed, of.repeat(2), added, of.repeat(3), np.full(len(added), -1))
+
+
+def edge_removals(x: FloatArray, mesh: Closed, edges: Ints) -> list[Cavities]:
+    """The tetrahedra round each edge (k, 2) give way to the best that their other corners can make."""
+    rows, of = mesh.star(edges[:, 0])
+    hit = (mesh.tets[rows] == edges[of, 1, None]).any(axis=1)
+    rows, of = rows[hit], of[hit]
+    counts = np.bincount(of, minlength=len(edges))
+    return [
+        _ring_fills(x, mesh, edges[counts == n], rows[counts[of] == n].reshape(-1, n))
+        for n in range(3, LARGEST_RING + 1)
+        if (counts == n).any()
+    ]
+
+
+def _ring_fills(x: FloatArray, mesh: Closed, edges: Ints, rows: Ints) -> Cavities:
+    count, n = rows.shape
+    tets = mesh.tets[rows]
+    place = [(tets == edges[:, None, end, None]).argmax(axis=2) for end in (0, 1)]
+    links = np.take_along_axis(tets, _OPPOSITE[place[0], place[1]], axis=2)
+    ring = np.empty((count, n + 1), dtype=np.int64)
+    ring[:, 0] = links[:, 0, 0]
+    for i in range(n):
+        step = (links[:, :, 0] == ring[:, i, None]).argmax(axis=1)
+        ring[:, i + 1] = links[np.arange(count), step, 1]
+    ordered = np.sort(ring[:, :n], axis=1)
+    closes = (ring[:, n] == ring[:, 0]) & (ordered[:, 1:] != ordered[:, :-1]).all(axis=1)
+    triples, fills, chords = _triangulations(n)
+    corners = ring[:, triples]  # (count, triples, 3)
+    ends = np.broadcast_to(edges[:, None], (*corners.shape[:2], 2))
+    i, j, k = np.moveaxis(corners, 2, 0)
+    tips = np.stack(
+        [np.stack([k, ends[..., 1], i, j], axis=2), np.stack([ends[..., 0], k, i, j], axis=2)], axis=2
+    )  # (count, triples, 2, 4)
+    worst = sizes(x, tips.reshape(-1, 4)).reshape(*corners.shape[:2], 2).min(axis=2)
+    # What is new inside must not be elsewhere: a chord, or of a ring of three the triangle.
+    if n == 3:
+        worst[mesh.has(corners[:, 0]), 0] = -np.inf
+    else:
+        there = mesh.has(ring[:, chords].reshape(-1, 2)).reshape(count, len(chords))
+        sides = (chords[:, None, :, None] == triples[None, :, None, :]).any(axis=3).all(axis=2)
+        worst[(there[:, :, None] & sides).any(axis=1)] = -np.inf
+    worst[~closes] = -np.inf
+    best = worst[:, fills].min(axis=2).argmax(axis=1)
+    added = tips[np.arange(count)[:, None], fills[best]].reshape(-1, 4)
+    of = np.arange(count)
+    good = Cavities(rows.ravel(), of.repeat(n), added, of.repeat(2 * (n - 2)), np.full(len(added), -1))
+    return good.kept(worst[of[:, None], fills[best]].min(axis=1) > 0)
+
+
+@cache
+def _triangulations(n: int) -> tuple[Ints, Ints, Ints]:
+    """Of a ring of n: all triples (t, 3), ways to fill it by them (w, n - 2), its chords (c, 2)."""
+
+    def fill(i: int, j: int) -> list[list[tuple[int, int, int]]]:
+        return [
+            [(i, k, j), *left, *right] for k in range(i + 1, j) for left in fill(i, k) for right in fill(k, j)
+        ] or [[]]
+
+    triples = list(combinations(range(n), 3))
+    fills = [[triples.index(triple) for triple in way] for way in fill(0, n - 1)]
+    chords = [pair for pair in combinations(range(n), 2) if pair[1] - pair[0] not in (1, n - 1)]
+    return np.array(triples), np.array(fills), np.array(chords, dtype=np.int64).reshape(-1, 2)
+
+
+def joined(parts: list[Cavities]) -> Cavities:
+    """All cavities of several lists, numbered on."""
+    shift = 0
+    shifted: list[tuple[Any, ...]] = []
+    for part in parts:
+        shifted.append(
+            (part.removed, part.removed_of + shift, part.added, part.added_of + shift, part.parent)
+        )
+        shift += part.total
+    return Cavities(*(np.concatenate(column) for column in zip(*shifted, strict=True)))
+
+
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Cross products of columns, (3, k)."""
+    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
