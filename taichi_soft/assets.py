@@ -14,8 +14,8 @@ from taichi_soft.contact import DEFAULT_CONTACT, THIN, Contact
 from taichi_soft.errors import MaterialError, OptionError
 from taichi_soft.first_mode import first_frequency
 from taichi_soft.laws import ElementModel, default_law, element_model, fit_model
-from taichi_soft.materials import AnyMaterial, Material, SpringMaterial
-from taichi_soft.meshing import BodyMesh, ParticleMesh
+from taichi_soft.materials import AnisotropicMaterial, AnyMaterial, Material, SpringMaterial
+from taichi_soft.meshing import BodyMesh, ParticleMesh, TetMesh
 from taichi_soft.meshing.arrays import read_only
 from taichi_soft.plasticity import Plasticity
 from taichi_soft.scene import BodyArrays, BodyDescription, arrange, require_size
@@ -127,29 +127,27 @@ class SoftBodyAsset:
 
     @cached_property
     def first_frequency(self) -> float:
-        """Angular frequency of the body's slowest vibration where nothing holds it [rad/s], a little above the
-        true one; 0 for ropes and cloth, which bend freely."""
+        """Angular frequency of the slowest vibration where nothing holds the body [rad/s], from above by some
+        per cent; 0 for ropes and cloth, which bend freely."""
         return 0.0 if isinstance(self.mesh, ParticleMesh) else first_frequency(self.description)
 
     def vibration_row(self, material: AnyMaterial) -> tuple[float, float]:
-        """How vibrations of a body of this asset fade if it is made of a material: at what rate [1/s], and after
-        what time at most they are damped again [s].
+        """How vibrations of a body of this asset fade if it is made of a material: at what rate [1/s], and
+        after what time at most they are damped again [s].
 
         Of another material the frequency goes with the root of its mean stiffness over its mass.
         """
-        if (
-            isinstance(material, SpringMaterial)
-            or material.damping_ratio == 0.0
-            or self.first_frequency == 0.0
-        ):
+        if isinstance(material, SpringMaterial) or material.damping_ratio * self.first_frequency == 0.0:
             return 0.0, 1.0
         frequency = self.first_frequency
         if material is not self.material:
+            assert isinstance(self.material, Material | AnisotropicMaterial)
             frequency *= float(np.sqrt(self._stiffness(material) / self._stiffness(self.material)))
         return 2.0 * material.damping_ratio * frequency, DAMPING_INTERVAL / max(frequency, 1e-6)
 
-    def _stiffness(self, material: AnyMaterial) -> float:
+    def _stiffness(self, material: Material | AnisotropicMaterial) -> float:
         """Mean stiffness of a material over its mean density, but for a factor [m^2/s^2]."""
+        assert isinstance(self.mesh, TetMesh)
         count, volumes = len(self.mesh.tets), self.mesh.volumes
         if isinstance(material, Material):
             stiffness = material.per_tet("young", count)

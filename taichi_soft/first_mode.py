@@ -51,8 +51,10 @@ def _applied(vibration: Vibration, u: Floats) -> Floats:
 
 
 def _ritz(directions: Floats, images: Floats) -> tuple[Floats, Floats, Floats]:
-    """The slowest vibrations that can be made of directions (3n, k) with their images by K: these, their images
-    and the squares of their frequencies."""
+    """The slowest vibrations that can be made of directions (3n, k), of which the images by K are given.
+
+    Returns: these, their images and the squares of their frequencies.
+    """
     lengths = np.linalg.norm(directions, axis=0) + 1e-300
     directions, images = directions / lengths, images / lengths
     sizes, mixed = np.linalg.eigh(directions.T @ directions)

@@ -67,14 +67,14 @@ class StableStep:
         """Why it is as short as it is, and the way out, in words."""
         if self.limit < 0.5 * self.undamped:
             return (
-                f"damping asks for {100 * (1 - self.limit / self.undamped):.3g} % of them: give the material a "
-                "damping_ratio instead of damping, which takes none"
+                f"damping asks for {100 * (1 - self.limit / self.undamped):.3g} % of them: give the material "
+                "a damping_ratio instead of damping, which takes none"
             )
         if self.slivers:
             share = 100 * (1 - self.limit / self.without_slivers)
             return (
-                f"{self.slivers:,} of {self.tets:,} tetrahedra are slivers, which ask for {share:.3g} % of them: "
-                "mesh.improved() does away with those"
+                f"{self.slivers:,} of {self.tets:,} tetrahedra are slivers, which ask for {share:.3g} % of "
+                "them: mesh.improved() does away with those"
             )
         return f"it has small or stiff elements ({self.stiffest}): take a coarser mesh or a softer material"
 

@@ -310,10 +310,10 @@ class State:
         fill(self.body_jolted, np.zeros(0))
         fill(self.body_patience, np.zeros(0))
         fill(self.rest_position, position)
-        rows = np.zeros((len(bodies), 3)) if kinds is None else kinds
-        fill(self.body_edge, rows[:, 0])
-        fill(self.body_fading, rows[:, 1])
-        fill(self.body_fading_interval, rows[:, 2])
+        own = np.zeros((len(bodies), 3)) if kinds is None else kinds
+        fill(self.body_edge, own[:, 0])
+        fill(self.body_fading, own[:, 1])
+        fill(self.body_fading_interval, own[:, 2])
         self.wind[None] = [0.0, 0.0, 0.0, 0.0]
         fill(self.body_gravity_scale, np.ones(self.capacity.bodies))
         fill(self.block_model, np.repeat(models, [r.blocks[1] - r.blocks[0] for r in ranges]))

@@ -89,8 +89,8 @@ class Substeps:
         step = stiffest.stable_step
         cost = count * TET_TIME * sum(len(asset.mesh.tets) for asset in self._pools.assets)
         said = (
-            f"a step of {dt:.4g} s takes {count:,} substeps, about {cost:.2g} s of one thread, because of body "
-            f"{self._pools.assets.index(stiffest)}: {step.reason}"
+            f"a step of {dt:.4g} s takes {count:,} substeps, about {cost:.2g} s of one thread, because of "
+            f"body {self._pools.assets.index(stiffest)}: {step.reason}"
         )
         if is_refused:
             raise OptionError(f"{said}; the world takes max_substeps={self._most:,}")

@@ -175,7 +175,7 @@ def put_back_body(state: ti.template(), body):
 
 @ti.func
 def fineness(retries, attempt):
-    """Into how many pieces a substep is cut in an attempt at a step: the last is no finer than the one before."""
+    """Into how many pieces a substep is cut in an attempt; the last is no finer than the one before."""
     return 1 << ti.min(attempt, retries)
 
 

@@ -1,10 +1,10 @@
 """What brings back a body that is caught inside out.
 
-Forces drive nearly all tetrahedra that are turned inside out back by themselves. A few may hold each other: in
-a coarse mesh they find a balance that is not the rest shape; and what has shrunk to a point has no direction in
-which to open. So every `PATIENCE` steps it is looked whether any is flat or inside out. Where that was so the
-time before, too, its corners go half of the way to where they lie in the rest shape, as that fits best to where
-all of the body is now.
+Forces drive nearly all tetrahedra that are turned inside out back by themselves. A few may hold each other:
+in a coarse mesh they find a balance that is not the rest shape; and what has shrunk to a point has no
+direction in which to open. So every `PATIENCE` steps it is looked whether any is flat or inside out. Where that
+was so the time before, too, its corners go half of the way to where they lie in the rest shape, as that fits
+best to all of the body now.
 """
 
 from taichi_soft.constants import LANES
@@ -47,7 +47,10 @@ def _caught_count(state: ti.template(), body):
 
 @ti.func
 def _best_fit(state: ti.template(), body):
-    """The centre of a body at rest and now [m], and the rotation, as rows, that fits the one best to the other."""
+    """How the rest shape fits best to where a body is.
+
+    Returns: its centre at rest and now [m], and the rotation, as rows.
+    """
     particles = state.body_particles[body]
     x0, r0 = state.particle_position[particles[0]], state.rest_position[particles[0]]
     total, now, rest = x0.x * 0.0, x0 * 0.0, x0 * 0.0

@@ -3,7 +3,7 @@
 Velocities v become P v + k (v - P v): P v is the rigid motion with the momentum and angular momentum of v,
 and k = exp(-2 zeta w seconds), w being the angular frequency of the body's first mode and zeta its damping
 ratio. The factor is a contraction that is symmetric in the mass: where it acts on the velocities after a kick
-and before they move anything, leapfrog stays stable for every step for which it is without. With D the factor,
+and before they move anything, leapfrog stays stable for each step for which it is without. With D the factor,
 
     D^-1 (x_(n+1) - x_n) = x_n - x_(n-1) - h^2 K x_n,
 
@@ -18,7 +18,7 @@ SHARP_BRAKE = 0.5
 """Of the vibration that a substep leaves where a step that failed is made for the last time."""
 
 FARTHEST = 0.1
-"""Way of a particle in a substep of such a step, beside the rigid motion, over the mean edge of the surface."""
+"""Way of a particle in a substep of such a step, beside the rigid motion, over the surface's mean edge."""
 
 THIN_BODY = 1e-6
 """Product of the principal moments over the cube of their sum, below which a body is taken for a straight
@@ -130,8 +130,10 @@ def _fade(state: ti.template(), body, kick, keep):
 
 @ti.func
 def _limit_vibration(state: ti.template(), body, kick, farthest):
-    """Let no particle be faster beside the rigid motion than `farthest` [m/s] after a kick, nor the body lose or
-    gain momentum or spin by that."""
+    """Let no particle be faster beside the rigid motion than `farthest` [m/s] after a kick.
+
+    Momentum and angular momentum stay.
+    """
     particles, gravity = state.body_particles[body], gravity_on(state, body)
     x0, v0 = state.particle_position[particles[0]], state.particle_velocity[particles[0]]
     center, velocity, spin = _rigid_motion(state, body, kick, x0, v0)
