@@ -34,6 +34,9 @@ MOVES_PINS, FEELS_REACTION, PUSHED, DAMPED, SHELTERED, GRABBED, JOINED = 1, 2, 4
 `particle_push` counts in the coming step; `body_damping` is not zero; the wind misses the body; a
 grab pulls at it; a joint holds it to another."""
 
+PLACED = -1000
+"""`body_patience` of a body that was put where it is, perhaps wrecked."""
+
 MOST_GRABS, PATCH_ROWS = 16, 128
 """Grabs of one world at a time, and particles that one of them holds."""
 
@@ -210,8 +213,8 @@ class State:
             real, bodies
         )  # after which they are damped again at the latest [s]
         self.body_is_braked = ti.field(ti.i32, bodies)  # 1 while a step is made for the last time
-        self.body_patience = ti.field(ti.i32, bodies)  # steps since nothing was inside out, of every few
-        self.body_jolted = ti.field(ti.i32, bodies)  # 1 where forces moved a particle too far at once (flat)
+        self.body_patience = ti.field(ti.i32, bodies)  # steps since nothing was inside out; below 0: see `untangling`
+        self.body_jolted = ti.field(ti.i32, bodies)  # 1 where a step was too coarse
         self.body_edge = ti.field(real, bodies)  # mean edge of its surface [m]
         self.retries = ti.field(
             ti.i32, ()

@@ -269,10 +269,10 @@ def _step_awake_island(state: ti.template(), program: ti.template(), island, sub
             attempt += 1
             if attempt > retries:
                 _brake(state, island, 1)
-    if attempt > retries:
-        _brake(state, island, 0)
     numbers = ti.Vector([finer * substeps, h / finer, 0.0, 0.0])
     work_on(state, program, island, OWNER, FINISH, numbers, nothing.xyz)
+    if attempt > retries:
+        _brake(state, island, 0)
     failed = 0
     for i in range(first, last):
         failed += state.contact.has_failed[state.contact.island_body[i]]

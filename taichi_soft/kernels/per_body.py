@@ -165,6 +165,7 @@ def remember_body(state: ti.template(), body):
 @ti.func
 def put_back_body(state: ti.template(), body):
     """Put a body back to where it was before the step."""
+    state.body_jolted[body] = 1
     particles = state.body_particles[body]
     for p in range(particles[0], particles[1]):
         restore_particle(state, p)
@@ -218,8 +219,8 @@ def _step_body(state: ti.template(), program: ti.template(), body, substeps, h):
             else:
                 put_back_body(state, body)
                 attempt += 1
-        state.body_is_braked[body] = 0
         failed = end_body(state, program, body, finer * substeps, h / finer)
+        state.body_is_braked[body] = 0
         if failed == 0:
             if ti.static(program.integrator == Integrator.IMPLICIT_EULER):
                 failed = int(state.body_residual[body] > state.solver[None][0])

@@ -56,4 +56,5 @@ def write_motion(
         if ti.static(state.capacity.implicit):
             state.particle_contact[p] = 0
     state.body_velocity_lag[body] = 0.0
+    state.body_patience[body] = PLACED
     state.body_status[body] = ACTIVE

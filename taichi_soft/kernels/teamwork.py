@@ -22,8 +22,8 @@ HELP = -1
 
 BEGIN, PUSH, BOXES, SEARCH, GAPS, DRIFT, FINISH = range(7)
 """Tasks. Their numbers: none; h, since, way, length of the step; given, h, left, forgets; none; given, h; h,
-since, left and fastest; substeps, h. What an island shares is a velocity [m/s] in the push, and in the drift a
-way [m]."""
+since, left and fastest; substeps, h. What an island shares is a velocity [m/s] in the push, and in the drift
+a way [m]."""
 
 
 @ti.func

@@ -2,47 +2,62 @@
 
 Forces drive nearly all tetrahedra that are turned inside out back by themselves. A few may hold each other:
 in a coarse mesh they find a balance that is not the rest shape; and what has shrunk to a point has no
-direction in which to open. So every `PATIENCE` steps it is looked whether any is flat or inside out. Where that
-was so the time before, too, its corners go half of the way to where they lie in the rest shape, as that fits
-best to all of the body now.
+direction in which to open. So every `PATIENCE` steps it is looked whether any is flat or inside out. Where
+that was so the time before, too, its corners go half of the way to where they lie in the rest shape, as that
+fits best to all of the body now. Of a body that is wrecked altogether all of it goes there, within a second.
 """
 
 from taichi_soft.constants import LANES
 from taichi_soft.kernels.elastic import particles_of, rest_inverse_of
+from taichi_soft.kernels.vibration import fade_vibration
 from taichi_soft.math.svd import signed_svd
 from taichi_soft.math.tensors import determinant
 from taichi_soft.math.tetrahedron import shape
 from taichi_soft.runtime import ti
+from taichi_soft.state import PLACED
 from taichi_soft.types import Flips
 
 PATIENCE = 15
 """Fixed steps between two looks: a quarter of a second."""
+
+WRECKED = 0.1
+"""Part of a body's tetrahedra from which on, caught before a step that was made again, it is a wreck."""
+
+RAISING, RAISING_STEPS, CALMING = 0.1, 60, 0.8
+"""Part of the way that all of a wreck goes in a step, for how many steps, and part of its vibration that is
+left each time. What is wound about itself twice without being inside out anywhere would stay so otherwise."""
 
 FLAT = 1e-5
 """Volume over that at rest, from which down a tetrahedron counts as caught."""
 
 
 @ti.func
-def _is_caught(state: ti.template(), t):
+def _is_caught(state: ti.template(), positions: ti.template(), t):
     """Whether tetrahedron `t`, a block times `LANES` plus a lane, is flat or inside out."""
     block, lane = t // LANES, t % LANES
     p0, p1, p2, p3 = particles_of(state, block, lane)
-    B = shape(
-        state.particle_position[p0],
-        state.particle_position[p1],
-        state.particle_position[p2],
-        state.particle_position[p3],
-    )
+    B = shape(positions[p0], positions[p1], positions[p2], positions[p3])
     inverse = determinant(rest_inverse_of(state, block, lane))  # 0 in the lanes that pad a last block
     return inverse != 0.0 and determinant(B) * inverse < FLAT
 
 
 @ti.func
-def _caught_count(state: ti.template(), body):
+def _caught_count(state: ti.template(), positions: ti.template(), body):
     count, blocks = 0, state.body_blocks[body]
     for t in range(blocks[0] * LANES, blocks[1] * LANES):
-        count += int(_is_caught(state, t))
+        count += int(_is_caught(state, positions, t))
     return count
+
+
+@ti.func
+def _is_wrecked(state: ti.template(), body):
+    """Whether much was caught before a step that had to be made again, or to which somebody put the body."""
+    is_wrecked = False
+    if state.body_jolted[body] == 1 or state.body_patience[body] == PLACED:
+        blocks = state.body_blocks[body]
+        caught = _caught_count(state, state.prev_position, body)
+        is_wrecked = caught >= WRECKED * LANES * (blocks[1] - blocks[0])
+    return is_wrecked
 
 
 @ti.func
@@ -76,18 +91,34 @@ def _best_fit(state: ti.template(), body):
 
 
 @ti.func
+def _pull(state: ti.template(), p, fit: ti.template(), share):
+    """Move a particle a share of the way to where it fits best; a pinned one stays."""
+    rest, now, rows = fit
+    if state.particle_inv_mass[p] > 0.0:
+        r = state.rest_position[p] - rest
+        goal = now + ti.Vector([rows[0].dot(r), rows[1].dot(r), rows[2].dot(r)])
+        state.particle_position[p] = state.particle_position[p] + share * (goal - state.particle_position[p])
+
+
+@ti.func
 def _free(state: ti.template(), body):
-    """Move the corners of what is caught half of the way to where they fit best."""
-    rest, now, rows = _best_fit(state, body)
+    """Move the corners of what is caught half of the way."""
+    fit = _best_fit(state, body)
     blocks = state.body_blocks[body]
     for t in range(blocks[0] * LANES, blocks[1] * LANES):
-        if _is_caught(state, t):
+        if _is_caught(state, state.particle_position, t):
             for corner in ti.static(range(4)):
-                p = particles_of(state, t // LANES, t % LANES)[corner]
-                if state.particle_inv_mass[p] > 0.0:
-                    r = state.rest_position[p] - rest
-                    goal = now + ti.Vector([rows[0].dot(r), rows[1].dot(r), rows[2].dot(r)])
-                    state.particle_position[p] = 0.5 * (state.particle_position[p] + goal)
+                _pull(state, particles_of(state, t // LANES, t % LANES)[corner], fit, 0.5)
+
+
+@ti.func
+def _raise(state: ti.template(), body):
+    """Move all of a wreck a part of the way, and calm it."""
+    fade_vibration(state, body, 0.0, CALMING)
+    fit = _best_fit(state, body)
+    particles = state.body_particles[body]
+    for p in range(particles[0], particles[1]):
+        _pull(state, p, fit, RAISING)
 
 
 @ti.func
@@ -96,10 +127,17 @@ def untangle_body(state: ti.template(), program: ti.template(), body):
     for m, model in ti.static(enumerate(program.models)):
         if ti.static(model.flips == Flips.RECOVER):
             if state.body_model[body] == m:
-                age = state.body_patience[body] + 1
-                if age % PATIENCE == 0:
-                    if _caught_count(state, body) == 0:
+                age = ti.max(state.body_patience[body], -RAISING_STEPS - 1) + 1
+                if _is_wrecked(state, body):
+                    age = -RAISING_STEPS
+                elif state.body_patience[body] == PLACED:
+                    age = 0
+                if age < 0:
+                    _raise(state, body)
+                elif age % PATIENCE == 0:
+                    if _caught_count(state, state.particle_position, body) == 0:
                         age = 0
                     elif age >= 2 * PATIENCE:
                         _free(state, body)
                 state.body_patience[body] = age
+                state.body_jolted[body] = 0

@@ -102,7 +102,7 @@ def _rigid_motion(state: ti.template(), body, kick, x0, v0):
 
 
 @ti.func
-def _fade(state: ti.template(), body, kick, keep):
+def fade_vibration(state: ti.template(), body, kick, keep):
     """Leave a body the share `keep` of the vibration that it has after a kick of its forces [s]."""
     particles, gravity = state.body_particles[body], gravity_on(state, body)
     x0, v0 = state.particle_position[particles[0]], state.particle_velocity[particles[0]]
@@ -180,6 +180,6 @@ def damp_vibration(state: ti.template(), body, kick, h, s, substeps):
     """
     keep = kept_vibration(state, body, h, s, substeps)
     if keep < 1.0:
-        _fade(state, body, kick, keep)
+        fade_vibration(state, body, kick, keep)
     if state.body_is_braked[body] == 1:
         _limit_vibration(state, body, kick, FARTHEST * state.body_edge[body] / h)
