@@ -1,0 +1,56 @@
+"""The command line ends cleanly when it is told to, at any time; other programs keep their signals."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals are those of POSIX")
+
+
+@pytest.fixture
+def interrupted_import(tmp_path):
+    """An environment in which Ctrl-C is pressed when Taichi is imported."""
+    (tmp_path / "taichi.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGINT)\n")
+    return {**os.environ, "PYTHONPATH": str(tmp_path)}
+
+
+def test_ctrl_c_while_the_command_is_imported_is_one_line(interrupted_import):
+    done = subprocess.run(
+        [sys.executable, "-m", "taichi_soft", "info"],
+        cwd=ROOT, env=interrupted_import, capture_output=True, text=True, timeout=60,
+    )  # fmt: skip
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "interrupted\n")
+
+
+def test_ctrl_c_while_another_program_imports_the_package_is_its_own(interrupted_import):
+    script = """
+try:
+    import taichi_soft
+except KeyboardInterrupt:
+    print("mine")
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", script],
+        cwd=ROOT, env=interrupted_import, capture_output=True, text=True, timeout=60,
+    )  # fmt: skip
+    assert (done.returncode, done.stdout) == (0, "mine\n"), done.stderr
+
+
+def test_a_film_that_is_terminated_leaves_no_part_behind(tmp_path):
+    film = tmp_path / "film.mp4"
+    command = ["demo", "bounce", "--seconds", "600", "--size", "64x48", "--out", str(film), "--threads", "1"]
+    with subprocess.Popen([sys.executable, "-m", "taichi_soft", *command], cwd=ROOT) as running:
+        waits_until = time.monotonic() + 100
+        while not list(tmp_path.iterdir()):
+            assert running.poll() is None
+            assert time.monotonic() < waits_until
+            time.sleep(0.05)
+        running.send_signal(signal.SIGTERM)
+        assert running.wait(100) == 143
+    assert list(tmp_path.iterdir()) == []
