@@ -52,7 +52,7 @@ def one_thread(method: Function) -> Function:
         turn, here = self._handles.turn, get_ident()
         if turn.holder == here:
             return method(self, *arguments, **options)
-        if _left_in is not None or not turn.lock.acquire(blocking=False):
+        if _left_in is not None or not turn.lock.acquire(False):
             turn.refuse()
         turn.holder = here
         try:
@@ -72,7 +72,8 @@ def in_turn(function: Function) -> Function:
 
     @wraps(function)
     def call(*arguments: Any, **options: Any) -> Any:
-        require_here()
+        if _left_in is not None:
+            require_here()
         with _taichi:
             return function(*arguments, **options)
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from engine_adapter import EngineAdapter, FixedStep
 from taichi_soft import (
     Material,
     MeshShape,
@@ -130,10 +131,11 @@ class Slow:
 
 def test_every_call_of_a_second_thread_is_refused_by_name_and_changes_nothing():
     world = made(collider_room=1)
+    game = EngineAdapter(world, FixedStep(DT), rewind_ticks=2)
     frame, body = world.add_frame(), world.bodies[0]
     handles = [world, body, frame, body.attach([0], frame), body.grab(0), world.floor_collider]
     before, slow, refused = world.snapshot(), Slow(), []
-    (game := threading.Thread(target=body.apply_impulse, args=(slow,), name="the game")).start()
+    (holding := threading.Thread(target=body.apply_impulse, args=(slow,), name="the game")).start()
     assert slow.began.wait(60)
     try:
         for handle in handles:
@@ -142,13 +144,15 @@ def test_every_call_of_a_second_thread_is_refused_by_name_and_changes_nothing():
                     with pytest.raises(StateError, match=r"'MainThread' called .* while thread 'the game'"):
                         method(handle)
                     refused.append((type(handle), name))
-        with pytest.raises(StateError, match="one thread at a time"):
-            _ = body.failure
+        for call in (lambda: body.failure, game.step, lambda: game.advance(DT / 2), lambda: game.rewind(1)):
+            with pytest.raises(StateError, match="one thread at a time"):
+                call()
     finally:
         slow.may_end.set()
-        game.join(60)
+        holding.join(60)
     assert len(refused) > 60
     assert world.snapshot() == before
+    assert (game.alpha, game.total_dropped_time) == (0.0, 0.0)
 
 
 def test_all_handles_let_one_thread_in():
