@@ -15,7 +15,7 @@ import textwrap
 import threading
 import types
 import weakref
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass, replace
 from importlib import import_module
@@ -37,7 +37,7 @@ from taichi_soft.cores import (
 from taichi_soft.errors import DeviceError, OptionError
 from taichi_soft.turns import in_turn, leave_behind
 
-__all__ = ["Device", "device", "init", "is_initialized", "making_fields", "ti"]
+__all__ = ["Device", "device", "init", "is_initialized", "make_fields", "ti"]
 
 Result = TypeVar("Result")
 
@@ -143,7 +143,6 @@ def init(arch: str = "auto", threads: int | None = None, cores: Sequence[int] | 
         DeviceError if the device asked for is missing, or threads cannot be bound; StateError in a process
         that was forked after a start.
     """
-    global _device, _process
     if not isinstance(arch, str) or arch not in ("auto", *_ARCHS):
         raise OptionError(f"unknown arch {arch!r}: choose one of 'auto', {', '.join(map(repr, _ARCHS))}")
     if threads is not None and (
@@ -184,20 +183,19 @@ def init(arch: str = "auto", threads: int | None = None, cores: Sequence[int] | 
         )
     is_left_to_us = threads is None and cores is None and chosen == "cpu" and count > 1 and can_bind()
     wanted = tuple(there) if is_left_to_us else bound
-    _at_home(int, chosen)  # so that its thread is there before Taichi's
-    before, since = (thread_ids(), number_now()) if wanted else (set(), 0)
     try:
-        _at_home(functools.partial(_start, chosen, count), chosen)
+        _at_home(functools.partial(_start, chosen, reason, count, wanted, is_left_to_us), chosen)
     except RuntimeError as error:
+        if isinstance(error, DeviceError):
+            raise
         raise DeviceError(f"cannot start Taichi on {chosen!r}: {error}. Use init('cpu')") from error
-    _device = Device(arch=chosen, threads=count if chosen == "cpu" else 1, reason=reason)
-    if wanted:
-        _device = _bound(_device, thread_ids() - before, since, wanted, is_left_to_us)
-    _process = os.getpid()
-    return _device
+    return device()
 
 
-def _start(arch: str, threads: int) -> None:
+def _start(arch: str, reason: str, threads: int, cores: tuple[int, ...], is_left_to_us: bool) -> None:
+    """Start Taichi, with its workers on these cores if there are any, and note the device."""
+    global _device, _process
+    before, since = (thread_ids(), number_now()) if cores else (set(), 0)
     with contextlib.redirect_stdout(io.StringIO()):  # Taichi announces itself
         ti.init(
             arch=getattr(ti, arch),
@@ -215,6 +213,10 @@ def _start(arch: str, threads: int) -> None:
             log_level=ti.ERROR,
         )
     ti.lang.impl.get_runtime().materialize()  # once, by the first kernel otherwise, in whichever thread
+    _process = os.getpid()
+    _device = Device(arch=arch, threads=threads if arch == "cpu" else 1, reason=reason)
+    if cores:
+        _device = _bound(_device, thread_ids() - before, since, cores, is_left_to_us)
 
 
 def _bound(
@@ -236,11 +238,15 @@ def _bound(
     return replace(chosen, cores=cores)
 
 
-@contextlib.contextmanager
-def making_fields() -> Iterator[None]:
-    """Where Taichi fields are made, in turn."""
-    yield
-    _at_home(ti.lang.impl.get_runtime().materialize, device().arch)
+def make_fields(function: Callable[[], Result]) -> Result:
+    """Call in turn what makes Taichi fields, and lay these out; whole, where Ctrl-C is pressed meanwhile."""
+
+    def make() -> Result:
+        made = function()
+        ti.lang.impl.get_runtime().materialize()
+        return made
+
+    return _at_home(make, device().arch)
 
 
 def _at_home(function: Callable[[], Result], arch: str) -> Result:

@@ -6,6 +6,7 @@ it takes it over with its kernels compiled.
 """
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from taichi_soft.constants import LANES
 from taichi_soft.contact_fields import ContactCapacity, ContactFields, SoftContactFields
 from taichi_soft.joint_fields import JointFields
 from taichi_soft.loading import Loader
-from taichi_soft.runtime import making_fields, ti
+from taichi_soft.runtime import make_fields, ti
 from taichi_soft.scene import BodyArrays, Ranges, Scene, blocks_of
 from taichi_soft.turns import in_turn
 
@@ -435,8 +436,7 @@ def acquire(capacity: Capacity, program: "Program") -> State:
         state = min(fitting, key=lambda each: (program not in each.programs, each.capacity.rooms))
         _free.remove(state)
     else:
-        with making_fields():
-            state = State(capacity)
+        state = make_fields(partial(State, capacity))
     state.programs.add(program)
     return state
 

@@ -54,3 +54,34 @@ def test_a_film_that_is_terminated_leaves_no_part_behind(tmp_path):
         running.send_signal(signal.SIGTERM)
         assert running.wait(100) == 143
     assert list(tmp_path.iterdir()) == []
+
+
+def test_ctrl_c_while_taichi_starts_or_makes_fields_leaves_it_whole():
+    """Pressed within each, by the code that is called there."""
+    script = """
+import os, signal, time
+from taichi_soft import Material, World, box, init, runtime, state
+def pressed_in(inner):
+    def call(*arguments, **options):
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(0.2)
+        return inner(*arguments, **options)
+    return call
+world = World()
+world.add_body(box(cells=(1, 1, 1)), Material(1e5, 0.2, 1000.0), position=(0, 0, 1))
+for place, name in ((runtime.ti, "init"), (state, "Loader")):
+    inner = getattr(place, name)
+    setattr(place, name, pressed_in(inner))
+    try:
+        world.build()
+    except KeyboardInterrupt:
+        print(name, world.is_built)
+    setattr(place, name, inner)
+world.build()
+world.step(1 / 60)
+print(init().arch)
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, timeout=100
+    )
+    assert (done.returncode, done.stdout) == (0, "init False\nLoader False\ncpu\n"), done.stderr
