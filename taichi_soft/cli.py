@@ -54,7 +54,9 @@ def main(*arguments: str) -> None:
     except TaichiSoftError as error:
         errors.print(f"[bold red]error:[/] {escape(str(error))}", soft_wrap=True, highlight=False)
         sys.exit(1)
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, SystemExit) as end:
+        if isinstance(end, SystemExit) and end.code != INTERRUPTED:
+            raise
         errors.print("interrupted")
         sys.exit(INTERRUPTED)
 

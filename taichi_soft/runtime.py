@@ -15,10 +15,12 @@ import textwrap
 import threading
 import types
 import weakref
+from _thread import start_new_thread
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor, wait
+from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from importlib import import_module
+from queue import SimpleQueue
 from typing import Any, TypeVar
 
 os.environ.setdefault("TI_SKIP_VERSION_CHECK", "ON")
@@ -115,8 +117,9 @@ class Device:
 
 
 _device: Device | None = None
-_home = ThreadPoolExecutor(1, "taichi")
 _process = 0  # that started Taichi
+_jobs: SimpleQueue[Callable[[], object]] = SimpleQueue()  # of the thread that started it
+_is_served = threading.Lock()
 
 
 @in_turn
@@ -254,20 +257,41 @@ def _at_home(function: Callable[[], Result], arch: str) -> Result:
     comes first may end soon, so on a CPU it is a thread of our own. On a GPU it is the caller's: untried."""
     if arch != "cpu":
         return function()
-    waiting = _home.submit(function)
+    found: Future[Result] = Future()
+
+    def work() -> None:
+        try:
+            found.set_result(function())
+        except BaseException as error:
+            found.set_exception(error)
+
+    if not _is_served.locked():
+        start_new_thread(_serve, ())
     try:
-        return waiting.result()
+        _jobs.put(work)
+        return found.result()
     except KeyboardInterrupt:
-        wait([waiting])  # half of it would be the end of every world
+        last = threading.Event()  # after what is being done, half of which would be the end of all worlds
+        _jobs.put(last.set)
+        last.wait()
         raise
+
+
+def _serve() -> None:
+    if _is_served.acquire(blocking=False):  # or another one does, where Ctrl-C was pressed as that began
+        while True:
+            _jobs.get()()
 
 
 def _after_fork() -> None:
     """Of the process that was forked: it has Taichi's memory and none of its threads."""
-    if _device is not None:
-        leave_behind(_process)
-        # The end of this process would wait for these threads, if the program were taken down.
-        ctypes.pythonapi.Py_IncRef(ctypes.py_object(ti.lang.impl.get_runtime().prog))
+    global _is_served
+    if _device is None:
+        _is_served = threading.Lock()
+        return
+    leave_behind(_process)
+    # The end of this process would wait for these threads, if the program were taken down.
+    ctypes.pythonapi.Py_IncRef(ctypes.py_object(ti.lang.impl.get_runtime().prog))
 
 
 if hasattr(os, "register_at_fork"):

@@ -42,17 +42,22 @@ except KeyboardInterrupt:
     assert (done.returncode, done.stdout) == (0, "mine\n"), done.stderr
 
 
-def test_a_film_that_is_terminated_leaves_no_part_behind(tmp_path):
+@pytest.mark.parametrize(
+    ("number", "status", "said"), [("SIGTERM", 143, ""), ("SIGINT", 130, "interrupted\n")]
+)
+def test_a_film_that_is_ended_leaves_no_part_behind(tmp_path, number, status, said):
     film = tmp_path / "film.mp4"
     command = ["demo", "bounce", "--seconds", "600", "--size", "64x48", "--out", str(film), "--threads", "1"]
-    with subprocess.Popen([sys.executable, "-m", "taichi_soft", *command], cwd=ROOT) as running:
+    command = [sys.executable, "-m", "taichi_soft", *command]
+    with subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True) as running:
         waits_until = time.monotonic() + 100
         while not list(tmp_path.iterdir()):
             assert running.poll() is None
             assert time.monotonic() < waits_until
             time.sleep(0.05)
-        running.send_signal(signal.SIGTERM)
-        assert running.wait(100) == 143
+        running.send_signal(getattr(signal, number))
+        assert running.communicate(timeout=100)[1] == said
+    assert running.returncode == status
     assert list(tmp_path.iterdir()) == []
 
 
