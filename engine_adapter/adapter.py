@@ -12,13 +12,14 @@ from engine_adapter.fixed_step import Accumulator, FixedStep
 from engine_adapter.rollback import Rollback
 from taichi_soft import Body, Event, OptionError, StateError, World
 from taichi_soft.checks import as_count, as_number
+from taichi_soft.turns import one_thread
 
 
 class EngineAdapter:
     """Runs a built world in fixed steps, whatever the frame rate, and gives the positions to draw.
 
     While an adapter is in use, only the adapter steps and restores its world: `alpha` and `time` count its
-    steps.
+    steps. As a world, it takes calls of one thread at a time.
 
         adapter = EngineAdapter(world, FixedStep(dt=1 / 60))
         while running:
@@ -53,6 +54,7 @@ class EngineAdapter:
         if not world.is_built:
             raise StateError("the world is not built: call world.build() before EngineAdapter(world)")
         self._world = world
+        self._handles = world._handles
         self._fixed_step = fixed_step
         self._before_step = before_step
         self._accumulator = Accumulator(fixed_step)
@@ -96,6 +98,7 @@ class EngineAdapter:
         """Time dropped so far [s]."""
         return self._total_dropped_time
 
+    @one_thread
     def step(self) -> None:
         """Make exactly one fixed step, past the accumulator: for replays, tests and servers.
 
@@ -107,6 +110,7 @@ class EngineAdapter:
         if self._rollback is not None:
             self._rollback.save()
 
+    @one_thread
     def advance(self, frame_dt: float) -> int:
         """Put in the time of one frame and make the steps that are due.
 
@@ -130,6 +134,7 @@ class EngineAdapter:
             self._total_dropped_time += self._dropped_time
         return made
 
+    @one_thread
     def rewind(self, steps: int) -> None:
         """Go back by that many steps, to where the world was before the inputs of the first of them.
 
@@ -149,6 +154,7 @@ class EngineAdapter:
         """See `World.snapshot`. The part of a step that `alpha` says is not in it."""
         return self._world.snapshot()
 
+    @one_thread
     def restore(self, data: bytes) -> None:
         """Load a state: as `World.restore`, with `alpha` 0, and `rewind` as far as to here.
 

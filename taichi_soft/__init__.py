@@ -1,5 +1,8 @@
 """Real-time soft bodies from real material parameters."""
 
+from taichi_soft import signals  # noqa: F401 - first: it watches while the rest is imported
+
+# isort: split
 from taichi_soft.assets import SoftBodyAsset
 from taichi_soft.body import Body
 from taichi_soft.colliders import Collider

@@ -36,6 +36,7 @@ from taichi_soft.queries import Pose
 from taichi_soft.scene import BodyArrays, BodyDescription, Ranges
 from taichi_soft.stability import StableStep
 from taichi_soft.state import SHELTERED
+from taichi_soft.turns import one_thread
 
 if TYPE_CHECKING:
     from taichi_soft.assets import SoftBodyAsset
@@ -244,6 +245,7 @@ class Body(Handle):
         return simulation is not None and simulation.is_asleep(self.index)
 
     @property
+    @one_thread
     def failure(self) -> Failure | None:
         """What broke first, None while the body is sound. Found out when first asked, not within a step."""
         self._require_alive()

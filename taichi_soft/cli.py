@@ -22,6 +22,7 @@ from rich.table import Table
 from taichi_soft.errors import OptionError, TaichiSoftError
 from taichi_soft.materials import Material
 from taichi_soft.runtime import Device, init
+from taichi_soft.signals import INTERRUPTED, ended_by_signals
 
 app = typer.Typer(
     help="Real-time soft bodies from real material parameters.",
@@ -48,13 +49,16 @@ def main(*arguments: str) -> None:
     """
     warnings.showwarning = _show_warning  # type: ignore[assignment]
     try:
-        app(arguments or None)
+        with ended_by_signals():
+            app(arguments or None)
     except TaichiSoftError as error:
         errors.print(f"[bold red]error:[/] {escape(str(error))}", soft_wrap=True, highlight=False)
         sys.exit(1)
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, SystemExit) as end:
+        if isinstance(end, SystemExit) and end.code != INTERRUPTED:
+            raise
         errors.print("interrupted")
-        sys.exit(130)
+        sys.exit(INTERRUPTED)
 
 
 def _show_version(asked: bool) -> None:
@@ -437,7 +441,11 @@ def report(
     ] = None,
     cluster: Annotated[
         str | None,
-        typer.Option(help="Address of a Dask scheduler, host:port, whose workers compute instead."),
+        typer.Option(
+            help="Address of a Dask scheduler, host:port, whose workers compute instead. Dask sends Python "
+            "objects by pickle both ways: whoever reaches that port can run code on its workers and on this "
+            "machine, so name a scheduler that you trust, in a network that you trust."
+        ),
     ] = None,
     arch: Arch = "auto",
     show_list: Annotated[

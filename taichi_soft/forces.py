@@ -19,13 +19,14 @@ from taichi_soft.kernels.gradients import (
 )
 from taichi_soft.kernels.program import Program
 from taichi_soft.kernels.readout import write_motion
-from taichi_soft.laws import ElementModel, element_model, fit_model
+from taichi_soft.laws import element_model, fit_model
 from taichi_soft.materials import AnyMaterial
 from taichi_soft.meshing import BodyMesh
 from taichi_soft.meshing.arrays import LARGEST_COORDINATE
 from taichi_soft.runtime import init
 from taichi_soft.scene import BodyDescription, Scene, arrange
 from taichi_soft.state import Capacity, acquire, release
+from taichi_soft.turns import in_turn
 from taichi_soft.types import DampingModel, Flips, Integrator, Strain
 
 Floats = NDArray[np.float64]
@@ -60,7 +61,7 @@ def internal_forces(
     real = _real(dtype)
     x = _rows(positions, mesh, "positions", real)
     v = np.zeros_like(x) if velocities is None else _rows(velocities, mesh, "velocities", real)
-    return _still_body(mesh, material, model, double=real == np.float64).forces(x, v)
+    return _forces_of(BodyDescription(mesh, material, model), x, v)
 
 
 def force_gradient(
@@ -162,16 +163,18 @@ def _add_blocks(total: Floats, owners: NDArray[np.int32], elements: Floats) -> N
 _last: dict[bool, StillBody] = {}
 
 
-def _still_body(mesh: BodyMesh, material: AnyMaterial, model: ElementModel, *, double: bool) -> StillBody:
-    """The body of the last call in this precision if it is the same, for loops over deformations."""
+@in_turn
+def _forces_of(body: BodyDescription, positions: NDArray[Any], velocities: NDArray[Any]) -> NDArray[Any]:
+    """By the still body of the last call in this precision if it is the same, for loops over deformations."""
+    double = positions.dtype == np.float64
     last = _last.get(double)
     if last is not None:
-        body = last.body
-        if (body.mesh, body.material, body.model) == (mesh, material, model):  # equal to themselves only
-            return last
-        del _last[double], last  # their fields serve the next
-    _last[double] = StillBody(BodyDescription(mesh, material, model), double=double)
-    return _last[double]
+        known = last.body  # its parts are equal to themselves only
+        if (known.mesh, known.material, known.model) != (body.mesh, body.material, body.model):
+            del _last[double], last  # their fields serve the next
+    if double not in _last:
+        _last[double] = StillBody(body, double=double)
+    return _last[double].forces(positions, velocities)
 
 
 def _real(dtype: DTypeLike) -> np.dtype[Any]:

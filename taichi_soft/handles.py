@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
 from functools import wraps
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 from weakref import WeakValueDictionary
+
+from taichi_soft.turns import Turn, one_thread
 
 if TYPE_CHECKING:
     from taichi_soft.recorder import Recorder
@@ -19,10 +22,20 @@ CALLS: dict[str, set[str]] = {}
 
 
 class Handle:
-    """What a caller holds of a world: a body, a collider, a frame, a grab, an attachment; or the world."""
+    """What a caller holds of a world: a body, a collider, a frame, a grab, an attachment; or the world.
+
+    Its public methods are called by one thread at a time: a second one gets a StateError, before anything is
+    changed.
+    """
 
     _handles: Handles
     _serial: int
+
+    def __init_subclass__(cls) -> None:
+        """Guard the public methods."""
+        for name, method in list(vars(cls).items()):
+            if inspect.isfunction(method) and not name.startswith("_"):
+                setattr(cls, name, one_thread(method))
 
 
 class Handles:
@@ -31,6 +44,7 @@ class Handles:
     def __init__(self) -> None:
         """None yet; 0 is the world itself."""
         self.count = 1
+        self.turn = Turn()
         self.recorder: Recorder | None = None
         self._known: WeakValueDictionary[int, Handle] = WeakValueDictionary()
 

@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.body import Body
+from taichi_soft.checks import as_count, as_flag, as_number
 from taichi_soft.colliders import Collider, ColliderRow
+from taichi_soft.constants import ALL_GROUPS, POSITION_LIMIT
 from taichi_soft.cutting import require_room
 from taichi_soft.errors import SnapshotError, TaichiSoftError
 from taichi_soft.failures import FailedStep
@@ -23,6 +25,12 @@ from taichi_soft.state import MOST_GRABS
 
 if TYPE_CHECKING:
     from taichi_soft.world import World
+
+_MOST = 1 << 53
+"""No count of steps or handles, and no time [s], is larger."""
+
+_FARTHEST = 1e12
+"""No collider has got so far [m], however long it moved at the highest speed."""
 
 
 def take_notes(world: World) -> dict[str, Any]:
@@ -137,9 +145,11 @@ def read_notes(world: World, notes: dict[str, Any], parts: dict[int, Part]) -> N
     """Notes of `take_notes`. Raises: SnapshotError, or what Python raises where they are not in order."""
     frames = [None if serial is None else int(serial) for serial in notes["frames"]]
     poses = {
-        name: np.array(notes[name], dtype=np.float32).reshape(max(len(frames), 1), 12)
+        name: np.array(notes[name], dtype=np.float64).reshape(max(len(frames), 1), 12)
         for name in ("present", "coming")
     }
+    if not all((np.abs(rows) <= POSITION_LIMIT).all() for rows in poses.values()):
+        raise ValueError("a frame is out of reach")
     slots = world.slot_count
     if len(notes["bodies"]) != slots:
         raise ValueError("it has another number of bodies")
@@ -150,20 +160,32 @@ def read_notes(world: World, notes: dict[str, Any], parts: dict[int, Part]) -> N
     ]
     if any(bodies[slot] is None for _, _, slot, _ in grabs):
         raise ValueError("a grab holds no body")
+    _require_serials(notes)
     return Notes(
-        int(notes["steps"]),
-        float(notes["time"]),
-        float(notes["last_dt"]),
-        int(notes["handles"]),
+        as_count(notes["steps"], "steps", 0, _MOST),
+        as_number(notes["time"], "time", 0.0, _MOST),
+        as_number(notes["last_dt"], "last_dt", 0.0, _MOST),
+        as_count(notes["handles"], "handles", 1, _MOST),
         bodies,
         [_read_collider(world, note, notes["shapes"]) for note in _some(notes["colliders"], world)],
         frames,
-        poses["present"],
-        poses["coming"],
+        poses["present"].astype(np.float32),
+        poses["coming"].astype(np.float32),
         bool(notes["aims"]),
         grabs,
         [_read_joint(world, bodies, note) for note in notes["joints"]],
     )
+
+
+def _require_serials(notes: dict[str, Any]) -> None:
+    """Raises: ValueError where two handles have the same number, or one that the next could have."""
+    bodies = [note for note in notes["bodies"] if note is not None]
+    hanging = [each for note in bodies for each in note[4]]
+    held = [*bodies, *hanging, *notes["colliders"], *notes["grabs"], *notes["joints"]]
+    numbers = [each[0] for each in held] + [number for number in notes["frames"] if number is not None]
+    serials = {as_count(number, "a handle", 1, _MOST) for number in numbers}
+    if len(serials) < len(numbers) or max(serials, default=0) >= notes["handles"]:
+        raise ValueError("two handles have the same number")
 
 
 def _some(notes: list[Any], world: World) -> list[Any]:
@@ -235,22 +257,24 @@ def _read_collider(world: World, note: Any, shapes: dict[str, Any]) -> tuple[int
     position, rotation, velocity, spin = (
         _vector(each, n) for each, n in zip(motion, (3, 4, 3, 3), strict=True)
     )
+    if abs(np.linalg.norm(rotation) - 1.0) > 1e-3:
+        raise ValueError("a rotation is none")
     row = ColliderRow(
         shape,
-        float(friction),
-        float(restitution),
-        float(thickness),
-        int(group),
-        int(mask),
+        as_number(friction, "friction", 0.0, 1e6),
+        -1.0 if restitution == -1.0 else as_number(restitution, "restitution", 0.0, 1.0),
+        as_number(thickness, "thickness", 0.0, 1e3),
+        as_count(group, "group", 0, ALL_GROUPS),
+        as_count(mask, "mask", 0, ALL_GROUPS),
         position,
         rotation,
         velocity,
         spin,
-        int(offset),
+        as_count(offset, "offset", 0),
         None if target is None else (_vector(target[0], 3), _vector(target[1], 4)),
-        bool(is_alive),
+        as_flag(is_alive, "is_alive"),
     )
-    if not 0 <= row.offset <= world._built.state.capacity.contact.samples - len(shape.samples):
+    if not row.offset <= world._built.state.capacity.contact.samples - len(shape.samples):
         raise ValueError("a collider's grid lies outside the room for grids")
     return int(serial), row
 
@@ -281,7 +305,7 @@ def _below(number: Any, limit: int) -> int:
 
 def _vector(numbers: Any, count: int) -> NDArray[np.float64]:
     vector = np.array(numbers, dtype=np.float64)
-    if vector.shape != (count,) or not np.isfinite(vector).all():
+    if vector.shape != (count,) or not (np.abs(vector) < _FARTHEST).all():
         raise ValueError("a vector is none")
     return vector
 

@@ -102,11 +102,21 @@ def to_json(data: Any) -> bytes:
 
 
 def from_json(content: bytes | memoryview) -> Any:
-    """Plain data again. Raises: SnapshotError."""
+    """Plain data again. Raises: SnapshotError, also for a number that is not finite, which `to_json` writes
+    nowhere."""
     try:
-        return json.loads(bytes(content))
-    except (ValueError, RecursionError):
+        return json.loads(bytes(content), parse_float=_finite, parse_constant=_finite)
+    except (ValueError, RecursionError) as error:
+        if isinstance(error, SnapshotError):
+            raise
         raise SnapshotError("what should be JSON is none") from None
+
+
+def _finite(text: str) -> float:
+    number = float(text)
+    if not math.isfinite(number):
+        raise SnapshotError(f"a number in it is not finite: {text}")
+    return number
 
 
 @lru_cache(maxsize=256)

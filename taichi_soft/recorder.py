@@ -30,6 +30,10 @@ if TYPE_CHECKING:
 
 MARK, VERSION = b"TSOFTREC", 1
 
+MOST_CONTENT = 1 << 28
+"""Bytes of a recording beside its snapshot, before they are compressed, which may make a thousandth of them:
+without a limit a file of some MB could fill the memory."""
+
 Pushes = list[tuple[int, NDArray[np.float32]]]
 """Of a force field in one step: bodies by their serial numbers, accelerations (n, 3) [m/s^2]."""
 
@@ -137,7 +141,13 @@ class Recorder:
             "built_with": world._built_with,
             "entries": [[as_plain(each) for each in entry[:3]] + _plain(entry[3:]) for entry in entries],
         }
-        return seal(MARK, VERSION, [zlib.compress(to_json(made_of), 1), first.snapshot])
+        plain = to_json(made_of)
+        if len(plain) > MOST_CONTENT:
+            raise SnapshotError(
+                f"the recording takes {len(plain) >> 20} MB, and no more than {MOST_CONTENT >> 20} are kept: "
+                "make the world with a smaller record"
+            )
+        return seal(MARK, VERSION, [zlib.compress(plain, 1), first.snapshot])
 
 
 def save_recording(world: World, path: Any) -> Path:
@@ -165,9 +175,13 @@ def read_recording(path: Any) -> tuple[dict[str, Any], bytes]:
     parts = unseal(data, MARK, VERSION, "recording")
     try:
         content, snapshot = parts
-        made_of = from_json(zlib.decompress(content))
-    except (ValueError, zlib.error):
-        raise SnapshotError("this recording is not in order") from None
+        inflating = zlib.decompressobj()
+        plain = inflating.decompress(content, MOST_CONTENT)
+        if not inflating.eof:
+            raise SnapshotError(f"it is cut off, or takes more than {MOST_CONTENT >> 20} MB")
+        made_of = from_json(plain)
+    except (ValueError, zlib.error) as error:
+        raise SnapshotError(f"this recording is not in order: {error}") from None
     return made_of, bytes(snapshot)
 
 

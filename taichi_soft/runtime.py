@@ -7,15 +7,21 @@ imported, and only this module calls `ti.init` (which would reset every field in
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import functools
 import io
 import os
 import textwrap
+import threading
 import types
 import weakref
+from _thread import start_new_thread
 from collections.abc import Callable, Sequence
+from concurrent.futures import Future
 from dataclasses import dataclass, replace
-from typing import Any
+from importlib import import_module
+from queue import SimpleQueue
+from typing import Any, TypeVar
 
 os.environ.setdefault("TI_SKIP_VERSION_CHECK", "ON")
 os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
@@ -31,8 +37,11 @@ from taichi_soft.cores import (
     thread_ids,
 )
 from taichi_soft.errors import DeviceError, OptionError
+from taichi_soft.turns import in_turn, leave_behind
 
-__all__ = ["Device", "device", "init", "is_initialized", "ti"]
+__all__ = ["Device", "device", "init", "is_initialized", "make_fields", "ti"]
+
+Result = TypeVar("Result")
 
 _MOST_THREADS = 256
 _ARCHS = ("cpu", "cuda", "vulkan", "metal")
@@ -69,8 +78,27 @@ def _remember_sources() -> None:
     nodes.TextWrapper = lambda width: wrapper
 
 
+def _let_threads_in() -> None:
+    """Taichi 1.7 takes what one thread compiles for what all do, and two that compile at once for one. Here
+    each kernel and each number in a field is a turn of one thread, for which others wait, and what is being
+    compiled is known to the thread that does it."""
+    compiling, accessor = threading.local(), import_module("taichi.lang.field").SNodeHostAccessor
+    ti.lang.impl.PyTaichi.inside_kernel = property(
+        lambda _: getattr(compiling, "is_on", False), lambda _, is_on: setattr(compiling, "is_on", is_on)
+    )
+    ti.lang.kernel_impl.Kernel.__call__ = in_turn(ti.lang.kernel_impl.Kernel.__call__)
+    make = accessor.__init__
+
+    def make_in_turn(self: Any, snode: Any) -> None:
+        make(self, snode)
+        self.getter, self.setter = in_turn(self.getter), in_turn(self.setter)
+
+    accessor.__init__ = make_in_turn
+
+
 if ti.__version__[:2] == (1, 7):
     _remember_sources()
+    _let_threads_in()
 
 
 @dataclass(frozen=True)
@@ -89,12 +117,17 @@ class Device:
 
 
 _device: Device | None = None
+_process = 0  # that started Taichi
+_jobs: SimpleQueue[Callable[[], object]] = SimpleQueue()  # of the thread that started it
+_is_served = threading.Lock()
 
 
+@in_turn
 def init(arch: str = "auto", threads: int | None = None, cores: Sequence[int] | None = None) -> Device:
     """Start Taichi for this process and say what was chosen.
 
-    Entry points call this; a library that embeds taichi-soft may call it first with its own choice.
+    Entry points call this; a library that embeds taichi-soft may call it first with its own choice. Any
+    thread may. A process that is forked later gets a StateError: start processes by "spawn".
     A second call with compatible arguments does nothing, because starting again would destroy the
     fields of every world.
     Args:
@@ -110,9 +143,9 @@ def init(arch: str = "auto", threads: int | None = None, cores: Sequence[int] | 
             Linux bound to it where the system allows that.
     Returns: the device in use.
     Raises: OptionError for an unknown arch, thread count or core, or if already started differently;
-        DeviceError if the device asked for is missing, or threads cannot be bound.
+        DeviceError if the device asked for is missing, or threads cannot be bound; StateError in a process
+        that was forked after a start.
     """
-    global _device
     if not isinstance(arch, str) or arch not in ("auto", *_ARCHS):
         raise OptionError(f"unknown arch {arch!r}: choose one of 'auto', {', '.join(map(repr, _ARCHS))}")
     if threads is not None and (
@@ -153,30 +186,40 @@ def init(arch: str = "auto", threads: int | None = None, cores: Sequence[int] | 
         )
     is_left_to_us = threads is None and cores is None and chosen == "cpu" and count > 1 and can_bind()
     wanted = tuple(there) if is_left_to_us else bound
-    before, since = (thread_ids(), number_now()) if wanted else (set(), 0)
     try:
-        with contextlib.redirect_stdout(io.StringIO()):  # Taichi announces itself
-            ti.init(
-                arch=getattr(ti, chosen),
-                cpu_max_num_threads=count,
-                default_fp=ti.f32,
-                default_ip=ti.i32,
-                offline_cache=True,
-                offline_cache_max_size_of_files=1
-                << 29,  # a game of many kinds of worlds fills the default 100 MB
-                enable_fallback=False,
-                cfg_optimization=False,  # halves the compile time; the kernels run as fast without it
-                detect_read_only=False,  # a GPU might not see what a real function wrote; untried
-                make_cpu_multithreading_loop=False,  # it would put up to 512 bodies into one thread
-                unrolling_limit=0,  # no warning
-                log_level=ti.ERROR,
-            )
+        _at_home(functools.partial(_start, chosen, reason, count, wanted, is_left_to_us), chosen)
     except RuntimeError as error:
+        if isinstance(error, DeviceError):
+            raise
         raise DeviceError(f"cannot start Taichi on {chosen!r}: {error}. Use init('cpu')") from error
-    _device = Device(arch=chosen, threads=count if chosen == "cpu" else 1, reason=reason)
-    if wanted:
-        _device = _bound(_device, thread_ids() - before, since, wanted, is_left_to_us)
-    return _device
+    return device()
+
+
+def _start(arch: str, reason: str, threads: int, cores: tuple[int, ...], is_left_to_us: bool) -> None:
+    """Start Taichi, with its workers on these cores if there are any, and note the device."""
+    global _device, _process
+    before, since = (thread_ids(), number_now()) if cores else (set(), 0)
+    with contextlib.redirect_stdout(io.StringIO()):  # Taichi announces itself
+        ti.init(
+            arch=getattr(ti, arch),
+            cpu_max_num_threads=threads,
+            default_fp=ti.f32,
+            default_ip=ti.i32,
+            offline_cache=True,
+            offline_cache_max_size_of_files=1
+            << 29,  # a game of many kinds of worlds fills the default 100 MB
+            enable_fallback=False,
+            cfg_optimization=False,  # halves the compile time; the kernels run as fast without it
+            detect_read_only=False,  # a GPU might not see what a real function wrote; untried
+            make_cpu_multithreading_loop=False,  # it would put up to 512 bodies into one thread
+            unrolling_limit=0,  # no warning
+            log_level=ti.ERROR,
+        )
+    ti.lang.impl.get_runtime().materialize()  # once, by the first kernel otherwise, in whichever thread
+    _process = os.getpid()
+    _device = Device(arch=arch, threads=threads if arch == "cpu" else 1, reason=reason)
+    if cores:
+        _device = _bound(_device, thread_ids() - before, since, cores, is_left_to_us)
 
 
 def _bound(
@@ -196,6 +239,63 @@ def _bound(
             raise
         return chosen
     return replace(chosen, cores=cores)
+
+
+def make_fields(function: Callable[[], Result]) -> Result:
+    """Call in turn what makes Taichi fields, and lay these out; whole, where Ctrl-C is pressed meanwhile."""
+
+    def make() -> Result:
+        made = function()
+        ti.lang.impl.get_runtime().materialize()
+        return made
+
+    return _at_home(make, device().arch)
+
+
+def _at_home(function: Callable[[], Result], arch: str) -> Result:
+    """Call what Taichi 1.7 does in one and the same thread only: start, and lay out fields. Whichever thread
+    comes first may end soon, so on a CPU it is a thread of our own. On a GPU it is the caller's: untried."""
+    if arch != "cpu":
+        return function()
+    found: Future[Result] = Future()
+
+    def work() -> None:
+        try:
+            found.set_result(function())
+        except BaseException as error:
+            found.set_exception(error)
+
+    if not _is_served.locked():
+        start_new_thread(_serve, ())
+    try:
+        _jobs.put(work)
+        return found.result()
+    except KeyboardInterrupt:
+        last = threading.Event()  # after what is being done, half of which would be the end of all worlds
+        _jobs.put(last.set)
+        last.wait()
+        raise
+
+
+def _serve() -> None:
+    if _is_served.acquire(blocking=False):  # or another one does, where Ctrl-C was pressed as that began
+        while True:
+            _jobs.get()()
+
+
+def _after_fork() -> None:
+    """Of the process that was forked: it has Taichi's memory and none of its threads."""
+    global _is_served
+    if _device is None:
+        _is_served = threading.Lock()
+        return
+    leave_behind(_process)
+    # The end of this process would wait for these threads, if the program were taken down.
+    ctypes.pythonapi.Py_IncRef(ctypes.py_object(ti.lang.impl.get_runtime().prog))
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_after_fork)
 
 
 def device() -> Device:

@@ -31,6 +31,8 @@ from taichi_soft.kernels.snapshot import (
     JOINT_END,
     PARTICLE,
     PATCH,
+    SHAPE,
+    WORLD,
     carried,
     copy_state,
     hash_bodies,
@@ -150,11 +152,25 @@ def _require_words(world: World, notes: Notes, table: Words, words: Words) -> No
         values = _rows(table, words, state, PARTICLE, field).view(np.float32)
         if not np.abs(values).max() <= highest:
             raise SnapshotError("this snapshot is not in order: particles are out of reach, or not finite")
+    for owner, field in _steering(state):
+        if not np.isfinite(_rows(table, words, state, owner, field).view(np.float32)).all():
+            raise SnapshotError("this snapshot is not in order: what moves its bodies is not finite")
     if world._built.program.has_contact:
         _require_joints(state, notes, table, words)
     lives = _rows(table, words, state, BODY, state.body_status)[:, 0] != ABSENT
     if lives.tolist() != [body is not None for body in notes.bodies]:
         raise SnapshotError("this snapshot is not in order: it is not sure who lives")
+
+
+def _steering(state: State) -> list[tuple[int, Any]]:
+    """Fields of real numbers that the next step begins with, beside positions and velocities."""
+    particle = [state.prev_position, state.prev_velocity, state.particle_mass, state.particle_inv_mass]
+    particle += [state.particle_target, state.particle_push]
+    body = [state.body_velocity_lag, state.body_gravity_scale, state.body_damping]
+    held = [state.grab_weights, state.grab_target, state.grab_spring]
+    shape = [state.tet_rest_inverse] if state.capacity.plastic else []
+    owners = (PARTICLE, particle), (BODY, body), (HELD, held), (PATCH, [state.patch_share]), (SHAPE, shape)
+    return [(owner, field) for owner, fields in owners for field in fields] + [(WORLD, state.wind)]
 
 
 def _require_joints(state: State, notes: Notes, table: Words, words: Words) -> None:

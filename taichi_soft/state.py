@@ -6,6 +6,7 @@ it takes it over with its kernels compiled.
 """
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,8 +16,9 @@ from taichi_soft.constants import LANES
 from taichi_soft.contact_fields import ContactCapacity, ContactFields, SoftContactFields
 from taichi_soft.joint_fields import JointFields
 from taichi_soft.loading import Loader
-from taichi_soft.runtime import ti
+from taichi_soft.runtime import make_fields, ti
 from taichi_soft.scene import BodyArrays, Ranges, Scene, blocks_of
+from taichi_soft.turns import in_turn
 
 if TYPE_CHECKING:
     from taichi_soft.kernels.program import Program
@@ -449,6 +451,7 @@ def _tet_blocks(
 _free: list[State] = []
 
 
+@in_turn
 def acquire(capacity: Capacity, program: "Program") -> State:
     """A state with room for that: of those that closed worlds gave back one for which the step of `program`
     is compiled, and of these the smallest; or a new one."""
@@ -457,7 +460,7 @@ def acquire(capacity: Capacity, program: "Program") -> State:
         state = min(fitting, key=lambda each: (program not in each.programs, each.capacity.rooms))
         _free.remove(state)
     else:
-        state = State(capacity)
+        state = make_fields(partial(State, capacity))
     state.programs.add(program)
     return state
 

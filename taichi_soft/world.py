@@ -66,6 +66,9 @@ Happened = TypeVar("Happened", bound=Event)
 class World(Handle):
     """Soft bodies under gravity, above a floor. SI units, z is up.
 
+    Any thread may call it and its handles, one at a time: a second one gets a StateError that names both, and
+    nothing is changed. So does a process that was forked after Taichi had started.
+
     Args:
         gravity: (3,) [m/s^2].
         floor: height of a horizontal floor [m], or None for none.

@@ -58,7 +58,7 @@ class VideoWriter:
                 self._part.touch()  # says why not, where OpenCV would only say no
             with quiet():
                 self._container = CONTAINERS[suffix](self._part, self.fps, self.size)
-        except VideoError:
+        except (VideoError, KeyboardInterrupt, SystemExit):
             self._remove_part()
             raise
         except OSError as error:

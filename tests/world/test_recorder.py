@@ -1,5 +1,8 @@
 """Flight recordings: written when a body freezes or on request, and made again from the file alone."""
 
+import tracemalloc
+import zlib
+
 import numpy as np
 import pytest
 from random_play import DT, SUBSTEPS, act, make_world, play
@@ -15,6 +18,7 @@ from taichi_soft import (
     box,
 )
 from taichi_soft.cli import main
+from taichi_soft.plain import to_json
 from taichi_soft.recorder import MARK, VERSION, read_recording
 from taichi_soft.replay import replay
 from taichi_soft.sealed import seal
@@ -170,12 +174,27 @@ def test_damaged_and_foreign_recordings_are_refused(game, tmp_path):
         replay(tmp_path / "nowhere.recording")
 
 
+def test_a_recording_inflates_to_so_much_and_no_more(game, tmp_path, monkeypatch):
+    world, path = game
+    monkeypatch.setattr("taichi_soft.recorder.MOST_CONTENT", 1 << 20)
+    bomb = tmp_path / "bomb.recording"
+    bomb.write_bytes(seal(MARK, VERSION, [zlib.compress(b" " * (1 << 27), 9), b""]))
+    tracemalloc.start()
+    try:
+        with pytest.raises(SnapshotError, match="more than 1 MB"):
+            read_recording(bomb)
+        assert tracemalloc.get_traced_memory()[1] < 1 << 23
+    finally:
+        tracemalloc.stop()
+    monkeypatch.setattr("taichi_soft.recorder.MOST_CONTENT", 1000)
+    before = path.read_bytes()
+    with pytest.raises(SnapshotError, match="smaller record"):
+        world.save_recording(path)
+    assert path.read_bytes() == before
+
+
 def test_a_recording_asks_for_recorded_calls_only(game, tmp_path):
     """However it was made, a file calls nothing but what a recorder notes."""
-    import zlib
-
-    from taichi_soft.plain import to_json
-
     _, path = game
     made_of, snapshot = read_recording(path)
     for serial, name in ((0, "save_recording"), (0, "_change"), (1, "__init__"), (10**6, "pin")):

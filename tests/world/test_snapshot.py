@@ -8,12 +8,14 @@ import pytest
 from random_play import DT, SUBSTEPS, make_world, play
 
 from taichi_soft import (
+    BoxShape,
     FrozenBodyWarning,
     Material,
     OptionError,
     Plasticity,
     SnapshotError,
     SoftBodyAsset,
+    SphereShape,
     SpringMaterial,
     StateError,
     World,
@@ -373,7 +375,12 @@ def set_word(at, to):
         set_note("grabs", to=[[9, 0, 0, [0, 0, 0]]]),
         set_note("frames", to=[1, 2, 3]),
         set_note("colliders", to=[[9, True, "none", 0, [0, 0, 0, 1, 1], [], None]]),
+        set_note("time", to=np.nan),
+        set_note("last_dt", to=np.inf),
+        set_note("handles", to=1),
+        set_note("bodies", 1, 0, to=1),
         set_word(0, np.float32(np.nan).view(np.int32)),
+        set_word(12, np.float32(np.nan).view(np.int32)),
         set_word(0, np.float32(1e30).view(np.int32)),
         set_word(14, 77),
         set_word(-4 - 16, 99),
@@ -382,6 +389,51 @@ def set_word(at, to):
 )
 def test_what_is_whole_but_makes_no_sense_is_refused(small, change):
     refused(small, forged(small.snapshot(), change))
+
+
+@pytest.fixture(scope="module")
+def held():
+    """A world with everything that notes tell of: colliders, a frame, a grab, an attachment, a joint."""
+    world = World(collider_room=2)
+    mesh = box(cells=(1, 1, 1))
+    a, b = (world.add_body(mesh, Material(1e5, 0.2, 1000.0), position=(0, 0, z)) for z in (0.6, 1.7))
+    world.add_collider(BoxShape((1, 1, 1)), position=(3, 0, 0.5)).set_velocity((0.1, 0, 0))
+    moved = world.add_collider(SphereShape(0.5), position=(-3, 0, 0.5), restitution=0.2)
+    world.build()
+    moved.move_to((-3, 0, 0.6))
+    a.set_material(Material(2e5, 0.2, 1000.0))
+    return (
+        world,
+        a.attach([0], world.add_frame((0, 0, 2)), two_way=True),
+        a.grab(0),
+        a.attach_to(b, [4], onto=[0]),
+    )
+
+
+def leaves(value, path=()):
+    """Where the numbers, texts and lists of notes are."""
+    keys = value if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else ()
+    yield from (leaf for key in keys for leaf in leaves(value[key], (*path, key)))
+    if path and not isinstance(value, dict):
+        yield path
+
+
+def test_whatever_a_note_says_it_is_refused_whole_or_restored_whole(held):
+    world, data = held[0], held[0].snapshot()
+    content = json.loads(bytes(unseal(data, MARK, VERSION, "snapshot")[1]))
+    count = 0
+    for path in leaves(content):
+        for bad in (np.nan, 1e30, 2**70, None):
+            made_up = forged(data, set_note(*path, to=bad))
+            try:
+                world.restore(made_up)
+            except SnapshotError:
+                count += 1
+            else:
+                world.snapshot()
+                world.restore(data)
+            assert world.snapshot() == data, (path, bad)
+    assert count > 500
 
 
 def test_it_is_no_call_before_build():

@@ -1,0 +1,59 @@
+"""What ends the command line from outside: Ctrl-C, also while it is being imported, and SIGTERM.
+
+A program that imports the package keeps its signals as they are.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+INTERRUPTED, TERMINATED = 130, 143
+"""Exit codes: 128 and the number of the signal, as shells have it."""
+
+
+def watch_imports() -> None:
+    """Let Ctrl-C end the command line by one line while it is being imported, which takes a second or two."""
+    name = sys.argv[0] if getattr(sys, "argv", None) else ""
+    is_command = Path(name).stem == "taichi-soft" or (name == "-m" and "taichi_soft" in sys.orig_argv)
+    is_ours = is_command and multiprocessing.parent_process() is None and _is_main_thread()
+    if is_ours and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, _end)
+
+
+@contextmanager
+def ended_by_signals() -> Iterator[None]:
+    """Where Ctrl-C is a KeyboardInterrupt, and SIGTERM an exit that leaves nothing half written behind."""
+    if not _is_main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, _leave)
+    if signal.getsignal(signal.SIGINT) is _end:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before or signal.SIG_DFL)
+
+
+def _is_main_thread() -> bool:
+    return threading.current_thread() is threading.main_thread()
+
+
+def _end(*_: Any) -> None:
+    os.write(2, b"interrupted\n")
+    os._exit(INTERRUPTED)
+
+
+def _leave(*_: Any) -> None:
+    sys.exit(TERMINATED)
+
+
+watch_imports()
