@@ -215,7 +215,7 @@ class State:
             real, bodies
         )  # after which they are damped again at the latest [s]
         self.body_is_braked = ti.field(ti.i32, bodies)  # 1 while a step is made for the last time
-        self.body_patience = ti.field(ti.i32, bodies)  # steps since nothing was inside out; below 0: see `untangling`
+        self.body_patience = ti.field(ti.i32, bodies)  # steps in trouble; see `untangling`
         self.body_jolted = ti.field(ti.i32, bodies)  # 1 where a step was too coarse
         self.body_edge = ti.field(real, bodies)  # mean edge of its surface [m]
         self.retries = ti.field(

@@ -1,7 +1,7 @@
 """Copies between the fields of a world and the caller's arrays, in the caller's vertex order."""
 
 from taichi_soft.runtime import ti
-from taichi_soft.state import ABSENT, ACTIVE
+from taichi_soft.state import ABSENT, ACTIVE, PLACED
 
 
 @ti.kernel
