@@ -6,7 +6,7 @@ from taichi_soft.kernels.per_body import end_body
 from taichi_soft.kernels.rebound import begin_rebounds
 from taichi_soft.kernels.soft_search import forget_candidates
 from taichi_soft.runtime import ti
-from taichi_soft.state import ABSENT, ACTIVE, FEELS_REACTION
+from taichi_soft.state import ABSENT, ACTIVE, FEELS_REACTION, FROZEN
 from taichi_soft.types import Integrator
 
 
@@ -21,6 +21,8 @@ def begin_body(state: ti.template(), program: ti.template(), body):
                 state.prev_contact[p] = state.particle_contact[p]
         if state.body_drives[body] & FEELS_REACTION != 0:
             for p in range(particles[0], particles[1]):
+                if state.body_status[body] == FROZEN:  # nobody aims at where its pins go, and begins anew
+                    state.particle_reaction[p] = ti.Vector.zero(ti.f32, 3)
                 state.contact.prev_reaction[p] = state.particle_reaction[p]
         begin_rebounds(state, body)
         forget_contacts(state, body)

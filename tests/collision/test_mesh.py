@@ -93,7 +93,7 @@ def surface_of(tets):
 
 
 def slit(vertices, triangles, count, rng):
-    """The same surface with T-junctions: an edge is split on one side only, and a flat sliver fills the slit."""
+    """The same surface with T-junctions: an edge is split on one side, and a flat sliver fills the slit."""
     vertices, triangles = list(vertices), [tuple(each) for each in triangles]
     for _ in range(count):
         number, turn = rng.integers(len(triangles)), rng.integers(3)
