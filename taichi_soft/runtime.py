@@ -34,6 +34,9 @@ from taichi_soft.errors import DeviceError, OptionError
 
 __all__ = ["Device", "device", "init", "is_initialized", "ti"]
 
+DEBUG = "TAICHI_SOFT_DEBUG"
+"""Name of the environment variable that at 1 has every index in a kernel checked: slow, for tests only."""
+
 _MOST_THREADS = 256
 _ARCHS = ("cpu", "cuda", "vulkan", "metal")
 
@@ -73,6 +76,41 @@ if ti.__version__[:2] == (1, 7):
     _remember_sources()
 
 
+def _check_real_functions() -> None:
+    """Taichi 1.7's own bounds check leaves out what a `ti.real_func` reads and writes. An index there is
+    asserted before its row is used, and made 0 where it is wrong, so that the process lives to tell."""
+    impl = ti.lang.impl
+    plain = impl.subscript
+
+    def checked(builder: Any, value: Any, *indices: Any, **options: Any) -> Any:
+        is_real = isinstance(impl.get_runtime().compiling_callable, ti._lib.core.Function)
+        if is_real and isinstance(value, ti.Field) and value.shape:
+            (index,), (size,) = indices, value.shape  # the fields of a world have one dimension
+            is_inside = ti.lang.ops.logical_and(index >= 0, index < size)
+            place = ti._lib.core.DebugInfo(impl.get_runtime().get_current_src_info())
+            message = f"Accessing a field of size ({size}) in a real function with index (%d)"
+            impl.ti_assert(is_inside, message, [impl.Expr(index).ptr], place)
+            indices = (ti.select(is_inside, index, 0),)
+        return plain(builder, value, *indices, **options)
+
+    impl.subscript = checked
+
+
+def _let_whole_numbers_overflow() -> None:
+    """Where Taichi 1.7 checks bounds it prints a line for each whole number that overflows; hashes are to."""
+    program = ti._lib.core.Program
+    plain = program.compile_kernel
+
+    def compiled(self: Any, config: Any, *arguments: Any) -> Any:
+        config.debug = False  # the bounds check has a switch of its own; the rest looks here
+        try:
+            return plain(self, config, *arguments)
+        finally:
+            config.debug = True  # looked at by the launch, which raises what was found
+
+    program.compile_kernel = compiled
+
+
 @dataclass(frozen=True)
 class Device:
     """What `init` chose."""
@@ -96,7 +134,7 @@ def init(arch: str = "auto", threads: int | None = None, cores: Sequence[int] | 
 
     Entry points call this; a library that embeds taichi-soft may call it first with its own choice.
     A second call with compatible arguments does nothing, because starting again would destroy the
-    fields of every world.
+    fields of every world. Where the environment has TAICHI_SOFT_DEBUG=1, kernels check every index.
     Args:
         arch: "auto" or "cpu"; or a GPU by name, "cuda", "vulkan" or "metal". "auto" takes the CPU: the GPU
             kernels have been tested on a CPU only, and games want their GPU for pictures.
@@ -152,6 +190,7 @@ def init(arch: str = "auto", threads: int | None = None, cores: Sequence[int] | 
             "taichi_soft.init() instead, first in the process"
         )
     is_left_to_us = threads is None and cores is None and chosen == "cpu" and count > 1 and can_bind()
+    is_checked = os.environ.get(DEBUG) == "1"
     wanted = tuple(there) if is_left_to_us else bound
     before, since = (thread_ids(), number_now()) if wanted else (set(), 0)
     try:
@@ -161,7 +200,8 @@ def init(arch: str = "auto", threads: int | None = None, cores: Sequence[int] | 
                 cpu_max_num_threads=count,
                 default_fp=ti.f32,
                 default_ip=ti.i32,
-                offline_cache=True,
+                debug=is_checked,
+                offline_cache=not is_checked,  # which does not notice changed options
                 offline_cache_max_size_of_files=1
                 << 29,  # a game of many kinds of worlds fills the default 100 MB
                 enable_fallback=False,
@@ -173,6 +213,9 @@ def init(arch: str = "auto", threads: int | None = None, cores: Sequence[int] | 
             )
     except RuntimeError as error:
         raise DeviceError(f"cannot start Taichi on {chosen!r}: {error}. Use init('cpu')") from error
+    if is_checked:
+        _check_real_functions()
+        _let_whole_numbers_overflow()
     _device = Device(arch=chosen, threads=count if chosen == "cpu" else 1, reason=reason)
     if wanted:
         _device = _bound(_device, thread_ids() - before, since, wanted, is_left_to_us)
