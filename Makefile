@@ -2,7 +2,7 @@
 # make test: set everything up, run the tests
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint profile clean
+.PHONY: help setup demo test test-bounds lint profile clean
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -11,6 +11,7 @@ READY := $(VENV)/.ready
 help:
 	@echo "make demo     set up, drop a soft sphere, write out/bounce.mp4"
 	@echo "make test     set up, run the tests"
+	@echo "make test-bounds  set up, run kernels with every index checked: takes minutes"
 	@echo "make profile  set up, measure what a frame costs here"
 	@echo "make lint     set up, check style and types"
 	@echo "make clean    delete the environment and what was written"
@@ -26,6 +27,9 @@ demo: $(READY)
 
 test: $(READY)
 	@$(BIN)/python -m pytest
+
+test-bounds: $(READY)
+	@TAICHI_SOFT_DEBUG=1 $(BIN)/python -m pytest tests/bounds
 
 profile: $(READY)
 	@$(BIN)/taichi-soft profile

@@ -43,6 +43,9 @@ __all__ = ["Device", "device", "init", "is_initialized", "make_fields", "ti"]
 
 Result = TypeVar("Result")
 
+DEBUG = "TAICHI_SOFT_DEBUG"
+"""Name of the environment variable that at 1 has every index in a kernel checked: slow, for tests only."""
+
 _MOST_THREADS = 256
 _ARCHS = ("cpu", "cuda", "vulkan", "metal")
 
@@ -101,6 +104,41 @@ if ti.__version__[:2] == (1, 7):
     _let_threads_in()
 
 
+def _check_real_functions() -> None:
+    """Taichi 1.7's own bounds check leaves out what a `ti.real_func` reads and writes. An index there is
+    asserted before its row is used, and made 0 where it is wrong, so that the process lives to tell."""
+    impl = ti.lang.impl
+    plain = impl.subscript
+
+    def checked(builder: Any, value: Any, *indices: Any, **options: Any) -> Any:
+        is_real = isinstance(impl.get_runtime().compiling_callable, ti._lib.core.Function)
+        if is_real and isinstance(value, ti.Field) and value.shape:
+            (index,), (size,) = indices, value.shape  # the fields of a world have one dimension
+            is_inside = ti.lang.ops.logical_and(index >= 0, index < size)
+            place = ti._lib.core.DebugInfo(impl.get_runtime().get_current_src_info())
+            message = f"Accessing a field of size ({size}) in a real function with index (%d)"
+            impl.ti_assert(is_inside, message, [impl.Expr(index).ptr], place)
+            indices = (ti.select(is_inside, index, 0),)
+        return plain(builder, value, *indices, **options)
+
+    impl.subscript = checked
+
+
+def _let_whole_numbers_overflow() -> None:
+    """Where Taichi 1.7 checks bounds it prints a line for each whole number that overflows; hashes are to."""
+    program = ti._lib.core.Program
+    plain = program.compile_kernel
+
+    def compiled(self: Any, config: Any, *arguments: Any) -> Any:
+        config.debug = False  # the bounds check has a switch of its own; the rest looks here
+        try:
+            return plain(self, config, *arguments)
+        finally:
+            config.debug = True  # looked at by the launch, which raises what was found
+
+    program.compile_kernel = compiled
+
+
 @dataclass(frozen=True)
 class Device:
     """What `init` chose."""
@@ -129,7 +167,7 @@ def init(arch: str = "auto", threads: int | None = None, cores: Sequence[int] | 
     Entry points call this; a library that embeds taichi-soft may call it first with its own choice. Any
     thread may. A process that is forked later gets a StateError: start processes by "spawn".
     A second call with compatible arguments does nothing, because starting again would destroy the
-    fields of every world.
+    fields of every world. Where the environment has TAICHI_SOFT_DEBUG=1, kernels check every index.
     Args:
         arch: "auto" or "cpu"; or a GPU by name, "cuda", "vulkan" or "metal". "auto" takes the CPU: the GPU
             kernels have been tested on a CPU only, and games want their GPU for pictures.
@@ -198,6 +236,7 @@ def init(arch: str = "auto", threads: int | None = None, cores: Sequence[int] | 
 def _start(arch: str, reason: str, threads: int, cores: tuple[int, ...], is_left_to_us: bool) -> None:
     """Start Taichi, with its workers on these cores if there are any, and note the device."""
     global _device, _process
+    is_checked = os.environ.get(DEBUG) == "1"
     before, since = (thread_ids(), number_now()) if cores else (set(), 0)
     with contextlib.redirect_stdout(io.StringIO()):  # Taichi announces itself
         ti.init(
@@ -205,7 +244,8 @@ def _start(arch: str, reason: str, threads: int, cores: tuple[int, ...], is_left
             cpu_max_num_threads=threads,
             default_fp=ti.f32,
             default_ip=ti.i32,
-            offline_cache=True,
+            debug=is_checked,
+            offline_cache=not is_checked,  # which does not notice changed options
             offline_cache_max_size_of_files=1
             << 29,  # a game of many kinds of worlds fills the default 100 MB
             enable_fallback=False,
@@ -215,6 +255,9 @@ def _start(arch: str, reason: str, threads: int, cores: tuple[int, ...], is_left
             unrolling_limit=0,  # no warning
             log_level=ti.ERROR,
         )
+    if is_checked:
+        _check_real_functions()
+        _let_whole_numbers_overflow()
     ti.lang.impl.get_runtime().materialize()  # once, by the first kernel otherwise, in whichever thread
     _process = os.getpid()
     _device = Device(arch=arch, threads=threads if arch == "cpu" else 1, reason=reason)

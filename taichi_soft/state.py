@@ -72,13 +72,13 @@ class Capacity:
         plastic: bool = False,
         double: bool = False,
     ) -> "Capacity":
-        """Room for `scene`."""
+        """Room for `scene`. Lanes of its last body read on behind its particles and triangles."""
         return cls(
-            _power_of_two(scene.particle_count, 512),
+            _power_of_two(scene.particle_count + LANES, 512),
             _power_of_two(scene.edge_count, 2048),
             _power_of_two(scene.block_count, 128),
             _power_of_two(len(scene.bodies), 8),
-            _power_of_two(scene.triangle_count, 512),
+            _power_of_two(scene.triangle_count + LANES, 512),
             _power_of_two(scene.outer_count, 512),
             parallel,
             _power_of_two(scene.ring_count, 512) if scene.has_bonds else 0,

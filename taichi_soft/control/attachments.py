@@ -47,7 +47,8 @@ class Attachment(Handle):
     def force(self) -> NDArray[np.float64]:
         """What the body pulled the frame with, mean over the last step, (3,) [N].
 
-        The weight of what is held by it and what it takes to accelerate it included.
+        The weight of what is held by it and what it takes to accelerate it included. A frozen body pulls at
+        nothing: 0, or what others do to the particles that are held.
         Raises: StateError once released, or made without `two_way`.
         """
         return self._load()[:3]

@@ -50,7 +50,10 @@ class Grab(Handle):
 
     @property
     def force(self) -> NDArray[np.float32]:
-        """With what it pulls the body, in the last substep, (3,) [N]. Raises: StateError once released."""
+        """With what it pulls the body, in the last substep, (3,) [N]; 0 while the body is frozen.
+
+        Raises: StateError once released.
+        """
         self._require_held()
         found = np.empty(3, dtype=np.float32)
         read_grab_force(self.body._world._built.state, self._number, found)

@@ -47,7 +47,7 @@ class Joint(Handle):
 
     @property
     def force(self) -> NDArray[np.float64]:
-        """With what `other` pulls `body`, mean over the last step, (3,) [N].
+        """With what `other` pulls `body`, mean over the last step, (3,) [N]; 0 for one in which either froze.
 
         Raises: StateError once released.
         """

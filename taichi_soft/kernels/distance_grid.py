@@ -42,7 +42,9 @@ def accumulate_crossings(
                 area_a, left_a = _side(bx, by, cx, cy, x, y)
                 area_b, left_b = _side(cx, cy, ax, ay, x, y)
                 area_c, left_c = _side(ax, ay, bx, by, x, y)
-                if left_a == left_b and left_b == left_c:
+                # A triangle that is one point from here has no inside; its neighbours count the crossing.
+                is_seen = area_a + area_b + area_c != 0
+                if is_seen and left_a == left_b and left_b == left_c:
                     a, b, c = ti.cast(area_a, ti.f64), ti.cast(area_b, ti.f64), ti.cast(area_c, ti.f64)
                     z = (a * heights[f, 0] + b * heights[f, 1] + c * heights[f, 2]) / (a + b + c)
                     below = ti.cast(ti.ceil(z), ti.i32) - 1

@@ -5,6 +5,7 @@ from taichi_soft.kernels.bonds import accumulate_pressures
 from taichi_soft.kernels.edges import accumulate_edge_forces, edge_force_of
 from taichi_soft.kernels.elastic import lane_forces
 from taichi_soft.kernels.internal_forces import clear_forces
+from taichi_soft.kernels.loads import forget_loads
 from taichi_soft.kernels.motion import particle_is_sound, restore_particle
 from taichi_soft.kernels.per_body import advance_body
 from taichi_soft.math.finite import is_finite
@@ -114,3 +115,4 @@ def find_broken_element(
         for p in range(particles[0], particles[1]):
             restore_particle(state, p)
         clear_forces(state, body)
+        forget_loads(state, body)

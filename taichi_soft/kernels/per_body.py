@@ -13,6 +13,7 @@ from taichi_soft.kernels.drives import add_reactions, blow_on, push_particles
 from taichi_soft.kernels.grabs import pull_grabs
 from taichi_soft.kernels.implicit_euler import implicit_substep
 from taichi_soft.kernels.internal_forces import accumulate_forces, clear_forces
+from taichi_soft.kernels.loads import forget_loads
 from taichi_soft.kernels.motion import (
     gravity_on,
     moved_particle,
@@ -132,6 +133,7 @@ def _settle_body(state: ti.template(), body):
         for p in range(particles[0], particles[1]):
             restore_particle(state, p)
         clear_forces(state, body)
+        forget_loads(state, body)
         state.body_status[body] = FROZEN
     return 1 - sound
 
@@ -159,6 +161,8 @@ def remember_body(state: ti.template(), body):
         remember_particle(state, p)
     if state.body_drives[body] & FEELS_REACTION != 0:
         for p in range(particles[0], particles[1]):
+            if state.body_status[body] == FROZEN:  # nobody aims at where its pins go, and begins anew
+                state.particle_reaction[p] = ti.Vector.zero(state.real, 3)
             state.prev_reaction[p] = state.particle_reaction[p]
 
 

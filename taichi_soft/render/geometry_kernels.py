@@ -81,7 +81,7 @@ def project_triangles(
         v2 = ti.Vector([corners[2, 0], corners[2, 1], corners[2, 2]])
         normal = (v1 - v0).cross(v2 - v0)
         determinant = normal.dot(v0)
-        low_u, high_u, low_v, high_v = 1e9, -1e9, 1e9, -1e9
+        low_u, high_u, low_v, high_v = 1e9, -1e9, 1e9, -1e9  # which whole numbers hold
         for i in range(3):
             j = (i + 1) % 3
             d, e = corners[i, 2], corners[j, 2]

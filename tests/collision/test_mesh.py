@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 import trimesh
+from scipy.spatial import Delaunay
 from trimesh.triangles import closest_point
 
 from taichi_soft import MeshShape
+from taichi_soft import box as lattice_box
 
 TURN = trimesh.transformations.euler_matrix(0.4, -0.7, 1.1)
 
@@ -81,6 +83,83 @@ def test_nodes_have_the_exact_distance_and_sign(case):
     np.testing.assert_allclose(np.abs(found), np.abs(wanted), atol=1e-5 * mesh.extents.max())
     clear = np.abs(wanted) > 1e-3 * shape.cell
     assert (np.sign(found) == np.sign(wanted))[clear].all()
+
+
+def surface_of(tets):
+    """Faces that belong to one tetrahedron only, outward."""
+    faces = tets[:, [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]]].reshape(-1, 3)
+    _, first, uses = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
+    return faces[first[uses == 1]]
+
+
+def slit(vertices, triangles, count, rng):
+    """The same surface with T-junctions: an edge is split on one side, and a flat sliver fills the slit."""
+    vertices, triangles = list(vertices), [tuple(each) for each in triangles]
+    for _ in range(count):
+        number, turn = rng.integers(len(triangles)), rng.integers(3)
+        a, b, c = np.roll(triangles[number], turn)
+        middle, share = len(vertices), rng.uniform(0.1, 0.9)
+        vertices.append((1 - share) * vertices[a] + share * vertices[b])
+        triangles[number] = (a, middle, c)
+        triangles += [(middle, b, c), (a, b, middle)]
+    return np.array(vertices), np.array(triangles)
+
+
+def sliver_at_a_junction(rng):
+    """A corner of a cube, one upright edge of which has a vertex of its own on one side."""
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 0.5]])
+    triangles = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 4, 2], [4, 3, 2], [0, 3, 4]])
+    return vertices, np.array([[0, 1, 2, 3]]), (vertices, triangles)
+
+
+def random_tetrahedra(rng):
+    """Some of those between random points, half of them above each other: their edges are upright."""
+    points = rng.uniform(size=(14, 3))
+    points = np.concatenate([points, points[:7] * (1, 1, 0) + (0, 0, 1) * rng.uniform(size=(7, 1))])
+    tets = Delaunay(points).simplices
+    volumes = np.linalg.det(points[tets[:, 1:]] - points[tets[:, :1]])
+    tets[volumes < 0] = tets[volumes < 0][:, [1, 0, 2, 3]]
+    tets = tets[np.abs(volumes) > 1e-6]
+    tets = tets[rng.uniform(size=len(tets)) < 0.7]
+    return points, tets, slit(points, surface_of(tets), 60, rng)
+
+
+def random_blocks(rng):
+    """Some cubes of a stack of 27, which meet in faces, in edges, in corners or not."""
+    mesh = lattice_box((1.0, 0.9, 1.1), (3, 3, 3))
+    tets = mesh.tets.reshape(27, -1, 4)[rng.uniform(size=27) < 0.5].reshape(-1, 4)
+    return mesh.vertices, tets, slit(mesh.vertices, surface_of(tets), 60, rng)
+
+
+def is_in_any(vertices, tets, x):
+    """By barycentric coordinates in float64."""
+    inside = np.zeros(len(x), dtype=bool)
+    for corners in vertices[tets]:
+        shares = np.linalg.solve((corners[1:] - corners[0]).T, (x - corners[0]).T)
+        inside |= (shares >= 0).all(axis=0) & (shares.sum(axis=0) <= 1)
+    return inside
+
+
+@pytest.mark.parametrize(
+    ("make", "seed"),
+    [(sliver_at_a_junction, 0), *((random_tetrahedra, seed) for seed in (1, 8, 17))]
+    + [(random_blocks, seed) for seed in range(3)],
+)
+def test_slivers_at_junctions_change_no_distance_and_no_sign(make, seed):
+    """Seen along z, those on upright edges are one point."""
+    rng = np.random.default_rng(seed)
+    vertices, tets, surface = make(rng)
+    corners = surface[0][surface[1]]
+    assert (np.ptp(corners[:, :, :2], axis=1).max(axis=1) < 1e-9).any()
+    shape = MeshShape(surface, cell=1 / 60, cache=False)
+    numbers = rng.choice(len(shape.samples), 600, replace=False)
+    low = shape.parameters[:3].astype(np.float64)
+    x = low + shape.cell * np.stack(np.unravel_index(numbers, shape.resolution), axis=1)
+    wanted = distance_to_triangles(trimesh.Trimesh(*surface, process=False), x)
+    found = shape.samples[numbers].astype(np.float64)
+    np.testing.assert_allclose(np.abs(found), wanted, atol=1e-5)
+    clear = wanted > 1e-3 * shape.cell
+    np.testing.assert_array_equal((found < 0)[clear], is_in_any(vertices, tets, x)[clear])
 
 
 def test_between_nodes_distances_are_right_to_a_fraction_of_a_cell(case, measure):

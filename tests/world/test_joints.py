@@ -244,10 +244,11 @@ def test_despawn_of_either_ends_the_joint(empty):
 
 
 def test_a_frozen_body_holds_the_other_where_it_is(empty):
+    """And the frame that it is on bears the other's weight alone."""
     world, kind = empty
     a = world.spawn(kind, position=(0, 0, 3.0))
     b = world.spawn(kind, position=(0, 0, 2.0))
-    joint = b.attach_to(a, TOP)
+    joint, hold = b.attach_to(a, TOP), a.attach(BOTTOM, world.add_frame(), two_way=True)
     world.step(DT)
     where = a.positions()
     a.set_motion(where, 1.9e4 * np.sign(BIG.vertices + 0.01))
@@ -260,6 +261,9 @@ def test_a_frozen_body_holds_the_other_where_it_is(empty):
     assert not b.is_frozen
     assert a.positions().tobytes() == where.tobytes()
     np.testing.assert_allclose(b.positions()[TOP], where[BOTTOM], atol=1e-4)
+    weight = b.masses.sum() * G
+    np.testing.assert_allclose(joint.force, [0, 0, weight], atol=1e-2 * weight)
+    np.testing.assert_allclose(hold.force, [0, 0, -weight], atol=1e-2 * weight)
     assert joint.force[2] == pytest.approx(1000 * G, rel=0.01)
 
 

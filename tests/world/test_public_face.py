@@ -9,6 +9,7 @@ import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 from public_face import CALLS, DEAD, DT, MAKERS, READABLE_WHEN_DEAD, READERS, SUBSTEPS, Game, Of
+from reading import burst, leave, not_finite
 
 import engine_adapter
 import taichi_soft
@@ -138,6 +139,28 @@ def test_a_dead_handle_does_nothing_and_says_so(game, kind):
     assert not wrong, "\n".join(wrong)
     for name in READABLE_WHEN_DEAD[kind].split():
         getattr(handle, name)
+
+
+@pytest.mark.filterwarnings(
+    "ignore::taichi_soft.FrozenBodyWarning", "ignore::taichi_soft.UnstableStepWarning"
+)
+@pytest.mark.parametrize("name", ["free", "held", "hanging", "sleeper", "piece"])
+def test_all_that_is_read_stays_finite_whichever_body_freezes(game, name):
+    """On a frame, in a hand, joined to another, asleep and cut off, among colliders. `test_finite_readout.py`
+    has worlds without contact."""
+    world = game.world
+    pieces = game.free.cut(plane=(game.free.center_of_mass(), (1.0, 0.2, 0.1)))
+    body = pieces[0] if name == "piece" else getattr(game, name)
+    data = world.snapshot()
+    for destroy in (burst, leave):
+        world.restore(data)
+        destroy(body)
+        for substeps in (1, SUBSTEPS, SUBSTEPS):
+            world.step(DT, substeps)
+            assert not_finite(world, game.adapter) == []
+        assert body.is_frozen
+        if name == "held":
+            assert not np.concatenate([game.hold.force, game.hold.torque, game.hand.force]).any()
 
 
 BAD_FIELDS = {

@@ -1,0 +1,75 @@
+"""Everything that a world and its handles tell, and ways to break a body."""
+
+import contextlib
+import dataclasses
+import warnings
+
+import numpy as np
+from public_face import READERS
+
+from taichi_soft import TaichiSoftError
+
+UP = np.array([0.01, 0.02, 3.0])
+NOT_NUMBERS = {"settings", "asset", "material", "mesh", "function"}
+
+
+def numbers_in(value):
+    """All floats that a read-out holds, without those of other objects of the world."""
+    if isinstance(value, np.ndarray):
+        return [value] if value.dtype.kind == "f" else []
+    if isinstance(value, (float, np.floating)):
+        return [np.array(value)]
+    if isinstance(value, (tuple, list)):
+        return [each for part in value for each in numbers_in(part)]
+    if dataclasses.is_dataclass(value):
+        return numbers_in([getattr(value, field.name) for field in dataclasses.fields(value)])
+    return []
+
+
+def readings(world, adapter):
+    """(name, what is read) of everything that a built world and its handles tell, by the table of readers."""
+    handles = {
+        "World": [world],
+        "Body": world.bodies,
+        "Collider": world.colliders,
+        "Frame": world.frames,
+        "Grab": world.grabs,
+        "Attachment": [each for body in world.bodies for each in body.attachments],
+        "Joint": world.joints,
+        "EngineAdapter": [adapter],
+    }
+    for kind, each in handles.items():
+        for number, handle in enumerate(each):
+            for name in (each for each in READERS[kind].split() if each not in NOT_NUMBERS):
+                with contextlib.suppress(TaichiSoftError):  # what has no tetrahedra has no stress
+                    found = getattr(handle, name)
+                    yield f"{kind} {number}.{name}", found() if callable(found) else found
+    for body in world.bodies:
+        yield "positions", (body.positions(), world.read_positions(body, 0.5), adapter.positions(body))
+        middle = body.center_of_mass()
+        yield "raycast", world.raycast(middle + UP, -UP)
+        yield "closest_point", world.closest_point(middle + UP, max_distance=10.0)
+        yield "overlaps", (world.overlap_sphere(middle, 1.0), world.overlap_box(middle, (1, 1, 1)))
+    yield "events", world.drain_events()
+
+
+def not_finite(world, adapter):
+    """Names of what is read that holds NaN or infinity."""
+    wrong = []
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", RuntimeWarning)  # NumPy's, of what it makes NaN of
+        for name, value in readings(world, adapter):
+            wrong += [name for each in numbers_in(value) if not np.isfinite(each).all()]
+    return wrong
+
+
+def burst(body):
+    """Vertices fly apart just below the highest speed there is: forces take some above it at once."""
+    signs = np.random.default_rng(body.index).choice([-1.0, 1.0], size=(body.vertex_count, 3))
+    body.set_motion(body.positions(), 1.9e4 * signs)
+
+
+def leave(body):
+    """One step ends beyond the farthest coordinate there is."""
+    rows = np.ones((body.vertex_count, 3))
+    body.set_motion(9.9999e6 * rows, 1.9e4 * rows)

@@ -1,0 +1,53 @@
+"""Every number that leaves the library is finite, or the call raises: also once a body froze."""
+
+import numpy as np
+import pytest
+from reading import burst, leave, not_finite
+
+from engine_adapter import EngineAdapter, FixedStep
+from taichi_soft import Event, Material, World, box
+
+DT = 1 / 60
+BLOCK = box((0.4, 0.4, 0.4), cells=(2, 2, 2))
+LEFT = np.flatnonzero(BLOCK.vertices[:, 0] < -0.19)
+JELLY = Material(3e4, 0.3, 500.0, 5.0)
+
+pytestmark = pytest.mark.filterwarnings(
+    "ignore::taichi_soft.FrozenBodyWarning", "ignore::taichi_soft.UnstableStepWarning"
+)
+
+
+def held_world(**options):
+    """Bodies on frames and in hands, and one that falls."""
+    world = World(**options)
+    for x in (0.0, 0.6, 3.0):
+        world.add_body(BLOCK, JELLY, position=(x, 0.0, 1.0))
+    world.build()
+    for body in world.bodies[:2]:
+        body.attach(LEFT, world.add_frame(position=(0.0, 0.0, 1.0)), two_way=True)
+        body.grab(3)
+    world.record_events([Event])
+    return world
+
+
+@pytest.mark.parametrize("integrator", ["leapfrog", "implicit_euler"])
+def test_all_that_is_read_stays_finite_whichever_body_freezes(integrator):
+    """What it hangs on and what holds it feel nothing of it then, also after its failure was looked into."""
+    world = held_world(integrator=integrator)
+    adapter = EngineAdapter(world, FixedStep(DT, 8))
+    for _ in range(3):
+        adapter.advance(DT)
+    assert not_finite(world, adapter) == []
+    base = adapter.snapshot()
+    for number in range(3):
+        for destroy in (burst, leave):
+            adapter.restore(base)
+            body = world.bodies[number]
+            destroy(body)
+            for substeps in (1, 8, 8):
+                world.step(DT, substeps)
+                assert not_finite(world, adapter) == []
+            assert body.is_frozen
+            for each in body.attachments:
+                assert not np.concatenate([each.force, each.torque]).any()
+            assert all(not grab.force.any() for grab in world.grabs if grab.body is body)
