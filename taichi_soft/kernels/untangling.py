@@ -23,9 +23,9 @@ PATIENCE = 15
 WRECKED = 0.1
 """Part of a body's tetrahedra from which on, caught before a step that was made again, it is a wreck."""
 
-RAISING, RAISING_STEPS, CALMING = 0.1, 60, 0.8
-"""Part of the way that all of a wreck goes in a step, for how many steps, and part of its vibration that is
-left each time. What is wound about itself twice without being inside out anywhere would stay so otherwise."""
+RAISING_STEPS, CALMING = 20, 0.8
+"""Steps in which all of a wreck goes there, and part of its vibration that is left each time. What is wound
+about itself twice without being inside out anywhere would stay so otherwise."""
 
 FLAT = 1e-5
 """Volume over that at rest, from which down a tetrahedron counts as caught."""
@@ -112,13 +112,13 @@ def _free(state: ti.template(), body):
 
 
 @ti.func
-def _raise(state: ti.template(), body):
-    """Move all of a wreck a part of the way, and calm it."""
+def _raise(state: ti.template(), body, steps_left):
+    """Move all of a wreck a part of the way, in the last step all of it, and calm it."""
     fade_vibration(state, body, 0.0, CALMING)
     fit = _best_fit(state, body)
     particles = state.body_particles[body]
     for p in range(particles[0], particles[1]):
-        _pull(state, p, fit, RAISING)
+        _pull(state, p, fit, 1.0 / steps_left)
 
 
 @ti.func
@@ -133,7 +133,7 @@ def untangle_body(state: ti.template(), program: ti.template(), body):
                 elif state.body_patience[body] == PLACED:
                     age = 0
                 if age < 0:
-                    _raise(state, body)
+                    _raise(state, body, -age)
                 elif age % PATIENCE == 0:
                     if _caught_count(state, state.particle_position, body) == 0:
                         age = 0
