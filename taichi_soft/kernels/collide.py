@@ -11,6 +11,14 @@ MOST_TOUCHES = 4
 """Colliders that one particle may meet, one after the other, within a substep; then it stays where it is."""
 
 
+DEEP = 0.5
+"""Mean edges of a body's surface that its fastest particle may go in what is left of a step before particles
+inside of it are looked at as well: a blow drives them through those that have stopped."""
+
+UNSEEN = 1e30
+"""Clearance of particles inside of a body, where it is slow [m]."""
+
+
 @ti.func
 def _in_frame(contact: ti.template(), c, x, time):
     """A point in the frame that a collider has `time` [s] after the start of the step."""
@@ -25,12 +33,18 @@ def find_near_colliders(state: ti.template(), body, reach, since, left):
     Args:
         since, left: time since the start of the step, and until its end [s].
     """
-    outer = state.body_outer[body]
+    outer, particles = state.body_outer[body], state.body_particles[body]
     first = state.particle_position[state.outer_particle[outer[0]]]
     lower, upper = first, first
     for k in range(outer[0], outer[1]):
         x = state.particle_position[state.outer_particle[k]]
         lower, upper = ti.min(lower, x), ti.max(upper, x)
+    is_deep = reach > DEEP * state.contact.body_edge[body]
+    for p in range(particles[0], particles[1]):
+        if is_deep:
+            x = state.particle_position[p]
+            lower, upper = ti.min(lower, x), ti.max(upper, x)
+        state.contact.particle_clearance[p] = UNSEEN
     lower, upper = lower - reach, upper + reach
     row = body * state.contact.capacity.colliders
     mine = state.contact.body_filter[body]
@@ -49,8 +63,10 @@ def find_near_colliders(state: ti.template(), body, reach, since, left):
     state.contact.near_count[body] = count
     state.contact.reach[body] = reach
     state.contact.gone[body] = 0.0
-    for k in range(outer[0], outer[1]):
-        p = state.outer_particle[k]
+    for k in range(ti.select(is_deep, particles[1] - particles[0], outer[1] - outer[0])):
+        p = particles[0] + k
+        if not is_deep:
+            p = state.outer_particle[outer[0] + k]
         x = state.particle_position[p]
         clearance = reach
         for i in range(count):
