@@ -22,7 +22,9 @@ LAYERS = """
     kernels
     forces  shapes
     plain  parts
-    stability  failures  colliders  control  queries  events  cutting
+    colliders
+    starts
+    stability  failures  control  queries  events  cutting
     measures
     tearing  readout  substeps
     body  assets  pools
