@@ -40,11 +40,10 @@ def find_near_colliders(state: ti.template(), body, reach, since, left):
         x = state.particle_position[state.outer_particle[k]]
         lower, upper = ti.min(lower, x), ti.max(upper, x)
     is_deep = reach > DEEP * state.contact.body_edge[body]
-    for p in range(particles[0], particles[1]):
-        if is_deep:
+    if is_deep:
+        for p in range(particles[0], particles[1]):
             x = state.particle_position[p]
             lower, upper = ti.min(lower, x), ti.max(upper, x)
-        state.contact.particle_clearance[p] = UNSEEN
     lower, upper = lower - reach, upper + reach
     row = body * state.contact.capacity.colliders
     mine = state.contact.body_filter[body]
@@ -84,6 +83,10 @@ def forget_contacts(state: ti.template(), body):
         state.contact.angular_impulse[row] = ti.Vector.zero(ti.f32, 3)
         state.contact.press[row] = ti.Vector.zero(ti.f32, 3)
         state.contact.press_rates[row] = ti.Vector.zero(ti.f32, 3)
+    was_deep = state.contact.reach[body] > DEEP * state.contact.body_edge[body]
+    if was_deep and state.contact.near_count[body] > 0:
+        for p in range(state.body_particles[body][0], state.body_particles[body][1]):
+            state.contact.particle_clearance[p] = UNSEEN  # the next search may leave those inside alone
     state.contact.near_count[body] = 0
     state.contact.reach[body] = ti.select(state.contact.collider_count[None] == 0, 1e30, -1.0)
     state.contact.gone[body] = 0.0
