@@ -381,7 +381,7 @@ class Body(Handle):
             position: where its centre of mass goes, (3,) [m].
             rotation: turn about the centre of mass, from how it lies now: matrix or quaternion (x, y, z, w).
             keep_velocity: True turns velocities with the body, False stops it.
-        Raises: OptionError where it would lie below the floor.
+        Raises: OptionError where it would lie below the floor, or crushed in a collider.
         """
         teleport(self, position, rotation, keep_velocity)
 

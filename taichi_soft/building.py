@@ -23,6 +23,7 @@ from taichi_soft.runtime import Device, init
 from taichi_soft.settings import Settings
 from taichi_soft.shapes import PlaneShape
 from taichi_soft.simulation import Simulation
+from taichi_soft.starts import free_points, require_clear
 from taichi_soft.state import Capacity, State, acquire, release
 from taichi_soft.tearing import Tears
 from taichi_soft.types import Integrator, Schedule
@@ -37,6 +38,9 @@ def build(world: World) -> Simulation:
     if not pools.slots:
         raise StateError("the world is empty: call add_body or reserve before build")
     world._substeps.review()
+    for slot, rows in pools.starts.items():
+        asset = pools.assets[slot]
+        require_clear(colliders.handles, asset, free_points(asset, rows), f"body {slot}")
     device = init()
     world._built_with = [digest_of(handle.shape) for handle in colliders.all_handles]
     has_contact = (

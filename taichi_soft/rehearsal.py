@@ -13,10 +13,12 @@ from numpy.typing import NDArray
 
 from taichi_soft.constants import LANES
 from taichi_soft.control.drives import push_bodies
+from taichi_soft.control.jumps import carry
 from taichi_soft.errors import StateError
 from taichi_soft.kernels.stress import read_stress
 from taichi_soft.shapes import SphereShape
 from taichi_soft.snapshot import restore_snapshot, take_snapshot
+from taichi_soft.spawning import enter
 
 if TYPE_CHECKING:
     from taichi_soft.body import Body
@@ -57,7 +59,7 @@ def _fill_pools(world: World) -> None:
         is_needed = asset not in living or len(world.bodies) < 2
         if is_needed and any(slot is None for slot in _slots_of(world, asset)):
             above = (world.settings.floor or 0.0) + float(np.abs(asset.mesh.vertices).max())
-            world.spawn(asset, position=above * UP)
+            enter(world, asset, asset.placed(above * UP, None, 0.0 * UP, 0.0 * UP, None))
 
 
 def _slots_of(world: World, asset: object) -> list[Body | None]:
@@ -89,7 +91,7 @@ def _control(world: World, body: Body, other: Body | None) -> None:
     body.unpin(free[:1])
     _hold(world, body, other, free)
     if not body.is_held and not len(body.pinned):
-        body.teleport(place + 100.0 * UP)  # clear of the floor, in which it may lie a little
+        carry([body], np.eye(3), place, place + 100.0 * UP, keep=True)  # as `teleport`, whatever is there
     body.set_motion(body.positions(), body.velocities())
 
 

@@ -12,6 +12,7 @@ from taichi_soft.checks import as_count
 from taichi_soft.control.materials import set_material
 from taichi_soft.cutting import refill_slot
 from taichi_soft.errors import OptionError, StateError
+from taichi_soft.starts import free_points, require_clear
 
 if TYPE_CHECKING:
     from taichi_soft.world import World
@@ -43,7 +44,7 @@ def add_body(
     rows = asset.placed(position, rotation, velocity, (0.0, 0.0, 0.0), world.settings.floor)
     _add_slot(world, asset)
     world._pools.added[key] = asset
-    return _enter(world, asset, rows)
+    return enter(world, asset, rows)
 
 
 def _content(asset: SoftBodyAsset) -> tuple[Any, ...]:
@@ -88,7 +89,9 @@ def spawn(
     _require_asset(asset)
     world._pools.next_slot(asset)
     rows = asset.placed(position, rotation, velocity, angular_velocity, world.settings.floor)
-    return _enter(world, asset, rows)
+    if world.is_built:
+        require_clear(world.colliders, asset, free_points(asset, rows), "the body")
+    return enter(world, asset, rows)
 
 
 def despawn(world: World, body: Body) -> None:
@@ -126,7 +129,7 @@ def _add_slot(world: World, asset: SoftBodyAsset) -> None:
     world._pools.add_slot(asset)
 
 
-def _enter(world: World, asset: SoftBodyAsset, rows: Floats32) -> Body:
+def enter(world: World, asset: SoftBodyAsset, rows: Floats32) -> Body:
     """A new body in the next free slot, which begins as `rows` say."""
     slot, simulation = world._pools.next_slot(asset), world._simulation
     if simulation is None:

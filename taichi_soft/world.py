@@ -273,8 +273,8 @@ class World(Handle):
             velocity: of the centre of mass, (3,) [m/s].
             angular_velocity: about the centre of mass, (3,) [rad/s]. Pinned vertices rest.
         Returns: a new handle.
-        Raises: OptionError for a value out of range, or a place out of reach or below the floor; StateError
-            for an asset without a pool in this world, or whose pool is full.
+        Raises: OptionError for a value out of range, or a place out of reach, below the floor or inside a
+            collider; StateError for an asset without a pool in this world, or whose pool is full.
         """
         return spawn(self, asset, position, rotation, velocity, angular_velocity)
 
@@ -366,7 +366,8 @@ class World(Handle):
     def build(self) -> None:
         """Move all bodies into Taichi fields and fix the kernels. Starts Taichi if nobody has.
 
-        Raises: StateError without bodies or when called twice.
+        Raises: StateError without bodies or when called twice; OptionError for a body that starts inside a
+            collider.
         """
         if self.is_built:
             raise StateError("the world is already built")

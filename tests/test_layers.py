@@ -23,7 +23,9 @@ LAYERS = """
     forces  shapes
     vibration
     plain  parts
-    stability  first_mode  failures  colliders  control  queries  events  cutting
+    colliders
+    starts
+    stability  first_mode  failures  control  queries  events  cutting
     measures
     tearing  readout  substeps
     body  assets  pools

@@ -14,6 +14,8 @@ from taichi_soft.control.attachments import require_unattached
 from taichi_soft.control.jumps import jump_to
 from taichi_soft.errors import OptionError
 from taichi_soft.kernels.placement import write_rigid_velocity
+from taichi_soft.scene import outer_vertices
+from taichi_soft.starts import require_clear
 
 if TYPE_CHECKING:
     from taichi_soft.body import Body
@@ -39,6 +41,10 @@ def teleport(body: Body, position: ArrayLike, rotation: Any, keep_velocity: bool
     require_unattached(body, some_particles(body, None))
     floor, simulation = body._world.settings.floor, body._world._built
     left = simulation.box_of(body)
+    free = np.setdiff1d(outer_vertices(body.mesh), body.pinned)
+    if len(free) and simulation.colliders is not None:
+        points = (body.positions()[free].astype(np.float64) - body.center_of_mass()) @ turn.T + target
+        require_clear(body._world.colliders, body.asset, points, f"body {body.index}")
     lowest = -np.inf if floor is None else floor
     bottom, top, farthest = jump_to(body, target, turn, lowest=lowest, keep=keep)
     if not farthest < POSITION_LIMIT:

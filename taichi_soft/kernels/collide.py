@@ -11,6 +11,14 @@ MOST_TOUCHES = 4
 """Colliders that one particle may meet, one after the other, within a substep; then it stays where it is."""
 
 
+DEEP = 0.5
+"""Mean edges of a body's surface that its fastest particle may go in what is left of a step before particles
+inside of it are looked at as well: a blow drives them through those that have stopped."""
+
+UNSEEN = 1e30
+"""Clearance of particles inside of a body, where it is slow [m]."""
+
+
 @ti.func
 def _in_frame(contact: ti.template(), c, x, time):
     """A point in the frame that a collider has `time` [s] after the start of the step."""
@@ -25,12 +33,17 @@ def find_near_colliders(state: ti.template(), body, reach, since, left):
     Args:
         since, left: time since the start of the step, and until its end [s].
     """
-    outer = state.body_outer[body]
+    outer, particles = state.body_outer[body], state.body_particles[body]
     first = state.particle_position[state.outer_particle[outer[0]]]
     lower, upper = first, first
     for k in range(outer[0], outer[1]):
         x = state.particle_position[state.outer_particle[k]]
         lower, upper = ti.min(lower, x), ti.max(upper, x)
+    is_deep = reach > DEEP * state.contact.body_edge[body]
+    if is_deep:
+        for p in range(particles[0], particles[1]):
+            x = state.particle_position[p]
+            lower, upper = ti.min(lower, x), ti.max(upper, x)
     lower, upper = lower - reach, upper + reach
     row = body * state.contact.capacity.colliders
     mine = state.contact.body_filter[body]
@@ -49,8 +62,10 @@ def find_near_colliders(state: ti.template(), body, reach, since, left):
     state.contact.near_count[body] = count
     state.contact.reach[body] = reach
     state.contact.gone[body] = 0.0
-    for k in range(outer[0], outer[1]):
-        p = state.outer_particle[k]
+    for k in range(ti.select(is_deep, particles[1] - particles[0], outer[1] - outer[0])):
+        p = particles[0] + k
+        if not is_deep:
+            p = state.outer_particle[outer[0] + k]
         x = state.particle_position[p]
         clearance = reach
         for i in range(count):
@@ -68,6 +83,10 @@ def forget_contacts(state: ti.template(), body):
         state.contact.angular_impulse[row] = ti.Vector.zero(ti.f32, 3)
         state.contact.press[row] = ti.Vector.zero(ti.f32, 3)
         state.contact.press_rates[row] = ti.Vector.zero(ti.f32, 3)
+    was_deep = state.contact.reach[body] > DEEP * state.contact.body_edge[body]
+    if was_deep and state.contact.near_count[body] > 0:
+        for p in range(state.body_particles[body][0], state.body_particles[body][1]):
+            state.contact.particle_clearance[p] = UNSEEN  # the next search may leave those inside alone
     state.contact.near_count[body] = 0
     state.contact.reach[body] = ti.select(state.contact.collider_count[None] == 0, 1e30, -1.0)
     state.contact.gone[body] = 0.0

@@ -141,9 +141,26 @@ def _drop_twins(soft: ti.template(), first, at, lead):
 
 
 @ti.func
+def _is_in_front(state: ti.template(), first, at, slot, depth, behind):
+    """Whether a vertex that is `depth` [m] behind a triangle is nearer to the front of another of that body.
+
+    Then it is outside: what is thinner than a search looks ahead shows its back as well.
+    Args:
+        first, at: rows of `near_slot`, that of the vertex's first and of this one.
+        behind: slot of the contact that is behind so far, or -1.
+    """
+    body, is_outside = state.particle_body[state.soft.slot_vertices[slot][1]], 0
+    for row in range(first, at):
+        other = state.soft.near_slot[row]
+        if other != behind and state.soft.slot_gap[other] < depth:
+            is_outside |= int(state.particle_body[state.soft.slot_vertices[other][1]] == body)
+    return is_outside
+
+
+@ti.func
 def _find_near_gaps(state: ti.template(), body, count, given, h):
     """Which of the near candidates count: those in front of their vertex's triangles, and of each vertex the
-    one it is least deep behind.
+    one it is least deep behind, unless it is nearer to the front of the same body.
 
     Args:
         count: of the near ones.
@@ -176,7 +193,16 @@ def _find_near_gaps(state: ti.template(), body, count, given, h):
                         state.soft.slot_weights[slot][i] = feet[lane, i]
                     state.soft.slot_gap[slot] = distance - thickness
                     _drop_twins(state.soft, first_row, first + lane, LEAD * thickness)
-                elif state.particle_body[other] != body and distance > shallowest:
+                    if behind >= 0 and distance < -shallowest:
+                        before = state.soft.slot_vertices[behind][1]
+                        if state.particle_body[before] == state.particle_body[other]:
+                            state.soft.slot_gap[behind] = NO_CONTACT
+                            shallowest, behind = -1e30, -1
+                elif (
+                    state.particle_body[other] != body
+                    and distance > shallowest
+                    and _is_in_front(state, first_row, first + lane, slot, -distance, behind) == 0
+                ):
                     for i in ti.static(range(3)):
                         state.soft.slot_normal[slot][i] = normals[lane, i]
                         state.soft.slot_weights[slot][i] = feet[lane, i]

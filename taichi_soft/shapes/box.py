@@ -40,6 +40,11 @@ class BoxShape(Shape):
         """Lower and upper corner, (2, 3) [m]."""
         return about_origin(np.asarray(self.size) / 2)
 
+    def depths(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """How deep points (n, 3) in its frame lie inside, (n,) [m], below 0 outside: to the nearest face."""
+        depths: NDArray[np.float64] = (np.asarray(self.size) / 2 - np.abs(points)).min(axis=1)
+        return depths
+
     def surface(self) -> Triangles:
         """Two triangles for each face."""
         import trimesh  # half a second that a game need not wait for

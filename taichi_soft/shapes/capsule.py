@@ -37,6 +37,13 @@ class CapsuleShape(Shape):
         """Lower and upper corner, (2, 3) [m]."""
         return about_origin([self.radius, self.radius, self.length / 2 + self.radius])
 
+    def depths(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """How deep points (n, 3) in its frame lie inside, (n,) [m], below 0 outside."""
+        half = self.length / 2
+        beside = points - np.clip(points, (0.0, 0.0, -half), (0.0, 0.0, half))
+        depths: NDArray[np.float64] = self.radius - np.linalg.norm(beside, axis=1)
+        return depths
+
     def surface(self) -> Triangles:
         """Triangles whose vertices lie on the capsule."""
         import trimesh  # half a second that a game need not wait for

@@ -79,6 +79,22 @@ class HeightFieldShape(Shape):
         corners: NDArray[np.float64] = read_only(np.array([[*-half, -np.inf], [*half, top]]))
         return corners
 
+    def depths(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """How deep points (n, 3) in its frame lie inside, (n,) [m], below 0 outside; no more than that."""
+        heights = np.asarray(self.heights, dtype=np.float64)
+        last = np.array(heights.shape) - 1
+        u = points[:, :2] / self.spacing + last / 2
+        i, j = np.clip(np.floor(u).astype(np.int64), 0, last - 1).T
+        s, t = u.T - (i, j)
+        long, short = np.maximum(s, t), np.minimum(s, t)
+        side = np.where(s >= t, heights[i + 1, j], heights[i, j + 1])
+        ground = (1 - long) * heights[i, j] + (long - short) * side + short * heights[i + 1, j + 1]
+        beside = np.abs(points[:, :2]) - last * self.spacing / 2
+        depths: NDArray[np.float64] = np.where(
+            beside.max(axis=1) > 0.0, -np.inf, self._values()[3] * (ground - points[:, 2])
+        )
+        return depths
+
     def surface(self) -> Triangles:
         """The ground itself: two triangles for each cell, facing up."""
         nx, ny, _ = self.resolution

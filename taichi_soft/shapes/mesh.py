@@ -93,6 +93,20 @@ class MeshShape(Shape):
         body = voxels(inside, self.cell)
         return body.translated(self._grid.origin + self.cell * (filled.min(axis=0) + filled.max(axis=0)) / 2)
 
+    def depths(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """How deep points (n, 3) in its frame lie inside, (n,) [m], below 0 outside; from its grid."""
+        resolution = np.array(self.resolution)
+        distances = self._samples.reshape(self.resolution)
+        u = (points - self._grid.origin) / self.cell
+        base = np.clip(np.floor(u).astype(np.int64), 0, resolution - 2)
+        w = u - base
+        depths = np.zeros(len(points))
+        for corner in np.ndindex(2, 2, 2):
+            share = np.where(corner, w, 1.0 - w).prod(axis=1)
+            depths -= share * distances[tuple((base + corner).T)]
+        outside = (u < 0.0).any(axis=1) | (u > resolution - 1).any(axis=1)
+        return np.where(outside, -np.inf, depths)
+
     def surface(self) -> Triangles:
         """The mesh itself, which the grid follows to a fraction of a cell."""
         return self.vertices, self.triangles

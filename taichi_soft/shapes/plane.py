@@ -42,6 +42,11 @@ class PlaneShape(Shape):
         """Infinite to all sides, (2, 3)."""
         return about_origin((np.inf, np.inf, np.inf))
 
+    def depths(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """How deep points (n, 3) in its frame lie inside, (n,) [m], below 0 outside."""
+        depths: NDArray[np.float64] = -points @ np.asarray(self.normal)
+        return depths
+
     def surface(self, size: float = 20.0) -> Triangles:
         """A square of edge `size` [m] about the origin."""
         half = as_length(size, "size") / 2

@@ -61,6 +61,10 @@ class Shape(ABC):
         """Lower and upper corner of the solid in its own frame, (2, 3) [m]; infinite where it has no end."""
 
     @abstractmethod
+    def depths(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """How deep points (n, 3) in its frame lie inside, (n,) [m], below 0 outside: about the way out."""
+
+    @abstractmethod
     def surface(self) -> Triangles:
         """What to draw: vertices (n, 3) [m] and triangles (m, 3), counterclockwise seen from outside."""
 

@@ -29,6 +29,11 @@ class SphereShape(Shape):
         """Lower and upper corner, (2, 3) [m]."""
         return about_origin([self.radius] * 3)
 
+    def depths(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """How deep points (n, 3) in its frame lie inside, (n,) [m], below 0 outside."""
+        depths: NDArray[np.float64] = self.radius - np.linalg.norm(points, axis=1)
+        return depths
+
     def surface(self) -> Triangles:
         """1,280 triangles whose vertices lie on the sphere."""
         import trimesh  # half a second that a game need not wait for

@@ -55,6 +55,9 @@ def test_distances_are_exact_inside_and_outside(name, measure):
     assert (wanted > 0.05).any()
     distance, _ = measure(shape, x)
     assert (np.abs(distance - wanted) <= 5e-7 * (1 + np.abs(x).max(axis=1))).all()
+    depths, inside = shape.depths(x), wanted < 0
+    np.testing.assert_allclose(depths[inside], -wanted[inside], atol=1e-12 * np.abs(x).max())
+    assert (depths[~inside] <= 0).all()
 
 
 def test_normals_are_the_gradient(name, measure):

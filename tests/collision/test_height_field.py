@@ -70,6 +70,9 @@ def test_signs_are_exact_and_distances_never_too_large(shape, measure):
     clear = np.abs(above) > 1e-5
     np.testing.assert_array_equal(np.sign(distance[clear]), np.sign(above[clear]))
     assert (np.abs(distance) <= true + 2e-6).all()
+    depths = shape.depths(x)
+    np.testing.assert_array_equal(np.sign(depths[clear]), -np.sign(above[clear]))
+    assert (depths <= true + 2e-6).all()
     np.testing.assert_allclose(np.linalg.norm(normal, axis=1), 1.0, atol=1e-6)
 
 

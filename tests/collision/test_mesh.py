@@ -167,6 +167,7 @@ def test_between_nodes_distances_are_right_to_a_fraction_of_a_cell(case, measure
     x = points_round(mesh, 2, 800)
     wanted = signed_distance_to(mesh, x)
     distance, normal = measure(shape, x)
+    np.testing.assert_allclose(shape.depths(x), -distance, atol=1e-5)
     error = np.abs(distance - wanted) / shape.cell
     assert error.max() < 0.6
     assert np.quantile(error, 0.9) < 0.1

@@ -358,6 +358,67 @@ def test_nothing_passes_a_mesh_of_two_cells_or_a_fence_of_thin_capsules_at_30_me
     assert all(body.momentum()[0] < 0.1 * FAST * body.masses.sum() for body in world.bodies)
 
 
+@pytest.mark.parametrize("speed", [50.0, 200.0])
+def test_no_vertex_of_a_thrown_body_passes_the_ground_outside_or_inside(speed):
+    """Six times the speed of sound in it: its middle must not go on through a skin that has stopped."""
+    world = room(gravity=(0, 0, 0))
+    for number, ground in enumerate((PlaneShape(), HeightFieldShape(np.zeros((9, 9)), 1.0))):
+        world.add_collider(ground, **alone(number))
+        ball = Material(1e6, 0.3, 1000.0, 5.0)
+        options = {"position": (0.13, 0.21, 0.3), "velocity": (0, 0, -speed), "flips": "recover"}
+        add(world, number, sphere(0.25, 3), ball, **options)
+    world.build()
+    for _ in range(30):
+        world.step(DT)
+        for body in world.bodies:
+            assert body.positions()[:, 2].min() > -1e-4
+            assert not body.is_frozen
+    for body in world.bodies:
+        assert body.momentum()[2] > 0.0
+
+
+CUBE = box((0.5,) * 3, (3, 3, 3))
+SOLIDS = [
+    (PlaneShape(), (0, 0, 0)),
+    (BoxShape((2, 2, 2)), (0, 0, -1)),
+    (SphereShape(2.0), (0, 0, -2)),
+    (CapsuleShape(1.0, 1.0), (0, 0, -1.5)),
+    (HeightFieldShape(np.zeros((5, 5)), 1.0), (0, 0, 0)),
+]
+
+
+def test_a_body_that_starts_crushed_in_a_collider_is_refused_with_collider_and_depth():
+    """Before build, by spawn and by teleport; a little inside it rises; what is pinned or apart may be."""
+    world = room()
+    for number, (solid, place) in enumerate(SOLIDS):
+        world.add_collider(solid, position=place, **alone(number))
+    for number in range(len(SOLIDS)):
+        add(world, number, CUBE, FIRM, position=(0, 0, 0.25 - 0.03))
+    add(world, 7, CUBE, FIRM, position=(0, 0, -0.5))
+    add(world, 0, CUBE, FIRM, position=(0, 0, 0.1), pinned=np.flatnonzero(CUBE.vertices[:, 2] < 0))
+    wrong = add(world, 1, CUBE, FIRM, position=(0, 0, -0.05))
+    with pytest.raises(OptionError, match=r"body 7 starts 0.3 m inside collider 1, BoxShape"):
+        world.build()
+    assert not world.is_built
+    world.despawn(wrong)
+    world.build()
+    for number, body in enumerate(world.bodies[:5]):
+        before = body.positions()
+        with pytest.raises(OptionError, match=rf"body {number} starts 0\.\d+ m inside collider {number}"):
+            body.teleport((0, 0, 0))
+        np.testing.assert_array_equal(body.positions(), before)
+    with pytest.raises(OptionError, match=r"starts 0\.3 m inside collider 1"):
+        world.spawn(wrong.asset, position=(0, 0, -0.05))
+    assert len(world.bodies) == 7
+    run(world, 2.0)
+    for body in world.bodies[:5]:
+        assert not body.is_frozen
+        assert body.positions()[:, 2].min() > -0.01
+        assert np.abs(body.velocities()).max() < 0.1
+    world.colliders[1].teleport((0, 0, -1.3))
+    assert world.spawn(wrong.asset, position=(0, 0, -0.05)).is_alive
+
+
 def test_nothing_slips_into_the_seam_between_the_floor_and_a_box_that_stands_on_it_and_moves():
     """The box's lower edge lies in the floor: there its bottom is as near as the face that pushes."""
     world = room(floor=0.0)

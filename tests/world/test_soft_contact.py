@@ -293,20 +293,20 @@ def test_a_block_slides_on_another_where_the_slope_exceeds_the_mean_friction(slo
         assert abs(way) < 1e-5
 
 
-@pytest.mark.parametrize("size", [0.1, 0.3])
-def test_what_is_thrown_at_a_thin_soft_plate_at_30_m_s_does_not_pass_it(size):
-    """Half a metre a frame, ten times the plate's thickness."""
+@pytest.mark.parametrize(("size", "speed"), [(0.1, 30), (0.3, 50)])
+def test_what_is_thrown_at_a_thin_soft_plate_bounces_off_it(size, speed):
+    """Up to 0.8 m a frame, seventeen times the plate's thickness; at 80 m/s some get stuck in it."""
     plate = box((1.5, 0.05, 1.5), (8, 1, 8))
     rim = np.flatnonzero(np.abs(plate.vertices[:, [0, 2]]).max(axis=1) > 0.74)
     ball = sphere(size / 2, 3)
     world = world_of(
         (plate, Material(1e6, 0.3, 1000.0, 100.0), {"pinned": rim}),
-        (ball, Material(1e6, 0.3, 300.0, 20.0), {"position": (0.02, 1.0, 0.03), "velocity": (0, -30, 0)}),
+        (ball, Material(1e6, 0.3, 300.0, 20.0), {"position": (0.02, 1.0, 0.03), "velocity": (0, -speed, 0)}),
     )
     target, thrown = world.bodies
     for _ in range(30):
         world.step(DT)
         assert thrown.positions()[:, 1].mean() > target.positions()[:, 1].min()
-    assert thrown.momentum()[1] > 0  # thrown back
+    assert thrown.positions()[:, 1].min() > target.positions()[:, 1].max() + size  # thrown back
     assert not thrown.is_frozen
     assert not target.is_frozen
