@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from datetime import date
 from pathlib import Path
 
@@ -13,6 +13,7 @@ from rich.table import Table
 
 from taichi_soft.drops.robustness import GROUPS, Verdict, run_cell
 from taichi_soft.drops.robustness.cells import Cell
+from taichi_soft.drops.robustness.foreign_meshes import scipy_spatial
 from taichi_soft.drops.robustness.trial import CALM_TIME, DROP, DROP_TIME, MOST_WORK, RECOVERY_TIME
 from taichi_soft.drops.robustness.verdict import MOST_SUBSTEPS, SHAPE_TOLERANCE, SPEED_TOLERANCE
 from taichi_soft.experiments import Effort, Experiment, Result, Section
@@ -57,9 +58,12 @@ def run_sweep(
 
     Args:
         workers: processes; None for one for each core.
-    Raises: SweepError for files that are not of a sweep, or cannot be written.
+    Raises: OptionError before anything is computed, where scipy is wanted and not installed; SweepError for
+        files that are not of a sweep, or cannot be written.
     """
     groups = [name for name in (*GROUPS, "random wrecks") if any(cell["group"] == name for cell in cells)]
+    if "foreign" in groups:
+        scipy_spatial()
     done = run_experiments(
         [_experiment(name, [cell for cell in cells if cell["group"] == name]) for name in groups],
         Effort.FULL,
@@ -202,8 +206,11 @@ def _meshes(rows: Sequence[Result]) -> list[list[str | int]]:
 
 def _table(headings: Sequence[str], words: int, rows: Sequence[Sequence[object]]) -> Iterator[str]:
     """A table of Markdown; columns after the first `words` hold numbers."""
-    line: Callable[[Sequence[object]], str] = lambda cells: f"| {' | '.join(map(escaped, cells))} |"  # noqa: E731
-    yield line(headings)
+    yield _line(headings)
     yield f"|{'---|' * words}{'---:|' * (len(headings) - words)}"
-    yield from map(line, rows)
+    yield from map(_line, rows)
     yield ""
+
+
+def _line(cells: Sequence[object]) -> str:
+    return f"| {' | '.join(map(escaped, cells))} |"

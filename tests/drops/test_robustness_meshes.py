@@ -6,7 +6,6 @@ import pytest
 from taichi_soft.drops.robustness import foreign_meshes
 from taichi_soft.drops.robustness.foreign_meshes import FOREIGN_MESHES, flat_body, sliver_lattice
 from taichi_soft.drops.robustness.own_meshes import OWN_MESHES
-from taichi_soft.errors import OptionError
 
 
 @pytest.fixture(scope="module")
@@ -74,9 +73,3 @@ def test_grading_makes_edges_longer_by_its_ratio():
     away = np.linalg.norm(middles, axis=1)
     near, far = (np.median(mesh.edge_lengths[rows]) for rows in (away < 0.1, away > 1.2))
     assert 8.0 < far / near < 40.0
-
-
-def test_without_scipy_it_is_said_what_to_install(monkeypatch):
-    monkeypatch.setitem(__import__("sys").modules, "scipy", None)
-    with pytest.raises(OptionError, match=r"taichi-soft\[voronoi\]"):
-        FOREIGN_MESHES["ball of 150 points, 0.1 m"]()

@@ -1,11 +1,13 @@
 """The sweep of drop-test: cells kept, taken up again and counted by law."""
 
 import io
+import sys
 
 import pytest
 from rich.console import Console
 
 from taichi_soft.drops.robustness import Verdict, choose_cells
+from taichi_soft.errors import OptionError
 from taichi_soft.experiments import Result
 from taichi_soft.report import robustness
 from taichi_soft.sweep import Store
@@ -65,6 +67,14 @@ def test_a_sweep_that_was_interrupted_ends_with_the_table_of_one_that_was_not(
     parts = page(sweep(tmp_path / "parts", cells, console), tmp_path / "parts.md")
     assert len(computed) == len(cells) - 7
     assert parts == whole
+
+
+def test_without_scipy_nothing_is_computed(tmp_path, console, computed, monkeypatch):
+    monkeypatch.setitem(sys.modules, "scipy", None)
+    with pytest.raises(OptionError, match=r"taichi-soft\[voronoi\]"):
+        sweep(tmp_path, choose_cells(["foreign"], count=2), console)
+    assert computed == []
+    assert list(tmp_path.iterdir()) == []
 
 
 def row(group, law, flips, verdict, name="a cell", damping="default"):
