@@ -10,7 +10,7 @@ from taichi_soft.film import Actor, Stage
 from taichi_soft.render import Camera, colormap
 from taichi_soft.stages import ASSETS
 
-MATERIAL = Material(young=2.0e6, poisson=0.2, density=1000.0, damping=20.0)
+MATERIAL = Material(young=2.0e6, poisson=0.2, density=1000.0, damping=20.0, damping_ratio=0.0)
 SCALE = 2.0e5  # of the colours [Pa]
 
 
@@ -20,7 +20,7 @@ def stage() -> Stage:
     mesh = mesh.translated(-np.mean(mesh.bounds, axis=0))
     reach = float(np.linalg.norm(mesh.vertices, axis=1).max())
     world = World()
-    body = world.add_body(mesh, MATERIAL, rotation=_tilt(0.5), position=(0.0, 0.0, reach + 2.0))
+    body = world.add_body(mesh, MATERIAL, rotation=_tilt(0.5), position=(0.0, 0.0, reach + 2.0), law="virial")
     world.build()
     box = (-1.1 * reach, -1.1 * reach, 0.0), (1.1 * reach, 1.1 * reach, 2.0 * reach + 2.0)
     camera = Camera.framing(*box, aspect=16 / 9, elevation=12.0)

@@ -14,7 +14,9 @@ def stage() -> Stage:
     """The sphere, about to fall."""
     mesh = load_mesh(ASSETS / "sphere.npz")
     world = World()
-    body = world.add_body(mesh, preset("thesis_sphere"), position=(0.0, 0.0, HEIGHT - mesh.bounds[0][2]))
+    body = world.add_body(
+        mesh, preset("thesis_sphere"), position=(0.0, 0.0, HEIGHT - mesh.bounds[0][2]), law="virial"
+    )
     world.build()
     camera = Camera.framing(
         (-6.0, -1.5, 0.0), (1.5, 1.5, HEIGHT + 2.0), aspect=16 / 9, azimuth=-90.0, elevation=8.0

@@ -14,7 +14,7 @@ from taichi_soft.film import Actor, Stage
 from taichi_soft.profiling.spread import time_calls
 from taichi_soft.render import PALETTE, Camera
 
-SOFT = Material(young=6.0e5, poisson=0.2, density=1000.0, damping=30.0)
+SOFT = Material(young=6.0e5, poisson=0.2, density=1000.0, damping=30.0, damping_ratio=0.0)
 HEIGHT = 2.2  # of the centres [m]
 STEP = FixedStep(dt=1 / 50, substeps=10)
 PER_ROW = 4

@@ -16,9 +16,11 @@ def stage() -> Stage:
     mesh = box((3.0, 1.5, 1.5), (8, 4, 4))
     mesh = mesh.translated(-np.mean(mesh.bounds, axis=0))
     right = (mesh.vertices[mesh.tets].mean(axis=1)[:, 0] + 1.5) / 3.0
-    material = Material(young=4.0e5, poisson=0.2, density=LIGHT + (HEAVY - LIGHT) * right, damping=20.0)
+    material = Material(
+        young=4.0e5, poisson=0.2, density=LIGHT + (HEAVY - LIGHT) * right, damping=20.0, damping_ratio=0.0
+    )
     world = World()
-    body = world.add_body(mesh, material, position=(0.0, 0.0, 3.75))
+    body = world.add_body(mesh, material, position=(0.0, 0.0, 3.75), law="virial")
     world.build()
     colors = colormap(mesh.vertices[:, 0], -1.9, 1.9)
     camera = Camera.framing((-2.2, -1.2, 0.0), (2.2, 1.2, 4.9), aspect=16 / 9, azimuth=-75.0, elevation=10.0)

@@ -13,7 +13,7 @@ from taichi_soft.film import Actor, Stage
 from taichi_soft.render import PALETTE, Camera, highlight
 from taichi_soft.stages import ASSETS
 
-SOFT = Material(young=2.0e5, poisson=0.1, density=1000.0, damping=100.0)
+SOFT = Material(young=2.0e5, poisson=0.1, density=1000.0, damping=100.0, damping_ratio=0.0)
 
 
 def stage() -> Stage:
@@ -22,7 +22,9 @@ def stage() -> Stage:
     world = World()
     actors = []
     for flips, x, color in (("tolerant", -1.6, PALETTE[0]), ("recover", 1.6, PALETTE[1])):
-        body = world.add_body(mesh, SOFT, flips=flips, position=(x, 0.0, 3.0), velocity=(0.0, 0.0, -6.0))
+        body = world.add_body(
+            mesh, SOFT, flips=flips, position=(x, 0.0, 3.0), velocity=(0.0, 0.0, -6.0), law="virial"
+        )
         actors.append(Actor(body, paint=_mark_flips(color), label=f'flips="{flips}"'))
     world.build()
     camera = Camera.framing((-3.0, -1.5, 0.0), (3.0, 1.5, 4.6), aspect=16 / 9, azimuth=-90.0, elevation=14.0)

@@ -19,7 +19,7 @@ def stage() -> Stage:
     for i in range(ROWS * ROWS):
         row, column = divmod(i, ROWS)
         place = (PITCH * (column - 3.5), PITCH * (row - 3.5), 2.0 + 0.35 * (row + column))
-        body = world.add_body(mesh, material, position=place)
+        body = world.add_body(mesh, material, position=place, law="virial")
         actors.append(Actor(body, PALETTE[(row + column) % len(PALETTE)]))
     world.build()
     edge = PITCH * ROWS / 2

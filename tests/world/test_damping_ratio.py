@@ -1,0 +1,156 @@
+"""The damping ratio of a material is that of the first mode of whatever is made of it.
+
+The oracle: K assembled in float64 from the shape functions of linear tetrahedra, or by differences of forces,
+its first mode from SciPy, and the logarithmic decrement of that mode in a world.
+"""
+
+import numpy as np
+import pytest
+from mode_oracle import assembled_stiffness, first_mode, lumped_masses, scattered
+
+from taichi_soft import Material, World, beam, internal_forces, sphere
+from taichi_soft.errors import MaterialError
+from taichi_soft.first_mode import first_frequency
+from taichi_soft.laws import element_model, fit_model
+from taichi_soft.scene import BodyDescription
+
+YOUNG, POISSON, DENSITY = 1e5, 0.3, 1000.0
+BALL = sphere(1.0, 6)
+MESHES = {
+    "540 tetrahedra": sphere(1.0, 3),
+    "4,320 tetrahedra": BALL,
+    "54,880 tetrahedra": sphere(1.0, 14),
+    "a hundredth": BALL.scaled(0.01),
+    "a hundred times": BALL.scaled(100.0),
+    "irregular": scattered(350, 5),
+    "irregular and long": scattered(250, 6, (3.0, 0.6, 0.6)),
+}
+
+
+def measured_ratio(mesh, mass, omega, mode, periods=2.0, **options):
+    """Of the first mode, from how its amplitude falls."""
+    ratio = options.pop("damping_ratio", 0.05)
+    integrator = options.pop("integrator", "leapfrog")
+    world = World(gravity=(0, 0, 0), floor=None, integrator=integrator)
+    body = world.add_body(mesh, Material(YOUNG, POISSON, DENSITY, damping_ratio=ratio), **options)
+    world.build()
+    size = float(np.ptp(mesh.vertices, axis=0).max())
+    swing = 1e-3 * size / np.abs(mode).max()
+    body.set_motion(mesh.vertices, swing * omega * mode)
+    dt, count = 2 * np.pi / omega / 40, int(40 * periods)
+
+    def amplitude():
+        u, v = body.positions() - mesh.vertices, body.velocities().astype(float)
+        return np.hypot(*(float((mass[:, None] * mode * rows).sum()) for rows in (u, v / omega)))
+
+    before = amplitude()
+    for _ in range(count):
+        world.step(dt)
+    return -np.log(amplitude() / before) / (omega * dt * count)
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_the_first_mode_fades_by_the_ratio_whatever_the_mesh_and_its_size(name):
+    mesh = MESHES[name]
+    mass = lumped_masses(mesh, DENSITY)
+    omega, mode = first_mode(assembled_stiffness(mesh, YOUNG, POISSON), mass)
+    assert measured_ratio(mesh, mass, omega, mode) == pytest.approx(0.05, rel=0.2)
+
+
+@pytest.mark.parametrize("options", [{"law": "virial"}, {"law": "springs"}, {"integrator": "implicit_euler"}])
+def test_other_laws_and_implicit_euler_fade_by_it_too(options):
+    """Beside what the integrator itself takes, which a run without the ratio tells."""
+    mesh = sphere(1.0, 2)
+    law = options.get("law", "neo_hookean")
+    material = Material(YOUNG, POISSON, DENSITY)
+    body = BodyDescription(mesh, material, fit_model(element_model(law), mesh, material))
+    omega, mode = first_mode(differences(mesh, law), body.masses)
+    with_it = measured_ratio(mesh, body.masses, omega, mode, **options)
+    without = measured_ratio(mesh, body.masses, omega, mode, damping_ratio=0.0, **options)
+    assert with_it - without == pytest.approx(0.05, rel=0.2)
+
+
+def differences(mesh, law):
+    """Stiffness at rest by differences of the forces, (3n, 3n)."""
+    material, count = Material(YOUNG, POISSON, DENSITY), mesh.vertices.size
+    K = np.empty((count, count))
+    for k in range(count):
+        u = np.zeros(count)
+        u[k] = 1e-6
+        ends = [
+            internal_forces(mesh, material, mesh.vertices + s * u.reshape(-1, 3), law=law) for s in (1, -1)
+        ]
+        K[:, k] = (ends[1] - ends[0]).ravel() / 2e-6
+    return (K + K.T) / 2
+
+
+@pytest.mark.parametrize("schedule", ["per_body", "flat"])
+def test_damping_however_large_leaves_momentum_spin_and_the_substeps(schedule):
+    mesh = sphere(0.5, 2)
+    found = {}
+    for ratio in (0.0, 1000.0):
+        world = World(gravity=(0, 0, 0), floor=None, schedule=schedule)
+        body = world.add_body(mesh, Material(YOUNG, POISSON, DENSITY, damping_ratio=ratio))
+        world.build()
+        found[ratio] = world.stable_substeps(1 / 60)
+        noise = 0.3 * np.random.default_rng(1).normal(size=mesh.vertices.shape)
+        spin = np.cross((1.0, 3.0, -2.0), mesh.vertices)
+        body.set_motion(mesh.vertices, noise + spin + np.array([30.0, -20, 10]))
+        mass = body.masses[:, None]
+
+        def budget(body=body, mass=mass):
+            x, v = body.positions().astype(float), body.velocities().astype(float)
+            x -= (mass * x).sum(axis=0) / mass.sum()
+            return (mass * v).sum(axis=0), (mass * np.cross(x, v)).sum(axis=0)
+
+        before = budget()
+        for _ in range(120):
+            world.step(1 / 60)
+        after = budget()
+        for first, last in zip(before, after, strict=True):
+            np.testing.assert_allclose(last, first, atol=2e-4 * np.linalg.norm(first))
+        assert not body.is_frozen
+    assert found[1000.0] == found[0.0]
+
+
+def test_the_first_frequency_is_that_of_the_sparse_eigenproblem_from_above():
+    for mesh in (
+        sphere(0.5, 3),
+        beam(2.0, 0.2, 0.2, 2),
+        scattered(300, 7),
+        scattered(200, 8, (2.0, 0.3, 0.3)),
+    ):
+        material = Material(YOUNG, POISSON, DENSITY)
+        body = BodyDescription(mesh, material, fit_model(element_model("virial"), mesh, material))
+        mass = lumped_masses(mesh, DENSITY)
+        omega, _ = first_mode(assembled_stiffness(mesh, YOUNG, POISSON), mass)
+        assert 0.999 * omega < first_frequency(body) < 1.12 * omega
+
+
+def test_a_material_set_later_brings_its_ratio_along():
+    """Twice the ratio: what is left after as long is the square."""
+    mesh = sphere(0.5, 2)
+    left = []
+    for later in (0.05, 0.1):
+        world = World(gravity=(0, 0, 0), floor=None)
+        body = world.add_body(mesh, Material(YOUNG, POISSON, DENSITY, damping_ratio=0.0))
+        world.build()
+        body.set_material(Material(YOUNG, POISSON, DENSITY, damping_ratio=later))
+        stretch = 1e-3 * mesh.vertices * (1.0, -0.5, -0.5)
+        body.set_motion(mesh.vertices, 40.0 * stretch)
+        energies = []
+        for _ in range(60):
+            world.step(1 / 60)
+            energies.append(body.kinetic_energy() + body.elastic_energy())
+        left.append(energies[-1] / energies[0])
+    assert left[1] == pytest.approx(left[0] ** 2, rel=0.4)
+
+
+@pytest.mark.parametrize("ratio", [-0.1, np.nan, np.inf, 1e9, "much", [0.1, 0.1], True])
+def test_what_is_no_ratio_is_refused(ratio):
+    with pytest.raises(MaterialError, match="damping_ratio"):
+        Material(YOUNG, POISSON, DENSITY, damping_ratio=ratio)
+
+
+def test_a_ratio_is_not_zero_where_nothing_is_said():
+    assert Material(YOUNG, POISSON, DENSITY).damping_ratio > 0
