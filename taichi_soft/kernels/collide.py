@@ -11,7 +11,7 @@ MOST_TOUCHES = 4
 """Colliders that one particle may meet, one after the other, within a substep; then it stays where it is."""
 
 
-DEEP = 0.5
+DEEP = 2.0
 """Mean edges of a body's surface that its fastest particle may go in what is left of a step before particles
 inside of it are looked at as well: a blow drives them through those that have stopped."""
 
@@ -24,6 +24,17 @@ def _in_frame(contact: ti.template(), c, x, time):
     """A point in the frame that a collider has `time` [s] after the start of the step."""
     position = contact.collider_position[c] + contact.collider_velocity[c] * time
     return turned_back(spun(contact.collider_rotation[c], contact.collider_spin[c] * time), x - position)
+
+
+@ti.func
+def _clearance(state: ti.template(), p, row, count, reach, since, left):
+    """How far a particle is from all colliders that are near, less what these may come nearer [m]."""
+    x, clearance = state.particle_position[p], ti.cast(reach, ti.f32)
+    for i in range(count):
+        c = state.contact.near[row + i]
+        distance = distance_from(state.contact, c, _in_frame(state.contact, c, x, since))
+        clearance = ti.min(clearance, distance - state.contact.collider_speed[c] * left)
+    return clearance
 
 
 @ti.func
@@ -62,17 +73,14 @@ def find_near_colliders(state: ti.template(), body, reach, since, left):
     state.contact.near_count[body] = count
     state.contact.reach[body] = reach
     state.contact.gone[body] = 0.0
-    for k in range(ti.select(is_deep, particles[1] - particles[0], outer[1] - outer[0])):
-        p = particles[0] + k
-        if not is_deep:
-            p = state.outer_particle[outer[0] + k]
-        x = state.particle_position[p]
-        clearance = reach
-        for i in range(count):
-            c = state.contact.near[row + i]
-            distance = distance_from(state.contact, c, _in_frame(state.contact, c, x, since))
-            clearance = ti.min(clearance, distance - state.contact.collider_speed[c] * left)
-        state.contact.particle_clearance[p] = clearance
+    if is_deep:
+        for p in range(particles[0], particles[1]):
+            clearance = _clearance(state, p, row, count, reach, since, left)
+            # One that went in unseen is not thrown out at once.
+            state.contact.particle_clearance[p] = ti.select(clearance < 0.0, UNSEEN, clearance)
+    for k in range(outer[0], outer[1]):
+        p = state.outer_particle[k]
+        state.contact.particle_clearance[p] = _clearance(state, p, row, count, reach, since, left)
 
 
 @ti.func
