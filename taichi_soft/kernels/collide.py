@@ -50,7 +50,7 @@ def find_near_colliders(state: ti.template(), body, reach, since, left):
     for k in range(outer[0], outer[1]):
         x = state.particle_position[state.outer_particle[k]]
         lower, upper = ti.min(lower, x), ti.max(upper, x)
-    is_deep = reach > DEEP * state.contact.body_edge[body]
+    is_deep = reach > DEEP * state.body_edge[body]
     if is_deep:
         for p in range(particles[0], particles[1]):
             x = state.particle_position[p]
@@ -91,7 +91,7 @@ def forget_contacts(state: ti.template(), body):
         state.contact.angular_impulse[row] = ti.Vector.zero(ti.f32, 3)
         state.contact.press[row] = ti.Vector.zero(ti.f32, 3)
         state.contact.press_rates[row] = ti.Vector.zero(ti.f32, 3)
-    was_deep = state.contact.reach[body] > DEEP * state.contact.body_edge[body]
+    was_deep = state.contact.reach[body] > DEEP * state.body_edge[body]
     if was_deep and state.contact.near_count[body] > 0:
         for p in range(state.body_particles[body][0], state.body_particles[body][1]):
             state.contact.particle_clearance[p] = UNSEEN  # the next search may leave those inside alone

@@ -41,7 +41,7 @@ def test_the_window_is_that_of_the_thesis_and_narrower_at_the_higher_ratio(rows)
 def test_at_the_linear_limit_the_fastest_motion_of_the_mesh_is_just_bounded(rows):
     young = numbers_of(rows, part="limit", mesh="coarse", poisson=0.4)["young"]
     form = quadratic_form(sphere_mesh("coarse"), young, 0.4, 1000.0, 100.0, 1 / 700)
-    assert np.linalg.eigvalsh(form)[-1] == pytest.approx(4.0, rel=0.02)
+    assert 3.8 < np.linalg.eigvalsh(form)[-1] <= 4.0  # the step is a little below the limit, never above
 
 
 def test_above_the_linear_limit_spheres_explode_and_below_none_does(rows):

@@ -16,7 +16,7 @@ def flight():
     """Builds a world of one body in a given motion. Returns both."""
 
     def build(mesh, material, x=None, v=None, integrator="leapfrog", gravity=(0, 0, 0), **options):
-        world = World(gravity=gravity, floor=None, integrator=integrator)
+        world = World(gravity=gravity, floor=None, integrator=integrator, retries=0)
         body = world.add_body(mesh, material, **options)
         world.build()
         x = mesh.vertices if x is None else x

@@ -79,7 +79,7 @@ def test_a_step_of_every_law_solves_with_its_projected_gradient_and_damping(law,
     """(M + h D + h^2 K) dv = h (f - h K v) in NumPy; D by the damping forces of unit velocities."""
     mesh = sphere(0.7, 1)
     across = {"shear_damping": 2.0} if getattr(LAWS[law], "takes_shear", False) else {}
-    material = Material(1e5, 0.3, 1000.0, 9.0, **across)
+    material = Material(1e5, 0.3, 1000.0, 9.0, damping_ratio=0.0, **across)
     world, body = make_world(mesh, material, law=law, damping_model=damping_model, world={"tolerance": 1e-6})
     rng = np.random.default_rng(1)
     x = (mesh.vertices + 0.03 * rng.normal(size=mesh.vertices.shape)).astype(np.float32).astype(float)
@@ -101,7 +101,7 @@ def test_a_step_of_every_law_solves_with_its_projected_gradient_and_damping(law,
     assert 0 < body.solve_residual <= 1e-6
 
 
-SOFT = Material(1e5, 0.3, 1000.0, 10.0)
+SOFT = Material(1e5, 0.3, 1000.0, 10.0, damping_ratio=0.0)
 
 
 @pytest.mark.parametrize("dt", [1 / 4, 1 / 10, 1 / 60])
@@ -109,7 +109,9 @@ SOFT = Material(1e5, 0.3, 1000.0, 10.0)
 def test_a_fall_that_ends_within_a_step_ends_on_the_floor(law, dt):
     """The step is made in pieces where its edges would change too much at once; no step is too long."""
     ball = sphere(0.5, 2)
-    world, body = make_world(ball, Material(4e5, 0.3, 1000.0, 10.0), floor=0.0, law=law, position=(0, 0, 1.5))
+    world, body = make_world(
+        ball, Material(4e5, 0.3, 1000.0, 10.0, damping_ratio=0.0), floor=0.0, law=law, position=(0, 0, 1.5)
+    )
     for _ in range(round(10 / dt)):
         world.step(dt)
         assert np.abs(body.positions()).max() < 2.1
@@ -189,7 +191,7 @@ def test_a_pinned_cloth_hangs_in_the_same_shape_as_by_leapfrog():
 def test_a_hanging_bar_hangs_in_the_same_shape_as_by_leapfrog(law):
     mesh = box((0.3, 0.3, 1.2), (1, 1, 4))
     top = np.flatnonzero(mesh.vertices[:, 2] > mesh.bounds[1, 2] - 1e-6)
-    material = Material(2e5, 0.2, 1000.0, 100.0)
+    material = Material(2e5, 0.2, 1000.0, 100.0, damping_ratio=0.0)
     shapes = {}
     for integrator, dt, steps in (("leapfrog", 1 / 100, 1500), ("implicit_euler", 1 / 50, 700)):
         world, body = make_world(
@@ -207,7 +209,7 @@ def test_a_hanging_bar_hangs_in_the_same_shape_as_by_leapfrog(law):
 def test_a_stiff_bar_takes_one_implicit_step_a_frame_and_settles():
     """E = 100 MPa at 60 Hz, where leapfrog would need hundreds of substeps."""
     mesh = box((1.5, 0.3, 0.3), (6, 2, 2))
-    material = Material(1e8, 0.3, 1000.0, 100.0)
+    material = Material(1e8, 0.3, 1000.0, 100.0, damping_ratio=0.0)
     world, body = make_world(mesh, material, floor=0.0, position=(0, 0, 1.0))
     with warnings.catch_warnings():
         warnings.simplefilter("error", SolverWarning)
@@ -229,7 +231,7 @@ def test_a_body_at_rest_is_carried_by_the_floor():
     for integrator, dt in (("leapfrog", 1 / 120), ("implicit_euler", 1 / 60)):
         world, body = make_world(
             mesh,
-            Material(1e5, 0.3, 1000.0, 50.0),
+            Material(1e5, 0.3, 1000.0, 50.0, damping_ratio=0.0),
             floor=0.0,
             integrator=integrator,
             position=(0, 0, 0.26),
@@ -248,7 +250,7 @@ def test_friction_stops_a_sliding_box_after_the_distance_of_coulombs_law():
     mesh = box((0.5, 0.5, 0.2), (2, 2, 1))
     world, body = make_world(
         mesh,
-        Material(1e6, 0.2, 1000.0, 50.0),
+        Material(1e6, 0.2, 1000.0, 50.0, damping_ratio=0.0),
         floor=0.0,
         position=(0, 0, 0.1),
         velocity=(2.0, 0, 0),
@@ -266,7 +268,7 @@ def test_momentum_is_kept_in_flight_and_ringing_fades():
     """By the system as well as by the forces; and implicit Euler takes energy where nothing damps."""
     mesh = sphere(0.5, 2)
     world, body = make_world(
-        mesh, Material(1e5, 0.3, 1000.0), world={"gravity": (0, 0, 0), "tolerance": 1e-5}
+        mesh, Material(1e5, 0.3, 1000.0, damping_ratio=0.0), world={"gravity": (0, 0, 0), "tolerance": 1e-5}
     )
     rng = np.random.default_rng(0)
     v = rng.normal(size=mesh.vertices.shape)
@@ -287,7 +289,10 @@ def test_the_same_input_gives_the_same_bits(law):
         world = World(integrator="implicit_euler")
         for i in range(2):
             world.add_body(
-                sphere(0.5, 1), Material(1e5, 0.3, 1000.0, 5.0), law=law, position=(2.0 * i, 0, 0.7)
+                sphere(0.5, 1),
+                Material(1e5, 0.3, 1000.0, 5.0, damping_ratio=0.0),
+                law=law,
+                position=(2.0 * i, 0, 0.7),
             )
         world.build()
         for _ in range(30):
@@ -299,7 +304,7 @@ def test_the_same_input_gives_the_same_bits(law):
 def test_a_solve_that_stops_early_is_reported_with_its_residual_and_stays_finite():
     world, body = make_world(
         box((1, 1, 1), (4, 4, 4)),
-        Material(1e8, 0.45, 1000.0),
+        Material(1e8, 0.45, 1000.0, damping_ratio=0.0),
         floor=0.0,
         position=(0, 0, 0.6),
         world={"most_iterations": 2},
@@ -319,7 +324,7 @@ def test_a_solve_that_stops_early_is_reported_with_its_residual_and_stays_finite
 
 def test_a_body_that_fails_under_it_is_frozen_and_can_be_asked_why():
     """One that gravity takes past the highest speed that counts as sound."""
-    world, body = make_world(sphere(0.5, 1), Material(1e5, 0.3, 1000.0))
+    world, body = make_world(sphere(0.5, 1), Material(1e5, 0.3, 1000.0, damping_ratio=0.0))
     body.set_motion(body.mesh.vertices, np.tile((0.0, 0.0, -19_999.0), (body.vertex_count, 1)))
     with pytest.warns(FrozenBodyWarning, match="body 0 went non-finite"):
         world.step(0.5)
@@ -356,7 +361,7 @@ def test_options_out_of_range_are_refused(options, text):
 
 
 def test_one_step_a_frame_is_what_it_needs():
-    world, body = make_world(sphere(0.5, 1), Material(1e9, 0.3, 1000.0))
+    world, body = make_world(sphere(0.5, 1), Material(1e9, 0.3, 1000.0, damping_ratio=0.0))
     assert world.stable_substeps(1 / 30) == 1
     world.step(1 / 30)  # warns of nothing
     assert np.isfinite(body.positions()).all()
