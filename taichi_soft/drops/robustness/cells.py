@@ -116,7 +116,7 @@ def _require_known(option: str, name: str, known: Any) -> None:
 
 
 def _some(total: int, count: int) -> list[int]:
-    """`count` of `total` numbers, at random but always the same, and more of them where more are asked for."""
+    """`count` of `total` numbers, at random but always the same; a larger sample holds the smaller one."""
     return sorted(np.random.default_rng(0).permutation(total)[:count].tolist())
 
 
