@@ -128,7 +128,7 @@ def print_sweep(console: Console, rows: Sequence[Result], worst: int) -> None:
         shown[kind] += 1
         if shown[kind] <= worst:
             console.print(line_of(row), soft_wrap=True, highlight=False, markup=False)
-    Console(file=console.file, width=max(console.width, 130)).print(grid)
+    Console(file=console.file, width=max(console.width, 150)).print(grid)
 
 
 def _unwell(rows: Sequence[Result]) -> list[Result]:

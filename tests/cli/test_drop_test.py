@@ -70,7 +70,7 @@ def test_a_sweep_keeps_what_it_computed_and_computes_nothing_twice(tmp_path):
     assert [json.loads(line)["numbers"]["verdict"] for line in kept[1:]] == ["ok"]
     again = subprocess.run([*command, "--json"], cwd=tmp_path, capture_output=True, text=True, timeout=300)
     assert "1 of them measured before" in again.stderr
-    assert [row["name"] for row in json.loads(again.stdout)] == ["box 2"]
+    assert [row["name"] for row in json.loads(again.stdout)] == [json.loads(kept[1])["point"]["name"]]
     assert (tmp_path / "out/sweep/own.jsonl").read_text().splitlines() == kept
     page = (tmp_path / "out/sweep/sweep.md").read_text()
     assert "| own | neo\\_hookean | recover | edges 0.2 | 1 |" in page

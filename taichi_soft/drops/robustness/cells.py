@@ -79,7 +79,7 @@ def choose_cells(
         law: "default" for what a game gets that names neither law nor flips; None means all of them.
         flips: of `law`, or of all that take it.
         damping: a name in `DAMPINGS`; None means the default one, and of named laws all.
-        count: of each group, evenly chosen; None means all.
+        count: of each group, a sample that grows with it; None means all.
         wrecks: how many random ones to add, to `wrecked` or as a group of their own.
     Raises: OptionError for names that are not known.
     """
@@ -99,7 +99,7 @@ def choose_cells(
     for name, make in GROUPS.items():
         if groups is None or name in groups:
             bodies = list(make())
-            found += bodies if count is None else [bodies[k] for k in _spread(len(bodies), count)]
+            found += bodies if count is None else [bodies[k] for k in _some(len(bodies), count)]
     if wrecks and (groups is None or "wrecked" in groups):
         found += [random_wreck(number) for number in range(wrecks)]
     return [
@@ -115,9 +115,9 @@ def _require_known(option: str, name: str, known: Any) -> None:
         raise OptionError(f"{option} {name!r} is not known: choose of {', '.join(known)}")
 
 
-def _spread(total: int, count: int) -> list[int]:
-    """`count` of `total` numbers, evenly."""
-    return sorted({round(k) for k in np.linspace(0, total - 1, min(count, total))})
+def _some(total: int, count: int) -> list[int]:
+    """`count` of `total` numbers, at random but always the same; a larger sample holds the smaller one."""
+    return sorted(np.random.default_rng(0).permutation(total)[:count].tolist())
 
 
 def _own() -> Iterator[Cell]:
