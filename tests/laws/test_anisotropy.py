@@ -191,7 +191,9 @@ def pulled(mesh, material, law, axis, stretch):
 def test_a_pulled_orthotropic_cube_has_the_moduli_it_was_given(law, axis, turn):
     """Young's moduli and Poisson's ratios along each axis; with a turned frame those of that direction."""
     mesh, stretch = box((1, 1, 1), (2, 2, 2)), 1e-4
-    x, force = pulled(mesh, AnisotropicMaterial(WOOD, 500.0, frame=turn, damping_ratio=0.0), law, axis, stretch)
+    x, force = pulled(
+        mesh, AnisotropicMaterial(WOOD, 500.0, frame=turn, damping_ratio=0.0), law, axis, stretch
+    )
     direction = WOOD.rotated(turn) if turn else WOOD
     expected = direction.young_along(I3[axis])
     assert force / stretch == pytest.approx(expected, rel=0.01)
@@ -307,7 +309,9 @@ def test_elastic_energy_and_stress_are_those_of_the_material():
     mesh = box((1, 1, 1), (2, 2, 2))
     stretch = np.diag([1.02, 0.99, 1.01])
     world = World(gravity=(0, 0, 0), floor=None, retries=0)
-    body = world.add_body(mesh, AnisotropicMaterial(WOOD, 500.0, damping_ratio=0.0), law="st_venant_kirchhoff")
+    body = world.add_body(
+        mesh, AnisotropicMaterial(WOOD, 500.0, damping_ratio=0.0), law="st_venant_kirchhoff"
+    )
     world.build()
     body.set_motion(mesh.vertices @ stretch, np.zeros_like(mesh.vertices))
     E = (stretch @ stretch - I3) / 2
@@ -322,7 +326,9 @@ def test_a_scrambled_anisotropic_body_finds_its_shape_again(strain):
     """Where directions differ eightfold."""
     mesh, rng = sphere(1.0, 2), np.random.default_rng(4)
     world = World(gravity=(0, 0, 0), floor=None, retries=0)
-    body = world.add_body(mesh, AnisotropicMaterial(WOOD, 1000, 200, damping_ratio=0.0), strain=strain, flips="recover")
+    body = world.add_body(
+        mesh, AnisotropicMaterial(WOOD, 1000, 200, damping_ratio=0.0), strain=strain, flips="recover"
+    )
     world.build()
     body.set_motion(rng.uniform(-1, 1, mesh.vertices.shape), np.zeros_like(mesh.vertices))
     for _ in range(900):
@@ -393,7 +399,9 @@ def test_both_schedules_and_plain_bodies_beside_move_the_same():
     ends = []
     for schedule in ("per_body", "flat"):
         world = World(gravity=(0, 0, -9.81), schedule=schedule, retries=0)
-        wood = world.add_body(mesh, AnisotropicMaterial(WOOD, 500.0, 5.0, damping_ratio=0.0), position=(0, 0, 0.5))
+        wood = world.add_body(
+            mesh, AnisotropicMaterial(WOOD, 500.0, 5.0, damping_ratio=0.0), position=(0, 0, 0.5)
+        )
         world.add_body(mesh, Material(3e5, 0.2, 500.0, 5.0, damping_ratio=0.0), position=(1, 0, 0.5))
         world.build()
         for _ in range(40):

@@ -163,7 +163,8 @@ def test_a_closed_path_takes_no_work(law, nu):
 def test_the_thesiss_laws_take_work_round_a_closed_path_but_at_one_poissons_ratio(strain, free):
     """At 1/4 for eq. 6.7 and at 1/3 for the exact strain there is an energy, elsewhere none."""
     work = {
-        nu: work_round_a_circle(Material(1e5, nu, 1000.0, damping_ratio=0.0), strain=strain) for nu in (0.0, 0.1, free, 0.45)
+        nu: work_round_a_circle(Material(1e5, nu, 1000.0, damping_ratio=0.0), strain=strain)
+        for nu in (0.0, 0.1, free, 0.45)
     }
     assert work.pop(free) < 1e-7
     assert min(work.values()) > 1e-3
@@ -176,7 +177,10 @@ def test_st_venant_kirchhoff_in_pure_tension_is_a_cubic(s):
     mesh = oracle.MESHES["box"]
     size = np.ptp(mesh.vertices, axis=0)
     forces = internal_forces(
-        mesh, Material(1e6, 0.0, 1000.0, damping_ratio=0.0), mesh.vertices * (1, 1, 1 + s), law="st_venant_kirchhoff"
+        mesh,
+        Material(1e6, 0.0, 1000.0, damping_ratio=0.0),
+        mesh.vertices * (1, 1, 1 + s),
+        law="st_venant_kirchhoff",
     )
     top = mesh.vertices[:, 2] > mesh.vertices[:, 2].max() - 1e-9
     pull = -forces[top, 2].sum()
@@ -254,4 +258,6 @@ def test_the_energy_of_a_body_is_that_of_the_equations(law):
 def test_options_that_an_energy_leaves_no_room_for_are_refused(law, option, value, taken):
     mesh = oracle.ONE_TET
     with pytest.raises(OptionError, match=f"{law}.*{option}='{value}'.*takes {taken}"):
-        internal_forces(mesh, Material(1e5, 0.2, 1.0, damping_ratio=0.0), mesh.vertices, law=law, **{option: value})
+        internal_forces(
+            mesh, Material(1e5, 0.2, 1.0, damping_ratio=0.0), mesh.vertices, law=law, **{option: value}
+        )

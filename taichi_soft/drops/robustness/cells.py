@@ -48,8 +48,11 @@ CELL_MESHES = ("sphere 4", "beam 3", "cylinder 3", "torus 2")
 
 DAMPINGS: dict[str, Callable[[TetMesh, Cell], dict[str, float]]] = {
     "default": lambda mesh, cell: {},
-    "none": lambda mesh, cell: {"damping": 0.0},
-    "edges 0.2": lambda mesh, cell: {"damping": edge_damping(mesh, cell["young"], cell["density"], 0.2)},
+    "none": lambda mesh, cell: {"damping_ratio": 0.0},
+    "edges 0.2": lambda mesh, cell: {
+        "damping": edge_damping(mesh, cell["young"], cell["density"], 0.2),
+        "damping_ratio": 0.0,
+    },
 }
 """What `Material` is given beside E, nu and density."""
 
