@@ -6,6 +6,7 @@ Taichi compiles a kernel where it is called first: a tenth of a second to one wi
 from __future__ import annotations
 
 import contextlib
+import sys
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,6 +20,7 @@ from taichi_soft.kernels.stress import read_stress
 from taichi_soft.shapes import SphereShape
 from taichi_soft.snapshot import restore_snapshot, take_snapshot
 from taichi_soft.spawning import enter
+from taichi_soft.substeps import FRAME
 
 if TYPE_CHECKING:
     from taichi_soft.body import Body
@@ -30,10 +32,21 @@ SHORTEST = 1e-6
 UP = np.array([0.0, 0.0, 1.0])
 
 
+def _say(what: str = "") -> None:
+    """What is being compiled, on a line of a terminal that each call writes anew; nothing elsewhere."""
+    if sys.stderr is not None and sys.stderr.isatty():
+        told = f"compiling {what} (once; later starts find it in a cache)" if what else ""
+        print(f"\r{told:<79}\r", end="", file=sys.stderr, flush=True)
+
+
 def rehearse(world: World) -> None:
     """As `World.warm_up`."""
+    _say("snapshots")
     before = take_snapshot(world)
     try:
+        _say("the step")
+        world._built.rehearse(SHORTEST)
+        _say("what a game does to bodies")
         _fill_pools(world)
         bodies = [body for body in world.bodies if not body.is_frozen]
         world.set_wind((1.0, 0.0, 0.0))
@@ -42,6 +55,7 @@ def rehearse(world: World) -> None:
         for body in {body.asset: body for body in bodies}.values():
             _control(world, body, next((each for each in bodies if each is not body), None))
             _measure(world, body)
+        _say("queries")
         _ask(world)
         _add_collider(world)
         world._built.rehearse(SHORTEST)
@@ -49,7 +63,10 @@ def rehearse(world: World) -> None:
             _ = collider.impulse
     finally:
         restore_snapshot(world, before)
+        _say()
     world.state_hash()
+    if world.bodies and not world.settings.is_implicit:
+        world.stable_substeps(FRAME)
 
 
 def _fill_pools(world: World) -> None:

@@ -427,7 +427,8 @@ class World(Handle):
         """Compile all that a game may call, behind its loading screen, so that nothing stops it later.
 
         Without it each kind of call compiles where it is made first: for 0.1 to 1 s with an empty cache, for
-        less in a later process. The world stays as it is, to the bit.
+        less in a later process. A first contact step takes 10 to 20 s, ever. A terminal is told what is being
+        compiled. The world stays as it is, to the bit.
         Raises: StateError before `build`.
         """
         rehearse(self)
