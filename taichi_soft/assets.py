@@ -131,29 +131,19 @@ class SoftBodyAsset:
         per cent; 0 for ropes and cloth, which bend freely."""
         return 0.0 if isinstance(self.mesh, ParticleMesh) else first_frequency(self.description)
 
-    def vibration_row(self, material: AnyMaterial) -> tuple[float, float]:
-        """How vibrations of a body of this asset fade if it is made of a material: at what rate [1/s], and
-        after what time at most they are damped again [s].
+    def vibration_row(self, body: BodyDescription) -> tuple[float, float]:
+        """How vibrations of a body of this asset fade, which may be cut or of another material: at what rate
+        [1/s], and after what time at most they are damped again [s].
 
         Of another material the frequency goes with the root of its mean stiffness over its mass.
         """
+        material = body.material
         if isinstance(material, SpringMaterial) or material.damping_ratio * self.first_frequency == 0.0:
             return 0.0, 1.0
         frequency = self.first_frequency
         if material is not self.material:
-            assert isinstance(self.material, Material | AnisotropicMaterial)
-            frequency *= float(np.sqrt(self._stiffness(material) / self._stiffness(self.material)))
+            frequency *= float(np.sqrt(_mean_stiffness(body) / _mean_stiffness(self.description)))
         return 2.0 * material.damping_ratio * frequency, DAMPING_INTERVAL / max(frequency, 1e-6)
-
-    def _stiffness(self, material: Material | AnisotropicMaterial) -> float:
-        """Mean stiffness of a material over its mean density, but for a factor [m^2/s^2]."""
-        assert isinstance(self.mesh, TetMesh)
-        count, volumes = len(self.mesh.tets), self.mesh.volumes
-        if isinstance(material, Material):
-            stiffness = material.per_tet("young", count)
-        else:
-            stiffness = np.trace(material.stiffness_matrices(count), axis1=1, axis2=2)
-        return float(volumes @ stiffness / (volumes @ material.per_tet("density", count)))
 
     @cached_property
     def surface_row(self) -> tuple[float, float, float]:
@@ -224,3 +214,16 @@ class SoftBodyAsset:
                 f"the body starts {depth:.4g} m below the floor: position=({origin[0]:g}, {origin[1]:g}, "
                 f"{origin[2] + depth:.6g}) puts it on the floor, World(floor=None) has none"
             )
+
+
+def _mean_stiffness(body: BodyDescription) -> float:
+    """Mean stiffness of a body over its mean density, but for a factor [m^2/s^2]."""
+    mesh, material = body.mesh, body.material
+    assert isinstance(mesh, TetMesh)
+    assert isinstance(material, Material | AnisotropicMaterial)
+    count = len(mesh.tets)
+    if isinstance(material, Material):
+        stiffness = material.per_tet("young", count)
+    else:
+        stiffness = np.trace(material.stiffness_matrices(count), axis1=1, axis2=2)
+    return float(mesh.volumes @ stiffness / (mesh.volumes @ material.per_tet("density", count)))

@@ -188,7 +188,16 @@ def read_recording(path: Any) -> tuple[dict[str, Any], bytes]:
 def _world_options(world: World) -> dict[str, Any]:
     """Arguments of `World`, beside what the snapshot holds."""
     chosen = world.settings
-    names = ("restitution", "friction", "integrator", "tolerance", "most_iterations", "schedule", "floor")
+    names = (
+        "restitution",
+        "friction",
+        "integrator",
+        "tolerance",
+        "most_iterations",
+        "schedule",
+        "floor",
+        "retries",
+    )
     return {
         **{name: as_plain(getattr(chosen, name)) for name in names},
         "gravity": chosen.gravity.tolist(),

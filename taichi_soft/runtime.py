@@ -97,6 +97,17 @@ def _let_threads_in() -> None:
         self.getter, self.setter = in_turn(self.getter), in_turn(self.setter)
 
     accessor.__init__ = make_in_turn
+    lay_out = ti.lang.impl.PyTaichi.materialize_root_fb
+
+    def lay_out_at_home(is_first_call: bool) -> None:
+        """Fields that somebody else made, which Taichi lays out where a kernel is called first."""
+        is_pending = not (ti.lang.impl._root_fb.finalized or ti.lang.impl._root_fb.empty)
+        if _device is not None and is_pending and threading.get_ident() != _home:
+            _at_home(functools.partial(lay_out, is_first_call), _device.arch)
+        else:
+            lay_out(is_first_call)
+
+    ti.lang.impl.PyTaichi.materialize_root_fb = staticmethod(lay_out_at_home)
 
 
 if ti.__version__[:2] == (1, 7):
@@ -158,6 +169,7 @@ _device: Device | None = None
 _process = 0  # that started Taichi
 _jobs: SimpleQueue[Callable[[], object]] = SimpleQueue()  # of the thread that started it
 _is_served = threading.Lock()
+_home = 0  # identity of that thread
 
 
 @in_turn
@@ -297,8 +309,9 @@ def make_fields(function: Callable[[], Result]) -> Result:
 
 def _at_home(function: Callable[[], Result], arch: str) -> Result:
     """Call what Taichi 1.7 does in one and the same thread only: start, and lay out fields. Whichever thread
-    comes first may end soon, so on a CPU it is a thread of our own. On a GPU it is the caller's: untried."""
-    if arch != "cpu":
+    comes first may end soon, so on a CPU it is a thread of our own. On a GPU it is the caller's:
+    untried; and where indices are checked, which ends the process in ours."""
+    if arch != "cpu" or os.environ.get(DEBUG) == "1":
         return function()
     found: Future[Result] = Future()
 
@@ -321,7 +334,9 @@ def _at_home(function: Callable[[], Result], arch: str) -> Result:
 
 
 def _serve() -> None:
+    global _home
     if _is_served.acquire(blocking=False):  # or another one does, where Ctrl-C was pressed as that began
+        _home = threading.get_ident()
         while True:
             _jobs.get()()
 

@@ -43,9 +43,7 @@ def write_constants(state: State, body: Body, description: BodyDescription) -> N
     masses = arrays.mass
     write_masses(state, place.particles[0], masses.astype(np.float32), (1.0 / masses).astype(np.float32))
     write_numbers(state.edge_damping, place.edges[0], arrays.edge_damping.astype(np.float32))
-    fading, interval = np.array(body.asset.vibration_row(description.material), dtype=np.float32).reshape(
-        2, 1
-    )
+    fading, interval = np.array(body.asset.vibration_row(description), dtype=np.float32).reshape(2, 1)
     write_numbers(state.body_fading, body.index, fading)
     write_numbers(state.body_fading_interval, body.index, interval)
     for field, rows in _tet_constants(state, arrays):

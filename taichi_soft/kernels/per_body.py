@@ -149,7 +149,7 @@ def end_body(state: ti.template(), program: ti.template(), body, substeps, h):
         state.body_drives[body] = state.body_drives[body] & ~PUSHED
         if ti.static(program.has_plasticity):
             flow_body(state, body, substeps * h)
-        untangle_body(state, program, body)
+        untangle_body(state, program, body, substeps * h)
     return failed
 
 

@@ -36,6 +36,7 @@ def carried(state: State, owner: int) -> list[tuple[Any, int, int]]:
     elif owner == BODY:
         fields += [state.body_status, state.body_velocity_lag, state.body_drives]
         fields += [state.body_gravity_scale, state.body_damping, state.body_patience]
+        fields += [state.body_fading, state.body_fading_interval]
         fields += [state.body_residual] if is_implicit else []
         # The box is the one in which a body sleeps.
         fields += [contact.calm, contact.body_lower, contact.body_upper] if contact else []

@@ -91,39 +91,46 @@ def _best_fit(state: ti.template(), body):
 
 
 @ti.func
-def _pull(state: ti.template(), p, fit: ti.template(), share):
-    """Move a particle a share of the way to where it fits best; a pinned one stays."""
+def _pull(state: ti.template(), program: ti.template(), p, fit: ti.template(), share, seconds):
+    """Move a particle a share of the way to where it fits best; a pinned one stays.
+
+    Among colliders, which may be in the way, it is thrown there in the coming step, of so many seconds.
+    """
     rest, now, rows = fit
     if state.particle_inv_mass[p] > 0.0:
         r = state.rest_position[p] - rest
         goal = now + ti.Vector([rows[0].dot(r), rows[1].dot(r), rows[2].dot(r)])
-        state.particle_position[p] = state.particle_position[p] + share * (goal - state.particle_position[p])
+        way = share * (goal - state.particle_position[p])
+        if ti.static(program.has_contact):
+            state.particle_velocity[p] = state.particle_velocity[p] + way / seconds
+        else:
+            state.particle_position[p] = state.particle_position[p] + way
 
 
 @ti.func
-def _free(state: ti.template(), body):
+def _free(state: ti.template(), program: ti.template(), body):
     """Move the corners of what is caught half of the way."""
     fit = _best_fit(state, body)
     blocks = state.body_blocks[body]
     for t in range(blocks[0] * LANES, blocks[1] * LANES):
         if _is_caught(state, state.particle_position, t):
             for corner in ti.static(range(4)):
-                _pull(state, particles_of(state, t // LANES, t % LANES)[corner], fit, 0.5)
+                _pull(state, program, particles_of(state, t // LANES, t % LANES)[corner], fit, 0.5, 1.0)
 
 
 @ti.func
-def _raise(state: ti.template(), body, steps_left):
+def _raise(state: ti.template(), program: ti.template(), body, steps_left, seconds):
     """Move all of a wreck a part of the way, in the last step all of it, and calm it."""
     fade_vibration(state, body, 0.0, CALMING)
     fit = _best_fit(state, body)
     particles = state.body_particles[body]
     for p in range(particles[0], particles[1]):
-        _pull(state, p, fit, 1.0 / steps_left)
+        _pull(state, program, p, fit, 1.0 / steps_left, seconds)
 
 
 @ti.func
-def untangle_body(state: ti.template(), program: ti.template(), body):
-    """At the end of a step: look after what is caught, of bodies whose law brings back what is inside out."""
+def untangle_body(state: ti.template(), program: ti.template(), body, seconds):
+    """At the end of a step, of so many seconds: look after what is caught, where the law brings it back."""
     for m, model in ti.static(enumerate(program.models)):
         if ti.static(model.flips == Flips.RECOVER):
             if state.body_model[body] == m:
@@ -133,11 +140,11 @@ def untangle_body(state: ti.template(), program: ti.template(), body):
                 elif state.body_patience[body] == PLACED:
                     age = 0
                 if age < 0:
-                    _raise(state, body, -age)
+                    _raise(state, program, body, -age, seconds)
                 elif age % PATIENCE == 0:
                     if _caught_count(state, state.particle_position, body) == 0:
                         age = 0
-                    elif age >= 2 * PATIENCE:
-                        _free(state, body)
+                    elif age >= 2 * PATIENCE and not ti.static(program.has_contact):
+                        _free(state, program, body)
                 state.body_patience[body] = age
                 state.body_jolted[body] = 0

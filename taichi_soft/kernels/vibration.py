@@ -13,6 +13,7 @@ which is leapfrog with the mass D^-1 >= 1 but for a damper that only takes energ
 from taichi_soft.constants import LANES, ROW_BITS
 from taichi_soft.kernels.motion import gravity_on
 from taichi_soft.runtime import ti
+from taichi_soft.state import FEELS_REACTION
 
 SHARP_BRAKE = 0.5
 """Of the vibration that a substep leaves where a step that failed is made for the last time."""
@@ -113,19 +114,19 @@ def fade_vibration(state: ti.template(), body, kick, keep):
         changes = ti.Matrix.zero(state.real, LANES, 3)
         for lane in range(LANES):
             p = first + lane
-            inv_mass = state.particle_inv_mass[p]
             x = state.particle_position[p] - x0
-            kicked = (
-                state.particle_velocity[p] - v0 + kick * (state.particle_force[p].xyz * inv_mass + gravity)
-            )
             rigid = velocity + angular_velocity.cross(x - center)
-            change = ti.select(inv_mass > 0.0, 1.0 - keep, 0.0) * (rigid - kicked)
+            change = (1.0 - keep) * (rigid + v0 - _kicked_velocity(state, p, gravity, kick))
             for i in ti.static(range(3)):
                 changes[lane, i] = change[i]
         for lane in range(ti.min(LANES, count - block * LANES)):
-            for i in ti.static(range(3)):
-                velocity_now = state.particle_velocity[first + lane][i]
-                state.particle_velocity[first + lane][i] = velocity_now + changes[lane, i]
+            p = first + lane
+            change = ti.Vector([changes[lane, i] for i in ti.static(range(3))])
+            if state.particle_inv_mass[p] > 0.0:
+                state.particle_velocity[p] = state.particle_velocity[p] + change
+            elif state.body_drives[body] & FEELS_REACTION != 0:
+                impulse = state.particle_mass[p] * change  # which what holds it takes up
+                state.particle_reaction[p] = state.particle_reaction[p] + impulse
 
 
 @ti.func

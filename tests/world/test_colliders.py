@@ -27,7 +27,7 @@ from taichi_soft import (
 
 G = 9.81
 DT = 1 / 60
-FIRM = Material(young=1e6, poisson=0.2, density=1000.0, damping=300.0)
+FIRM = Material(young=1e6, poisson=0.2, density=1000.0, damping=300.0, damping_ratio=0.0)
 BLOCK = box((1.0, 1.0, 0.5), (2, 2, 1))
 
 
@@ -173,7 +173,7 @@ RESTITUTIONS = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 def test_vertices_leave_a_collider_with_its_restitution():
     """A flat fall: when the soles touch, no tetrahedron is deformed yet, so v+ = -e v- exactly."""
-    world = room(gravity=(0, 0, 0))
+    world = room(gravity=(0, 0, 0), retries=0)
     for number, restitution in enumerate(RESTITUTIONS):
         world.add_collider(PlaneShape(), restitution=restitution, **alone(number))
         add(world, number, BLOCK, FIRM, position=(0, 0, 0.2515), velocity=(0, 0, -3.0))
@@ -181,7 +181,7 @@ def test_vertices_leave_a_collider_with_its_restitution():
     world.step(1e-3, 1)
     soles = BLOCK.vertices[:, 2] < 0.0
     for restitution, body in zip(RESTITUTIONS, world.bodies, strict=True):
-        assert body.positions()[soles, 2].max() == pytest.approx(0.0, abs=1e-6)
+        assert body.positions()[soles, 2].max() == pytest.approx(0.0, abs=1e-5)
         np.testing.assert_allclose(body.velocities()[soles, 2], 3.0 * restitution, atol=1e-4)
         np.testing.assert_allclose(body.velocities()[~soles, 2], -3.0, atol=0.5)
 
@@ -592,13 +592,15 @@ def test_a_refused_call_changes_nothing():
 
 
 def test_a_body_that_breaks_among_colliders_tells_where():
-    world = World(collider_room=1)
+    world = World(collider_room=1, retries=0)
     world.add_collider(BoxShape((1.0, 1.0, 1.0)), position=(0.9, 0.0, 0.5))
-    body = world.add_body(box(cells=(2, 2, 2)), Material(1e5, 0.2, 1000.0, 20.0), position=(0, 0, 1.6))
+    body = world.add_body(
+        box(cells=(2, 2, 2)), Material(1e5, 0.2, 1000.0, 20.0), position=(0, 0, 1.6), law="virial"
+    )
     world.build()
     fast = 9e3 * np.where(np.arange(body.vertex_count) % 2, 1, -1)
     body.set_motion(body.positions(), fast[:, None] * np.ones(3))
     with pytest.warns(FrozenBodyWarning):
-        world.step(1 / 60, 1)
+        world.step(1 / 60, 8)
     assert body.failure.tetrahedron is not None
     assert body.failure.step == 0

@@ -28,24 +28,29 @@ FRAME = (0, 0, 0.6, 0.8)
 
 # law, options, mesh, the material at first, the one set later.
 KINDS = {
-    "virial": ({}, CUBE, Material(1e5, 0.2, 1000.0, 20.0), Material(3e5 * SPREAD, -0.1, 700 * SPREAD, 35.0)),
+    "virial": (
+        {},
+        CUBE,
+        Material(1e5, 0.2, 1000.0, 20.0, damping_ratio=0.0),
+        Material(3e5 * SPREAD, -0.1, 700 * SPREAD, 35.0, damping_ratio=0.0),
+    ),
     "neo_hookean": (
         {"law": "neo_hookean", "damping_model": "tet_mean"},
         CUBE,
-        Material(1e5, 0.2, 1000.0, 20.0),
-        Material(2e5, 0.4, 900.0, 3.0 * SPREAD),
+        Material(1e5, 0.2, 1000.0, 20.0, damping_ratio=0.0),
+        Material(2e5, 0.4, 900.0, 3.0 * SPREAD, damping_ratio=0.0),
     ),
     "volume_springs": (
         {"law": "volume_springs"},
         CUBE,
-        Material(1e5, 0.2, 1000.0, 20.0),
-        Material(2e5 * SPREAD, 0.3, 1500.0, 10.0),
+        Material(1e5, 0.2, 1000.0, 20.0, damping_ratio=0.0),
+        Material(2e5 * SPREAD, 0.3, 1500.0, 10.0, damping_ratio=0.0),
     ),
     "anisotropic": (
         {"law": "st_venant_kirchhoff"},
         CUBE,
-        AnisotropicMaterial(WOOD, 1000.0, 20.0),
-        AnisotropicMaterial(Stiffness.isotropic(2e5, 0.1), 500.0, 10.0, FRAME),
+        AnisotropicMaterial(WOOD, 1000.0, 20.0, damping_ratio=0.0),
+        AnisotropicMaterial(Stiffness.isotropic(2e5, 0.1), 500.0, 10.0, FRAME, damping_ratio=0.0),
     ),
     "springs": (
         {"law": "springs"},
@@ -133,7 +138,7 @@ def test_momentum_goes_with_the_density(told):
     body.unpin()
     body.set_velocity((1.0, 0, 0))
     body.pin([0])
-    body.set_material(Material(1e5, 0.2, 2000.0, 20.0))
+    body.set_material(Material(1e5, 0.2, 2000.0, 20.0, damping_ratio=0.0))
     assert body.masses.sum() == pytest.approx(2000.0)
     assert body.momentum()[0] == pytest.approx(2000.0 - body.masses[0], rel=1e-5)
     body.unpin()
@@ -145,11 +150,11 @@ def test_momentum_goes_with_the_density(told):
 
 def test_the_number_of_substeps_follows_at_once():
     world = World(floor=None)
-    body = world.add_body(CUBE, Material(1e5, 0.2, 1000.0, 20.0))
+    body = world.add_body(CUBE, Material(1e5, 0.2, 1000.0, 20.0, damping_ratio=0.0))
     world.build()
     counts = []
     for young in (1e5, 1e7, 1e5):
-        body.set_material(Material(young, 0.2, 1000.0, 20.0))
+        body.set_material(Material(young, 0.2, 1000.0, 20.0, damping_ratio=0.0))
         counts.append(world.stable_substeps(1 / 60))
         for _ in range(3):
             world.step(1 / 60)
@@ -162,11 +167,19 @@ def test_the_number_of_substeps_follows_at_once():
     ("name", "wrong", "text"),
     [
         ("virial", SpringMaterial(1.0), "is made of a Material and stays so"),
-        ("springs", Material(1e5, 0.2, 1000.0), "is made of a SpringMaterial and stays so"),
-        ("virial", AnisotropicMaterial(WOOD, 1000.0), "stays so"),
-        ("virial", Material(1e5 * np.ones(7), 0.2, 1000.0), "7 values for a mesh of 40"),
-        ("virial", Material(1e5, 0.2, 1000.0, shear_modulus=1e4), "takes no shear_modulus"),
-        ("anisotropic", AnisotropicMaterial(WOOD, np.ones(7)), "7 values"),
+        (
+            "springs",
+            Material(1e5, 0.2, 1000.0, damping_ratio=0.0),
+            "is made of a SpringMaterial and stays so",
+        ),
+        ("virial", AnisotropicMaterial(WOOD, 1000.0, damping_ratio=0.0), "stays so"),
+        ("virial", Material(1e5 * np.ones(7), 0.2, 1000.0, damping_ratio=0.0), "7 values for a mesh of 40"),
+        (
+            "virial",
+            Material(1e5, 0.2, 1000.0, shear_modulus=1e4, damping_ratio=0.0),
+            "takes no shear_modulus",
+        ),
+        ("anisotropic", AnisotropicMaterial(WOOD, np.ones(7), damping_ratio=0.0), "7 values"),
         ("virial", "jelly", "got str"),
         ("virial", None, "got NoneType"),
     ],
@@ -187,7 +200,7 @@ def test_no_material_is_set_before_build(cube, jelly):
     world = World()
     body = world.add_body(cube, jelly, position=(0, 0, 2))
     with pytest.raises(StateError, match="not built"):
-        body.set_material(Material(2e5, 0.2, 1000.0))
+        body.set_material(Material(2e5, 0.2, 1000.0, damping_ratio=0.0))
     assert body.material is jelly
 
 

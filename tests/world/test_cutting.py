@@ -21,7 +21,7 @@ from taichi_soft import (
 DT = 1 / 60
 BAR = box((2.0, 0.5, 0.5), (8, 2, 2))
 SPREAD = np.linspace(0.8, 1.2, len(BAR.tets))
-JELLY = Material(1e5, 0.3, 1000.0 * SPREAD, 20.0)
+JELLY = Material(1e5, 0.3, 1000.0 * SPREAD, 20.0, damping_ratio=0.0)
 ALONG = np.array([0.03, 0.0, 0.0]), np.array([1.0, 0.1, 0.2])
 OPEN = [[0.03, -1.0, 0.05], [0.03, 1.0, 0.05], [0.03, 0.0, 3.0]]
 
@@ -110,7 +110,7 @@ def half(side):
     """The tetrahedra on one side as a mesh and a material, and which vertices they have."""
     used, corners = np.unique(BAR.tets[side], return_inverse=True)
     mesh = TetMesh(BAR.vertices[used], corners.reshape(-1, 4))
-    return SoftBodyAsset(mesh, Material(1e5, 0.3, 1000.0 * SPREAD[side], 20.0)), used
+    return SoftBodyAsset(mesh, Material(1e5, 0.3, 1000.0 * SPREAD[side], 20.0, damping_ratio=0.0)), used
 
 
 @pytest.mark.parametrize("mode", ["leapfrog", "implicit"])
@@ -318,7 +318,7 @@ def test_bodies_that_cannot_be_cut_say_so():
     with pytest.raises(StateError, match="not built"):
         ready.cut(plane=ALONG)
     with pytest.raises(OptionError, match="law 'springs' cannot be cut"):
-        SoftBodyAsset(BAR, Material(1e5, 0.3, 1000.0), law="springs", spare_vertices=5)
+        SoftBodyAsset(BAR, Material(1e5, 0.3, 1000.0, damping_ratio=0.0), law="springs", spare_vertices=5)
     with pytest.raises(OptionError, match="spare_vertices must be a whole number"):
         bar(spare_vertices=-1)
     flat = World(schedule="flat")
@@ -331,7 +331,11 @@ def test_a_part_keeps_its_pins_its_fibres_and_its_dents():
     """Anisotropic and pinned; and, in the same world, one that has flowed."""
     frames = np.tile(np.eye(3), (len(BAR.tets), 1, 1))
     wood = AnisotropicMaterial(
-        Stiffness.orthotropic((2e5, 1e5, 1e5), (0.2, 0.2, 0.2), (4e4,) * 3), 1000.0, 20.0, frames
+        Stiffness.orthotropic((2e5, 1e5, 1e5), (0.2, 0.2, 0.2), (4e4,) * 3),
+        1000.0,
+        20.0,
+        frames,
+        damping_ratio=0.0,
     )
     held = np.flatnonzero(BAR.vertices[:, 0] < -0.99)
     world = World(floor=None, gravity=(0, 0, 0))

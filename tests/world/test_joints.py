@@ -182,7 +182,7 @@ def test_a_rope_is_held_by_a_body_and_by_a_rope():
 def resting(tmp_path_factory):
     """A world with sleep and room for three blocks."""
     out = tmp_path_factory.mktemp("frozen") / "frozen.recording"
-    world = World(soft_contact=True, sleep_speed=0.05, record=500, record_to=out)
+    world = World(soft_contact=True, sleep_speed=0.05, record=500, record_to=out, retries=0)
     kind = SoftBodyAsset(BIG, Material(1e5, 0.3, 1000.0, 200.0))
     world.reserve(kind, 3)
     world.build()
