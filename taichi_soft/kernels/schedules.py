@@ -44,7 +44,7 @@ def choose_schedule(asked: Schedule, scene: Scene, device: Device, *, needs_bodi
 
 
 def make_launch(
-    schedule: Schedule, state: State, program: Program, scene: Scene, device: Device, retries: int
+    schedule: Schedule, state: State, program: Program, scene: Scene, device: Device, retries: int = 0
 ) -> Launch:
     """A function (substeps, h) -> number of bodies that failed, which makes one fixed step.
 

@@ -154,7 +154,7 @@ def default_law(material: AnyMaterial, strain: str | Strain | None, flips: str |
         return "springs"
     if isinstance(material, AnisotropicMaterial) or strain is not None:
         return "virial"
-    return "neo_hookean" if flips in (None, Flips.RECOVER, Flips.RECOVER.value) else "virial"
+    return "neo_hookean" if flips is None or flips is Flips.RECOVER or str(flips) == "recover" else "virial"
 
 
 def fit_model(model: ElementModel, mesh: BodyMesh, material: AnyMaterial) -> ElementModel:

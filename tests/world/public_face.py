@@ -50,6 +50,7 @@ class Game:
             sample_room=20,
             record=6,
             record_to=folder / "frozen.recording",
+            retries=0,
         )
         world.add_collider(SphereShape(0.3), position=(0.0, 0.0, 0.1))
         world.add_collider(HeightFieldShape(np.zeros((4, 4)), 1.0), position=(0.0, 0.0, 0.02))
@@ -101,7 +102,7 @@ class Game:
         assert self.sleeper.is_asleep
 
     def _meet_another_world(self):
-        self.other = World()
+        self.other = World(retries=0)
         self.foreign_body = self.other.add_body(BLOCK, SOFT, position=(0.0, 0.0, 2.0))
         self.foreign_frame = self.other.add_frame()
         self.foreign_asset = SoftBodyAsset(BLOCK, SOFT)
@@ -585,12 +586,13 @@ MAKERS: dict[Any, dict[str, Kind]] = {
         "integrator": choice("leapfrog", **NAME_OF), "tolerance": number(1e-4, 0.1, zero=0.0, above=0.6),
         "most_iterations": choice(100, **NOT_COUNTS, zero=0), "schedule": choice("auto", **NAME_OF),
         "soft_contact": ANY_FLAG, "sleep_speed": number(0.0, 1.0, below=-1.0), "collider_room": choice(2, **NOT_COUNTS),
-        "sample_room": choice(8, **NOT_COUNTS),
+        "sample_room": choice(8, **NOT_COUNTS), "retries": choice(0, **NOT_COUNTS),
+        "max_substeps": or_none(choice(500, **NOT_COUNTS, zero=0)),
         "record": choice(2, **NOT_COUNTS), "record_to": choice("a", none=None, number=1, empty="", nul="\0"),
     },
     SoftBodyAsset: {
         "mesh": SOFT_MESH, "material": choice(SOFT, none=None, text="rubber", springs=SpringMaterial(500.0, 0.2)),
-        "law": choice("virial", "face", **NAME_OF), "strain": choice(None, **OPTIONAL), "flips": choice(None, **OPTIONAL),
+        "law": choice("virial", **OPTIONAL), "strain": choice(None, **OPTIONAL), "flips": choice(None, **OPTIONAL),
         "damping_model": choice("edge", **NAME_OF), "pinned": Kind(lambda g, rng: [0], NOT_VERTICES).but("empty"),
         "contact": choice(Contact(), none=None, number=1, text="soft"), "plasticity": choice(None, number=1, text="soft"),
         "spare_vertices": choice(4, **NOT_COUNTS), "tearing": choice(None, number=1, text="soft"),
@@ -607,6 +609,7 @@ MAKERS: dict[Any, dict[str, Kind]] = {
     Material: {
         "young": CONSTANT, "poisson": number(0.1, 0.4, above=0.5, below=-1.0).but("list", "array"),
         "density": CONSTANT, "damping": DAMPING, "shear_modulus": or_none(CONSTANT), "shear_damping": or_none(DAMPING),
+        "damping_ratio": number(0.0, 1.0, below=-1.0, above=2e3),
     },
     SphereShape: {"radius": LENGTH},
     BoxShape: {"size": vector(0.1, 1.0, zero=(0.0, 1.0, 1.0), below=(-1.0, 1.0, 1.0))},

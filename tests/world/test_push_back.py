@@ -14,7 +14,12 @@ RADIUS = 0.2
 def cushion():
     """A world with a soft block of 500 kg at rest on the floor, room for a ball, and its state."""
     world = World(collider_room=2)
-    world.add_body(box((1, 1, 0.5), (4, 4, 2)), Material(3e5, 0.3, 1000.0, 60.0), position=(0, 0, 0.26))
+    world.add_body(
+        box((1, 1, 0.5), (4, 4, 2)),
+        Material(3e5, 0.3, 1000.0, 60.0, damping_ratio=0.0),
+        position=(0, 0, 0.26),
+        law="virial",
+    )
     world.build()
     for _ in range(60):
         world.step(DT)

@@ -77,7 +77,7 @@ def test_motion_that_is_set_comes_back_in_the_callers_order(solo, jelly):
 def test_masses_are_quarters_of_the_neighbours(solo):
     mesh = sphere(0.7, 3)
     density = np.linspace(500, 1500, len(mesh.tets))
-    _, body = solo(mesh, Material(1e5, 0.2, density))
+    _, body = solo(mesh, Material(1e5, 0.2, density, damping_ratio=0.0))
     np.testing.assert_allclose(body.masses, quarter_masses(mesh, density), rtol=1e-12)
     assert body.masses.sum() == pytest.approx((mesh.volumes * density).sum())
 
@@ -184,7 +184,7 @@ def test_a_thrown_and_spinning_body_keeps_its_momenta(solo, jelly):
 
 def test_a_small_vibration_keeps_its_energy_without_damping(solo, cube):
     """For small strain the stress is that of the energy: what leapfrog conserves but for ripples."""
-    world, body = solo(cube, Material(1e5, 0.25, 1000.0), FREE)
+    world, body = solo(cube, Material(1e5, 0.25, 1000.0, damping_ratio=0.0), FREE)
     body.set_motion(cube.vertices * [1.002, 0.999, 0.999], np.zeros_like(cube.vertices))
     start = body.elastic_energy()
     totals = []
@@ -211,7 +211,10 @@ def test_a_number_per_tetrahedron_acts_on_that_tetrahedron(solo):
     right = mesh.vertices[mesh.tets].mean(axis=1)[:, 0] > 0
     young = np.where(right, 4e5, 1e5)
     world, body = solo(
-        mesh, Material(young, 0.2, 1000.0), {**FREE, "integrator": "explicit_euler"}, strain="linear"
+        mesh,
+        Material(young, 0.2, 1000.0, damping_ratio=0.0),
+        {**FREE, "integrator": "explicit_euler"},
+        strain="linear",
     )
     x = mesh.vertices * [1.05, 1.0, 1.0]
     body.set_motion(x, np.zeros_like(x))
@@ -226,7 +229,7 @@ def test_a_number_per_tetrahedron_acts_on_that_tetrahedron(solo):
 
 
 def test_an_array_of_equal_numbers_is_that_number(solo, cube, jelly):
-    arrays = Material(*(np.full(40, value) for value in (1e5, 0.2, 1000.0, 20.0)))
+    arrays = Material(*(np.full(40, value) for value in (1e5, 0.2, 1000.0, 20.0)), damping_ratio=0.0)
     hashes = []
     for material in (jelly, arrays):
         world, body = solo(cube, material, position=(0, 0, 0.6))
@@ -261,7 +264,7 @@ def test_positions_between_two_steps(solo, cube, jelly):
 
 def test_a_body_at_rest_has_no_velocity(solo, cube):
     """The floor carries the weight: gravity alone must not show in the velocities of the soles."""
-    world, body = solo(cube, Material(1e5, 0.2, 1000.0, 300.0), position=(0, 0, 0.55))
+    world, body = solo(cube, Material(1e5, 0.2, 1000.0, 300.0, damping_ratio=0.0), position=(0, 0, 0.55))
     for _ in range(900):
         world.step(1 / 60)
     before = body.positions().astype(float)
