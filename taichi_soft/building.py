@@ -56,7 +56,7 @@ def build(world: World) -> Simulation:
             "explicit_euler gains energy at every substep, however short, and explodes sooner or later: "
             "it is here for comparison, leapfrog is for use",
             UnstableStepWarning,
-            stacklevel=3,
+            stacklevel=4,
         )
     state = acquire(capacity, program)
     weakref.finalize(world, release, state)

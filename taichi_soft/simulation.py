@@ -78,7 +78,7 @@ class Simulation:
         clock.last_dt = seconds
         loss = self.events.collect(clock.steps - 1, clock.time, seconds)
         if loss:
-            warnings.warn(loss, DroppedEventsWarning, stacklevel=3)
+            warnings.warn(loss, DroppedEventsWarning, stacklevel=4)
         if self.tears is not None:
             for body, pieces in self.tears.tear():
                 self.events.note_torn(clock.steps - 1, clock.time, body, pieces)
@@ -138,7 +138,7 @@ class Simulation:
                 f"of {self.settings.tolerance:g} within {self.settings.most_iterations} iterations: raise "
                 "most_iterations or tolerance, or use more substeps",
                 SolverWarning,
-                stacklevel=3,
+                stacklevel=4,
             )
 
     def fill(self, slot: int, rows: NDArray[np.float32]) -> None:

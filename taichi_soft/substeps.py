@@ -95,7 +95,7 @@ class Substeps:
         if is_refused:
             raise OptionError(f"{said}; the world takes max_substeps={self._most:,}")
         self._is_said = True
-        warnings.warn(said, SlowStepWarning, stacklevel=5)
+        warnings.warn(said, SlowStepWarning, stacklevel=6)
 
     def choose(self, dt: float, substeps: int | None) -> tuple[float, int, float]:
         """Length of a step [s], number of its substeps and their length [s], as `World.step` takes them.
@@ -124,7 +124,7 @@ class Substeps:
                 f"{self._pools.assets.index(stiffest)} can take ({stiffest.stable_step.stiffest}): it may "
                 f"explode. Use substeps={self.stable_count(seconds)} or leave substeps out",
                 UnstableStepWarning,
-                stacklevel=4,  # who called World.step
+                stacklevel=5,  # who called World.step
             )
             self._warned.add(h)
         return seconds, count, h

@@ -418,7 +418,7 @@ class World(Handle):
         if self._handles.recorder is not None:
             reports += self._handles.recorder.note_step(self, seconds, count, is_broken=bool(reports))
         if reports:
-            warnings.warn("; ".join(reports), FrozenBodyWarning, stacklevel=2)
+            warnings.warn("; ".join(reports), FrozenBodyWarning, stacklevel=3)
         if simulation.troubled:
             simulation.check_solves()
 

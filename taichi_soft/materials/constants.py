@@ -37,7 +37,7 @@ def as_ratio(given: Any) -> float:
         raise MaterialError(f"damping_ratio must be one number for the whole body, got {given!r}")
     if not 0.0 <= given <= MOST_DAMPING_RATIO:
         raise MaterialError(
-            f"damping_ratio is {given:g}: it must be from 0 to {MOST_DAMPING_RATIO:g}; 1 is critical damping"
+            f"damping_ratio is {given!r}: it must be from 0 to {MOST_DAMPING_RATIO:g}; 1 is critical damping"
         )
     return float(given)
 

@@ -27,7 +27,7 @@ def cube():
 
 @pytest.fixture(scope="session")
 def jelly():
-    return Material(young=1e5, poisson=0.2, density=1000.0, damping=20.0)
+    return Material(young=1e5, poisson=0.2, density=1000.0, damping=20.0, damping_ratio=0.0)
 
 
 @pytest.fixture(scope="session")
@@ -50,7 +50,7 @@ def solo():
     def build(mesh, material, world_options=None, **body_options):
         usual = {} if "position" in body_options else {"floor": None}
         world = World(**{**usual, **(world_options or {})})
-        body = world.add_body(mesh, material, **body_options)
+        body = world.add_body(mesh, material, **{"law": "virial", **body_options})
         world.build()
         return world, body
 
