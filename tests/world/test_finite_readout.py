@@ -21,7 +21,7 @@ def held_world(**options):
     """Bodies on frames and in hands, and one that falls."""
     world = World(**{"retries": 0, **options})
     for x in (0.0, 0.6, 3.0):
-        world.add_body(BLOCK, JELLY, position=(x, 0.0, 1.0))
+        world.add_body(BLOCK, JELLY, position=(x, 0.0, 1.0), law="virial")
     world.build()
     for body in world.bodies[:2]:
         body.attach(LEFT, world.add_frame(position=(0.0, 0.0, 1.0)), two_way=True)

@@ -232,7 +232,7 @@ def test_every_preset_survives_a_fall_of_two_metres_and_keeps_its_volume(name):
     mesh = sphere(0.5, 3)
     world = World()
     flips = "recover" if name == "gelatine" else "tolerant"
-    body = world.add_body(mesh, preset(name), flips=flips, position=(0, 0, 2.5), law="virial")
+    body = world.add_body(mesh, preset(name), flips=flips, position=(0, 0, 2.5))
     world.build()
     for _ in range(240):
         world.step(1 / 60)
