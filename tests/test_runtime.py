@@ -306,9 +306,11 @@ from taichi_soft import MeshShape, init
 from taichi_soft.runtime import ti
 
 init("cpu", threads=1)
+around = [ti.field(ti.f32, 1024)]  # a wrong access is made as well, where no memory may be
 field = ti.field(ti.f32, 10)
 rows = ti.Vector.field(3, ti.f32, 10)
-array = np.zeros((3, 4), np.float32)
+around.append(ti.field(ti.f32, 1024))
+array = np.zeros((4, 4), np.float32)[:3]
 
 @ti.real_func
 def deep(field: ti.template(), rows: ti.template(), i: ti.i32) -> ti.f32:
