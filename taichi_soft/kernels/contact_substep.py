@@ -130,7 +130,7 @@ def push_body(state: ti.template(), program: ti.template(), body, h, since, way,
     push_particles(state, body, before_kick(program, h, is_first))
     s, substeps = ti.cast(ti.round(since / h), ti.i32), ti.cast(ti.round(whole / h), ti.i32)
     if ti.static(program.integrator == Integrator.IMPLICIT_EULER):
-        damp_vibration(state, body, 0.0, h, s, substeps)
+        damp_vibration(state, program, body, 0.0, h, s, substeps)
         speed, speed_beside = kick_implicitly(state, program, body, h, since, is_first, common)
         mean_beside = speed_beside
     else:
@@ -138,7 +138,7 @@ def push_body(state: ti.template(), program: ti.template(), body, h, since, way,
         accumulate_forces(state, program, body)
         add_reactions(state, body, lasting)
         pull_grabs(state, body, h, lasting)
-        damp_vibration(state, body, lasting, h, s, substeps)
+        damp_vibration(state, program, body, lasting, h, s, substeps)
         speed, speed_beside, mean_beside, change = _kick_body(state, program, body, kick, way, common)
         is_gentle = int(change * h <= JOLT * edge)
     # Bodies beside each other in a field share a cache line, which every write takes from other threads: what

@@ -117,9 +117,9 @@ def _gather_phase(state: ti.template(), p, h, s, substeps):
 
 
 @ti.func
-def _damp_phase(state: ti.template(), body, h, s, substeps):
+def _damp_phase(state: ti.template(), program: ti.template(), body, h, s, substeps):
     if _is_damped_now(state, body, h, s, substeps):
-        damp_vibration(state, body, _kick_of(state, body, h, s), h, s, substeps)
+        damp_vibration(state, program, body, _kick_of(state, body, h, s), h, s, substeps)
         clear_forces(state, body)
 
 
@@ -227,7 +227,7 @@ def step_flat_cpu(
                     _gather_phase(state, p, h, s, substeps)
                 _meet(state, workers)
                 for i in range((body_count - worker + workers - 1) // workers):
-                    _damp_phase(state, worker + i * workers, h, s, substeps)
+                    _damp_phase(state, program, worker + i * workers, h, s, substeps)
                 _meet(state, workers)
             for p in range(p0, p1):
                 _move_phase(state, program, p, h, s)
@@ -284,7 +284,7 @@ def substep_flat(
     for p in range(particle_count):
         _gather_phase(state, p, h, s, substeps)
     for body in range(body_count):
-        _damp_phase(state, body, h, s, substeps)
+        _damp_phase(state, program, body, h, s, substeps)
     for p in range(particle_count):
         _move_phase(state, program, p, h, s)
 

@@ -96,14 +96,14 @@ def advance_body(state: ti.template(), program: ti.template(), body, h, kick, s,
     blow_on(state, body, h)
     push_particles(state, body, before_kick(program, h, is_first))
     if ti.static(program.integrator == Integrator.IMPLICIT_EULER):
-        damp_vibration(state, body, 0.0, h, s, substeps)
+        damp_vibration(state, program, body, 0.0, h, s, substeps)
         implicit_substep(state, program, body, h, is_first)
     else:
         lasting = kick if ti.static(program.integrator == Integrator.LEAPFROG) else h
         accumulate_forces(state, program, body)
         add_reactions(state, body, lasting)
         pull_grabs(state, body, h, lasting)
-        damp_vibration(state, body, lasting, h, s, substeps)
+        damp_vibration(state, program, body, lasting, h, s, substeps)
         is_gentle = move_body(state, program, body, h, kick)
     return is_gentle
 

@@ -121,7 +121,7 @@ def _free(state: ti.template(), program: ti.template(), body):
 @ti.func
 def _raise(state: ti.template(), program: ti.template(), body, steps_left, seconds):
     """Move all of a wreck a part of the way, in the last step all of it, and calm it."""
-    fade_vibration(state, body, 0.0, CALMING)
+    fade_vibration(state, program, body, 0.0, 0.0, CALMING)
     fit = _best_fit(state, body)
     particles = state.body_particles[body]
     for p in range(particles[0], particles[1]):

@@ -184,8 +184,10 @@ def test_handles_of_pieces_live_and_die_with_the_state(played):
 def test_what_tears_by_itself_tears_on_in_the_same_way(played, fresh):
     slab = played.bodies[1]
     slab.apply_impulse((0.0, 0.0, -700.0), np.flatnonzero(SLAB.vertices[:, 2] < -0.5))
-    while not slab.is_cut:
+    for _ in range(100):
         played.step(DT, SUBSTEPS)
+        if slab.is_cut:
+            break
     data, torn = played.snapshot(), slab.topology_version
     expected = run(played, 30)
     assert slab.topology_version > torn
