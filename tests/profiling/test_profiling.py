@@ -3,6 +3,7 @@
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 from taichi_soft import box
@@ -39,6 +40,13 @@ def test_the_baseline_moves_a_body_as_the_kernels_do():
     assert row.tets > 900
     assert row.deviation < 1e-4
     assert row.ratio.least > 0
+
+
+@needs_compiler
+def test_the_baseline_leaves_subnormal_numbers_as_they_are():
+    smallest = np.array([5e-324])
+    compile_baseline()
+    assert (smallest * 1.0)[0] > 0.0
 
 
 @pytest.mark.parametrize("count", [1, 3])
