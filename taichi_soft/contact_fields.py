@@ -94,6 +94,12 @@ class ContactFields:
 
         self.island_count = ti.field(ti.i32, ())
         self.island_first = ti.field(ti.i32, bodies + 1)  # row of its first body
+        # Where an island is in a step that is made in several calls: attempt, next substep, 1 if gentle so
+        # far, state of its candidates; way shared since these were found [m], velocity shared [m/s], speed.
+        self.island_pause = ti.Vector.field(4, ti.i32, bodies)
+        self.island_way = ti.Vector.field(3, ti.f32, bodies)
+        self.island_common = ti.Vector.field(3, ti.f32, bodies)
+        self.island_speed = ti.field(ti.f32, bodies)
         self.island_body = ti.field(ti.i32, bodies)  # bodies that may touch or are joined, island by island
         self.body_island = ti.field(ti.i32, bodies)
         self.parent = ti.field(ti.i32, bodies)  # in the forest of islands

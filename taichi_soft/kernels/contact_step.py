@@ -16,7 +16,14 @@ from taichi_soft.kernels.contact_substep import has_drifted, is_clear
 from taichi_soft.kernels.implicit_euler import MOST_PIECES, keeps_shape
 from taichi_soft.kernels.islands import find_islands
 from taichi_soft.kernels.joints import solve_joints
-from taichi_soft.kernels.per_body import body_is_sound, fineness, last_attempt, put_back_body
+from taichi_soft.kernels.per_body import (
+    DONE,
+    UNFINISHED,
+    body_is_sound,
+    fineness,
+    last_attempt,
+    put_back_body,
+)
 from taichi_soft.kernels.rebound import take_back_rebounds
 from taichi_soft.kernels.sleep import settle_island, wake_by_colliders, wake_island
 from taichi_soft.kernels.soft_contact import solve_island
@@ -204,19 +211,32 @@ def _common_velocity(state: ti.template(), island):
 
 
 @ti.func
-def _move_island(state: ti.template(), program: ti.template(), island, substeps, h, is_again):
-    """All substeps of an island that is awake, for the first time in this step or again (1).
+def _move_island(
+    state: ti.template(),
+    program: ti.template(),
+    island,
+    substeps,
+    h,
+    begin,
+    end,
+    candidates_before,
+    way_before,
+    fastest_before,
+    common,
+):
+    """Substeps from `begin` to before `end`, of so many in an attempt of an island that is awake.
 
-    Returns: whether forces moved no particle too far at once (1).
+    Args:
+        candidates_before, way_before, fastest_before: as returned for the substeps before these.
+        common: velocity that its bodies shared before the attempt [m/s].
+    Returns: whether forces moved no particle too far at once (1); state of the candidates, way [m] that all
+        have gone since these were looked for, and highest speed [m/s].
     """
     first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
     first_body = state.contact.island_body[first]
-    candidates, is_gentle = NONE + is_again, 1
-    common, shared = ti.Vector.zero(ti.f32, 3), ti.Vector.zero(ti.f32, 3)
-    if ti.static(program.has_soft_contact):
-        common = _common_velocity(state, island)
-    is_alone, fastest = _is_alone(state, program, island), ti.cast(0.0, ti.f32)
-    for s in range(substeps):
+    is_gentle, candidates, shared, fastest = 1, candidates_before, way_before, fastest_before
+    is_alone = _is_alone(state, program, island)
+    for s in range(begin, end):
         since, left = s * h, h * (substeps - s)
         way = h * ti.cast(is_alone & is_clear(state, first_body, fastest * h), ti.f32)
         work_on(state, program, island, OWNER, PUSH, ti.Vector([h, since, way, h * substeps]), common)
@@ -245,47 +265,88 @@ def _move_island(state: ti.template(), program: ti.template(), island, substeps,
                 body = state.contact.island_body[i]
                 if state.body_status[body] == ACTIVE:
                     is_gentle = is_gentle & int(keeps_shape(state, body))
-    return is_gentle
+    return is_gentle, candidates, shared, fastest
 
 
 @ti.func
-def _step_awake_island(state: ti.template(), program: ti.template(), island, substeps, h):
-    """One fixed step of an island, as fine as it needs. Returns how many of its bodies failed."""
+def _step_awake_island(state: ti.template(), program: ti.template(), island, substeps, h, most):
+    """One fixed step of an island, as fine as it needs, or the next `most` substeps of it.
+
+    Returns: how many of its bodies failed, or UNFINISHED.
+    """
     first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
     nothing = ti.Vector.zero(ti.f32, 4)
-    work_on(state, program, island, OWNER, BEGIN, nothing, nothing.xyz)
-    attempt, finer, is_open = 0, 1, 1
     retries, last_one = state.retries[None], last_attempt(state.retries[None])
     if ti.static(program.integrator == Integrator.IMPLICIT_EULER):
         retries = ti.static(MOST_PIECES.bit_length() - 1)
         last_one = retries
-    while is_open == 1:
+    attempt, s, is_gentle, candidates = state.contact.island_pause[island]
+    way, fastest = state.contact.island_way[island], state.contact.island_speed[island]
+    common = state.contact.island_common[island]
+    finer, is_open, left = 1, 1, most
+    while is_open == 1 and left > 0:
         finer = fineness(retries, attempt)
-        is_gentle = _move_island(state, program, island, finer * substeps, h / finer, int(attempt > 0))
-        if attempt == last_one or (is_gentle & _island_is_sound(state, island)) == 1:
-            is_open = 0
-        else:
-            _take_back(state, program, island)
-            attempt += 1
-            if attempt > retries:
-                _brake(state, island, 1)
-    numbers = ti.Vector([finer * substeps, h / finer, 0.0, 0.0])
-    work_on(state, program, island, OWNER, FINISH, numbers, nothing.xyz)
-    if attempt > retries:
-        _brake(state, island, 0)
-    failed = 0
-    for i in range(first, last):
-        failed += state.contact.has_failed[state.contact.island_body[i]]
-    return failed
+        count = finer * substeps
+        end = ti.min(s + left, count)
+        if ti.static(program.has_soft_contact):
+            if s == 0:
+                common = _common_velocity(state, island)
+        gently, candidates_now, way_now, fastest_now = _move_island(
+            state, program, island, count, h / finer, s, end, candidates, way, fastest, common
+        )
+        is_gentle, left, s = is_gentle & gently, left - (end - s), end
+        candidates, way, fastest = candidates_now, way_now, fastest_now
+        if s == count:
+            if attempt == last_one or (is_gentle & _island_is_sound(state, island)) == 1:
+                is_open = 0
+            else:
+                _take_back(state, program, island)
+                attempt, s, is_gentle, candidates = attempt + 1, 0, 1, OUTDATED
+                way, fastest = ti.Vector.zero(ti.f32, 3), 0.0
+                if attempt > retries:
+                    _brake(state, island, 1)
+    found = UNFINISHED
+    if is_open == 0:
+        numbers = ti.Vector([finer * substeps, h / finer, 0.0, 0.0])
+        work_on(state, program, island, OWNER, FINISH, numbers, nothing.xyz)
+        if attempt > retries:
+            _brake(state, island, 0)
+        found = 0
+        for i in range(first, last):
+            found += state.contact.has_failed[state.contact.island_body[i]]
+    else:
+        state.contact.island_pause[island] = ti.Vector([attempt, s, is_gentle, candidates])
+        state.contact.island_way[island] = way
+        state.contact.island_speed[island] = fastest
+        state.contact.island_common[island] = common
+    return found
 
 
 @ti.func
-def _step_island(state: ti.template(), program: ti.template(), island, substeps, h):
-    """One fixed step of one island. Returns how many of its bodies failed, and whether it is awake (1)."""
-    failed, is_awake = 0, wake_island(state, island)
-    if is_awake == 1:
-        failed = _step_awake_island(state, program, island, substeps, h)
-        is_awake = settle_island(state, island, substeps * h)
+def _step_island(state: ti.template(), program: ti.template(), island, substeps, h, most, goes_on):
+    """One fixed step of one island, or the next `most` substeps of it.
+
+    Returns: how many of its bodies failed, or UNFINISHED; and whether it is awake (1).
+    """
+    failed, is_awake = 0, 1
+    if goes_on == 0:
+        is_awake = wake_island(state, island)
+        if is_awake == 1:
+            nothing = ti.Vector.zero(ti.f32, 4)
+            work_on(state, program, island, OWNER, BEGIN, nothing, nothing.xyz)
+            state.contact.island_pause[island] = ti.Vector([0, 0, 1, NONE])
+            state.contact.island_way[island] = ti.Vector.zero(ti.f32, 3)
+            state.contact.island_speed[island] = 0.0
+        else:
+            state.contact.island_pause[island] = ti.Vector([DONE, 0, 0, 0])
+    pause = state.contact.island_pause[island]
+    if pause[0] == DONE:
+        failed, is_awake = pause[1], pause[2]
+    else:
+        failed = _step_awake_island(state, program, island, substeps, h, most)
+        if failed != UNFINISHED:
+            is_awake = settle_island(state, island, substeps * h)
+            state.contact.island_pause[island] = ti.Vector([DONE, failed, is_awake, 0])
     return failed, is_awake
 
 
@@ -297,29 +358,35 @@ def step_islands(
     helpers: ti.i32,
     substeps: ti.i32,
     h: ti.f32,
+    most: ti.i32,
+    goes_on: ti.i32,
 ) -> ti.i32:
-    """One fixed step of every active body. Returns how many failed, or `ALL_SLEEP`.
+    """One fixed step of every active body, or the next `most` substeps of it.
 
     One kernel, which calls one real function, because Taichi's cache would not find it again otherwise.
 
     Args:
         helpers: threads that may work on islands of others when there is none left for themselves.
+    Returns: how many failed, or `ALL_SLEEP`; or UNFINISHED: then it is to be called again, with `goes_on` 1.
     """
-    failed, awake = 0, 0
+    failed, awake, unfinished = 0, 0, 0
     ti.loop_config(serialize=True)
     for _ in range(1):
-        wake_by_colliders(state, body_count)
-        if ti.static(program.has_soft_contact):
-            find_islands(state, body_count, substeps * h)
+        if goes_on == 0:
+            wake_by_colliders(state, body_count)
+            if ti.static(program.has_soft_contact):
+                find_islands(state, body_count, substeps * h)
         open_crowds(state, helpers)
     ti.loop_config(block_dim=1)
     for i in range(state.contact.island_count[None] + helpers):
         if i < state.contact.island_count[None]:
-            failed_here, is_awake = _step_island(state, program, i, substeps, h)
-            failed += failed_here
+            failed_here, is_awake = _step_island(state, program, i, substeps, h, most, goes_on)
+            failed += ti.max(failed_here, 0)
             awake += is_awake
+            unfinished += int(failed_here == UNFINISHED)
             if is_crowd(state, i):
                 ti.atomic_sub(state.contact.unfinished_crowds[None], 1)
         else:
             help_others(state, program, i - state.contact.island_count[None])
-    return ti.select(failed + awake == 0, ALL_SLEEP, failed)
+    found = ti.select(failed + awake == 0, ALL_SLEEP, failed)
+    return ti.select(unfinished > 0, UNFINISHED, found)

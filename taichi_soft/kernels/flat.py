@@ -196,11 +196,15 @@ def step_flat_cpu(
     particle_count: ti.i32,
     substeps: ti.i32,
     h: ti.f32,
+    first: ti.i32,
+    last: ti.i32,
     attempt: ti.i32,
     attempts: ti.i32,
 ) -> ti.i32:
-    """One attempt, of `attempts`, at a fixed step of all bodies that have not made it yet, by
-    `program.worker_count` threads. Returns how many failed."""
+    """Substeps from `first` to before `last`, of so many in one attempt, of `attempts`, at a fixed step.
+
+    Of all bodies that have not made it yet, by `program.worker_count` threads. Returns how many failed.
+    """
     failed = 0
     state.barrier[0] = 0
     ti.loop_config(block_dim=1)
@@ -209,9 +213,10 @@ def step_flat_cpu(
         p0, p1 = particle_count * worker // workers, particle_count * (worker + 1) // workers
         b0, b1 = block_count * worker // workers, block_count * (worker + 1) // workers
         e0, e1 = edge_count * worker // workers, edge_count * (worker + 1) // workers
-        for p in range(p0, p1):
-            _begin_phase(state, p, attempt)
-        for s in range(substeps):
+        if first == 0:
+            for p in range(p0, p1):
+                _begin_phase(state, p, attempt)
+        for s in range(first, last):
             for block in range(b0, b1):
                 _block_phase(state, program, block)
             if ti.static(program.reads_expansion):
@@ -232,21 +237,23 @@ def step_flat_cpu(
             for p in range(p0, p1):
                 _move_phase(state, program, p, h, s)
             _meet(state, workers)
-        for p in range(p0, p1):
-            _check_phase(state, p, int(attempt == attempts - 1))
-        _meet(state, workers)
-        for p in range(p0, p1):
-            _fall_back_phase(state, p)
-        if ti.static(program.has_plasticity):
-            for block in range(b0, b1):
-                _flow_phase(state, block, substeps * h)
+        if last == substeps:
+            for p in range(p0, p1):
+                _check_phase(state, p, int(attempt == attempts - 1))
+            _meet(state, workers)
+            for p in range(p0, p1):
+                _fall_back_phase(state, p)
+            if ti.static(program.has_plasticity):
+                for block in range(b0, b1):
+                    _flow_phase(state, block, substeps * h)
     ti.loop_config(serialize=True)
     for _ in range(1):
-        for body in range(body_count):
-            is_last = int(attempt == attempts - 1)
-            failed += _settle_body(state, body, h, int(attempt == attempts - 2), is_last)
-        if failed == 0 or attempt == attempts - 1:
-            _end_step(state, body_count)
+        if last == substeps:
+            for body in range(body_count):
+                is_last = int(attempt == attempts - 1)
+                failed += _settle_body(state, body, h, int(attempt == attempts - 2), is_last)
+            if failed == 0 or attempt == attempts - 1:
+                _end_step(state, body_count)
     return failed
 
 

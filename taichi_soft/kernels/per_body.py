@@ -6,6 +6,8 @@ of threads.
 Substeps are chosen for small deformation; what is flattened is stiffer. Where a step ends non-finite, or
 forces moved a particle by more than `JOLT` edges at once, the body is put back and makes the step again with
 twice as many substeps, and so on. The last attempt brakes its vibrations sharply: momentum and spin stay.
+
+A long step is made in several calls, so that Ctrl-C can come between: each body goes on where it stopped.
 """
 
 from taichi_soft.constants import LANES, ROW_BITS
@@ -31,6 +33,13 @@ from taichi_soft.types import Integrator
 JOLT = 1.0
 """Way by which the forces of one substep may move a particle within it, over the mean edge of its body's
 surface. Vibrations of a stable substep stay below it."""
+
+
+UNFINISHED = -2
+"""Instead of a number of bodies: the call made the substeps that it was given, and the step needs more."""
+
+DONE = -1
+"""Instead of the number of an attempt: the step is made."""
 
 
 @ti.func
@@ -191,65 +200,102 @@ def last_attempt(retries):
 
 
 @ti.func
-def _attempt_body(state: ti.template(), program: ti.template(), body, substeps, h):
-    """All substeps of one body. Returns whether forces moved no particle too far at once (1)."""
-    is_gentle, kick = 1, 0.5 * (state.body_velocity_lag[body] + h)
-    for s in range(substeps):
+def _attempt_body(state: ti.template(), program: ti.template(), body, substeps, h, first, last):
+    """Substeps from `first` to before `last`, of so many in an attempt of one body.
+
+    Returns: whether forces moved no particle too far at once (1).
+    """
+    is_gentle, kick = 1, ti.cast(h, ti.f32)
+    if first == 0:
+        kick = 0.5 * (state.body_velocity_lag[body] + h)
+    for s in range(first, last):
         is_gentle = is_gentle & advance_body(state, program, body, h, kick, s, substeps)
         kick = h
     return is_gentle
 
 
 @ti.func
-def _step_body(state: ti.template(), program: ti.template(), body, substeps, h):
-    """One fixed step of one body, as fine as it needs.
+def _step_body(state: ti.template(), program: ti.template(), body, substeps, h, most, goes_on):
+    """One fixed step of one body, as fine as it needs, or the next `most` substeps of it.
 
-    Returns: 1 where it failed, or was not solved as exactly as asked.
+    Returns: 1 where it failed, or was not solved as exactly as asked; or UNFINISHED.
     """
-    if state.body_status[body] != ABSENT:
-        remember_body(state, body)
-    failed = 0
-    if state.body_status[body] == ACTIVE:
+    if goes_on == 0:
+        state.body_pause[body] = ti.Vector([0, 0, 1])
+        if state.body_status[body] != ABSENT:
+            remember_body(state, body)
+    attempt, s, is_gentle = state.body_pause[body]
+    found = 0
+    if attempt == DONE:
+        found = s
+    elif state.body_status[body] == ACTIVE:
         retries = state.retries[None]
         if ti.static(program.integrator == Integrator.IMPLICIT_EULER):
             retries = 0  # it cuts its substeps by itself
-        attempt, finer, is_open = 0, 1, 1
-        while is_open == 1:
+        finer, is_open, left = 1, 1, most
+        while is_open == 1 and left > 0:
             finer = fineness(retries, attempt)
             state.body_is_braked[body] = int(attempt > retries)
-            is_gentle = _attempt_body(state, program, body, finer * substeps, h / finer)
-            if attempt == last_attempt(retries) or is_gentle & body_is_sound(state, body) == 1:
-                is_open = 0
-            else:
-                put_back_body(state, body)
-                attempt += 1
-        failed = end_body(state, program, body, finer * substeps, h / finer)
-        state.body_is_braked[body] = 0
-        if failed == 0:
-            if ti.static(program.integrator == Integrator.IMPLICIT_EULER):
-                failed = int(state.body_residual[body] > state.solver[None][0])
-    return failed
+            last = ti.min(s + left, finer * substeps)
+            gently = _attempt_body(state, program, body, finer * substeps, h / finer, s, last)
+            is_gentle, left, s = is_gentle & gently, left - (last - s), last
+            if s == finer * substeps:
+                if attempt == last_attempt(retries) or is_gentle & body_is_sound(state, body) == 1:
+                    is_open = 0
+                else:
+                    put_back_body(state, body)
+                    attempt, s, is_gentle = attempt + 1, 0, 1
+        if is_open == 1:
+            found = UNFINISHED
+        else:
+            found = end_body(state, program, body, finer * substeps, h / finer)
+            state.body_is_braked[body] = 0
+            if found == 0:
+                if ti.static(program.integrator == Integrator.IMPLICIT_EULER):
+                    found = int(state.body_residual[body] > state.solver[None][0])
+            attempt, s = DONE, found
+        state.body_pause[body] = ti.Vector([attempt, s, is_gentle])
+    return found
 
 
 @ti.kernel
 def step_per_body(
-    state: ti.template(), program: ti.template(), body_count: ti.i32, substeps: ti.i32, h: ti.f32
+    state: ti.template(),
+    program: ti.template(),
+    body_count: ti.i32,
+    substeps: ti.i32,
+    h: ti.f32,
+    most: ti.i32,
+    goes_on: ti.i32,
 ) -> ti.i32:
-    """One fixed step of every active body, side by side. Returns how many had trouble in it."""
-    failed = 0
+    """One fixed step of every active body, side by side, or the next `most` substeps of it.
+
+    Returns: how many had trouble in it, or UNFINISHED: then it is to be called again, with `goes_on` 1.
+    """
+    failed, unfinished = 0, 0
     ti.loop_config(block_dim=1)
     for body in range(body_count):
-        failed += _step_body(state, program, body, substeps, h)
-    return failed
+        found = _step_body(state, program, body, substeps, h, most, goes_on)
+        failed += ti.max(found, 0)
+        unfinished += int(found == UNFINISHED)
+    return ti.select(unfinished > 0, UNFINISHED, failed)
 
 
 @ti.kernel
 def step_in_turn(
-    state: ti.template(), program: ti.template(), body_count: ti.i32, substeps: ti.i32, h: ti.f32
+    state: ti.template(),
+    program: ti.template(),
+    body_count: ti.i32,
+    substeps: ti.i32,
+    h: ti.f32,
+    most: ti.i32,
+    goes_on: ti.i32,
 ) -> ti.i32:
     """As `step_per_body` in the calling thread: a single body need not wait for another thread to wake up."""
-    failed = 0
+    failed, unfinished = 0, 0
     ti.loop_config(serialize=True)
     for body in range(body_count):
-        failed += _step_body(state, program, body, substeps, h)
-    return failed
+        found = _step_body(state, program, body, substeps, h, most, goes_on)
+        failed += ti.max(found, 0)
+        unfinished += int(found == UNFINISHED)
+    return ti.select(unfinished > 0, UNFINISHED, failed)

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from taichi_soft.kernels.contact_step import step_islands
 from taichi_soft.kernels.flat import begin_flat, end_flat, finish_flat, step_flat_cpu, substep_flat
-from taichi_soft.kernels.per_body import step_in_turn, step_per_body
+from taichi_soft.kernels.per_body import UNFINISHED, step_in_turn, step_per_body
 from taichi_soft.kernels.program import Program
 from taichi_soft.runtime import Device
 from taichi_soft.scene import Scene
@@ -17,6 +17,10 @@ Measured with `taichi-soft profile --crossover`: with both cores free, two threa
 (0.83 of the time, 0.69 at 110,000). But a barrier that waits for a thread which another program has pushed
 off its core stands still for milliseconds: with a third process at work, bodies of 1,000 to 50,000 ran 4 to
 300 times slower than on one thread, and only the largest still won."""
+
+STRETCH = 2_000_000
+"""Tetrahedra times substeps of one call of a kernel, at most: some 0.03 s on one thread, and several times as
+much where bodies touch. While a kernel runs, Python hears no Ctrl-C."""
 
 Launch = Callable[[int, float], int]
 
@@ -43,6 +47,12 @@ def choose_schedule(asked: Schedule, scene: Scene, device: Device, *, needs_bodi
     return Schedule.FLAT
 
 
+def most_substeps(scene: Scene) -> int:
+    """How many substeps of a world one call of a kernel makes at most."""
+    sizes = [max(len(body.tet_vertices), len(body.edge_vertices) // 2) for body in scene.bodies]
+    return max(1, STRETCH // max(1, sum(sizes)))
+
+
 def make_launch(
     schedule: Schedule, state: State, program: Program, scene: Scene, device: Device, retries: int = 0
 ) -> Launch:
@@ -55,12 +65,19 @@ def make_launch(
 
     step_bodies = step_in_turn if bodies == 1 or device.threads == 1 else step_per_body
     helpers = 0 if device.is_gpu else min(device.threads, bodies) - 1
+    most = most_substeps(scene)
 
     def per_body(substeps: int, h: float) -> int:
-        return int(step_bodies(state, program, bodies, substeps, h))
+        found = int(step_bodies(state, program, bodies, substeps, h, most, 0))
+        while found == UNFINISHED:
+            found = int(step_bodies(state, program, bodies, substeps, h, most, 1))
+        return found
 
     def by_islands(substeps: int, h: float) -> int:
-        return int(step_islands(state, program, bodies, helpers, substeps, h))
+        found = int(step_islands(state, program, bodies, helpers, substeps, h, most, 0))
+        while found == UNFINISHED:
+            found = int(step_islands(state, program, bodies, helpers, substeps, h, most, 1))
+        return found
 
     attempts = retries + 2 if retries else 1  # the last as fine as the one before it
 
@@ -68,8 +85,13 @@ def make_launch(
         failed, attempt = 1, 0
         while failed and attempt < attempts:
             finer = 1 << min(attempt, retries)
-            counts = bodies, blocks, edges, particles, finer * substeps
-            failed = int(step_flat_cpu(state, program, *counts, h / finer, attempt, attempts))
+            count, first = finer * substeps, 0
+            while first < count:
+                last = min(first + most, count)
+                counts = bodies, blocks, edges, particles, count
+                which = first, last, attempt, attempts
+                failed = int(step_flat_cpu(state, program, *counts, h / finer, *which))
+                first = last
             attempt += 1
         return failed
 

@@ -100,9 +100,13 @@ def _rigid_motion(state: ti.template(), program: ti.template(), body, kick, h, p
         first = (particles[0] + block * LANES) & ROW_BITS
         for lane in range(LANES):
             p = first + lane
-            mass = ti.select(block * LANES + lane < count, state.particle_mass[p], 0.0)
-            x = state.particle_position[p] - x0
-            v = _felt_velocity(state, program, p, gravity, kick, h, pressed) - v0
+            # What lies behind belongs to another body, which may be on its way to infinity: times 0 that is
+            # no number.
+            is_own = block * LANES + lane < count
+            mass = ti.select(is_own, state.particle_mass[p], 0.0)
+            x = ti.select(is_own, state.particle_position[p], x0) - x0
+            felt = _felt_velocity(state, program, p, gravity, kick, h, pressed)
+            v = ti.select(is_own, felt, v0) - v0
             arm, momentum = mass * x, mass * v
             turn = x.cross(momentum)
             masses[lane] += mass
@@ -129,8 +133,10 @@ def _rigid_motion(state: ti.template(), program: ti.template(), body, kick, h, p
     return center, velocity, angular_velocity
 
 
-@ti.func
-def fade_vibration(state: ti.template(), program: ti.template(), body, kick, h, keep):
+@ti.real_func
+def fade_vibration(
+    state: ti.template(), program: ti.template(), body: ti.i32, kick: ti.f32, h: ti.f32, keep: ti.f32
+):
     """Leave a body the share `keep` of the vibration that it has after a kick of its forces [s], in a substep
     of `h` [s]."""
     particles, gravity = state.body_particles[body], gravity_on(state, body)
@@ -160,8 +166,10 @@ def fade_vibration(state: ti.template(), program: ti.template(), body, kick, h, 
                 state.particle_reaction[p] = state.particle_reaction[p] + impulse
 
 
-@ti.func
-def _limit_vibration(state: ti.template(), program: ti.template(), body, kick, farthest):
+@ti.real_func
+def _limit_vibration(
+    state: ti.template(), program: ti.template(), body: ti.i32, kick: ti.f32, farthest: ti.f32
+):
     """Let no particle be faster beside the rigid motion than `farthest` [m/s] after a kick.
 
     Momentum and angular momentum stay.
