@@ -15,7 +15,7 @@ from taichi_soft.cutting import warm_up
 from taichi_soft.errors import OptionError, StateError, UnstableStepWarning
 from taichi_soft.events import EventLog, Witness
 from taichi_soft.kernels.program import Program
-from taichi_soft.kernels.schedules import choose_schedule, make_launch
+from taichi_soft.kernels.schedules import choose_schedule, make_launch, most_substeps
 from taichi_soft.kernels.spawn import despawn_body, spawn_body
 from taichi_soft.plain import digest_of
 from taichi_soft.plasticity import RIGID_ROW
@@ -78,6 +78,7 @@ def build(world: World) -> Simulation:
         state,
         program,
         make_launch(settings.schedule, state, program, scene, device, settings.retries),
+        most_substeps(scene),
         EventLog(Witness(state, scene, pools.slots, colliders if has_contact else None)),
         tears,
     )

@@ -49,6 +49,7 @@ class Simulation:
     state: State
     program: Program
     launch: Launch
+    long_from: int  # substeps of a step beyond which it is made in several calls
     events: EventLog
     tears: Tears | None  # None where no body tears
     readout: Readout = field(init=False)

@@ -405,8 +405,9 @@ class World(Handle):
         """Make one fixed step of `dt` [s] in `substeps` equal substeps; None chooses their number.
 
         A body that goes non-finite is put back to where it was before the step and frozen, with a
-        `FrozenBodyWarning` and `body.failure`; the other bodies go on. Among colliders, and where bodies may
-        touch, it and what it may touch first make the step again with up to eight times the substeps.
+        `FrozenBodyWarning` and `body.failure`; the other bodies go on. Before, it and what it may touch make
+        the step again with up to eight times the substeps, by `World(retries=3)`.
+        Ctrl-C ends a step of more than about 0.03 s within a second: the world is then as before the step.
         Raises: OptionError if dt is not a positive number or substeps not a positive whole one;
             StateError before `build`.
         """
@@ -414,7 +415,13 @@ class World(Handle):
         seconds, count, h = self._substeps.choose(dt, substeps)
         if self._force_field is not None:
             push_by_field(self, self._force_field)
-        reports = simulation.step(seconds, count, h)
+        before = take_snapshot(self) if count > simulation.long_from else None
+        try:
+            reports = simulation.step(seconds, count, h)
+        except KeyboardInterrupt:
+            if before is not None:
+                restore_snapshot(self, before)
+            raise
         if self._handles.recorder is not None:
             reports += self._handles.recorder.note_step(self, seconds, count, is_broken=bool(reports))
         if reports:

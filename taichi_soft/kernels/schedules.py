@@ -22,6 +22,9 @@ STRETCH = 2_000_000
 """Tetrahedra times substeps of one call of a kernel, at most: some 0.03 s on one thread, and several times as
 much where bodies touch. While a kernel runs, Python hears no Ctrl-C."""
 
+ALL = 2**31 - 1
+"""Substeps of one call of a kernel that makes the whole step."""
+
 Launch = Callable[[int, float], int]
 
 
@@ -48,7 +51,7 @@ def choose_schedule(asked: Schedule, scene: Scene, device: Device, *, needs_bodi
 
 
 def most_substeps(scene: Scene) -> int:
-    """How many substeps of a world one call of a kernel makes at most."""
+    """How many substeps a step of a world may have that one call of a kernel makes."""
     sizes = [max(len(body.tet_vertices), len(body.edge_vertices) // 2) for body in scene.bodies]
     return max(1, STRETCH // max(1, sum(sizes)))
 
@@ -65,15 +68,17 @@ def make_launch(
 
     step_bodies = step_in_turn if bodies == 1 or device.threads == 1 else step_per_body
     helpers = 0 if device.is_gpu else min(device.threads, bodies) - 1
-    most = most_substeps(scene)
+    stretch = most_substeps(scene)
 
     def per_body(substeps: int, h: float) -> int:
+        most = stretch if substeps > stretch else ALL
         found = int(step_bodies(state, program, bodies, substeps, h, most, 0))
         while found == UNFINISHED:
             found = int(step_bodies(state, program, bodies, substeps, h, most, 1))
         return found
 
     def by_islands(substeps: int, h: float) -> int:
+        most = stretch if substeps > stretch else ALL
         found = int(step_islands(state, program, bodies, helpers, substeps, h, most, 0))
         while found == UNFINISHED:
             found = int(step_islands(state, program, bodies, helpers, substeps, h, most, 1))
@@ -83,6 +88,7 @@ def make_launch(
 
     def flat_cpu(substeps: int, h: float) -> int:
         failed, attempt = 1, 0
+        most = stretch if substeps > stretch else ALL
         while failed and attempt < attempts:
             finer = 1 << min(attempt, retries)
             count, first = finer * substeps, 0

@@ -16,11 +16,10 @@ from taichi_soft.kernels.motion import gravity_on
 from taichi_soft.runtime import ti
 from taichi_soft.state import FEELS_REACTION
 
-MOSTLY_KEPT = 0.65
-"""Share d of its vibration that a body keeps from which damping may leave the kick out altogether of what is
-pressed. With a share p left out, a mode of stiffness k and mass 1 becomes d v + h a (d + (1 - d) p), which is
-stable for h^2 k (d + (1 - d) p) < 2 (1 + d): for p = 1/2 up to leapfrog's own limit of 4, for p = 1 and this
-share up to 0.9 of that step."""
+MOST_FADING = 0.43
+"""What damping takes from a vibration in one substep, at most: exp(-0.43) = 0.65 is left, d below. The kick
+of what is pressed is no part of that vibration, so there a mode of stiffness k and mass 1 becomes d v + h a.
+That is stable for h^2 k < 2 (1 + d), here up to 0.9 of leapfrog's own longest step."""
 
 SHARP_BRAKE = 0.5
 """Of the vibration that a substep leaves where a step that failed is made for the last time."""
@@ -56,21 +55,22 @@ def _kicked_velocity(state: ti.template(), p, gravity, kick):
 
 
 @ti.func
-def _felt_velocity(state: ti.template(), program: ti.template(), p, gravity, kick, h, pressed):
-    """The same with what will hold the particle in a substep of `h` [s].
+def _felt_velocity(state: ti.template(), program: ti.template(), p, gravity, kick, h, is_held):
+    """The same with what will hold the particle in a substep of `h` [s], where that counts (`is_held` 1).
 
     What is pressed against something gains speed only to lose it. If that counted as vibration, what lies
-    still would be pushed. What the floor takes is known before; a particle that something else held in the
-    last substep will lose the share `pressed` of its kick. Where both are 0, nothing is held.
+    still would be pushed. What the floor takes is known before; what something else held in the last substep
+    it will hold again.
     """
     velocity = _kicked_velocity(state, p, gravity, kick)
-    if ti.static(program.has_contact):
-        if state.contact.particle_touches[p] == 1:
-            velocity += pressed * (state.particle_velocity[p] - velocity)
-    if ti.static(program.has_floor):
-        if state.particle_inv_mass[p] > 0.0:
-            place = state.particle_position[p] + h * velocity
-            _, velocity = resolve_floor(place, velocity, h, state.floor[None])
+    if is_held == 1:
+        if ti.static(program.has_contact):
+            if state.contact.particle_touches[p] == 1:
+                velocity = state.particle_velocity[p]
+        if ti.static(program.has_floor):
+            if state.particle_inv_mass[p] > 0.0:
+                place = state.particle_position[p] + h * velocity
+                _, velocity = resolve_floor(place, velocity, h, state.floor[None])
     return velocity
 
 
@@ -84,8 +84,8 @@ def _column_sums(rows: ti.template()):
 
 
 @ti.func
-def _rigid_motion(state: ti.template(), program: ti.template(), body, kick, h, pressed, x0, v0):
-    """Of a body after a kick of its forces [s], with what will hold it; `h` and `pressed` as `_felt_velocity`
+def _rigid_motion(state: ti.template(), program: ti.template(), body, kick, h, is_held, x0, v0):
+    """Of a body after a kick of its forces [s], with what will hold it; `h` and `is_held` as `_felt_velocity`
     takes them.
 
     Returns: its centre beside x0 [m], velocity beside v0 [m/s] and angular velocity [rad/s].
@@ -105,7 +105,7 @@ def _rigid_motion(state: ti.template(), program: ti.template(), body, kick, h, p
             is_own = block * LANES + lane < count
             mass = ti.select(is_own, state.particle_mass[p], 0.0)
             x = ti.select(is_own, state.particle_position[p], x0) - x0
-            felt = _felt_velocity(state, program, p, gravity, kick, h, pressed)
+            felt = _felt_velocity(state, program, p, gravity, kick, h, is_held)
             v = ti.select(is_own, felt, v0) - v0
             arm, momentum = mass * x, mass * v
             turn = x.cross(momentum)
@@ -140,9 +140,8 @@ def fade_vibration(
     """Leave a body the share `keep` of the vibration that it has after a kick of its forces [s], in a substep
     of `h` [s]."""
     particles, gravity = state.body_particles[body], gravity_on(state, body)
-    pressed = ti.select(keep < MOSTLY_KEPT, 0.5, 1.0)
     x0, v0 = state.particle_position[particles[0]], state.particle_velocity[particles[0]]
-    center, velocity, angular_velocity = _rigid_motion(state, program, body, kick, h, pressed, x0, v0)
+    center, velocity, angular_velocity = _rigid_motion(state, program, body, kick, h, 1, x0, v0)
     count = particles[1] - particles[0]
     for block in range((count + LANES - 1) // LANES):
         first = (particles[0] + block * LANES) & ROW_BITS
@@ -151,9 +150,7 @@ def fade_vibration(
             p = first + lane
             x = state.particle_position[p] - x0
             rigid = velocity + angular_velocity.cross(x - center)
-            change = (1.0 - keep) * (
-                rigid + v0 - _felt_velocity(state, program, p, gravity, kick, h, pressed)
-            )
+            change = (1.0 - keep) * (rigid + v0 - _felt_velocity(state, program, p, gravity, kick, h, 1))
             for i in ti.static(range(3)):
                 changes[lane, i] = change[i]
         for lane in range(ti.min(LANES, count - block * LANES)):
@@ -176,7 +173,7 @@ def _limit_vibration(
     """
     particles, gravity = state.body_particles[body], gravity_on(state, body)
     x0, v0 = state.particle_position[particles[0]], state.particle_velocity[particles[0]]
-    center, velocity, spin = _rigid_motion(state, program, body, kick, 0.0, 0.0, x0, v0)
+    center, velocity, spin = _rigid_motion(state, program, body, kick, 0.0, 0, x0, v0)
     for p in range(particles[0], particles[1]):
         if state.particle_inv_mass[p] > 0.0:
             kicked = _kicked_velocity(state, p, gravity, kick)
@@ -187,7 +184,7 @@ def _limit_vibration(
             if not speed < 1e18:  # whose square overflows: its direction is not known
                 slower = beside * 0.0
             state.particle_velocity[p] = state.particle_velocity[p] + (rigid + slower - kicked)
-    _, velocity_now, spin_now = _rigid_motion(state, program, body, kick, 0.0, 0.0, x0, v0)
+    _, velocity_now, spin_now = _rigid_motion(state, program, body, kick, 0.0, 0, x0, v0)
     for p in range(particles[0], particles[1]):
         if state.particle_inv_mass[p] > 0.0:
             arm = state.particle_position[p] - x0 - center
@@ -205,9 +202,11 @@ def kept_vibration(state: ti.template(), body, h, s, substeps):
     if state.body_is_braked[body] == 1:
         keep = SHARP_BRAKE
     elif rate > 0.0:
-        times = ti.min(substeps, ti.cast(ti.ceil(ti.min(substeps * h / interval, 1e6)), ti.i32))
+        whole = substeps * h
+        wanted = ti.ceil(whole * ti.max(1.0 / interval, rate / MOST_FADING))
+        times = ti.min(substeps, ti.cast(ti.min(wanted, 1e6), ti.i32))
         if (s + 1) * times // substeps > s * times // substeps:
-            keep = ti.exp(-rate * substeps * h / times)
+            keep = ti.exp(-ti.min(rate * whole / times, MOST_FADING))
     return keep
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mode_oracle import assembled_stiffness, first_mode, lumped_masses, scattered
 
-from taichi_soft import Material, World, beam, internal_forces, sphere
+from taichi_soft import Material, World, beam, box, internal_forces, sphere
 from taichi_soft.errors import MaterialError
 from taichi_soft.first_mode import first_frequency
 from taichi_soft.laws import element_model, fit_model
@@ -154,3 +154,33 @@ def test_what_is_no_ratio_is_refused(ratio):
 
 def test_a_ratio_is_not_zero_where_nothing_is_said():
     assert Material(YOUNG, POISSON, DENSITY).damping_ratio > 0
+
+
+@pytest.mark.parametrize("ratio", [0.3, 1.0, 1000.0])
+@pytest.mark.parametrize(
+    "options",
+    [
+        {},
+        {"schedule": "flat"},
+        {"integrator": "implicit_euler"},
+        {"collider_room": 1},
+        {"soft_contact": True},
+    ],
+    ids=["floor", "flat", "implicit", "colliders", "soft"],
+)
+def test_what_lies_still_is_not_moved_by_its_damping(options, ratio):
+    """A pile, or two blocks beside each other: after they have come to rest nothing moves at all."""
+    world = World(**options)
+    is_pile = "soft_contact" in options
+    for i in range(2):
+        place = (0, 0, 0.255 + 0.51 * i) if is_pile else (i, 0, 0.255)
+        block = box((0.5, 0.5, 0.5), (3, 3, 3))
+        world.add_body(block, Material(3e5, 0.3, 500.0, damping_ratio=ratio), position=place)
+    world.build()
+    for _ in range(360):
+        world.step(1 / 60)
+    fastest = 0.0
+    for _ in range(30):
+        world.step(1 / 60)
+        fastest = max(fastest, *(np.abs(body.velocities()).max() for body in world.bodies))
+    assert fastest < 1e-3

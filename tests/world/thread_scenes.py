@@ -112,6 +112,21 @@ def fallen(schedule):
     return motion(world)
 
 
+def torn():
+    """Bodies so torn that their steps fail, are made again, and have tetrahedra to bring back."""
+    world = World()
+    for i in range(3):
+        mesh = CUBE if i % 2 else sphere(0.5, 3)
+        world.add_body(mesh, Material(3e5, 0.3, 500.0), position=(2 * i, 0, 1.0))
+    world.build()
+    for body in world.bodies:
+        x = body.positions()
+        body.set_motion(x, 60.0 * np.random.default_rng(0).normal(size=x.shape))
+    for _ in range(40):
+        world.step(DT)
+    return motion(world)
+
+
 def played():
     """300 ticks of anything: hashes of each, after wrong inputs were taken back every 20 ticks."""
     hashes, different = random_play.check(300, seed=11)
@@ -127,6 +142,7 @@ SCENES = {
     "joined, passing": lambda: joined({"collider_room": 1}),
     "fallen, per body": lambda: fallen("per_body"),
     "fallen, flat": lambda: fallen("flat"),
+    "torn": torn,
     "played": played,
 }
 
