@@ -214,9 +214,20 @@ def _attempt_body(state: ti.template(), program: ti.template(), body, substeps, 
     return is_gentle
 
 
-@ti.func
-def _step_body(state: ti.template(), program: ti.template(), body, substeps, h, most, goes_on):
+@ti.real_func
+def _step_body(
+    state: ti.template(),
+    program: ti.template(),
+    body: ti.i32,
+    substeps: ti.i32,
+    h: ti.f32,
+    most: ti.i32,
+    goes_on: ti.i32,
+) -> ti.i32:
     """One fixed step of one body, as fine as it needs, or the next `most` substeps of it.
+
+    By itself, so that sums are rounded alike in the kernels for one thread and for several; and there is no
+    other such function in them, because Taichi's cache would not find them again otherwise.
 
     Returns: 1 where it failed, or was not solved as exactly as asked; or UNFINISHED.
     """

@@ -128,12 +128,9 @@ def _raise(state: ti.template(), program: ti.template(), body, steps_left, secon
         _pull(state, program, p, fit, 1.0 / steps_left, seconds)
 
 
-@ti.real_func
-def untangle_body(state: ti.template(), program: ti.template(), body: ti.i32, seconds: ti.f32):
-    """At the end of a step, of so many seconds: look after what is caught, where the law brings it back.
-
-    By itself, so that its sums are rounded alike in every kernel, for one thread or several.
-    """
+@ti.func
+def untangle_body(state: ti.template(), program: ti.template(), body, seconds):
+    """At the end of a step, of so many seconds: look after what is caught, where the law brings it back."""
     for m, model in ti.static(enumerate(program.models)):
         if ti.static(model.flips == Flips.RECOVER):
             if state.body_model[body] == m:

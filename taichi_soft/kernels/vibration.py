@@ -133,10 +133,8 @@ def _rigid_motion(state: ti.template(), program: ti.template(), body, kick, h, i
     return center, velocity, angular_velocity
 
 
-@ti.real_func
-def fade_vibration(
-    state: ti.template(), program: ti.template(), body: ti.i32, kick: ti.f32, h: ti.f32, keep: ti.f32
-):
+@ti.func
+def fade_vibration(state: ti.template(), program: ti.template(), body, kick, h, keep):
     """Leave a body the share `keep` of the vibration that it has after a kick of its forces [s], in a substep
     of `h` [s]."""
     particles, gravity = state.body_particles[body], gravity_on(state, body)
@@ -163,10 +161,8 @@ def fade_vibration(
                 state.particle_reaction[p] = state.particle_reaction[p] + impulse
 
 
-@ti.real_func
-def _limit_vibration(
-    state: ti.template(), program: ti.template(), body: ti.i32, kick: ti.f32, farthest: ti.f32
-):
+@ti.func
+def _limit_vibration(state: ti.template(), program: ti.template(), body, kick, farthest):
     """Let no particle be faster beside the rigid motion than `farthest` [m/s] after a kick.
 
     Momentum and angular momentum stay.
