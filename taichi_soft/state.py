@@ -312,6 +312,13 @@ class State:
         fill(self.body_velocity_lag, np.zeros(0))
         fill(self.body_drives, np.zeros(0))
         fill(self.grab_body, np.zeros(0))
+        # A world that was here before may have held particles that there are not any more.
+        for numbers in (self.grab_count, self.patch_particle, self.patch_share):
+            fill(numbers, np.zeros(0))
+        for rows in (self.grab_corners, self.grab_weights, self.grab_target, self.grab_spring):
+            fill(rows, np.zeros((0, 3)))
+        for rows in (self.grab_limits, self.grab_force):
+            fill(rows, np.zeros((0, 3)))
         fill(self.body_damping, np.zeros(0))
         fill(self.body_is_braked, np.zeros(0))
         fill(self.body_jolted, np.zeros(0))
@@ -335,6 +342,8 @@ class State:
         fill(contact.rebound, np.zeros(0))
         fill(self.joints.bodies, np.zeros((0, 2)))
         fill(self.joints.is_held, np.zeros(0))
+        for numbers in (self.joints.particle, self.joints.weight, self.joints.share):
+            fill(numbers, np.zeros(0))
         # What lies inside a body is never near anything.
         fill(contact.particle_clearance, np.full(scene.particle_count, np.inf))
         fill(contact.particle_touches, np.zeros(0))

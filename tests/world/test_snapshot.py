@@ -1,5 +1,6 @@
 """Snapshots: what comes back, bit by bit; what is refused, with nothing changed."""
 
+import gc
 import json
 import warnings
 
@@ -508,3 +509,17 @@ def test_rest_shapes_come_back(bendable):
     assert (body.plastic_strains() == bent).all()
     assert throw() == thrown
     bendable.restore(data)
+
+
+def test_what_a_larger_world_held_before_is_not_in_the_snapshots_of_the_next():
+    """Which takes over its fields."""
+    for cells in (4, 1):
+        world = World(floor=None)
+        mesh = box(cells=(cells,) * 3)
+        bodies = [world.add_body(mesh, Material(1e5, 0.2, 1000.0), position=(x, 0, 0)) for x in (0, 3)]
+        world.build()
+        bodies[cells // 4].grab(0 if cells == 1 else len(mesh.vertices) - 1)
+        world.step(DT)
+        world.restore(world.snapshot())
+        del bodies, world
+        gc.collect()
