@@ -24,6 +24,7 @@ from taichi_soft.errors import (
     SolverWarning,
     StateError,
     TaichiSoftError,
+    TooSoftWarning,
     UnstableStepWarning,
     VideoError,
 )
@@ -146,6 +147,7 @@ __all__ = [
     "TearCandidates",
     "Tearing",
     "TetMesh",
+    "TooSoftWarning",
     "Torn",
     "UnstableStepWarning",
     "VideoError",

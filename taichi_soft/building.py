@@ -20,6 +20,7 @@ from taichi_soft.kernels.spawn import despawn_body, spawn_body
 from taichi_soft.plain import digest_of
 from taichi_soft.plasticity import RIGID_ROW
 from taichi_soft.runtime import Device, init
+from taichi_soft.sag import review_weight
 from taichi_soft.settings import Settings
 from taichi_soft.shapes import PlaneShape
 from taichi_soft.simulation import Simulation
@@ -38,6 +39,7 @@ def build(world: World) -> Simulation:
     if not pools.slots:
         raise StateError("the world is empty: call add_body or reserve before build")
     world._substeps.review()
+    review_weight(pools.kinds, world.settings.gravity)
     for slot, rows in pools.starts.items():
         asset = pools.assets[slot]
         require_clear(colliders.handles, asset, free_points(asset, rows), f"body {slot}")

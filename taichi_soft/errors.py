@@ -44,6 +44,10 @@ class SlowStepWarning(UserWarning):
     """A world needs so many substeps that a game will not keep up."""
 
 
+class TooSoftWarning(UserWarning):
+    """A body cannot bear its own weight."""
+
+
 class UnstableStepWarning(UserWarning):
     """The substep is larger than the estimate of what stays stable."""
 

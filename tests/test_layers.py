@@ -29,7 +29,7 @@ LAYERS = """
     measures
     tearing  readout  substeps
     body  assets  pools
-    simulation
+    sag  simulation
     building  spawning  structure  notes
     restoring
     snapshot

@@ -34,6 +34,7 @@ COLUMNS = (
     Verdict.INVERTED,
     Verdict.RUNAWAY,
     Verdict.MISSHAPEN,
+    Verdict.TOO_SOFT,
     Verdict.TOO_SLOW,
     Verdict.REFUSED,
     Verdict.NO_RESULT,
@@ -46,7 +47,8 @@ CRITERION = (
     "Frozen: it says so, or its positions are not finite. Inverted: tetrahedra inside out at the end. "
     f"Runaway: faster at the end than {SPEED_TOLERANCE:g} times what the fall can give. Misshapen: farther "
     f"from its rest shape than {100 * SHAPE_TOLERANCE:g} % of its size, as root mean square with rigid "
-    f"motion taken out. Too slow, and not tried: more than {MOST_SUBSTEPS} substeps for 1/60 s, or "
+    "motion taken out. Too soft: inverted, and the library warned that it does not bear its own weight. "
+    f"Too slow, and not tried: more than {MOST_SUBSTEPS} substeps for 1/60 s, or "
     f"{MOST_WORK:.0e} substeps of tetrahedra in all. Refused: the library raised an error when it was built."
 )
 
@@ -95,7 +97,7 @@ def verdict_of(row: Result) -> Verdict:
 
 def is_broken(row: Result) -> bool:
     """Whether a game that names no law would have a broken body there, or nothing is known."""
-    fine = (Verdict.OK, Verdict.TOO_SLOW, Verdict.REFUSED)
+    fine = (Verdict.OK, Verdict.TOO_SOFT, Verdict.TOO_SLOW, Verdict.REFUSED)
     return row.point["law"] is None and verdict_of(row) not in fine
 
 

@@ -132,4 +132,5 @@ def test_a_body_that_no_material_could_save_is_told_apart():
 def test_only_what_a_game_gets_by_default_counts_as_broken():
     assert [robustness.is_broken(each) for each in ROWS] == [False, True, False, False, False, True]
     assert not robustness.is_broken(row("own", None, None, "too slow"))
+    assert not robustness.is_broken(row("own", None, None, "too soft"))
     assert robustness.is_broken(Result(ROWS[0].point, None, "lost"))

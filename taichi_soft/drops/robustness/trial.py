@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from taichi_soft import FrozenBodyWarning, Material, TetMesh, World
+from taichi_soft import FrozenBodyWarning, Material, TetMesh, TooSoftWarning, World
 from taichi_soft.body import Body
 from taichi_soft.constants import GRAVITY_EARTH
 from taichi_soft.drops.robustness.cells import DAMPINGS, MESHES, Cell
@@ -61,6 +61,9 @@ def run_cell(cell: Cell) -> dict[str, Any]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FrozenBodyWarning)
         verdict, reason = judge(_try(cell, world, body))
+    told = next((str(each.message) for each in caught if each.category is TooSoftWarning), None)
+    if verdict is Verdict.INVERTED and told is not None:
+        verdict, reason = Verdict.TOO_SOFT, f"{reason}; when it was built: {told}"
     return {**facts, "verdict": verdict.value, "reason": reason}
 
 

@@ -17,12 +17,14 @@ SPEED_TOLERANCE = 1.5
 
 
 class Verdict(Choice):
-    """Of a cell, worst first; `NO_RESULT` where the trial itself broke off."""
+    """Of a cell, worst first. `TOO_SOFT`: inverted, and the world said so when it was built; `NO_RESULT`: the
+    trial itself broke off."""
 
     FROZEN = "frozen"
     INVERTED = "inverted"
     RUNAWAY = "runaway"
     MISSHAPEN = "misshapen"
+    TOO_SOFT = "too soft"
     TOO_SLOW = "too slow"
     REFUSED = "refused"
     NO_RESULT = "no result"

@@ -1,0 +1,55 @@
+"""Bodies that cannot bear their own weight: said when the world is built, with what would bear it."""
+
+import re
+import warnings
+
+import numpy as np
+import pytest
+
+from taichi_soft import Material, TooSoftWarning, World, box
+
+BLOCK = box((1, 1, 1), (2, 2, 2))
+SLAB = box((1, 1, 0.1), (2, 2, 1))
+
+
+def said_of(mesh, material, **options):
+    """What a world with such a body warns of when it is built."""
+    world = World(**options)
+    world.add_body(mesh, material, position=(0, 0, 5))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        world.build()
+    return [each for each in caught if each.category is TooSoftWarning]
+
+
+def test_a_block_that_weighs_more_at_its_foot_than_a_fifth_of_its_modulus_is_named_with_one_that_bears():
+    """A column of 1 m and 1,000 kg/m^3 presses with 9,807 Pa."""
+    (found,) = said_of(BLOCK, Material(20e3, 0.3, 1000.0))
+    assert found.filename == __file__
+    said = str(found.message)
+    assert "9.81e+03 Pa" in said
+    enough = float(re.search(r"modulus of ([\d.e+]+) Pa", said)[1])
+    assert enough == pytest.approx(5 * 9807, rel=0.05)
+    assert not said_of(BLOCK, Material(1.05 * enough, 0.3, 1000.0))
+
+
+@pytest.mark.parametrize(
+    ("mesh", "material", "options"),
+    [
+        (SLAB, Material(20e3, 0.3, 1000.0), {}),
+        (BLOCK, Material(20e3, 0.3, 100.0), {}),
+        (BLOCK, Material(20e3, 0.3, 1000.0), {"gravity": (0, 0, -1.6)}),
+        (BLOCK, Material(20e3, 0.3, 1000.0), {"gravity": (0, 0, 0)}),
+        (BLOCK.scaled(0.1), Material(20e3, 0.3, 1000.0), {}),
+    ],
+)
+def test_thin_light_and_small_bodies_and_those_with_little_gravity_are_not(mesh, material, options):
+    assert not said_of(mesh, material, **options)
+
+
+def test_of_several_materials_in_a_body_the_softness_counts_by_volume():
+    """Half of it ten times as stiff: a column of both is squeezed by 0.55 of what the soft one alone is."""
+    z = BLOCK.vertices[BLOCK.tets].mean(axis=1)[:, 2]
+    layered = Material(np.where(z > 0, 400e3, 40e3), 0.3, 1000.0)
+    assert said_of(BLOCK, Material(40e3, 0.3, 1000.0))
+    assert not said_of(BLOCK, layered)
