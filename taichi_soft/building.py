@@ -80,7 +80,7 @@ def build(world: World) -> Simulation:
         state,
         program,
         make_launch(settings.schedule, state, program, scene, device, settings.retries),
-        most_substeps(scene),
+        most_substeps(scene, settings.integrator),
         EventLog(Witness(state, scene, pools.slots, colliders if has_contact else None)),
         tears,
     )

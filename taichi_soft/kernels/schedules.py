@@ -9,7 +9,7 @@ from taichi_soft.kernels.program import Program
 from taichi_soft.runtime import Device
 from taichi_soft.scene import Scene
 from taichi_soft.state import State
-from taichi_soft.types import Schedule
+from taichi_soft.types import Integrator, Schedule
 
 FLAT_FROM_TETS = 100_000
 """Tetrahedra in a world's largest body from which the threads share it rather than leave it to one of them.
@@ -18,9 +18,13 @@ Measured with `taichi-soft profile --crossover`: with both cores free, two threa
 off its core stands still for milliseconds: with a third process at work, bodies of 1,000 to 50,000 ran 4 to
 300 times slower than on one thread, and only the largest still won."""
 
-STRETCH = 2_000_000
-"""Tetrahedra times substeps of one call of a kernel, at most: some 0.03 s on one thread, and several times as
-much where bodies touch. While a kernel runs, Python hears no Ctrl-C."""
+STRETCH = 5_000_000
+"""Tetrahedra times substeps of one call of a kernel, at most: some 0.08 s on one thread, and several times as
+much where bodies touch. While a kernel runs, Python hears no Ctrl-C. A longer step takes a snapshot first,
+which costs a shorter one some 5 %."""
+
+IMPLICIT_WORK = 50
+"""A substep of implicit Euler over one of leapfrog, about: so many products with the matrix it takes."""
 
 ALL = 2**31 - 1
 """Substeps of one call of a kernel that makes the whole step."""
@@ -50,10 +54,11 @@ def choose_schedule(asked: Schedule, scene: Scene, device: Device, *, needs_bodi
     return Schedule.FLAT
 
 
-def most_substeps(scene: Scene) -> int:
+def most_substeps(scene: Scene, integrator: Integrator) -> int:
     """How many substeps a step of a world may have that one call of a kernel makes."""
+    work = IMPLICIT_WORK if integrator is Integrator.IMPLICIT_EULER else 1
     sizes = [max(len(body.tet_vertices), len(body.edge_vertices) // 2) for body in scene.bodies]
-    return max(1, STRETCH // max(1, sum(sizes)))
+    return max(1, STRETCH // max(1, work * sum(sizes)))
 
 
 def make_launch(
@@ -68,7 +73,7 @@ def make_launch(
 
     step_bodies = step_in_turn if bodies == 1 or device.threads == 1 else step_per_body
     helpers = 0 if device.is_gpu else min(device.threads, bodies) - 1
-    stretch = most_substeps(scene)
+    stretch = most_substeps(scene, program.integrator)
 
     def per_body(substeps: int, h: float) -> int:
         most = stretch if substeps > stretch else ALL
