@@ -64,11 +64,7 @@ def settle_imports():
 
 @pytest.fixture(autouse=True, scope="session")
 def share_the_cores():
-    """Tests that run side by side take a core each: threads would wait for those of others.
-
-    Taichi flushes subnormal numbers to zero in all of the process, so that strategies of floats round zero
-    have to say `allow_subnormal=False`.
-    """
+    """Tests that run side by side take a core each: threads would wait for those of others."""
     if "PYTEST_XDIST_WORKER" in os.environ:
         init("cpu", threads=1)
 

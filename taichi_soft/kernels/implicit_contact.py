@@ -15,6 +15,9 @@ from taichi_soft.kernels.rebound import add_press
 from taichi_soft.math.quaternion import spun, turned, turned_back
 from taichi_soft.runtime import ti
 
+HARDEST = 1e24
+"""Impulse [N s] from which the solve of a body torn to pieces has overflowed: a collider is told of none."""
+
 
 @ti.func
 def _surface_velocity(contact: ti.template(), c, x, since, h):
@@ -76,6 +79,8 @@ def _press(state: ti.template(), body, p, h, since, v):
     hold = state.particle_hold[p]
     n = hold.xyz
     press = hold.w + n.dot(state.image[p] - state.particle_force[p].xyz)  # [N s]
+    if not ti.abs(press) < HARDEST:
+        press = 0.0
     surface_velocity, arm = _surface_velocity(state.contact, c, x, since, h)
     sliding = v - surface_velocity
     sliding -= n.dot(sliding) * n

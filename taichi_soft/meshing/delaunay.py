@@ -16,12 +16,12 @@ TOLERANCE = 1e-6
 corners lie on one sphere but for rounding."""
 
 
-def scipy_spatial() -> Any:
-    """scipy.spatial. Raises: OptionError where it is not installed."""
+def scipy_spatial(purpose: str = "Voronoi graphs") -> Any:
+    """scipy.spatial. Raises: OptionError where it is not installed, with the purpose."""
     try:
         from scipy import spatial
     except ImportError:
-        raise OptionError("Voronoi graphs need scipy: pip install 'taichi-soft[voronoi]'") from None
+        raise OptionError(f"{purpose} need scipy: pip install 'taichi-soft[voronoi]'") from None
     return spatial
 
 

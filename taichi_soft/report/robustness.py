@@ -13,10 +13,10 @@ from rich.table import Table
 
 from taichi_soft.drops.robustness import GROUPS, Verdict, run_cell
 from taichi_soft.drops.robustness.cells import Cell
-from taichi_soft.drops.robustness.foreign_meshes import scipy_spatial
 from taichi_soft.drops.robustness.trial import CALM_TIME, DROP, DROP_TIME, MOST_WORK, RECOVERY_TIME
 from taichi_soft.drops.robustness.verdict import MOST_SUBSTEPS, SHAPE_TOLERANCE, SPEED_TOLERANCE
 from taichi_soft.experiments import Effort, Experiment, Result, Section
+from taichi_soft.meshing.delaunay import scipy_spatial
 from taichi_soft.report.machine import machine_facts
 from taichi_soft.report.markdown import escaped
 from taichi_soft.report.run import run_experiments
@@ -65,7 +65,7 @@ def run_sweep(
     """
     groups = [name for name in (*GROUPS, "random wrecks") if any(cell["group"] == name for cell in cells)]
     if "foreign" in groups:
-        scipy_spatial()
+        scipy_spatial("foreign meshes")
     done = run_experiments(
         [_experiment(name, [cell for cell in cells if cell["group"] == name]) for name in groups],
         Effort.FULL,

@@ -107,7 +107,7 @@ def test_forces_equal_those_of_the_equations_in_numpy(law, strain, flips, seed, 
 
 @EACH_MODE
 @settings(max_examples=4)
-@given(seed=seeds, nu=st.floats(-0.9, 0.49, allow_subnormal=False), amount=st.sampled_from([0.01, 0.3, 2.0]))
+@given(seed=seeds, nu=st.floats(-0.9, 0.49), amount=st.sampled_from([0.01, 0.3, 2.0]))
 def test_an_isotropic_stiffness_gives_the_isotropic_forces_to_round_off(law, strain, flips, seed, nu, amount):
     rng = np.random.default_rng(seed)
     mesh = oracle.MESHES["sphere"]

@@ -5,7 +5,7 @@ import pytest
 from reading import burst, leave, not_finite
 
 from engine_adapter import EngineAdapter, FixedStep
-from taichi_soft import Event, Material, World, box
+from taichi_soft import Event, Material, PlaneShape, World, box
 
 DT = 1 / 60
 BLOCK = box((0.4, 0.4, 0.4), cells=(2, 2, 2))
@@ -51,3 +51,18 @@ def test_all_that_is_read_stays_finite_whichever_body_freezes(integrator):
             for each in body.attachments:
                 assert not np.concatenate([each.force, each.torque]).any()
             assert all(not grab.force.any() for grab in world.grabs if grab.body is body)
+
+
+def test_the_load_on_a_collider_is_finite_where_a_solve_overflows():
+    """A block torn to pieces on it: its forces are beyond what float32 holds, though it goes on."""
+    world = World(integrator="implicit_euler", floor=None)
+    body = world.add_body(BLOCK, JELLY, position=(0, 0, 1))
+    ground = world.add_collider(PlaneShape(), restitution=0.3)
+    world.build()
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        x, v = rng.uniform(-9.9e6, 9.9e6, BLOCK.vertices.shape), rng.uniform(-1e4, 1e4, BLOCK.vertices.shape)
+        body.set_motion(x, v)
+        for substeps in (1, 8):
+            world.step(DT, substeps)
+            assert np.isfinite([ground.impulse, ground.angular_impulse]).all()

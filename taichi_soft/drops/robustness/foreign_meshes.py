@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft import TetMesh, extrude
-from taichi_soft.errors import OptionError
+from taichi_soft.meshing.delaunay import scipy_spatial
 
 Floats = NDArray[np.float64]
 Loops = tuple[tuple[tuple[float, float], ...], ...]
@@ -19,15 +18,6 @@ Loops = tuple[tuple[tuple[float, float], ...], ...]
 FLATTEST_OUTSIDE = 0.002
 """Volume over longest edge cubed (0.118 if regular): flatter ones at the surface are taken off, as meshers
 do. Inside they stay."""
-
-
-def scipy_spatial() -> Any:
-    """scipy.spatial. Raises: OptionError where it is not installed."""
-    try:
-        from scipy import spatial
-    except ImportError:
-        raise OptionError("foreign meshes need scipy: pip install 'taichi-soft[voronoi]'") from None
-    return spatial
 
 
 def spread_points(rng: np.random.Generator, candidates: Floats, spacing: Floats | float) -> Floats:
@@ -42,7 +32,7 @@ def spread_points(rng: np.random.Generator, candidates: Floats, spacing: Floats 
 
 def delaunay_body(points: Floats) -> TetMesh:
     """The Delaunay mesh of (n, 3) points [m], without the flat tetrahedra that its surface begins with."""
-    tets = np.asarray(scipy_spatial().Delaunay(points).simplices, dtype=np.int64)
+    tets = np.asarray(scipy_spatial("foreign meshes").Delaunay(points).simplices, dtype=np.int64)
     x = points[tets]
     volumes = np.abs(np.linalg.det(x[:, 1:] - x[:, :1])) / 6
     longest = np.linalg.norm(x[:, :, None] - x[:, None], axis=3).max(axis=(1, 2))
@@ -125,9 +115,9 @@ def flat_body(
     rim = np.concatenate([_along(loop, spacing) for loop in outline])
     candidates = rng.uniform(size=(int(12 / (spacing * inside) ** 2), 2))
     candidates = candidates[_is_inside(candidates, outline)]
-    far = scipy_spatial().cKDTree(rim).query(candidates)[0] > 0.6 * spacing
+    far = scipy_spatial("foreign meshes").cKDTree(rim).query(candidates)[0] > 0.6 * spacing
     points = np.concatenate([rim, spread_points(rng, candidates[far], spacing * inside)])
-    triangles = np.asarray(scipy_spatial().Delaunay(points).simplices, dtype=np.int64)
+    triangles = np.asarray(scipy_spatial("foreign meshes").Delaunay(points).simplices, dtype=np.int64)
     a, b, c = (points[triangles[:, k]] for k in range(3))
     area = np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
     triangles = triangles[_is_inside((a + b + c) / 3, outline) & (area > 1e-3 * spacing**2)]
