@@ -12,7 +12,7 @@ from taichi_soft.film import Actor, Stage
 from taichi_soft.render import PALETTE, Camera
 from taichi_soft.scenery import Prop
 
-MATERIAL = Material(young=1.0e5, poisson=0.3, density=300.0, damping=30.0)
+MATERIAL = Material(young=1.0e5, poisson=0.3, density=300.0, damping_ratio=0.1)
 CONTACT = Contact(friction=0.3)
 ROOM, WALL, HEIGHT = 4.0, 0.12, 0.5  # width of the arena, thickness and height of its walls [m]
 BESIDE = np.array([ROOM + 0.9, 0.0, 0.0])  # where the second machine's picture is drawn [m]
