@@ -9,7 +9,7 @@ from taichi_soft.film import Actor, Stage
 from taichi_soft.render import PALETTE, Camera
 from taichi_soft.scenery import Prop
 
-MATERIAL = Material(young=2.5e5, poisson=0.3, density=1000.0, damping_ratio=0.1)
+MATERIAL = Material(young=2.5e5, poisson=0.3, density=1000.0, damping_ratio=0.3)
 SIZE = (0.6, 0.6, 2.0)  # of the bar [m]
 HEIGHT = 2.4  # of its middle [m]
 CUT = np.array([0.0, 0.0, 2.25])  # where the blade crosses the middle [m]
