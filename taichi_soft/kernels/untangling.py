@@ -4,7 +4,8 @@ Forces drive nearly all tetrahedra that are turned inside out back by themselves
 in a coarse mesh they find a balance that is not the rest shape; and what has shrunk to a point has no
 direction in which to open. So every `PATIENCE` steps it is looked whether any is flat or inside out. Where
 that was so the time before, too, its corners go half of the way to where they lie in the rest shape, as that
-fits best to all of the body now. Of a body that is wrecked altogether all of it goes there, within a second.
+fits best to all of the body now. Until a look finds none, vibrations fade. Of a body that is wrecked
+altogether all of it goes there, within a second.
 """
 
 from taichi_soft.constants import LANES
@@ -26,6 +27,10 @@ WRECKED = 0.1
 RAISING_STEPS, CALMING = 20, 0.8
 """Steps in which all of a wreck goes there, and part of its vibration that is left each time. What is wound
 about itself twice without being inside out anywhere would stay so otherwise."""
+
+FADING = 20.0
+"""At what rate the vibration of a body fades of which some is caught [1/s]. Slivers that a blow turned inside
+out would keep each other trembling otherwise, light ones for seconds."""
 
 FLAT = 1e-5
 """Volume over that at rest, from which down a tetrahedron counts as caught."""
@@ -120,8 +125,7 @@ def _free(state: ti.template(), program: ti.template(), body):
 
 @ti.func
 def _raise(state: ti.template(), program: ti.template(), body, steps_left, seconds):
-    """Move all of a wreck a part of the way, in the last step all of it, and calm it."""
-    fade_vibration(state, program, body, 0.0, 0.0, CALMING)
+    """Move all of a wreck a part of the way, in the last step all of it."""
     fit = _best_fit(state, body)
     particles = state.body_particles[body]
     for p in range(particles[0], particles[1]):
@@ -139,12 +143,21 @@ def untangle_body(state: ti.template(), program: ti.template(), body, seconds):
                     age = -RAISING_STEPS
                 elif state.body_patience[body] == PLACED:
                     age = 0
-                if age < 0:
-                    _raise(state, program, body, -age, seconds)
-                elif age % PATIENCE == 0:
+                is_look = age >= 0 and age % PATIENCE == 0
+                if is_look:
                     if _caught_count(state, state.particle_position, body) == 0:
                         age = 0
-                    elif age >= 2 * PATIENCE and not ti.static(program.has_contact):
+                keep = 1.0
+                if age < 0:
+                    keep = CALMING
+                elif age >= PATIENCE:
+                    keep = ti.exp(-FADING * seconds)
+                if keep < 1.0:
+                    fade_vibration(state, program, body, 0.0, 0.0, keep)
+                if age < 0:
+                    _raise(state, program, body, -age, seconds)
+                elif is_look and age >= 2 * PATIENCE:
+                    if ti.static(not program.has_contact):
                         _free(state, program, body)
                 state.body_patience[body] = age
                 state.body_jolted[body] = 0
