@@ -22,7 +22,7 @@ from taichi_soft.cli import main
 from taichi_soft.film import Actor, Stage
 from taichi_soft.render import PALETTE, Camera
 
-MATERIAL = Material(young=2.5e5, poisson=0.3, density=400.0, damping_ratio=0.1)
+MATERIAL = Material(young=2.5e5, poisson=0.3, density=400.0, damping_ratio=0.3)
 LAYERS, ROWS, COLUMNS = 2, 2, 4  # of bodies over the ramp
 SLOPE = 0.32  # of the ramp [rad]
 HUB = np.array([1.85, 0.0, 3.6])  # of the wheel [m]
