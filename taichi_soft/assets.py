@@ -26,8 +26,8 @@ from taichi_soft.types import DampingModel, Flips, Strain
 Floats = NDArray[np.float64]
 Floats32 = NDArray[np.float32]
 
-DAMPING_INTERVAL = 0.2
-"""Between two times that vibrations are damped, over the time in which the first mode turns by a radian: 30
+DAMPING_INTERVAL = 0.5
+"""Between two times that vibrations are damped, over the time in which the first mode turns by a radian: 12
 times in its period."""
 
 
@@ -127,8 +127,8 @@ class SoftBodyAsset:
 
     @cached_property
     def first_frequency(self) -> float:
-        """Angular frequency of the slowest vibration where nothing holds the body [rad/s], from above by some
-        per cent; 0 for ropes and cloth, which bend freely."""
+        """Angular frequency of the slowest vibration where nothing holds the body [rad/s], from above by less
+        than a fifth; 0 for ropes and cloth, which bend freely."""
         return 0.0 if isinstance(self.mesh, ParticleMesh) else first_frequency(self.description)
 
     def vibration_row(self, body: BodyDescription) -> tuple[float, float]:

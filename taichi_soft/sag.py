@@ -20,12 +20,14 @@ where it stands or lands. Four shapes of a metre with three Poisson's ratios up 
 
 
 def sag(asset: SoftBodyAsset, gravity: float) -> float:
-    """density * g * height / E of a body, `gravity` in m/s^2; zero for materials that have no such E.
+    """density * g * height / E of a body, `gravity` in m/s^2; zero for materials that have no such E, and for
+    bodies that are pinned altogether.
 
     The height is the least extent of the mesh along its axes, so that it counts however the body lies.
     """
     mesh, material = asset.mesh, asset.description.material
-    if not (isinstance(mesh, TetMesh) and isinstance(material, Material)):
+    is_held = len(asset.description.pinned) == len(mesh.vertices)
+    if is_held or not (isinstance(mesh, TetMesh) and isinstance(material, Material)):
         return 0.0
     shares = mesh.volumes / mesh.volumes.sum()
     softness = shares @ (1.0 / asset.description.per_tet("young"))
@@ -42,7 +44,7 @@ def review_weight(assets: Iterable[SoftBodyAsset], gravity: NDArray[np.float64])
         young = np.mean(worst.description.per_tet("young"))
         warnings.warn(
             f"a body is too soft for its weight: {worst!r} weighs {found * young:.3g} Pa at its foot, and "
-            f"its Young's modulus is {young:.3g} Pa. It will lie flat, partly inside out. Take a "
+            f"its Young's modulus is {young:.3g} Pa. It may end flat and partly inside out. Take a "
             f"modulus of {young * found / MOST_SAG:.2g} Pa, less gravity or a smaller body",
             TooSoftWarning,
             stacklevel=5,  # who called World.build

@@ -43,6 +43,24 @@ def ended_by_signals() -> Iterator[None]:
         signal.signal(signal.SIGTERM, before or signal.SIG_DFL)
 
 
+class Whole:
+    """What is inside is done before Ctrl-C counts, in the main thread."""
+
+    def __enter__(self) -> None:
+        self._handler, self._is_asked = None, False
+        if _is_main_thread() and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+            self._handler = signal.signal(signal.SIGINT, self._ask)
+
+    def _ask(self, *_: Any) -> None:
+        self._is_asked = True
+
+    def __exit__(self, *_: object) -> None:
+        if self._handler is not None:
+            signal.signal(signal.SIGINT, self._handler)
+        if self._is_asked:
+            raise KeyboardInterrupt
+
+
 def _is_main_thread() -> bool:
     return threading.current_thread() is threading.main_thread()
 

@@ -85,17 +85,23 @@ class Substeps:
         is_refused = self._most is not None and count > self._most
         if not is_refused and (count <= MANY_SUBSTEPS or self._is_said):
             return
-        stiffest = min(self._pools.kinds, key=lambda asset: asset.stable_step.limit)
-        step = stiffest.stable_step
+        index, step = self._stiffest()
         cost = count * TET_TIME * sum(len(asset.mesh.tets) for asset in self._pools.assets)
         said = (
             f"a step of {dt:.4g} s takes {count:,} substeps, about {cost:.2g} s of one thread, because of "
-            f"body {self._pools.assets.index(stiffest)}: {step.reason}"
+            f"body {index}: {step.reason}"
         )
         if is_refused:
             raise OptionError(f"{said}; the world takes max_substeps={self._most:,}")
         self._is_said = True
         warnings.warn(said, SlowStepWarning, stacklevel=6)
+
+    def _stiffest(self) -> tuple[int, StableStep]:
+        """The slot that needs the shortest substeps, and these."""
+        found = [(asset.stable_step, slot) for slot, asset in enumerate(self._pools.assets)]
+        found += [(self.stable_step(body), body.index) for body in self._pools.living]
+        step, slot = min(found, key=lambda each: each[0].limit)
+        return slot, step
 
     def choose(self, dt: float, substeps: int | None) -> tuple[float, int, float]:
         """Length of a step [s], number of its substeps and their length [s], as `World.step` takes them.
@@ -111,11 +117,15 @@ class Substeps:
     def _check(self, dt: float, substeps: int | None) -> tuple[float, int, float]:
         seconds = as_step(dt)
         count = as_count(self.stable_count(seconds) if substeps is None else substeps, "substeps")
-        if not self._is_implicit and (substeps is None or self._most is not None):
-            self._require_few(seconds, count)
+        if substeps is None:
+            if not self._is_implicit:
+                self._require_few(seconds, count)
+        elif self._most is not None and count > self._most:
+            raise OptionError(f"substeps is {count:,}; the world takes max_substeps={self._most:,}")
         h = seconds / count
         if self._is_implicit:
             return seconds, count, h
+        # Of bodies that were cut or are of something else nothing is estimated here: the caller knows better.
         stiffest = min(self._pools.kinds, key=lambda asset: asset.stable_step.limit)
         limit = stiffest.stable_step.limit
         if h > limit and h not in self._warned:

@@ -48,6 +48,7 @@ from taichi_soft.rehearsal import rehearse
 from taichi_soft.scene import Scene
 from taichi_soft.settings import ContactSettings, Settings
 from taichi_soft.shapes import Shape
+from taichi_soft.signals import Whole
 from taichi_soft.simulation import Simulation, require_built
 from taichi_soft.snapshot import restore_snapshot, state_hash, take_snapshot
 from taichi_soft.spawning import add_body, despawn, require_open, require_own, reserve, spawn, take_in
@@ -395,9 +396,9 @@ class World(Handle):
 
         Of all that have slots, whether a body lives there or not: so that neither the time of a frame nor the
         motion of the others changes where one comes or goes. Bodies that were cut, or given another material,
-        count with an estimate of their own after each change, which takes some 0.2 s for 5,000 tetrahedra:
-        give substeps where that is too long. 1 for implicit Euler, which needs none; with `soft_contact` so
-        many that they last no longer than 1/240 s.
+        count with an estimate of their own after each change, which takes some 20 ms for 5,000 tetrahedra and
+        several times as much with `damping`: give substeps where that is too long. 1 for implicit Euler,
+        which needs none; with `soft_contact` so many that they last no longer than 1/240 s.
         """
         return self._substeps.stable_count(dt)
 
@@ -407,27 +408,37 @@ class World(Handle):
         A body that goes non-finite is put back to where it was before the step and frozen, with a
         `FrozenBodyWarning` and `body.failure`; the other bodies go on. Before, it and what it may touch make
         the step again with up to eight times the substeps, by `World(retries=3)`.
-        Ctrl-C ends a step of more than about 0.03 s within a second: the world is then as before the step.
+        Ctrl-C lets a step of less than about 0.03 s end first. It ends a longer one within a second, and the
+        world is as before that step.
         Raises: OptionError if dt is not a positive number or substeps not a positive whole one;
             StateError before `build`.
         """
         simulation = self._simulation or self._built  # which raises
         seconds, count, h = self._substeps.choose(dt, substeps)
-        if self._force_field is not None:
-            push_by_field(self, self._force_field)
-        before = take_snapshot(self) if count > simulation.long_from else None
-        try:
-            reports = simulation.step(seconds, count, h)
-        except KeyboardInterrupt:
-            if before is not None:
-                restore_snapshot(self, before)
-            raise
+        if count > simulation.long_from:
+            reports = self._make_long_step(simulation, seconds, count, h)
+        else:
+            if self._force_field is not None:
+                push_by_field(self, self._force_field)
+            with Whole():
+                reports = simulation.step(seconds, count, h)
         if self._handles.recorder is not None:
             reports += self._handles.recorder.note_step(self, seconds, count, is_broken=bool(reports))
         if reports:
             warnings.warn("; ".join(reports), FrozenBodyWarning, stacklevel=3)
         if simulation.troubled:
             simulation.check_solves()
+
+    def _make_long_step(self, simulation: Simulation, seconds: float, substeps: int, h: float) -> list[str]:
+        """One that Ctrl-C may end, and then all is as before."""
+        before = take_snapshot(self)
+        try:
+            if self._force_field is not None:
+                push_by_field(self, self._force_field)
+            return simulation.step(seconds, substeps, h)
+        except KeyboardInterrupt:
+            restore_snapshot(self, before)
+            raise
 
     @recorded
     def warm_up(self) -> None:

@@ -18,10 +18,10 @@ Measured with `taichi-soft profile --crossover`: with both cores free, two threa
 off its core stands still for milliseconds: with a third process at work, bodies of 1,000 to 50,000 ran 4 to
 300 times slower than on one thread, and only the largest still won."""
 
-STRETCH = 5_000_000
-"""Tetrahedra times substeps of one call of a kernel, at most: some 0.08 s on one thread, and several times as
-much where bodies touch. While a kernel runs, Python hears no Ctrl-C. A longer step takes a snapshot first,
-which costs a shorter one some 5 %."""
+STRETCH = 2_000_000
+"""Tetrahedra times substeps of one call of a kernel, at most: some 0.03 s on one thread, several times as
+much where bodies touch, and up to 23 times where a step is made again. While a kernel runs, Python hears no
+Ctrl-C. A longer step takes a snapshot first: some 5 % of its time, and it is no step of a game."""
 
 IMPLICIT_WORK = 50
 """A substep of implicit Euler over one of leapfrog, about: so many products with the matrix it takes."""

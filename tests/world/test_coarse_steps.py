@@ -79,6 +79,11 @@ def test_a_world_of_many_substeps_says_when_built_which_slivers_or_which_damping
         (with_sliver(), JELLY, "1 of .* slivers.*improved"),
         (BALL, Material(1e5, 0.3, 1000.0, 1e5), "damping_ratio instead"),
         (BALL.scaled(1e-3), Material(1e6, 0.3, 1000.0), "coarser mesh or a softer material"),
+        (
+            BALL,
+            Material(np.where(np.arange(len(BALL.tets)) < 5, 1e11, 1e6), 0.3, 1000.0),
+            "or a softer material",
+        ),
     ):
         world = World()
         world.add_body(mesh, material, position=(0, 0, 3))
@@ -102,6 +107,18 @@ def test_a_world_that_may_not_take_so_many_refuses_and_stays_as_it_was():
     assert small.step_count == 0
     np.testing.assert_array_equal(body.positions(), before)
     small.step(1 / 60)
+    body.set_material(Material(1e8, 0.3, 1000.0))
+    with pytest.raises(OptionError, match=r"small or stiff elements.*max_substeps=20"):
+        small.step(1 / 60)
+
+
+def test_what_one_may_ask_of_implicit_euler_is_bounded_too():
+    world = World(max_substeps=2, integrator="implicit_euler")
+    world.add_body(sphere(0.5, 2), Material(1e9, 0.3, 1000.0), position=(0, 0, 3))
+    world.build()
+    world.step(1 / 60)
+    with pytest.raises(OptionError, match="substeps is 3; the world takes max_substeps=2"):
+        world.step(1 / 60, 3)
 
 
 @pytest.mark.parametrize("value", [-1, 1.5, "many", 100])

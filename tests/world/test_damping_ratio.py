@@ -9,6 +9,7 @@ import pytest
 from mode_oracle import assembled_stiffness, first_mode, lumped_masses, scattered
 
 from taichi_soft import Material, World, beam, box, internal_forces, sphere
+from taichi_soft.drops.robustness.foreign_meshes import FOREIGN_MESHES
 from taichi_soft.errors import MaterialError
 from taichi_soft.first_mode import first_frequency
 from taichi_soft.laws import element_model, fit_model
@@ -85,11 +86,12 @@ def differences(mesh, law):
 
 
 @pytest.mark.parametrize("schedule", ["per_body", "flat"])
-def test_damping_however_large_leaves_momentum_spin_and_the_substeps(schedule):
+def test_damping_however_large_leaves_momentum_and_spin_and_gives_no_energy_by_the_same_substeps(schedule):
+    """Nothing is made again here: a substep that damping makes unstable would show."""
     mesh = sphere(0.5, 2)
     found = {}
-    for ratio in (0.0, 1000.0):
-        world = World(gravity=(0, 0, 0), floor=None, schedule=schedule)
+    for ratio in (0.0, 0.3, 1.0, 1000.0):
+        world = World(gravity=(0, 0, 0), floor=None, schedule=schedule, retries=0)
         body = world.add_body(mesh, Material(YOUNG, POISSON, DENSITY, damping_ratio=ratio))
         world.build()
         found[ratio] = world.stable_substeps(1 / 60)
@@ -103,14 +105,19 @@ def test_damping_however_large_leaves_momentum_spin_and_the_substeps(schedule):
             x -= (mass * x).sum(axis=0) / mass.sum()
             return (mass * v).sum(axis=0), (mass * np.cross(x, v)).sum(axis=0)
 
-        before = budget()
+        def energy(body=body):
+            return body.kinetic_energy() + body.elastic_energy()
+
+        before, energies = budget(), [energy()]
         for _ in range(120):
             world.step(1 / 60)
+            energies.append(energy())
         after = budget()
+        assert max(energies) < (1 + 1e-3) * energies[0]
         for first, last in zip(before, after, strict=True):
             np.testing.assert_allclose(last, first, atol=2e-4 * np.linalg.norm(first))
         assert not body.is_frozen
-    assert found[1000.0] == found[0.0]
+    assert len(set(found.values())) == 1
 
 
 def test_the_first_frequency_is_that_of_the_sparse_eigenproblem_from_above():
@@ -127,23 +134,33 @@ def test_the_first_frequency_is_that_of_the_sparse_eigenproblem_from_above():
         assert 0.999 * omega < first_frequency(body) < 1.12 * omega
 
 
-def test_a_material_set_later_brings_its_ratio_along():
-    """Twice the ratio: what is left after as long is the square."""
+def test_the_first_frequency_of_slivers_letters_plates_and_rods_is_too_high_by_less_than_a_fifth():
+    for name, make in FOREIGN_MESHES.items():
+        mesh, material = make(), Material(YOUNG, POISSON, DENSITY)
+        body = BodyDescription(mesh, material, fit_model(element_model("virial"), mesh, material))
+        mass = lumped_masses(mesh, DENSITY)
+        omega, _ = first_mode(assembled_stiffness(mesh, YOUNG, POISSON), mass)
+        assert 0.999 * omega < first_frequency(body) < 1.2 * omega, name
+
+
+def test_a_material_set_later_fades_as_if_the_body_had_been_made_of_it():
     mesh = sphere(0.5, 2)
+    stiffer = Material(4 * YOUNG, POISSON, DENSITY / 2, damping_ratio=0.1)
     left = []
-    for later in (0.05, 0.1):
+    for first in (stiffer, Material(YOUNG, POISSON, DENSITY, damping_ratio=0.0)):
         world = World(gravity=(0, 0, 0), floor=None)
-        body = world.add_body(mesh, Material(YOUNG, POISSON, DENSITY, damping_ratio=0.0))
+        body = world.add_body(mesh, first)
         world.build()
-        body.set_material(Material(YOUNG, POISSON, DENSITY, damping_ratio=later))
+        body.set_material(stiffer)
         stretch = 1e-3 * mesh.vertices * (1.0, -0.5, -0.5)
         body.set_motion(mesh.vertices, 40.0 * stretch)
         energies = []
-        for _ in range(60):
-            world.step(1 / 60)
+        for _ in range(30):
+            world.step(1 / 60, 8)
             energies.append(body.kinetic_energy() + body.elastic_energy())
         left.append(energies[-1] / energies[0])
-    assert left[1] == pytest.approx(left[0] ** 2, rel=0.4)
+    assert left[0] < 0.5
+    assert left[1] == pytest.approx(left[0], rel=0.05)
 
 
 @pytest.mark.parametrize("ratio", [-0.1, np.nan, np.inf, 1e9, "much", [0.1, 0.1], True])

@@ -52,6 +52,8 @@ def test_ctrl_c_ends_a_long_step_and_the_world_is_as_before(name):
     hand = world.add_frame((0, 0, 1))
     world.build()
     body.attach([0, 1, 2], hand)
+    if name != "flat":
+        world.set_force_field(lambda positions, time: np.full(positions.shape, (0.0, 2.0, 0.0)))
     for _ in range(3):
         world.step(1 / 60)
     hand.move_to((0, 0, 1.2))
@@ -73,3 +75,33 @@ def test_ctrl_c_ends_a_long_step_and_the_world_is_as_before(name):
     world.step(1 / 60)
     assert world.state_hash() == after
     assert body.center_of_mass()[0] > 1e-4  # the impulse that waited
+
+
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="this system has no timer that raises")
+@pytest.mark.skipif(threading.current_thread() is not threading.main_thread(), reason="which hears Ctrl-C")
+def test_ctrl_c_lets_a_short_step_end(monkeypatch):
+    """The world is then as after a step that nobody ended."""
+    monkeypatch.setattr(schedules, "STRETCH", 10**9)
+
+    def stepped():
+        world = World()
+        world.add_body(sphere(0.3, 6), MATERIAL, position=(0, 0, 0.5))
+        world.build()
+        world.step(1 / 60)
+        return world
+
+    whole, ended = stepped(), stepped()
+    whole.step(1 / 60, 4000)
+    handlers = signal.SIGALRM, signal.SIGINT
+    before = [signal.signal(each, signal.default_int_handler) for each in handlers]
+    signal.signal(signal.SIGALRM, lambda *_: signal.raise_signal(signal.SIGINT))
+    signal.setitimer(signal.ITIMER_REAL, 0.05)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            ended.step(1 / 60, 4000)  # a quarter of a second
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        for each, handler in zip(handlers, before, strict=True):
+            signal.signal(each, handler)
+    assert (ended.state_hash(), ended.time) == (whole.state_hash(), whole.time)
