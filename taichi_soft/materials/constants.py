@@ -16,7 +16,7 @@ SMALLEST, LARGEST = 1e-9, 1e20
 """Constants beyond overflow float32 on their way to a force or an acceleration."""
 
 MOST_DAMPING_RATIO = 1000.0
-"""A body then moves as if it were rigid, and keeps its deformation for seconds."""
+"""Far above what a substep can take of a vibration: larger ones would damp no more."""
 
 POSITIVE = f"from {SMALLEST:g} to {LARGEST:g}"
 

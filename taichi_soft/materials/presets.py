@@ -1,8 +1,8 @@
 """Named materials. Textbook figures, rounded: a start, not a measurement.
 
 Moduli and densities from M. F. Ashby, Materials Selection in Mechanical Design (property tables);
-gelatine from the stiff end of its usual range of 1 to 100 kPa (dropped by metres it dents for good, unless
-added with flips="recover"); damping ratios are half of usual loss factors at a few hertz, rounded;
+gelatine from the stiff end of its usual range of 1 to 100 kPa (by the thesis's law with tolerant flips a fall
+of metres dents it for good); damping ratios are half of usual loss factors at a few hertz, rounded;
 `thesis_sphere` from thesis section 6.6, with its damping of edges and no other.
 """
 
