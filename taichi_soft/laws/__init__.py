@@ -147,7 +147,8 @@ def element_model(
 def default_law(material: AnyMaterial, strain: str | Strain | None, flips: str | Flips | None) -> str:
     """Name of the law that a body has where none is named.
 
-    Neo-Hookean: no body froze by it, and every wreck came back (`taichi-soft drop-test --sweep`). The virial one for options that only the thesis's laws have and for an `AnisotropicMaterial`; springs for a
+    Neo-Hookean: no body froze by it, and every wreck came back (`taichi-soft drop-test --sweep`). The virial
+    one for options that only the thesis's laws have and for an `AnisotropicMaterial`; springs for a
     `SpringMaterial`.
     """
     if isinstance(material, SpringMaterial):
