@@ -160,6 +160,7 @@ def _world_of(batch: list[Case]) -> tuple[World, list[_Run]]:
 
 @cache
 def _filler(shape: str, law: str, flips: str | None) -> SoftBodyAsset:
-    """Of slots that stay empty: soft, so that nothing warns of the step."""
+    """Of slots that stay empty: soft and pinned, so that nothing warns of its step or its weight."""
     mesh = shape_mesh(shape, LARGEST, np.full(2, 0.5))
-    return SoftBodyAsset(mesh, Material(1.0, 0.3, 1000.0, 0.0), law=law, flips=flips)
+    pinned = range(len(mesh.vertices))
+    return SoftBodyAsset(mesh, Material(1.0, 0.3, 1000.0, 0.0), law=law, flips=flips, pinned=pinned)
