@@ -23,7 +23,7 @@ from taichi_soft.film import Actor, Stage
 from taichi_soft.render import PALETTE, Camera
 from taichi_soft.scenery import Prop
 
-MATERIAL = Material(young=2.5e5, poisson=0.3, density=400.0, damping_ratio=0.1)
+MATERIAL = Material(young=2.5e5, poisson=0.3, density=400.0, damping_ratio=0.4)
 CRATE = np.array([2.4, 0.0, 0.0])  # middle of its bottom [m]
 INSIDE, WALL, HEIGHT = 2.4, 0.14, 1.2  # of the crate: width, thickness and height of its walls [m]
 FIRST, EVERY = 0.8, 1.7  # when the hand takes the first body, and another [s]
