@@ -59,11 +59,13 @@ def _move_block(state: ti.template(), program: ti.template(), first, count, grav
         for i in ti.static(range(3)):
             positions[lane, i] = x[i]
             velocities[lane, i] = v[i]
-        acceleration2[lane] = ti.select(lane < count, a.dot(a), 0.0)
+        acceleration2[lane] = a.dot(a)
     if count >= LANES:
         _put_block(state, first, LANES, positions, velocities)
     else:
         _put_block(state, first, count, positions, velocities)
+        for lane in range(LANES):
+            acceleration2[lane] = ti.select(lane < count, acceleration2[lane], 0.0)
     return acceleration2
 
 
