@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
 from typing import Any
@@ -14,6 +14,7 @@ from taichi_soft.assets import SoftBodyAsset
 from taichi_soft.body import Body
 from taichi_soft.contact import DEFAULT_CONTACT, Contact
 from taichi_soft.materials import preset
+from taichi_soft.materials.material import DAMPING_RATIO
 from taichi_soft.meshing import TetMesh, box, load_mesh, sphere
 from taichi_soft.profiling.spread import Spread, compare, time_calls
 from taichi_soft.profiling.stolen import processor_ticks, stolen_since
@@ -66,12 +67,19 @@ def _mesh() -> TetMesh:
     return sphere(radius=1.0, resolution=4)
 
 
-def _spheres(height: float, contact: Contact = DEFAULT_CONTACT, **options: Any) -> World:
+def _spheres(
+    height: float,
+    contact: Contact = DEFAULT_CONTACT,
+    law: str | None = "virial",
+    damping_ratio: float = 0.0,
+    **options: Any,
+) -> World:
     """Spheres side by side, their middles at `height` [m]."""
     world = World(**options)
+    material = replace(preset("thesis_sphere"), damping_ratio=damping_ratio)
     for i in range(COUNT):
         place = (SPACING * (i % 4), SPACING * (i // 4), height)
-        world.add_body(_mesh(), preset("thesis_sphere"), position=place, contact=contact, law="virial")
+        world.add_body(_mesh(), material, position=place, contact=contact, law=law)
     return world
 
 
@@ -111,6 +119,10 @@ def measure_features(repeats: int = 41) -> list[FeatureCost]:
         body.unpin([0])
     against(free, "forces and pins, no longer used", False, idle)
 
+    ratio = DAMPING_RATIO
+    against(free, f"damping_ratio={ratio:g}", True, _spheres(high, floor=None, damping_ratio=ratio))
+    default = _spheres(high, law=None, floor=None, damping_ratio=ratio)
+    against(free, "the same, and the default law", True, default)
     far = _spheres(high, floor=None)
     for i in range(8):
         far.add_collider(BoxShape((1.0, 1.0, 1.0)), position=(SPACING * i, 0.0, 0.0))

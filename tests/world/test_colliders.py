@@ -419,6 +419,25 @@ def test_a_body_that_starts_crushed_in_a_collider_is_refused_with_collider_and_d
     assert world.spawn(wrong.asset, position=(0, 0, -0.05)).is_alive
 
 
+@pytest.mark.parametrize("damping_ratio", [0.0, 0.01])
+def test_a_sheet_of_1_cm_lands_without_freezing(damping_ratio):
+    """From 2 m, flat and tilted, a hundred times as wide as thick."""
+    world = room()
+    world.add_collider(PlaneShape())
+    sheet = box((1.0, 1.0, 0.01), (12, 12, 1))
+    for young, tilt in ((1e5, 0.0), (1e5, 0.5), (1e6, 0.5), (1e6, 1.5)):  # none meets another
+        material = Material(young, 0.3, 1000.0, damping_ratio=damping_ratio)
+        where = {"position": (0, 0, 2.0), "rotation": turn(tilt, (1.0, 0.0, 0.0))}
+        world.add_body(sheet, material, **where)
+    world.build()
+    run(world, 3.0)
+    for body in world.bodies:
+        rows = body.positions()
+        assert not body.is_frozen
+        assert np.isfinite(rows).all()
+        assert rows[:, 2].max() < 1.0  # it is down
+
+
 def test_nothing_slips_into_the_seam_between_the_floor_and_a_box_that_stands_on_it_and_moves():
     """The box's lower edge lies in the floor: there its bottom is as near as the face that pushes."""
     world = room(floor=0.0)

@@ -1,5 +1,7 @@
 """What lies on each other comes to rest, stays where it is and falls asleep; what cannot stand falls."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -73,6 +75,28 @@ def test_a_pile_too_soft_to_stand_in_one_piece_leans_as_fast_as_that():
         rates.append(np.polyfit(times[grows], np.log(lean[grows]), 1)[0])
     assert rates[0] == pytest.approx(rates[1], rel=0.2)
     assert rates[0] > 0.2
+
+
+@pytest.mark.parametrize(("heavier", "density", "young"), [(100, 1000.0, 1e7), (1000, 50.0, 1e7)])
+def test_a_block_bears_one_of_many_times_its_mass_for_a_minute(heavier, density, young):
+    """The load on the lower block is 2.5 to 5 % of Young's modulus. It still swings up and down, but may not
+    creep sideways by more than a 200th of its edge in 50 s."""
+    block, material = box((EDGE,) * 3, (3, 3, 3)), Material(young, 0.3, density)
+    assert 0.02 < heavier * density * GRAVITY * EDGE / young < 0.05
+    world = World(gravity=(0, 0, -GRAVITY), soft_contact=True)
+    lower = world.add_body(block, material, position=(0, 0, EDGE / 2))
+    upper = world.add_body(block, replace(material, density=heavier * density), position=(0, 0, 1.52 * EDGE))
+    world.build()
+    run(world, 10.0)
+    start = upper.center_of_mass()
+    run(world, 50.0)
+    end = upper.center_of_mass()
+    assert np.linalg.norm((end - start)[:2]) < EDGE / 200
+    assert np.linalg.norm(end[:2]) < EDGE / 20
+    assert end[2] == pytest.approx(1.5 * EDGE, abs=0.1 * EDGE)
+    for body in (lower, upper):
+        assert not body.is_frozen
+        assert len(body.flipped_tets()) == 0
 
 
 def test_a_heap_falls_asleep_and_stays_asleep():
