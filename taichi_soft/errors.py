@@ -41,11 +41,11 @@ class SweepError(TaichiSoftError, RuntimeError):
 
 
 class SlowStepWarning(UserWarning):
-    """A world needs so many substeps that a game will not keep up."""
+    """A step takes more than 500 substeps. It names the body, what asks for them, and the way out."""
 
 
 class TooSoftWarning(UserWarning):
-    """A body cannot bear its own weight."""
+    """A body's weight on its foot exceeds a fifth of its Young's modulus: it cannot bear it."""
 
 
 class UnstableStepWarning(UserWarning):

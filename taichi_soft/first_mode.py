@@ -14,6 +14,7 @@ _MODES = 4
 """That are looked for at once: round bodies have several of the same frequency."""
 
 _AT_ONCE = 4
+"""Columns that a product with the stiffness matrix takes: more fall out of a processor's cache."""
 
 _MOST_ITERATIONS = 400
 _WINDOW, _CHANGE = 10, 5e-3
@@ -24,8 +25,8 @@ letters a single one changes little long before the end."""
 def first_frequency(body: BodyDescription) -> float:
     """Angular frequency of the slowest vibration of a body that nothing holds [rad/s]; 0 where it has none.
 
-    Ritz's method with polynomials of up to third order as a first guess, made better by
-    locally optimal block conjugate gradients (Knyazev 2001). The value comes from above.
+    Ritz's method with polynomials of up to third order as a first guess, made better by locally optimal block
+    conjugate gradients (Knyazev 2001). The value comes from above.
     """
     vibration = vibration_of(body)
     rigid, bent = _polynomials(body)

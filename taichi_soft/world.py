@@ -367,8 +367,10 @@ class World(Handle):
     def build(self) -> None:
         """Move all bodies into Taichi fields and fix the kernels. Starts Taichi if nobody has.
 
+        Warns: SlowStepWarning where 1/60 s takes more than 500 substeps, with what asks for them;
+            TooSoftWarning of bodies that cannot bear their weight.
         Raises: StateError without bodies or when called twice; OptionError for a body that starts inside a
-            collider.
+            collider, or where 1/60 s takes more substeps than `max_substeps`.
         """
         if self.is_built:
             raise StateError("the world is already built")
@@ -396,7 +398,7 @@ class World(Handle):
 
         Of all that have slots, whether a body lives there or not: so that neither the time of a frame nor the
         motion of the others changes where one comes or goes. Bodies that were cut, or given another material,
-        count with an estimate of their own after each change, which takes some 20 ms for 5,000 tetrahedra and
+        count with an estimate of their own after each change, which takes some 35 ms for 5,000 tetrahedra and
         several times as much with `damping`: give substeps where that is too long. 1 for implicit Euler,
         which needs none; with `soft_contact` so many that they last no longer than 1/240 s.
         """
@@ -410,8 +412,10 @@ class World(Handle):
         the step again with up to eight times the substeps, by `World(retries=3)`.
         Ctrl-C lets a step of less than about 0.03 s end first. It ends a longer one within a second, and the
         world is as before that step.
-        Raises: OptionError if dt is not a positive number or substeps not a positive whole one;
-            StateError before `build`.
+        Warns: as above; UnstableStepWarning for substeps longer than the stable step of the stiffest asset;
+            SlowStepWarning as `build`, once in a world; SolverWarning, of implicit Euler.
+        Raises: OptionError if dt is not a positive number or substeps not a positive whole one, and where
+            there are more than `max_substeps`; StateError before `build`.
         """
         simulation = self._simulation or self._built  # which raises
         seconds, count, h = self._substeps.choose(dt, substeps)

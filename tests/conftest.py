@@ -2,6 +2,8 @@
 
 import gc
 import os
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +14,8 @@ from taichi_soft import init
 
 settings.register_profile("same every time", derandomize=True, deadline=None)
 settings.load_profile("same every time")
+
+sys.path.insert(0, str(Path(__file__).parent))  # for `random_meshes`
 
 TOGETHER = (
     *("tests/experiments/", "tests/integrators/", "tests/laws/", "tests/demos/"),

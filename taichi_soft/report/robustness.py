@@ -41,9 +41,9 @@ COLUMNS = (
 )
 
 CRITERION = (
-    "Every body is built with what its row names and nothing else. It is dropped from "
-    f"{DROP:g} m and watched for {DROP_TIME:g} s, or wrecked and given {RECOVERY_TIME:g} s in which to have "
-    f"no tetrahedron inside out for {CALM_TIME:g} s; then gravity ends and it comes to rest, braked. "
+    "Every body is built with what its row names and nothing else. A body that is dropped falls "
+    f"{DROP:g} m and is watched for {DROP_TIME:g} s. A wreck has {RECOVERY_TIME:g} s in which to have no "
+    f"tetrahedron inside out for {CALM_TIME:g} s. Then gravity ends and it comes to rest, braked. "
     "Frozen: it says so, or its positions are not finite. Inverted: tetrahedra inside out at the end. "
     f"Runaway: faster at the end than {SPEED_TOLERANCE:g} times what the fall can give. Misshapen: farther "
     f"from its rest shape than {100 * SHAPE_TOLERANCE:g} % of its size, as root mean square with rigid "
