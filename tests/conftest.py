@@ -15,7 +15,7 @@ from taichi_soft import init
 settings.register_profile("same every time", derandomize=True, deadline=None)
 settings.load_profile("same every time")
 
-sys.path.insert(0, str(Path(__file__).parent))  # for `random_meshes`
+sys.path.insert(0, str(Path(__file__).parent / "shared"))  # what tests of several folders import
 
 TOGETHER = (
     *("tests/experiments/", "tests/integrators/", "tests/laws/", "tests/demos/"),
