@@ -2,6 +2,7 @@
 
 import gc
 import os
+import signal
 import sys
 from pathlib import Path
 
@@ -16,6 +17,11 @@ settings.register_profile("same every time", derandomize=True, deadline=None)
 settings.load_profile("same every time")
 
 sys.path.insert(0, str(Path(__file__).parent / "shared"))  # what tests of several folders import
+
+if (
+    signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+):  # as where a shell runs them behind `&`: no Ctrl-C comes
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 TOGETHER = (
     *("tests/experiments/", "tests/integrators/", "tests/laws/", "tests/demos/"),
