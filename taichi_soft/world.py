@@ -412,8 +412,8 @@ class World(Handle):
         the step again with up to eight times the substeps, by `World(retries=3)`.
         Ctrl-C lets a step of less than about 0.03 s end first. It ends a longer one within a second, and the
         world is as before that step.
-        Warns: as above; UnstableStepWarning for substeps longer than the stable step of the stiffest asset;
-            SlowStepWarning as `build`, once in a world; SolverWarning, of implicit Euler.
+        Warns: FrozenBodyWarning; UnstableStepWarning for substeps longer than the stable step of the stiffest
+            asset; SlowStepWarning as `build`, once in a world; SolverWarning, of implicit Euler.
         Raises: OptionError if dt is not a positive number or substeps not a positive whole one, and where
             there are more than `max_substeps`; StateError before `build`.
         """

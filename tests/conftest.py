@@ -18,9 +18,8 @@ settings.load_profile("same every time")
 
 sys.path.insert(0, str(Path(__file__).parent / "shared"))  # what tests of several folders import
 
-if (
-    signal.getsignal(signal.SIGINT) is signal.SIG_IGN
-):  # as where a shell runs them behind `&`: no Ctrl-C comes
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    # A shell that runs the tests behind `&` has them ignore Ctrl-C, and the processes that they start too.
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 TOGETHER = (
