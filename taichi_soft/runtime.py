@@ -37,6 +37,7 @@ from taichi_soft.cores import (
     thread_ids,
 )
 from taichi_soft.errors import DeviceError, OptionError
+from taichi_soft.subnormals import learn, without_subnormals
 from taichi_soft.turns import in_turn, leave_behind
 
 __all__ = ["Device", "device", "init", "is_initialized", "make_fields", "ti"]
@@ -89,7 +90,7 @@ def _let_threads_in() -> None:
     ti.lang.impl.PyTaichi.inside_kernel = property(
         lambda _: getattr(compiling, "is_on", False), lambda _, is_on: setattr(compiling, "is_on", is_on)
     )
-    ti.lang.kernel_impl.Kernel.__call__ = in_turn(ti.lang.kernel_impl.Kernel.__call__)
+    ti.lang.kernel_impl.Kernel.__call__ = in_turn(without_subnormals(ti.lang.kernel_impl.Kernel.__call__))
     make = accessor.__init__
 
     def make_in_turn(self: Any, snode: Any) -> None:
@@ -237,7 +238,8 @@ def init(arch: str = "auto", threads: int | None = None, cores: Sequence[int] | 
     is_left_to_us = threads is None and cores is None and chosen == "cpu" and count > 1 and can_bind()
     wanted = tuple(there) if is_left_to_us else bound
     try:
-        _at_home(functools.partial(_start, chosen, reason, count, wanted, is_left_to_us), chosen)
+        start = functools.partial(_start, chosen, reason, count, wanted, is_left_to_us)
+        _at_home(functools.partial(learn, start), chosen)
     except RuntimeError as error:
         if isinstance(error, DeviceError):
             raise

@@ -11,7 +11,7 @@ ROOT = Path(__file__).parents[1]
 # From the ground up. A module or package imports from its own line's package and from lines below, never from
 # a neighbour on its line. Names without a prefix are parts of taichi_soft. Those not written yet are allowed.
 LAYERS = """
-    errors  constants  clock  signals
+    errors  constants  clock  signals  subnormals
     cores  turns
     types  runtime  checks  handles  sealed
     math  loading

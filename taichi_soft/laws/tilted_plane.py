@@ -36,14 +36,17 @@ def tilt(axis, arm, height, rest_angle, weight):
     rise = axis.dot(arm)
     across = arm - axis * rise
     distance = ti.max(ti.sqrt(across.dot(across)), 1e-30)
-    return across * (weight * (ti.atan2(rise - height, distance) - rest_angle) / distance)
+    # By a name: within a vector's expression a real function would ask for the angle once per component.
+    angle = ti.atan2(rise - height, distance)
+    return across * (weight * (angle - rest_angle) / distance)
 
 
 @ti.func
 def tilted_normal(axis, push):
     """The unit vector `axis` turned away from `push` by an angle of its length."""
     angle = ti.sqrt(push.dot(push))
-    return axis * ti.cos(angle) - push * ti.select(angle > 1e-6, ti.sin(angle) / ti.max(angle, 1e-6), 1.0)
+    cosine, sine = ti.cos(angle), ti.sin(angle)
+    return axis * cosine - push * ti.select(angle > 1e-6, sine / ti.max(angle, 1e-6), 1.0)
 
 
 def tilt_rows(rings: EdgeRings) -> tuple[Floats, Floats]:
