@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 from engine_adapter import FixedStep
 from taichi_soft import Body, Contact, Material, MeshShape, World, box, cylinder, sphere, torus
 from taichi_soft.cli import main
-from taichi_soft.film import Actor, Stage
 from taichi_soft.render import PALETTE, Camera
+from taichi_soft.render.film import Actor, Stage
 
 MATERIAL = Material(young=3.0e5, poisson=0.3, density=500.0)
 THICKNESS = 0.02  # of the skins of the bodies [m]

@@ -5,8 +5,8 @@ import numpy as np
 from engine_adapter import FixedStep
 from taichi_soft import SpringMaterial, World, cloth, cloth_constants
 from taichi_soft.cli import main
-from taichi_soft.film import Actor, Stage
 from taichi_soft.render import Camera
+from taichi_soft.render.film import Actor, Stage
 
 CELLS = (24, 24)
 SIDE, MASS = 2.0, 0.5  # [m], [kg]

@@ -10,9 +10,9 @@ from statistics import median
 from engine_adapter import FixedStep
 from taichi_soft import LAWS, Material, TetMesh, World, sphere
 from taichi_soft.cli import main
-from taichi_soft.film import Actor, Stage
-from taichi_soft.profiling.spread import time_calls
+from taichi_soft.lab.profiling.spread import time_calls
 from taichi_soft.render import PALETTE, Camera
+from taichi_soft.render.film import Actor, Stage
 
 SOFT = Material(young=6.0e5, poisson=0.2, density=1000.0, damping=30.0, damping_ratio=0.0)
 HEIGHT = 2.2  # of the centres [m]

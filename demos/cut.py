@@ -5,9 +5,9 @@ import numpy as np
 from engine_adapter import FixedStep
 from taichi_soft import Body, BoxShape, Frame, Material, SoftBodyAsset, World, box
 from taichi_soft.cli import main
-from taichi_soft.film import Actor, Stage
 from taichi_soft.render import PALETTE, Camera
-from taichi_soft.scenery import Prop
+from taichi_soft.render.film import Actor, Stage
+from taichi_soft.render.scenery import Prop
 
 MATERIAL = Material(young=2.5e5, poisson=0.3, density=1000.0, damping_ratio=0.3)
 SIZE = (0.6, 0.6, 2.0)  # of the bar [m]

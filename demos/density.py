@@ -5,8 +5,8 @@ import numpy as np
 from engine_adapter import FixedStep
 from taichi_soft import Material, World, box
 from taichi_soft.cli import main
-from taichi_soft.film import Actor, Stage
 from taichi_soft.render import Camera, colormap
+from taichi_soft.render.film import Actor, Stage
 
 LIGHT, HEAVY = 200.0, 2000.0  # [kg/m^3]
 

@@ -19,8 +19,8 @@ from taichi_soft import (
     torus,
 )
 from taichi_soft.cli import main
-from taichi_soft.film import Actor, Stage
 from taichi_soft.render import PALETTE, Camera
+from taichi_soft.render.film import Actor, Stage
 
 MATERIAL = Material(young=2.5e5, poisson=0.3, density=400.0, damping_ratio=0.3)
 LAYERS, ROWS, COLUMNS = 2, 2, 4  # of bodies over the ramp

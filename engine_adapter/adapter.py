@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from engine_adapter.fixed_step import Accumulator, FixedStep
 from engine_adapter.rollback import Rollback
 from taichi_soft import Body, Event, OptionError, StateError, World
-from taichi_soft.checks import as_count, as_number
-from taichi_soft.turns import one_thread
+from taichi_soft.core.checks import as_count, as_number
+from taichi_soft.core.turns import one_thread
 
 
 class EngineAdapter:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from taichi_soft.checks import as_count, as_step
+from taichi_soft.core.checks import as_count, as_step
 
 ROUND_OFF = 1e-9
 """Part of a step that may be missing when the step is due. Sums of frame times are rounded: six frames of

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from taichi_soft import OptionError, StateError, World
-from taichi_soft.checks import as_count
+from taichi_soft.core.checks import as_count
 
 
 class Rollback:

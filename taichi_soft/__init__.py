@@ -1,17 +1,31 @@
 """Real-time soft bodies from real material parameters."""
 
-from taichi_soft import signals  # noqa: F401 - first: it watches while the rest is imported
+from taichi_soft.core import signals  # noqa: F401 - first: it watches while the rest is imported
 
 # isort: split
-from taichi_soft.assets import SoftBodyAsset
-from taichi_soft.body import Body
-from taichi_soft.colliders import Collider
-from taichi_soft.contact import Contact
+from taichi_soft.bodies.asset import SoftBodyAsset
+from taichi_soft.bodies.contact import Contact
+from taichi_soft.bodies.failure import Failure
+from taichi_soft.bodies.forces import force_gradient, internal_forces
+from taichi_soft.bodies.plasticity import Plasticity
+from taichi_soft.bodies.pose import Pose
+from taichi_soft.bodies.stability import StableStep, stable_step
+from taichi_soft.bodies.tearing import Tearing
+from taichi_soft.contact.colliders import Collider
+from taichi_soft.contact.shapes import (
+    BoxShape,
+    CapsuleShape,
+    HeightFieldShape,
+    MeshShape,
+    PlaneShape,
+    Shape,
+    SphereShape,
+)
 from taichi_soft.control.attachments import Attachment
 from taichi_soft.control.frames import Frame
 from taichi_soft.control.grabs import Grab
 from taichi_soft.control.joints import Joint
-from taichi_soft.errors import (
+from taichi_soft.core.errors import (
     DeviceError,
     DroppedEventsWarning,
     FrozenBodyWarning,
@@ -28,6 +42,19 @@ from taichi_soft.errors import (
     UnstableStepWarning,
     VideoError,
 )
+from taichi_soft.core.runtime import Device, device, init
+from taichi_soft.core.settings import Settings
+from taichi_soft.elements.laws import LAWS, element_model
+from taichi_soft.elements.laws.planes import plane_angles
+from taichi_soft.elements.materials import (
+    PRESETS,
+    AnisotropicMaterial,
+    Material,
+    SpringMaterial,
+    Stiffness,
+    frames_along,
+    preset,
+)
 from taichi_soft.events import (
     ContactBegan,
     ContactEnded,
@@ -39,19 +66,6 @@ from taichi_soft.events import (
     TearCandidates,
     Torn,
     Woke,
-)
-from taichi_soft.failures import Failure
-from taichi_soft.forces import force_gradient, internal_forces
-from taichi_soft.laws import LAWS, element_model
-from taichi_soft.laws.planes import plane_angles
-from taichi_soft.materials import (
-    PRESETS,
-    AnisotropicMaterial,
-    Material,
-    SpringMaterial,
-    Stiffness,
-    frames_along,
-    preset,
 )
 from taichi_soft.meshing import (
     MeshQuality,
@@ -74,22 +88,9 @@ from taichi_soft.meshing import (
     voronoi_graph,
     voxels,
 )
-from taichi_soft.plasticity import Plasticity
-from taichi_soft.queries import ClosestPoint, Overlap, Pose, RayHit, RayHits
-from taichi_soft.runtime import Device, device, init
-from taichi_soft.settings import Settings
-from taichi_soft.shapes import (
-    BoxShape,
-    CapsuleShape,
-    HeightFieldShape,
-    MeshShape,
-    PlaneShape,
-    Shape,
-    SphereShape,
-)
-from taichi_soft.stability import StableStep, stable_step
-from taichi_soft.tearing import Tearing
-from taichi_soft.world import World
+from taichi_soft.queries import ClosestPoint, Overlap, RayHit, RayHits
+from taichi_soft.world.body import Body
+from taichi_soft.world.world import World
 
 __all__ = [
     "LAWS",

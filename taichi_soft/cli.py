@@ -19,10 +19,10 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from taichi_soft.errors import OptionError, TaichiSoftError
-from taichi_soft.materials import Material
-from taichi_soft.runtime import Device, init
-from taichi_soft.signals import INTERRUPTED, ended_by_signals
+from taichi_soft.core.errors import OptionError, TaichiSoftError
+from taichi_soft.core.runtime import Device, init
+from taichi_soft.core.signals import INTERRUPTED, ended_by_signals
+from taichi_soft.elements.materials import Material
 
 app = typer.Typer(
     help="Real-time soft bodies from real material parameters.",
@@ -94,7 +94,7 @@ def demo(
     threads: Threads = None,
 ) -> None:
     """Run a demo without a display, film it, and say how much faster than real time it ran."""
-    from taichi_soft.stages import demo_names, load_demo
+    from taichi_soft.render.stages import demo_names, load_demo
 
     if name is None:
         for each in demo_names():
@@ -105,7 +105,7 @@ def demo(
     module = load_demo(name)
     path = (out or Path("out") / f"{name}.mp4") if video else None
     init(arch, threads)
-    from taichi_soft.film import film
+    from taichi_soft.render.film import film
 
     stage = module.stage()
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
@@ -161,9 +161,9 @@ def info(
     as_json: AsJson = False,
 ) -> None:
     """Say which device, versions, laws and materials there are."""
-    from taichi_soft.laws import LAWS
-    from taichi_soft.materials import PRESETS
-    from taichi_soft.profiling.baseline import find_compiler
+    from taichi_soft.elements.laws import LAWS
+    from taichi_soft.elements.materials import PRESETS
+    from taichi_soft.lab.profiling.baseline import find_compiler
 
     device = init(arch, threads)
     if laws or law:
@@ -190,8 +190,8 @@ def info(
 
 
 def _say_laws(names: list[str], as_json: bool) -> None:
-    from taichi_soft.profiling import measure_laws
-    from taichi_soft.profiling.report import law_rows, law_table
+    from taichi_soft.lab.profiling import measure_laws
+    from taichi_soft.lab.profiling.report import law_rows, law_table
 
     with errors.status("compiling and measuring laws"):
         costs = measure_laws(names)
@@ -232,8 +232,8 @@ def replay(
 ) -> None:
     """Make a recording again, bit by bit; say what broke first, and draw the moment."""
     init(arch, threads)
-    from taichi_soft.replay import failure_line
-    from taichi_soft.replay import replay as play_again
+    from taichi_soft.render.replay import failure_line
+    from taichi_soft.render.replay import replay as play_again
 
     report = play_again(file, out or file.with_suffix(".png"))
     end = f"up to step {report.world.step_count}, t = {report.world.time:.4g} s"
@@ -285,8 +285,8 @@ def profile(
 ) -> None:
     """Measure what a frame costs and how many bodies fit one of 60 Hz and of 120 Hz."""
     device = init(arch, threads, _cores_of(cores))
-    from taichi_soft import profiling
-    from taichi_soft.profiling import report
+    from taichi_soft.lab import profiling
+    from taichi_soft.lab.profiling import report
 
     library = profiling.compile_baseline() if baseline else None
     with errors.status("measuring frames") as status:
@@ -373,7 +373,7 @@ def drop_test(
         _sweep(asked, only, out, worst, workers, arch, as_json=as_json)
         return
     init(arch, threads)
-    from taichi_soft.drops import Summary, make_case, run_cases
+    from taichi_soft.lab.drop_test import Summary, make_case, run_cases
 
     cases, law = cases or 1000, law or "virial"
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
@@ -405,9 +405,9 @@ def _sweep(
     *,
     as_json: bool,
 ) -> None:
-    from taichi_soft.drops.robustness import choose_cells
-    from taichi_soft.report import robustness
-    from taichi_soft.report.run import require_writable
+    from taichi_soft.lab.drop_test.robustness import choose_cells
+    from taichi_soft.lab.report import robustness
+    from taichi_soft.lab.report.run import require_writable
 
     cells = choose_cells(groups or None, **asked)
     require_writable(out.parent)
@@ -457,10 +457,10 @@ def report(
     Every number is kept at once, in the folder data beside the page. What was interrupted goes on from there,
     and points that failed are computed again; without that folder everything is.
     """
-    from taichi_soft.experiments import Effort
-    from taichi_soft.report.extra import require_extra
-    from taichi_soft.report.machine import machine_facts
-    from taichi_soft.report.run import choose_experiments, require_writable, run_experiments
+    from taichi_soft.lab.experiments import Effort
+    from taichi_soft.lab.report.extra import require_extra
+    from taichi_soft.lab.report.machine import machine_facts
+    from taichi_soft.lab.report.run import choose_experiments, require_writable, run_experiments
 
     chosen = choose_experiments(names or [])
     if show_list:
@@ -481,9 +481,9 @@ def report(
     concluded = run_experiments(
         chosen, effort, folder / "data", errors, workers=workers, cluster=cluster, arch=device.arch
     )
-    from taichi_soft.report.judgements import judge
-    from taichi_soft.report.page import write_report
-    from taichi_soft.report.terminal import print_section, print_verdicts
+    from taichi_soft.lab.report.judgements import judge
+    from taichi_soft.lab.report.page import write_report
+    from taichi_soft.lab.report.terminal import print_section, print_verdicts
 
     if names and out is None:
         for experiment, results, section in concluded:

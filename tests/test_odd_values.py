@@ -7,7 +7,6 @@ import pytest
 
 import taichi_soft as ts
 from engine_adapter import EngineAdapter, FixedStep
-from taichi_soft.film import Actor, Stage, film
 from taichi_soft.render import (
     Camera,
     Renderer,
@@ -18,6 +17,7 @@ from taichi_soft.render import (
     draw_text,
     highlight,
 )
+from taichi_soft.render.film import Actor, Stage, film
 
 ODD = (
     *(None, True, 0, -0.0, -1, 1.5, np.nan, np.inf, 10**400, 1j, np.float32(2), np.int64(3)),

@@ -10,8 +10,8 @@ from types import SimpleNamespace
 import pytest
 
 from taichi_soft import OptionError, init
-from taichi_soft.cores import available_cores, can_bind
-from taichi_soft.runtime import ti
+from taichi_soft.core.cores import available_cores, can_bind
+from taichi_soft.core.runtime import ti
 
 ROOT = Path(__file__).parents[1]
 CORES = available_cores()
@@ -63,7 +63,7 @@ def test_cores_are_for_as_many_threads_of_the_cpu():
 
 
 def test_threads_are_bound_to_cores_only_where_the_system_can(monkeypatch):
-    monkeypatch.setattr("taichi_soft.cores.sys", SimpleNamespace(platform="win32"))
+    monkeypatch.setattr("taichi_soft.core.cores.sys", SimpleNamespace(platform="win32"))
     with pytest.raises(OptionError, match="on Linux with /proc only, not on win32"):
         init("cpu", cores=[0])
 
@@ -115,7 +115,7 @@ def test_left_alone_each_core_has_a_thread_bound_to_it_and_a_number_of_threads_i
     script = """
 import os, sys
 from taichi_soft import init
-from taichi_soft.cores import thread_ids
+from taichi_soft.core.cores import thread_ids
 there, before = os.sched_getaffinity(0), thread_ids()
 device = init(**eval(sys.argv[1]))
 places = [os.sched_getaffinity(thread) for thread in thread_ids() - before]
@@ -133,7 +133,7 @@ def test_where_the_system_refuses_no_thread_is_bound_and_cores_that_were_asked_f
     script = """
 import os, sys
 from taichi_soft import DeviceError, init
-from taichi_soft.cores import thread_ids
+from taichi_soft.core.cores import thread_ids
 inner, asked = os.sched_setaffinity, []
 def refuse(thread, cores):
     asked.append(thread)
@@ -225,7 +225,7 @@ def test_more_threads_than_cores_are_not_waited_for():
     """The flat schedule's threads wait for each other, so there must be no more than run."""
     script = """
 from taichi_soft import Material, World, box, device, init
-from taichi_soft.cores import available_cores
+from taichi_soft.core.cores import available_cores
 init("cpu", threads=64)
 assert device().threads == min(64, len(available_cores()))
 init("cpu", threads=64)
@@ -303,7 +303,7 @@ CHECKED = """
 import sys
 import numpy as np
 from taichi_soft import MeshShape, init
-from taichi_soft.runtime import ti
+from taichi_soft.core.runtime import ti
 
 init("cpu", threads=1)
 around = [ti.field(ti.f32, 1024)]  # a wrong access is made as well, where no memory may be

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from taichi_soft import init
-from taichi_soft.runtime import ti
+from taichi_soft.core.runtime import ti
 
 ROWS = 4096
 SMALL, SMALLER = np.float32(1e-30), np.float32(1e-10)  # their product is subnormal: under 1.2e-38

@@ -22,7 +22,7 @@ from taichi_soft import (
     init,
     internal_forces,
 )
-from taichi_soft.handles import Handle
+from taichi_soft.core.handles import Handle
 
 ROOT = Path(__file__).parents[1]
 CUBE, JELLY = box(cells=(2, 2, 2)), Material(1e5, 0.2, 1000.0, 20.0)

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.checks import as_indices
-from taichi_soft.errors import OptionError, StateError
-from taichi_soft.types import Schedule
+from taichi_soft.core.checks import as_indices
+from taichi_soft.core.errors import OptionError, StateError
+from taichi_soft.core.types import Schedule
 
 if TYPE_CHECKING:
-    from taichi_soft.body import Body
-    from taichi_soft.world import World
+    from taichi_soft.world.body import Body
+    from taichi_soft.world.world import World
 
 Rows32 = NDArray[np.float32]
 

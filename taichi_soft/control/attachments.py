@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.checks import as_flag
 from taichi_soft.control.access import change, named_particles, require_substeps, rows_of
 from taichi_soft.control.frames import Frame
-from taichi_soft.errors import OptionError, StateError
-from taichi_soft.handles import Handle, recorded
-from taichi_soft.kernels.pins import attach_particles, free_particles, read_reaction, write_feeling
+from taichi_soft.control.kernels.pins import attach_particles, free_particles, read_reaction, write_feeling
+from taichi_soft.core.checks import as_flag
+from taichi_soft.core.errors import OptionError, StateError
+from taichi_soft.core.handles import Handle, recorded
 
 if TYPE_CHECKING:
-    from taichi_soft.body import Body
+    from taichi_soft.world.body import Body
 
 
 class Attachment(Handle):

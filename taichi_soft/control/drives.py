@@ -8,12 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.checks import as_array, as_flag, as_number, as_vector
-from taichi_soft.constants import VELOCITY_LIMIT
 from taichi_soft.control.access import change, numbers, require_substeps, rows_of, some_particles
 from taichi_soft.control.impulses import LARGEST_IMPULSE
-from taichi_soft.errors import OptionError
-from taichi_soft.kernels.drives import (
+from taichi_soft.control.kernels.drives import (
     add_push,
     add_pushes,
     write_gravity_scale,
@@ -21,10 +18,13 @@ from taichi_soft.kernels.drives import (
     write_shelter,
     write_wind,
 )
+from taichi_soft.core.checks import as_array, as_flag, as_number, as_vector
+from taichi_soft.core.constants import VELOCITY_LIMIT
+from taichi_soft.core.errors import OptionError
 
 if TYPE_CHECKING:
-    from taichi_soft.body import Body
-    from taichi_soft.world import World
+    from taichi_soft.world.body import Body
+    from taichi_soft.world.world import World
 
 ForceField = Callable[[NDArray[np.float32], float], ArrayLike]
 """(positions (n, 3) [m], time [s]) -> accelerations (n, 3) [m/s^2]."""
@@ -82,9 +82,10 @@ def require_field(field: Any) -> ForceField | None:
     return field  # type: ignore[no-any-return]
 
 
-def push_by_field(world: World, field: ForceField) -> None:
+def push_by_field(world: World, field: ForceField) -> list[tuple[Body, NDArray[np.float32]]]:
     """Ask a force field for every body that moves, then push them all.
 
+    Returns: bodies and their accelerations, (n, 3) [m/s^2].
     Raises: what the field raises, or OptionError for what it returns; then no body is pushed.
     """
     rows = []
@@ -96,9 +97,7 @@ def push_by_field(world: World, field: ForceField) -> None:
                 raise OptionError(f"the force field must stay below {LARGEST_PUSH:g} m/s^2")
             rows.append((body, found.astype(np.float32)))
     push_bodies(rows)
-    recorder = world._handles.recorder
-    if recorder is not None:
-        recorder.pushes = [(body._serial, accelerations) for body, accelerations in rows]
+    return rows
 
 
 def push_bodies(rows: list[tuple[Body, Any]]) -> None:

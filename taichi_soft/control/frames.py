@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.checks import as_flag, as_rotation, as_vector
 from taichi_soft.control.jumps import carry
-from taichi_soft.errors import StateError
-from taichi_soft.handles import Handle, recorded
-from taichi_soft.kernels.pins import aim_pinned
+from taichi_soft.control.kernels.pins import aim_pinned
+from taichi_soft.core.checks import as_flag, as_rotation, as_vector
+from taichi_soft.core.errors import StateError
+from taichi_soft.core.handles import Handle, recorded
 
 if TYPE_CHECKING:
-    from taichi_soft.body import Body
+    from taichi_soft.bodies.fields import BodyFields
+    from taichi_soft.bodies.slots import Pools
     from taichi_soft.control.attachments import Attachment
-    from taichi_soft.pools import Pools
-    from taichi_soft.state import State
+    from taichi_soft.world.body import Body
 
 
 class Frames:
@@ -53,7 +53,7 @@ class Frames:
         """What hangs from a frame, body by body."""
         return [each for body in self._pools.living for each in body._attachments if each.frame is frame]
 
-    def aim(self, state: State, body_count: int, dt: float) -> None:
+    def aim(self, state: BodyFields, body_count: int, dt: float) -> None:
         """Give pinned particles the velocities of the coming step."""
         if self.has_work:
             self.has_work = aim_pinned(state, body_count, dt, self.coming) > 0

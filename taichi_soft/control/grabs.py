@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.checks import as_array, as_count, as_number, as_vector
-from taichi_soft.constants import GRAVITY_EARTH
+from taichi_soft.bodies.fields import MOST_GRABS
 from taichi_soft.control.access import change, numbers, require_substeps, rows_of
+from taichi_soft.control.kernels.grabs import end_grab, read_grab_force, write_grab, write_grab_target
 from taichi_soft.control.patches import patch_round
-from taichi_soft.errors import MeshError, OptionError, StateError
-from taichi_soft.handles import Handle, recorded
-from taichi_soft.kernels.grabs import end_grab, read_grab_force, write_grab, write_grab_target
-from taichi_soft.state import MOST_GRABS
+from taichi_soft.core.checks import as_array, as_count, as_number, as_vector
+from taichi_soft.core.constants import GRAVITY_EARTH
+from taichi_soft.core.errors import MeshError, OptionError, StateError
+from taichi_soft.core.handles import Handle, recorded
 
 if TYPE_CHECKING:
-    from taichi_soft.body import Body
+    from taichi_soft.world.body import Body
 
 WEIGHTS = 10.0
 """Strongest pull in weights of the body on Earth, where nothing else is asked for."""

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from taichi_soft.checks import as_number, as_vector
-from taichi_soft.constants import VELOCITY_LIMIT
 from taichi_soft.control.access import attempt, change, numbers, rouse, rows_of, some_particles
-from taichi_soft.errors import OptionError
-from taichi_soft.kernels.impulses import add_impulse_near, add_radial_impulse, add_velocity
+from taichi_soft.control.kernels.impulses import add_impulse_near, add_radial_impulse, add_velocity
+from taichi_soft.core.checks import as_number, as_vector
+from taichi_soft.core.constants import VELOCITY_LIMIT
+from taichi_soft.core.errors import OptionError
 
 if TYPE_CHECKING:
-    from taichi_soft.body import Body
-    from taichi_soft.world import World
+    from taichi_soft.world.body import Body
+    from taichi_soft.world.world import World
 
 LARGEST_IMPULSE = 1e20
 """[N s], and for forces [N]: beyond, float32 has no room for squares."""

@@ -8,17 +8,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.control.access import change, named_particles, rows_of
+from taichi_soft.control.joint_fields import JOINT_ROWS, MOST_JOINTS
+from taichi_soft.control.kernels.joints import end_joint, read_joint_impulse, write_joint
 from taichi_soft.control.patches import wave_speed
 from taichi_soft.control.places import Places, places_at, places_on
-from taichi_soft.errors import OptionError, StateError
-from taichi_soft.handles import Handle, recorded
-from taichi_soft.joint_fields import JOINT_ROWS, MOST_JOINTS
-from taichi_soft.kernels.islands import list_joined_islands
-from taichi_soft.kernels.joints import end_joint, read_joint_impulse, write_joint
+from taichi_soft.core.errors import OptionError, StateError
+from taichi_soft.core.handles import Handle, recorded
+from taichi_soft.solver.kernels.islands import list_joined_islands
 
 if TYPE_CHECKING:
-    from taichi_soft.body import Body
-    from taichi_soft.world import World
+    from taichi_soft.world.body import Body
+    from taichi_soft.world.world import World
 
 DRAW = 0.25
 """Speed at which a gap closes at most, over that of waves in the body times the root of the part of its mass

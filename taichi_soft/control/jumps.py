@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.constants import POSITION_LIMIT
 from taichi_soft.control.access import attempt, rouse
-from taichi_soft.errors import OptionError
-from taichi_soft.kernels.placement import jump
+from taichi_soft.control.kernels.placement import jump
+from taichi_soft.core.constants import POSITION_LIMIT
+from taichi_soft.core.errors import OptionError
 
 if TYPE_CHECKING:
-    from taichi_soft.body import Body
+    from taichi_soft.world.body import Body
 
 Floats = NDArray[np.float64]
 

@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from taichi_soft.constants import LANES
+from taichi_soft.bodies.kernels.constants import write_fours, write_masses, write_numbers
+from taichi_soft.bodies.layout import BodyArrays, BodyDescription, Ranges, blocks_of, rearrange
 from taichi_soft.control.access import change
-from taichi_soft.errors import MaterialError
-from taichi_soft.kernels.constants import write_fours, write_masses, write_numbers
-from taichi_soft.laws import fit_model
-from taichi_soft.scene import BodyArrays, BodyDescription, Ranges, blocks_of, rearrange
+from taichi_soft.core.constants import LANES
+from taichi_soft.core.errors import MaterialError
+from taichi_soft.elements.laws import fit_model
 
 if TYPE_CHECKING:
-    from taichi_soft.body import Body
-    from taichi_soft.state import State
+    from taichi_soft.bodies.fields import BodyFields
+    from taichi_soft.world.body import Body
 
 
 def set_material(body: Body, material: Any) -> None:
@@ -36,7 +36,7 @@ def set_damping(body: Body, damping: Any) -> None:
     set_material(body, replace(body.material, damping=damping))
 
 
-def write_constants(state: State, body: Body, description: BodyDescription) -> None:
+def write_constants(state: BodyFields, body: Body, description: BodyDescription) -> None:
     """Not a kernel, but called like one: what a body is made of lies in several fields."""
     arrays = rearrange(body._world._scene.bodies[body.index], description)
     place = body._redescribe(description, arrays)
@@ -53,7 +53,7 @@ def write_constants(state: State, body: Body, description: BodyDescription) -> N
         _write_bonds(state, arrays, place)
 
 
-def _tet_constants(state: State, arrays: BodyArrays) -> list[tuple[Any, Any]]:
+def _tet_constants(state: BodyFields, arrays: BodyArrays) -> list[tuple[Any, Any]]:
     """Fields of blocks of tetrahedra, with the rows of one body, (m, k)."""
     if len(arrays.tet_vertices) == 0:
         return []
@@ -65,7 +65,7 @@ def _tet_constants(state: State, arrays: BodyArrays) -> list[tuple[Any, Any]]:
     return found
 
 
-def _write_bonds(state: State, arrays: BodyArrays, place: Ranges) -> None:
+def _write_bonds(state: BodyFields, arrays: BodyArrays, place: Ranges) -> None:
     assert arrays.bonds is not None
     write_fours(state.edge_bond, place.edges[0], arrays.bonds.constants.astype(np.float32))
     if len(arrays.bonds.weights):

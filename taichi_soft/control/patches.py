@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.materials import SpringMaterial
-from taichi_soft.scene import BodyDescription
-from taichi_soft.state import PATCH_ROWS
+from taichi_soft.bodies.fields import PATCH_ROWS
+from taichi_soft.bodies.layout import BodyDescription
+from taichi_soft.elements.materials import SpringMaterial
 
 PATCH_SIZE = 0.25
 """Radius of a patch over the diagonal of the body: about the hold of a hand."""

@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.checks import as_array
-from taichi_soft.constants import POSITION_LIMIT
 from taichi_soft.control.access import attempt, change, named_particles, rouse, rows_of, some_particles
 from taichi_soft.control.attachments import attached_vertices, require_unattached
-from taichi_soft.errors import OptionError, StateError
-from taichi_soft.kernels.pins import free_particles, pin_particles, read_pinned, write_targets
+from taichi_soft.control.kernels.pins import free_particles, pin_particles, read_pinned, write_targets
+from taichi_soft.core.checks import as_array
+from taichi_soft.core.constants import POSITION_LIMIT
+from taichi_soft.core.errors import OptionError, StateError
 
 if TYPE_CHECKING:
-    from taichi_soft.body import Body
+    from taichi_soft.world.body import Body
 
 
 def pinned_vertices(body: Body) -> NDArray[np.int32]:

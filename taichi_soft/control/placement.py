@@ -7,18 +7,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from taichi_soft.checks import as_flag, as_rotation, as_vector
-from taichi_soft.constants import POSITION_LIMIT, VELOCITY_LIMIT
+from taichi_soft.bodies.layout import outer_vertices
+from taichi_soft.contact.clearance import require_clear
 from taichi_soft.control.access import attempt, numbers, rouse, some_particles
 from taichi_soft.control.attachments import require_unattached
 from taichi_soft.control.jumps import jump_to
-from taichi_soft.errors import OptionError
-from taichi_soft.kernels.placement import write_rigid_velocity
-from taichi_soft.scene import outer_vertices
-from taichi_soft.starts import require_clear
+from taichi_soft.control.kernels.placement import write_rigid_velocity
+from taichi_soft.core.checks import as_flag, as_rotation, as_vector
+from taichi_soft.core.constants import POSITION_LIMIT, VELOCITY_LIMIT
+from taichi_soft.core.errors import OptionError
 
 if TYPE_CHECKING:
-    from taichi_soft.body import Body
+    from taichi_soft.world.body import Body
 
 
 def set_velocity(body: Body, linear: ArrayLike, angular: ArrayLike) -> None:

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from taichi_soft.contact.kernels.touches import OF_BODY
 from taichi_soft.events.kinds import ContactBegan, ContactEnded
 from taichi_soft.events.memory import CONTACT_WIDTH, Known
-from taichi_soft.kernels.touches import OF_BODY
 
 if TYPE_CHECKING:
-    from taichi_soft.body import Body
-    from taichi_soft.colliders import Collider
+    from taichi_soft.contact.colliders import Collider
+    from taichi_soft.world.body import Body
 
 CONTACT_PAUSE = 0.05
 """Time without an impulse [s] after which a contact has ended. Single vertices of what rests, rolls or slides

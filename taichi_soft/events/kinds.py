@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from taichi_soft.body import Body
-    from taichi_soft.colliders import Collider
-    from taichi_soft.failures import Failure
+    from taichi_soft.bodies.failure import Failure
+    from taichi_soft.contact.colliders import Collider
+    from taichi_soft.world.body import Body
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -6,13 +6,13 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
-from taichi_soft.errors import OptionError, StateError
+from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.events.kinds import CONTACT_KINDS, KINDS, Event, Torn
 from taichi_soft.events.memory import Known, Memory
 from taichi_soft.events.witness import Witness
 
 if TYPE_CHECKING:
-    from taichi_soft.body import Body
+    from taichi_soft.world.body import Body
 
 MOST_EVENTS = 10_000
 """That wait to be drained; then the oldest are dropped."""

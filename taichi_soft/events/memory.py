@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from taichi_soft.bodies.status import ABSENT
+from taichi_soft.core.serialisation import as_plain, from_plain
 from taichi_soft.events.kinds import STRESS_KINDS, Event
-from taichi_soft.plain import as_plain, from_plain
-from taichi_soft.state import ABSENT
 
 if TYPE_CHECKING:
-    from taichi_soft.body import Body
-    from taichi_soft.colliders import Collider
+    from taichi_soft.contact.colliders import Collider
+    from taichi_soft.world.body import Body
 
 CONTACT_WIDTH = 11
 """A row of a contact: key (3), serial numbers of the two, began, touched, pause [s], impulse (3) [N s]."""

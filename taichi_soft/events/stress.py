@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.constants import LANES
+from taichi_soft.bodies.fields import BodyFields
+from taichi_soft.bodies.layout import Scene
+from taichi_soft.core.constants import LANES
+from taichi_soft.elements.kernels.stress import NO_LIMIT, read_stress
 from taichi_soft.events.kinds import Event, StressExceeded, TearCandidates
 from taichi_soft.events.memory import Known, WatchNote
-from taichi_soft.kernels.stress import NO_LIMIT, read_stress
-from taichi_soft.scene import Scene
-from taichi_soft.state import State
 
 if TYPE_CHECKING:
-    from taichi_soft.body import Body
+    from taichi_soft.world.body import Body
 
 BACK_BELOW = 0.9
 """Part of a threshold below which a tetrahedron has to come before it can come over it again: or one that
@@ -45,7 +45,7 @@ class _Watch:
 class StressWatches:
     """The bodies of one world whose stress is looked at after each step."""
 
-    def __init__(self, state: State, scene: Scene) -> None:
+    def __init__(self, state: BodyFields, scene: Scene) -> None:
         """Nothing is watched yet."""
         self._state = state
         self._scene = scene

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from taichi_soft.contact_fields import PAIR_ROWS
+from taichi_soft.bodies.layout import Scene
+from taichi_soft.bodies.status import ACTIVE, ASLEEP
+from taichi_soft.contact.fields import PAIR_ROWS
+from taichi_soft.contact.kernels.touches import OF_BODY, read_touches
 from taichi_soft.events.contacts import Contacts, Key
 from taichi_soft.events.kinds import (
     CONTACT_KINDS,
@@ -22,22 +25,19 @@ from taichi_soft.events.kinds import (
 )
 from taichi_soft.events.memory import Known, Memory
 from taichi_soft.events.stress import StressWatches
-from taichi_soft.kernels.touches import OF_BODY, read_touches
-from taichi_soft.scene import Scene
-from taichi_soft.state import ACTIVE, ASLEEP, State
 
 if TYPE_CHECKING:
-    from taichi_soft.body import Body
-    from taichi_soft.colliders import Collider, Colliders
+    from taichi_soft.contact.colliders import Collider, Colliders
+    from taichi_soft.world.body import Body
 
 
 class Witness:
     """Compares each step with the one before it."""
 
     def __init__(
-        self, state: State, scene: Scene, slots: Sequence[Body | None], colliders: Colliders | None
+        self, state: Any, scene: Scene, slots: Sequence[Body | None], colliders: Colliders | None
     ) -> None:
-        """Args: slots: the body in each; colliders: None in a world without contact."""
+        """Args: state: all fields of a world; slots: the body in each; colliders: None without contact."""
         self._state = state
         self._slots = slots
         self._colliders = colliders

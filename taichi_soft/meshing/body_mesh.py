@@ -9,7 +9,7 @@ from typing import NoReturn, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from taichi_soft.checks import as_array, as_positive, as_rotation
+from taichi_soft.core.checks import as_array, as_positive, as_rotation
 from taichi_soft.meshing.arrays import FloatArray, IntArray, read_only
 
 Self = TypeVar("Self", bound="BodyMesh")

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from taichi_soft.errors import MeshError, OptionError
+from taichi_soft.core.errors import MeshError, OptionError
 from taichi_soft.meshing.arrays import FloatArray
 from taichi_soft.meshing.quality import FLATTEST
 from taichi_soft.meshing.tet_mesh import TetMesh

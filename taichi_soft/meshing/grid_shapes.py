@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.checks import as_count, as_positive, to_array
-from taichi_soft.errors import MeshError, OptionError
+from taichi_soft.core.checks import as_count, as_positive, to_array
+from taichi_soft.core.errors import MeshError, OptionError
 from taichi_soft.meshing.arrays import MOST_TETS, FloatArray, require_tet_count
 from taichi_soft.meshing.tet_mesh import TetMesh
 

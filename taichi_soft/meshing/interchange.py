@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.errors import MeshError, SkippedCellsWarning
+from taichi_soft.core.errors import MeshError, SkippedCellsWarning
 from taichi_soft.meshing import gmsh, medit
 from taichi_soft.meshing.advice import filling
 from taichi_soft.meshing.tet_mesh import TetMesh

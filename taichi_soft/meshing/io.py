@@ -24,8 +24,8 @@ from typing import Any
 
 import numpy as np
 
-from taichi_soft.checks import as_path
-from taichi_soft.errors import MeshError
+from taichi_soft.core.checks import as_path
+from taichi_soft.core.errors import MeshError
 from taichi_soft.meshing.advice import filling, needing
 from taichi_soft.meshing.interchange import FORMATS, read_interchange, write_interchange
 from taichi_soft.meshing.tet_mesh import TetMesh

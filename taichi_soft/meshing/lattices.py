@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.checks import as_array, as_count, as_number, as_positive, to_array
-from taichi_soft.errors import MeshError, OptionError
+from taichi_soft.core.checks import as_array, as_count, as_number, as_positive, to_array
+from taichi_soft.core.errors import MeshError, OptionError
 from taichi_soft.meshing.arrays import FloatArray
 from taichi_soft.meshing.particle_mesh import ParticleMesh
 from taichi_soft.meshing.tet_mesh import TetMesh

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from taichi_soft.errors import MeshError
+from taichi_soft.core.errors import MeshError
 
 NODES = {
     b"Edges": 2,

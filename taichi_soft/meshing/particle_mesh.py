@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from taichi_soft.errors import MeshError
+from taichi_soft.core.errors import MeshError
+from taichi_soft.core.serialisation import serialised
 from taichi_soft.meshing.arrays import (
     FloatArray,
     IntArray,
@@ -20,6 +21,7 @@ from taichi_soft.meshing.arrays import (
 from taichi_soft.meshing.body_mesh import BodyMesh
 
 
+@serialised("vertices", "edges", "masses", "surface")
 class ParticleMesh(BodyMesh):
     """A body of particles and edges whose masses are given, not derived from a volume. Immutable.
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.checks import as_count, as_positive
-from taichi_soft.errors import OptionError
+from taichi_soft.core.checks import as_count, as_positive
+from taichi_soft.core.errors import OptionError
 from taichi_soft.meshing.arrays import FloatArray, as_indices, as_points, require_tet_count
 from taichi_soft.meshing.tet_mesh import TetMesh
 

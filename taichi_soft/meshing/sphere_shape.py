@@ -7,7 +7,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.checks import as_count, as_positive
+from taichi_soft.core.checks import as_count, as_positive
 from taichi_soft.meshing.arrays import FloatArray, require_tet_count
 from taichi_soft.meshing.tet_mesh import TetMesh
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from taichi_soft.errors import MeshError
+from taichi_soft.core.errors import MeshError
 from taichi_soft.meshing.arrays import as_points
 from taichi_soft.meshing.tet_mesh import TetMesh
 

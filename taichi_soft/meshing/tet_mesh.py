@@ -8,8 +8,9 @@ from typing import Any, Literal, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.checks import as_positive
-from taichi_soft.errors import MeshError
+from taichi_soft.core.checks import as_positive
+from taichi_soft.core.errors import MeshError
+from taichi_soft.core.serialisation import serialised
 from taichi_soft.meshing.arrays import FloatArray, IntArray, as_indices, as_points, name_vertices, read_only
 from taichi_soft.meshing.body_mesh import BodyMesh
 from taichi_soft.meshing.improvement import improve
@@ -17,6 +18,7 @@ from taichi_soft.meshing.quality import FLATTEST, MeshQuality, measure_quality
 from taichi_soft.meshing.topology import LOCAL_EDGES, edges_of, first_duplicate, surface_of
 
 
+@serialised("vertices", "tets")
 class TetMesh(BodyMesh):
     """A tetrahedral mesh, checked once and immutable from then on.
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.errors import MeshError
+from taichi_soft.core.errors import MeshError
 from taichi_soft.meshing.arrays import FloatArray
 from taichi_soft.meshing.tet_mesh import TetMesh
 

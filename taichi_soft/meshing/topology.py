@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.errors import MeshError
+from taichi_soft.core.errors import MeshError
 from taichi_soft.meshing.arrays import IntArray, name_vertices
 
 # The six edges of a tetrahedron in local vertex numbers.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.errors import MeshError
+from taichi_soft.core.errors import MeshError
 from taichi_soft.meshing.arrays import FloatArray
 from taichi_soft.meshing.delaunay import require_delaunay, scipy_spatial
 from taichi_soft.meshing.polygons import Polygons

@@ -1,8 +1,8 @@
 """Questions to bodies, as they are after the last step. Nothing is changed."""
 
+from taichi_soft.bodies.pose import Pose, best_fitting_pose
 from taichi_soft.queries.closest import ClosestPoint, find_closest_point
 from taichi_soft.queries.overlaps import Overlap, find_in_box, find_in_sphere
-from taichi_soft.queries.pose import Pose, best_fitting_pose
 from taichi_soft.queries.rays import RayHit, RayHits, cast_ray, cast_rays
 
 __all__ = [

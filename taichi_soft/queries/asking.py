@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.checks import as_number
-from taichi_soft.errors import OptionError
+from taichi_soft.core.checks import as_number
+from taichi_soft.core.errors import OptionError
 
 if TYPE_CHECKING:
-    from taichi_soft.body import Body
+    from taichi_soft.world.body import Body
 
 Floats = NDArray[np.float64]
 

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.checks import as_vector
-from taichi_soft.kernels.queries import find_closest
+from taichi_soft.bodies.fields import BodyFields
+from taichi_soft.core.checks import as_vector
 from taichi_soft.queries.asking import as_chosen, as_reach, just_beyond, read_answer
-from taichi_soft.state import State
+from taichi_soft.queries.kernels import find_closest
 
 if TYPE_CHECKING:
-    from taichi_soft.body import Body
+    from taichi_soft.world.body import Body
 
 Floats = NDArray[np.float64]
 
@@ -35,7 +35,7 @@ class ClosestPoint:
 
 
 def find_closest_point(
-    state: State,
+    state: BodyFields,
     handles: Sequence[Body | None],
     point: ArrayLike,
     max_distance: float,

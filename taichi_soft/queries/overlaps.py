@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.checks import as_number, as_rotation, as_vector
-from taichi_soft.constants import POSITION_LIMIT
-from taichi_soft.errors import OptionError
-from taichi_soft.kernels.queries import find_overlaps
+from taichi_soft.bodies.fields import BodyFields
+from taichi_soft.core.checks import as_number, as_rotation, as_vector
+from taichi_soft.core.constants import POSITION_LIMIT
+from taichi_soft.core.errors import OptionError
 from taichi_soft.queries.asking import as_chosen
-from taichi_soft.state import State
+from taichi_soft.queries.kernels import find_overlaps
 
 if TYPE_CHECKING:
-    from taichi_soft.body import Body
+    from taichi_soft.world.body import Body
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +33,7 @@ SMALLEST = 1e-9
 
 
 def find_in_sphere(
-    state: State,
+    state: BodyFields,
     handles: Sequence[Body | None],
     center: ArrayLike,
     radius: float,
@@ -48,7 +48,7 @@ def find_in_sphere(
 
 
 def find_in_box(
-    state: State,
+    state: BodyFields,
     handles: Sequence[Body | None],
     center: ArrayLike,
     size: ArrayLike,
@@ -67,7 +67,7 @@ def find_in_box(
 
 
 def _overlaps(
-    state: State,
+    state: BodyFields,
     handles: Sequence[Body | None],
     is_box: bool,
     shape: NDArray[np.float32],

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.checks import as_array, as_vector
-from taichi_soft.constants import POSITION_LIMIT
-from taichi_soft.errors import OptionError
-from taichi_soft.kernels.queries import find_hits
+from taichi_soft.bodies.fields import BodyFields
+from taichi_soft.core.checks import as_array, as_vector
+from taichi_soft.core.constants import POSITION_LIMIT
+from taichi_soft.core.errors import OptionError
 from taichi_soft.queries.asking import as_chosen, as_reach, just_beyond, read_answer
-from taichi_soft.state import State
+from taichi_soft.queries.kernels import find_hits
 
 if TYPE_CHECKING:
-    from taichi_soft.body import Body
+    from taichi_soft.world.body import Body
 
 Floats = NDArray[np.float64]
 
@@ -52,7 +52,7 @@ class RayHits:
 
 
 def cast_ray(
-    state: State,
+    state: BodyFields,
     handles: Sequence[Body | None],
     origin: ArrayLike,
     direction: ArrayLike,
@@ -74,7 +74,7 @@ def cast_ray(
 
 
 def cast_rays(
-    state: State,
+    state: BodyFields,
     handles: Sequence[Body | None],
     origins: ArrayLike,
     directions: ArrayLike,
@@ -98,7 +98,7 @@ def cast_rays(
 
 
 def _hits(
-    state: State,
+    state: BodyFields,
     handles: Sequence[Body | None],
     rays: NDArray[np.float32],
     max_distance: float,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
-from taichi_soft.checks import as_array
-from taichi_soft.errors import OptionError
+from taichi_soft.core.checks import as_array
+from taichi_soft.core.errors import OptionError
 
 
 def as_point(value: ArrayLike, name: str) -> tuple[float, float, float]:

@@ -2,9 +2,9 @@
 # (Taichi's argument annotations are values, which a type checker cannot read.)
 """Sky and floor, painted once per camera, and how light becomes a pixel."""
 
+from taichi_soft.core.runtime import ti
 from taichi_soft.render import look
 from taichi_soft.render.kernel_types import image, picture, reals, rows, vec3
-from taichi_soft.runtime import ti
 
 
 @ti.func

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.checks import as_array, as_count, as_number
-from taichi_soft.errors import OptionError
+from taichi_soft.core.checks import as_array, as_count, as_number
+from taichi_soft.core.errors import OptionError
 from taichi_soft.render.arguments import as_point
 
 Point = tuple[float, float, float]

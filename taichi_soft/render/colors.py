@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.checks import as_array, as_number, to_array
-from taichi_soft.errors import OptionError
+from taichi_soft.core.checks import as_array, as_number, to_array
+from taichi_soft.core.errors import OptionError
 from taichi_soft.render.arguments import as_color
 
 Color = tuple[float, float, float]

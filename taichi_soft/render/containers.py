@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.errors import VideoError
+from taichi_soft.core.errors import VideoError
 
 Frame = NDArray[np.uint8]
 CODECS = {".mp4": ("mp4v",), ".webm": ("VP90", "VP80")}  # in the order in which they are tried

@@ -7,8 +7,8 @@ numbers E_i . (u, v, 1) are positive, E_i being the cross product of the two oth
 be in front of the camera for that, so nothing is clipped. The same holds without perspective with d = 1.
 """
 
+from taichi_soft.core.runtime import ti
 from taichi_soft.render.kernel_types import TILE, int_rows, ints, matrix, row_vec3, rows
-from taichi_soft.runtime import ti
 
 PLANE = 12
 """Numbers per triangle: three edges and the depth, each a, b, c of a u + b v + c."""

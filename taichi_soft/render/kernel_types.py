@@ -2,7 +2,7 @@
 # (Taichi's argument annotations are values, which a type checker cannot read.)
 """Arguments of the drawing kernels. NumPy arrays go in as they are, and a new length compiles nothing."""
 
-from taichi_soft.runtime import ti
+from taichi_soft.core.runtime import ti
 
 TILE = 32
 """Pixels along a tile. Smaller ones repeat triangles, larger ones divide badly among threads."""

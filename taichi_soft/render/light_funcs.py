@@ -2,8 +2,8 @@
 # (Taichi's argument annotations are values, which a type checker cannot read.)
 """Light on a point: shadows from their maps, and what a body sends to the eye."""
 
+from taichi_soft.core.runtime import ti
 from taichi_soft.render import look
-from taichi_soft.runtime import ti
 
 COARSE = 4.0
 """Texels of the sun's map along one of the maps of far shadows."""

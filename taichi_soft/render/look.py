@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from taichi_soft.runtime import ti
+from taichi_soft.core.runtime import ti
 
 vec3 = ti.types.vector(3, ti.f32)
 

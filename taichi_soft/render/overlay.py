@@ -8,9 +8,9 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.checks import to_array
-from taichi_soft.errors import OptionError
-from taichi_soft.types import Choice
+from taichi_soft.core.checks import to_array
+from taichi_soft.core.errors import OptionError
+from taichi_soft.core.types import Choice
 
 Picture = NDArray[np.uint8]
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from taichi_soft.core.runtime import ti
 from taichi_soft.render.geometry_kernels import PLANE, project_triangles
 from taichi_soft.render.kernel_types import TILE, matrix
 from taichi_soft.render.raster_kernels import rasterize
 from taichi_soft.render.scene import SceneArrays
-from taichi_soft.runtime import ti
 
 # Places of samples inside a pixel [pixels]. Four lie on a turned grid: no two in a row or column, which
 # smooths the nearly upright and nearly level edges that the eye sees best.

@@ -6,8 +6,8 @@ Tiles are independent, and each goes through its triangles in their order: the r
 whatever the number of threads.
 """
 
+from taichi_soft.core.runtime import ti
 from taichi_soft.render.kernel_types import TILE, int_rows, ints, reals, rows, vec3
-from taichi_soft.runtime import ti
 
 
 @ti.func

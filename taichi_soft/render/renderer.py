@@ -8,8 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.checks import as_count, as_number
-from taichi_soft.errors import OptionError
+from taichi_soft.core.checks import as_count, as_number
+from taichi_soft.core.errors import OptionError
+from taichi_soft.core.runtime import init, is_initialized, ti
 from taichi_soft.render.backdrop_kernels import paint_backdrop
 from taichi_soft.render.camera import Camera
 from taichi_soft.render.colors import to_srgb
@@ -19,7 +20,6 @@ from taichi_soft.render.scene import SceneArrays
 from taichi_soft.render.shade_kernels import shade
 from taichi_soft.render.shadows import ShadowMaps
 from taichi_soft.render.surface import Surface
-from taichi_soft.runtime import init, is_initialized, ti
 
 LARGEST = 8192  # pixels along a picture; beyond it sample numbers leave 32 bits
 

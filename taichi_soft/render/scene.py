@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.errors import OptionError
+from taichi_soft.core.errors import OptionError
 from taichi_soft.render.geometry_kernels import compute_normals
 from taichi_soft.render.surface import Surface
 

@@ -2,10 +2,10 @@
 # (Taichi's argument annotations are values, which a type checker cannot read.)
 """Samples to colours, every frame: bodies in their light, and shadows on the floor behind them."""
 
+from taichi_soft.core.runtime import ti
 from taichi_soft.render.backdrop_kernels import pixel_ray, smoothstep, write_pixel
 from taichi_soft.render.kernel_types import TILE, image, int_rows, ints, picture, reals, row_vec3, rows, vec3
 from taichi_soft.render.light_funcs import floor_shadow, glow, sunlight
-from taichi_soft.runtime import ti
 
 
 @ti.func

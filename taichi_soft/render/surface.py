@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.checks import as_array, to_array
-from taichi_soft.errors import MeshError, OptionError
+from taichi_soft.core.checks import as_array, to_array
+from taichi_soft.core.errors import MeshError, OptionError
 from taichi_soft.meshing import BodyMesh, ParticleMesh, TetMesh
 from taichi_soft.render.colors import PALETTE, to_linear
 from taichi_soft.render.creases import split_at_creases

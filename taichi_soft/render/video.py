@@ -12,8 +12,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.checks import as_count, as_number, as_path
-from taichi_soft.errors import StateError, VideoError
+from taichi_soft.core.checks import as_count, as_number, as_path
+from taichi_soft.core.errors import StateError, VideoError
 from taichi_soft.render.containers import Container, Gif, Pictures, Stream, measure, quiet
 
 CONTAINERS: dict[str, type[Container]] = {".mp4": Stream, ".webm": Stream, ".gif": Gif, ".png": Pictures}

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from taichi_soft import state
-from taichi_soft.runtime import DEBUG
+from taichi_soft.bodies import fields as state
+from taichi_soft.core.runtime import DEBUG
 
 if os.environ.get(DEBUG) != "1":
     collect_ignore_glob = ["test_*.py"]

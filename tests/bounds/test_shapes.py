@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from taichi_soft import HeightFieldShape, MeshError, MeshShape, init
-from taichi_soft.collision.distance import signed_distance
-from taichi_soft.runtime import ti
+from taichi_soft.contact.distances.distance import signed_distance
+from taichi_soft.core.runtime import ti
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "collision"))
 

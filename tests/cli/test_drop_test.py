@@ -6,8 +6,8 @@ import sys
 
 import pytest
 
-from taichi_soft import drops
 from taichi_soft.cli import main
+from taichi_soft.lab import drop_test as drops
 
 
 @pytest.mark.parametrize(

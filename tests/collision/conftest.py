@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from taichi_soft import init
-from taichi_soft.collision.distance import signed_distance
-from taichi_soft.runtime import ti
+from taichi_soft.contact.distances.distance import signed_distance
+from taichi_soft.core.runtime import ti
 
 vec8 = ti.types.vector(8, ti.f32)
 ivec3 = ti.types.vector(3, ti.i32)

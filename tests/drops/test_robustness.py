@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from taichi_soft import LAWS, sphere
-from taichi_soft.drops.robustness import GROUPS, Verdict, choose_cells, law_variants, run_cell
-from taichi_soft.drops.robustness.cells import AXES, USUAL
-from taichi_soft.drops.robustness.verdict import Ending, judge
-from taichi_soft.drops.robustness.wrecks import WRECKS, distance_from_rest, wrecked
-from taichi_soft.errors import OptionError
-from taichi_soft.math.rotations import matrix_of
+from taichi_soft.core.errors import OptionError
+from taichi_soft.core.math.rotations import matrix_of
+from taichi_soft.lab.drop_test.robustness import GROUPS, Verdict, choose_cells, law_variants, run_cell
+from taichi_soft.lab.drop_test.robustness.cells import AXES, USUAL
+from taichi_soft.lab.drop_test.robustness.verdict import Ending, judge
+from taichi_soft.lab.drop_test.robustness.wrecks import WRECKS, distance_from_rest, wrecked
 
 SOUND = Ending(tets=40, failure=None, is_finite=True, flipped=0, speed=6.0, fastest=6.3)
 PLAIN = {

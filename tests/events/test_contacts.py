@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from taichi_soft.contact.kernels.touches import OF_BODY, OF_COLLIDER
 from taichi_soft.events.contacts import CONTACT_PAUSE, Contacts
-from taichi_soft.kernels.touches import OF_BODY, OF_COLLIDER
 
 FLOOR, PAIR, FAR_PAIR = (0, OF_COLLIDER, 0), (0, OF_BODY, 1), (2, OF_BODY, 10)
 DT = 1 / 60

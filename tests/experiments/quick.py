@@ -7,8 +7,8 @@ from contextlib import closing
 from functools import cache
 from pathlib import Path
 
-from taichi_soft.experiments import EXPERIMENTS, Effort, Result, Results, section_of
-from taichi_soft.sweep import Outcome, Store, origin
+from taichi_soft.lab.experiments import EXPERIMENTS, Effort, Result, Results, section_of
+from taichi_soft.lab.sweep import Outcome, Store, origin
 
 
 @cache

@@ -5,9 +5,9 @@ import pytest
 from quick import quick_results
 
 from taichi_soft import box
-from taichi_soft.experiments import Result, Results, Verdict, section_of
-from taichi_soft.experiments.dynamics import ENERGY_BUDGET, MOMENTUM_BUDGET
-from taichi_soft.experiments.dynamics.energy_budget import _damping_power, _energy_density
+from taichi_soft.lab.experiments import Result, Results, Verdict, section_of
+from taichi_soft.lab.experiments.dynamics import ENERGY_BUDGET, MOMENTUM_BUDGET
+from taichi_soft.lab.experiments.dynamics.energy_budget import _damping_power, _energy_density
 
 
 @pytest.mark.parametrize("law", ["st_venant_kirchhoff", "neo_hookean"])

@@ -5,9 +5,9 @@ import pytest
 from quick import altered, findings, quick_results, verdicts
 
 from taichi_soft import Material, voronoi_graph
-from taichi_soft.experiments import Verdict
-from taichi_soft.experiments.anisotropy import mesh_of
-from taichi_soft.experiments.directional_stiffness import directions
+from taichi_soft.lab.experiments import Verdict
+from taichi_soft.lab.experiments.anisotropy import mesh_of
+from taichi_soft.lab.experiments.directional_stiffness import directions
 from taichi_soft.meshing import EdgeRings
 
 SHARE = Material(1.0, 0.25, 1.0)

@@ -7,8 +7,8 @@ import pytest
 from quick import quick_results
 
 from taichi_soft import Material, box, internal_forces
-from taichi_soft.experiments import EXPERIMENTS, Results, Verdict, section_of
-from taichi_soft.experiments.energy_drift import damping_ratio, growth
+from taichi_soft.lab.experiments import EXPERIMENTS, Results, Verdict, section_of
+from taichi_soft.lab.experiments.energy_drift import damping_ratio, growth
 
 EXPERIMENT = EXPERIMENTS["energy-drift"]
 

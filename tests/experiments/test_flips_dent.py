@@ -8,8 +8,8 @@ import pytest
 from quick import quick_results
 
 from taichi_soft import load_mesh
-from taichi_soft.experiments import EXPERIMENTS, Results, Verdict, section_of
-from taichi_soft.stages import ASSETS
+from taichi_soft.lab.experiments import EXPERIMENTS, Results, Verdict, section_of
+from taichi_soft.render.stages import ASSETS
 
 EXPERIMENT = EXPERIMENTS["flips-dent"]
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from taichi_soft import OptionError, box
-from taichi_soft.experiments.pictures import GAP, frames_side_by_side, picture
+from taichi_soft.lab.experiments.pictures import GAP, frames_side_by_side, picture
 
 SIZE = (160, 120)
 

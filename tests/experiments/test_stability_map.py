@@ -7,8 +7,8 @@ import pytest
 from linear_motion import quadratic_form
 from quick import quick_results
 
-from taichi_soft.experiments import EXPERIMENTS, Results, Verdict, section_of
-from taichi_soft.experiments.stability_map import outcomes, sphere_mesh, window
+from taichi_soft.lab.experiments import EXPERIMENTS, Results, Verdict, section_of
+from taichi_soft.lab.experiments.stability_map import outcomes, sphere_mesh, window
 
 EXPERIMENT = EXPERIMENTS["stability-map"]
 

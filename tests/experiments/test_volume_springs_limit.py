@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from taichi_soft import Material, internal_forces
-from taichi_soft.experiments import EXPERIMENTS, Effort, Result, Results, Verdict, section_of
-from taichi_soft.experiments.irregular import cube
+from taichi_soft.lab.experiments import EXPERIMENTS, Effort, Result, Results, Verdict, section_of
+from taichi_soft.lab.experiments.irregular import cube
 
 EXPERIMENT = EXPERIMENTS["volume-springs-limit"]
 

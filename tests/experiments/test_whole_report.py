@@ -7,7 +7,7 @@ import sys
 import pytest
 from quick import quick_folder
 
-from taichi_soft.experiments import CLAIMS, EXPERIMENTS
+from taichi_soft.lab.experiments import CLAIMS, EXPERIMENTS
 
 TIMED = {claim for each in EXPERIMENTS.values() if each.is_timing for claim in each.claims}
 """Judged by a clock, which other tests disturb."""

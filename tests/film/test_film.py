@@ -6,8 +6,8 @@ import pytest
 
 from engine_adapter import FixedStep
 from taichi_soft import Material, OptionError, VideoError, World, box
-from taichi_soft.film import Actor, Stage, film
 from taichi_soft.render import Camera, Renderer
+from taichi_soft.render.film import Actor, Stage, film
 
 
 def falling_box(dt: float = 1 / 50) -> Stage:
@@ -33,7 +33,7 @@ def test_frames_show_every_fixed_step_where_both_rates_agree(tmp_path):
 def test_the_time_in_the_picture_is_that_of_the_body_in_it(tmp_path, monkeypatch):
     """In free fall from z0 the lowest point is at z0 - g t^2 / 2 at the time that the panel tells."""
     told, drawn = [], []
-    monkeypatch.setattr("taichi_soft.film.draw_text", lambda picture, lines: told.append(lines[1]))
+    monkeypatch.setattr("taichi_soft.render.film.draw_text", lambda picture, lines: told.append(lines[1]))
     original = Renderer.render
 
     def watched(self, surfaces):

@@ -16,9 +16,9 @@ from taichi_soft import (
     World,
     box,
 )
-from taichi_soft.film import Actor, Stage, film
 from taichi_soft.render import Camera, Renderer
-from taichi_soft.scenery import Prop, Scenery
+from taichi_soft.render.film import Actor, Stage, film
+from taichi_soft.render.scenery import Prop, Scenery
 
 
 def about_y(angle):

@@ -17,7 +17,7 @@ from taichi_soft import (
     stable_step,
     torus,
 )
-from taichi_soft.laws import element_model
+from taichi_soft.elements.laws import element_model
 
 MESHES = {
     "box": box((1.0, 0.6, 0.8), (2, 1, 2)),

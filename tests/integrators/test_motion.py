@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from taichi_soft import Material, box, internal_forces, sphere, stable_step
-from taichi_soft.laws import element_model
+from taichi_soft.elements.laws import element_model
 
 CUBE = box((1.0, 1.0, 1.0), (1, 1, 1))
 BALL = sphere(0.5, 2)

@@ -12,8 +12,8 @@ from scipy.sparse.linalg import eigsh
 from step_oracle import differences
 
 from taichi_soft import Material, beam, box, cylinder, delaunay_mesh, sphere, stable_step, torus
-from taichi_soft.laws import element_model, fit_model
-from taichi_soft.scene import BodyDescription
+from taichi_soft.bodies.layout import BodyDescription
+from taichi_soft.elements.laws import element_model, fit_model
 
 MESHES = {
     "box": box((1.0, 0.6, 0.8), (2, 1, 2)),

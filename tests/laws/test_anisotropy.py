@@ -19,7 +19,7 @@ from taichi_soft import (
     sphere,
     stable_step,
 )
-from taichi_soft.laws import element_model
+from taichi_soft.elements.laws import element_model
 
 STVK = ("st_venant_kirchhoff", None, None)
 # "face" makes the same forces of a stress as "virial" (test_stress_to_forces), so one of it will do.

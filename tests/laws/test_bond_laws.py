@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from taichi_soft import LAWS, Material, ParticleMesh, SpringMaterial, TetMesh, internal_forces
-from taichi_soft.errors import MaterialError, MeshError, OptionError
-from taichi_soft.laws import BondLaw
+from taichi_soft.core.errors import MaterialError, MeshError, OptionError
+from taichi_soft.elements.laws import BondLaw
 
 BONDS = [law.name for law in LAWS.values() if isinstance(law, BondLaw)]
 DIRECTIONAL = [name for name in BONDS if LAWS[name].takes_shear]

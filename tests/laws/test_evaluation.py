@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from taichi_soft import Material, MeshError, OptionError, ParticleMesh, internal_forces
-from taichi_soft.errors import MaterialError
+from taichi_soft.core.errors import MaterialError
 
 MESHES = oracle.MESHES
 BALL = MESHES["sphere"]
@@ -87,7 +87,7 @@ def test_unknown_choices_are_refused_with_the_list(option, value, text):
 
 
 def test_choices_may_be_enum_members():
-    from taichi_soft.types import DampingModel, Flips, Strain
+    from taichi_soft.core.types import DampingModel, Flips, Strain
 
     x = oracle.shaken(BALL, np.random.default_rng(0), 0.2)
     by_name = internal_forces(BALL, MATERIAL, x, x, strain="exact", flips="off", damping_model="edge")

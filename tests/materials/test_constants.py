@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from taichi_soft import PRESETS, Material, OptionError, box, internal_forces, preset
-from taichi_soft.errors import MaterialError, TaichiSoftError
+from taichi_soft.core.errors import MaterialError, TaichiSoftError
 
 CUBE = box((1, 1, 1), (1, 1, 1))
 GOOD = {"young": 1e6, "poisson": 0.3, "density": 1000.0, "damping": 10.0}

@@ -5,8 +5,8 @@ import pytest
 from scipy.optimize import linprog
 
 from taichi_soft import box
-from taichi_soft.math.triangle import closest_point_on_triangle, solid_angle, triangle_touches_box
-from taichi_soft.runtime import init, ti
+from taichi_soft.core.math.triangle import closest_point_on_triangle, solid_angle, triangle_touches_box
+from taichi_soft.core.runtime import init, ti
 
 
 @ti.kernel

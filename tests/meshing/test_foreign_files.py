@@ -11,7 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from taichi_soft.errors import MeshError, SkippedCellsWarning
+from taichi_soft.core.errors import MeshError, SkippedCellsWarning
 from taichi_soft.meshing import load_mesh, save_mesh, sphere
 
 meshio = pytest.importorskip("meshio")

@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from taichi_soft.errors import MeshError, OptionError
+from taichi_soft.core.errors import MeshError, OptionError
 from taichi_soft.meshing import ParticleMesh, TetMesh, load_mesh, save_mesh, sphere
 
 MESH = sphere(1.0, 2).translated([0.1, 1 / 3, -1e-7])

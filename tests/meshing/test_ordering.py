@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from taichi_soft.errors import MeshError
+from taichi_soft.core.errors import MeshError
 from taichi_soft.meshing import (
     TetMesh,
     box,

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from taichi_soft.errors import MeshError
+from taichi_soft.core.errors import MeshError
 from taichi_soft.meshing import BodyMesh, ParticleMesh
 
 SQUARE = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])

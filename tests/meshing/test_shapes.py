@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from taichi_soft.errors import MeshError, OptionError
+from taichi_soft.core.errors import MeshError, OptionError
 from taichi_soft.meshing import beam, box, cylinder, extrude, sphere, torus, voxels
 
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from taichi_soft.errors import MeshError, OptionError
+from taichi_soft.core.errors import MeshError, OptionError
 from taichi_soft.meshing import BodyMesh, TetMesh, beam, box, cylinder, extrude, sphere, torus, voxels
 
 CORNER = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])

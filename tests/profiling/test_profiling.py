@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from taichi_soft import box
-from taichi_soft.errors import DeviceError
-from taichi_soft.profiling import (
+from taichi_soft.core.errors import DeviceError
+from taichi_soft.lab.profiling import (
     compare_with_baseline,
     compile_baseline,
     find_compiler,
@@ -19,9 +19,9 @@ from taichi_soft.profiling import (
     measure_moments,
     scaling,
 )
-from taichi_soft.profiling.report import tables
-from taichi_soft.profiling.spread import Spread
-from taichi_soft.profiling.stolen import processor_ticks, stolen_since
+from taichi_soft.lab.profiling.report import tables
+from taichi_soft.lab.profiling.spread import Spread
+from taichi_soft.lab.profiling.stolen import processor_ticks, stolen_since
 
 needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler here")
 
@@ -109,7 +109,7 @@ def test_scaling_says_which_process_failed(monkeypatch):
 
 def test_stolen_time_is_told_of_what_the_processors_were_wanted_for(monkeypatch, tmp_path):
     times = tmp_path / "stat"
-    monkeypatch.setattr("taichi_soft.profiling.stolen.TIMES", times)
+    monkeypatch.setattr("taichi_soft.lab.profiling.stolen.TIMES", times)
     assert stolen_since(processor_ticks()) is None
     times.write_text("cpu  100 0 20 5000 30 0 0 10 0 0\ncpu0 1 2 3 4 5 6 7 8 0 0\n")
     before = processor_ticks()

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from taichi_soft.errors import OptionError
+from taichi_soft.core.errors import OptionError
 from taichi_soft.render import Camera
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from taichi_soft.errors import OptionError
+from taichi_soft.core.errors import OptionError
 from taichi_soft.render import Corner, draw_labels, draw_text
 
 LINES = ["t = 1.24 s", "frame 1.8 ms", "9.3 x real time"]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from taichi_soft import init
-from taichi_soft.errors import OptionError
+from taichi_soft.core.errors import OptionError
 from taichi_soft.meshing import box, sphere
 from taichi_soft.render import Camera, Renderer, Surface
 from taichi_soft.render.colors import to_linear

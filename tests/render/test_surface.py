@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from taichi_soft import init
-from taichi_soft.errors import MeshError, OptionError
+from taichi_soft.core.errors import MeshError, OptionError
 from taichi_soft.meshing import box, sphere
 from taichi_soft.render import PALETTE, Surface, colormap, highlight
 from taichi_soft.render.colors import to_linear, to_srgb

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from taichi_soft.errors import OptionError, StateError, VideoError
+from taichi_soft.core.errors import OptionError, StateError, VideoError
 from taichi_soft.render import VideoWriter
 
 WIDTH, HEIGHT = 96, 64

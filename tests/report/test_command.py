@@ -7,8 +7,8 @@ import pytest
 from fakes import NOTHING, SQUARES
 
 from taichi_soft import cli
-from taichi_soft.report import run
-from taichi_soft.runtime import Device
+from taichi_soft.core.runtime import Device
+from taichi_soft.lab.report import run
 
 
 @pytest.fixture

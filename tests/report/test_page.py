@@ -16,11 +16,21 @@ import numpy as np
 import pytest
 
 from taichi_soft import OptionError
-from taichi_soft.experiments import CLAIMS, Effort, Finding, Picture, Plot, Results, Section, Table, Verdict
-from taichi_soft.report.markdown import escaped
-from taichi_soft.report.page import write_report
-from taichi_soft.report.plots import png_of
-from taichi_soft.report.wording import duration, legible, readable
+from taichi_soft.lab.experiments import (
+    CLAIMS,
+    Effort,
+    Finding,
+    Picture,
+    Plot,
+    Results,
+    Section,
+    Table,
+    Verdict,
+)
+from taichi_soft.lab.report.markdown import escaped
+from taichi_soft.lab.report.page import write_report
+from taichi_soft.lab.report.plots import png_of
+from taichi_soft.lab.report.wording import duration, legible, readable
 
 VOID = {"meta", "img", "br", "hr", "link", "input"}
 

@@ -6,11 +6,11 @@ import sys
 import pytest
 from rich.console import Console
 
-from taichi_soft.drops.robustness import Verdict, choose_cells
-from taichi_soft.errors import OptionError
-from taichi_soft.experiments import Result
-from taichi_soft.report import robustness
-from taichi_soft.sweep import Store
+from taichi_soft.core.errors import OptionError
+from taichi_soft.lab.drop_test.robustness import Verdict, choose_cells
+from taichi_soft.lab.experiments import Result
+from taichi_soft.lab.report import robustness
+from taichi_soft.lab.sweep import Store
 
 VERDICTS = ("ok", "frozen", "inverted", "too slow")
 

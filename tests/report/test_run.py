@@ -7,10 +7,10 @@ import pytest
 from fakes import CARELESS, ROUGH, SQUARES
 from rich.console import Console
 
-from taichi_soft.errors import OptionError, SweepError
-from taichi_soft.experiments import EXPERIMENTS, Effort, Verdict
-from taichi_soft.report import extra, run
-from taichi_soft.sweep import Store
+from taichi_soft.core.errors import OptionError, SweepError
+from taichi_soft.lab.experiments import EXPERIMENTS, Effort, Verdict
+from taichi_soft.lab.report import extra, run
+from taichi_soft.lab.sweep import Store
 
 
 @pytest.fixture

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import trimesh
 
-import taichi_soft.shapes.mesh as mesh_module
+import taichi_soft.contact.shapes.mesh as mesh_module
 from taichi_soft import MeshShape
-from taichi_soft.shapes.grid_cache import cache_folder as default_folder
+from taichi_soft.contact.shapes.grid_cache import cache_folder as default_folder
 
 CUBE = trimesh.creation.box((1, 1, 1))
 BALL = trimesh.creation.icosphere(subdivisions=1)

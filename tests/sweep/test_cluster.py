@@ -5,8 +5,8 @@ from contextlib import closing
 import pytest
 from acts import act, root
 
-from taichi_soft.errors import SweepError
-from taichi_soft.sweep import Task, cluster_workers, compute_all, local_workers
+from taichi_soft.core.errors import SweepError
+from taichi_soft.lab.sweep import Task, cluster_workers, compute_all, local_workers
 
 TIME_LIMIT = 12.0
 """For a point that hangs [s]: longer than a shared machine stands still now and then."""
@@ -40,7 +40,7 @@ def test_the_same_numbers_come_from_a_cluster_and_from_this_machine(cluster):
 
 
 def test_workers_with_other_code_are_refused(cluster, monkeypatch):
-    monkeypatch.setattr("taichi_soft.sweep.sources._digest", lambda: "another")
+    monkeypatch.setattr("taichi_soft.lab.sweep.sources._digest", lambda: "another")
     with (
         pytest.raises(SweepError, match="install the same versions"),
         cluster_workers(cluster.scheduler_address),
@@ -76,7 +76,7 @@ def test_a_client_whose_thread_is_late_is_started_again(cluster, monkeypatch):
 
 @pytest.mark.parametrize("address", ["127.0.0.1:1", "nonsense", "moon://x:1", ""])
 def test_no_cluster_is_one_line(address, monkeypatch):
-    monkeypatch.setattr("taichi_soft.sweep.cluster.CONNECT_LIMIT", 1.0)
+    monkeypatch.setattr("taichi_soft.lab.sweep.cluster.CONNECT_LIMIT", 1.0)
     with pytest.raises(SweepError, match="dask scheduler") as caught, cluster_workers(address):
         pass
     assert repr(address) in str(caught.value)

@@ -5,8 +5,8 @@ import math
 
 import pytest
 
-from taichi_soft.errors import SweepError
-from taichi_soft.sweep import Outcome, Store, origin
+from taichi_soft.core.errors import SweepError
+from taichi_soft.lab.sweep import Outcome, Store, origin
 
 MINE = {"sources": "0123456789abcdef", "arch": "cpu"}
 OTHER = {"sources": "fedcba9876543210", "arch": "cpu"}

@@ -15,7 +15,7 @@ from taichi_soft import (
     World,
     box,
 )
-from taichi_soft.scene import arrange
+from taichi_soft.bodies.layout import arrange
 
 JELLY = Material(1e5, 0.2, 1000.0, 20.0)
 MESH = box(cells=(2, 2, 2))
@@ -55,7 +55,7 @@ def test_copies_are_arranged_once(monkeypatch):
         made.append(description)
         return arrange(description)
 
-    monkeypatch.setattr("taichi_soft.assets.arrange", counted)
+    monkeypatch.setattr("taichi_soft.bodies.asset.arrange", counted)
     world, kind = World(floor=None), cube()
     for x in range(4):
         world.add_body(MESH, JELLY, position=(3 * x, 0, 0))

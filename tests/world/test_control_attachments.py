@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from taichi_soft import FrozenBodyWarning, Material, OptionError, StateError, World, box
-from taichi_soft.kernels.readout import read_velocities
+from taichi_soft.bodies.kernels.readout import read_velocities
 
 SIDE = np.flatnonzero(box(cells=(2, 2, 2)).vertices[:, 0] < -0.4)
 WEIGHT = 9.81 * 1000.0

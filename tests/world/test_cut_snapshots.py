@@ -7,9 +7,9 @@ import pytest
 
 from engine_adapter import Rollback
 from taichi_soft import Material, Plasticity, SnapshotError, SoftBodyAsset, Tearing, World, box
-from taichi_soft.replay import replay
-from taichi_soft.sealed import seal, unseal
-from taichi_soft.snapshot import MARK, VERSION
+from taichi_soft.core.container import seal, unseal
+from taichi_soft.persistence.snapshot import MARK, VERSION
+from taichi_soft.render.replay import replay
 
 DT, SUBSTEPS = 1 / 60, 12
 BAR, SLAB = box((1.6, 0.4, 0.4), (8, 2, 2)), box((0.2, 0.8, 1.2), (1, 4, 6))

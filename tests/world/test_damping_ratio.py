@@ -10,11 +10,11 @@ from mode_oracle import assembled_stiffness, first_mode, lumped_masses
 from random_meshes import scattered
 
 from taichi_soft import Material, World, beam, box, internal_forces, sphere
-from taichi_soft.drops.robustness.foreign_meshes import FOREIGN_MESHES
-from taichi_soft.errors import MaterialError
-from taichi_soft.first_mode import first_frequency
-from taichi_soft.laws import element_model, fit_model
-from taichi_soft.scene import BodyDescription
+from taichi_soft.bodies.first_mode import first_frequency
+from taichi_soft.bodies.layout import BodyDescription
+from taichi_soft.core.errors import MaterialError
+from taichi_soft.elements.laws import element_model, fit_model
+from taichi_soft.lab.drop_test.robustness.foreign_meshes import FOREIGN_MESHES
 
 YOUNG, POISSON, DENSITY = 1e5, 0.3, 1000.0
 BALL = sphere(1.0, 6)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from taichi_soft import Device, FrozenBodyWarning, Material, World, box, sphere
-from taichi_soft.kernels.schedules import choose_schedule, make_launch
-from taichi_soft.types import Schedule
+from taichi_soft.core.types import Schedule
+from taichi_soft.solver.schedules import choose_schedule, make_launch
 
 GPU = Device("cuda", 1, "pretended")
 

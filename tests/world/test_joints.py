@@ -15,8 +15,8 @@ from taichi_soft import (
     box,
     rope,
 )
-from taichi_soft.joint_fields import JOINT_ROWS, MOST_JOINTS
-from taichi_soft.replay import replay
+from taichi_soft.control.joint_fields import JOINT_ROWS, MOST_JOINTS
+from taichi_soft.render.replay import replay
 
 G, DT = 9.81, 1 / 60
 BIG, SMALL = box(cells=(2, 2, 2)), box((0.7, 0.6, 0.5), (3, 3, 2))  # whose vertices lie nowhere alike

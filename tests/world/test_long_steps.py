@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from taichi_soft import Material, World, box, sphere
-from taichi_soft.kernels import schedules
+from taichi_soft.solver import schedules
 
 BALL, CUBE = sphere(0.3, 3), box((0.5,) * 3, (3, 3, 3))
 MATERIAL = Material(3e5, 0.3, 500.0)

@@ -5,8 +5,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from taichi_soft import MeshError, World, box, cloth, rope, sphere
-from taichi_soft.materials import SpringMaterial
-from taichi_soft.queries import best_fitting_pose
+from taichi_soft.bodies.pose import best_fitting_pose
+from taichi_soft.elements.materials import SpringMaterial
 
 RANDOM = np.random.default_rng(2)
 TURNS = [np.eye(3), *Rotation.random(4, random_state=3).as_matrix()]

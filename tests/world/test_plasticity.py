@@ -18,7 +18,7 @@ from taichi_soft import (
     World,
     box,
 )
-from taichi_soft.kernels.plasticity import read_rest_inverses
+from taichi_soft.bodies.kernels.plasticity import read_rest_inverses
 
 YOUNG, POISSON = 1e5, 0.3
 SHEAR = YOUNG / (2 * (1 + POISSON))

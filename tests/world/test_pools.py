@@ -21,9 +21,9 @@ from taichi_soft import (
     box,
     sphere,
 )
-from taichi_soft.kernels.schedules import make_launch
-from taichi_soft.runtime import ti
-from taichi_soft.types import Schedule
+from taichi_soft.core.runtime import ti
+from taichi_soft.core.types import Schedule
+from taichi_soft.solver.schedules import make_launch
 
 DT = 1 / 60
 JELLY = Material(1e5, 0.2, 1000.0, 20.0)

@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from taichi_soft import OptionError, SpringMaterial, StateError, World, box, cloth, rope, sphere
-from taichi_soft.state import ABSENT, ACTIVE, FROZEN
+from taichi_soft.bodies.status import ABSENT, ACTIVE, FROZEN
 
 NAN, INF = float("nan"), float("inf")
 SPRING = SpringMaterial(stiffness=100.0)

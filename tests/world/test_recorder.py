@@ -18,10 +18,10 @@ from taichi_soft import (
     box,
 )
 from taichi_soft.cli import main
-from taichi_soft.plain import to_json
-from taichi_soft.recorder import MARK, VERSION, read_recording
-from taichi_soft.replay import replay
-from taichi_soft.sealed import seal
+from taichi_soft.core.container import seal
+from taichi_soft.core.serialisation import to_json
+from taichi_soft.persistence.recorder import MARK, VERSION, read_recording
+from taichi_soft.render.replay import replay
 
 
 @pytest.fixture(scope="module")
@@ -176,7 +176,7 @@ def test_damaged_and_foreign_recordings_are_refused(game, tmp_path):
 
 def test_a_recording_inflates_to_so_much_and_no_more(game, tmp_path, monkeypatch):
     world, path = game
-    monkeypatch.setattr("taichi_soft.recorder.MOST_CONTENT", 1 << 20)
+    monkeypatch.setattr("taichi_soft.persistence.recorder.MOST_CONTENT", 1 << 20)
     bomb = tmp_path / "bomb.recording"
     bomb.write_bytes(seal(MARK, VERSION, [zlib.compress(b" " * (1 << 27), 9), b""]))
     tracemalloc.start()
@@ -186,7 +186,7 @@ def test_a_recording_inflates_to_so_much_and_no_more(game, tmp_path, monkeypatch
         assert tracemalloc.get_traced_memory()[1] < 1 << 23
     finally:
         tracemalloc.stop()
-    monkeypatch.setattr("taichi_soft.recorder.MOST_CONTENT", 1000)
+    monkeypatch.setattr("taichi_soft.persistence.recorder.MOST_CONTENT", 1000)
     before = path.read_bytes()
     with pytest.raises(SnapshotError, match="smaller record"):
         world.save_recording(path)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from taichi_soft import Material, World, box, sphere
-from taichi_soft.drops.robustness.foreign_meshes import sliver_lattice
+from taichi_soft.lab.drop_test.robustness.foreign_meshes import sliver_lattice
 
 BALL = sphere(1.0, 2)
 RNG = np.random.default_rng(4)

@@ -18,8 +18,8 @@ from taichi_soft import (
     World,
     box,
 )
-from taichi_soft.sealed import seal, unseal
-from taichi_soft.snapshot import MARK, VERSION
+from taichi_soft.core.container import seal, unseal
+from taichi_soft.persistence.snapshot import MARK, VERSION
 
 DT, STEPS, TICKS = 1 / 60, 12, 150
 BLOCK = box((0.4, 0.4, 0.4), cells=(2, 2, 2))

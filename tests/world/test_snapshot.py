@@ -23,8 +23,8 @@ from taichi_soft import (
     box,
     rope,
 )
-from taichi_soft.sealed import seal, unseal
-from taichi_soft.snapshot import MARK, VERSION
+from taichi_soft.core.container import seal, unseal
+from taichi_soft.persistence.snapshot import MARK, VERSION
 
 
 def middle():

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from taichi_soft import Contact, Material, TetMesh, World, box
-from taichi_soft.contact_fields import SLOTS
-from taichi_soft.kernels.soft_gaps import find_gaps
-from taichi_soft.runtime import ti
-from taichi_soft.state import State
+from taichi_soft.contact.fields import SLOTS
+from taichi_soft.contact.kernels.soft_gaps import find_gaps
+from taichi_soft.core.runtime import ti
+from taichi_soft.solver.state import State
 
 SOFT = Material(young=2e5, poisson=0.3, density=1000.0, damping=60.0)
 THICKNESS = 0.02

@@ -1,0 +1,229 @@
+"""What all bodies of one kind share: made once, placed many times."""
+
+from __future__ import annotations
+
+from dataclasses import KW_ONLY, dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taichi_soft.bodies.contact import DEFAULT_CONTACT, THIN, Contact
+from taichi_soft.bodies.first_mode import first_frequency
+from taichi_soft.bodies.layout import BodyArrays, BodyDescription, arrange, require_size
+from taichi_soft.bodies.plasticity import Plasticity
+from taichi_soft.bodies.stability import StableStep, stable_step
+from taichi_soft.bodies.tearing import Tearing
+from taichi_soft.core.checks import as_count, as_indices, as_rotation, as_vector
+from taichi_soft.core.constants import POSITION_LIMIT, VELOCITY_LIMIT
+from taichi_soft.core.errors import MaterialError, OptionError
+from taichi_soft.core.types import DampingModel, Flips, Strain
+from taichi_soft.elements.laws import ElementModel, default_law, element_model, fit_model
+from taichi_soft.elements.materials import AnisotropicMaterial, AnyMaterial, Material, SpringMaterial
+from taichi_soft.meshing import BodyMesh, ParticleMesh, TetMesh
+from taichi_soft.meshing.arrays import read_only
+
+Floats = NDArray[np.float64]
+Floats32 = NDArray[np.float32]
+
+DAMPING_INTERVAL = 0.5
+"""Between two times that vibrations are damped, over the time in which the first mode turns by a radian: 12
+times in its period."""
+
+
+@dataclass(frozen=True, eq=False)
+class SoftBodyAsset:
+    """A kind of body, immutable: what the bodies share that worlds make of it.
+
+    Args:
+        mesh: rest shape. A `ParticleMesh` (rope, cloth) takes law "springs".
+        material: constants in SI units; a `SpringMaterial` for a `ParticleMesh`.
+        law: one of `LAWS`: "virial" (thesis 6.3), "face" (6.2), "st_venant_kirchhoff", "neo_hookean"; and
+            along edges "springs" (3.4), "volume_springs" (chapter 5), "cmpm", "cmpm2",
+            "best_fitting_plane", "tilted_plane" and "tilted_plane_printed" (chapter 4). None takes
+            "neo_hookean"; "virial" where strain or another way with flips is chosen, or for an
+            `AnisotropicMaterial`; "springs" for a `SpringMaterial`.
+        strain: "linear" (eq. 6.7) or "exact" (square root of U^2); None takes the law's own.
+        flips: "tolerant" (the thesis: a mirrored tetrahedron is at rest too), "recover" or "off"; None
+            takes the law's own. A law with an energy does what follows from it, and takes no other.
+        damping_model: "edge" (eq. 3.9) or "tet_mean" (which section 6.4 rejects: it stops rotation).
+        pinned: vertices that stay where they are.
+        contact: how its surface touches others, in a world with colliders or soft contact.
+        spare_vertices: how many copies of vertices there is room for where `Body.cut` splits them; 0 for a
+            body that is not cut. Takes laws that look at tetrahedra. A cut through a body of n vertices needs
+            about n^(2/3).
+        plasticity: how it is bent for good; None for never. Takes laws that look at tetrahedra, and a
+            `Material`.
+        tearing: where it tears by itself, into its spare vertices; None for nowhere. Takes a `Material`.
+    Raises: MeshError, MaterialError or OptionError for bad input.
+    """
+
+    mesh: BodyMesh
+    material: AnyMaterial
+    _: KW_ONLY
+    law: str | None = None
+    strain: str | Strain | None = None
+    flips: str | Flips | None = None
+    damping_model: str | DampingModel = DampingModel.EDGE
+    pinned: ArrayLike = ()
+    contact: Contact = DEFAULT_CONTACT
+    plasticity: Plasticity | None = None
+    spare_vertices: int = 0
+    tearing: Tearing | None = None
+    description: BodyDescription = field(init=False)
+
+    def __post_init__(self) -> None:
+        if self.law is None:
+            object.__setattr__(self, "law", default_law(self.material, self.strain, self.flips))
+        assert self.law is not None
+        model = element_model(self.law, self.strain, self.flips, self.damping_model)
+        model = fit_model(model, self.mesh, self.material)
+        if not isinstance(self.contact, Contact):
+            raise OptionError(f"contact must be a Contact, got {self.contact!r}")
+        as_count(self.spare_vertices, "spare_vertices", 0)
+        if self.spare_vertices and model.has_bonds:
+            raise OptionError(f"law {self.law!r} cannot be cut: it looks at edges, 'virial' at tetrahedra")
+        if self.tearing is not None:
+            self._require_tears(model)
+        if self.plasticity is not None:
+            self._require_flow(model)
+        pinned = read_only(as_indices(self.pinned, "pinned", len(self.mesh.vertices)))
+        require_size(self.mesh)
+        description = BodyDescription(self.mesh, self.material, model, pinned)
+        _ = description.bonds  # made now, because a pairwise law may refuse the mesh
+        object.__setattr__(self, "pinned", pinned)
+        object.__setattr__(self, "description", description)
+
+    def _require_tears(self, model: ElementModel) -> None:
+        if not isinstance(self.tearing, Tearing):
+            raise OptionError(f"tearing must be a Tearing or None, got {self.tearing!r}")
+        if self.spare_vertices == 0:
+            raise OptionError("tearing takes spare_vertices: a tear makes copies of vertices")
+        if model.is_anisotropic:
+            raise MaterialError("an AnisotropicMaterial takes no tearing: its strength has directions too")
+
+    def _require_flow(self, model: ElementModel) -> None:
+        if not isinstance(self.plasticity, Plasticity):
+            raise OptionError(f"plasticity must be a Plasticity or None, got {self.plasticity!r}")
+        if model.has_bonds:
+            raise OptionError(
+                f"law {self.law!r} takes no plasticity: it looks at edges, 'virial' at tetrahedra"
+            )
+        if model.is_anisotropic:
+            raise MaterialError("an AnisotropicMaterial takes no plasticity: it does not yield by von Mises")
+
+    def __repr__(self) -> str:
+        return f"SoftBodyAsset({self.mesh!r}, {self.law!r})"
+
+    @cached_property
+    def arrays(self) -> BodyArrays:
+        """The body in the order in which the kernels walk it: slow to make, and made once."""
+        return arrange(self.description)
+
+    @cached_property
+    def stable_step(self) -> StableStep:
+        """Estimate of the largest stable substep."""
+        return stable_step(self.mesh, self.material, self.description.model)
+
+    @cached_property
+    def first_frequency(self) -> float:
+        """Angular frequency of the slowest vibration where nothing holds the body [rad/s], from above by less
+        than a fifth; 0 for ropes and cloth, which bend freely."""
+        return 0.0 if isinstance(self.mesh, ParticleMesh) else first_frequency(self.description)
+
+    def vibration_row(self, body: BodyDescription) -> tuple[float, float]:
+        """How vibrations of a body of this asset fade, which may be cut or of another material: at what rate
+        [1/s], and after what time at most they are damped again [s].
+
+        Of another material the frequency goes with the root of its mean stiffness over its mass.
+        """
+        material = body.material
+        if isinstance(material, SpringMaterial) or material.damping_ratio * self.first_frequency == 0.0:
+            return 0.0, 1.0
+        frequency = self.first_frequency
+        if material is not self.material:
+            frequency *= float(np.sqrt(_mean_stiffness(body) / _mean_stiffness(self.description)))
+        return 2.0 * material.damping_ratio * frequency, DAMPING_INTERVAL / max(frequency, 1e-6)
+
+    @cached_property
+    def surface_row(self) -> tuple[float, float, float]:
+        """Friction, thickness [m] and mean edge [m] of the surface, or of all where it has no triangles."""
+        corners = self.mesh.surface if len(self.mesh.surface) else self.mesh.edges
+        ends = self.mesh.vertices[np.concatenate([corners[:, :2], corners[:, -2:]])]
+        edge = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).mean())
+        thickness = self.contact.thickness
+        return self.contact.friction, THIN * edge if thickness is None else thickness, edge
+
+    @cached_property
+    def _center_of_mass(self) -> Floats:
+        masses = self.description.masses
+        return np.asarray(masses @ self.mesh.vertices / masses.sum())
+
+    @cached_property
+    def rest_rows(self) -> Floats32:
+        """Position, velocity, inverse mass and mass of each vertex, (n, 8), of a body where its mesh is."""
+        rows = np.zeros((len(self.mesh.vertices), 8), dtype=np.float32)
+        rows[:, :3] = self.mesh.vertices
+        rows[:, 6] = 1.0 / self.description.masses
+        rows[:, 7] = self.description.masses
+        rows[self.description.pinned, 6] = 0.0
+        return rows
+
+    def placed(
+        self,
+        position: ArrayLike,
+        rotation: ArrayLike | None,
+        velocity: ArrayLike,
+        angular_velocity: ArrayLike,
+        floor: float | None,
+    ) -> Floats32:
+        """Position, velocity, inverse mass and mass of each vertex of a body that begins there, (n, 8).
+
+        Args: as `World.spawn` takes them, and the height of the floor [m].
+        Raises: OptionError for bad values, a vertex that is too fast, and a place out of reach or below the
+            floor, which would crush the body.
+        """
+        origin, turn = as_vector(position, "position", "m"), as_rotation(rotation)
+        drift = as_vector(velocity, "velocity", "m/s", VELOCITY_LIMIT)
+        spin = as_vector(angular_velocity, "angular_velocity", "rad/s")
+        x = self.mesh.vertices @ turn.T + origin
+        self._require_place(x, origin, floor)
+        rows: Floats32 = self.rest_rows.copy()
+        rows[:, :3] = x
+        rows[:, 3:6] = drift
+        if spin.any():
+            a, b, c = spin
+            turning = np.array([[0, -c, b], [c, 0, -a], [-b, a, 0]])  # spin x r = turning @ r
+            rows[:, 3:6] += (x - (turn @ self._center_of_mass + origin)) @ turning.T
+            fastest = float(np.abs(rows[:, 3:6]).max())
+            if not fastest < VELOCITY_LIMIT:
+                raise OptionError(
+                    f"angular_velocity {spin.tolist()} rad/s makes a vertex as fast as {fastest:.4g} m/s: "
+                    f"stay below {VELOCITY_LIMIT:g}"
+                )
+        rows[self.description.pinned, 3:6] = 0.0
+        return rows
+
+    def _require_place(self, x: Floats, origin: Floats, floor: float | None) -> None:
+        if not np.abs(x).max() < POSITION_LIMIT:
+            raise OptionError(f"position puts the body beyond {POSITION_LIMIT:g} m: stay nearer the origin")
+        lowest, highest = float(x[:, 2].min()), float(x[:, 2].max())
+        if floor is not None and lowest < floor - 1e-3 * (highest - lowest):
+            depth = floor - lowest
+            raise OptionError(
+                f"the body starts {depth:.4g} m below the floor: position=({origin[0]:g}, {origin[1]:g}, "
+                f"{origin[2] + depth:.6g}) puts it on the floor, World(floor=None) has none"
+            )
+
+
+def _mean_stiffness(body: BodyDescription) -> float:
+    """Mean stiffness of a body over its mean density, but for a factor [m^2/s^2]."""
+    mesh, material = body.mesh, body.material
+    assert isinstance(mesh, TetMesh)
+    assert isinstance(material, Material | AnisotropicMaterial)
+    count = len(mesh.tets)
+    if isinstance(material, Material):
+        stiffness = material.per_tet("young", count)
+    else:
+        stiffness = np.trace(material.stiffness_matrices(count), axis1=1, axis2=2)
+    return float(mesh.volumes @ stiffness / (mesh.volumes @ material.per_tet("density", count)))

@@ -1,0 +1,47 @@
+"""How a body touches other bodies and colliders."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from taichi_soft.core.checks import as_count, as_flag, as_number
+from taichi_soft.core.constants import ALL_GROUPS
+from taichi_soft.core.serialisation import serialised
+
+THIN = 0.02
+"""Thickness over the mean edge of the surface, where none is given: it is not seen, and it is found by the
+search for contacts well before."""
+
+
+@serialised("friction", "thickness", "itself", "group", "mask")
+@dataclass(frozen=True)
+class Contact:
+    """What a body's surface does where it touches another.
+
+    Args:
+        friction: Coulomb coefficient, 0 or more. Between two bodies the geometric mean counts; against a
+            collider the collider's.
+        thickness: of a skin on the surface [m]: two bodies keep the mean of theirs between them. None takes
+            2 % of the mean edge of the surface.
+        itself: whether parts of the body touch each other that are more than 1.5 edges apart at rest.
+        group, mask: bits. Two bodies, or a body and a collider, touch where each one's mask has a bit of the
+            other's group.
+    Raises: OptionError for a value out of range.
+    """
+
+    friction: float = 0.5
+    thickness: float | None = None
+    itself: bool = False
+    group: int = 1
+    mask: int = ALL_GROUPS
+
+    def __post_init__(self) -> None:
+        as_number(self.friction, "friction", 0.0, 1e6, "a number from 0 to 1,000,000")
+        if self.thickness is not None:
+            as_number(self.thickness, "thickness", 0.0, 1e3, "a length of 0 to 1000 m, or None")
+        as_flag(self.itself, "itself")
+        as_count(self.group, "group", 0, ALL_GROUPS)
+        as_count(self.mask, "mask", 0, ALL_GROUPS)
+
+
+DEFAULT_CONTACT = Contact()

@@ -1,0 +1,429 @@
+"""The Taichi fields that hold particles, edges and tetrahedra of bodies.
+
+Fields live as long as the process: Taichi compiles kernels per set of fields, and destroying one while
+a game runs stalls it. A closed world therefore gives its fields back, and the next world that fits into
+them takes them over with its kernels compiled.
+"""
+
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.bodies.layout import BodyArrays, Ranges, Scene, blocks_of
+from taichi_soft.bodies.program import Program
+from taichi_soft.bodies.status import ABSENT
+from taichi_soft.core.constants import LANES
+from taichi_soft.core.loading import Loader
+from taichi_soft.core.runtime import make_fields, ti
+from taichi_soft.core.turns import in_turn
+
+ROOMS = "particles", "edges", "blocks", "triangles", "outer", "rings", "bodies"
+"""The numbers of a `Capacity` that a world does not notice if they are larger than it needs."""
+
+MOST_GRABS, PATCH_ROWS = 16, 128
+"""Grabs of one world at a time, and particles that one of them holds."""
+
+
+Room = TypeVar("Room", bound="BodyCapacity")
+
+
+@dataclass(frozen=True)
+class BodyCapacity:
+    """Room in a state. Rounded up to powers of two, so that similar worlds share compiled kernels."""
+
+    particles: int
+    edges: int
+    blocks: int
+    bodies: int
+    triangles: int
+    outer: int
+    parallel: bool  # room for the force of every corner and edge at once, as the flat schedule needs
+    rings: int = 0  # rows of what lies round edges, and whether edges carry force at all
+    implicit: bool = False  # room for the linear system of implicit integration
+    anisotropic: bool = False  # room for 21 elastic constants per tetrahedron
+    plastic: bool = False  # room for the first rest shapes of bodies that can be bent for good
+    double: bool = False  # float64 instead of float32: to evaluate forces, not to move
+
+    @classmethod
+    def of(
+        cls: type[Room],
+        scene: Scene,
+        *,
+        parallel: bool = False,
+        implicit: bool = False,
+        plastic: bool = False,
+        double: bool = False,
+        **others: Any,
+    ) -> Room:
+        """Room for `scene`. Lanes of its last body read on behind its particles and triangles.
+
+        Args: others: by name, of what a subclass adds.
+        """
+        return cls(
+            _power_of_two(scene.particle_count + LANES, 512),
+            _power_of_two(scene.edge_count, 2048),
+            _power_of_two(scene.block_count, 128),
+            _power_of_two(len(scene.bodies), 8),
+            _power_of_two(scene.triangle_count + LANES, 512),
+            _power_of_two(scene.outer_count, 512),
+            parallel,
+            _power_of_two(scene.ring_count, 512) if scene.has_bonds else 0,
+            implicit,
+            any(body.stiffness.any() for body in scene.bodies),
+            plastic,
+            double,
+            **others,
+        )
+
+    @property
+    def rooms(self) -> list[int]:
+        """How much room there is, in the order of `ROOMS`."""
+        return [getattr(self, name) for name in ROOMS]
+
+    def has_room_for(self, other: "BodyCapacity") -> bool:
+        """Whether a state of this capacity has the fields of one of `other`, and none of them shorter."""
+        widened = {name: max(getattr(self, name), getattr(other, name)) for name in ROOMS}
+        return replace(other, **widened) == self and (self.rings > 0) == (other.rings > 0)
+
+
+def _power_of_two(count: int, least: int) -> int:
+    return max(least, 1 << max(count - 1, 0).bit_length())
+
+
+@ti.data_oriented
+class BodyFields:
+    """Particles, edges, tetrahedra and bodies, each quantity one field.
+
+    Tetrahedra lie in blocks of `LANES`, quantity by quantity: entry k of lane l in block b of a quantity
+    with K entries is at (b K + k) LANES + l. The arrays are flat because Taichi 1.7 confuses stores at a
+    constant index with loads at a computed one in fields of several dimensions.
+    """
+
+    def __init__(self, capacity: BodyCapacity) -> None:
+        """Allocate `capacity`; contents are zero until `load`."""
+        self.capacity = capacity
+        self.programs: set[Program] = set()  # that it has been used with
+        self.loader = Loader()
+        n, k, b, bodies = capacity.particles, capacity.edges, capacity.blocks, capacity.bodies
+        real = self.real = ti.f64 if capacity.double else ti.f32
+        self.particle_position = ti.Vector.field(3, real, n)  # [m]
+        self.particle_velocity = ti.Vector.field(3, real, n)  # [m/s], see body_velocity_lag
+        # [N], zero between steps; with a fourth component, because four floats load and store in one piece.
+        self.particle_force = ti.Vector.field(4, real, n)
+        self.particle_mass = ti.field(real, n)  # [kg]
+        self.particle_inv_mass = ti.field(real, n)  # [1/kg], 0 where pinned
+        self.particle_body = ti.field(ti.i32, n)
+        self.particle_of_vertex = ti.field(ti.i32, n)  # where the caller's next vertex lies
+        self.prev_position = ti.Vector.field(3, real, n)  # before the last fixed step
+        self.prev_velocity = ti.Vector.field(3, real, n)
+        self.rest_position = ti.Vector.field(3, real, n)  # [m]
+        self.particle_aim = ti.field(ti.i32, n)  # where a pinned particle goes: see `control.kernels.pins`
+        self.particle_target = ti.Vector.field(3, real, n)  # there [m], or in the axes of a frame
+        self.particle_push = ti.Vector.field(3, real, n)  # [N], where the body is `PUSHED`
+        self.particle_reaction = ti.Vector.field(3, real, n)  # [N s] on what holds it, in the last step
+        self.prev_reaction = ti.Vector.field(3, real, n)  # the same before the step
+
+        self.tet_vertices = ti.field(ti.i32, b * 4 * LANES)
+        self.tet_rest_inverse = ti.field(real, b * 9 * LANES)  # [1/m], column by column
+        if capacity.plastic:
+            self.tet_original_inverse = ti.field(real, b * 9 * LANES)  # the same before any plastic flow
+            self.body_plasticity = ti.Vector.field(4, real, bodies)  # see `Plasticity.row`
+        self.tet_lame = ti.field(real, b * 2 * LANES)  # [Pa]
+        if capacity.anisotropic:
+            self.tet_stiffness = ti.field(real, b * 21 * LANES)  # [Pa], upper triangle row by row
+        self.tet_damping = ti.field(real, b * LANES)  # [N s/m], for damping by the mean velocity
+
+        self.edge_vertices = ti.Vector.field(2, ti.i32, k, layout=ti.Layout.SOA)
+        self.edge_blocks = ti.Vector.field(2, ti.i32, k)  # first row and number of edges from one particle
+        self.edge_damping = ti.field(real, k)  # [N s/m]
+        if capacity.rings:
+            self.edge_bond = ti.Vector.field(4, real, k, layout=ti.Layout.SOA)  # see `laws.bonds.Bonds`
+            self.edge_ring = ti.Vector.field(2, ti.i32, k)  # range in the rings
+            self.ring_members = ti.Vector.field(
+                4, ti.i32, capacity.rings
+            )  # particles, or slots of tetrahedra
+            self.ring_weights = ti.Vector.field(4, real, capacity.rings)
+            self.tet_inverse_volume6 = ti.field(real, b * LANES)  # 1 / (6 V0) [1/m^3]
+            self.tet_expansion_modulus = ti.field(real, b * LANES)  # E nu [Pa]
+            self.tet_pressure = ti.field(real, b * LANES)  # E nu dV / V0 [Pa]
+            self.edge_pressure = ti.field(real, k)  # [Pa], of all tetrahedra round an edge
+        if capacity.rings or capacity.implicit:
+            self.tet_edges = ti.field(ti.i32, b * 6 * LANES)
+        if capacity.implicit:
+            self.particle_block = ti.Matrix.field(3, 3, real, n)  # of the system, on its diagonal
+            self.particle_block_inverse = ti.Matrix.field(3, 3, real, n)
+            self.edge_block = ti.Matrix.field(3, 3, real, k)  # row of the first end, column of the second
+            self.solution = ti.Vector.field(3, real, n)  # change of velocity [m/s]
+            self.residual = ti.Vector.field(3, real, n)
+            self.direction = ti.Vector.field(3, real, n)
+            self.image = ti.Vector.field(3, real, n)
+            # 1 where the floor holds it, or a collider's number plus 1.
+            self.particle_contact = ti.field(ti.i32, n)
+            self.prev_contact = ti.field(ti.i32, n)  # before a piece of a step that may be taken back
+            self.body_residual = ti.field(real, bodies)  # largest of the last step, over the right-hand side
+            self.solver = ti.Vector.field(2, real, ())  # tolerance, most iterations
+        if capacity.parallel:
+            self.corner_force = ti.Vector.field(4, real, b * 4 * LANES)  # [N], corner by corner in each block
+            self.edge_force = ti.Vector.field(3, real, k)
+            self.particle_corners = ti.Vector.field(2, ti.i32, n)  # range in corner_slot
+            self.corner_slot = ti.field(ti.i32, b * 4 * LANES)  # where a corner lies in corner_force
+            self.particle_edges = ti.Vector.field(2, ti.i32, n)  # range in incident_edge
+            self.incident_edge = ti.field(ti.i32, 2 * k)  # e as first end, -1 - e as second
+            self.barrier = ti.field(ti.i32, 1)
+
+        self.triangle_vertices = ti.Vector.field(3, ti.i32, capacity.triangles)  # outward
+        self.outer_particle = ti.field(ti.i32, capacity.outer)  # of the surface, body by body
+
+        self.body_particles = ti.Vector.field(2, ti.i32, bodies)  # range
+        self.body_triangles = ti.Vector.field(2, ti.i32, bodies)
+        self.body_outer = ti.Vector.field(2, ti.i32, bodies)
+        self.body_edges = ti.Vector.field(2, ti.i32, bodies)
+        self.body_edge_blocks = ti.Vector.field(2, ti.i32, bodies)
+        self.body_blocks = ti.Vector.field(2, ti.i32, bodies)
+        self.body_model = ti.field(ti.i32, bodies)
+        self.body_status = ti.field(ti.i32, bodies)
+        self.body_velocity_lag = ti.field(real, bodies)  # substep [s] by half of which leapfrog lags
+        self.body_lower = ti.Vector.field(3, real, bodies)  # [m], box at the last query that needed it
+        self.body_upper = ti.Vector.field(3, real, bodies)
+        self.body_drives = ti.field(ti.i32, bodies)  # bits: what a game does to the body
+        self.body_gravity_scale = ti.field(real, bodies)
+        self.body_damping = ti.field(real, bodies)  # of velocities against the world [1/s]
+        self.body_fading = ti.field(real, bodies)  # of vibrations [1/s]
+        self.body_fading_interval = ti.field(
+            real, bodies
+        )  # after which they are damped again at the latest [s]
+        self.body_is_braked = ti.field(ti.i32, bodies)  # 1 while a step is made for the last time
+        self.body_patience = ti.field(ti.i32, bodies)  # steps in trouble; see `untangling`
+        self.body_jolted = ti.field(ti.i32, bodies)  # 1 where a step was too coarse
+        # Where a body is in a step that is made in several calls: attempt, next substep, 1 if gentle so far.
+        self.body_pause = ti.Vector.field(3, ti.i32, bodies)
+        self.body_edge = ti.field(real, bodies)  # mean edge of its surface [m]
+        self.retries = ti.field(
+            ti.i32, ()
+        )  # how often a step that fails is made again, twice as fine each time
+        self.block_model = ti.field(ti.i32, b)
+
+        self.grab_body = ti.field(ti.i32, MOST_GRABS)  # its number plus 1, 0 where nothing is held
+        self.grab_corners = ti.Vector.field(3, ti.i32, MOST_GRABS)
+        self.grab_weights = ti.Vector.field(3, real, MOST_GRABS)  # of the corners
+        self.grab_target = ti.Vector.field(3, real, MOST_GRABS)  # [m]
+        self.grab_spring = ti.Vector.field(3, real, MOST_GRABS)  # see `write_grab`
+        self.grab_limits = ti.Vector.field(3, real, MOST_GRABS)
+        self.grab_force = ti.Vector.field(3, real, MOST_GRABS)  # [N], in the last substep
+        self.grab_count = ti.field(ti.i32, MOST_GRABS)  # rows of the patch
+        self.patch_particle = ti.field(ti.i32, MOST_GRABS * PATCH_ROWS)
+        self.patch_share = ti.field(real, MOST_GRABS * PATCH_ROWS)
+
+        self.gravity = ti.Vector.field(3, real, ())  # [m/s^2]
+        self.wind = ti.Vector.field(4, real, ())  # [m/s], density times drag coefficient [kg/m^3]
+        self.floor = ti.Vector.field(3, real, ())  # height [m], restitution, friction
+
+    def load(self, scene: Scene, models: list[int], kinds: NDArray[np.float64] | None = None) -> None:
+        """Fill every field from `scene`, and those that `loader` has rows for already.
+
+        `models[i]` is the number of body i's force model, `kinds[i]` its `body_edge`, `body_fading` and
+        `body_fading_interval`.
+
+        All bodies are absent, and their particles where their meshes are, until `spawn_body` places them.
+        """
+        fill, ranges, bodies = self.loader.fill, scene.ranges, scene.bodies
+        position = _laid_out(scene, "particles", lambda b: b.rest_position)
+        fill(self.particle_position, position)
+        fill(self.prev_position, position)
+        fill(self.particle_velocity, np.zeros((0, 3)))
+        fill(self.prev_velocity, np.zeros((0, 3)))
+        fill(self.particle_force, np.zeros((0, 4)))
+        fill(self.particle_mass, _laid_out(scene, "particles", lambda b: b.mass))
+        inv_mass = _laid_out(scene, "particles", lambda b: 1.0 / b.mass)
+        for body, place in zip(bodies, ranges, strict=True):
+            inv_mass[body.pinned + place.particles[0]] = 0.0
+        fill(self.particle_inv_mass, inv_mass)
+        fill(self.particle_aim, np.zeros(0))
+        fill(self.particle_body, np.repeat(np.arange(len(bodies)), [np.diff(r.particles)[0] for r in ranges]))
+        fill(self.particle_of_vertex, _laid_out(scene, "particles", lambda b: b.rank, "particles"))
+
+        vertices, corners = _tet_blocks(bodies, ranges)
+        fill(self.tet_vertices, vertices)
+        inverses = _blocks(bodies, lambda b: np.swapaxes(b.rest_inverse, 1, 2), 9)
+        fill(self.tet_rest_inverse, inverses)
+        if self.capacity.plastic:
+            fill(self.tet_original_inverse, inverses)
+        fill(self.tet_lame, _blocks(bodies, lambda b: b.lame, 2))
+        if self.capacity.anisotropic:
+            fill(self.tet_stiffness, _blocks(bodies, lambda b: b.stiffness, 21))
+        fill(self.tet_damping, _blocks(bodies, lambda b: b.tet_damping, 1))
+
+        edges = _laid_out(scene, "edges", lambda b: with_spare_rows(b.edge_vertices), "particles")
+        fill(self.edge_vertices, edges)
+        fill(self.edge_blocks, _laid_out(scene, "edge_blocks", lambda b: b.edge_blocks, "edges", columns=1))
+        fill(self.edge_damping, _laid_out(scene, "edges", lambda b: with_spare_rows(b.edge_damping)))
+        if self.capacity.rings:
+            self._load_bonds(scene)
+        if self.capacity.rings or self.capacity.implicit:
+            names = [b.tet_edges + r.edges[0] for b, r in zip(bodies, ranges, strict=True)]
+            # The lanes that pad a last block pull the body's first edge with no pressure.
+            rows = [blocks_of(rows, 6, r.edges[0]) for rows, r in zip(names, ranges, strict=True)]
+            fill(self.tet_edges, np.concatenate(rows))
+        if self.capacity.implicit:
+            fill(self.particle_contact, np.zeros(0))
+        if self.capacity.parallel:
+            self._load_gather_lists(corners, edges, scene.particle_count)
+
+        fill(self.triangle_vertices, _laid_out(scene, "triangles", lambda b: b.triangles, "particles"))
+        fill(self.outer_particle, _laid_out(scene, "outer", lambda b: b.outer, "particles"))
+        fill(self.body_particles, _used(scene, "particles", lambda b: b.mass))
+        fill(self.body_triangles, _used(scene, "triangles", lambda b: b.triangles))
+        fill(self.body_outer, _used(scene, "outer", lambda b: b.outer))
+        fill(self.body_edges, _used(scene, "edges", lambda b: b.edge_vertices))
+        fill(self.body_edge_blocks, _used(scene, "edge_blocks", lambda b: b.edge_blocks))
+        fill(self.body_blocks, np.array([r.blocks for r in ranges]))
+        fill(self.body_model, np.array(models))
+        fill(self.body_status, np.full(len(bodies), ABSENT))
+        fill(self.body_velocity_lag, np.zeros(0))
+        fill(self.body_drives, np.zeros(0))
+        fill(self.grab_body, np.zeros(0))
+        # A world that was here before may have held particles that there are not any more.
+        for numbers in (self.grab_count, self.patch_particle, self.patch_share):
+            fill(numbers, np.zeros(0))
+        for rows in (self.grab_corners, self.grab_weights, self.grab_target, self.grab_spring):
+            fill(rows, np.zeros((0, 3)))
+        for rows in (self.grab_limits, self.grab_force):
+            fill(rows, np.zeros((0, 3)))
+        fill(self.body_damping, np.zeros(0))
+        fill(self.body_is_braked, np.zeros(0))
+        fill(self.body_jolted, np.zeros(0))
+        fill(self.body_patience, np.zeros(0))
+        fill(self.rest_position, position)
+        own = np.zeros((len(bodies), 3)) if kinds is None else kinds
+        fill(self.body_edge, own[:, 0])
+        fill(self.body_fading, own[:, 1])
+        fill(self.body_fading_interval, own[:, 2])
+        self.wind[None] = [0.0, 0.0, 0.0, 0.0]
+        fill(self.body_gravity_scale, np.ones(self.capacity.bodies))
+        fill(self.block_model, np.repeat(models, [r.blocks[1] - r.blocks[0] for r in ranges]))
+        self.loader.write()
+
+    def _load_bonds(self, scene: Scene) -> None:
+        """What the pairwise laws know of their edges; zeros for the edges of other bodies."""
+        fill, bodies = self.loader.fill, scene.bodies
+        constants, rings, members, weights = [], [], [], []
+        for body, place, rows in zip(bodies, scene.ranges, _spans(scene, "edges"), strict=True):
+            bonds = body.bonds
+            if bonds is None:
+                constants.append(np.zeros((rows, 4)))
+                rings.append(np.zeros((rows, 2), dtype=np.int32))
+                continue
+            names_tets = bonds.expansion_modulus is not None
+            first = place.blocks[0] * LANES if names_tets else place.particles[0]
+            constants.append(with_spare_rows(bonds.constants))
+            rings.append(with_spare_rows(bonds.ring + place.rings[0]))
+            members.append(bonds.members + first)
+            weights.append(bonds.weights)
+        fill(self.edge_bond, np.concatenate(constants))
+        fill(self.edge_ring, np.concatenate(rings))
+        fill(self.ring_members, np.concatenate(members))
+        fill(self.ring_weights, np.concatenate(weights))
+        fill(self.tet_inverse_volume6, _blocks(bodies, lambda b: np.linalg.det(b.rest_inverse), 1))
+        fill(self.tet_expansion_modulus, _blocks(bodies, lambda b: b.expansion_modulus, 1))
+        fill(self.edge_pressure, np.zeros(0))
+
+    def _load_gather_lists(self, corners: NDArray[np.int64], edges: NDArray[np.int64], count: int) -> None:
+        """For each particle, the corner forces and edge forces that act on it, in a fixed order."""
+        fill, order = self.loader.fill, np.argsort(corners[:, 0], kind="stable")
+        fill(self.corner_slot, corners[order, 1])
+        fill(self.particle_corners, _row_ranges(corners[:, 0], count))
+        numbers = np.flatnonzero(edges[:, 0] != edges[:, 1])  # without the spare rows
+        ends = edges[numbers].T.reshape(-1)
+        incident = np.concatenate([numbers, -1 - numbers])
+        fill(self.incident_edge, incident[np.argsort(ends, kind="stable")])
+        fill(self.particle_edges, _row_ranges(ends, count))
+
+
+def with_spare_rows(rows: NDArray[Any]) -> NDArray[Any]:
+    """A body's edges and `LANES` rows of zeros behind them, which lead from its first particle to itself."""
+    return np.concatenate([rows, np.zeros((LANES, *rows.shape[1:]), dtype=rows.dtype)])
+
+
+def _laid_out(scene: Scene, kind: str, rows_of, counted_from: str = "", columns=None):  # type: ignore[no-untyped-def]
+    """Rows of all bodies, each at the start of its range, with zeros in the room that is left.
+
+    `counted_from`: the kind of rows that the numbers in them name, which become rows of the world; in the
+    first so many `columns` where they are given.
+    """
+    parts = []
+    for body, place, span in zip(scene.bodies, scene.ranges, _spans(scene, kind), strict=True):
+        rows = np.array(rows_of(body))
+        if counted_from:
+            numbers = rows if columns is None else rows[:, :columns]
+            numbers += getattr(place, counted_from)[0]
+        parts += [rows, np.zeros((span - len(rows), *rows.shape[1:]), dtype=rows.dtype)]
+    return np.concatenate(parts)
+
+
+def _spans(scene: Scene, kind: str) -> NDArray[np.int64]:
+    """How many rows of a kind each body has for its own, used or not."""
+    starts = [getattr(place, kind)[0] for place in (*scene.ranges, scene.ends)]
+    return np.diff(starts)
+
+
+def _used(scene: Scene, kind: str, rows_of) -> NDArray[np.int64]:  # type: ignore[no-untyped-def]
+    """Which rows of its range each body uses, (bodies, 2)."""
+    starts = np.array([getattr(place, kind)[0] for place in scene.ranges])
+    return np.stack([starts, starts + [len(rows_of(body)) for body in scene.bodies]], axis=1)
+
+
+def _row_ranges(owner: NDArray[np.int64], count: int) -> NDArray[np.int64]:
+    ends = np.cumsum(np.bincount(owner, minlength=count))
+    return np.stack([np.concatenate([[0], ends[:-1]]), ends], axis=1)
+
+
+def _blocks(bodies: list[BodyArrays], quantity, width: int) -> NDArray[np.generic]:  # type: ignore[no-untyped-def]
+    return np.concatenate([blocks_of(quantity(body).reshape(-1, width), width, 0) for body in bodies])
+
+
+def _tet_blocks(
+    bodies: list[BodyArrays], ranges: list[Ranges]
+) -> tuple[NDArray[np.generic], NDArray[np.int64]]:
+    """Vertices of all blocks; and for each corner with a force its particle and its place in corner_force.
+
+    The lanes that pad a last block name the body's first particle four times: no shape, no force.
+    """
+    blocks, corners = [], []
+    for body, place in zip(bodies, ranges, strict=True):
+        rows = body.tet_vertices + place.particles[0]
+        blocks.append(blocks_of(rows, 4, place.particles[0]))
+        if body.bonds is not None:
+            continue
+        block, lane = np.divmod(np.arange(len(rows)), LANES)
+        for corner in range(4):
+            slot = ((block + place.blocks[0]) * 4 + corner) * LANES + lane
+            corners.append(np.stack([rows[:, corner], slot], axis=1))
+    none = np.zeros((0, 2), dtype=np.int64)
+    return np.concatenate(blocks), np.concatenate([none, *corners]).astype(np.int64)
+
+
+_free: list[BodyFields] = []
+
+Kind = TypeVar("Kind", bound=BodyFields)
+
+
+@in_turn
+def acquire(kind: type[Kind], capacity: BodyCapacity, program: Program) -> Kind:
+    """Fields of a kind with room for that: of those that closed worlds gave back one for which the step of
+    `program` is compiled, and of these the smallest; or new ones."""
+    fitting = [each for each in _free if type(each) is kind and each.capacity.has_room_for(capacity)]
+    if fitting:
+        fields = min(fitting, key=lambda each: (program not in each.programs, each.capacity.rooms))
+        _free.remove(fields)
+    else:
+        fields = make_fields(partial(kind, capacity))
+    fields.programs.add(program)
+    return fields
+
+
+def release(fields: BodyFields) -> None:
+    """Take back the fields of a world that is gone."""
+    _free.append(fields)

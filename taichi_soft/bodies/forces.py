@@ -1,0 +1,208 @@
+"""Internal forces of a mesh without a world: for tests and material studies."""
+
+from __future__ import annotations
+
+import weakref
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, DTypeLike, NDArray
+
+from taichi_soft.bodies.fields import BodyCapacity, BodyFields, acquire, release
+from taichi_soft.bodies.kernels.evaluate import compute_body_forces
+from taichi_soft.bodies.kernels.readout import write_motion
+from taichi_soft.bodies.layout import BodyDescription, Scene, arrange
+from taichi_soft.bodies.program import Program
+from taichi_soft.core.constants import POSITION_LIMIT
+from taichi_soft.core.errors import MeshError, OptionError
+from taichi_soft.core.runtime import init
+from taichi_soft.core.turns import in_turn
+from taichi_soft.core.types import DampingModel, Flips, Integrator, Strain
+from taichi_soft.elements.kernels.gradients import (
+    compute_bond_stiffness,
+    compute_system_stiffness,
+    compute_tet_stiffness,
+    compute_volume_pull,
+)
+from taichi_soft.elements.laws import element_model, fit_model
+from taichi_soft.elements.materials import AnyMaterial
+from taichi_soft.meshing import BodyMesh
+from taichi_soft.meshing.arrays import LARGEST_COORDINATE
+
+Floats = NDArray[np.float64]
+
+
+def internal_forces(
+    mesh: BodyMesh,
+    material: AnyMaterial,
+    positions: ArrayLike,
+    velocities: ArrayLike | None = None,
+    *,
+    law: str = "virial",
+    strain: str | Strain | None = None,
+    flips: str | Flips | None = None,
+    damping_model: str | DampingModel = DampingModel.EDGE,
+    dtype: DTypeLike = np.float64,
+) -> NDArray[Any]:
+    """Elastic and damping forces on every vertex of a deformed mesh [N].
+
+    The functions of a running world, in the precision asked for.
+    Args:
+        mesh: the body at rest.
+        material: constants of the body.
+        positions: deformed vertices, (n, 3) [m], in the mesh's order.
+        velocities: (n, 3) [m/s]; None leaves damping out.
+        law, strain, flips, damping_model: as in `World.add_body`.
+        dtype: float64 or float32, the precision of the whole computation.
+    Returns: (n, 3) of `dtype`.
+    Raises: OptionError for a name or dtype that is not known; MeshError for arrays that do not fit.
+    """
+    model = fit_model(element_model(law, strain, flips, damping_model), mesh, material)
+    real = _real(dtype)
+    x = _rows(positions, mesh, "positions", real)
+    v = np.zeros_like(x) if velocities is None else _rows(velocities, mesh, "velocities", real)
+    return _forces_of(BodyDescription(mesh, material, model), x, v)
+
+
+def force_gradient(
+    mesh: BodyMesh,
+    material: AnyMaterial,
+    positions: ArrayLike,
+    *,
+    law: str = "virial",
+    strain: str | Strain | None = None,
+    flips: str | Flips | None = None,
+    projected: bool = False,
+) -> NDArray[np.float64]:
+    """How the elastic forces on a deformed mesh change as its vertices move, in float64.
+
+    Laws of chapter 4 hold the normals of their planes (thesis 4.2); "cmpm2" and "best_fitting_plane", which
+    compare directions, take for an edge the matrix that "cmpm" would have with the same normal.
+    Args:
+        mesh, material, positions, law, strain, flips: as in `internal_forces`.
+        projected: as the system of implicit Euler has it, symmetric and negative semi-definite.
+    Returns: df/dx, (n, 3, n, 3) [N/m], all of it: for meshes of some hundred vertices.
+    Raises: as `internal_forces`.
+    """
+    model = fit_model(element_model(law, strain, flips), mesh, material)
+    model.require_integrator(Integrator.IMPLICIT_EULER)
+    x = _rows(positions, mesh, "positions", np.dtype(np.float64))
+    if not isinstance(projected, bool):
+        raise OptionError(f"projected must be True or False, got {projected!r}")
+    still = StillBody(BodyDescription(mesh, material, model), double=True, implicit=True)
+    still.forces(x, np.zeros_like(x))
+    return -(still.system_stiffness() if projected else still.exact_stiffness())
+
+
+class StillBody:
+    """One body in fields of its own: what a world computes with, without its motion."""
+
+    def __init__(self, body: BodyDescription, *, double: bool, implicit: bool = False) -> None:
+        """Put it into fields of float64 (`double`) or float32. Starts Taichi if nobody has."""
+        init()
+        self.body = body
+        self._rows = arrange(body)
+        self._program = Program((body.model,))
+        scene = Scene()
+        scene.append(self._rows)
+        self._state = acquire(
+            BodyFields, BodyCapacity.of(scene, double=double, implicit=implicit), self._program
+        )
+        weakref.finalize(self, release, self._state)
+        self._state.load(scene, [0])
+
+    def forces(self, positions: NDArray[Any], velocities: NDArray[Any]) -> NDArray[Any]:
+        """Internal forces there, (n, 3) [N], in the mesh's order."""
+        write_motion(self._state, 0, positions, velocities)
+        rows = np.empty_like(positions)
+        compute_body_forces(self._state, self._program, 0, rows)
+        return np.asarray(rows[self._rows.rank])
+
+    def exact_stiffness(self) -> Floats:
+        """-df/dx where the forces were asked for last, (n, 3, n, 3) [N/m], in the mesh's order."""
+        n, body = len(self._rows.mass), self._rows
+        total = np.zeros((n, n, 3, 3))
+        if not self.body.model.has_bonds:
+            elements = np.zeros((len(body.tet_vertices), 12, 12))
+            compute_tet_stiffness(self._state, self.body.model, elements)
+            _add_blocks(total, body.tet_vertices, elements)
+            return self._in_mesh_order(total)
+        bonds = np.zeros((len(body.edge_vertices), 3, 3))
+        compute_bond_stiffness(self._state, self.body.model.law, bonds)
+        _add_blocks(total, body.edge_vertices, np.block([[bonds, -bonds], [-bonds, bonds]]))
+        if self.body.model.reads_expansion:
+            gradients, pulls = (np.zeros((len(body.tet_vertices), 4, 3)) for _ in range(2))
+            compute_volume_pull(self._state, gradients, pulls)
+            outer = pulls.reshape(-1, 12, 1) * gradients.reshape(-1, 1, 12)
+            _add_blocks(total, body.tet_vertices, outer)
+        return self._in_mesh_order(total)
+
+    def system_stiffness(self) -> Floats:
+        """The same as implicit Euler's system has it: projected, in blocks of particles and edges."""
+        n, (p, q) = len(self._rows.mass), self._rows.edge_vertices.T
+        compute_system_stiffness(self._state, self._program)
+        total = np.zeros((n, n, 3, 3))
+        total[np.arange(n), np.arange(n)] = self._state.particle_block.to_numpy()[:n]
+        blocks = self._state.edge_block.to_numpy()[: len(p)]
+        total[p, q] = blocks
+        total[q, p] = np.swapaxes(blocks, 1, 2)
+        return self._in_mesh_order(total)
+
+    def _in_mesh_order(self, total: Floats) -> Floats:
+        rank = self._rows.rank
+        return np.asarray(total[rank][:, rank].transpose(0, 2, 1, 3))
+
+
+def _add_blocks(total: Floats, owners: NDArray[np.int32], elements: Floats) -> None:
+    """Add elements (m, 3 c, 3 c) to the blocks (n, n, 3, 3) of their c owners (m, c)."""
+    corners = owners.shape[1]
+    blocks = elements.reshape(-1, corners, 3, corners, 3)
+    for i in range(corners):
+        for j in range(corners):
+            np.add.at(total, (owners[:, i], owners[:, j]), blocks[:, i, :, j])
+
+
+_last: dict[bool, StillBody] = {}
+
+
+@in_turn
+def _forces_of(body: BodyDescription, positions: NDArray[Any], velocities: NDArray[Any]) -> NDArray[Any]:
+    """By the still body of the last call in this precision if it is the same, for loops over deformations."""
+    double = positions.dtype == np.float64
+    last = _last.get(double)
+    if last is not None:
+        known = last.body  # its parts are equal to themselves only
+        if (known.mesh, known.material, known.model) != (body.mesh, body.material, body.model):
+            del _last[double], last  # their fields serve the next
+    if double not in _last:
+        _last[double] = StillBody(body, double=double)
+    return _last[double].forces(positions, velocities)
+
+
+def _real(dtype: DTypeLike) -> np.dtype[Any]:
+    try:
+        real = np.dtype(dtype)
+    except TypeError:
+        raise OptionError(f"dtype must be float64 or float32, got {dtype!r}") from None
+    if real not in (np.dtype(np.float64), np.dtype(np.float32)):
+        raise OptionError(f"dtype must be float64 or float32, got {real}")
+    return real
+
+
+def _rows(values: ArrayLike, mesh: BodyMesh, name: str, real: np.dtype[Any]) -> NDArray[Any]:
+    try:
+        given = np.asarray(values)
+        rows = np.array(given, dtype=real if given.dtype.kind in "iuf" else None, order="C")
+        if rows.dtype != real:
+            raise TypeError
+    except (TypeError, ValueError):
+        raise MeshError(f"{name} must be an array of numbers, got {type(values).__name__}") from None
+    if rows.shape != mesh.vertices.shape:
+        raise MeshError(f"{name} has shape {rows.shape}: this mesh needs {mesh.vertices.shape}")
+    if not np.isfinite(rows).all():
+        raise MeshError(f"{name}[{int(np.argmin(np.isfinite(rows).all(axis=1)))}] is not finite")
+    limit = POSITION_LIMIT if real == np.float32 else LARGEST_COORDINATE
+    if np.abs(rows).max() > limit:
+        wider = ": use dtype float64" if real == np.float32 else ""
+        raise MeshError(f"{name} go up to {np.abs(rows).max():g}, beyond {limit:g}{wider}")
+    return rows

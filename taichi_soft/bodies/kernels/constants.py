@@ -1,0 +1,34 @@
+"""Constants of one body written anew between two steps: rows of a flat field from a given one on."""
+
+from taichi_soft.core.runtime import ti
+
+
+@ti.kernel
+def write_numbers(target: ti.template(), first: ti.i32, rows: ti.types.ndarray(dtype=ti.f32, ndim=1)):
+    """Copy numbers into a field of numbers."""
+    ti.loop_config(serialize=True)
+    for i in range(rows.shape[0]):
+        target[first + i] = rows[i]
+
+
+@ti.kernel
+def write_fours(target: ti.template(), first: ti.i32, rows: ti.types.ndarray(dtype=ti.f32, ndim=2)):
+    """Copy rows of four into a field of vectors."""
+    ti.loop_config(serialize=True)
+    for i in range(rows.shape[0]):
+        target[first + i] = ti.Vector([rows[i, 0], rows[i, 1], rows[i, 2], rows[i, 3]])
+
+
+@ti.kernel
+def write_masses(
+    state: ti.template(),
+    first: ti.i32,
+    masses: ti.types.ndarray(dtype=ti.f32, ndim=1),
+    inverses: ti.types.ndarray(dtype=ti.f32, ndim=1),
+):
+    """Masses [kg] and their inverses; pinned particles keep an inverse of zero."""
+    ti.loop_config(serialize=True)
+    for i in range(masses.shape[0]):
+        p = first + i
+        state.particle_mass[p] = masses[i]
+        state.particle_inv_mass[p] = ti.select(state.particle_inv_mass[p] > 0.0, inverses[i], 0.0)

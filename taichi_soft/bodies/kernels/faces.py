@@ -1,0 +1,88 @@
+"""Faces of a deformed surface: its triangles; or, of a body without any, its vertices.
+
+A vertex counts as a triangle of no size. Rays cannot hit it, and it has a nearest point like any other.
+"""
+
+from taichi_soft.bodies.status import ABSENT
+from taichi_soft.core.math.triangle import solid_angle
+from taichi_soft.core.runtime import ti
+
+INSIDE = 6.283
+"""Solid angle [sr] from which on a point counts as inside: half of the 4 pi that a whole surface fills."""
+
+
+@ti.func
+def face_count(state: ti.template(), body):
+    """Triangles of a body, or vertices where it has none; 0 for a body that is not there."""
+    triangles, particles = state.body_triangles[body], state.body_particles[body]
+    count = triangles[1] - triangles[0]
+    if count == 0:
+        count = particles[1] - particles[0]
+    if state.body_status[body] == ABSENT:
+        count = 0
+    return count
+
+
+@ti.func
+def face_particles(state: ti.template(), body, face):
+    """Particles of a triangle, or three times that of a vertex."""
+    triangles = state.body_triangles[body]
+    particles = ti.Vector.one(ti.i32, 3)
+    if triangles[1] > triangles[0]:
+        particles = state.triangle_vertices[triangles[0] + face]
+    else:
+        particles *= state.particle_of_vertex[state.body_particles[body][0] + face]
+    return particles
+
+
+@ti.func
+def face_corners(state: ti.template(), body, face, origin):
+    """Corners of a face as seen from `origin` [m]."""
+    v = face_particles(state, body, face)
+    x = ti.static(state.particle_position)
+    return x[v[0]] - origin, x[v[1]] - origin, x[v[2]] - origin
+
+
+@ti.func
+def box_around(state: ti.template(), body):
+    """Least and greatest coordinates of a body [m]."""
+    outer = state.body_outer[body]
+    lower = ti.Vector([1e30, 1e30, 1e30])
+    upper = -lower
+    for i in range(outer[0], outer[1]):
+        x = state.particle_position[state.outer_particle[i]]
+        lower, upper = ti.select(x < lower, x, lower), ti.select(x > upper, x, upper)  # quicker than min, max
+    return lower, upper
+
+
+@ti.func
+def is_inside(state: ti.template(), body, x):
+    """Whether a body's surface goes round a point more than half, mirrored surfaces too."""
+    total = x.x * 0.0
+    for face in range(face_count(state, body)):
+        a, b, c = face_corners(state, body, face, x)
+        total += solid_angle(a, b, c)
+    return ti.abs(total) > INSIDE
+
+
+@ti.func
+def write_place(state: ti.template(), row, out: ti.template(), body, face, weights, distance, away):
+    """Distance, weights, point, unit normal (`away` where the face has none), body and face of an answer.
+
+    As float32 all of them: 16 million faces are counted exactly.
+    """
+    v = face_particles(state, body, face)
+    x = ti.static(state.particle_position)
+    a, b, c = x[v[0]], x[v[1]] - x[v[0]], x[v[2]] - x[v[0]]
+    point = a + b * weights[1] + c * weights[2]
+    normal = b.cross(c)
+    if normal.norm() < 1e-30:
+        normal = away
+    normal /= ti.max(normal.norm(), 1e-30)
+    for k in ti.static(range(3)):
+        out[row, 1 + k] = weights[k]
+        out[row, 4 + k] = point[k]
+        out[row, 7 + k] = normal[k]
+    out[row, 0] = distance
+    out[row, 10] = body
+    out[row, 11] = face

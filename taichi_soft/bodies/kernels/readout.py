@@ -1,0 +1,60 @@
+"""Copies between the fields of a world and the caller's arrays, in the caller's vertex order."""
+
+from taichi_soft.bodies.status import ABSENT, ACTIVE, PLACED
+from taichi_soft.core.runtime import ti
+
+
+@ti.kernel
+def read_positions(state: ti.template(), alpha: ti.f32, out: ti.types.ndarray(dtype=ti.f32, ndim=2)):
+    """Positions of all bodies [m], `alpha` of the way from the previous step (0) to the last one (1).
+
+    Rows of absent bodies are left alone.
+    """
+    ti.loop_config(serialize=True)
+    for body in range(state.capacity.bodies):
+        rows = state.body_particles[body]
+        if state.body_status[body] != ABSENT:
+            for i in range(rows[0], rows[1]):
+                p = state.particle_of_vertex[i]
+                before, after = state.prev_position[p], state.particle_position[p]
+                x = before + alpha * (after - before)
+                if alpha == 1.0:
+                    x = after
+                for k in ti.static(range(3)):
+                    out[i, k] = x[k]
+
+
+@ti.kernel
+def read_velocities(
+    state: ti.template(), begin: ti.i32, count: ti.i32, out: ti.types.ndarray(dtype=ti.f32, ndim=2)
+):
+    """Velocities of one body as the integrator keeps them [m/s]."""
+    ti.loop_config(serialize=True)
+    for i in range(count):
+        v = state.particle_velocity[state.particle_of_vertex[begin + i]]
+        for k in ti.static(range(3)):
+            out[i, k] = v[k]
+
+
+@ti.kernel
+def write_motion(
+    state: ti.template(),
+    body: ti.i32,
+    positions: ti.types.ndarray(ndim=2),
+    velocities: ti.types.ndarray(ndim=2),
+):
+    """Put the particles of one body somewhere else, with velocities of the same moment."""
+    ti.loop_config(serialize=True)
+    for i in range(positions.shape[0]):
+        p = state.particle_of_vertex[state.body_particles[body][0] + i]
+        x = ti.Vector([positions[i, 0], positions[i, 1], positions[i, 2]])
+        state.particle_position[p] = x
+        state.prev_position[p] = x
+        v = ti.Vector([velocities[i, 0], velocities[i, 1], velocities[i, 2]])
+        state.particle_velocity[p] = v * ti.select(state.particle_inv_mass[p] > 0.0, 1.0, 0.0)
+        state.particle_force[p] = ti.Vector.zero(state.real, 4)
+        if ti.static(state.capacity.implicit):
+            state.particle_contact[p] = 0
+    state.body_velocity_lag[body] = 0.0
+    state.body_patience[body] = PLACED
+    state.body_status[body] = ACTIVE

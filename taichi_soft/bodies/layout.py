@@ -1,0 +1,418 @@
+"""Bodies of a world as flat arrays with offsets: everything the Taichi fields will hold, in numpy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.core.constants import HALF, LANES
+from taichi_soft.core.errors import MeshError
+from taichi_soft.core.types import DampingModel
+from taichi_soft.elements.laws import BondLaw, ElementModel
+from taichi_soft.elements.laws.bonds import Bonds, Ring
+from taichi_soft.elements.materials import AnisotropicMaterial, AnyMaterial, Material, SpringMaterial
+from taichi_soft.meshing import (
+    BodyMesh,
+    ParticleMesh,
+    TetMesh,
+    edge_owners,
+    renumbered,
+    spatial_order,
+    tet_order,
+)
+from taichi_soft.meshing.arrays import read_only
+from taichi_soft.meshing.splitting import InnerFaces, inner_faces
+
+SHORTEST_EDGE = 1e-6
+"""[m]; volumes of smaller tetrahedra run out of float32's range."""
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
+
+@dataclass(frozen=True, eq=False)
+class BodyDescription:
+    """One kind of body, wherever it is."""
+
+    mesh: BodyMesh
+    material: AnyMaterial
+    model: ElementModel
+    pinned: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int32))  # vertices that stay in place
+
+    @cached_property
+    def bonds(self) -> Bonds | None:
+        """What a pairwise law knows of the edges; None for other laws."""
+        law = self.model.law
+        return law.bonds(self.mesh, self.material) if isinstance(law, BondLaw) else None
+
+    @cached_property
+    def masses(self) -> Floats:
+        """Mass of each vertex, (n,) [kg], in the caller's order, read-only."""
+        if isinstance(self.mesh, ParticleMesh):
+            return self.mesh.masses
+        if self.bonds is not None and self.bonds.masses is not None:
+            return read_only(self.bonds.masses)
+        return read_only(vertex_masses(self.mesh, self.per_tet("density")))  # type: ignore[arg-type]
+
+    def per_tet(self, name: str) -> Floats:
+        """A constant of the material for each tetrahedron, (m,)."""
+        if isinstance(self.material, SpringMaterial):
+            return np.zeros(0)
+        return self.material.per_tet(name, len(self.mesh.tets))
+
+    @cached_property
+    def rest_inverses(self) -> Floats:
+        """A^-1 of each tetrahedron, (m, 3, 3) [1/m], in the caller's order, read-only."""
+        return read_only(rest_inverses(self.mesh))
+
+    @cached_property
+    def inner_faces(self) -> InnerFaces:
+        """Where it can be cut."""
+        return inner_faces(self.mesh.tets)
+
+    @property
+    def lame(self) -> Floats:
+        """Lame's lambda and mu of each tetrahedron, (m, 2) [Pa]; zero for an anisotropic material."""
+        if not isinstance(self.material, Material):
+            return np.zeros((len(self.mesh.tets), 2))
+        return np.stack([self.per_tet("lame_lambda"), self.per_tet("lame_mu")], axis=1)
+
+    @property
+    def stiffness(self) -> Floats:
+        """The 21 constants of each tetrahedron of an anisotropic material, (m, 21) [Pa]; zero for others."""
+        count = len(self.mesh.tets)
+        if not isinstance(self.material, AnisotropicMaterial):
+            return np.zeros((count, 21))
+        rows, columns = np.triu_indices(6)
+        return self.material.stiffness_matrices(count)[:, rows, columns]
+
+    @cached_property
+    def edge_damping(self) -> Floats:
+        """Damping of each edge by the law, (k,) [N s/m]."""
+        if isinstance(self.material, SpringMaterial):
+            return self.material.per_edge("damping", len(self.mesh.edges))
+        if self.model.damping_model is not DampingModel.EDGE:
+            return np.zeros(len(self.mesh.edges))
+        damping = edge_damping(self.mesh, self.per_tet("damping"))  # type: ignore[arg-type]
+        return damping if self.bonds is None else damping * self.bonds.is_bond
+
+
+@dataclass(frozen=True)
+class BondArrays:
+    """The bonds of one body, in kernel order."""
+
+    constants: Floats  # (k, 4), see `Bonds`
+    ring: Ints  # (k, 2) rows of each edge in the arrays below
+    members: Ints  # (r, 4) particles or tetrahedra of this body
+    weights: Floats  # (r, 4)
+    expansion_modulus: Floats | None  # (m,) [Pa], where the members are tetrahedra
+
+
+@dataclass(frozen=True)
+class BodyArrays:
+    """One body in the order in which the kernels walk it."""
+
+    order: Ints  # (n,) caller's index of each particle
+    rank: Ints  # (n,) particle of each of the caller's vertices
+    rest_position: Floats  # (n, 3) [m]
+    mass: Floats  # (n,) [kg]
+    tet_vertices: Ints  # (m, 4) into the particles of this body
+    tet_order: Ints  # (m,) caller's index of each tetrahedron
+    rest_inverse: Floats  # (m, 3, 3) [1/m]
+    lame: Floats  # (m, 2) lambda, mu [Pa]; zero where the stiffness tells all
+    stiffness: Floats  # (m, 21) [Pa], upper triangle of an anisotropic one; zero of others
+    tet_damping: Floats  # (m,) [N s/m]
+    tet_edges: Ints  # (m, 6) edges of each, in the order of `LOCAL_EDGES`
+    edge_vertices: Ints  # (k, 2)
+    edge_order: Ints  # (k,) caller's index of each edge
+    edge_blocks: Ints  # (c, 2) first row and number, at most `LANES`, of edges; a half has one first end
+    edge_damping: Floats  # (k,) [N s/m]
+    bonds: BondArrays | None  # of a pairwise law
+    pinned: Ints  # particles that do not move
+    triangles: Ints  # (f, 3) of the surface, in the caller's order
+    outer: Ints  # particles that can touch something: those of the surface, or all where there is no inside
+
+    @property
+    def expansion_modulus(self) -> Floats:
+        """Pressure of each tetrahedron on its edges per dV / V0, (m,) [Pa]; zero for laws without one."""
+        if self.bonds is None or self.bonds.expansion_modulus is None:
+            return np.zeros(len(self.tet_vertices))
+        return self.bonds.expansion_modulus
+
+
+@dataclass
+class Ranges:
+    """Where the body's rows lie in the world's flat arrays, with the room for those that cuts will add."""
+
+    particles: tuple[int, int] = (0, 0)
+    edges: tuple[int, int] = (0, 0)
+    edge_blocks: tuple[int, int] = (0, 0)
+    blocks: tuple[int, int] = (0, 0)
+    rings: tuple[int, int] = (0, 0)
+    triangles: tuple[int, int] = (0, 0)
+    outer: tuple[int, int] = (0, 0)
+
+
+@dataclass
+class Scene:
+    """All bodies, one behind the other.
+
+    Behind the edges of each come `LANES` spare rows: the last block of edges is read in full, and must not
+    reach into another body, which another thread may be moving.
+    """
+
+    bodies: list[BodyArrays] = field(default_factory=list)
+    ranges: list[Ranges] = field(default_factory=list)
+    particle_count: int = 0
+    edge_count: int = 0  # with the spare rows
+    edge_block_count: int = 0
+    block_count: int = 0
+    ring_count: int = 0
+    triangle_count: int = 0
+    outer_count: int = 0
+
+    @property
+    def has_bonds(self) -> bool:
+        """Whether any body has a pairwise law."""
+        return any(body.bonds is not None for body in self.bodies)
+
+    @property
+    def ends(self) -> Ranges:
+        """Where the next body would lie, without any rows."""
+        return Ranges(
+            (self.particle_count,) * 2,
+            (self.edge_count,) * 2,
+            (self.edge_block_count,) * 2,
+            (self.block_count,) * 2,
+            (self.ring_count,) * 2,
+            (self.triangle_count,) * 2,
+            (self.outer_count,) * 2,
+        )
+
+    def append(self, body: BodyArrays, spare_vertices: int = 0) -> None:
+        """Give `body` the next free rows, and room for copies of its vertices."""
+        blocks = -(-len(body.tet_vertices) // LANES)
+        rings = 0 if body.bonds is None else len(body.bonds.members)
+        particles, edges, edge_blocks, triangles, outer = room_of(body, spare_vertices)
+        self.ranges.append(
+            Ranges(
+                (self.particle_count, self.particle_count + particles),
+                (self.edge_count, self.edge_count + edges),
+                (self.edge_block_count, self.edge_block_count + edge_blocks),
+                (self.block_count, self.block_count + blocks),
+                (self.ring_count, self.ring_count + rings),
+                (self.triangle_count, self.triangle_count + triangles),
+                (self.outer_count, self.outer_count + outer),
+            )
+        )
+        self.bodies.append(body)
+        self.particle_count += particles
+        self.edge_count += edges + LANES
+        self.edge_block_count += edge_blocks
+        self.block_count += blocks
+        self.ring_count += rings
+        self.triangle_count += triangles
+        self.outer_count += outer
+
+
+def room_of(body: BodyArrays, spare_vertices: int) -> tuple[int, int, int, int, int]:
+    """Rows of particles, edges, blocks of edges, triangles and outer particles for a body and its copies.
+
+    A cut has some three edges, and on either side two triangles, for each vertex that it goes through, and up
+    to twice as many where it is small and ends inside (Euler's formula).
+    """
+    if spare_vertices == 0:
+        exact = body.mass, body.edge_vertices, body.edge_blocks, body.triangles, body.outer
+        particles, edges, blocks, triangles, outer = (len(rows) for rows in exact)
+        return particles, edges, blocks, triangles, outer
+    particles = len(body.mass) + spare_vertices
+    edges = len(body.edge_vertices) + 6 * spare_vertices
+    # Every block is full, but for those with the last edges of a particle.
+    blocks = (edges + (LANES - 1) * particles) // LANES
+    return particles, edges, blocks, len(body.triangles) + 12 * spare_vertices, particles
+
+
+def outer_vertices(mesh: BodyMesh) -> Ints:
+    """Vertices of the surface; of a `ParticleMesh`, which has no inside, all."""
+    if isinstance(mesh, TetMesh):
+        return mesh.surface_vertices
+    return np.arange(len(mesh.vertices), dtype=np.int32)
+
+
+def edge_damping(mesh: TetMesh, tet_damping: Floats) -> Floats:
+    """Damping of each edge: the mean over the tetrahedra that share it, (k,) [N s/m]."""
+    total = np.bincount(mesh.tet_edges.ravel(), np.repeat(tet_damping, 6), minlength=len(mesh.edges))
+    return total / mesh.edge_valence
+
+
+def vertex_masses(mesh: TetMesh, density: Floats) -> Floats:
+    """A quarter of the mass of each neighbouring tetrahedron, (n,) [kg] (thesis chapter 6)."""
+    quarter = np.repeat(mesh.volumes * density / 4.0, 4)
+    return np.bincount(mesh.tets.ravel(), quarter, minlength=len(mesh.vertices)).astype(np.float64)
+
+
+def rest_inverses(mesh: BodyMesh) -> Floats:
+    """A^-1 of thesis eq. 6.1 for every tetrahedron, (m, 3, 3) [1/m]."""
+    corners = mesh.vertices[mesh.tets]
+    shapes = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
+    return np.asarray(np.linalg.inv(shapes))
+
+
+def require_size(mesh: BodyMesh) -> None:
+    """Raises: MeshError for edges below `SHORTEST_EDGE`."""
+    shortest = float(mesh.edge_lengths.min())
+    if shortest < SHORTEST_EDGE:
+        raise MeshError(
+            f"the shortest edge is {shortest:.3g} m: scale the mesh (in metres) to {SHORTEST_EDGE:g} or more"
+        )
+
+
+def arrange(description: BodyDescription) -> BodyArrays:
+    """Reorder a body along a space-filling curve, so that neighbours share cache lines."""
+    mesh = description.mesh
+    order = spatial_order(mesh.vertices)
+    tets = tet_order(mesh.tets, order) if len(mesh.tets) else np.zeros(0, dtype=np.int32)
+    edges = renumbered(order)[mesh.edges]
+    if description.model.has_simple_edges:  # whose ends are alike; others have a direction from i to j
+        edges = _led_by_owners(np.sort(edges, axis=1), len(order))
+    return _in_order(description, order, tets, edges)
+
+
+def arrange_part(
+    description: BodyDescription,
+    before: BodyArrays,
+    vertices: NDArray[np.int64],
+    tets: NDArray[np.int64],
+    order: Ints | None = None,
+) -> BodyArrays:
+    """Put what a cut has left of a body into the order that the body had: copies come behind their originals.
+
+    Args:
+        vertices, tets: which of the body before each one is, or is a copy of.
+        order: of the vertices; None for copies in the order of their numbers.
+    """
+    mesh, rank = description.mesh, before.rank[vertices]
+    if order is None:
+        order = np.argsort(rank, kind="stable").astype(np.int32)
+    ends = rank[mesh.edges].astype(np.int64)
+    # An edge is led by the same end as before.
+    count = len(before.rank)
+    old = np.sort(before.edge_vertices, axis=1).astype(np.int64) @ [count, 1]
+    by_key = np.argsort(old)
+    place = by_key[np.searchsorted(old[by_key], np.sort(ends, axis=1) @ [count, 1])]
+    is_led = ends[:, 0] == before.edge_vertices[place, 0]
+    edges = renumbered(order)[np.where(is_led[:, None], mesh.edges, mesh.edges[:, ::-1])]
+    tet_order = np.argsort(renumbered(before.tet_order)[tets]).astype(np.int32)
+    return _in_order(description, order, tet_order, edges)
+
+
+def _in_order(description: BodyDescription, order: Ints, tets: Ints, edges: Ints) -> BodyArrays:
+    """A body whose particles and tetrahedra come in these orders, and whose edges are turned as given."""
+    mesh, new_index = description.mesh, renumbered(order)
+    edge_order = np.lexsort((edges[:, 1], edges[:, 0])).astype(np.int32)
+    return BodyArrays(
+        order=order,
+        rank=new_index,
+        rest_position=mesh.vertices[order],
+        mass=description.masses[order],
+        tet_vertices=new_index[mesh.tets[tets]],
+        tet_order=tets,
+        rest_inverse=rest_inverses(mesh)[tets],
+        lame=description.lame[tets],
+        stiffness=description.stiffness[tets],
+        tet_damping=description.per_tet("damping")[tets],
+        tet_edges=_arrange_tet_edges(mesh, tets, edge_order),
+        edge_vertices=edges[edge_order],
+        edge_order=edge_order,
+        edge_blocks=_edge_blocks(edges[edge_order, 0]),
+        edge_damping=description.edge_damping[edge_order],
+        bonds=_arrange_bonds(description.bonds, description.model, edge_order, new_index, renumbered(tets)),
+        pinned=new_index[description.pinned],
+        triangles=new_index[mesh.surface],
+        outer=np.sort(new_index[outer_vertices(mesh)]),
+    )
+
+
+def rearrange(arrays: BodyArrays, description: BodyDescription) -> BodyArrays:
+    """The same body of another material, in the order that it has."""
+    tets, bonds = arrays.tet_order, description.bonds
+    return replace(
+        arrays,
+        mass=description.masses[arrays.order],
+        lame=description.lame[tets],
+        stiffness=description.stiffness[tets] if arrays.stiffness.any() else arrays.stiffness,
+        tet_damping=description.per_tet("damping")[tets],
+        edge_damping=description.edge_damping[arrays.edge_order],
+        bonds=_arrange_bonds(bonds, description.model, arrays.edge_order, arrays.rank, renumbered(tets)),
+    )
+
+
+def _led_by_owners(edges: Ints, particle_count: int) -> Ints:
+    """The same edges, turned so that most particles come first in a multiple of `HALF` of them."""
+    in_order = edges[np.lexsort((edges[:, 1], edges[:, 0]))]
+    keys = in_order[:, 0].astype(np.int64) * particle_count + in_order[:, 1]
+    owner = edge_owners(in_order, particle_count, HALF)
+    own = owner[np.searchsorted(keys, edges[:, 0].astype(np.int64) * particle_count + edges[:, 1])]
+    return np.asarray(np.where(edges[:, :1] == own[:, None], edges, edges[:, ::-1]))
+
+
+def _edge_blocks(first_ends: Ints) -> Ints:
+    """First row and number of edges, at most `LANES`, of which each half shares its first end.
+
+    Rows come ordered by it. A half that is not full ends its block, so that rows lie side by side.
+    """
+    starts = np.flatnonzero(np.r_[True, first_ends[1:] != first_ends[:-1]])
+    counts = np.diff(np.r_[starts, len(first_ends)])
+    halves = -(-counts // HALF)
+    number = np.arange(halves.sum()) - np.repeat(np.cumsum(halves) - halves, halves)  # within its first end
+    rows = np.repeat(starts, halves) + number * HALF
+    sizes = np.minimum(np.repeat(counts, halves) - number * HALF, HALF)
+    ends_block = np.r_[True, sizes[:-1] < HALF][: len(sizes)]
+    since = np.arange(len(sizes)) - np.maximum.accumulate(np.where(ends_block, np.arange(len(sizes)), 0))
+    leads = since % 2 == 0
+    follows = np.r_[~leads[1:], False][: len(sizes)]  # whether the next half belongs to the same block
+    both = sizes + np.where(follows, np.r_[sizes[1:], 0][: len(sizes)], 0)
+    return np.stack([rows[leads], both[leads]], axis=1).astype(np.int32)
+
+
+def _arrange_tet_edges(mesh: BodyMesh, tets: Ints, edge_order: Ints) -> Ints:
+    if not isinstance(mesh, TetMesh):
+        return np.zeros((0, 6), dtype=np.int32)
+    new_edge = np.empty(len(edge_order), dtype=np.int32)
+    new_edge[edge_order] = np.arange(len(edge_order))
+    return np.asarray(new_edge[mesh.tet_edges[tets]])
+
+
+def _arrange_bonds(
+    bonds: Bonds | None, model: ElementModel, edge_order: Ints, new_vertex: Ints, new_tet: Ints
+) -> BondArrays | None:
+    if bonds is None:
+        return None
+    names_tets = isinstance(model.law, BondLaw) and model.law.ring is Ring.EXPANSION
+    count = np.bincount(bonds.ring_edge, minlength=len(edge_order))
+    start = np.cumsum(count) - count
+    ends = np.cumsum(count[edge_order])
+    ring = np.stack([ends - count[edge_order], ends], axis=1)
+    # Row i of the new order is row i of its edge's rows in the old one.
+    rows = np.repeat(start[edge_order] - ring[:, 0], count[edge_order]) + np.arange(len(bonds.ring_edge))
+    members = bonds.ring_members[rows]
+    renamed = (new_tet if names_tets else new_vertex)[np.maximum(members, 0)] if len(members) else members
+    modulus = bonds.expansion_modulus
+    return BondArrays(
+        bonds.constants[edge_order],
+        ring.astype(np.int32),
+        np.where(members >= 0, renamed, 0).astype(np.int32),
+        bonds.ring_weights[rows],
+        None if modulus is None else modulus[np.argsort(new_tet)],
+    )
+
+
+def blocks_of(rows: NDArray[np.generic], width: int, fill: float) -> NDArray[np.generic]:
+    """Rows (m, width) as (blocks, width, LANES), flattened: lane beside lane, padded with `fill`."""
+    block_count = -(-len(rows) // LANES)
+    padded = np.full((block_count * LANES, width), fill, dtype=rows.dtype)
+    padded[: len(rows)] = rows.reshape(len(rows), width)
+    return np.ascontiguousarray(padded.reshape(block_count, LANES, width).transpose(0, 2, 1)).reshape(-1)

@@ -1,0 +1,1 @@
+"""What bodies touch: colliders, and each other."""

@@ -1,0 +1,39 @@
+"""Signed distance of a point from any solid."""
+
+from taichi_soft.contact.distances.box import box_distance
+from taichi_soft.contact.distances.capsule import capsule_distance
+from taichi_soft.contact.distances.height_field import height_field_distance
+from taichi_soft.contact.distances.kinds import ShapeKind
+from taichi_soft.contact.distances.mesh import mesh_distance
+from taichi_soft.contact.distances.plane import plane_distance
+from taichi_soft.contact.distances.sphere import sphere_distance
+from taichi_soft.core.runtime import ti
+
+
+@ti.func
+def signed_distance(samples: ti.template(), kind, parameters, resolution, offset, x):
+    """How far a point is from the surface of a solid, negative inside, and the outward unit normal there.
+
+    Exact for plane, sphere, box and capsule. For the others no larger than the distance, so that a ray may
+    always go on by that much: see `height_field_distance` and `mesh_distance`.
+    Args:
+        samples: f32 field with the grids of all solids, one after the other.
+        kind: a `ShapeKind`.
+        parameters: vec8, see the function of each kind.
+        resolution: ivec3, nodes of the solid's grid along each axis.
+        offset: where its grid begins in `samples`.
+        x: the point in the solid's own frame, f32 [m].
+    Returns: distance [m] and normal, of length 1 for every x.
+    """
+    distance, normal = plane_distance(parameters, x)
+    if kind == ShapeKind.SPHERE:
+        distance, normal = sphere_distance(parameters, x)
+    elif kind == ShapeKind.BOX:
+        distance, normal = box_distance(parameters, x)
+    elif kind == ShapeKind.CAPSULE:
+        distance, normal = capsule_distance(parameters, x)
+    elif kind == ShapeKind.HEIGHT_FIELD:
+        distance, normal = height_field_distance(samples, parameters, resolution, offset, x)
+    elif kind == ShapeKind.MESH:
+        distance, normal = mesh_distance(samples, parameters, resolution, offset, x)
+    return distance, normal

@@ -1,0 +1,31 @@
+"""The horizontal floor: an inelastic or restituting plane with Coulomb friction."""
+
+from taichi_soft.core.runtime import ti
+
+RESTITUTION_SPEED = 0.5
+"""Impact speed [m/s] below which nothing bounces, so that resting bodies come to rest."""
+
+
+@ti.func
+def resolve_floor(x, v, h, floor):
+    """Position and velocity after contact, for a particle that this substep took to x with v.
+
+    The impulse acts before the drift: what it takes from the velocity, it takes from the path, or a
+    particle that friction holds would creep.
+    Args:
+        x: new position [m].
+        v: new velocity [m/s].
+        h: substep [s].
+        floor: height [m], restitution 0 to 1, friction coefficient 0 or more.
+    """
+    x_out, v_out = x, v
+    if x.z < floor.x:
+        bounce = ti.select(v.z < -RESTITUTION_SPEED, floor.y, 0.0)
+        impulse = ti.max(-v.z, 0.0) * (1.0 + bounce)
+        slide = ti.sqrt(v.x * v.x + v.y * v.y)
+        keep = 0.0
+        if slide > floor.z * impulse:
+            keep = 1.0 - floor.z * impulse / slide
+        v_out = ti.Vector([v.x * keep, v.y * keep, v.z + impulse])
+        x_out = ti.Vector([x.x + h * (v_out.x - v.x), x.y + h * (v_out.y - v.y), floor.x])
+    return x_out, v_out

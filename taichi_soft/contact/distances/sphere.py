@@ -1,0 +1,11 @@
+"""A ball about the origin."""
+
+from taichi_soft.contact.distances.direction import length_and_direction
+from taichi_soft.core.runtime import ti
+
+
+@ti.func
+def sphere_distance(parameters, x):
+    """Signed distance [m] and normal; upwards at the centre. Parameters: radius."""
+    length, normal = length_and_direction(x, ti.Vector([0.0, 0.0, 1.0]))
+    return length - parameters[0], normal

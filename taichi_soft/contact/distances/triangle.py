@@ -1,0 +1,37 @@
+"""The point of a triangle that is nearest to another point."""
+
+from taichi_soft.core.runtime import ti
+
+FLATTEST_SQUARED = 1e-8
+"""Height over length, squared, below which float32 knows no normal: such a triangle counts as its edges."""
+
+
+@ti.func
+def nearest_on_segment(p, a, b):
+    """Nearest point to p between a and b, which may be one point."""
+    along = b - a
+    t = (p - a).dot(along) / ti.max(along.dot(along), 1e-30)
+    return a + ti.max(0.0, ti.min(1.0, t)) * along
+
+
+@ti.func
+def nearest_on_triangle(p, a, b, c):
+    """Nearest point to p in the triangle abc, which may be flat."""
+    normal = (b - a).cross(c - a)
+    squared = normal.dot(normal)
+    longest = ti.max((b - a).dot(b - a), (c - a).dot(c - a))
+    over = ti.min(
+        normal.cross(b - a).dot(p - a), normal.cross(c - b).dot(p - b), normal.cross(a - c).dot(p - c)
+    )
+    nearest = a
+    if over >= 0.0 and squared > FLATTEST_SQUARED * longest * longest:
+        nearest = p - normal * ((p - a).dot(normal) / squared)
+    else:
+        nearest = nearest_on_segment(p, a, b)
+        second = nearest_on_segment(p, b, c)
+        if (p - second).norm_sqr() < (p - nearest).norm_sqr():
+            nearest = second
+        third = nearest_on_segment(p, c, a)
+        if (p - third).norm_sqr() < (p - nearest).norm_sqr():
+            nearest = third
+    return nearest

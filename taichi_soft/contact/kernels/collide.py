@@ -1,0 +1,167 @@
+"""Particles of one body against the colliders, in one thread."""
+
+from taichi_soft.contact.distances.response import resolved_velocity
+from taichi_soft.contact.distances.sweep import NEVER, TOUCHING, distance_from, first_touch, rests_at
+from taichi_soft.contact.fields import NO_COLLIDER
+from taichi_soft.contact.kernels.rebound import add_press
+from taichi_soft.core.math.quaternion import spun, turned, turned_back
+from taichi_soft.core.runtime import ti
+
+MOST_TOUCHES = 4
+"""Colliders that one particle may meet, one after the other, within a substep; then it stays where it is."""
+
+
+DEEP = 2.0
+"""Mean edges of a body's surface that its fastest particle may go in what is left of a step before particles
+inside of it are looked at as well: a blow drives them through those that have stopped."""
+
+UNSEEN = 1e30
+"""Clearance of particles inside of a body, where it is slow [m]."""
+
+
+@ti.func
+def _in_frame(contact: ti.template(), c, x, time):
+    """A point in the frame that a collider has `time` [s] after the start of the step."""
+    position = contact.collider_position[c] + contact.collider_velocity[c] * time
+    return turned_back(spun(contact.collider_rotation[c], contact.collider_spin[c] * time), x - position)
+
+
+@ti.func
+def _clearance(state: ti.template(), p, row, count, reach, since, left):
+    """How far a particle is from all colliders that are near, less what these may come nearer [m]."""
+    x, clearance = state.particle_position[p], ti.cast(reach, ti.f32)
+    for i in range(count):
+        c = state.contact.near[row + i]
+        distance = distance_from(state.contact, c, _in_frame(state.contact, c, x, since))
+        clearance = ti.min(clearance, distance - state.contact.collider_speed[c] * left)
+    return clearance
+
+
+@ti.func
+def find_near_colliders(state: ti.template(), body, reach, since, left):
+    """List the colliders that come within `reach` [m] of a body's particles, and how clear of them each is.
+
+    Args:
+        since, left: time since the start of the step, and until its end [s].
+    """
+    outer, particles = state.body_outer[body], state.body_particles[body]
+    first = state.particle_position[state.outer_particle[outer[0]]]
+    lower, upper = first, first
+    for k in range(outer[0], outer[1]):
+        x = state.particle_position[state.outer_particle[k]]
+        lower, upper = ti.min(lower, x), ti.max(upper, x)
+    is_deep = reach > DEEP * state.body_edge[body]
+    if is_deep:
+        for p in range(particles[0], particles[1]):
+            x = state.particle_position[p]
+            lower, upper = ti.min(lower, x), ti.max(upper, x)
+    lower, upper = lower - reach, upper + reach
+    row = body * state.contact.capacity.colliders
+    mine = state.contact.body_filter[body]
+    count = 0
+    for c in range(state.contact.collider_count[None]):
+        theirs = state.contact.collider_filter[c]
+        wanted = (mine[0] & theirs[1]) != 0 and (theirs[0] & mine[1]) != 0
+        if state.contact.collider_kind[c] != NO_COLLIDER and wanted:
+            low, high = state.contact.collider_lower[c], state.contact.collider_upper[c]
+            apart = 0
+            for i in ti.static(range(3)):
+                apart = apart | int(low[i] > upper[i]) | int(high[i] < lower[i])
+            if apart == 0:
+                state.contact.near[row + count] = c
+                count += 1
+    state.contact.near_count[body] = count
+    state.contact.reach[body] = reach
+    state.contact.gone[body] = 0.0
+    if is_deep:
+        for p in range(particles[0], particles[1]):
+            clearance = _clearance(state, p, row, count, reach, since, left)
+            # One that went in unseen is not thrown out at once.
+            state.contact.particle_clearance[p] = ti.select(clearance < 0.0, UNSEEN, clearance)
+    for k in range(outer[0], outer[1]):
+        p = state.outer_particle[k]
+        state.contact.particle_clearance[p] = _clearance(state, p, row, count, reach, since, left)
+
+
+@ti.func
+def forget_contacts(state: ti.template(), body):
+    """Start a step: no impulses yet, and where there is any collider, nobody knows which are near."""
+    for row in range(body * state.contact.capacity.colliders, (body + 1) * state.contact.capacity.colliders):
+        state.contact.impulse[row] = ti.Vector.zero(ti.f32, 3)
+        state.contact.angular_impulse[row] = ti.Vector.zero(ti.f32, 3)
+        state.contact.press[row] = ti.Vector.zero(ti.f32, 3)
+        state.contact.press_rates[row] = ti.Vector.zero(ti.f32, 3)
+    was_deep = state.contact.reach[body] > DEEP * state.body_edge[body]
+    if was_deep and state.contact.near_count[body] > 0:
+        for p in range(state.body_particles[body][0], state.body_particles[body][1]):
+            state.contact.particle_clearance[p] = UNSEEN  # the next search may leave those inside alone
+    state.contact.near_count[body] = 0
+    state.contact.reach[body] = ti.select(state.contact.collider_count[None] == 0, 1e30, -1.0)
+    state.contact.gone[body] = 0.0
+
+
+@ti.func
+def collided(state: ti.template(), body, p, start, way_velocity, h, since):
+    """Position and velocity of a particle after a substep among colliders.
+
+    Args:
+        start: where it is [m].
+        way_velocity: with which it would go on [m/s].
+        h: substep [s].
+        since: time since the start of the fixed step [s], to which the colliders' poses belong.
+    """
+    x, v, way = start, way_velocity, h * way_velocity
+    row = body * state.contact.capacity.colliders
+    left = ti.cast(1.0, ti.f32)  # part of the substep still to go
+    touches, is_open = 0, 1
+    while is_open == 1:
+        earliest, which = ti.cast(NEVER, ti.f32), -1
+        distance, beyond, normal = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32), ti.Vector.zero(ti.f32, 3)
+        # After a touch the path lies in the surface to rounding, which is no second touch.
+        slack = ti.select(touches == 0, 0.0, TOUCHING)
+        for k in range(state.contact.near_count[body]):
+            c = state.contact.near[row + k]
+            a = _in_frame(state.contact, c, x, since + (1.0 - left) * h)
+            b = _in_frame(state.contact, c, x + way, since + h)
+            part, near, far, n = first_touch(state.contact, c, a, b, slack)
+            if part < earliest:
+                earliest, which, distance, beyond, normal = part, k, near, far, n
+        if which < 0:
+            is_open = 0
+        else:
+            c = state.contact.near[row + which]
+            after = since + h
+            centre = state.contact.collider_position[c] + state.contact.collider_velocity[c] * after
+            spin = state.contact.collider_spin[c]
+            n = turned(spun(state.contact.collider_rotation[c], spin * after), normal)
+            place = x + way - beyond * n
+            surface_velocity = state.contact.collider_velocity[c] + spin.cross(place - centre)
+            surface = state.contact.collider_surface[c]
+            v_out = resolved_velocity(v, n, surface_velocity, surface.x, surface.y)
+            push = v_out - v
+            left = left * (1.0 - earliest)
+            rest = ti.select(rests_at(distance), distance, 0.5 * TOUCHING)
+            lift = ti.max(rest - distance, 0.0)
+            before = x + way
+            x += earliest * way + lift * n
+            # What contact takes from the velocity it takes from the way left.
+            way = (1.0 - earliest) * way + (rest - beyond - lift) * n + left * h * (push - n * push.dot(n))
+            touches += 1
+            if touches == MOST_TOUCHES:
+                way = ti.Vector.zero(ti.f32, 3)
+                is_open = 0
+            end = x + way
+            mass = 1.0 / ti.max(state.particle_inv_mass[p], 1e-30)
+            impulse = -mass * push
+            if surface.y >= 0.0:
+                add_press(state.contact, row + c, -n.dot(impulse), n, n.dot(v), n.dot(surface_velocity))
+            # With what the shift of the path, which v takes no part in, does to the angular momentum.
+            angular_impulse = (end - centre).cross(impulse) - mass * (end - before).cross(v)
+            state.contact.impulse[row + c] = state.contact.impulse[row + c] + impulse
+            state.contact.angular_impulse[row + c] = state.contact.angular_impulse[row + c] + angular_impulse
+            state.contact.particle_touches[p] = 1
+            if ti.static(state.capacity.implicit):
+                if state.particle_contact[p] == 0:
+                    state.particle_contact[p] = c + 1
+            v = v_out
+    return x + way, v

@@ -1,0 +1,49 @@
+"""What the caller says of colliders, into their fields."""
+
+from taichi_soft.core.runtime import ti
+
+MOTION_WIDTH = 20
+"""Position, quaternion, velocity, spin, both corners of the box round the way, highest speed."""
+
+
+@ti.func
+def _vector(rows: ti.template(), c, at):
+    return ti.Vector([rows[c, at], rows[c, at + 1], rows[c, at + 2]])
+
+
+@ti.kernel
+def write_collider_motion(contact: ti.template(), rows: ti.types.ndarray(dtype=ti.f32, ndim=2)):
+    """Where all colliders are and how they move, rows (n, `MOTION_WIDTH`)."""
+    ti.loop_config(serialize=True)
+    for c in range(rows.shape[0]):
+        contact.collider_position[c] = _vector(rows, c, 0)
+        contact.collider_rotation[c] = ti.Vector([rows[c, 3], rows[c, 4], rows[c, 5], rows[c, 6]])
+        contact.collider_velocity[c] = _vector(rows, c, 7)
+        contact.collider_spin[c] = _vector(rows, c, 10)
+        contact.collider_lower[c] = _vector(rows, c, 13)
+        contact.collider_upper[c] = _vector(rows, c, 16)
+        contact.collider_speed[c] = rows[c, 19]
+
+
+@ti.kernel
+def write_samples(contact: ti.template(), begin: ti.i32, samples: ti.types.ndarray(dtype=ti.f32, ndim=1)):
+    """The grid of one solid, from row `begin` on."""
+    for i in range(samples.shape[0]):
+        contact.samples[begin + i] = samples[i]
+
+
+@ti.kernel
+def sum_collider_impulses(
+    contact: ti.template(), body_count: ti.i32, out: ti.types.ndarray(dtype=ti.f32, ndim=2)
+):
+    """Impulse and angular impulse of the last step on each collider by all bodies, (n, 6) [N s, N m s]."""
+    ti.loop_config(serialize=True)
+    for c in range(out.shape[0]):
+        linear, angular = ti.Vector.zero(ti.f32, 3), ti.Vector.zero(ti.f32, 3)
+        for body in range(body_count):
+            row = body * contact.capacity.colliders + c
+            linear += contact.impulse[row]
+            angular += contact.angular_impulse[row]
+        for i in ti.static(range(3)):
+            out[c, i] = linear[i]
+            out[c, 3 + i] = angular[i]

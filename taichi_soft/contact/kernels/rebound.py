@@ -1,0 +1,89 @@
+"""Restitution of a whole body: how fast its centre of mass leaves a collider, at most.
+
+An elastic body stores the energy of an impact and gives it back, whatever becomes of the vertices that touch.
+So Newton's law holds for the centre of mass: from a collider that it came near with a speed v, it goes away
+with e v. What contact would give beyond that is taken off again, the same change of velocity for all of the
+body, and never more than contact gave: a collider does not pull.
+"""
+
+from taichi_soft.contact.distances.floor import RESTITUTION_SPEED
+from taichi_soft.core.runtime import ti
+
+LEAST_REBOUND = 0.1
+"""Speed [m/s] that is always left to the centre of mass: a body that was pressed flat rises again."""
+
+
+@ti.func
+def begin_rebounds(state: ti.template(), body):
+    """Before the impulses of the last step are cleared: contacts that ended in it are over."""
+    for row in range(body * state.contact.capacity.colliders, (body + 1) * state.contact.capacity.colliders):
+        lasts = ti.abs(state.contact.impulse[row]).max() > 0.0
+        leave = ti.select(lasts, state.contact.rebound[row], 0.0)
+        state.contact.rebound[row] = leave
+        state.contact.prev_rebound[row] = leave
+
+
+@ti.func
+def take_back_rebounds(state: ti.template(), body):
+    """The step is made again."""
+    for row in range(body * state.contact.capacity.colliders, (body + 1) * state.contact.capacity.colliders):
+        state.contact.rebound[row] = state.contact.prev_rebound[row]
+
+
+@ti.func
+def add_press(contact: ti.template(), row, press, normal, before, surface):
+    """Note how a collider pressed a particle.
+
+    Args:
+        press: impulse along the normal [N s].
+        before, surface: velocities along the normal, of the particle until then and of the surface [m/s].
+    """
+    contact.press[row] = contact.press[row] + press * normal
+    rates = ti.Vector([press, press * surface, press * (surface - before)])
+    contact.press_rates[row] = contact.press_rates[row] + rates
+
+
+@ti.func
+def limit_rebounds(state: ti.template(), body, time):
+    """Take from a body what the presses of a substep give its centre of mass beyond the restitution.
+
+    Args:
+        time: since the start of the fixed step [s].
+    """
+    particles = state.body_particles[body]
+    first = body * state.contact.capacity.colliders
+    for k in range(state.contact.near_count[body]):
+        c = state.contact.near[first + k]
+        row = first + c
+        rates = state.contact.press_rates[row]
+        press = state.contact.press[row].norm()
+        if press > 0.0:
+            n = state.contact.press[row] / press
+            mass, along = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32)
+            moment = ti.Vector.zero(ti.f32, 3)
+            for p in range(particles[0], particles[1]):
+                if state.particle_inv_mass[p] > 0.0:
+                    mass += state.particle_mass[p]
+                    along += state.particle_mass[p] * state.particle_velocity[p].dot(n)
+                    moment += state.particle_mass[p] * state.particle_position[p]
+            speed = along / mass - rates.y / rates.x
+            approach = press / mass - speed
+            leave = state.contact.rebound[row]
+            if leave == 0.0:
+                # Where a body strikes because it turns, its centre may leave though it did not come near.
+                leave = ti.max(LEAST_REBOUND, rates.z / rates.x - approach)
+            if approach > RESTITUTION_SPEED:
+                leave = ti.max(leave, state.contact.collider_surface[c].y * approach)
+            state.contact.rebound[row] = leave
+            excess = ti.min(mass * (speed - leave), press)
+            if excess > 0.0:
+                for p in range(particles[0], particles[1]):
+                    if state.particle_inv_mass[p] > 0.0:
+                        state.particle_velocity[p] = state.particle_velocity[p] - excess / mass * n
+                arm = moment / mass - state.contact.collider_position[c]
+                arm -= state.contact.collider_velocity[c] * time
+                state.contact.impulse[row] = state.contact.impulse[row] + excess * n
+                turn = state.contact.angular_impulse[row] + excess * arm.cross(n)
+                state.contact.angular_impulse[row] = turn
+            state.contact.press[row] = ti.Vector.zero(ti.f32, 3)
+            state.contact.press_rates[row] = ti.Vector.zero(ti.f32, 3)

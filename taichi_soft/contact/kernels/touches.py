@@ -1,0 +1,116 @@
+"""Who touched whom in a step, and with what impulse: added up pair by pair where somebody records it.
+
+An island has its own part of the table of pairs, so that the threads share nothing; within it a pair is found
+by hashing. What is read is cleared, and nothing else writes there.
+"""
+
+from taichi_soft.bodies.status import ACTIVE, ASLEEP
+from taichi_soft.contact.fields import PAIR_ROWS, SLOTS
+from taichi_soft.core.math.finite import is_finite
+from taichi_soft.core.runtime import ti
+
+OF_COLLIDER, OF_BODY = 0, 1
+"""What the second one of a pair is."""
+
+
+@ti.func
+def _find_pair(soft: ti.template(), first, count, a, b):
+    """Row of two bodies in the part of the table that begins at `first`, or -1 where that is full."""
+    start = (a * 40503 + b) & 0x7FFFFFFF
+    row, tried = -1, 0
+    while row < 0 and tried < count:
+        here = first + (start + tried) % count
+        tried += 1
+        pair = soft.pair_bodies[here]
+        if pair.y == 0:  # no pair has body 0 as its second
+            soft.pair_bodies[here] = ti.Vector([a, b])
+            row = here
+        elif pair.x == a and pair.y == b:
+            row = here
+    return row
+
+
+@ti.func
+def add_touches(state: ti.template(), island):
+    """Add the impulses of a substep between the bodies of an island to the rows of their pairs."""
+    first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
+    for i in range(first, last):
+        body = state.contact.island_body[i]
+        first_slot = state.body_outer[body][0] * SLOTS
+        for k in range(first_slot, first_slot + state.soft.contact_count[body]):
+            slot = state.soft.contact_slot[k]
+            press = state.soft.slot_press[slot]
+            other = state.particle_body[state.soft.slot_vertices[slot].y]
+            if press > 0.0 and other != body:
+                a, b = ti.min(body, other), ti.max(body, other)
+                row = _find_pair(state.soft, first * PAIR_ROWS, (last - first) * PAIR_ROWS, a, b)
+                if row < 0:
+                    state.soft.pairs_lost[None] = 1  # the same from whichever thread
+                else:
+                    on_vertex = press * state.soft.slot_normal[slot] + state.soft.slot_rub[slot]
+                    on_b = ti.select(body == b, 1.0, -1.0) * on_vertex
+                    state.soft.pair_impulse[row] = state.soft.pair_impulse[row] + on_b
+
+
+@ti.func
+def forget_touches(state: ti.template(), island):
+    """Clear the rows of an island: its step is made again."""
+    first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
+    for row in range(first * PAIR_ROWS, last * PAIR_ROWS):
+        state.soft.pair_bodies[row] = ti.Vector.zero(ti.i32, 2)
+        state.soft.pair_impulse[row] = ti.Vector.zero(ti.f32, 3)
+
+
+@ti.func
+def _write_touch(who: ti.template(), impulses: ti.template(), at, a, kind, b, impulse):
+    who[at, 0], who[at, 1], who[at, 2] = a, kind, b
+    for k in ti.static(range(3)):
+        impulses[at, k] = impulse[k]
+
+
+@ti.kernel
+def read_touches(
+    state: ti.template(),
+    body_count: ti.i32,
+    status: ti.types.ndarray(dtype=ti.i32, ndim=1),
+    who: ti.types.ndarray(dtype=ti.i32, ndim=2),
+    impulses: ti.types.ndarray(dtype=ti.f32, ndim=2),
+) -> ti.i32:
+    """Status of all bodies; and which pairs touched in the last step, in no particular but a fixed order.
+
+    Args:
+        status: (bodies + 1,), as of the last call, or 0; the last one is not 0 where the table had no room
+            for all pairs.
+        who: (rows, 3): a body, `OF_COLLIDER` or `OF_BODY`, and that collider or body.
+        impulses: (rows, 3) that the first gave the second [N s].
+    Returns: how many rows were written.
+    """
+    written = 0
+    ti.loop_config(serialize=True)
+    for _ in range(1):
+        count = 0
+        status[body_count] = 0
+        for body in range(body_count):
+            before, now = status[body], state.body_status[body]
+            status[body] = now
+            if ti.static(state.capacity.contact.colliders > 0):
+                if now == ACTIVE or (now == ASLEEP and before == ACTIVE):  # others have impulses of old
+                    for c in range(state.contact.collider_count[None]):
+                        impulse = state.contact.impulse[body * state.contact.capacity.colliders + c]
+                        if ti.abs(impulse).max() > 0.0 and is_finite(impulse):
+                            _write_touch(who, impulses, count, body, OF_COLLIDER, c, impulse)
+                            count += 1
+        if ti.static(state.capacity.contact.soft):
+            for row in range(body_count * PAIR_ROWS):
+                pair = state.soft.pair_bodies[row]
+                if pair.y > 0:
+                    impulse = state.soft.pair_impulse[row]
+                    if is_finite(impulse):
+                        _write_touch(who, impulses, count, pair.x, OF_BODY, pair.y, impulse)
+                        count += 1
+                    state.soft.pair_bodies[row] = ti.Vector.zero(ti.i32, 2)
+                    state.soft.pair_impulse[row] = ti.Vector.zero(ti.f32, 3)
+            status[body_count] = state.soft.pairs_lost[None]
+            state.soft.pairs_lost[None] = 0
+        written += count
+    return written

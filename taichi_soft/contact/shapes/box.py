@@ -1,0 +1,54 @@
+"""A box."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taichi_soft.contact.distances.kinds import ShapeKind
+from taichi_soft.contact.shapes.shape import SEAM, Shape, Triangles, about_origin, as_length, triangles_of
+from taichi_soft.core.checks import as_array
+from taichi_soft.core.serialisation import serialised
+from taichi_soft.meshing.arrays import read_only
+
+
+@serialised("size")
+@dataclass(frozen=True, eq=False)
+class BoxShape(Shape):
+    """A box about the origin, edges along the axes.
+
+    Args:
+        size: length of its edges along x, y, z, (3,) [m].
+    Raises: OptionError.
+    """
+
+    kind = ShapeKind.BOX
+    seam = SEAM
+    size: ArrayLike
+
+    def __post_init__(self) -> None:
+        size = as_array(self.size, "size", (3,), "m")
+        edges = [as_length(edge, f"size along {axis}") for edge, axis in zip(size, "xyz", strict=True)]
+        object.__setattr__(self, "size", read_only(np.array(edges)))
+
+    def _values(self) -> tuple[float, ...]:
+        x, y, z = np.asarray(self.size) / 2
+        return (x, y, z)
+
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """Lower and upper corner, (2, 3) [m]."""
+        return about_origin(np.asarray(self.size) / 2)
+
+    def depths(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """How deep points (n, 3) in its frame lie inside, (n,) [m], below 0 outside: to the nearest face."""
+        depths: NDArray[np.float64] = (np.asarray(self.size) / 2 - np.abs(points)).min(axis=1)
+        return depths
+
+    def surface(self) -> Triangles:
+        """Two triangles for each face."""
+        import trimesh  # half a second that a game need not wait for
+
+        return triangles_of(trimesh.creation.box(np.asarray(self.size)))

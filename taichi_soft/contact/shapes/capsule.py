@@ -1,0 +1,53 @@
+"""A capsule: a cylinder with round caps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.contact.distances.kinds import ShapeKind
+from taichi_soft.contact.shapes.shape import Shape, Triangles, about_origin, as_length, triangles_of
+from taichi_soft.core.serialisation import serialised
+
+
+@serialised("radius", "length")
+@dataclass(frozen=True, eq=False)
+class CapsuleShape(Shape):
+    """All points within `radius` of a piece of the z axis about the origin.
+
+    Args:
+        radius: of cylinder and caps [m].
+        length: between the centres of the caps [m], 0 or more; the whole is `length + 2 * radius` long.
+    Raises: OptionError.
+    """
+
+    kind = ShapeKind.CAPSULE
+    radius: float
+    length: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "radius", as_length(self.radius, "radius"))
+        object.__setattr__(self, "length", as_length(self.length, "length", low=0.0))
+
+    def _values(self) -> tuple[float, ...]:
+        return (self.radius, self.length / 2)
+
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """Lower and upper corner, (2, 3) [m]."""
+        return about_origin([self.radius, self.radius, self.length / 2 + self.radius])
+
+    def depths(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """How deep points (n, 3) in its frame lie inside, (n,) [m], below 0 outside."""
+        half = self.length / 2
+        beside = points - np.clip(points, (0.0, 0.0, -half), (0.0, 0.0, half))
+        depths: NDArray[np.float64] = self.radius - np.linalg.norm(beside, axis=1)
+        return depths
+
+    def surface(self) -> Triangles:
+        """Triangles whose vertices lie on the capsule."""
+        import trimesh  # half a second that a game need not wait for
+
+        return triangles_of(trimesh.creation.capsule(self.length, self.radius, count=(32, 32)))

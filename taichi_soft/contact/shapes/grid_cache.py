@@ -1,0 +1,79 @@
+"""Distance grids kept on disk: what was computed once need not be computed at the next start of a game."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.contact.shapes.closed_mesh import ClosedMesh
+from taichi_soft.contact.shapes.distance_grid import Grid
+
+VERSION = b"taichi-soft distance grid 1"
+"""Changes with the file and with what the numbers in it mean."""
+
+DIGEST = hashlib.sha256().digest_size
+
+
+def cache_folder() -> Path:
+    """$TAICHI_SOFT_CACHE, or `taichi-soft` where this system keeps caches of this user."""
+    chosen = os.environ.get("TAICHI_SOFT_CACHE")
+    if chosen:
+        return Path(chosen)
+    if sys.platform == "win32":
+        base = os.environ.get("LOCALAPPDATA") or "~/AppData/Local"
+    elif sys.platform == "darwin":
+        base = "~/Library/Caches"
+    else:
+        base = os.environ.get("XDG_CACHE_HOME") or "~/.cache"
+    return Path(os.path.expanduser(base)) / "taichi-soft"
+
+
+def grid_key(mesh: ClosedMesh, grid: Grid) -> str:
+    """Different for whatever changes the numbers."""
+    digest = hashlib.sha256(VERSION)
+    for array in (mesh.vertices.astype("<f8"), mesh.triangles.astype("<i4"), np.array([grid.cell], "<f8")):
+        digest.update(len(array).to_bytes(8, "little") + array.tobytes())
+    return digest.hexdigest()
+
+
+def read_grid(key: str, grid: Grid) -> NDArray[np.float32] | None:
+    """Distances (nx, ny, nz) [m], or None where there are none or they are damaged."""
+    try:
+        content = _path(key).read_bytes()
+    except OSError:
+        return None
+    digest, payload = content[:DIGEST], content[DIGEST:]
+    if digest != _checksum(key, payload) or len(payload) != 4 * np.prod(grid.resolution):
+        return None
+    return np.frombuffer(payload, "<f4").astype(np.float32).reshape(grid.resolution)
+
+
+def write_grid(key: str, distances: NDArray[np.float32]) -> None:
+    """Keep distances. Where that is not possible they are computed again next time, and nothing is said."""
+    payload = distances.astype("<f4").tobytes()
+    path = _path(key)
+    with contextlib.suppress(OSError):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        # In one piece, so that no other process sees half of it.
+        handle, name = tempfile.mkstemp(dir=path.parent)
+        try:
+            with os.fdopen(handle, "wb") as file:
+                file.write(_checksum(key, payload) + payload)
+            os.replace(name, path)
+        except OSError:
+            os.unlink(name)
+
+
+def _path(key: str) -> Path:
+    return cache_folder() / f"{key}.grid"
+
+
+def _checksum(key: str, payload: bytes) -> bytes:
+    return hashlib.sha256(key.encode() + payload).digest()

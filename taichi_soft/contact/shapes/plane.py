@@ -1,0 +1,60 @@
+"""An endless plane."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taichi_soft.contact.distances.kinds import ShapeKind
+from taichi_soft.contact.shapes.shape import Shape, Triangles, about_origin, as_length
+from taichi_soft.core.checks import as_vector
+from taichi_soft.core.errors import OptionError
+from taichi_soft.core.serialisation import serialised
+from taichi_soft.meshing.arrays import read_only
+
+
+@serialised("normal")
+@dataclass(frozen=True, eq=False)
+class PlaneShape(Shape):
+    """A plane through the origin; everything below it is solid.
+
+    Args:
+        normal: away from the solid, (3,), of any length.
+    Raises: OptionError for a normal without direction.
+    """
+
+    kind = ShapeKind.PLANE
+    normal: ArrayLike = (0.0, 0.0, 1.0)
+
+    def __post_init__(self) -> None:
+        normal = as_vector(self.normal, "normal", "")
+        length = np.linalg.norm(normal)
+        if length < 1e-9:
+            raise OptionError(f"normal must be longer than 1e-9, got {normal.tolist()}")
+        object.__setattr__(self, "normal", read_only(normal / length))
+
+    def _values(self) -> tuple[float, ...]:
+        x, y, z = np.asarray(self.normal)
+        return (x, y, z)
+
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """Infinite to all sides, (2, 3)."""
+        return about_origin((np.inf, np.inf, np.inf))
+
+    def depths(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """How deep points (n, 3) in its frame lie inside, (n,) [m], below 0 outside."""
+        depths: NDArray[np.float64] = -points @ np.asarray(self.normal)
+        return depths
+
+    def surface(self, size: float = 20.0) -> Triangles:
+        """A square of edge `size` [m] about the origin."""
+        half = as_length(size, "size") / 2
+        normal = np.asarray(self.normal)
+        across = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
+        across /= np.linalg.norm(across)
+        along = np.cross(normal, across)
+        corners = [-across - along, across - along, across + along, along - across]
+        return half * np.array(corners), np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)

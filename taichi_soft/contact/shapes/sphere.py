@@ -1,0 +1,43 @@
+"""A ball."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.contact.distances.kinds import ShapeKind
+from taichi_soft.contact.shapes.shape import Shape, Triangles, about_origin, as_length, triangles_of
+from taichi_soft.core.serialisation import serialised
+
+
+@serialised("radius")
+@dataclass(frozen=True, eq=False)
+class SphereShape(Shape):
+    """A ball about the origin of `radius` [m]. Raises: OptionError."""
+
+    kind = ShapeKind.SPHERE
+    radius: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "radius", as_length(self.radius, "radius"))
+
+    def _values(self) -> tuple[float, ...]:
+        return (self.radius,)
+
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """Lower and upper corner, (2, 3) [m]."""
+        return about_origin([self.radius] * 3)
+
+    def depths(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """How deep points (n, 3) in its frame lie inside, (n,) [m], below 0 outside."""
+        depths: NDArray[np.float64] = self.radius - np.linalg.norm(points, axis=1)
+        return depths
+
+    def surface(self) -> Triangles:
+        """1,280 triangles whose vertices lie on the sphere."""
+        import trimesh  # half a second that a game need not wait for
+
+        return triangles_of(trimesh.creation.icosphere(subdivisions=3, radius=self.radius))

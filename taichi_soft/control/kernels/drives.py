@@ -1,0 +1,142 @@
+"""What drives a body from outside within a step: pushes, linear damping, wind; and what its pins take up.
+
+All but gravity act on velocities, for as long as they last, so that their impulse over a step is exact: under
+leapfrog half a substep's worth comes before the first kick and the other half after the last, as velocities
+are between.
+"""
+
+from taichi_soft.bodies.kernels.motion import gravity_on
+from taichi_soft.bodies.status import DAMPED, FEELS_REACTION, PUSHED, SHELTERED
+from taichi_soft.core.runtime import ti
+
+
+@ti.func
+def push_particles(state: ti.template(), body, seconds):
+    """Change the velocities of one body by what pushes and linear damping do in `seconds`."""
+    drives = state.body_drives[body]
+    if drives & (PUSHED | DAMPED) != 0:
+        keep = ti.exp(-seconds * state.body_damping[body])
+        lasting = ti.select(drives & PUSHED != 0, seconds, 0.0)
+        particles = state.body_particles[body]
+        for p in range(particles[0], particles[1]):
+            impulse = lasting * state.particle_push[p]
+            inv_mass = state.particle_inv_mass[p]
+            if inv_mass > 0.0:
+                state.particle_velocity[p] = keep * state.particle_velocity[p] + inv_mass * impulse
+            elif drives & FEELS_REACTION != 0:
+                state.particle_reaction[p] = state.particle_reaction[p] + impulse
+
+
+@ti.func
+def blow_on(state: ti.template(), body, h):
+    """Change the velocities of one body by what the wind does in `h` [s], triangle by triangle.
+
+    A vertex takes up its third of 1/4 rho c_d A |v_n| v_n implicitly: it is never taken beyond the wind's own
+    speed along the normal.
+    """
+    wind = state.wind[None]
+    drives = state.body_drives[body]
+    if wind.w > 0.0 and drives & SHELTERED == 0:
+        triangles = state.body_triangles[body]
+        for t in range(triangles[0], triangles[1]):
+            corners = state.triangle_vertices[t]
+            a, b, c = corners[0], corners[1], corners[2]
+            x = state.particle_position[a]
+            across = (state.particle_position[b] - x).cross(state.particle_position[c] - x)
+            twice_area = across.norm() + 1e-30
+            n = across / twice_area
+            sum = state.particle_velocity[a] + state.particle_velocity[b] + state.particle_velocity[c]
+            flow = ti.abs((wind.xyz - sum / 3.0).dot(n))
+            drag = wind.w * twice_area * flow / 24.0  # of each vertex [kg/s]
+            for i in range(3):
+                p = corners[i]
+                inv_mass = state.particle_inv_mass[p]
+                past = (wind.xyz - state.particle_velocity[p]).dot(n)
+                impulse = h * drag * past / (1.0 + h * drag * inv_mass) * n
+                state.particle_velocity[p] = state.particle_velocity[p] + inv_mass * impulse
+                if inv_mass == 0.0 and drives & FEELS_REACTION != 0:
+                    state.particle_reaction[p] = state.particle_reaction[p] + impulse
+
+
+@ti.func
+def add_reactions(state: ti.template(), body, seconds):
+    """Add up what internal forces and gravity on pinned particles do in `seconds` [N s]."""
+    if state.body_drives[body] & FEELS_REACTION != 0:
+        gravity = gravity_on(state, body)
+        particles = state.body_particles[body]
+        for p in range(particles[0], particles[1]):
+            if state.particle_inv_mass[p] == 0.0:
+                force = state.particle_force[p].xyz + state.particle_mass[p] * gravity
+                state.particle_reaction[p] = state.particle_reaction[p] + seconds * force
+
+
+@ti.func
+def _open_pushes(state: ti.template(), body):
+    """Clear what is left of the pushes of an earlier step, where this is the first since."""
+    if state.body_drives[body] & PUSHED == 0:
+        state.body_drives[body] = state.body_drives[body] | PUSHED
+        particles = state.body_particles[body]
+        for p in range(particles[0], particles[1]):
+            state.particle_push[p] = ti.Vector.zero(state.real, 3)
+
+
+@ti.kernel
+def add_push(
+    state: ti.template(),
+    body: ti.i32,
+    particles: ti.types.ndarray(dtype=ti.i32, ndim=1),
+    acceleration: ti.types.ndarray(dtype=ti.f32, ndim=1),
+):
+    """Push `particles` of one body throughout the coming step, each with its mass times (3,) [m/s^2]."""
+    ti.loop_config(serialize=True)
+    for _ in range(1):
+        _open_pushes(state, body)
+        a = ti.Vector([acceleration[0], acceleration[1], acceleration[2]])
+        for i in range(particles.shape[0]):
+            p = particles[i]
+            state.particle_push[p] = state.particle_push[p] + state.particle_mass[p] * a
+
+
+@ti.kernel
+def add_pushes(state: ti.template(), body: ti.i32, accelerations: ti.types.ndarray(dtype=ti.f32, ndim=2)):
+    """Push every vertex of one body throughout the coming step, each with its mass times a row [m/s^2]."""
+    ti.loop_config(serialize=True)
+    for _ in range(1):
+        _open_pushes(state, body)
+        for i in range(accelerations.shape[0]):
+            p = state.particle_of_vertex[state.body_particles[body][0] + i]
+            a = ti.Vector([accelerations[i, 0], accelerations[i, 1], accelerations[i, 2]])
+            state.particle_push[p] = state.particle_push[p] + state.particle_mass[p] * a
+
+
+@ti.kernel
+def write_gravity_scale(state: ti.template(), body: ti.i32, scale: ti.f32):
+    """By what gravity on one body is multiplied."""
+    state.body_gravity_scale[body] = scale
+
+
+@ti.kernel
+def write_linear_damping(state: ti.template(), body: ti.i32, rate: ti.f32):
+    """How fast the velocities of one body fade [1/s]."""
+    state.body_damping[body] = rate
+    _set_bit(state, body, DAMPED, int(rate > 0.0))
+
+
+@ti.kernel
+def write_shelter(state: ti.template(), body: ti.i32, is_sheltered: ti.i32):
+    """Whether the wind misses one body."""
+    _set_bit(state, body, SHELTERED, is_sheltered)
+
+
+@ti.kernel
+def write_wind(state: ti.template(), wind: ti.types.ndarray(dtype=ti.f32, ndim=1)) -> ti.i32:
+    """Velocity [m/s] and density times drag coefficient [kg/m^3], (4,). Returns whether any differs (1)."""
+    given = ti.Vector([wind[0], wind[1], wind[2], wind[3]])
+    differs = int((given != state.wind[None]).any())
+    state.wind[None] = given
+    return differs
+
+
+@ti.func
+def _set_bit(state: ti.template(), body, bit, is_set):
+    state.body_drives[body] = (state.body_drives[body] & ~bit) | ti.select(is_set != 0, bit, 0)

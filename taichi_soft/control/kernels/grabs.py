@@ -1,0 +1,179 @@
+"""Springs that pull a patch of a body's surface to a point: a hand, or a mouse.
+
+Each is a soft constraint in the sense of Catto, Soft Constraints (GDC 2011): the velocity after the pull
+enters the spring and its damper, so that it takes nothing beyond its aim, however stiff it is. A particle of
+the patch has its share of both; the shares add up to 1. What is more than the patch can bear pulls at the
+whole body, by mass, which deforms nothing.
+"""
+
+from taichi_soft.bodies.fields import MOST_GRABS, PATCH_ROWS
+from taichi_soft.bodies.kernels.motion import gravity_on
+from taichi_soft.bodies.status import GRABBED
+from taichi_soft.core.math.tensors import widened
+from taichi_soft.core.runtime import ti
+
+
+@ti.func
+def _stretch(state: ti.template(), g):
+    """From where a grab wants its point to where that is [m], no longer than the longest."""
+    corners, weights = state.grab_corners[g], state.grab_weights[g]
+    point = ti.Vector.zero(state.real, 3)
+    for i in ti.static(range(3)):
+        point += weights[i] * state.particle_position[corners[i]]
+    stretch = point - state.grab_target[g]
+    return stretch * ti.min(1.0, state.grab_spring[g].z / ti.max(stretch.norm(), 1e-12))
+
+
+@ti.func
+def _rest_of_pull(state: ti.template(), g, wanted, h, drag):
+    """What the patch leaves to the whole body, as a change of its velocity [m/s].
+
+    Args:
+        wanted: force of the spring and its damper, at the velocity that the body is going to have [N].
+        drag: by how much it falls with that velocity [N s/m].
+    """
+    on_patch, on_all, inv_mass = state.grab_limits[g].x, state.grab_limits[g].y, state.grab_limits[g].z
+    force = wanted / (1.0 + h * drag * inv_mass)
+    size = ti.max(force.norm(), 1e-30)
+    return ti.max(ti.min(size, on_all) - on_patch, 0.0) / size * h * inv_mass * force
+
+
+@ti.func
+def pull_grabs(state: ti.template(), body, h, kick):
+    """Change the velocities of one body by the pull of its grabs in `h` [s].
+
+    It looks at the velocities after the forces of this substep, or it would not feel what holds against it.
+    """
+    if state.body_drives[body] & GRABBED != 0:
+        gravity = gravity_on(state, body)
+        particles = state.body_particles[body]
+        for g in range(MOST_GRABS):
+            if state.grab_body[g] == body + 1:
+                spring = state.grab_spring[g]
+                pull = spring.x * _stretch(state, g)
+                drag = spring.y + h * spring.x
+                part = ti.cast(0.0, state.real)
+                wanted, total = -pull, ti.Vector.zero(state.real, 3)
+                for turn in range(2):  # the first time to see how strong it is, the second to do it
+                    total = ti.Vector.zero(state.real, 3)
+                    for row in range(g * PATCH_ROWS, g * PATCH_ROWS + state.grab_count[g]):
+                        p, share = state.patch_particle[row], state.patch_share[row]
+                        inv_mass = state.particle_inv_mass[p]
+                        if inv_mass > 0.0:
+                            v = state.particle_velocity[p]
+                            after = v + kick * (state.particle_force[p].xyz * inv_mass + gravity)
+                            impulse = -h * share * (pull + drag * after) / (1.0 + h * share * drag * inv_mass)
+                            state.particle_velocity[p] = v + part * inv_mass * impulse
+                            total += impulse
+                            wanted -= ti.select(turn == 0, share * drag, 0.0) * (v + kick * gravity)
+                    if turn == 0:
+                        part = ti.min(1.0, h * state.grab_limits[g].x / ti.max(total.norm(), 1e-30))
+                change = _rest_of_pull(state, g, wanted, h, drag)
+                if change.norm_sqr() > 0.0:
+                    for p in range(particles[0], particles[1]):
+                        if state.particle_inv_mass[p] > 0.0:
+                            state.particle_velocity[p] = state.particle_velocity[p] + change
+                state.grab_force[g] = (part * total + change / state.grab_limits[g].z) / h
+
+
+@ti.func
+def add_grabs(state: ti.template(), body, h):
+    """Add the grabs of one body to the system of implicit Euler and to its right-hand side."""
+    if state.body_drives[body] & GRABBED != 0:
+        gravity = gravity_on(state, body)
+        particles = state.body_particles[body]
+        for g in range(MOST_GRABS):
+            if state.grab_body[g] == body + 1:
+                spring = state.grab_spring[g]
+                pull = spring.x * _stretch(state, g)
+                drag = spring.y + h * spring.x
+                part = ti.cast(1.0, state.real)
+                wanted = ti.Vector.zero(state.real, 3)
+                for turn in range(2):
+                    for row in range(g * PATCH_ROWS, g * PATCH_ROWS + state.grab_count[g]):
+                        p, share = state.patch_particle[row], state.patch_share[row]
+                        if state.particle_inv_mass[p] > 0.0:
+                            force = -share * (pull + drag * state.particle_velocity[p])
+                            if turn == 0:
+                                wanted += force
+                            else:
+                                _add_force(state, p, part * h * force)
+                                for i in ti.static(range(3)):
+                                    state.particle_block[p][i, i] = (
+                                        state.particle_block[p][i, i] + part * share * h * drag
+                                    )
+                    if turn == 0:
+                        part = ti.min(1.0, state.grab_limits[g].x / ti.max(wanted.norm(), 1e-30))
+                change = _rest_of_pull(state, g, wanted - h * drag * gravity, h, drag)
+                if change.norm_sqr() > 0.0:
+                    for p in range(particles[0], particles[1]):
+                        if state.particle_inv_mass[p] > 0.0:
+                            _add_force(state, p, state.particle_mass[p] * change)
+                state.grab_force[g] = part * wanted + change / (h * state.grab_limits[g].z)
+
+
+@ti.func
+def _add_force(state: ti.template(), p, impulse):
+    rhs = state.residual[p] + impulse
+    state.residual[p] = rhs
+    state.particle_force[p] = widened(rhs)
+
+
+@ti.kernel
+def write_grab(
+    state: ti.template(),
+    g: ti.i32,
+    body: ti.i32,
+    corners: ti.types.ndarray(dtype=ti.i32, ndim=1),
+    numbers: ti.types.ndarray(dtype=ti.f32, ndim=1),
+    patch: ti.types.ndarray(dtype=ti.i32, ndim=1),
+    shares: ti.types.ndarray(dtype=ti.f32, ndim=1),
+):
+    """Begin a grab.
+
+    Args:
+        corners: particles of the triangle, (3,).
+        numbers: their weights, the point to pull to [m]; of the spring stiffness [N/m], damping [N s/m] and
+            longest stretch [m]; strongest pull on the patch and on all [N]; 1 / mass of the body [1/kg].
+        patch: particles, at most `PATCH_ROWS`.
+        shares: of them.
+    """
+    ti.loop_config(serialize=True)
+    for _ in range(1):
+        state.grab_body[g] = body + 1
+        state.grab_corners[g] = ti.Vector([corners[0], corners[1], corners[2]])
+        state.grab_weights[g] = ti.Vector([numbers[0], numbers[1], numbers[2]])
+        state.grab_target[g] = ti.Vector([numbers[3], numbers[4], numbers[5]])
+        state.grab_spring[g] = ti.Vector([numbers[6], numbers[7], numbers[8]])
+        state.grab_limits[g] = ti.Vector([numbers[9], numbers[10], numbers[11]])
+        state.grab_force[g] = ti.Vector.zero(state.real, 3)
+        state.grab_count[g] = patch.shape[0]
+        for i in range(patch.shape[0]):
+            state.patch_particle[g * PATCH_ROWS + i] = patch[i]
+            state.patch_share[g * PATCH_ROWS + i] = shares[i]
+        state.body_drives[body] = state.body_drives[body] | GRABBED
+
+
+@ti.kernel
+def write_grab_target(state: ti.template(), g: ti.i32, target: ti.types.ndarray(dtype=ti.f32, ndim=1)):
+    """Where a grab pulls to from now on, (3,) [m]."""
+    state.grab_target[g] = ti.Vector([target[0], target[1], target[2]])
+
+
+@ti.kernel
+def end_grab(state: ti.template(), g: ti.i32, body: ti.i32):
+    """Let go."""
+    others = 0
+    state.grab_body[g] = 0
+    ti.loop_config(serialize=True)
+    for each in range(MOST_GRABS):
+        others += int(state.grab_body[each] == body + 1)
+    if others == 0:
+        state.body_drives[body] = state.body_drives[body] & ~GRABBED
+
+
+@ti.kernel
+def read_grab_force(state: ti.template(), g: ti.i32, force: ti.types.ndarray(dtype=ti.f32, ndim=1)):
+    """With what a grab pulled in the last substep, (3,) [N]."""
+    for k in ti.static(range(3)):
+        force[k] = state.grab_force[g][k]

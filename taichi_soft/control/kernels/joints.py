@@ -1,0 +1,243 @@
+"""Joints: particles of one body held at places in another, which go with a tetrahedron of that.
+
+In every substep impulses make the velocity of each particle that of its place, row by row, some times over
+(Gauss-Seidel). That takes energy out and puts none in, whatever the masses; it has no stiffness that could be
+too high. The rows are gone through there and back: in one direction only, those that are not satisfied yet
+would act as forces that come from no energy, and bodies would begin to flutter.
+
+What has come apart all the same is drawn together, no faster than the bodies can follow.
+
+The impulse on the place is shared out so that it acts where the particle is. So momentum and angular
+momentum stay, also where there is a gap.
+"""
+
+from taichi_soft.bodies.kernels.motion import mobility, velocity
+from taichi_soft.bodies.status import FEELS_REACTION, JOINED
+from taichi_soft.control.joint_fields import ENDS, MOST_JOINTS
+from taichi_soft.core.math.finite import is_finite
+from taichi_soft.core.runtime import ti
+
+SWEEPS = 6
+"""Times all rows of an island are gone through in a substep, an even number. Rows that share no particle need
+one."""
+
+CLOSE = 30.0
+"""Rate at which a gap closes [1/s]. Faster, rows that cannot all be satisfied at once, as of a fine mesh held
+by a coarse one, would shake what is light."""
+
+MOST_SHIFT = 0.5
+"""Change of the weights, at most, that makes an impulse act where the particle is: what is farther off its
+place, over the size of the tetrahedron, is turned a little by the joint."""
+
+
+@ti.func
+def _open_row(state: ti.template(), r, h, draw_speed):
+    """How an impulse of one row is shared out in this substep, and how fast its gap is to close."""
+    at = r * ENDS
+    gap = ti.Vector.zero(ti.f32, 3)
+    for k in range(at, at + ENDS):
+        gap += state.joints.weight[k] * state.particle_position[state.joints.particle[k]]
+        state.joints.share[k] = state.joints.weight[k]
+    a = state.particle_position[state.joints.particle[at + 1]]
+    volume6, largest = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32)
+    for turn in range(2):  # the first time to see how large the shift is, the second to do it
+        part = ti.min(1.0, MOST_SHIFT / ti.max(largest, 1e-30))
+        for i in range(3):
+            b = state.particle_position[state.joints.particle[at + 2 + i]] - a
+            c = state.particle_position[state.joints.particle[at + 2 + (i + 1) % 3]] - a
+            d = state.particle_position[state.joints.particle[at + 2 + (i + 2) % 3]] - a
+            across = c.cross(d)
+            volume6 = b.dot(across)
+            shift = gap.dot(across) / volume6  # change of the barycentric coordinate of this corner
+            if turn == 0:
+                largest = ti.max(largest, 3.0 * ti.abs(shift))
+            elif volume6 != 0.0 and largest < 1e6:
+                state.joints.share[at + 2 + i] = state.joints.share[at + 2 + i] - part * shift
+                state.joints.share[at + 1] = state.joints.share[at + 1] + part * shift
+    rate = ti.min(CLOSE, 0.5 / h, draw_speed / ti.max(gap.norm(), 1e-30))
+    state.joints.approach[r] = -rate * gap
+    state.joints.row_impulse[r] = ti.Vector.zero(ti.f32, 3)
+
+
+@ti.func
+def _solve_row(state: ti.template(), j, r):
+    """Let the gap of a row change as fast as it is to."""
+    at = r * ENDS
+    total, wanted = ti.cast(0.0, ti.f32), state.joints.approach[r]
+    for k in range(at, at + ENDS):
+        p, share = state.joints.particle[k], state.joints.share[k]
+        total += share * share * mobility(state, p)
+        wanted -= share * velocity(state, p)
+    impulse = wanted / ti.max(total, 1e-30)
+    if total > 0.0 and is_finite(impulse) == 1:
+        for k in range(at, at + ENDS):
+            p, part = state.joints.particle[k], state.joints.share[k] * impulse
+            state.particle_velocity[p] = state.particle_velocity[p] + mobility(state, p) * part
+            feels = state.body_drives[state.particle_body[p]] & FEELS_REACTION
+            if state.particle_inv_mass[p] == 0.0 and feels != 0:
+                state.particle_reaction[p] = state.particle_reaction[p] + part
+        state.joints.row_impulse[r] = state.joints.row_impulse[r] + impulse
+        state.joints.impulse[j] = state.joints.impulse[j] + impulse
+
+
+@ti.func
+def _turned(i, first, last, back):
+    """The number itself, or counted from the other end."""
+    return ti.select(back == 1, first + last - 1 - i, i)
+
+
+@ti.func
+def solve_joints(state: ti.template(), island, h, is_first, common):
+    """Let the joints of an island act for a substep of `h` [s], after all its bodies have been kicked.
+
+    Args:
+        is_first: 1 in the first substep of a step.
+        common: velocity that the bodies of the island share [m/s].
+    Returns: the highest speed of a particle that a joint names [m/s], and the highest beside `common`.
+    """
+    first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
+    is_joined = 0
+    for i in range(first, last):
+        is_joined = is_joined | (state.body_drives[state.contact.island_body[i]] & JOINED)
+    highest, highest_beside = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32)
+    sweeps = ti.select(is_joined != 0, SWEEPS + 2, 0)
+    for sweep in range(sweeps):
+        back = sweep % 2
+        for i in range(first, last):
+            body = state.contact.island_body[_turned(i, first, last, back)]
+            for step in range(ti.select(state.body_drives[body] & JOINED != 0, MOST_JOINTS, 0)):
+                j = _turned(step, 0, MOST_JOINTS, back)
+                ends = state.joints.bodies[j]
+                # What explodes takes no other with it.
+                is_wild = state.contact.is_wild[body] + state.contact.is_wild[ti.max(ends[1] - 1, 0)]
+                if ends[0] == body + 1 and is_wild == 0:
+                    if sweep == 0 and is_first == 1:
+                        state.joints.impulse[j] = ti.Vector.zero(ti.f32, 3)
+                    rows = state.joints.rows[j]
+                    for row in range(rows[0], rows[1]):
+                        r = _turned(row, rows[0], rows[1], back)
+                        if sweep == 0:
+                            _open_row(state, r, h, state.joints.draw_speed[j])
+                        elif sweep <= SWEEPS:
+                            _solve_row(state, j, r)
+                        else:
+                            for k in range(r * ENDS, (r + 1) * ENDS):
+                                v = state.particle_velocity[state.joints.particle[k]]
+                                highest = ti.max(highest, v.dot(v))
+                                highest_beside = ti.max(highest_beside, (v - common).dot(v - common))
+    return ti.sqrt(highest), ti.sqrt(highest_beside)
+
+
+@ti.func
+def are_joined(state: ti.template(), a, b):
+    """Whether a joint holds two bodies to each other (1)."""
+    found = 0
+    if state.body_drives[a] & state.body_drives[b] & JOINED != 0:
+        for j in range(MOST_JOINTS):
+            ends = state.joints.bodies[j]
+            if ti.min(ends[0], ends[1]) == ti.min(a, b) + 1 and ti.max(ends[0], ends[1]) == ti.max(a, b) + 1:
+                found = 1
+    return found
+
+
+@ti.func
+def mark_held(state: ti.template(), is_held):
+    """Note which particles joints hold (1), or held (0)."""
+    for j in range(MOST_JOINTS):
+        if state.joints.bodies[j][0] > 0:
+            for r in range(state.joints.rows[j][0], state.joints.rows[j][1]):
+                state.joints.is_held[state.joints.particle[r * ENDS]] = is_held
+
+
+@ti.kernel
+def forget_held(state: ti.template()):
+    """Note that no particle is held, before joints change; each step finds anew which are."""
+    ti.loop_config(serialize=True)
+    for _ in range(1):
+        mark_held(state, 0)
+
+
+@ti.kernel
+def write_joint(
+    state: ti.template(),
+    j: ti.i32,
+    body: ti.i32,
+    other: ti.i32,
+    first: ti.i32,
+    draw_speed: ti.f32,
+    particles: ti.types.ndarray(dtype=ti.i32, ndim=2),
+    weights: ti.types.ndarray(dtype=ti.f32, ndim=2),
+):
+    """Begin a joint.
+
+    Args:
+        first: row, behind those of all others.
+        particles: of `body` and the four of `other` that hold it, (n, 5).
+        weights: of these, 1 and four that add up to -1, (n, 5).
+    """
+    ti.loop_config(serialize=True)
+    for _ in range(1):
+        state.joints.bodies[j] = ti.Vector([body + 1, other + 1])
+        state.joints.rows[j] = ti.Vector([first, first + particles.shape[0]])
+        state.joints.draw_speed[j] = draw_speed
+        state.joints.impulse[j] = ti.Vector.zero(ti.f32, 3)
+        for i in range(particles.shape[0]):
+            state.joints.row_impulse[first + i] = ti.Vector.zero(ti.f32, 3)
+            for k in range(ENDS):
+                state.joints.particle[(first + i) * ENDS + k] = particles[i, k]
+                state.joints.weight[(first + i) * ENDS + k] = weights[i, k]
+                state.joints.share[(first + i) * ENDS + k] = weights[i, k]
+        state.body_drives[body] = state.body_drives[body] | JOINED
+        state.body_drives[other] = state.body_drives[other] | JOINED
+
+
+@ti.kernel
+def end_joint(state: ti.template(), j: ti.i32):
+    """Let go, and close the gap in the rows."""
+    ti.loop_config(serialize=True)
+    for _ in range(1):
+        mark_held(state, 0)
+        ends, rows = state.joints.bodies[j], state.joints.rows[j]
+        count, used = rows[1] - rows[0], rows[1]
+        state.joints.bodies[j] = ti.Vector([0, 0])
+        for i in ti.static(range(2)):
+            state.body_drives[ends[i] - 1] = state.body_drives[ends[i] - 1] & ~JOINED
+        for each in range(MOST_JOINTS):
+            here = state.joints.bodies[each]
+            if here[0] > 0:
+                used = ti.max(used, state.joints.rows[each][1])
+                if state.joints.rows[each][0] >= rows[1]:
+                    state.joints.rows[each] = state.joints.rows[each] - count
+                for i in ti.static(range(2)):
+                    state.body_drives[here[i] - 1] = state.body_drives[here[i] - 1] | JOINED
+        for r in range(rows[1], used):
+            state.joints.row_impulse[r - count] = state.joints.row_impulse[r]
+        for k in range(rows[1] * ENDS, used * ENDS):
+            state.joints.particle[k - count * ENDS] = state.joints.particle[k]
+            state.joints.weight[k - count * ENDS] = state.joints.weight[k]
+            state.joints.share[k - count * ENDS] = state.joints.share[k]
+
+
+@ti.kernel
+def read_joint_impulse(state: ti.template(), j: ti.i32, impulse: ti.types.ndarray(dtype=ti.f32, ndim=1)):
+    """What a joint did to its first body in the last step, (3,) [N s]."""
+    for k in ti.static(range(3)):
+        impulse[k] = state.joints.impulse[j][k]
+
+
+@ti.kernel
+def add_joint_forces(
+    state: ti.template(), body: ti.i32, h: ti.f32, forces: ti.types.ndarray(dtype=ti.f32, ndim=2)
+):
+    """Add what joints did to the particles of one body in the last substep of `h` [s] to (n, 3) [N]."""
+    ti.loop_config(serialize=True)
+    for j in range(MOST_JOINTS):
+        ends = state.joints.bodies[j]
+        if ends[0] == body + 1 or ends[1] == body + 1:
+            for k in range(state.joints.rows[j][0] * ENDS, state.joints.rows[j][1] * ENDS):
+                p = state.joints.particle[k]
+                if state.particle_body[p] == body:
+                    force = state.joints.share[k] / h * state.joints.row_impulse[k // ENDS]
+                    for i in ti.static(range(3)):
+                        row = p - state.body_particles[body][0]
+                        forces[row, i] = forces[row, i] + force[i]

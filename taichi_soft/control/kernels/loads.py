@@ -1,0 +1,26 @@
+"""What frames, hands and other bodies feel of a body."""
+
+from taichi_soft.bodies.fields import MOST_GRABS
+from taichi_soft.control.joint_fields import ENDS, MOST_JOINTS
+from taichi_soft.core.runtime import ti
+
+
+@ti.func
+def forget_loads(state: ti.template(), body):
+    """Of a step that was undone because the body broke: NaN otherwise, for as long as it is frozen."""
+    zero = ti.Vector.zero(state.real, 3)
+    particles = state.body_particles[body]
+    for p in range(particles[0], particles[1]):
+        state.particle_reaction[p] = zero
+    for g in range(MOST_GRABS):
+        if state.grab_body[g] == body + 1:
+            state.grab_force[g] = zero
+    if ti.static(state.capacity.has_contact):
+        for j in range(MOST_JOINTS):
+            ends, rows = state.joints.bodies[j], state.joints.rows[j]
+            if ends[0] == body + 1 or ends[1] == body + 1:
+                state.joints.impulse[j] = zero
+                for r in range(rows[0], rows[1]):
+                    state.joints.row_impulse[r] = zero
+                    for k in range(r * ENDS, (r + 1) * ENDS):
+                        state.joints.share[k] = state.joints.weight[k]

@@ -1,0 +1,183 @@
+"""Pinned particles: no inverse mass, and a velocity that somebody else decides.
+
+`particle_aim` says where one goes in the coming step: nowhere (`STILL`), to its target (`TO_TARGET`), nowhere
+any more (`ARRIVED`, with the velocity of the step before still to be taken from it), or with a frame
+(`WITH_FRAME` plus its number), in whose axes its target is.
+"""
+
+from taichi_soft.bodies.status import ACTIVE, ASLEEP, FEELS_REACTION, FROZEN, MOVES_PINS
+from taichi_soft.core.runtime import ti
+
+STILL, TO_TARGET, ARRIVED, WITH_FRAME = 0, 1, 2, 3
+
+
+@ti.kernel
+def pin_particles(state: ti.template(), particles: ti.types.ndarray(dtype=ti.i32, ndim=1)):
+    """Stop particles and hold them where they are."""
+    ti.loop_config(serialize=True)
+    for i in range(particles.shape[0]):
+        p = particles[i]
+        state.particle_inv_mass[p] = 0.0
+        state.particle_velocity[p] = ti.Vector.zero(state.real, 3)
+        state.particle_aim[p] = STILL
+        if ti.static(state.capacity.implicit):
+            state.particle_contact[p] = 0
+
+
+@ti.kernel
+def free_particles(state: ti.template(), particles: ti.types.ndarray(dtype=ti.i32, ndim=1)):
+    """Give pinned particles their mass back, with the velocity that they have."""
+    ti.loop_config(serialize=True)
+    for i in range(particles.shape[0]):
+        p = particles[i]
+        state.particle_inv_mass[p] = 1.0 / state.particle_mass[p]
+        state.particle_aim[p] = STILL
+
+
+@ti.kernel
+def read_pinned(state: ti.template(), begin: ti.i32, pinned: ti.types.ndarray(dtype=ti.i32, ndim=1)):
+    """1 where a vertex of one body is pinned, in the caller's order."""
+    ti.loop_config(serialize=True)
+    for i in range(pinned.shape[0]):
+        pinned[i] = int(state.particle_inv_mass[state.particle_of_vertex[begin + i]] == 0.0)
+
+
+@ti.kernel
+def write_targets(
+    state: ti.template(),
+    particles: ti.types.ndarray(dtype=ti.i32, ndim=1),
+    targets: ti.types.ndarray(dtype=ti.f32, ndim=2),
+) -> ti.i32:
+    """Say where pinned particles are at the end of the coming step [m].
+
+    Returns: the number of the first in `particles` that is not pinned, with nothing changed, or -1.
+    """
+    loose = -1
+    ti.loop_config(serialize=True)
+    for _ in range(1):
+        for i in range(particles.shape[0]):
+            if loose < 0 and state.particle_inv_mass[particles[i]] > 0.0:
+                loose = i
+        if loose < 0:
+            for i in range(particles.shape[0]):
+                p = particles[i]
+                state.particle_target[p] = ti.Vector([targets[i, 0], targets[i, 1], targets[i, 2]])
+                state.particle_aim[p] = TO_TARGET
+                body = state.particle_body[p]
+                state.body_drives[body] = state.body_drives[body] | MOVES_PINS
+    return loose
+
+
+@ti.kernel
+def attach_particles(
+    state: ti.template(),
+    body: ti.i32,
+    frame: ti.i32,
+    feels: ti.i32,
+    particles: ti.types.ndarray(dtype=ti.i32, ndim=1),
+    places: ti.types.ndarray(dtype=ti.f32, ndim=2),
+):
+    """Let particles of one body go with a frame, at `places` in its axes [m], and feel their load or not."""
+    ti.loop_config(serialize=True)
+    for i in range(particles.shape[0]):
+        p = particles[i]
+        state.particle_inv_mass[p] = 0.0
+        state.particle_aim[p] = WITH_FRAME + frame
+        state.particle_target[p] = ti.Vector([places[i, 0], places[i, 1], places[i, 2]])
+        state.particle_reaction[p] = ti.Vector.zero(state.real, 3)
+        if ti.static(state.capacity.implicit):
+            state.particle_contact[p] = 0
+    bits = MOVES_PINS | ti.select(feels != 0, FEELS_REACTION, 0)
+    state.body_drives[body] = state.body_drives[body] | bits
+
+
+@ti.kernel
+def write_feeling(state: ti.template(), body: ti.i32, feels: ti.i32):
+    """Whether what the pins of one body take up is added up."""
+    bit = ti.select(feels != 0, FEELS_REACTION, 0)
+    state.body_drives[body] = (state.body_drives[body] & ~FEELS_REACTION) | bit
+
+
+@ti.kernel
+def read_reaction(
+    state: ti.template(),
+    begin: ti.i32,
+    particles: ti.types.ndarray(dtype=ti.i32, ndim=1),
+    origin: ti.types.ndarray(dtype=ti.f32, ndim=1),
+    load: ti.types.ndarray(dtype=ti.f64, ndim=1),
+):
+    """Impulse [N s] and its moment about a point [N m s], (6,), that `particles` took up in the last step."""
+    ti.loop_config(serialize=True)
+    for _ in range(1):
+        center = ti.Vector([origin[0], origin[1], origin[2]])
+        impulse, moment = ti.Vector.zero(ti.f64, 3), ti.Vector.zero(ti.f64, 3)
+        for i in range(particles.shape[0]):
+            part = ti.cast(state.particle_reaction[particles[i]], ti.f64)
+            impulse += part
+            moment += ti.cast(state.particle_position[particles[i]] - center, ti.f64).cross(part)
+        for k in ti.static(range(3)):
+            load[k], load[3 + k] = impulse[k], moment[k]
+
+
+@ti.kernel
+def aim_pinned(
+    state: ti.template(), body_count: ti.i32, dt: ti.f32, frames: ti.types.ndarray(dtype=ti.f32, ndim=2)
+) -> ti.i32:
+    """Give pinned particles the velocity that takes them in a step of `dt` [s] to where they are to be.
+
+    Args:
+        frames: where each frame is then: rotation matrix, row by row, and position [m], (f, 12).
+    Returns: how many bodies will have to be looked at before the step after, too.
+    """
+    waiting = 0
+    ti.loop_config(serialize=True)
+    for body in range(body_count):
+        drives = state.body_drives[body]
+        if drives & MOVES_PINS != 0 and state.body_status[body] == FROZEN:
+            waiting += 1
+        elif drives & MOVES_PINS != 0:
+            moving = 0
+            particles = state.body_particles[body]
+            for p in range(particles[0], particles[1]):
+                if state.particle_inv_mass[p] == 0.0:
+                    before = state.particle_velocity[p]
+                    moving += _aim(state, p, dt, frames)
+                    change = state.particle_velocity[p] - before
+                    if drives & FEELS_REACTION != 0:
+                        state.particle_reaction[p] = -change * state.particle_mass[p]
+            if moving == 0:
+                state.body_drives[body] = drives & ~MOVES_PINS
+            waiting += int(moving > 0)
+            if moving > 0 and state.body_status[body] == ASLEEP:
+                state.body_status[body] = ACTIVE
+    return waiting
+
+
+@ti.func
+def _aim(state: ti.template(), p, dt, frames: ti.template()):
+    """Returns 1 where the particle will have to be aimed again."""
+    aim = state.particle_aim[p]
+    x, goal = state.particle_position[p], state.particle_target[p]
+    if aim >= WITH_FRAME:
+        goal = in_world(frames, aim - WITH_FRAME, goal)
+    elif aim == TO_TARGET:
+        state.particle_aim[p] = ARRIVED
+    else:
+        goal = x
+        state.particle_aim[p] = STILL
+    state.particle_velocity[p] = (goal - x) / dt
+    return int(aim >= WITH_FRAME or aim == TO_TARGET)
+
+
+@ti.func
+def in_world(frames: ti.template(), frame, local):
+    """A point in the axes of a frame, in those of the world [m]."""
+    return ti.Vector(
+        [
+            frames[frame, 3 * i] * local.x
+            + frames[frame, 3 * i + 1] * local.y
+            + frames[frame, 3 * i + 2] * local.z
+            + frames[frame, 9 + i]
+            for i in ti.static(range(3))
+        ]
+    )

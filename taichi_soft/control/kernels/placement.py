@@ -1,0 +1,97 @@
+"""A whole body moved or set in motion as a rigid one, between two steps."""
+
+from taichi_soft.control.kernels.pins import TO_TARGET
+from taichi_soft.core.constants import POSITION_LIMIT, VELOCITY_LIMIT
+from taichi_soft.core.runtime import ti
+
+
+@ti.func
+def _center_of_mass(state: ti.template(), body):
+    """In float64 [m]."""
+    particles = state.body_particles[body]
+    moment, mass = ti.Vector.zero(ti.f64, 3), ti.cast(0.0, ti.f64)
+    for p in range(particles[0], particles[1]):
+        mass += state.particle_mass[p]
+        moment += ti.cast(state.particle_position[p], ti.f64) * state.particle_mass[p]
+    return moment / mass
+
+
+@ti.func
+def _relative(state: ti.template(), p, center):
+    return ti.cast(ti.cast(state.particle_position[p], ti.f64) - center, ti.f32)
+
+
+@ti.kernel
+def write_rigid_velocity(
+    state: ti.template(), body: ti.i32, motion: ti.types.ndarray(dtype=ti.f32, ndim=1)
+) -> ti.f32:
+    """Set the velocities of one body, but for pinned particles, to those of a rigid one.
+
+    Args:
+        motion: velocity of the centre of mass [m/s], angular velocity [rad/s]: (6,).
+    Returns: the highest speed [m/s]; if that is too high, nothing is changed.
+    """
+    fastest = ti.cast(0.0, ti.f32)
+    ti.loop_config(serialize=True)
+    for _ in range(1):
+        linear = ti.Vector([motion[0], motion[1], motion[2]])
+        angular = ti.Vector([motion[3], motion[4], motion[5]])
+        center = _center_of_mass(state, body)
+        particles = state.body_particles[body]
+        for p in range(particles[0], particles[1]):
+            fastest = ti.max(fastest, (linear + angular.cross(_relative(state, p, center))).norm())
+        if fastest < VELOCITY_LIMIT:
+            for p in range(particles[0], particles[1]):
+                if state.particle_inv_mass[p] > 0.0:
+                    velocity = linear + angular.cross(_relative(state, p, center))
+                    state.particle_velocity[p] = velocity
+            state.body_velocity_lag[body] = 0.0
+    return fastest
+
+
+@ti.func
+def _turned(turn: ti.template(), v):
+    return ti.Vector([turn[i, 0] * v.x + turn[i, 1] * v.y + turn[i, 2] * v.z for i in ti.static(range(3))])
+
+
+@ti.kernel
+def jump(
+    state: ti.template(),
+    body: ti.i32,
+    place: ti.types.ndarray(dtype=ti.f64, ndim=1),
+    turn: ti.types.ndarray(dtype=ti.f64, ndim=2),
+    found: ti.types.ndarray(dtype=ti.f64, ndim=1),
+):
+    """Turn one body about its centre of mass and put that somewhere else, with where it was before the step
+    and where its pins are to be after the coming one.
+
+    Args:
+        place: the new centre [m], the height below which nothing may come [m], what the velocity is
+            multiplied by: (5,).
+        turn: rotation matrix (3, 3).
+        found: receives the lowest height, the highest, and the largest coordinate [m], (3,); where they are
+            out of bounds nothing is changed.
+    """
+    ti.loop_config(serialize=True)
+    for _ in range(1):
+        target = ti.Vector([place[0], place[1], place[2]])
+        center = _center_of_mass(state, body)
+        particles = state.body_particles[body]
+        lowest, highest = ti.cast(ti.math.inf, ti.f64), ti.cast(-ti.math.inf, ti.f64)
+        farthest = ti.cast(0.0, ti.f64)
+        for p in range(particles[0], particles[1]):
+            x = _turned(turn, ti.cast(state.particle_position[p], ti.f64) - center) + target
+            lowest, highest = ti.min(lowest, x.z), ti.max(highest, x.z)
+            farthest = ti.max(farthest, ti.abs(x.x), ti.abs(x.y), ti.abs(x.z))
+        found[0], found[1], found[2] = lowest, highest, farthest
+        if farthest < POSITION_LIMIT and lowest >= place[3] - 1e-3 * (highest - lowest):
+            for p in range(particles[0], particles[1]):
+                for old in ti.static((state.particle_position, state.prev_position)):
+                    old[p] = ti.cast(_turned(turn, ti.cast(old[p], ti.f64) - center) + target, ti.f32)
+                for old in ti.static((state.particle_velocity, state.prev_velocity)):
+                    old[p] = ti.cast(_turned(turn, ti.cast(old[p], ti.f64)) * place[4], ti.f32)
+                if state.particle_aim[p] == TO_TARGET:
+                    target_before = ti.cast(state.particle_target[p], ti.f64)
+                    state.particle_target[p] = ti.cast(_turned(turn, target_before - center) + target, ti.f32)
+                if ti.static(state.capacity.implicit):
+                    state.particle_contact[p] = 0

@@ -1,0 +1,195 @@
+"""Arguments of the public face, checked before anything is changed."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taichi_soft.core.constants import POSITION_LIMIT
+from taichi_soft.core.errors import OptionError
+
+Floats = NDArray[np.float64]
+
+LARGEST_COUNT = 1_000_000
+"""Substeps, bodies or pixels: more would not end within minutes, or not fit 32 bits."""
+
+SHORTEST_STEP, LONGEST_STEP = 1e-9, 1e4
+"""Fixed steps [s]: shorter ones are lost in float32, longer ones would take days of computing."""
+
+
+def as_number(value: Any, name: str, low: float, high: float, text: str = "") -> float:
+    """`value` as a float within [low, high]. Raises: OptionError saying `text`, or the range."""
+    wanted = text or f"a number from {low:g} to {high:g}"
+    if isinstance(value, (bool, np.bool_, str)) or getattr(value, "ndim", 0) != 0:
+        raise OptionError(f"{name} must be {wanted}, got {value!r}")
+    try:
+        number = float(value)
+    except (TypeError, ValueError, OverflowError):
+        raise OptionError(f"{name} must be {wanted}, got {value!r}") from None
+    if not (np.isfinite(number) and low <= number <= high):
+        raise OptionError(f"{name} must be {wanted}, got {number:g}")
+    return number
+
+
+def as_positive(value: Any, name: str, unit: str) -> float:
+    """`value` as a float above 0. Raises: OptionError."""
+    number = as_number(value, name, 0.0, np.inf, f"a number above 0 {unit}")
+    if number == 0.0:
+        raise OptionError(f"{name} must be a number above 0 {unit}, got 0")
+    return number
+
+
+def as_step(dt: float) -> float:
+    """`dt` if it can be the length of a fixed step [s]. Raises: OptionError."""
+    return as_number(dt, "dt", SHORTEST_STEP, LONGEST_STEP, "a number above 0 s, from 1e-9 to 1e4")
+
+
+def as_count(value: Any, name: str, low: int = 1, high: int = LARGEST_COUNT) -> int:
+    """`value` as a whole number from `low` to `high`. Raises: OptionError."""
+    is_whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+    if not is_whole or not low <= value <= high:
+        raise OptionError(f"{name} must be a whole number from {low} to {high}, got {value!r}")
+    return int(value)
+
+
+def as_flag(value: Any, name: str) -> bool:
+    """`value` if it is True or False. Raises: OptionError."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise OptionError(f"{name} must be True or False, got {value!r}")
+    return bool(value)
+
+
+def _is_plain(value: Any) -> bool:
+    return type(value) is float or type(value) is int
+
+
+def as_vector(value: ArrayLike, name: str, unit: str, limit: float = POSITION_LIMIT) -> Floats:
+    """`value` as three numbers nearer to zero than `limit`. Raises: OptionError."""
+    if isinstance(value, tuple) and len(value) == 3 and all(_is_plain(x) and abs(x) < limit for x in value):
+        return np.array(
+            value, dtype=np.float64
+        )  # the same, ten times as fast: games move many things a frame
+    vector = as_array(value, name, (3,), unit)
+    if not np.abs(vector).max() < limit:
+        raise OptionError(f"{name} must lie within {limit:g} {unit} of zero, got {vector.tolist()}")
+    return vector
+
+
+def to_array(values: Any, name: str) -> NDArray[Any]:
+    """`values` as an array of whatever they hold. Raises: OptionError for rows of unequal lengths."""
+    try:
+        return np.asarray(values)
+    except (ValueError, TypeError) as error:
+        raise OptionError(f"{name} is not an array of numbers ({error})") from None
+
+
+def as_array(values: ArrayLike, name: str, shape: tuple[int | None, ...], unit: str = "") -> Floats:
+    """`values` as finite float64 of that shape (None: any length), copied. Raises: OptionError."""
+    lengths = ", ".join("n" if length is None else str(length) for length in shape)
+    wanted = f"({lengths}{',' if len(shape) == 1 else ''})" + (f" [{unit}]" if unit else "")
+    array = to_array(values, name)
+    if array.dtype.kind not in "fiu":
+        raise OptionError(f"{name} must be numbers of shape {wanted}, got {values!r}")
+    if array.ndim != len(shape) or any(
+        want not in (None, got) for want, got in zip(shape, array.shape, strict=True)
+    ):
+        raise OptionError(f"{name} must have shape {wanted}, got shape {array.shape}")
+    real = array.astype(np.float64)  # a copy, also of float64
+    # The sum is finite for all sound arrays but absurd ones, and quicker than looking at every number.
+    if not np.isfinite(real.sum()) and not np.isfinite(real).all():
+        first = int(np.argmin(np.isfinite(real.reshape(len(real), -1)).all(axis=1)))
+        raise OptionError(f"{name} must be finite, but entry {first} is {real[first].tolist()}")
+    return real
+
+
+def as_indices(values: ArrayLike, name: str, count: int) -> NDArray[np.int32]:
+    """`values` as distinct whole numbers from 0 to `count` - 1, ascending. Raises: OptionError."""
+    array = to_array(values, name)
+    if array.size == 0 and array.ndim == 1:
+        return np.zeros(0, dtype=np.int32)
+    if array.dtype.kind not in "iu" or array.ndim != 1:
+        raise OptionError(f"{name} must be a list of vertex numbers, got {values!r}")
+    if array.min() < 0 or array.max() >= count:
+        worst = int(array.min() if array.min() < 0 else array.max())
+        raise OptionError(f"{name} names vertex {worst}: there are {count}, from 0 to {count - 1}")
+    return np.unique(array).astype(np.int32)
+
+
+def as_path(value: Any) -> Path:
+    """`value` as the path of a file. Raises: OptionError."""
+    if not isinstance(value, (str, os.PathLike)):
+        raise OptionError(f"path must be a string or a Path, got {value!r}")
+    path = Path(os.fsdecode(value))
+    if not path.name or "\0" in str(path):
+        raise OptionError(f"path {str(path)!r} names no file")
+    return path
+
+
+def as_rotation(value: Any) -> Floats:
+    """A rotation matrix from a matrix (3, 3), a quaternion (x, y, z, w), or None for no rotation.
+
+    Raises: OptionError if it is neither orthonormal with determinant +1 nor of length 1.
+    """
+    if value is None:
+        return np.eye(3)
+    if to_array(value, "rotation").shape == (4,):
+        quaternion = as_array(value, "rotation", (4,), "quaternion x, y, z, w")
+        length = float(np.linalg.norm(quaternion))
+        _require_unit(np.array([length]), "rotation")
+        return np.array(_turning_rows(*(quaternion / length).tolist()))
+    matrix = as_array(value, "rotation", (3, 3), "or quaternion of shape (4,)")
+    return np.asarray(_rotations(matrix[None], "rotation")[0])
+
+
+def as_rotations(value: Any, name: str) -> Floats:
+    """Rotation matrices (m, 3, 3) from such matrices, or from quaternions (m, 4) of x, y, z, w.
+
+    Raises: OptionError with the first that is no rotation.
+    """
+    if to_array(value, name).ndim == 2:
+        return _from_quaternions(as_array(value, name, (None, 4), "quaternions x, y, z, w"), name)
+    return _rotations(as_array(value, name, (None, 3, 3), "or quaternions of shape (n, 4)"), name)
+
+
+def _rotations(matrices: Floats, name: str) -> Floats:
+    bad = np.abs(matrices).max(axis=(1, 2), initial=0.0) > 2.0  # whose squares might overflow
+    sound = matrices[~bad]
+    gap = np.abs(sound @ np.swapaxes(sound, 1, 2) - np.eye(3)).max(axis=(1, 2))
+    bad[~bad] = (gap > 1e-5) | (np.linalg.det(sound) < 0)
+    if bad.any():
+        raise OptionError(
+            f"{name}{_which(bad)} must be an orthonormal matrix with determinant +1, "
+            f"got {matrices[bad.argmax()].round(6).tolist()}"
+        )
+    return matrices
+
+
+def _from_quaternions(quaternions: Floats, name: str) -> Floats:
+    lengths = np.linalg.norm(quaternions, axis=1)
+    _require_unit(lengths, name)
+    return np.moveaxis(np.array(_turning_rows(*(quaternions / lengths[:, None]).T)), 2, 0)
+
+
+def _require_unit(lengths: Floats, name: str) -> None:
+    bad = np.abs(lengths - 1.0) > 1e-3
+    if bad.any():
+        raise OptionError(
+            f"{name}{_which(bad)} is a quaternion of length {lengths[bad.argmax()]:g}: normalise it"
+        )
+
+
+def _turning_rows(x: Any, y: Any, z: Any, w: Any) -> list[list[Any]]:
+    """Rows of the matrix that turns as a unit quaternion does, of numbers or arrays."""
+    return [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+
+
+def _which(bad: NDArray[np.bool_]) -> str:
+    return f" {int(bad.argmax())}" if len(bad) > 1 else ""

@@ -1,0 +1,84 @@
+"""Numbers of what a world gives out handles to: the same in every world with the same history."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from functools import wraps
+from typing import Any, Protocol, TypeVar, cast
+from weakref import WeakValueDictionary
+
+from taichi_soft.core.turns import Turn, one_thread
+
+Kind = TypeVar("Kind", bound="Handle")
+Method = TypeVar("Method", bound=Callable[..., Any])
+
+
+CALLS: dict[str, set[str]] = {}
+"""Names of the methods that are recorded, by class: what a file may ask for."""
+
+
+class Recorder(Protocol):
+    """Who takes note of calls, where a world has one."""
+
+    def call(
+        self, method: Callable[..., Any], handle: Handle, arguments: tuple[Any, ...], options: dict[str, Any]
+    ) -> Any:
+        """Make a call, and take note of it."""
+
+
+class Handle:
+    """What a caller holds of a world: a body, a collider, a frame, a grab, an attachment; or the world.
+
+    Its public methods are called by one thread at a time: a second one gets a StateError, before anything is
+    changed.
+    """
+
+    _handles: Handles
+    _serial: int
+
+    def __init_subclass__(cls) -> None:
+        """Guard the public methods."""
+        for name, method in list(vars(cls).items()):
+            if inspect.isfunction(method) and not name.startswith("_"):
+                setattr(cls, name, one_thread(method))
+
+
+class Handles:
+    """Counts the handles of one world, and finds those that somebody still holds."""
+
+    def __init__(self) -> None:
+        """None yet; 0 is the world itself."""
+        self.count = 1
+        self.turn = Turn()
+        self.recorder: Recorder | None = None
+        self._known: WeakValueDictionary[int, Handle] = WeakValueDictionary()
+
+    def enlist(self, handle: Handle, serial: int | None = None) -> None:
+        """Give a new handle the next number, or the one that it had in an earlier state of the world."""
+        if serial is None:
+            serial = self.count
+            self.count += 1
+        handle._handles, handle._serial = self, serial
+        self._known[serial] = handle
+
+    def find(self, serial: int, kind: type[Kind]) -> Kind | None:
+        """The handle of that number, if it is of that kind and somebody holds it."""
+        handle = self._known.get(serial)
+        return handle if isinstance(handle, kind) else None
+
+
+def recorded(method: Method) -> Method:
+    """Lets the recorder of a world that has one take note of the calls of a public method that changes it."""
+
+    kind, _, name = method.__qualname__.partition(".")
+    CALLS.setdefault(kind, set()).add(name)
+
+    @wraps(method)
+    def call(self: Handle, *arguments: Any, **options: Any) -> Any:
+        recorder = self._handles.recorder
+        if recorder is None:
+            return method(self, *arguments, **options)
+        return recorder.call(method, self, arguments, options)
+
+    return cast("Method", call)

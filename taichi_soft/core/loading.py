@@ -1,0 +1,68 @@
+"""Rows of NumPy arrays into fields, many fields with one kernel.
+
+Taichi compiles a kernel for each field that is written alone: for those of a world they took longer than
+the step's.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.core.runtime import ti
+
+
+@ti.data_oriented
+class Loader:
+    """Fields that are always written together, in the same order."""
+
+    def __init__(self) -> None:
+        """Without fields: the first `write` fixes which they are."""
+        self.pieces: list[tuple[Any, int, int, int]] = []
+        self._waiting: list[tuple[Any, NDArray[Any]]] = []
+
+    def fill(self, field: Any, rows: NDArray[Any]) -> None:
+        """Note `rows` for the front of a one-dimensional field, and zeros behind them."""
+        width = getattr(field, "n", 1)
+        whole = np.zeros((field.shape[0], width), np.int32 if field.dtype == ti.i32 else np.float64)
+        if len(rows):
+            whole[: len(rows)] = rows.reshape(len(rows), width)
+        self._waiting.append((field, whole.reshape(-1)))
+
+    def write(self) -> None:
+        """Write all that was to be filled."""
+        reals, wholes = [np.zeros(1)], [np.zeros(1, np.int32)]
+        pieces, sizes = [], [1, 1]
+        for field, rows in self._waiting:
+            is_whole = int(rows.dtype == np.int32)
+            (wholes if is_whole else reals).append(rows)
+            pieces.append((field, getattr(field, "n", 1), is_whole, sizes[is_whole]))
+            sizes[is_whole] += len(rows)
+        self._waiting.clear()
+        if not self.pieces:
+            self.pieces = pieces
+        assert [id(piece[0]) for piece in pieces] == [id(piece[0]) for piece in self.pieces]
+        _write_pieces(self, np.concatenate(reals), np.concatenate(wholes))
+
+
+@ti.kernel
+def _write_pieces(
+    loader: ti.template(),
+    reals: ti.types.ndarray(dtype=ti.f64, ndim=1),
+    wholes: ti.types.ndarray(dtype=ti.i32, ndim=1),
+):
+    for field, width, is_whole, start in ti.static(loader.pieces):
+        # Serial loops become one function, and of many fields that compiles three times as long as a function
+        # per field; but to write the few of a collider, no threads are worth waking up.
+        ti.loop_config(serialize=ti.static(len(loader.pieces) < 20))
+        for i in range(field.shape[0]):
+            for k in ti.static(range(width)):
+                value = (
+                    wholes[start + i * width + k]
+                    if ti.static(is_whole == 1)
+                    else reals[start + i * width + k]
+                )
+                if ti.static(width == 1):
+                    field[i] = ti.cast(value, field.dtype)
+                else:
+                    field[i][k] = ti.cast(value, field.dtype)

@@ -1,0 +1,33 @@
+"""Unit quaternions (x, y, z, w)."""
+
+from taichi_soft.core.runtime import ti
+
+
+@ti.func
+def turned(q, v):
+    """A vec3 turned by `q`."""
+    axis = q.xyz
+    t = 2.0 * axis.cross(v)
+    return v + q.w * t + axis.cross(t)
+
+
+@ti.func
+def turned_back(q, v):
+    """A vec3 turned by the inverse of `q`."""
+    axis = q.xyz
+    t = 2.0 * v.cross(axis)
+    return v + q.w * t + t.cross(axis)
+
+
+@ti.func
+def spun(q, rotation):
+    """`q` and then a turn by the rotation vector [rad], as one quaternion."""
+    angle2 = rotation.dot(rotation)
+    result = q
+    if angle2 > 0.0:
+        angle = ti.sqrt(angle2)
+        axis = rotation * (ti.sin(0.5 * angle) / angle)
+        w = ti.cos(0.5 * angle)
+        turn = axis * q.w + q.xyz * w + axis.cross(q.xyz)
+        result = ti.Vector([turn.x, turn.y, turn.z, w * q.w - axis.dot(q.xyz)])
+    return result

@@ -1,0 +1,31 @@
+"""Singular values of a 3x3 matrix with the sign of its determinant."""
+
+from taichi_soft.core.math.eigen import symmetric_eigen
+from taichi_soft.core.math.tensors import inner_square, times
+from taichi_soft.core.runtime import ti
+
+
+@ti.func
+def signed_svd(F):
+    """U, s and V of F = U diag(s) V^T, U and V rotations, s0 >= s1 >= |s2|, s2 negative where F mirrors.
+
+    U is built from the images of V's columns, so it stays a rotation where F is flat or zero.
+    Args:
+        F: as columns.
+    Returns: U as columns, s as vec3, V as columns.
+    """
+    _, V = symmetric_eigen(inner_square(F))
+    a = times(F, V[0])
+    s0 = ti.sqrt(a.dot(a))
+    u0 = ti.select(s0 > 1e-20, a / ti.max(s0, 1e-20), V[0])
+    b = times(F, V[1])
+    b = b - u0 * u0.dot(b)
+    s1 = ti.sqrt(b.dot(b))
+    u1 = b / ti.max(s1, 1e-30)
+    if s1 <= 1e-6 * s0:  # b has no direction that means anything: any at right angles to u0
+        u1 = u0.cross(V[1])
+        if u1.dot(u1) < 0.1:
+            u1 = u0.cross(V[2])
+        u1 = u1 / ti.sqrt(u1.dot(u1))
+    u2 = u0.cross(u1)
+    return (u0, u1, u2), ti.Vector([s0, s1, u2.dot(times(F, V[2]))]), V

@@ -1,0 +1,96 @@
+"""Geometry of one triangle: what is nearest, what a line of sight meets, how much of the view it fills."""
+
+from taichi_soft.core.runtime import ti
+
+_TINY = 1e-37
+"""Least divisor: what is smaller is a length of zero in float32, and its numerator is then zero too."""
+
+
+@ti.func
+def closest_point_on_triangle(x, a, b, c):
+    """Barycentric coordinates of the triangle's point nearest to x, vec3.
+
+    The nearest of the projection onto the plane, where that falls inside, and of the nearest points of the
+    three edges. Each is a point of the triangle whatever the rounding, so flat triangles, down to a segment
+    or a point, are no special case.
+    Args:
+        x, a, b, c: vec3 [m].
+    Returns: weights of a, b and c, each from 0 to 1, of sum 1.
+    """
+    ab, ac, ax = b - a, c - a, x - a
+    bc, bx = c - b, x - b
+    n = ab.cross(ac)
+    scale = 1.0 / ti.max(n.dot(n), _TINY)
+    v, w = ax.cross(ac).dot(n) * scale, ab.cross(ax).dot(n) * scale
+    is_inside = ti.min(v, w, 1.0 - v - w) >= 0.0
+    v, w = ti.select(is_inside, v, 0.0), ti.select(is_inside, w, 0.0)  # otherwise a
+    gap = ax - ab * v - ac * w
+    best = gap.dot(gap)
+    for edge in ti.static(range(3)):
+        away, along = ((ax, ab), (bx, bc), (ax, ac))[edge]
+        t = ti.min(ti.max(away.dot(along) / ti.max(along.dot(along), _TINY), 0.0), 1.0)
+        gap = away - along * t
+        distance = gap.dot(gap)
+        is_nearer = distance < best  # no branch: it would keep lanes from running side by side
+        best = ti.select(is_nearer, distance, best)
+        v = ti.select(is_nearer, (t, 1.0 - t, 0.0)[edge], v)
+        w = ti.select(is_nearer, (0.0, t, t)[edge], w)
+    return ti.Vector([ti.max(1.0 - v - w, 0.0), v, w])
+
+
+@ti.func
+def pierce_triangle(a, b, c):
+    """Where the z axis goes through a triangle: for a ray, in axes whose z runs along it from its start.
+
+    The axis is as thick as float32 resolves at the triangle's distance, so nothing slips through between two
+    triangles. One that is seen edge on is not met: its neighbours are.
+    Args:
+        a, b, c: vec3 [m].
+    Returns: -1 where the axis enters through the front (from which a, b, c run counterclockwise), 1 where it
+        leaves through it, 0 where it passes by; and the weights of a, b and c there, vec3 of sum 1.
+    """
+    areas = ti.Vector([b.x * c.y - b.y * c.x, c.x * a.y - c.y * a.x, a.x * b.y - a.y * b.x])
+    across = ti.max(ti.abs(a.x), ti.abs(a.y), ti.abs(b.x), ti.abs(b.y), ti.abs(c.x), ti.abs(c.y))
+    slack = 1e-6 * across * ti.max(across, ti.abs(a.z), ti.abs(b.z), ti.abs(c.z))
+    side = ti.select(areas.sum() < 0.0, -1, 1)
+    areas = areas * side
+    if areas.sum() <= slack or areas.min() < -slack:
+        side = 0
+    areas = ti.max(areas, 0.0)
+    return side, areas / ti.max(areas.sum(), _TINY)
+
+
+@ti.func
+def solid_angle(a, b, c):
+    """How much of the view from the origin a triangle fills [sr], negative seen from its front.
+
+    Over a closed surface that looks outward the sum is 4 pi inside and 0 outside. Van Oosterom and Strackee
+    1983.
+    """
+    la, lb, lc = a.norm(), b.norm(), c.norm()
+    down = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb
+    return 2.0 * ti.atan2(a.dot(b.cross(c)), down)
+
+
+@ti.func
+def triangle_touches_box(a, b, c, half):
+    """Whether a triangle has a point in the box from -half to half, which includes its faces.
+
+    By separating axes: the normals of the box and of the triangle, and the cross products of their edges
+    (Akenine-Moeller 2001). A flat triangle leaves the axes of a segment or a point.
+    """
+    normal = (b - a).cross(c - a)
+    heights = ti.Vector([normal.dot(a), normal.dot(b), normal.dot(c)])  # equal, unless the triangle is flat
+    reach = ti.abs(normal).dot(half)
+    touches = spans_meet(a, b, c, half) and heights.max() >= -reach and heights.min() <= reach
+    for edge in ti.static((b - a, c - b, a - c)):
+        e = ti.abs(edge)
+        reaches = e.yzx * half.zxy + e.zxy * half.yzx
+        touches = touches and spans_meet(edge.cross(a), edge.cross(b), edge.cross(c), reaches)
+    return touches
+
+
+@ti.func
+def spans_meet(a, b, c, reach):
+    """Whether along each axis something of a, b and c lies between -reach and reach."""
+    return ti.min(ti.max(a, b, c) + reach, reach - ti.min(a, b, c)).min() >= 0.0

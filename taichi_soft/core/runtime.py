@@ -1,0 +1,370 @@
+"""Taichi, started once.
+
+Every other module takes `ti` from here, so that the environment below is set before Taichi is
+imported, and only this module calls `ti.init` (which would reset every field in the process).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import functools
+import io
+import os
+import textwrap
+import threading
+import types
+import weakref
+from _thread import start_new_thread
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
+from dataclasses import dataclass, replace
+from importlib import import_module
+from queue import SimpleQueue
+from typing import Any, TypeVar
+
+os.environ.setdefault("TI_SKIP_VERSION_CHECK", "ON")
+os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
+
+import taichi as ti
+
+from taichi_soft.core.cores import (
+    available_cores,
+    bind_youngest,
+    can_bind,
+    number_now,
+    require_cores,
+    thread_ids,
+)
+from taichi_soft.core.errors import DeviceError, OptionError
+from taichi_soft.core.subnormals import learn, without_subnormals
+from taichi_soft.core.turns import in_turn, leave_behind
+
+__all__ = ["Device", "device", "init", "is_initialized", "make_fields", "ti"]
+
+Result = TypeVar("Result")
+
+DEBUG = "TAICHI_SOFT_DEBUG"
+"""Name of the environment variable that at 1 has every index in a kernel checked: slow, for tests only."""
+
+_MOST_THREADS = 256
+_ARCHS = ("cpu", "cuda", "vulkan", "metal")
+
+# A `ti.real_func` is compiled once and by itself, where a `ti.func` is copied to wherever it is called. But
+# Taichi 1.7 puts branches and loops of a `ti.func` called in it into the kernel, and crashes. With this
+# they go into what is being compiled.
+ti.lang.kernel_impl.Kernel.ast_builder = lambda _: ti.lang.impl.get_runtime().compiling_callable.ast_builder()
+
+
+def _remember(look_up: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """`look_up`, which asks once about each object, for as long as the object lives."""
+    known: weakref.WeakKeyDictionary[Any, Any] = weakref.WeakKeyDictionary()
+
+    def remembered(key: Any) -> Any:
+        if key not in known:
+            known[key] = look_up(key)
+        return known[key]
+
+    return remembered
+
+
+def _remember_sources() -> None:
+    """Wherever a `ti.func` is called, Taichi 1.7 reads its source again, and wraps the line of every name and
+    operator in it for messages of errors: a third of a first step whose kernels are in the cache. The answers
+    are always the same, so they are kept."""
+    kernels, nodes = ti.lang.kernel_impl, ti.lang.ast.ast_transformer_utils
+    kernels.getsourcefile = _remember(kernels.getsourcefile)
+    kernels.getsourcelines = _remember(kernels.getsourcelines)
+    kernels.textwrap = types.SimpleNamespace(
+        fill=functools.cache(textwrap.fill), dedent=functools.cache(textwrap.dedent)
+    )
+    wrapper = types.SimpleNamespace(wrap=functools.cache(nodes.TextWrapper(width=80).wrap))
+    nodes.TextWrapper = lambda width: wrapper
+
+
+def _let_threads_in() -> None:
+    """Taichi 1.7 takes what one thread compiles for what all do, and two that compile at once for one. Here
+    each kernel and each number in a field is a turn of one thread, for which others wait, and what is being
+    compiled is known to the thread that does it."""
+    compiling, accessor = threading.local(), import_module("taichi.lang.field").SNodeHostAccessor
+    ti.lang.impl.PyTaichi.inside_kernel = property(
+        lambda _: getattr(compiling, "is_on", False), lambda _, is_on: setattr(compiling, "is_on", is_on)
+    )
+    ti.lang.kernel_impl.Kernel.__call__ = in_turn(without_subnormals(ti.lang.kernel_impl.Kernel.__call__))
+    make = accessor.__init__
+
+    def make_in_turn(self: Any, snode: Any) -> None:
+        make(self, snode)
+        self.getter, self.setter = in_turn(self.getter), in_turn(self.setter)
+
+    accessor.__init__ = make_in_turn
+    lay_out = ti.lang.impl.PyTaichi.materialize_root_fb
+
+    def lay_out_at_home(is_first_call: bool) -> None:
+        """Fields that somebody else made, which Taichi lays out where a kernel is called first."""
+        is_pending = not (ti.lang.impl._root_fb.finalized or ti.lang.impl._root_fb.empty)
+        if _device is not None and is_pending and threading.get_ident() != _home:
+            _at_home(functools.partial(lay_out, is_first_call), _device.arch)
+        else:
+            lay_out(is_first_call)
+
+    ti.lang.impl.PyTaichi.materialize_root_fb = staticmethod(lay_out_at_home)
+
+
+if ti.__version__[:2] == (1, 7):
+    _remember_sources()
+    _let_threads_in()
+
+
+def _check_real_functions() -> None:
+    """Taichi 1.7's own bounds check leaves out what a `ti.real_func` reads and writes. An index there is
+    asserted before its row is used, and made 0 where it is wrong, so that the process lives to tell."""
+    impl = ti.lang.impl
+    plain = impl.subscript
+
+    def checked(builder: Any, value: Any, *indices: Any, **options: Any) -> Any:
+        is_real = isinstance(impl.get_runtime().compiling_callable, ti._lib.core.Function)
+        if is_real and isinstance(value, ti.Field) and value.shape:
+            (index,), (size,) = indices, value.shape  # the fields of a world have one dimension
+            is_inside = ti.lang.ops.logical_and(index >= 0, index < size)
+            place = ti._lib.core.DebugInfo(impl.get_runtime().get_current_src_info())
+            message = f"Accessing a field of size ({size}) in a real function with index (%d)"
+            impl.ti_assert(is_inside, message, [impl.Expr(index).ptr], place)
+            indices = (ti.select(is_inside, index, 0),)
+        return plain(builder, value, *indices, **options)
+
+    impl.subscript = checked
+
+
+def _let_whole_numbers_overflow() -> None:
+    """Where Taichi 1.7 checks bounds it prints a line for each whole number that overflows; hashes are to."""
+    program = ti._lib.core.Program
+    plain = program.compile_kernel
+
+    def compiled(self: Any, config: Any, *arguments: Any) -> Any:
+        config.debug = False  # the bounds check has a switch of its own; the rest looks here
+        try:
+            return plain(self, config, *arguments)
+        finally:
+            config.debug = True  # looked at by the launch, which raises what was found
+
+    program.compile_kernel = compiled
+
+
+@dataclass(frozen=True)
+class Device:
+    """What `init` chose."""
+
+    arch: str  # "cpu", "cuda", "vulkan" or "metal"
+    threads: int  # CPU worker threads (1 on a GPU: the host side is serial)
+    reason: str  # one line for people
+    cores: tuple[int, ...] = ()  # to which the worker threads are bound, one each; none where they are free
+
+    @property
+    def is_gpu(self) -> bool:
+        """True where kernels run on a graphics processor."""
+        return self.arch != "cpu"
+
+
+_device: Device | None = None
+_process = 0  # that started Taichi
+_jobs: SimpleQueue[Callable[[], object]] = SimpleQueue()  # of the thread that started it
+_is_served = threading.Lock()
+_home = 0  # identity of that thread
+
+
+@in_turn
+def init(arch: str = "auto", threads: int | None = None, cores: Sequence[int] | None = None) -> Device:
+    """Start Taichi for this process and say what was chosen.
+
+    Entry points call this; a library that embeds taichi-soft may call it first with its own choice. Any
+    thread may. A process that is forked later gets a StateError: start processes by "spawn".
+    A second call with compatible arguments does nothing, because starting again would destroy the
+    fields of every world. Where the environment has TAICHI_SOFT_DEBUG=1, kernels check every index.
+    Args:
+        arch: "auto" or "cpu"; or a GPU by name, "cuda", "vulkan" or "metal". "auto" takes the CPU: the GPU
+            kernels have been tested on a CPU only, and games want their GPU for pictures.
+        threads: CPU worker threads, 1 or more, of which no more are used than there are cores available to
+            this process. The system moves them from core to core, and often wakes two on one: short frames
+            then take nearly as long as with one thread.
+        cores: on Linux, numbers of processor cores: as many CPU worker threads, each bound to one of them.
+            Take cores that the rest of the game leaves alone, as a bound thread cannot go elsewhere, and call
+            this before others start threads.
+            With neither `threads` nor `cores` there is a thread for each core available to this process, on
+            Linux bound to it where the system allows that.
+    Returns: the device in use.
+    Raises: OptionError for an unknown arch, thread count or core, or if already started differently;
+        DeviceError if the device asked for is missing, or threads cannot be bound; StateError in a process
+        that was forked after a start.
+    """
+    if not isinstance(arch, str) or arch not in ("auto", *_ARCHS):
+        raise OptionError(f"unknown arch {arch!r}: choose one of 'auto', {', '.join(map(repr, _ARCHS))}")
+    if threads is not None and (
+        isinstance(threads, bool) or not isinstance(threads, int) or not 1 <= threads <= _MOST_THREADS
+    ):
+        raise OptionError(
+            f"threads must be None or a whole number from 1 to {_MOST_THREADS}, got {threads!r}"
+        )
+    there = available_cores()
+    taken = () if _device is None else _device.cores  # the caller may have left them to our threads since
+    bound = () if cores is None else require_cores(cores, sorted({*there, *taken}))
+    if bound and (arch not in ("auto", "cpu") or threads not in (None, len(bound))):
+        raise OptionError(
+            f"cores {list(bound)} are for {len(bound)} CPU threads, got arch={arch!r}, threads={threads}: "
+            "leave out one or the other"
+        )
+    # Taichi starts no more than there are, and the flat schedule waits for all of them.
+    count = len(bound) or min(threads or len(there), len(there))
+    if _device is not None:
+        if arch not in ("auto", _device.arch):
+            raise OptionError(
+                f"Taichi already runs on {_device.arch!r}: call init({arch!r}) first in the process"
+            )
+        if threads is not None and _device.arch == "cpu" and count != _device.threads:
+            raise OptionError(
+                f"Taichi already runs with {_device.threads} threads: call init(threads={threads}) first"
+            )
+        if bound not in ((), _device.cores):
+            where = f"on cores {list(_device.cores)}" if _device.cores else "on any core"
+            raise OptionError(f"Taichi already runs {where}: call init(cores={list(bound)}) first")
+        return _device
+
+    chosen, reason = ("cpu", "the default") if arch == "auto" else (arch, "asked for by name")
+    if ti.lang.impl.get_runtime().prog is not None:
+        raise DeviceError(
+            "Taichi was started by ti.init, and starting it again would destroy the fields made since: call "
+            "taichi_soft.init() instead, first in the process"
+        )
+    is_left_to_us = threads is None and cores is None and chosen == "cpu" and count > 1 and can_bind()
+    wanted = tuple(there) if is_left_to_us else bound
+    try:
+        start = functools.partial(_start, chosen, reason, count, wanted, is_left_to_us)
+        _at_home(functools.partial(learn, start), chosen)
+    except RuntimeError as error:
+        if isinstance(error, DeviceError):
+            raise
+        raise DeviceError(f"cannot start Taichi on {chosen!r}: {error}. Use init('cpu')") from error
+    return device()
+
+
+def _start(arch: str, reason: str, threads: int, cores: tuple[int, ...], is_left_to_us: bool) -> None:
+    """Start Taichi, with its workers on these cores if there are any, and note the device."""
+    global _device, _process
+    is_checked = os.environ.get(DEBUG) == "1"
+    before, since = (thread_ids(), number_now()) if cores else (set(), 0)
+    with contextlib.redirect_stdout(io.StringIO()):  # Taichi announces itself
+        ti.init(
+            arch=getattr(ti, arch),
+            cpu_max_num_threads=threads,
+            default_fp=ti.f32,
+            default_ip=ti.i32,
+            debug=is_checked,
+            offline_cache=not is_checked,  # which does not notice changed options
+            offline_cache_max_size_of_files=1
+            << 29,  # a game of many kinds of worlds fills the default 100 MB
+            enable_fallback=False,
+            cfg_optimization=False,  # halves the compile time; the kernels run as fast without it
+            detect_read_only=False,  # a GPU might not see what a real function wrote; untried
+            make_cpu_multithreading_loop=False,  # it would put up to 512 bodies into one thread
+            unrolling_limit=0,  # no warning
+            log_level=ti.ERROR,
+        )
+    if is_checked:
+        _check_real_functions()
+        _let_whole_numbers_overflow()
+    ti.lang.impl.get_runtime().materialize()  # once, by the first kernel otherwise, in whichever thread
+    _process = os.getpid()
+    _device = Device(arch=arch, threads=threads if arch == "cpu" else 1, reason=reason)
+    if cores:
+        _device = _bound(_device, thread_ids() - before, since, cores, is_left_to_us)
+
+
+def _bound(
+    chosen: Device, started: set[int], since: int, cores: tuple[int, ...], is_left_to_us: bool
+) -> Device:
+    """The device with its workers, which Taichi starts after the threads that compile, bound to cores.
+
+    Where the choice is ours they stay free if the system does not let us, or if somebody else has started
+    threads meanwhile, which we must leave alone.
+    """
+    if is_left_to_us and len(started) != ti.lang.impl.current_cfg().num_compile_threads + chosen.threads:
+        return chosen
+    try:
+        bind_youngest(started, since, cores)
+    except DeviceError:
+        if not is_left_to_us:
+            raise
+        return chosen
+    return replace(chosen, cores=cores)
+
+
+def make_fields(function: Callable[[], Result]) -> Result:
+    """Call in turn what makes Taichi fields, and lay these out; whole, where Ctrl-C is pressed meanwhile."""
+
+    def make() -> Result:
+        made = function()
+        ti.lang.impl.get_runtime().materialize()
+        return made
+
+    return _at_home(make, device().arch)
+
+
+def _at_home(function: Callable[[], Result], arch: str) -> Result:
+    """Call what Taichi 1.7 does in one and the same thread only: start, and lay out fields. Whichever thread
+    comes first may end soon, so on a CPU it is a thread of our own. On a GPU it is the caller's:
+    untried; and where indices are checked, which ends the process in ours."""
+    if arch != "cpu" or os.environ.get(DEBUG) == "1":
+        return function()
+    found: Future[Result] = Future()
+
+    def work() -> None:
+        try:
+            found.set_result(function())
+        except BaseException as error:
+            found.set_exception(error)
+
+    if not _is_served.locked():
+        start_new_thread(_serve, ())
+    try:
+        _jobs.put(work)
+        return found.result()
+    except KeyboardInterrupt:
+        last = threading.Event()  # after what is being done, half of which would be the end of all worlds
+        _jobs.put(last.set)
+        last.wait()
+        raise
+
+
+def _serve() -> None:
+    global _home
+    if _is_served.acquire(blocking=False):  # or another one does, where Ctrl-C was pressed as that began
+        _home = threading.get_ident()
+        while True:
+            _jobs.get()()
+
+
+def _after_fork() -> None:
+    """Of the process that was forked: it has Taichi's memory and none of its threads."""
+    global _is_served
+    if _device is None:
+        _is_served = threading.Lock()
+        return
+    leave_behind(_process)
+    # The end of this process would wait for these threads, if the program were taken down.
+    ctypes.pythonapi.Py_IncRef(ctypes.py_object(ti.lang.impl.get_runtime().prog))
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_after_fork)
+
+
+def device() -> Device:
+    """The device in use. Raises: DeviceError before `init`."""
+    if _device is None:
+        raise DeviceError("Taichi is not started: call taichi_soft.init() first")
+    return _device
+
+
+def is_initialized() -> bool:
+    """True once `init` has run in this process."""
+    return _device is not None

@@ -1,0 +1,124 @@
+"""What worlds are made of as plain data and back: numbers, texts, lists and dictionaries, for files.
+
+Reading makes objects of classes that are `serialised` only, by their own checks. Nothing in a file is run.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from base64 import b64decode, b64encode
+from collections.abc import Callable
+from enum import Enum
+from functools import lru_cache
+from hashlib import blake2b
+from typing import Any, TypeVar
+
+import numpy as np
+
+from taichi_soft.core.errors import SnapshotError
+
+Kind = TypeVar("Kind")
+
+_FIELDS: dict[type, tuple[str, ...]] = {}
+_MAKERS: dict[str, tuple[type, Callable[..., Any]]] = {}
+_ARRAYS = ("<f4", "<f8", "<i4", "<i8", "|b1")
+
+
+def serialised(*fields: str, make: Callable[..., Any] | None = None) -> Callable[[type[Kind]], type[Kind]]:
+    """Lets objects of a class be written, and made again.
+
+    Args:
+        fields: names of attributes that say what an object is made of.
+        make: called with them by name; None for the class itself.
+    """
+
+    def register(kind: type[Kind]) -> type[Kind]:
+        _FIELDS[kind], _MAKERS[kind.__name__] = fields, (kind, make or kind)
+        return kind
+
+    return register
+
+
+def as_plain(value: Any) -> Any:
+    """A value as data that JSON takes. Raises: SnapshotError for what has no such form."""
+    if isinstance(value, float) and not math.isfinite(value):
+        return {"number": str(float(value))}
+    if value is None or isinstance(value, (bool, int, float, str)):
+        return value.value if isinstance(value, Enum) else value
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, Enum):
+        return value.value
+    if isinstance(value, (list, tuple)):
+        return [as_plain(each) for each in value]
+    if isinstance(value, np.ndarray):
+        little = np.ascontiguousarray(value, dtype=value.dtype.newbyteorder("<"))
+        if little.dtype.str in _ARRAYS:
+            rows = b64encode(little.tobytes()).decode()
+            return {"array": little.dtype.str, "shape": list(value.shape), "rows": rows}
+        return as_plain(value.tolist())
+    elif type(value) in _FIELDS:
+        parts = {name: as_plain(getattr(value, name)) for name in _FIELDS[type(value)]}
+        return {"kind": type(value).__name__, **parts}
+    raise SnapshotError(f"a {type(value).__name__} cannot be kept in a file: {value!r}")
+
+
+def from_plain(data: Any) -> Any:
+    """The value again. Raises: SnapshotError for data of no known form; what the kind's own checks raise."""
+    if isinstance(data, list):
+        return [from_plain(each) for each in data]
+    if not isinstance(data, dict):
+        return data
+    if "number" in data:
+        return float(data["number"])
+    if "array" in data:
+        return _array(data)
+    kind, make = _MAKERS.get(data.get("kind", ""), (None, None))
+    if kind is None or make is None or set(data) != {"kind", *_FIELDS[kind]}:
+        raise SnapshotError(f"unknown data: {sorted(data)}")
+    return make(**{name: from_plain(data[name]) for name in _FIELDS[kind]})
+
+
+def _array(data: dict[str, Any]) -> Any:
+    try:
+        if data["array"] not in _ARRAYS:
+            raise ValueError
+        return np.frombuffer(b64decode(data["rows"]), data["array"]).reshape(data["shape"]).copy()
+    except (KeyError, TypeError, ValueError):
+        raise SnapshotError("an array is broken off or of a kind that is not kept in files") from None
+
+
+def to_json(data: Any) -> bytes:
+    """The same bytes for the same plain data."""
+    return json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False).encode()
+
+
+def from_json(content: bytes | memoryview) -> Any:
+    """Plain data again. Raises: SnapshotError, also for a number that is not finite, which `to_json` writes
+    nowhere."""
+    try:
+        return json.loads(bytes(content), parse_float=_finite, parse_constant=_finite)
+    except (ValueError, RecursionError) as error:
+        if isinstance(error, SnapshotError):
+            raise
+        raise SnapshotError("what should be JSON is none") from None
+
+
+def _finite(text: str) -> float:
+    number = float(text)
+    if not math.isfinite(number):
+        raise SnapshotError(f"a number in it is not finite: {text}")
+    return number
+
+
+@lru_cache(maxsize=256)
+def plain_of(value: Any) -> Any:
+    """`as_plain` of an immutable object, made once."""
+    return as_plain(value)
+
+
+@lru_cache(maxsize=256)
+def digest_of(value: Any) -> str:
+    """A name of an immutable object that another object has only if it is made of the same numbers."""
+    return blake2b(to_json(as_plain(value)), digest_size=8).hexdigest()

@@ -1,0 +1,65 @@
+"""Choices that the public face takes by name. Each enum also accepts its string."""
+
+from __future__ import annotations
+
+import re
+from enum import Enum
+from typing import TypeVar
+
+from taichi_soft.core.errors import OptionError
+
+
+class Choice(str, Enum):
+    """A named option; `parse` turns a user's string into a member or refuses it with the list."""
+
+    @classmethod
+    def parse(cls: type[ChoiceT], value: str | ChoiceT) -> ChoiceT:
+        """Return the member that `value` names. Raises: OptionError with the names there are."""
+        try:
+            return cls(value)
+        except ValueError:
+            names = ", ".join(repr(member.value) for member in cls)
+            option = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", cls.__name__).lower()
+            raise OptionError(f"unknown {option} {value!r}: choose one of {names}") from None
+
+
+ChoiceT = TypeVar("ChoiceT", bound=Choice)
+
+
+class Strain(Choice):
+    """Strain of a tetrahedron from its deformation gradient F = U R."""
+
+    LINEAR = "linear"  # 1/2 (F F^T - I), thesis eq. 6.7
+    EXACT = "exact"  # sqrt(F F^T) - I, thesis chapter 7
+
+
+class Flips(Choice):
+    """What a tetrahedron does that is turned inside out."""
+
+    TOLERANT = "tolerant"  # the mirrored shape is at rest too (thesis)
+    RECOVER = "recover"  # driven back to its own orientation
+    OFF = "off"  # not handled
+
+
+class DampingModel(Choice):
+    """What the damping constant brakes."""
+
+    EDGE = "edge"  # relative velocity along each edge, thesis eq. 3.9
+    TET_MEAN = "tet_mean"  # velocity against the tetrahedron's mean, rejected in thesis section 6.4
+
+
+class Integrator(Choice):
+    """How forces become motion (thesis section 3.5)."""
+
+    EXPLICIT_EULER = "explicit_euler"
+    LEAPFROG = "leapfrog"
+    LAZY_LEAPFROG = "lazy_leapfrog"
+    IMPLICIT_EULER = "implicit_euler"
+
+
+class Schedule(Choice):
+    """In which loops the substeps of a world run."""
+
+    AUTO = "auto"
+    PER_BODY = "per_body"  # one thread per body, all substeps of a body in a row
+    FLAT = "flat"  # all tetrahedra of all bodies in parallel, substep by substep

@@ -1,0 +1,1 @@
+"""Loops over tetrahedra and edges: they load values, call laws, store forces."""

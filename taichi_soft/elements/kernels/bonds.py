@@ -1,0 +1,163 @@
+"""Forces along and across edges: loads values, calls the law, stores forces."""
+
+from taichi_soft.core.constants import LANES
+from taichi_soft.core.runtime import ti
+from taichi_soft.elements.kernels.elastic import BLOCK_BITS, particles_of
+from taichi_soft.elements.laws.best_fitting_plane import plane_normal
+from taichi_soft.elements.laws.bonds import Ring
+from taichi_soft.elements.laws.cmpm import bond_damping, bond_force, direction_of
+from taichi_soft.elements.laws.cmpm2 import subface
+from taichi_soft.elements.laws.tilted_plane import tilt, tilted_normal
+from taichi_soft.elements.laws.volume_springs import expansion
+
+
+@ti.func
+def lane_pressure(state: ti.template(), block, lane):
+    """Pressure E nu dV / V0 of one tetrahedron on its edges [Pa]."""
+    p0, p1, p2, p3 = particles_of(state, block, lane)
+    growth = expansion(
+        state.particle_position[p0],
+        state.particle_position[p1],
+        state.particle_position[p2],
+        state.particle_position[p3],
+        state.tet_inverse_volume6[block * LANES + lane],
+    )
+    return growth * state.tet_expansion_modulus[block * LANES + lane]
+
+
+@ti.func
+def store_block_pressures(state: ti.template(), number):
+    """Pressures of a block's tetrahedra, for their edges to read."""
+    block = number & BLOCK_BITS
+    pressure = ti.Vector.zero(state.real, LANES)
+    for lane in range(LANES):
+        pressure[lane] = lane_pressure(state, block, lane)
+    for lane in range(LANES):
+        state.tet_pressure[block * LANES + lane] = pressure[lane]
+
+
+@ti.func
+def accumulate_pressures(state: ti.template(), body):
+    """Store the pressures of a body's tetrahedra, and in `edge_pressure` their sums, in one thread."""
+    edges, blocks = state.body_edges[body], state.body_blocks[body]
+    for e in range(edges[0], edges[1]):
+        state.edge_pressure[e] = 0.0
+    for number in range(blocks[0], blocks[1]):
+        store_block_pressures(state, number)
+    for number in range(blocks[0], blocks[1]):
+        block = number & BLOCK_BITS
+        for lane in range(LANES):
+            pressure = state.tet_pressure[block * LANES + lane]
+            for k in ti.static(range(6)):
+                e = state.tet_edges[(block * 6 + k) * LANES + lane]
+                state.edge_pressure[e] = state.edge_pressure[e] + pressure
+
+
+@ti.func
+def _corner(state: ti.template(), k, origin):
+    """A corner of a Voronoi face against `origin` [m]."""
+    members, weights = state.ring_members[k], state.ring_weights[k]
+    arm = state.particle_position[members[0]] * weights[0] - origin
+    for i in ti.static(range(1, 4)):
+        arm += state.particle_position[members[i]] * weights[i]
+    return arm
+
+
+@ti.func
+def _voronoi_normal(state: ti.template(), e, center):
+    """Twice the area vector of a deformed Voronoi face: triangles from the edge's centre (thesis 4.1)."""
+    total = center * 0.0
+    ring = state.edge_ring[e]
+    if ring[1] > ring[0]:
+        arm = _corner(state, ring[0], center)
+        for k in range(ring[0] + 1, ring[1]):
+            following = _corner(state, k, center)
+            total += arm.cross(following)
+            arm = following
+    return total
+
+
+@ti.func
+def _subface_normal(state: ti.template(), e, xp, r):
+    """Area vector of the subfaces of an edge, and the direction it had at rest carried along (4.4.1)."""
+    total, carried = r * 0.0, r * 0.0
+    ring = state.edge_ring[e]
+    for k in range(ring[0], ring[1]):
+        members, weights = state.ring_members[k], state.ring_weights[k]
+        a, b = state.particle_position[members[0]] - xp, state.particle_position[members[1]] - xp
+        total += subface(r * 0.5, a, b)
+        carried += a * weights[0] + b * weights[1] + r * weights[2]
+    return total, carried
+
+
+@ti.func
+def _fitted_normal(state: ti.template(), e, xp, r):
+    """Normal of the plane through the particles round an edge, and its carried direction (4.4.2)."""
+    total, carried = r * 0.0, r * 0.0
+    s0, s1, s2 = r * 0.0, r * 0.0, r * 0.0
+    ring = state.edge_ring[e]
+    for k in range(ring[0], ring[1]):
+        arm = state.particle_position[state.ring_members[k][0]] - xp
+        carried += arm * state.ring_weights[k][0] + r * state.ring_weights[k][1]
+        arm -= r * 0.5
+        total += arm
+        s0 += arm * arm.x
+        s1 += arm * arm.y
+        s2 += arm * arm.z
+    count = ti.max(ring[1] - ring[0], 3)  # of two, the centre of the edge is the third
+    return plane_normal(count, total, (s0, s1, s2), r), carried
+
+
+@ti.func
+def _tilted_normal(state: ti.template(), e, xp, r):
+    """Normal of the plane that the particles round an edge tilt (4.4.3)."""
+    axis = direction_of(r)
+    height = axis.x * 0.0
+    ring = state.edge_ring[e]
+    for k in range(ring[0], ring[1]):
+        height += axis.dot(state.particle_position[state.ring_members[k][0]] - xp)
+    height /= ti.max(ring[1] - ring[0], 1)
+    push = r * 0.0
+    for k in range(ring[0], ring[1]):
+        arm = state.particle_position[state.ring_members[k][0]] - xp
+        push += tilt(axis, arm, height, state.ring_weights[k][1], state.ring_weights[k][0])
+    return tilted_normal(axis, push)
+
+
+@ti.func
+def bond_frame_of(state: ti.template(), law: ti.template(), e):
+    """Of an edge: second end minus first [m], the unit direction of tension, and what is compared with it."""
+    xp = state.particle_position[state.edge_vertices[e][0]]
+    r = state.particle_position[state.edge_vertices[e][1]] - xp
+    normal, compared = r, r
+    if ti.static(law.ring == Ring.VORONOI):
+        normal = _voronoi_normal(state, e, xp + r * 0.5)
+    if ti.static(law.ring == Ring.SUBFACES):
+        normal, compared = _subface_normal(state, e, xp, r)
+    if ti.static(law.ring == Ring.PLANE):
+        normal, compared = _fitted_normal(state, e, xp, r)
+    if ti.static(law.ring == Ring.TILT):
+        normal = _tilted_normal(state, e, xp, r)
+    return r, direction_of(normal), compared
+
+
+@ti.func
+def ring_tension(state: ti.template(), e):
+    """Pull of the tetrahedra round an edge on its ends [N], gathered from their pressures."""
+    pressure = state.edge_damping[e] * 0.0
+    ring = state.edge_ring[e]
+    for k in range(ring[0], ring[1]):
+        pressure += state.tet_pressure[state.ring_members[k][0]]
+    return pressure * state.edge_bond[e].z
+
+
+@ti.func
+def bond_force_of(state: ti.template(), law: ti.template(), e):
+    """Elastic and damping force on the first end of an edge that looks round it [N]."""
+    p, q = state.edge_vertices[e][0], state.edge_vertices[e][1]
+    relative_velocity = state.particle_velocity[q] - state.particle_velocity[p]
+    _, n, compared = bond_frame_of(state, law, e)
+    constants = state.edge_bond[e]
+    return bond_force(compared, n, constants) + bond_damping(
+        compared, n, relative_velocity, state.edge_damping[e], constants.w
+    )

@@ -1,0 +1,96 @@
+"""Continuum mechanics particle model: a spring along and one across each edge (thesis chapter 4).
+
+Between two particles lies a face of the Voronoi graph. Its corners move with the tetrahedra that hold them,
+and the normal of the deformed face tells what part of the edge is tension and what is shear.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from taichi_soft.core.runtime import ti
+from taichi_soft.elements.laws.bonds import Bonds, Floats, columns
+from taichi_soft.elements.materials import Material
+from taichi_soft.meshing import EdgeRings, TetMesh
+from taichi_soft.meshing.voronoi import voronoi_graph
+
+
+@ti.func
+def direction_of(v):
+    """The unit vector along `v`, or zero where it has no length."""
+    return v / ti.max(ti.sqrt(v.dot(v)), 1e-30)
+
+
+@ti.func
+def bond_force(r, n, constants):
+    """Force on the first end of a bond [N], eq. 4.1 to 4.4: f_p = a/l (E (n.r - l) n + G m), f_q = -f_p.
+
+    m = r - (n.r) n is what of r lies across n; unnormalised, so that nothing is divided by zero at rest.
+    Args:
+        r: second end minus first [m].
+        n: unit normal of the face between them, towards the second end; zero gives no force.
+        constants: l [m], a E / l and a G / l [N/m].
+    """
+    stretch = n.dot(r)
+    return n * (constants.y * (stretch - constants.x)) + (r - n * stretch) * constants.z
+
+
+@ti.func
+def bond_damping(r, n, relative_velocity, tensile, shear):
+    """Damping force on the first end of a bond [N], eq. 4.5, along n and along m where there is shear.
+
+    Along m it brakes the rotation of sheared bodies too.
+    Args:
+        r, n: as in `bond_force`; or the direction that is compared with n.
+        relative_velocity: of the second end against the first [m/s].
+        tensile, shear: b_n and b_m [N s/m].
+    """
+    m = shear_direction(r, n)
+    return n * (tensile * n.dot(relative_velocity)) + m * (shear * m.dot(relative_velocity))
+
+
+@ti.func
+def shear_direction(r, n):
+    """Unit vector along what of r lies across n; zero where that is a millionth of r and so rounding."""
+    m = r - n * n.dot(r)
+    return ti.select(m.dot(m) > 1e-12 * r.dot(r), direction_of(m), m * 0.0)
+
+
+def moduli(rings: EdgeRings, material: Material) -> tuple[Floats, Floats, Floats]:
+    """Mean E and G [Pa] and shear damping b_m [N s/m] of every edge, (k,) each."""
+    count = len(rings.mesh.tets)
+    shear = "lame_mu" if material.shear_modulus is None else "shear_modulus"
+    damping = "damping" if material.shear_damping is None else "shear_damping"
+    across = material.per_tet(damping, count)
+    mean_damping = rings.sum(across[rings.tet]) / rings.mesh.edge_valence
+    return (
+        rings.mean(material.per_tet("young", count)),
+        rings.mean(material.per_tet(shear, count)),
+        mean_damping,
+    )
+
+
+def cmpm_bonds(mesh: TetMesh, material: Material) -> Bonds:
+    """Bonds across the clipped Voronoi faces; ring rows: a corner in barycentric coordinates.
+
+    The first corner of a face is repeated at its end. Masses are those of the Voronoi cells (section 4.1).
+    Raises: MeshError if the mesh is not Delaunay.
+    """
+    graph = voronoi_graph(mesh)
+    young, shear, damping = moduli(EdgeRings.of(mesh), material)
+    per_length = graph.areas / mesh.edge_lengths
+    ends = mesh.vertices[mesh.edges]
+    normals = (ends[:, 1] - ends[:, 0]) / mesh.edge_lengths[:, None]
+    is_bond = graph.areas > 0
+    constants = columns(
+        mesh.edge_lengths, young * per_length, shear * per_length, damping, count=len(mesh.edges)
+    )
+    density = material.per_tet("density", len(mesh.tets))
+    return Bonds(
+        np.where(is_bond[:, None], constants, 0.0),
+        graph.corner_edge,
+        mesh.tets[graph.corner_tet].astype(np.int64),
+        graph.corner_weights,
+        np.where(is_bond[:, None], normals, np.nan),
+        graph.masses(density),
+    )

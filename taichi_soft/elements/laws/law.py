@@ -1,0 +1,70 @@
+"""What a force law is: its name, its source, and one function from deformation to forces."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from taichi_soft.core.types import Flips, Integrator, Strain
+from taichi_soft.elements.laws.bonds import Bonds, Ring
+
+SOLID = ("young", "poisson", "density", "damping")
+ANISOTROPIC = ("stiffness", "frame", "density", "damping")
+
+
+@dataclass(frozen=True)
+class StressLaw:
+    """Hooke's stress of a tetrahedron, turned into forces on its vertices (thesis chapter 6)."""
+
+    name: str
+    source: str
+    summary: str
+    forces: Any  # ti.func (shape columns, Cauchy stress columns) -> four vec3 [N]
+    strains: tuple[Strain, ...] = (Strain.LINEAR, Strain.EXACT)  # that it takes, its default first
+    flips: tuple[Flips, ...] = (Flips.TOLERANT, Flips.RECOVER, Flips.OFF)
+    parameters: tuple[str, ...] = SOLID  # of its material
+    integrators: tuple[Integrator, ...] = tuple(Integrator)
+    keeps_energy: bool = False
+    takes_anisotropy: bool = True  # also a material with the parameters `ANISOTROPIC`
+
+
+@dataclass(frozen=True)
+class EnergyLaw:
+    """An elastic energy and its derivative: what a body gives back is what was put in."""
+
+    name: str
+    source: str
+    summary: str
+    piola: Any  # ti.func (F columns, lambda, mu) -> d energy / d F, columns [Pa]
+    principal: Any  # ti.func (stretches vec3, lambda, mu) -> the same in their axes, and its derivatives
+    energy_density: Callable[..., Any]  # numpy: F (m, 3, 3), lambda, mu (m,) -> (m,) [J per m^3 at rest]
+    strains: tuple[Strain, ...]
+    flips: tuple[Flips, ...]  # one: what it does with them follows from the energy
+    parameters: tuple[str, ...] = SOLID
+    integrators: tuple[Integrator, ...] = tuple(Integrator)
+    keeps_energy: bool = True
+    takes_anisotropy: bool = False
+
+
+@dataclass(frozen=True)
+class BondLaw:
+    """Forces between the two ends of each edge: the pairwise models of thesis chapters 3 to 5."""
+
+    name: str
+    source: str
+    summary: str
+    ring: Ring  # what is looked at besides the two ends
+    bonds: Callable[..., Bonds]  # numpy: (mesh, material) -> constants of every edge
+    parameters: tuple[str, ...] = (*SOLID, "shear_modulus", "shear_damping")
+    keeps_energy: bool = False
+    integrators: tuple[Integrator, ...] = tuple(Integrator)
+    takes_anisotropy: bool = False
+    strains: tuple[Strain, ...] = ()
+    flips: tuple[Flips, ...] = ()
+
+    @property
+    def takes_shear(self) -> bool:
+        """Whether shear modulus and shear damping of a material mean anything to it."""
+        return "shear_modulus" in self.parameters
+
+
+Law = StressLaw | EnergyLaw | BondLaw

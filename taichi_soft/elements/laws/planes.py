@@ -1,0 +1,35 @@
+"""How far from perpendicular to their edges the planes of CMPM and its variants are (thesis fig. 4.7)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.core.errors import MeshError, OptionError
+from taichi_soft.elements.laws import LAWS, BondLaw
+from taichi_soft.elements.materials import Material
+from taichi_soft.meshing import TetMesh
+
+
+def plane_angles(mesh: TetMesh, law: str) -> NDArray[np.float64]:
+    """Angle at rest between each edge and the normal of its plane, (k,) [degrees]; NaN where no bond.
+
+    The strain of an edge is told apart by this normal: the larger the angle, the more of a pull is taken for
+    shear. Faces of the Voronoi graph and tilted planes are perpendicular by construction.
+    Args:
+        law: one of chapter 4, such as "cmpm2" or "best_fitting_plane".
+    Raises: OptionError for another law; MeshError for what is no TetMesh, or not Delaunay for "cmpm".
+    """
+    if not isinstance(mesh, TetMesh):
+        raise MeshError(f"mesh must be a TetMesh, got {type(mesh).__name__}")
+    chosen = LAWS.get(law) if isinstance(law, str) else None
+    if not isinstance(chosen, BondLaw) or not chosen.takes_shear:
+        names = ", ".join(
+            repr(each.name) for each in LAWS.values() if isinstance(each, BondLaw) and each.takes_shear
+        )
+        raise OptionError(f"law {law!r} has no planes: choose one of {names}")
+    normals = chosen.bonds(mesh, Material(young=1.0, poisson=0.0, density=1.0)).normals
+    assert normals is not None
+    ends = mesh.vertices[mesh.edges]
+    along = np.einsum("ka,ka->k", normals, ends[:, 1] - ends[:, 0]) / mesh.edge_lengths
+    return np.asarray(np.degrees(np.arccos(np.clip(along, -1.0, 1.0))))

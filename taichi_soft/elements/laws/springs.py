@@ -1,0 +1,56 @@
+"""Mass-spring model (thesis section 3.4)."""
+
+from __future__ import annotations
+
+from taichi_soft.core.errors import MeshError
+from taichi_soft.core.runtime import ti
+from taichi_soft.elements.laws.bonds import Bonds, columns
+from taichi_soft.elements.materials import Material, SpringMaterial
+from taichi_soft.meshing import BodyMesh, EdgeRings, TetMesh
+
+TINY = 1e-30
+"""[m^2], beside any length that counts; added, because a maximum takes three times as many instructions."""
+
+
+@ti.func
+def spring_tension(r, constants):
+    """Pull of a spring on its ends [N], eq. 3.8.
+
+    Args:
+        r: second end minus first end [m].
+        constants: length at rest [m] and stiffness k [N/m] in x and y.
+    """
+    return constants.y * (ti.sqrt(r.dot(r) + TINY) - constants.x)
+
+
+@ti.func
+def along(r, tension):
+    """Force on the first end of an edge pulled together with `tension` [N].
+
+    None where both ends meet: they have no direction.
+    """
+    return r * (tension / ti.max(ti.sqrt(r.dot(r)), 1e-15))
+
+
+@ti.func
+def damped_pull(r, relative_velocity, tension, damping):
+    """`along` and `edge_damping_force` in one, whose one division need not wait for the root."""
+    square = r.dot(r) + TINY
+    inverse = 1.0 / square
+    return r * (inverse * (tension * ti.sqrt(square) + damping * r.dot(relative_velocity)))
+
+
+def spring_bonds(mesh: BodyMesh, material: Material | SpringMaterial) -> Bonds:
+    """Springs between given particles, or on the edges of a solid with k = E a / l (eq. 5.1).
+
+    The area a is that of the barycentric subfaces (4.4.1), E their mean.
+    """
+    count = len(mesh.edges)
+    if isinstance(material, SpringMaterial):
+        length = material.per_edge("rest_length", count, mesh.edge_lengths)
+        return Bonds(columns(length, material.per_edge("stiffness", count), count=count))
+    if not isinstance(mesh, TetMesh):
+        raise MeshError("a ParticleMesh has no volume for a Material: pass a SpringMaterial")
+    rings = EdgeRings.of(mesh)
+    young = rings.mean(material.per_tet("young", len(mesh.tets)))
+    return Bonds(columns(mesh.edge_lengths, young * rings.edge_areas / mesh.edge_lengths, count=count))

@@ -1,0 +1,135 @@
+"""How the forces of a tetrahedron change as its vertices move: what implicit integration needs.
+
+The derivative of an isotropic law falls apart in the axes of the singular value decomposition F = U diag(s)
+V^T: a 3x3 block for the stretches, and for each pair of axes one number for their shear, (p_a - p_b)/(s_a -
+s_b), and one for their rotation, (p_a + p_b)/(s_a + s_b). (As Smith, de Goes and Kim 2019, Analytic
+eigensystems for isotropic distortion energies, find for energies; it holds without one, but then the block is
+not symmetric.) Projected, the block is symmetrised and nothing is negative: then the system is positive
+definite for every pose, which conjugate gradients need.
+"""
+
+from taichi_soft.core.math.eigen import symmetric_eigen
+from taichi_soft.core.math.svd import signed_svd
+from taichi_soft.core.math.tensors import determinant, symmetric_part, transposed
+from taichi_soft.core.runtime import ti
+from taichi_soft.elements.laws.principal import hooke_principal
+
+CLOSE = 1.0e-3
+"""Stretches nearer to each other share a limit: their difference would be rounding."""
+
+
+@ti.func
+def principal(model: ti.template(), s, lame_lambda, lame_mu):
+    """p(s) and dp/ds of the model's law."""
+    if ti.static(model.has_energy):
+        return model.law.principal(s, lame_lambda, lame_mu)
+    else:
+        return hooke_principal(model, s, lame_lambda, lame_mu)
+
+
+@ti.func
+def positive_part(columns):
+    """The nearest positive semi-definite matrix to the symmetric part, as columns."""
+    values, axes = symmetric_eigen(symmetric_part(columns))
+    x, y, z = ti.max(values.x, 0.0), ti.max(values.y, 0.0), ti.max(values.z, 0.0)
+    u, v, w = axes[0], axes[1], axes[2]
+    return (
+        u * (x * u.x) + v * (y * v.x) + w * (z * w.x),
+        u * (x * u.y) + v * (y * v.y) + w * (z * w.y),
+        u * (x * u.z) + v * (y * v.z) + w * (z * w.z),
+    )
+
+
+@ti.func
+def shear_and_rotation(sa, sb, pa, pb, along, largest, projected: ti.template()):
+    """Sum and difference halves alpha, beta of a pair's shear and rotation stiffness [Pa].
+
+    Args:
+        along: limit of the shear stiffness for equal stretches.
+        largest: bound of the rotation stiffness, which has a pole where sa = -sb.
+    """
+    gap, total = sa - sb, sa + sb
+    shear = along
+    if ti.abs(gap) > CLOSE * (ti.abs(sa) + ti.abs(sb)):
+        shear = (pa - pb) / gap
+    rotation = (pa + pb) / ti.max(total, 1e-9)
+    if ti.static(projected):
+        shear = ti.max(shear, 0.0)
+        rotation = ti.min(ti.max(rotation, 0.0), largest)
+    return 0.5 * (shear + rotation), 0.5 * (shear - rotation)
+
+
+@ti.func
+def weighed_rows(rest_inverse):
+    """Rows of A^-1 that take a move of each vertex to F (four vec3), times the root of the volume at rest.
+
+    Zero for the lanes that pad a block, which have no volume.
+    """
+    inverse_volume6 = determinant(rest_inverse)
+    root = ti.select(inverse_volume6 > 0.0, 1.0 / ti.sqrt(6.0 * ti.max(inverse_volume6, 1e-37)), 0.0)
+    rows = transposed(rest_inverse)
+    g1, g2, g3 = rows[0] * root, rows[1] * root, rows[2] * root
+    return -(g1 + g2 + g3), g1, g2, g3
+
+
+@ti.func
+def element_stiffness(model: ti.template(), F, rows, elasticity, projected: ti.template()):
+    """What `stiffness_block` needs: the `weighed_rows` in the axes of V; and U, dp/ds, alpha and beta.
+
+    Args:
+        projected: make it symmetric and positive semi-definite.
+    """
+    lame_lambda, lame_mu = elasticity[0], elasticity[1]
+    U, s, V = signed_svd(F)
+    p, M = principal(model, s, lame_lambda, lame_mu)
+    largest = 10.0 * (2.0 * lame_mu + ti.abs(lame_lambda))
+    yz = 0.5 * (M[1].y - M[2].y + M[2].z - M[1].z)
+    xz = 0.5 * (M[0].x - M[2].x + M[2].z - M[0].z)
+    xy = 0.5 * (M[0].x - M[1].x + M[1].y - M[0].y)
+    ax, bx = shear_and_rotation(s.y, s.z, p.y, p.z, yz, largest, projected)
+    ay, by = shear_and_rotation(s.x, s.z, p.x, p.z, xz, largest, projected)
+    az, bz = shear_and_rotation(s.x, s.y, p.x, p.y, xy, largest, projected)
+    m0, m1, m2 = M[0], M[1], M[2]
+    if ti.static(projected):
+        m0, m1, m2 = positive_part((m0, m1, m2))
+    turned = _in_axes(V, rows[0]), _in_axes(V, rows[1]), _in_axes(V, rows[2]), _in_axes(V, rows[3])
+    return turned, (U, (m0, m1, m2), ti.Vector([ax, ay, az]), ti.Vector([bx, by, bz]))
+
+
+@ti.func
+def _in_axes(V, g):
+    return ti.Vector([V[0].dot(g), V[1].dot(g), V[2].dot(g)])
+
+
+@ti.func
+def stiffness_block(U, gi, gj, M, alpha, beta):
+    """- d f_i / d x_j of two vertices of a tetrahedron [N/m], as columns.
+
+    Args:
+        gi, gj: their rows from `element_stiffness`.
+    """
+    both = gi * gj
+    shear = alpha.x * ti.Vector([0.0, both.z, both.y])
+    shear += alpha.y * ti.Vector([both.z, 0.0, both.x])
+    shear += alpha.z * ti.Vector([both.y, both.x, 0.0])
+    # In the axes of U: rows by the first vertex, columns by the second.
+    b00, b11, b22 = (
+        M[0].x * both.x + shear.x,
+        M[1].y * both.y + shear.y,
+        M[2].z * both.z + shear.z,
+    )
+    b10 = M[0].y * gi.y * gj.x + beta.z * gi.x * gj.y
+    b01 = M[1].x * gi.x * gj.y + beta.z * gi.y * gj.x
+    b20 = M[0].z * gi.z * gj.x + beta.y * gi.x * gj.z
+    b02 = M[2].x * gi.x * gj.z + beta.y * gi.z * gj.x
+    b21 = M[1].z * gi.z * gj.y + beta.x * gi.y * gj.z
+    b12 = M[2].y * gi.y * gj.z + beta.x * gi.z * gj.y
+    # U B U^T, column by column of U B first.
+    c0 = U[0] * b00 + U[1] * b10 + U[2] * b20
+    c1 = U[0] * b01 + U[1] * b11 + U[2] * b21
+    c2 = U[0] * b02 + U[1] * b12 + U[2] * b22
+    return (
+        c0 * U[0].x + c1 * U[1].x + c2 * U[2].x,
+        c0 * U[0].y + c1 * U[1].y + c2 * U[2].y,
+        c0 * U[0].z + c1 * U[1].z + c2 * U[2].z,
+    )

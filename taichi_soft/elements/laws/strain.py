@@ -1,0 +1,38 @@
+"""Strain of a tetrahedron in its deformed orientation (thesis section 6.1).
+
+F = U R carries the rest shape into the deformed one; F F^T = U^2 holds no rotation. All functions take
+F as columns and return a symmetric 3x3 strain as columns.
+"""
+
+from taichi_soft.core.math.polar import orthogonal_factor
+from taichi_soft.core.math.tensors import (
+    outer_square,
+    product,
+    scaled_plus_identity,
+    symmetric_part,
+    transposed,
+)
+from taichi_soft.core.runtime import ti
+
+
+@ti.func
+def linear_strain(F):
+    """1/2 (F F^T - I), thesis eq. 6.7: exact to first order, half the square beyond."""
+    return scaled_plus_identity(outer_square(F), 0.5, -0.5)
+
+
+@ti.func
+def exact_strain(F):
+    """U - I with U = sqrt(F F^T) = F R^T, the root that thesis chapter 7 leaves open. Blind to flips."""
+    return scaled_plus_identity(symmetric_part(product(F, transposed(orthogonal_factor(F)))), 1.0, -1.0)
+
+
+@ti.func
+def from_axes(values, axes):
+    """The symmetric matrix with these principal values, as columns."""
+    a, b, c = axes[0] * values.x, axes[1] * values.y, axes[2] * values.z
+    return (
+        a * axes[0].x + b * axes[1].x + c * axes[2].x,
+        a * axes[0].y + b * axes[1].y + c * axes[2].y,
+        a * axes[0].z + b * axes[1].z + c * axes[2].z,
+    )

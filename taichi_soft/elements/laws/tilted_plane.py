@@ -1,0 +1,92 @@
+"""CMPM with a plane that the particles round an edge tilt (thesis section 4.4.3), which never built it.
+
+The plane is perpendicular to its edge at rest. Where a particle round the edge rises by an angle, it tilts
+the plane by c times that angle about the axis through the edge at right angles to the particle's arm. Eq.
+4.11 and 4.12 as printed, b = 1/4 and c = b beta / (2 pi), tilt it by an eighth of an even shear only; c =
+beta / pi tilts it by all of it wherever the particles stand evenly. beta is the angle that a particle
+represents.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from taichi_soft.core.runtime import ti
+from taichi_soft.elements.laws.bonds import Bonds, Floats, columns, member_columns
+from taichi_soft.elements.laws.cmpm import moduli
+from taichi_soft.elements.laws.cmpm2 import require_tets
+from taichi_soft.elements.materials import Material
+from taichi_soft.meshing import EdgeRings, TetMesh
+
+PRINTED = 1 / 8
+"""What eq. 4.12 as printed makes of c = beta / pi: (1/4) beta / (2 pi)."""
+
+
+@ti.func
+def tilt(axis, arm, height, rest_angle, weight):
+    """How far one particle pushes the normal over, as a vector across the edge.
+
+    Args:
+        axis: unit vector along the edge.
+        arm: from the edge's first end to the particle [m].
+        height: of the plane over that end [m].
+        rest_angle: of the particle over the plane at rest.
+        weight: c.
+    """
+    rise = axis.dot(arm)
+    across = arm - axis * rise
+    distance = ti.max(ti.sqrt(across.dot(across)), 1e-30)
+    # By a name: within a vector's expression a real function would ask for the angle once per component.
+    angle = ti.atan2(rise - height, distance)
+    return across * (weight * (angle - rest_angle) / distance)
+
+
+@ti.func
+def tilted_normal(axis, push):
+    """The unit vector `axis` turned away from `push` by an angle of its length."""
+    angle = ti.sqrt(push.dot(push))
+    cosine, sine = ti.cos(angle), ti.sin(angle)
+    return axis * cosine - push * ti.select(angle > 1e-6, sine / ti.max(angle, 1e-6), 1.0)
+
+
+def tilt_rows(rings: EdgeRings) -> tuple[Floats, Floats]:
+    """beta / pi, and the angle over the plane at rest, of each of `rings.neighbours`, (s,) each."""
+    mesh = rings.mesh
+    edge, vertex = rings.neighbours
+    ends = mesh.vertices[mesh.edges[edge]]
+    axis = (ends[:, 1] - ends[:, 0]) / mesh.edge_lengths[edge][:, None]
+    arm = mesh.vertices[vertex] - ends[:, 0]
+    rise = np.einsum("sa,sa->s", axis, arm)
+    across = arm - rise[:, None] * axis
+    start, count = np.searchsorted(edge, edge), np.bincount(edge)[edge]
+    height = np.add.reduceat(rise, np.unique(start))[edge] / count
+    rest_angle = np.arctan2(rise - height, np.linalg.norm(across, axis=1))
+    number = np.arange(len(edge)) - start
+    after, before = (start + (number + step) % count for step in (1, -1))
+    return (_turn(axis, across, across[after]) + _turn(axis, across[before], across)) / (
+        2 * np.pi
+    ), rest_angle
+
+
+def _turn(axis: Floats, one: Floats, other: Floats) -> Floats:
+    """Angle from `one` to `other` about `axis`, from 0 to 2 pi."""
+    sine = np.einsum("sa,sa->s", axis, np.cross(one, other))
+    return np.asarray(np.arctan2(sine, np.einsum("sa,sa->s", one, other)) % (2 * np.pi))
+
+
+def tilted_plane_bonds(mesh: TetMesh, material: Material, factor: float = 1.0) -> Bonds:
+    """Ring rows: a particle; its c (times `factor`) and its angle over the plane at rest."""
+    rings = require_tets(mesh, material, "tilted_plane")
+    edge, vertex = rings.neighbours
+    share, rest_angle = tilt_rows(rings)
+    young, shear, damping = moduli(rings, material)
+    length = mesh.edge_lengths
+    per_length = rings.edge_areas / length
+    ends = mesh.vertices[mesh.edges]
+    return Bonds(
+        columns(length, young * per_length, shear * per_length, damping, count=len(mesh.edges)),
+        edge,
+        member_columns(vertex, count=len(edge)),
+        columns(factor * share, rest_angle, count=len(edge)),
+        (ends[:, 1] - ends[:, 0]) / length[:, None],
+    )

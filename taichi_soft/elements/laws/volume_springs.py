@@ -1,0 +1,57 @@
+"""Springs that keep the volume of their tetrahedra (thesis chapter 5).
+
+Each tetrahedron that has grown by dV pulls the ends of its six edges together with the pressure E nu dV / V0
+times the area a of the whole edge, besides the springs (eq. 5.5 with its sign turned: as printed a grown one
+pushes them apart, and its volume runs away).
+"""
+
+from __future__ import annotations
+
+from taichi_soft.core.errors import MeshError
+from taichi_soft.core.math.tensors import cofactor, determinant
+from taichi_soft.core.math.tetrahedron import shape
+from taichi_soft.core.runtime import ti
+from taichi_soft.elements.laws.bonds import Bonds, columns, member_columns
+from taichi_soft.elements.laws.springs import spring_bonds
+from taichi_soft.elements.materials import Material
+from taichi_soft.meshing import EdgeRings, TetMesh
+
+
+@ti.func
+def expansion(x0, x1, x2, x3, inverse_volume6):
+    """Growth dV / V0 of a tetrahedron (eq. 5.4).
+
+    Turned inside out it has a volume too, and is at rest as its own mirror image: by its signed volume it
+    would push its edges apart, have less of it still, and run away.
+
+    Args:
+        inverse_volume6: 1 / (6 V0) [1/m^3].
+    """
+    return ti.abs(determinant(shape(x0, x1, x2, x3))) * inverse_volume6 - 1.0
+
+
+@ti.func
+def expansion_gradients(x0, x1, x2, x3, inverse_volume6):
+    """How V / V0 changes as each of the four vertices moves, four vec3 [1/m]."""
+    B = shape(x0, x1, x2, x3)
+    C = cofactor(B)
+    scale = inverse_volume6 * ti.select(determinant(B) < 0.0, -1.0, 1.0)
+    g1, g2, g3 = C[0] * scale, C[1] * scale, C[2] * scale
+    return -(g1 + g2 + g3), g1, g2, g3
+
+
+def volume_spring_bonds(mesh: TetMesh, material: Material) -> Bonds:
+    """Springs of eq. 5.2, with the area a of the edge; ring rows name a tetrahedron each."""
+    if not isinstance(mesh, TetMesh) or not isinstance(material, Material):
+        raise MeshError("law 'volume_springs' needs tetrahedra and a Material")
+    rings = EdgeRings.of(mesh)
+    young, poisson = (material.per_tet(name, len(mesh.tets)) for name in ("young", "poisson"))
+    constants = spring_bonds(mesh, material).constants
+    constants[:, 2] = rings.edge_areas
+    return Bonds(
+        constants,
+        rings.edge,
+        member_columns(rings.tet, count=len(rings.edge)),
+        columns(count=len(rings.edge)),
+        expansion_modulus=young * poisson,
+    )

@@ -1,0 +1,23 @@
+"""What bodies are made of: numbers only, no Taichi."""
+
+from taichi_soft.elements.materials.anisotropic import AnisotropicMaterial, frames_along
+from taichi_soft.elements.materials.material import CONSTANTS, Material
+from taichi_soft.elements.materials.presets import PRESETS, preset
+from taichi_soft.elements.materials.springs import SpringMaterial
+from taichi_soft.elements.materials.stiffness import Stiffness, voigt_stress
+
+AnyMaterial = Material | AnisotropicMaterial | SpringMaterial
+"""What a body can be made of."""
+
+__all__ = [
+    "CONSTANTS",
+    "PRESETS",
+    "AnisotropicMaterial",
+    "AnyMaterial",
+    "Material",
+    "SpringMaterial",
+    "Stiffness",
+    "frames_along",
+    "preset",
+    "voigt_stress",
+]

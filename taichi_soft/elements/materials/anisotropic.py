@@ -1,0 +1,137 @@
+"""Materials that are not the same in all directions: wood, muscle, laminates (thesis 2.4 and chapter 7)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taichi_soft.core.checks import as_array, as_rotation, as_rotations, to_array
+from taichi_soft.core.errors import MaterialError
+from taichi_soft.core.serialisation import serialised
+from taichi_soft.elements.materials.constants import (
+    LARGEST,
+    POSITIVE,
+    Array,
+    as_constant,
+    as_ratio,
+    is_damping,
+    is_positive,
+    require_one_length,
+    spread,
+)
+from taichi_soft.elements.materials.material import DAMPING_RATIO
+from taichi_soft.elements.materials.stiffness import Stiffness, turned
+
+
+@serialised("stiffness", "density", "damping", "frame", "damping_ratio")
+@dataclass(frozen=True, eq=False)
+class AnisotropicMaterial:
+    """A linearly elastic, damped material whose stiffness depends on the direction.
+
+    Args:
+        stiffness: in the material's own axes.
+        density: mass per volume [kg/m^3], above 0: a number, or one per tetrahedron.
+        damping: b of thesis eq. 3.9 [N s/m], 0 or more: a number, or one per tetrahedron.
+        frame: the material's axes in the mesh, as columns: a rotation matrix (3, 3) or a quaternion
+            (x, y, z, w) for the whole body, or one per tetrahedron, (m, 3, 3) or (m, 4), such as
+            `frames_along` gives. None: those of the mesh.
+        damping_ratio: as of a `Material`.
+    Raises: MaterialError or OptionError with the first value out of range.
+    """
+
+    stiffness: Stiffness
+    density: float | Array
+    damping: float | Array = 0.0
+    frame: Any = None
+    damping_ratio: float = DAMPING_RATIO
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.stiffness, Stiffness):
+            raise MaterialError(
+                f"stiffness must be a taichi_soft.Stiffness, got {type(self.stiffness).__name__}: "
+                "make it with Stiffness.orthotropic(...), or Stiffness(matrix)"
+            )
+        density = as_constant(
+            self.density, "density", "tetrahedron", is_positive, f"above 0 kg/m^3, {POSITIVE}"
+        )
+        damping = as_constant(
+            self.damping, "damping", "tetrahedron", is_damping, f"0 N s/m or more and below {LARGEST:g}"
+        )
+        object.__setattr__(self, "density", density)
+        object.__setattr__(self, "damping", damping)
+        object.__setattr__(self, "damping_ratio", as_ratio(self.damping_ratio))
+        object.__setattr__(self, "frame", _frame(self.frame))
+        frames = self.frame if np.ndim(self.frame) == 3 else None
+        require_one_length({"density": density, "damping": damping, "frame": frames}, "tetrahedron")
+
+    def per_tet(self, name: str, tet_count: int) -> Array:
+        """`density` or `damping` of each of `tet_count` tetrahedra.
+
+        Raises: MaterialError if it is an array of another length.
+        """
+        return spread(getattr(self, name), name, "tetrahedra", tet_count)
+
+    def require_count(self, tet_count: int) -> None:
+        """Raises: MaterialError if density, damping or frame are given for another number of tetrahedra."""
+        self.per_tet("density", tet_count)
+        self.per_tet("damping", tet_count)
+        if np.ndim(self.frame) == 3 and len(self.frame) != tet_count:
+            raise MaterialError(
+                f"frame has {len(self.frame)} rotations for a mesh of {tet_count} tetrahedra: give one each"
+            )
+
+    def of_tets(self, rows: NDArray[np.int64]) -> AnisotropicMaterial:
+        """The material of some of the tetrahedra."""
+        lists = {"density": 1, "damping": 1, "frame": 3}
+        given = {
+            name: getattr(self, name) for name, ndim in lists.items() if np.ndim(getattr(self, name)) == ndim
+        }
+        return replace(self, **{name: value[rows] for name, value in given.items()})
+
+    def stiffness_matrices(self, tet_count: int) -> Array:
+        """Stiffness of each tetrahedron in the axes of the mesh, (m, 6, 6) [Pa], as `Stiffness.matrix`.
+
+        Raises: MaterialError if there are frames for another number of tetrahedra.
+        """
+        self.require_count(tet_count)
+        matrices = turned(self.stiffness.matrix, np.atleast_3d(self.frame).reshape(-1, 3, 3))
+        return np.ascontiguousarray(np.broadcast_to(matrices, (tet_count, 6, 6)))
+
+
+def frames_along(directions: ArrayLike) -> NDArray[np.float64]:
+    """Frames whose first axis points along each direction: for fibres, with `Stiffness.one_axis`.
+
+    Args:
+        directions: (m, 3), of any length but zero.
+    Returns: rotation matrices, (m, 3, 3). Their other two axes lie as near to those of the mesh as they can.
+    Raises: MaterialError for a direction that is zero.
+    """
+    rows = as_array(directions, "directions", (None, 3))
+    lengths = np.linalg.norm(rows, axis=1)
+    if len(rows) == 0 or not lengths.min() > 0:
+        where = f" {int(lengths.argmin())} is zero" if len(rows) else " are missing"
+        raise MaterialError(f"directions{where}: pass the fibre's direction in every tetrahedron")
+    along = rows / lengths[:, None]
+    # The shortest turn that takes x there; straight back it is half a turn about z.
+    frames = np.empty((len(rows), 3, 3))
+    cosine = along[:, 0]
+    axis = np.cross([1.0, 0.0, 0.0], along)
+    factor = 1 / np.maximum(1 + cosine, 1e-12)
+    for column, unit in enumerate(np.eye(3)):
+        turn = np.cross(axis, unit)
+        frames[:, :, column] = cosine[:, None] * unit + turn + (axis @ unit * factor)[:, None] * axis
+    frames[cosine < -1 + 1e-9] = np.diag([-1.0, -1.0, 1.0])
+    return frames
+
+
+def _frame(value: Any) -> Array:
+    """One rotation (3, 3), or one for each tetrahedron (m, 3, 3), read-only."""
+    if value is None or to_array(value, "frame").shape in ((4,), (3, 3)):
+        frame: Array = as_rotation(value).copy()
+    else:
+        frame = as_rotations(value, "frame")
+    frame.flags.writeable = False
+    return frame

@@ -1,0 +1,80 @@
+"""Constants that are one number for a whole body or one per element."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.core.errors import MaterialError
+
+Array = NDArray[np.float64]
+
+SMALLEST, LARGEST = 1e-9, 1e20
+"""Constants beyond overflow float32 on their way to a force or an acceleration."""
+
+MOST_DAMPING_RATIO = 1000.0
+"""Far above what a substep can take of a vibration: larger ones would damp no more."""
+
+POSITIVE = f"from {SMALLEST:g} to {LARGEST:g}"
+
+
+def is_positive(x: Array) -> NDArray[np.bool_]:
+    """Which values are above 0 and can be computed with."""
+    return np.asarray((x >= SMALLEST) & (x < LARGEST))
+
+
+def is_damping(x: Array) -> NDArray[np.bool_]:
+    """Which values are 0 or more and can be computed with."""
+    return np.asarray((x >= 0) & (x < LARGEST))
+
+
+def as_ratio(given: Any) -> float:
+    """A damping ratio. Raises: MaterialError."""
+    if isinstance(given, (bool, np.bool_)) or not isinstance(given, (int, float, np.integer, np.floating)):
+        raise MaterialError(f"damping_ratio must be one number for the whole body, got {given!r}")
+    if not 0.0 <= given <= MOST_DAMPING_RATIO:
+        raise MaterialError(
+            f"damping_ratio is {given!r}: it must be from 0 to {MOST_DAMPING_RATIO:g}; 1 is critical damping"
+        )
+    return float(given)
+
+
+def as_constant(
+    given: Any, name: str, element: str, is_valid: Callable[[Array], Any], range_text: str
+) -> float | Array:
+    """A number, or a read-only array of one per `element`. Raises: MaterialError with the first bad value."""
+    try:
+        if np.asarray(given).dtype.kind not in "iuf":
+            raise TypeError
+        values = np.array(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise MaterialError(f"{name} must be a number or one number per {element}, got {given!r}") from None
+    if values.ndim > 1 or values.size == 0:
+        raise MaterialError(f"{name} must be a number or a flat array, got an array of shape {values.shape}")
+    bad = ~(np.isfinite(values) & is_valid(values))
+    if bad.any():
+        first = int(np.flatnonzero(bad)[0])
+        where = "" if values.ndim == 0 else f" of {element} {first}"
+        raise MaterialError(f"{name}{where} is {values.reshape(-1)[first]:g}: it must be {range_text}")
+    values.flags.writeable = False
+    return float(values) if values.ndim == 0 else values
+
+
+def spread(given: float | Array, name: str, elements: str, count: int) -> Array:
+    """One value for each of `count` elements. Raises: MaterialError for an array of another length."""
+    values = np.asarray(given, dtype=np.float64)
+    if values.ndim == 1 and values.shape[0] != count:
+        raise MaterialError(
+            f"{name} has {values.shape[0]} values for a mesh of {count} {elements}: give one each"
+        )
+    return np.ascontiguousarray(np.broadcast_to(values, (count,)))
+
+
+def require_one_length(given: dict[str, Any], element: str) -> None:
+    """Raises: MaterialError where constants are given for different numbers of elements."""
+    lengths = {name: len(value) for name, value in given.items() if isinstance(value, np.ndarray)}
+    if len(set(lengths.values())) > 1:
+        raise MaterialError(f"arrays of different lengths {lengths}: give one value per {element} in each")

@@ -1,0 +1,28 @@
+"""Named materials. Textbook figures, rounded: a start, not a measurement.
+
+Moduli and densities from M. F. Ashby, Materials Selection in Mechanical Design (property tables);
+gelatine from the stiff end of its usual range of 1 to 100 kPa (by the thesis's law with tolerant flips a fall
+of metres dents it for good); damping ratios are half of usual loss factors at a few hertz, rounded;
+`thesis_sphere` from thesis section 6.6, with its damping of edges and no other.
+"""
+
+from __future__ import annotations
+
+from taichi_soft.core.errors import OptionError
+from taichi_soft.elements.materials.material import Material
+
+PRESETS = {
+    "thesis_sphere": Material(young=1.0e6, poisson=0.1, density=1000.0, damping=100.0, damping_ratio=0.0),
+    "gelatine": Material(young=1.0e5, poisson=0.45, density=1050.0, damping_ratio=0.08),
+    "soft_rubber": Material(young=2.0e6, poisson=0.47, density=1100.0, damping_ratio=0.05),
+    "foam": Material(young=1.0e6, poisson=0.3, density=60.0, damping_ratio=0.1),
+    "cork": Material(young=2.0e7, poisson=0.0, density=180.0, damping_ratio=0.05),
+    "auxetic_foam": Material(young=5.0e5, poisson=-0.5, density=80.0, damping_ratio=0.1),
+}
+
+
+def preset(name: str) -> Material:
+    """The material of that name. Raises: OptionError with the names there are."""
+    if not isinstance(name, str) or name not in PRESETS:
+        raise OptionError(f"unknown material {name!r}: choose one of {', '.join(map(repr, PRESETS))}")
+    return PRESETS[name]

@@ -1,0 +1,86 @@
+"""Constants of springs between given particles (thesis section 3.4)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from taichi_soft.core.errors import MaterialError
+from taichi_soft.core.serialisation import serialised
+from taichi_soft.elements.materials.constants import (
+    LARGEST,
+    POSITIVE,
+    Array,
+    as_constant,
+    is_damping,
+    is_positive,
+    require_one_length,
+    spread,
+)
+
+
+@serialised("stiffness", "damping", "rest_length")
+@dataclass(frozen=True, eq=False)
+class SpringMaterial:
+    """Springs of a `ParticleMesh`. Each constant is a number, or an array with one per row of `mesh.edges`.
+
+    Args:
+        stiffness: k of thesis eq. 3.8 [N/m], above 0.
+        damping: b of eq. 3.9 [N s/m], 0 or more.
+        rest_length: l of eq. 3.8 [m], above 0; None takes the lengths in the mesh.
+    Raises: MaterialError with the first value out of range.
+    """
+
+    stiffness: float | Array
+    damping: float | Array = 0.0
+    rest_length: float | Array | None = None
+
+    def __post_init__(self) -> None:
+        self._check("stiffness", is_positive, f"above 0 N/m, {POSITIVE}")
+        self._check("damping", is_damping, f"0 N s/m or more and below {LARGEST:g}")
+        if self.rest_length is not None:
+            self._check("rest_length", is_positive, f"above 0 m, {POSITIVE}")
+        given = {"stiffness": self.stiffness, "damping": self.damping, "rest_length": self.rest_length}
+        require_one_length(given, "edge")
+
+    def _check(self, name: str, is_valid: Any, range_text: str) -> None:
+        object.__setattr__(self, name, as_constant(getattr(self, name), name, "edge", is_valid, range_text))
+
+    @classmethod
+    def from_young(
+        cls, young: float, area: ArrayLike, lengths: ArrayLike, damping: float | Array = 0.0
+    ) -> SpringMaterial:
+        """Springs as stiff as bars: k = E a / l (eq. 5.1).
+
+        Args:
+            young: Young's modulus E [Pa].
+            area: cross-section a of each bar, or of all [m^2].
+            lengths: at rest [m], such as `mesh.edge_lengths`.
+            damping: b [N s/m].
+        Raises: MaterialError if a number is not positive or lengths do not fit.
+        """
+        E, a, l = (  # noqa: E741
+            np.asarray(as_constant(value, name, "edge", is_positive, f"above 0 {unit}, {POSITIVE}"))
+            for value, name, unit in (
+                (young, "young", "Pa"),
+                (area, "area", "m^2"),
+                (lengths, "lengths", "m"),
+            )
+        )
+        if a.ndim and l.ndim and len(a) != len(l):
+            raise MaterialError(
+                f"area has {len(a)} values and lengths has {len(l)}: give one per edge in each"
+            )
+        stiffness = E * a / l
+        return cls(stiffness if stiffness.ndim else float(stiffness), damping, l if l.ndim else float(l))
+
+    def per_edge(self, name: str, edge_count: int, default: Array | None = None) -> Array:
+        """One value of a constant for each of `edge_count` edges; `default` where it is None.
+
+        Raises: MaterialError if it is an array of another length.
+        """
+        given = getattr(self, name)
+        return spread(default if given is None else given, name, "edges", edge_count)  # type: ignore[arg-type]

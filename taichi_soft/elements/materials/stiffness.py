@@ -1,0 +1,226 @@
+"""Stiffness of a linear material that need not be the same in all directions (thesis 2.3 and 2.4, eq. 2.25).
+
+A 6x6 matrix takes strain to stress in Voigt's order xx, yy, zz, yz, xz, xy, with engineering shear
+gamma_xy = 2 eps_xy: then it is symmetric, and so are its inverses and sums. The thesis's own order is xx, yy,
+zz, xy, xz, yz with tensor shear; `Stiffness.from_thesis` reads it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taichi_soft.core.checks import as_array, as_number, as_positive, as_rotation
+from taichi_soft.core.errors import MaterialError
+from taichi_soft.core.serialisation import serialised
+from taichi_soft.elements.materials.constants import LARGEST, SMALLEST
+
+Floats = NDArray[np.float64]
+
+PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
+"""Axes of each of Voigt's six components."""
+
+ONE_PLANE = tuple((i, j) for i in range(6) for j in range(i, 6) if (i in (3, 4)) == (j in (3, 4)))
+"""Entries that one plane of symmetry leaves: it mirrors yz and xz, which act on each other only."""
+
+THESIS_ORDER = (0, 1, 2, 5, 4, 3)
+"""Where Voigt's components stand in the thesis: its fourth is xy, its sixth yz."""
+
+
+def _as_ratio(value: float, name: str, high: float = 0.5) -> float:
+    """Poisson's ratio, strictly between -1 and `high`. Raises: OptionError."""
+    return as_number(value, name, np.nextafter(-1, 0), np.nextafter(high, 0), f"above -1 and below {high:g}")
+
+
+def turned(matrix: Floats, rotations: Floats) -> Floats:
+    """A stiffness (6, 6) in the axes of materials that are turned by `rotations` (m, 3, 3), (m, 6, 6).
+
+    With K, which turns stress in Voigt's order, it is K C K^T (Bond 1943).
+    """
+    first, second = np.array(PAIRS).T
+    R = rotations
+    # Stress turns as R s R^T, and components off the diagonal stand in it twice.
+    K = R[:, first[:, None], first] * R[:, second[:, None], second]
+    K[:, :, 3:] += (R[:, first[:, None], second] * R[:, second[:, None], first])[:, :, 3:]
+    return np.asarray(K @ matrix @ np.swapaxes(K, 1, 2))
+
+
+def voigt_stress(matrices: Floats, strain: Floats) -> Floats:
+    """Stress (m, 3, 3) [Pa] of strain (m, 3, 3) by stiffness (m, 6, 6) in Voigt's order."""
+    first, second = np.array(PAIRS).T
+    rows = strain[:, first, second] * np.array([1, 1, 1, 2, 2, 2])
+    stress = np.empty_like(strain)
+    stress[:, first, second] = stress[:, second, first] = np.einsum("mab,mb->ma", matrices, rows)
+    return stress
+
+
+@serialised("matrix")
+@dataclass(frozen=True, eq=False)
+class Stiffness:
+    """A symmetric, positive definite stiffness in the axes of its material.
+
+    Args:
+        matrix: (6, 6) [Pa], Voigt's order, engineering shear.
+    Raises: MaterialError if it is not symmetric to 1e-6 of its largest entry, or if a strain would release
+        energy (with the smallest eigenvalue).
+    """
+
+    matrix: Floats
+
+    def __post_init__(self) -> None:
+        matrix = as_array(self.matrix, "stiffness", (6, 6), "Pa")
+        gap = np.abs(matrix - matrix.T)
+        if gap.max() > 1e-6 * np.abs(matrix).max():
+            row, column = np.unravel_index(int(gap.argmax()), (6, 6))
+            raise MaterialError(
+                f"stiffness is not symmetric: entry ({row}, {column}) is {matrix[row, column]:g} and "
+                f"({column}, {row}) is {matrix[column, row]:g}"
+            )
+        matrix = (matrix + matrix.T) / 2
+        lowest, highest = np.linalg.eigvalsh(matrix)[[0, -1]].tolist()
+        if lowest <= 0:
+            raise MaterialError(
+                f"stiffness has the eigenvalue {lowest:g} Pa: a material that resists every strain has none "
+                "of 0 or below"
+            )
+        if not (lowest > 1e-9 * highest and lowest >= SMALLEST and highest < LARGEST):
+            raise MaterialError(
+                f"stiffness has eigenvalues from {lowest:g} to {highest:g} Pa: they must lie from "
+                f"{SMALLEST:g} to {LARGEST:g}, and within a factor of 1e9"
+            )
+        matrix.flags.writeable = False
+        object.__setattr__(self, "matrix", matrix)
+
+    @classmethod
+    def isotropic(cls, young: float, poisson: float) -> Stiffness:
+        """The same in all directions: 2 constants (thesis eq. 2.35). young [Pa], poisson from -1 to 0.5."""
+        nu = _as_ratio(poisson, "poisson")
+        E = as_positive(young, "young", "Pa")
+        return cls.orthotropic((E,) * 3, (nu,) * 3, (E / (2 * (1 + nu)),) * 3)
+
+    @classmethod
+    def one_axis(
+        cls,
+        young_along: float,
+        young_across: float,
+        poisson_along: float,
+        poisson_across: float,
+        shear_along: float,
+    ) -> Stiffness:
+        """The same in all directions round x, such as wood: 5 constants (thesis 2.4.2).
+
+        Args:
+            young_along, young_across: Young's moduli along x, and across it [Pa].
+            poisson_along: contraction across x when pulled along x.
+            poisson_across: contraction across x when pulled across x, at right angles.
+            shear_along: shear modulus of planes through x [Pa]. The other follows: E / (2 (1 + nu)) across.
+        """
+        shear_across = as_positive(young_across, "young_across", "Pa") / (
+            2 * (1 + _as_ratio(poisson_across, "poisson_across", 1.0))
+        )
+        return cls.orthotropic(
+            (young_along, young_across, young_across),
+            (poisson_across, poisson_along, poisson_along),
+            (shear_across, shear_along, shear_along),
+        )
+
+    @classmethod
+    def orthotropic(
+        cls, young: Sequence[float], poisson: Sequence[float], shear: Sequence[float]
+    ) -> Stiffness:
+        """Three planes of symmetry at right angles: 9 constants (thesis 2.4.1).
+
+        Args:
+            young: along x, y, z [Pa].
+            poisson: nu_yz, nu_xz, nu_xy: contraction along the second axis when pulled along the first.
+            shear: moduli G_yz, G_xz, G_xy [Pa].
+        """
+        moduli = as_array(young, "young", (3,), "Pa")
+        ratios = as_array(poisson, "poisson", (3,))
+        shears = as_array(shear, "shear", (3,), "Pa")
+        for name, values in (("young", moduli), ("shear", shears)):
+            if values.min() <= 0:
+                raise MaterialError(f"{name} is {values.tolist()}: it must be above 0 Pa along every axis")
+        compliance = np.diag(1 / np.concatenate([moduli, shears]))
+        for (a, b), ratio in zip(((1, 2), (0, 2), (0, 1)), ratios, strict=True):
+            compliance[a, b] = compliance[b, a] = -ratio / moduli[a]
+        try:
+            return cls(np.asarray(np.linalg.inv(compliance), dtype=np.float64))
+        except np.linalg.LinAlgError:
+            raise MaterialError(f"poisson is {ratios.tolist()}: no material has such ratios") from None
+
+    @classmethod
+    def one_plane(cls, constants: Sequence[float]) -> Stiffness:
+        """One plane of symmetry, that of x and y: 13 constants (thesis 2.4.1).
+
+        Args:
+            constants: [Pa], the entries of the matrix that need not vanish, row by row from the diagonal
+                on: c11, c12, c13, c16, c22, c23, c26, c33, c36, c44, c45, c55, c66.
+        """
+        values = as_array(constants, "constants", (13,), "Pa")
+        matrix = np.zeros((6, 6))
+        rows, columns = np.array(ONE_PLANE).T
+        matrix[rows, columns] = matrix[columns, rows] = values
+        return cls(matrix)
+
+    @classmethod
+    def from_thesis(cls, matrix: ArrayLike) -> Stiffness:
+        """From eq. 2.25 as the thesis writes it: order xx, yy, zz, xy, xz, yz, with tensor shear strain."""
+        rows = as_array(matrix, "stiffness", (6, 6), "Pa")[np.ix_(THESIS_ORDER, THESIS_ORDER)]
+        rows[:, 3:] /= 2  # gamma = 2 eps
+        return cls(rows)
+
+    def to_thesis(self) -> Floats:
+        """As the thesis writes it in eq. 2.25, (6, 6) [Pa]: for tensor shear, so not symmetric as a rule."""
+        rows = self.matrix.copy()
+        rows[:, 3:] *= 2
+        return np.asarray(rows[np.ix_(THESIS_ORDER, THESIS_ORDER)])
+
+    @property
+    def tensor(self) -> Floats:
+        """c_ijkl of stress_ij = c_ijkl strain_kl, (3, 3, 3, 3) [Pa]."""
+        index = np.zeros((3, 3), dtype=int)
+        for number, (a, b) in enumerate(PAIRS):
+            index[a, b] = index[b, a] = number
+        return np.asarray(self.matrix[index[:, :, None, None], index])
+
+    def rotated(self, rotation: ArrayLike) -> Stiffness:
+        """The stiffness of the material turned by a matrix (3, 3) or a quaternion (x, y, z, w)."""
+        return Stiffness(turned(self.matrix, as_rotation(rotation)[None])[0])
+
+    def young_along(self, direction: ArrayLike) -> float:
+        """Young's modulus of a bar cut out along `direction` (3,) [Pa]."""
+        n = as_array(direction, "direction", (3,))
+        length = float(np.linalg.norm(n))
+        if length == 0.0:
+            raise MaterialError("direction is zero: pass the axis of the bar")
+        n = n / length
+        pull = np.array([n[a] * n[b] for a, b in PAIRS])
+        strain = np.linalg.solve(self.matrix, pull)  # engineering shear counts both halves of each product
+        return float(1 / (pull @ strain))
+
+    def symmetry(self, tolerance: float = 1e-6) -> str:
+        """The narrowest class in these axes: isotropic, one axis (x), orthotropic, one plane (xy) or none.
+
+        Args:
+            tolerance: of what counts as zero or equal, over the largest entry.
+        """
+        c = self.matrix
+        small = tolerance * np.abs(c).max()
+
+        def vanish(*entries: float) -> bool:
+            return bool(np.abs(entries).max() <= small)
+
+        if not vanish(*c[:3, 3], *c[:3, 4], c[3, 5], c[4, 5]):
+            return "none"
+        if not vanish(*c[:3, 5], c[3, 4]):
+            return "one plane"
+        round_x = c[1, 1] - c[2, 2], c[0, 1] - c[0, 2], c[4, 4] - c[5, 5], c[3, 3] - (c[1, 1] - c[1, 2]) / 2
+        if not vanish(*round_x):
+            return "orthotropic"
+        if not vanish(c[0, 0] - c[1, 1], c[0, 1] - c[1, 2], c[3, 3] - c[4, 4]):
+            return "one axis"
+        return "isotropic"

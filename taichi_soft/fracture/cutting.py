@@ -1,0 +1,259 @@
+"""Bodies cut in two, or open, along the faces of their tetrahedra (thesis chapter 7).
+
+No tetrahedron changes: particles are the only bond between them, so a cut gives some of them copies. Mass
+goes with the tetrahedra; a copy begins where its original is, as fast. So mass, momentum and elastic energy
+stay.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.bodies.fields import BodyFields, with_spare_rows
+from taichi_soft.bodies.kernels.plasticity import read_rest_inverses
+from taichi_soft.bodies.layout import BodyArrays, BodyDescription, arrange_part, blocks_of
+from taichi_soft.bodies.status import ABSENT, ACTIVE
+from taichi_soft.core.checks import as_array, as_vector
+from taichi_soft.core.errors import OptionError, StateError
+from taichi_soft.fracture.kernels.topology import MOTION_WIDTH, read_motion, write_body
+from taichi_soft.fracture.parts import Part
+from taichi_soft.meshing import TetMesh
+from taichi_soft.meshing.splitting import InnerFaces, loose_parts, split_vertices
+
+if TYPE_CHECKING:
+    from taichi_soft.world.body import Body
+    from taichi_soft.world.world import World
+
+Floats = NDArray[np.float64]
+
+CRUMB = 0.02
+"""Part of the whole body's volume below which what is torn off takes no slot: those are for larger parts."""
+
+
+def cut(body: Body, plane: Any, triangle: Any) -> tuple[Body, ...]:
+    """As `Body.cut`."""
+    require_cuttable(body)
+    corners, normal, is_endless = _blade(plane, triangle)
+    mesh = body.mesh
+    faces = body._description.inner_faces
+    centers = body.positions().astype(np.float64)[mesh.tets].mean(axis=1)
+    is_cut = _crosses(corners, normal, is_endless, centers[faces.tets[:, 0]], centers[faces.tets[:, 1]])
+    return divide(body, faces, is_cut)
+
+
+def require_cuttable(body: Body) -> None:
+    """Raises: OptionError for a body that was not made to be cut; StateError for one that cannot be now."""
+    world = body._world
+    if body.asset.spare_vertices == 0:
+        raise OptionError(
+            f"body {body.index} has no room for copies of vertices: make its asset with spare_vertices"
+        )
+    if not world.is_built:
+        raise StateError("the world is not built: call world.build() first, and cut what moves")
+    if body._is_pulled:
+        raise StateError(
+            f"body {body.index} is grabbed or joined to another body: release it before it is cut"
+        )
+    if body.is_frozen:
+        raise StateError(f"body {body.index} is frozen: bring it back with set_motion before it is cut")
+
+
+def _blade(plane: Any, triangle: Any) -> tuple[Floats, Floats, bool]:
+    """Corners (3, 3) of a triangle or of any in a plane, the normal, and whether it is a plane."""
+    if (plane is None) == (triangle is None):
+        raise OptionError("give plane=(point, normal) or triangle=(3, 3), one of the two")
+    if triangle is not None:
+        corners = as_array(triangle, "triangle", (3, 3), "m")
+        normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+        longest = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1).max()
+        if not np.linalg.norm(normal) > 1e-9 * longest**2:
+            raise OptionError(f"triangle has no area: {corners.tolist()}")
+        return corners, normal, False
+    if not isinstance(plane, (tuple, list, np.ndarray)) or len(plane) != 2:
+        raise OptionError(f"plane must be (point, normal), got {plane!r}")
+    point, normal = as_vector(plane[0], "point", "m"), as_vector(plane[1], "normal", "(any length)")
+    if not np.linalg.norm(normal) > 0.0:
+        raise OptionError("normal is zero: give the direction across the plane")
+    return np.tile(point, (3, 1)), normal, True
+
+
+def _crosses(corners: Floats, normal: Floats, is_endless: bool, a: Floats, b: Floats) -> NDArray[np.bool_]:
+    """Which segments a-b, (f, 3) each, go through the blade."""
+    over, under = (a - corners[0]) @ normal, (b - corners[0]) @ normal
+    passes = (over > 0) != (under > 0)
+    if is_endless:
+        return np.asarray(passes)
+    part = over / np.where(passes, over - under, 1.0)
+    at = a + part[:, None] * (b - a)
+    for i in range(3):
+        start, end = corners[i], corners[(i + 1) % 3]
+        passes &= np.cross(end - start, at - start) @ normal >= 0
+    return np.asarray(passes)
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """What a cut makes of a body, or of a part of it."""
+
+    description: BodyDescription
+    arrays: BodyArrays
+    vertices: NDArray[np.int64]  # of the body before, of which each is itself or a copy
+    tets: NDArray[np.int64]  # of the body before
+
+
+def divide(
+    body: Body, faces: InnerFaces, is_cut: NDArray[np.bool_], *, keeps_crumbs: bool = False
+) -> tuple[Body, ...]:
+    """Open a body along faces. Returns the bodies that fell off, the largest first.
+
+    Args:
+        keeps_crumbs: small parts stay in the body, and so do those for which there is no slot.
+    """
+    world, mesh = body._world, body.mesh
+    assert isinstance(mesh, TetMesh), "others are refused before"
+    tets, vertices = split_vertices(mesh.tets, len(mesh.vertices), faces, is_cut)
+    if len(vertices) == len(mesh.vertices):
+        return ()
+    part = loose_parts(tets, len(vertices))
+    sizes = np.bincount(part, mesh.volumes)
+    numbers = np.argsort(-sizes, kind="stable")  # largest first
+    slots = world._pools.free_slots(body.asset)
+    if keeps_crumbs:
+        own = numbers[1 : 1 + len(slots)]
+        volume = body.asset.mesh.volumes.sum()  # type: ignore[attr-defined]
+        own = own[sizes[own] >= CRUMB * volume]
+        part[~np.isin(part, own)] = numbers[0]
+        numbers = np.r_[numbers[0], own]
+    if len(numbers) > 1 + len(slots):
+        raise StateError(
+            f"body {body.index} would fall into {len(numbers)} pieces, and {len(slots)} slots are free for "
+            f"the {len(numbers) - 1} new ones: reserve more of its asset before build, or despawn bodies"
+        )
+    pieces = [_piece(body, tets, vertices, np.flatnonzero(part == number)) for number in numbers]
+    for piece in pieces:
+        require_room(world, body.index, piece.arrays)
+    return _settle(world, body, pieces, slots)
+
+
+def _piece(
+    body: Body, tets: NDArray[np.int32], vertices: NDArray[np.int64], rows: NDArray[np.int64]
+) -> _Piece:
+    """A body of some of the tetrahedra."""
+    before = body._description
+    assert isinstance(before.mesh, TetMesh)
+    used, corners = np.unique(tets[rows], return_inverse=True)
+    origins = vertices[used]
+    description = BodyDescription(
+        before.mesh.part(origins, corners.reshape(-1, 4).astype(np.int32), rows),
+        before.material.of_tets(rows),  # type: ignore[union-attr]
+        before.model,
+        np.flatnonzero(np.isin(origins, before.pinned)).astype(np.int32),
+    )
+    arrays = arrange_part(description, body._world._scene.bodies[body.index], origins, rows)
+    return _Piece(description, arrays, origins, rows)
+
+
+def require_room(world: World, slot: int, arrays: BodyArrays) -> None:
+    """Raises: StateError where a part of a body does not fit into its slot."""
+    place = world._scene.ranges[slot]
+    for name, rows, (begin, end) in (
+        ("vertices", arrays.mass, place.particles),
+        ("edges", arrays.edge_vertices, place.edges),
+        ("triangles", arrays.triangles, place.triangles),
+    ):
+        if len(rows) > end - begin:
+            raise StateError(
+                f"the cut would leave {len(rows)} {name} in body {slot}, and there is room for "
+                f"{end - begin}: make its asset with more spare_vertices than "
+                f"{world._pools.assets[slot].spare_vertices}"
+            )
+
+
+def _settle(world: World, body: Body, pieces: list[_Piece], slots: list[int]) -> tuple[Body, ...]:
+    """Write the first piece into the body's slot and the others into free ones. Refuses nothing."""
+    simulation = world._built
+    state = simulation.state
+    motion = np.empty((body.vertex_count, MOTION_WIDTH), dtype=np.float32)
+    read_motion(state, body.index, motion)
+    inverses = None
+    if state.capacity.plastic:
+        inverses = np.empty((len(body.tets), 3, 3), dtype=np.float32)
+        read_rest_inverses(state, body.index, inverses)
+        inverses = inverses[np.argsort(world._scene.bodies[body.index].tet_order)]
+    for slot, piece in zip([body.index, *slots], pieces, strict=False):
+        rows = motion[piece.vertices]
+        free = rows[:, 12] > 0.0
+        masses = piece.description.masses
+        rows[free, 12] = 1.0 / masses[free]
+        rows[:, 20:26] *= (masses / rows[:, 15])[:, None]  # pushes and reactions are shared like the mass
+        rows[:, 15] = masses
+        present = None if inverses is None else inverses[piece.tets][piece.arrays.tet_order]
+        _write(state, slot, piece.arrays, rows, ACTIVE, body.index, present)
+    simulation.has_changed()
+    fallen = tuple(world._take_in(body.asset) for _ in pieces[1:])
+    vertices, tets = body.vertex_origins, body.tet_origins
+    for each, piece in zip((body, *fallen), pieces, strict=True):
+        each._redescribe(piece.description, piece.arrays)
+        corners, order = piece.description.mesh.tets, piece.arrays.order
+        each._become(Part(vertices[piece.vertices], order, tets[piece.tets], corners))
+    body._share_attachments(
+        [(each, piece.vertices) for each, piece in zip((body, *fallen), pieces, strict=True)]
+    )
+    simulation.events.renew_watches(body)
+    return fallen
+
+
+def warm_up(world: World, state: BodyFields, slot: int) -> None:
+    """Make a body's slot what it is, so that nothing compiles where the first cut comes in the game."""
+    read_motion(state, slot, np.empty((len(world._scene.bodies[slot].mass), MOTION_WIDTH), dtype=np.float32))
+    refill_slot(world, state, slot)
+
+
+def refill_slot(world: World, state: BodyFields, slot: int, part: BodyArrays | None = None) -> None:
+    """Write the whole body of its asset, or a part of it, into a slot where another part was, at rest."""
+    arrays = world._pools.assets[slot].arrays if part is None else part
+    rows = np.zeros((len(arrays.mass), MOTION_WIDTH), dtype=np.float32)
+    _write(state, slot, arrays, rows, ABSENT, slot, None)
+    world._scene.bodies[slot] = arrays
+
+
+def _write(
+    state: BodyFields,
+    slot: int,
+    arrays: BodyArrays,
+    motion: NDArray[np.float32],
+    status: int,
+    model_of: int,
+    inverses: NDArray[np.float32] | None,
+) -> None:
+    """`inverses`: of the rest shapes as they are, (m, 3, 3), where they may have flowed."""
+    first = _real_blocks(np.swapaxes(arrays.rest_inverse, 1, 2), 9)
+    present = first if inverses is None else _real_blocks(np.swapaxes(inverses, 1, 2), 9)
+    write_body(
+        state,
+        slot,
+        status,
+        model_of,
+        motion,
+        arrays.rest_position.astype(np.float32),
+        arrays.rank,
+        blocks_of(arrays.tet_vertices, 4, 0),
+        blocks_of(arrays.tet_edges, 6, 0),
+        np.stack([present, first]),
+        _real_blocks(arrays.lame, 2),
+        _real_blocks(arrays.stiffness, 21) if state.capacity.anisotropic else np.zeros(1, dtype=np.float32),
+        _real_blocks(arrays.tet_damping, 1),
+        with_spare_rows(arrays.edge_vertices),
+        with_spare_rows(arrays.edge_damping).astype(np.float32),
+        arrays.edge_blocks,
+        arrays.triangles,
+        arrays.outer,
+    )
+
+
+def _real_blocks(rows: NDArray[Any], width: int) -> NDArray[np.float32]:
+    return blocks_of(rows.reshape(len(rows), width), width, 0).astype(np.float32)

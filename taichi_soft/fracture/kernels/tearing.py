@@ -1,0 +1,33 @@
+"""Which bodies may tear: a bound on the stress of every tetrahedron, cheap enough for every step."""
+
+from taichi_soft.bodies.status import ACTIVE
+from taichi_soft.core.constants import LANES
+from taichi_soft.core.math.tensors import scaled_plus_identity, trace
+from taichi_soft.core.runtime import ti
+from taichi_soft.elements.kernels.stress import deformation_of, stress_of
+
+
+@ti.func
+def _pull_bound(state: ti.template(), block, lane):
+    """At least the largest principal stress of a tetrahedron [Pa]; it itself in a pull along one axis."""
+    stress = stress_of(state, deformation_of(state, block, lane), block, lane)
+    mean = trace(stress) / 3.0
+    d = scaled_plus_identity(stress, 1.0, -mean)
+    return mean + ti.sqrt((d[0].norm_sqr() + d[1].norm_sqr() + d[2].norm_sqr()) * 2.0 / 3.0)
+
+
+@ti.kernel
+def find_overloaded(
+    state: ti.template(),
+    limits: ti.types.ndarray(dtype=ti.f32, ndim=1),
+    found: ti.types.ndarray(dtype=ti.i32, ndim=1),
+):
+    """Mark with 1 each body of which a tetrahedron may bear more than the body's limit [Pa]; 0 for none."""
+    for body in range(limits.shape[0]):
+        result = 0
+        if limits[body] > 0.0 and state.body_status[body] == ACTIVE:
+            blocks = state.body_blocks[body]
+            for t in range(blocks[0] * LANES, blocks[1] * LANES):
+                if _pull_bound(state, t // LANES, t % LANES) > limits[body]:
+                    result = 1
+        found[body] = result

@@ -1,0 +1,142 @@
+"""A body of a slot written anew, with all that its particles are in the middle of."""
+
+from taichi_soft.contact.fields import NO_CONTACT
+from taichi_soft.core.constants import LANES
+from taichi_soft.core.runtime import ti
+
+MOTION_WIDTH = 26
+"""Of a row of `read_motion`: position, velocity, both before the last step, inverse mass, floor, touch, mass,
+aim, target, push, reaction."""
+
+
+@ti.func
+def _three(rows: ti.template(), i, first):
+    return ti.Vector([rows[i, first], rows[i, first + 1], rows[i, first + 2]])
+
+
+@ti.kernel
+def read_motion(state: ti.template(), body: ti.i32, out: ti.types.ndarray(dtype=ti.f32, ndim=2)):
+    """All that the particles of one body are in the middle of, (n, MOTION_WIDTH), in the caller's order."""
+    ti.loop_config(serialize=True)
+    for i in range(out.shape[0]):
+        p = state.particle_of_vertex[state.body_particles[body][0] + i]
+        for k in range(3):
+            out[i, k] = state.particle_position[p][k]
+            out[i, 3 + k] = state.particle_velocity[p][k]
+            out[i, 6 + k] = state.prev_position[p][k]
+            out[i, 9 + k] = state.prev_velocity[p][k]
+        out[i, 12] = state.particle_inv_mass[p]
+        out[i, 15] = state.particle_mass[p]
+        out[i, 16] = state.particle_aim[p]
+        for k in range(3):
+            out[i, 17 + k] = state.particle_target[p][k]
+            out[i, 20 + k] = state.particle_push[p][k]
+            out[i, 23 + k] = state.particle_reaction[p][k]
+        out[i, 13], out[i, 14] = 0.0, 0.0
+        if ti.static(state.capacity.implicit):
+            out[i, 13] = state.particle_contact[p]
+        if ti.static(state.capacity.has_contact):
+            out[i, 14] = state.contact.particle_touches[p]
+
+
+@ti.kernel
+def write_body(
+    state: ti.template(),
+    body: ti.i32,
+    status: ti.i32,
+    model_of: ti.i32,
+    motion: ti.types.ndarray(dtype=ti.f32, ndim=2),
+    rest: ti.types.ndarray(dtype=ti.f32, ndim=2),
+    particles: ti.types.ndarray(dtype=ti.i32, ndim=1),
+    tet_vertices: ti.types.ndarray(dtype=ti.i32, ndim=1),
+    tet_edges: ti.types.ndarray(dtype=ti.i32, ndim=1),
+    rest_inverses: ti.types.ndarray(dtype=ti.f32, ndim=2),
+    lame: ti.types.ndarray(dtype=ti.f32, ndim=1),
+    stiffness: ti.types.ndarray(dtype=ti.f32, ndim=1),
+    tet_damping: ti.types.ndarray(dtype=ti.f32, ndim=1),
+    edges: ti.types.ndarray(dtype=ti.i32, ndim=2),
+    edge_damping: ti.types.ndarray(dtype=ti.f32, ndim=1),
+    edge_blocks: ti.types.ndarray(dtype=ti.i32, ndim=2),
+    triangles: ti.types.ndarray(dtype=ti.i32, ndim=2),
+    outer: ti.types.ndarray(dtype=ti.i32, ndim=1),
+):
+    """Write a body into its slot; indices count from the slot's first rows.
+
+    Args:
+        model_of: body whose lag, drives and residual it takes over: itself, or the one it fell off.
+        motion: as `read_motion`, of each vertex in the caller's order.
+        rest: positions of the particles at rest, in kernel order.
+        particles: of each vertex.
+        tet_vertices, tet_edges, lame, stiffness, tet_damping: in blocks.
+        rest_inverses: in blocks; as they are, and as they first were.
+        edges, edge_damping: with the spare rows.
+    """
+    ti.loop_config(serialize=True)
+    for _ in range(1):
+        p0, b0 = state.body_particles[body][0], state.body_blocks[body][0]
+        e0, c0 = state.body_edges[body][0], state.body_edge_blocks[body][0]
+        t0, o0 = state.body_triangles[body][0], state.body_outer[body][0]
+        for i in range(particles.shape[0]):
+            p = p0 + particles[i]
+            state.particle_of_vertex[p0 + i] = p
+            state.particle_position[p] = _three(motion, i, 0)
+            state.particle_velocity[p] = _three(motion, i, 3)
+            state.prev_position[p] = _three(motion, i, 6)
+            state.prev_velocity[p] = _three(motion, i, 9)
+            state.particle_inv_mass[p] = motion[i, 12]
+            state.particle_force[p] = ti.Vector.zero(state.real, 4)
+            state.particle_mass[p] = motion[i, 15]
+            state.particle_aim[p] = int(motion[i, 16])
+            state.particle_target[p] = _three(motion, i, 17)
+            state.particle_push[p] = _three(motion, i, 20)
+            state.particle_reaction[p] = _three(motion, i, 23)
+            if ti.static(state.capacity.implicit):
+                state.particle_contact[p] = int(motion[i, 13])
+            if ti.static(state.capacity.has_contact):
+                state.contact.particle_touches[p] = int(motion[i, 14])
+                state.contact.particle_clearance[p] = NO_CONTACT
+            state.rest_position[p0 + i] = _three(rest, i, 0)
+        for i in range(tet_vertices.shape[0]):
+            state.tet_vertices[b0 * 4 * LANES + i] = p0 + tet_vertices[i]
+        for i in range(rest_inverses.shape[1]):
+            state.tet_rest_inverse[b0 * 9 * LANES + i] = rest_inverses[0, i]
+            if ti.static(state.capacity.plastic):
+                state.tet_original_inverse[b0 * 9 * LANES + i] = rest_inverses[1, i]
+        for i in range(lame.shape[0]):
+            state.tet_lame[b0 * 2 * LANES + i] = lame[i]
+        if ti.static(state.capacity.anisotropic):
+            for i in range(stiffness.shape[0]):
+                state.tet_stiffness[b0 * 21 * LANES + i] = stiffness[i]
+        for i in range(tet_damping.shape[0]):
+            state.tet_damping[b0 * LANES + i] = tet_damping[i]
+        if ti.static(state.capacity.implicit):
+            for i in range(tet_edges.shape[0]):
+                state.tet_edges[b0 * 6 * LANES + i] = e0 + tet_edges[i]
+        for i in range(edges.shape[0]):
+            state.edge_vertices[e0 + i] = ti.Vector([p0 + edges[i, 0], p0 + edges[i, 1]])
+            state.edge_damping[e0 + i] = edge_damping[i]
+        for i in range(edge_blocks.shape[0]):
+            state.edge_blocks[c0 + i] = ti.Vector([e0 + edge_blocks[i, 0], edge_blocks[i, 1]])
+        for i in range(triangles.shape[0]):
+            corners = ti.Vector([triangles[i, 0], triangles[i, 1], triangles[i, 2]])
+            state.triangle_vertices[t0 + i] = p0 + corners
+        for i in range(outer.shape[0]):
+            state.outer_particle[o0 + i] = p0 + outer[i]
+        state.body_particles[body] = ti.Vector([p0, p0 + particles.shape[0]])
+        state.body_blocks[body] = ti.Vector([b0, b0 + tet_damping.shape[0] // LANES])
+        state.body_edges[body] = ti.Vector([e0, e0 + edges.shape[0] - LANES])
+        state.body_edge_blocks[body] = ti.Vector([c0, c0 + edge_blocks.shape[0]])
+        state.body_triangles[body] = ti.Vector([t0, t0 + triangles.shape[0]])
+        state.body_outer[body] = ti.Vector([o0, o0 + outer.shape[0]])
+        state.body_velocity_lag[body] = state.body_velocity_lag[model_of]
+        state.body_drives[body] = state.body_drives[model_of]
+        state.body_gravity_scale[body] = state.body_gravity_scale[model_of]
+        state.body_damping[body] = state.body_damping[model_of]
+        state.body_patience[body] = state.body_patience[model_of]
+        state.body_fading[body] = state.body_fading[model_of]
+        state.body_fading_interval[body] = state.body_fading_interval[model_of]
+        if ti.static(state.capacity.has_contact):
+            state.contact.calm[body] = 0.0
+        if ti.static(state.capacity.implicit):
+            state.body_residual[body] = state.body_residual[model_of]
+        state.body_status[body] = status

@@ -1,0 +1,1 @@
+"""What measures and judges: experiments, reports, profiles, the drop test."""

@@ -1,0 +1,59 @@
+"""What became of a cell, in one word and a reason."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from taichi_soft.core.types import Choice
+
+MOST_SUBSTEPS = 500
+"""Of 1/60 s: what needs more is no game."""
+
+SHAPE_TOLERANCE = 0.01
+"""How far a body that was wrecked may end from its rest shape, in its size."""
+
+SPEED_TOLERANCE = 1.5
+"""Speed at the end over the largest that the fall could have given: above it energy came from nowhere."""
+
+
+class Verdict(Choice):
+    """Of a cell, worst first. `TOO_SOFT`: inverted, and the world said so when it was built; `NO_RESULT`: the
+    trial itself broke off."""
+
+    FROZEN = "frozen"
+    INVERTED = "inverted"
+    RUNAWAY = "runaway"
+    MISSHAPEN = "misshapen"
+    TOO_SOFT = "too soft"
+    TOO_SLOW = "too slow"
+    REFUSED = "refused"
+    NO_RESULT = "no result"
+    OK = "ok"
+
+
+@dataclass(frozen=True)
+class Ending:
+    """What is to be judged, at the end of a trial."""
+
+    tets: int
+    failure: str | None  # why it froze; None where it did not
+    is_finite: bool
+    flipped: int  # tetrahedra inside out
+    speed: float  # root mean square over mass [m/s]
+    fastest: float  # that it can be, by the height it was dropped from [m/s]; infinite where it was wrecked
+    distance: float = 0.0  # from the rest shape, where it was wrecked, in its size
+
+
+def judge(end: Ending) -> tuple[Verdict, str]:
+    """The worst that can be said, and why; no reason where all is well."""
+    if end.failure is not None:
+        return Verdict.FROZEN, end.failure
+    if not end.is_finite:
+        return Verdict.FROZEN, "positions are not finite, and it does not say that it is frozen"
+    if end.flipped:
+        return Verdict.INVERTED, f"{end.flipped} of {end.tets} tetrahedra inside out at the end"
+    if end.speed > SPEED_TOLERANCE * end.fastest:
+        return Verdict.RUNAWAY, f"{end.speed:.3g} m/s at the end, a fall gives {end.fastest:.3g}"
+    if end.distance > SHAPE_TOLERANCE:
+        return Verdict.MISSHAPEN, f"{100 * end.distance:.3g} % of its size from its rest shape"
+    return Verdict.OK, ""

@@ -1,0 +1,1 @@
+"""State as bytes: snapshots, and recordings of calls."""

@@ -1,0 +1,152 @@
+"""All that passes from one step of a world to the next, in one array and back, bit by bit."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.bodies.fields import MOST_GRABS, PATCH_ROWS
+from taichi_soft.bodies.status import ABSENT
+from taichi_soft.control.joint_fields import ENDS, MOST_JOINTS
+from taichi_soft.core.constants import LANES
+from taichi_soft.core.runtime import ti
+from taichi_soft.solver.state import State
+
+OWNERS = PARTICLE, BODY, GRAB, HELD, PATCH, PAIR, SHAPE, JOINT, JOINT_ROW, JOINT_END, WORLD = range(11)
+"""What a field has a row for: a particle, a body, a grab, a grab up to the last that is in use, a row of the
+patch of such a one, a pair of a body and a collider, a number of a rest shape, a joint, a row of it, an end
+of such a row; or only one row."""
+
+
+def carried(state: State, owner: int) -> list[tuple[Any, int, int]]:
+    """Fields that the next step, or a reading before it, depends on: (field, column, width).
+
+    All others are constant, follow from what bodies are made of, or are written in each step before they are
+    read: forces, boxes, candidates of contacts, islands.
+    """
+    is_implicit, touches = state.capacity.implicit, state.capacity.contact.colliders > 0
+    contact, joints = (state.contact, state.joints) if touches else (None, None)
+    fields: list[Any] = []
+    if owner == PARTICLE:
+        fields += [state.particle_position, state.particle_velocity, state.prev_position, state.prev_velocity]
+        fields += [state.particle_mass, state.particle_inv_mass, state.particle_aim, state.particle_target]
+        fields += [state.particle_push, state.particle_reaction]
+        fields += [state.particle_contact] if is_implicit else []
+        fields += [contact.particle_touches] if contact else []
+        if state.capacity.contact.soft:
+            fields += [state.soft.kept_triangle, state.soft.kept_press, state.soft.kept_rub]
+    elif owner == BODY:
+        fields += [state.body_status, state.body_velocity_lag, state.body_drives]
+        fields += [state.body_gravity_scale, state.body_damping, state.body_patience]
+        fields += [state.body_fading, state.body_fading_interval]
+        fields += [state.body_residual] if is_implicit else []
+        # The box is the one in which a body sleeps.
+        fields += [contact.calm, contact.body_lower, contact.body_upper] if contact else []
+    elif owner == GRAB:
+        fields += [state.grab_body]
+    elif owner == HELD:
+        fields += [state.grab_corners, state.grab_weights, state.grab_target, state.grab_spring]
+        fields += [state.grab_limits, state.grab_force, state.grab_count]
+    elif owner == PATCH:
+        fields += [state.patch_particle, state.patch_share]
+    elif owner == PAIR:
+        fields += [contact.impulse, contact.angular_impulse, contact.rebound] if contact else []
+    elif owner == SHAPE:
+        fields += [state.tet_rest_inverse] if state.capacity.plastic else []
+    elif owner == JOINT:
+        fields += [joints.bodies, joints.rows, joints.draw_speed, joints.impulse] if joints else []
+    elif owner == JOINT_ROW and joints:
+        fields += [joints.row_impulse]
+    elif owner == JOINT_END and joints:
+        fields += [joints.particle, joints.weight, joints.share]
+    elif owner == WORLD:
+        fields += [state.wind]
+    widths = [getattr(field, "n", 1) for field in fields]
+    return [(field, sum(widths[:i]), widths[i]) for i, field in enumerate(fields)]
+
+
+def row_table(
+    state: State, particles: int, bodies: int, blocks: int, held: int, joint_rows: int
+) -> NDArray[np.int32]:
+    """Rows of each owner, their width and where they begin: (12, 3), the last row being the end.
+
+    Args:
+        held: number of the last grab in use, plus 1.
+        joint_rows: that joints use.
+    """
+    pairs = bodies * state.capacity.contact.colliders
+    counts = [particles, bodies, MOST_GRABS, held, held * PATCH_ROWS, pairs, blocks * 9 * LANES]
+    counts += [MOST_JOINTS, joint_rows, joint_rows * ENDS, 1]
+    rows, at = [], 0
+    for owner in OWNERS:
+        width = sum(each for _, _, each in carried(state, owner))
+        rows.append((counts[owner], width, at))
+        at += counts[owner] * width
+    return np.array([*rows, (0, 0, at)], dtype=np.int32)
+
+
+@ti.kernel
+def copy_state(
+    state: ti.template(),
+    table: ti.types.ndarray(dtype=ti.i32, ndim=2),
+    words: ti.types.ndarray(dtype=ti.i32, ndim=1),
+    packs: ti.template(),
+):
+    """Copy everything that is `carried` into `words`, row by row as `table` says; back where not `packs`."""
+    for owner in ti.static(OWNERS):
+        ti.loop_config(serialize=True)
+        for i in range(table[owner, 0]):
+            for field, column, width in ti.static(carried(state, owner)):
+                at = table[owner, 2] + i * table[owner, 1] + column
+                for k in ti.static(range(width)):
+                    if ti.static(owner == WORLD):
+                        if ti.static(packs):
+                            words[at + k] = ti.bit_cast(field[None][k], ti.i32)
+                        else:
+                            field[None][k] = ti.bit_cast(words[at + k], field.dtype)
+                    elif ti.static(width == 1):
+                        if ti.static(packs):
+                            words[at] = ti.bit_cast(field[i], ti.i32)
+                        else:
+                            field[i] = ti.bit_cast(words[at], field.dtype)
+                    elif ti.static(packs):
+                        words[at + k] = ti.bit_cast(field[i][k], ti.i32)
+                    else:
+                        field[i][k] = ti.bit_cast(words[at + k], field.dtype)
+
+
+@ti.func
+def _word(x):
+    return ti.cast(ti.bit_cast(x, ti.u32), ti.u64)
+
+
+@ti.func
+def _mix(code, word):
+    """Take a word into a hash: FNV-1a (Fowler, Noll, Vo) with 64 bits, word by word, then a shift."""
+    mixed = (code ^ word) * ti.u64(1099511628211)
+    return mixed ^ (mixed >> ti.u64(29))
+
+
+@ti.func
+def _mix_two(code, x, y):
+    """Take two numbers of 32 bits into a hash at once."""
+    return _mix(code, _word(x) | (_word(y) << ti.u64(32)))
+
+
+@ti.kernel
+def hash_bodies(state: ti.template(), body_count: ti.i32) -> ti.i64:
+    """A number that tells states apart: positions, velocities, pins and all of each body that lives."""
+    code = ti.u64(1469598103934665603)
+    ti.loop_config(serialize=True)
+    for body in range(body_count):
+        code = _mix(code, _word(state.body_status[body]))
+        if state.body_status[body] != ABSENT:
+            code = _mix_two(code, state.body_velocity_lag[body], state.body_drives[body])
+            code = _mix_two(code, state.body_gravity_scale[body], state.body_damping[body])
+            particles = state.body_particles[body]
+            for p in range(particles[0], particles[1]):
+                x, v = state.particle_position[p], state.particle_velocity[p]
+                for k in ti.static(range(3)):
+                    code = _mix_two(code, x[k], v[k])
+                code = _mix_two(code, state.particle_inv_mass[p], state.particle_aim[p])
+    return ti.cast(code, ti.i64)

@@ -1,0 +1,200 @@
+"""The state of a world between two steps, as bytes and back.
+
+A snapshot has four parts. The *structure* is what the world was built of; a world of another structure
+refuses it. The *notes* are what Python knows: time, who lives in which slot, colliders, frames, grabs and
+joints. The *words* are what the fields hold, bit by bit (see `persistence.kernels.words`), and the parts of
+meshes that cuts have left (see `fracture.parts`). The last part is what events go on with (see
+`events.memory`).
+"""
+
+from __future__ import annotations
+
+from hashlib import blake2b
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.bodies.fields import PATCH_ROWS
+from taichi_soft.bodies.status import ABSENT
+from taichi_soft.contact.colliders import Collider
+from taichi_soft.control.joint_fields import JOINT_ROWS
+from taichi_soft.control.joints import renew_islands, rows_in_use
+from taichi_soft.control.kernels.joints import forget_held
+from taichi_soft.control.kernels.pins import WITH_FRAME
+from taichi_soft.core.constants import POSITION_LIMIT, VELOCITY_LIMIT
+from taichi_soft.core.container import seal, unseal
+from taichi_soft.core.errors import SnapshotError, StateError
+from taichi_soft.core.serialisation import from_json, to_json
+from taichi_soft.events import Known, Memory
+from taichi_soft.persistence.kernels.words import (
+    BODY,
+    GRAB,
+    HELD,
+    JOINT,
+    JOINT_END,
+    PARTICLE,
+    PATCH,
+    SHAPE,
+    WORLD,
+    carried,
+    copy_state,
+    hash_bodies,
+    row_table,
+)
+from taichi_soft.persistence.manifest import Notes, read_notes, read_parts, take_notes
+from taichi_soft.persistence.restoring import put_back
+from taichi_soft.persistence.structure import require_structure
+from taichi_soft.solver.state import State
+from taichi_soft.world.body import Body
+
+if TYPE_CHECKING:
+    from taichi_soft.world.world import World
+
+MARK, VERSION = b"TSOFTSNP", 4
+
+MOST_PRESS = 1e30
+"""Impulse [N s] that no contact has reached: what is beyond is not finite."""
+
+Words = NDArray[np.int32]
+
+
+def take_snapshot(world: World) -> bytes:
+    """As `World.snapshot`."""
+    state = world._built.state
+    table = _table(world, max(world._grabs, default=-1) + 1, rows_in_use(world))
+    words = np.empty(int(table[-1, 2]), dtype=np.int32)
+    copy_state(state, table, words, True)
+    words = np.concatenate([words, *(body._part.rows for body in world.bodies if body._part is not None)])
+    notes, memory = to_json(take_notes(world)), to_json(world._built.events.remember().plain)
+    return seal(MARK, VERSION, [world._structure, notes, words.astype("<i4").tobytes(), memory])
+
+
+def state_hash(world: World) -> str:
+    """As `World.state_hash`."""
+    code = int(hash_bodies(world._built.state, world.slot_count))
+    return blake2b(to_json([code, take_notes(world)]), digest_size=8).hexdigest()
+
+
+def _table(world: World, held: int, joint_rows: int) -> Words:
+    state, scene, slots = world._built.state, world._scene, world.slot_count
+    return row_table(state, scene.particle_count, slots, scene.block_count, held, joint_rows)
+
+
+def restore_snapshot(world: World, data: Any) -> None:
+    """As `World.restore`."""
+    state = world._built.state
+    structure, content, rows, remembered = _four(unseal(data, MARK, VERSION, "snapshot"))
+    require_structure(bytes(structure), world._structure)
+    plain = from_json(content)
+    try:
+        words = np.frombuffer(rows, "<i4").astype(np.int32)
+        grabs = (int(number) for _, number, _, _ in plain["grabs"])
+        joined = sum(len(each[-1]) for each in plain["joints"])
+        table = _table(world, max(grabs, default=-1) + 1, joined)
+        if len(words) < table[-1, 2]:
+            raise ValueError(f"it has {len(words)} words, where this world takes {table[-1, 2]}")
+        parts = read_parts(world, plain["bodies"], words[table[-1, 2] :])
+        words = words[: table[-1, 2]]
+        notes = read_notes(world, plain, parts)
+        memory = Memory.of(from_json(remembered), world.slot_count)
+    except (KeyError, TypeError, ValueError, IndexError, OverflowError, AttributeError, StateError) as error:
+        if isinstance(error, SnapshotError):
+            raise
+        raise SnapshotError(f"this snapshot is not in order: {error}") from None
+    _require_words(world, notes, table, words)
+    put_back(world, notes)
+    if world._built.program.has_contact:
+        forget_held(state)
+    copy_state(state, table, words, False)
+    renew_islands(world)
+    find = world._handles.find
+    known = Known(lambda serial: find(serial, Body), lambda serial: find(serial, Collider))
+    world._built.events.recall(memory, notes.steps, known)
+
+
+def _four(parts: list[memoryview]) -> list[memoryview]:
+    if len(parts) != 4:
+        raise SnapshotError(f"this snapshot has {len(parts)} parts instead of 4")
+    return parts
+
+
+def _require_words(world: World, notes: Notes, table: Words, words: Words) -> None:
+    """Raises: SnapshotError where a kernel would read beyond its fields, or begin with what is not finite."""
+    state = world._built.state
+    particles, slots = world._scene.particle_count, world.slot_count
+    limits: list[tuple[int, Any, int]] = [
+        (PARTICLE, state.particle_aim, WITH_FRAME + len(notes.frames)),
+        (BODY, state.body_status, ABSENT + 1),
+        (GRAB, state.grab_body, slots + 1),
+        (HELD, state.grab_corners, particles),
+        (HELD, state.grab_count, PATCH_ROWS + 1),
+        (PATCH, state.patch_particle, particles),
+    ]
+    if state.capacity.implicit:
+        limits.append((PARTICLE, state.particle_contact, max(state.capacity.contact.colliders, 1) + 1))
+    if world._built.program.has_contact:
+        limits += [
+            (JOINT, state.joints.bodies, slots + 1),
+            (JOINT, state.joints.rows, JOINT_ROWS + 1),
+            (JOINT_END, state.joints.particle, particles),
+        ]
+    for owner, field, limit in limits:
+        rows = _rows(table, words, state, owner, field)
+        if rows.size and not (rows.min() >= 0 and rows.max() < limit):
+            raise SnapshotError(
+                "this snapshot is not in order: it names particles or bodies that there are not"
+            )
+    bounds: list[tuple[Any, float]] = [
+        (state.particle_position, POSITION_LIMIT),
+        (state.particle_velocity, VELOCITY_LIMIT),
+    ]
+    if state.capacity.contact.soft:
+        bounds += [(state.soft.kept_press, MOST_PRESS), (state.soft.kept_rub, MOST_PRESS)]
+    for field, highest in bounds:
+        values = _rows(table, words, state, PARTICLE, field).view(np.float32)
+        if not np.abs(values).max() <= highest:
+            raise SnapshotError("this snapshot is not in order: particles are out of reach, or not finite")
+    for owner, field in _steering(state):
+        if not np.isfinite(_rows(table, words, state, owner, field).view(np.float32)).all():
+            raise SnapshotError("this snapshot is not in order: what moves its bodies is not finite")
+    if world._built.program.has_contact:
+        _require_joints(state, notes, table, words)
+    lives = _rows(table, words, state, BODY, state.body_status)[:, 0] != ABSENT
+    if lives.tolist() != [body is not None for body in notes.bodies]:
+        raise SnapshotError("this snapshot is not in order: it is not sure who lives")
+
+
+def _steering(state: State) -> list[tuple[int, Any]]:
+    """Fields of real numbers that the next step begins with, beside positions and velocities."""
+    particle = [state.prev_position, state.prev_velocity, state.particle_mass, state.particle_inv_mass]
+    particle += [state.particle_target, state.particle_push]
+    body = [state.body_velocity_lag, state.body_gravity_scale, state.body_damping]
+    held = [state.grab_weights, state.grab_target, state.grab_spring]
+    shape = [state.tet_rest_inverse] if state.capacity.plastic else []
+    owners = (PARTICLE, particle), (BODY, body), (HELD, held), (PATCH, [state.patch_share]), (SHAPE, shape)
+    return [(owner, field) for owner, fields in owners for field in fields] + [(WORLD, state.wind)]
+
+
+def _require_joints(state: State, notes: Notes, table: Words, words: Words) -> None:
+    """Raises: SnapshotError where the words of joints do not say what the notes do."""
+    bodies = _rows(table, words, state, JOINT, state.joints.bodies)
+    rows = _rows(table, words, state, JOINT, state.joints.rows)
+    noted = {number: (a + 1, b + 1, len(particles)) for _, number, a, b, particles in notes.joints}
+    used = np.flatnonzero(bodies[:, 0])
+    told = {int(j): (*bodies[j].tolist(), int(rows[j, 1] - rows[j, 0])) for j in used}
+    weights = _rows(table, words, state, JOINT_END, state.joints.weight).view(np.float32)
+    spans = sorted(rows[used].tolist())
+    ends = [0, *(end for _, end in spans)]
+    if told != noted or [start for start, _ in spans] != ends[:-1] or not (np.abs(weights) < 1e3).all():
+        raise SnapshotError("this snapshot is not in order: its joints are not those that it names")
+
+
+def _rows(table: Words, words: Words, state: State, owner: int, wanted: Any) -> Words:
+    """What a snapshot holds for a field, (rows, width)."""
+    count, width, begin = table[owner].tolist()
+    rows = words[begin : begin + count * width].reshape(count, width)
+    for field, column, size in carried(state, owner):
+        if field is wanted:
+            return np.ascontiguousarray(rows[:, column : column + size])
+    raise KeyError(owner)

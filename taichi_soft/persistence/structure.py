@@ -1,0 +1,81 @@
+"""What a world was built of, as plain data: a snapshot fits worlds of the same structure only."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from hashlib import blake2b
+from importlib.metadata import PackageNotFoundError, version
+from typing import TYPE_CHECKING, Any
+
+from taichi_soft.bodies.fields import ROOMS
+from taichi_soft.core.errors import SnapshotError
+from taichi_soft.core.serialisation import as_plain, digest_of, from_json, to_json
+
+if TYPE_CHECKING:
+    from taichi_soft.bodies.asset import SoftBodyAsset
+    from taichi_soft.world.world import World
+
+
+def structure_of(world: World) -> bytes:
+    """What a snapshot's world must be built of, as JSON."""
+    settings = {name: as_plain(value) for name, value in asdict(world.settings).items()}
+    capacity = asdict(world._built.state.capacity)
+    return to_json(
+        {
+            "package": _package_version(),
+            # The rooms may be another world's, and follow from the bodies.
+            "capacity": {name: value for name, value in capacity.items() if name not in ROOMS},
+            "soft_contact": world._contact.soft,
+            "sleep_speed": world._contact.sleep_speed,
+            **settings,
+            "bodies": [asset_digest(asset) for asset in world._pools.assets],
+        }
+    )
+
+
+def _package_version() -> str:
+    try:
+        return version("taichi-soft")
+    except PackageNotFoundError:
+        return "not installed"
+
+
+def asset_digest(asset: SoftBodyAsset) -> str:
+    """A name of what an asset is made of."""
+    described = asset.description
+    model = described.model
+    parts = [model.law.name, model.strain, model.flips, model.damping_model]
+    touch = asset.contact
+    thickness = None if touch.thickness is None else float(touch.thickness)
+    contact: list[Any] = [float(touch.friction), thickness, touch.itself, touch.group, touch.mask]
+    flow = None if asset.plasticity is None else [float(each) for each in asset.plasticity.row]
+    tear = None if asset.tearing is None else [float(asset.tearing.stress), asset.tearing.most]
+    contact += [flow, asset.spare_vertices, tear]
+    content = [digest_of(described.mesh), digest_of(described.material), described.pinned.tolist()]
+    return blake2b(to_json([as_plain(parts), content, contact]), digest_size=8).hexdigest()
+
+
+def require_structure(theirs: bytes, ours: bytes) -> None:
+    """Raises: SnapshotError with the first thing that differs."""
+    if theirs == ours:
+        return
+    made_of, mine = from_json(theirs), from_json(ours)
+    if not isinstance(made_of, dict):
+        raise SnapshotError("this snapshot does not say what its world was built of")
+    for name, value in mine.items():
+        other = made_of.get(name)
+        if other == value:
+            continue
+        if name == "bodies" and isinstance(other, list) and len(other) == len(value):
+            slot = next(i for i, (a, b) in enumerate(zip(other, value, strict=True)) if a != b)
+            raise SnapshotError(
+                f"this snapshot is of another world: the asset of body {slot} has another mesh, material, "
+                "law or options"
+            )
+        if name == "bodies" and isinstance(other, list):
+            value, other = len(value), len(other)
+        raise SnapshotError(
+            f"this snapshot is of another world: its {name} is {str(other)[:200]}, here it is "
+            f"{str(value)[:200]}"
+        )
+    raise SnapshotError("this snapshot is of another world")

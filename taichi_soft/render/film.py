@@ -1,0 +1,211 @@
+"""Films of a world: steps it as a game loop would, draws every frame, and times the steps."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from contextlib import nullcontext
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from engine_adapter import EngineAdapter, FixedStep
+from taichi_soft.core.checks import LARGEST_COUNT, as_positive
+from taichi_soft.core.errors import OptionError
+from taichi_soft.render import PALETTE, Camera, Renderer, Surface, VideoWriter, draw_labels, draw_text
+from taichi_soft.render.scenery import Prop, Scenery
+from taichi_soft.world.body import Body
+from taichi_soft.world.world import World
+
+Color = tuple[float, float, float]
+Paint = Callable[[Body], NDArray[np.float32]]
+Progress = Callable[[int, int], None]
+
+_COMPILING = 2
+"""Frames at the start that are left out of the times: the first draws, the second makes the first step."""
+
+
+@dataclass
+class Actor:
+    """A body and how it is drawn."""
+
+    body: Body
+    color: Color = PALETTE[0]
+    paint: Paint | None = None  # vertex colours (n, 3) after the last step, instead of `color`
+    label: str = ""  # below the body
+    world: World | None = None  # that it lives in, where that is not the stage's
+    shift: ArrayLike = (0.0, 0.0, 0.0)  # from where it is to where it is drawn, (3,) [m]
+
+
+@dataclass
+class Stage:
+    """A built world, how it is stepped and how it is seen. Its colliders are drawn by themselves."""
+
+    title: str
+    world: World
+    actors: list[Actor]  # `act` may add pieces that fell off
+    camera: Camera
+    step: FixedStep
+    seconds: float  # that a film of it shows
+    act: Callable[[World], object] | None = None  # before every fixed step: moves colliders, grabs, throws
+    props: list[Prop] = field(default_factory=list)
+    caption: Callable[[], str] | None = None  # a further line in the corner, after the last step
+
+
+@dataclass(frozen=True)
+class FilmReport:
+    """What a film took. Drawing and writing are not part of the step times."""
+
+    path: Path | None
+    frames: int
+    fps: float
+    simulated: float  # time that passed in the world [s]
+    step_times: NDArray[np.float64]  # of stepping and reading each frame [s], without those that compile
+    draw_times: NDArray[np.float64]  # of drawing each frame [s], likewise; empty where nothing is drawn
+
+    @property
+    def real_time_factor(self) -> float:
+        """Simulated time over the time it took; 0 if too few frames were made to tell."""
+        if len(self.step_times) == 0:
+            return 0.0
+        return float(len(self.step_times) / self.fps / self.step_times.sum())
+
+
+def film(
+    stage: Stage,
+    path: str | Path | None,
+    *,
+    fps: float = 50.0,
+    size: tuple[int, int] = (1280, 720),
+    seconds: float | None = None,
+    on_frame: Progress | None = None,
+) -> FilmReport:
+    """Run a stage and write what it shows.
+
+    Args:
+        stage: what to film; it goes on from where it stands.
+        path: of the film, see `VideoWriter`; None draws and writes nothing.
+        fps: frames per second.
+        size: width and height [pixels].
+        seconds: length [s]; None takes the stage's own.
+        on_frame: called with (frames made, frames in all) after each.
+    Raises: VideoError or OptionError, before anything moves where the arguments are wrong.
+    """
+    if not isinstance(stage, Stage):
+        raise OptionError(f"stage must be a Stage, got {type(stage).__name__}")
+    if not (on_frame is None or callable(on_frame)):
+        raise OptionError(f"on_frame must be a function (frames made, frames in all), got {on_frame!r}")
+    length = as_positive(stage.seconds if seconds is None else seconds, "seconds", "s")
+    frames = length * as_positive(fps, "fps", "1/s")
+    if frames > LARGEST_COUNT:
+        raise OptionError(f"seconds is {length:g} at {fps:g} per second: at most {LARGEST_COUNT:,} frames")
+    count = max(1, round(frames))
+    if 1.0 / fps > stage.step.dt * stage.step.max_steps:
+        raise OptionError(
+            f"fps is {fps:g}: a frame takes at most {stage.step.max_steps} steps of {stage.step.dt:g} s: use "
+            f"{1.0 / (stage.step.dt * stage.step.max_steps):g} or more"
+        )
+    start = stage.world.time
+    scenery = Scenery(stage.world, stage.props)
+    take = _Take(stage, scenery, fps)
+    with nullcontext() if path is None else VideoWriter(path, fps=fps, size=size) as writer:
+        artist = _Artist(stage, scenery, writer.size, fps) if writer else None
+        for number in range(count):
+            positions = take.play(number)
+            if artist and writer:
+                writer.write(artist.draw(positions, take.adapter, take.times))
+            if on_frame:
+                on_frame(number + 1, count)
+    return FilmReport(
+        None if path is None else Path(path),
+        count,
+        fps,
+        stage.world.time - start,
+        np.array(take.times[_COMPILING:]),
+        np.array(artist.times[_COMPILING:] if artist else []),
+    )
+
+
+class _Take:
+    """Steps a stage frame by frame, as a game loop does, with a clock at its side."""
+
+    def __init__(self, stage: Stage, scenery: Scenery, fps: float) -> None:
+        self.stage, self.scenery = stage, scenery
+        self.adapter = EngineAdapter(stage.world, stage.step, before_step=self._before_step)
+        self.fps = fps
+        self.buffers: list[NDArray[np.float32]] = []
+        self.times: list[float] = []
+
+    def _before_step(self, world: World) -> None:
+        self.scenery.remember()
+        if self.stage.act:
+            self.stage.act(world)
+
+    def play(self, number: int) -> list[NDArray[np.float32]]:
+        """Go on to frame `number`; the first shows the stage as it stands. Returns positions to draw."""
+        start = time.perf_counter()
+        if number > 0:
+            self.adapter.advance(1.0 / self.fps)
+        actors = self.stage.actors
+        if [actor.body.vertex_count for actor in actors] != [len(buffer) for buffer in self.buffers]:
+            self.buffers = [np.empty((actor.body.vertex_count, 3), dtype=np.float32) for actor in actors]
+        for actor, buffer in zip(actors, self.buffers, strict=True):
+            world = actor.world or self.stage.world
+            world.read_positions(actor.body, self.adapter.alpha, buffer)
+            buffer += np.asarray(actor.shift, dtype=np.float32)
+        self.times.append(time.perf_counter() - start)
+        return self.buffers
+
+
+class _Artist:
+    """Draws a stage and writes beside it what the steps cost."""
+
+    def __init__(self, stage: Stage, scenery: Scenery, size: tuple[int, int], fps: float) -> None:
+        self.stage, self.scenery = stage, scenery
+        self.fps = fps
+        self.renderer = Renderer(*size, camera=stage.camera, floor=stage.world.settings.floor)
+        self.times: list[float] = []
+        self.surfaces: dict[tuple[int, int], Surface] = {}  # by actor and version of its topology
+
+    def draw(
+        self, positions: list[NDArray[np.float32]], now: EngineAdapter, step_times: list[float]
+    ) -> NDArray[np.uint8]:
+        """The picture of the bodies at `positions`, where they are `now`."""
+        start = time.perf_counter()
+        surfaces = [self._surface_of(actor) for actor in self.stage.actors]
+        for actor, surface, rows in zip(self.stage.actors, surfaces, positions, strict=True):
+            surface.positions = rows
+            if actor.paint:
+                surface.color = actor.paint(actor.body)
+        picture = self.renderer.render([*self.scenery.at(now.alpha), *surfaces])
+        self._draw_labels(picture, positions)
+        lines = [self.stage.title, f"t = {now.time:.2f} s"]
+        if self.stage.caption:
+            lines.append(self.stage.caption())
+        recent = step_times[_COMPILING:][-25:]
+        if recent:
+            mean = float(np.mean(recent))
+            factor = 1.0 / self.fps / mean
+            lines.append(f"step {mean * 1e3:.2f} ms, {factor:.{0 if factor >= 10 else 1}f} x real time")
+        draw_text(picture, lines)
+        self.times.append(time.perf_counter() - start)
+        return picture
+
+    def _surface_of(self, actor: Actor) -> Surface:
+        """Its surface, made anew where a cut has changed it."""
+        key = id(actor), actor.body.topology_version
+        if key not in self.surfaces:
+            self.surfaces[key] = Surface.of(actor.body.mesh, color=actor.color)
+        return self.surfaces[key]
+
+    def _draw_labels(self, picture: NDArray[np.uint8], positions: list[NDArray[np.float32]]) -> None:
+        """A caption on the floor in front of each body that has one."""
+        named = [(a.label, rows) for a, rows in zip(self.stage.actors, positions, strict=True) if a.label]
+        if not named:
+            return
+        feet = np.array([rows.mean(axis=0) for _, rows in named])
+        feet[:, 2] = [rows[:, 2].min() for _, rows in named]
+        places = self.stage.camera.project(feet, self.renderer.width, self.renderer.height)
+        draw_labels(picture, [label for label, _ in named], places)

@@ -1,0 +1,171 @@
+"""A recording made again: the same world, the same calls, the same bits; and what broke in it."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from taichi_soft.bodies.asset import SoftBodyAsset
+from taichi_soft.bodies.failure import Failure
+from taichi_soft.control.drives import push_bodies
+from taichi_soft.core.checks import as_path
+from taichi_soft.core.errors import FrozenBodyWarning, SnapshotError, TaichiSoftError, VideoError
+from taichi_soft.core.handles import CALLS, Handle
+from taichi_soft.core.serialisation import from_plain
+from taichi_soft.persistence.recorder import read_recording
+from taichi_soft.render import FLIPPED, PALETTE, Camera, Renderer, Surface, draw_text, highlight
+from taichi_soft.render.scenery import Scenery
+from taichi_soft.world.body import Body
+from taichi_soft.world.world import World
+
+
+@dataclass(frozen=True)
+class ReplayReport:
+    """What a recording showed."""
+
+    world: World  # as it is at the end
+    steps: int  # made again
+    first_difference: int | None  # step count of the world after which a state was another; None for none
+    failures: tuple[Failure, ...]  # of the bodies that are frozen at the end
+    picture: Path | None
+
+
+def replay(path: Any, picture: Any = None) -> ReplayReport:
+    """Make a recording again.
+
+    Args:
+        path: of a file that `World.save_recording` or a body that froze has written.
+        picture: of the end, .png; None draws nothing.
+    Raises: SnapshotError for what is damaged, no recording, or from another version of this package;
+        VideoError where the picture cannot be written.
+    """
+    target = None if picture is None else as_path(picture)
+    made_of, snapshot = read_recording(path)
+    try:
+        world, parts = _rebuilt(made_of)
+        entries = made_of["entries"]
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        if isinstance(error, TaichiSoftError):
+            raise
+        raise SnapshotError(f"this recording is not in order: {error!r}") from None
+    world.restore(snapshot)
+    steps, difference = 0, None
+    for entry in entries:
+        try:
+            if entry[0] == "call":
+                _call(world, parts, *entry[1:])
+                continue
+            expected = _step(world, *entry[1:])
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            raise SnapshotError(f"this recording stops after {steps} steps: {error}") from None
+        steps += 1
+        if difference is None and world.state_hash() != expected:
+            difference = world.step_count
+    failures = tuple(body.failure for body in world.bodies if body.failure is not None)
+    if target is not None:
+        _draw(world, failures, target)
+    return ReplayReport(world, steps, difference, failures, target)
+
+
+def _rebuilt(made_of: dict[str, Any]) -> tuple[World, dict[str, Any]]:
+    """A world of the same structure; its assets and shapes by their digests."""
+    shapes: dict[str, Any] = {name: from_plain(data) for name, data in made_of["shapes"].items()}
+    assets = {name: _asset(options) for name, options in made_of["assets"].items()}
+    world = World(**made_of["world"])
+    for name in made_of["slots"]:
+        world.reserve(assets[name], 1)
+    for name in made_of["built_with"]:
+        world.add_collider(shapes[name])
+    world.build()
+    world._colliders.shapes.update(shapes)
+    return world, {**shapes, **assets}
+
+
+def _asset(options: dict[str, Any]) -> SoftBodyAsset:
+    plain = dict(options)
+    mesh, material = from_plain(plain.pop("mesh")), from_plain(plain.pop("material"))
+    for name in ("contact", "plasticity", "tearing"):
+        plain[name] = from_plain(plain[name])
+    return SoftBodyAsset(mesh, material, **plain)
+
+
+def _call(world: World, parts: dict[str, Any], serial: int, name: str, arguments: Any, options: Any) -> None:
+    """One of the calls that a recorder notes, and no other."""
+    handle: Handle | None = world if serial == 0 else world._handles.find(serial, Handle)
+    if handle is None or name not in CALLS.get(type(handle).__name__, ()):
+        raise SnapshotError(f"{name!r} of handle {serial} is no call that is recorded")
+    given = [_value(world, parts, each) for each in arguments]
+    named = {key: _value(world, parts, each) for key, each in options["options"].items()}
+    getattr(handle, name)(*given, **named)
+
+
+def _value(world: World, parts: dict[str, Any], data: Any) -> Any:
+    if isinstance(data, list):
+        return [_value(world, parts, each) for each in data]
+    if isinstance(data, dict) and "handle" in data:
+        return world._handles.find(data["handle"], Handle)
+    if isinstance(data, dict) and "part" in data:
+        return parts[data["part"]]
+    return from_plain(data)
+
+
+def _step(world: World, seconds: float, substeps: int, expected: str, pushes: list[Any]) -> str:
+    """Make a step again. Returns the name that the state had."""
+    rows = []
+    for serial, data in pushes:
+        body = world._handles.find(serial, Body)
+        if body is None:
+            raise SnapshotError(f"there is no body with the number {serial}")
+        rows.append((body, from_plain(data)))
+    push_bodies(rows)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FrozenBodyWarning)  # the report tells
+        world.step(seconds, substeps)
+    return expected
+
+
+def _draw(world: World, failures: tuple[Failure, ...], path: Path) -> None:
+    """A picture of the world, with what broke marked."""
+    broken = {failure.body: failure for failure in failures}
+    surfaces = []
+    for body in world.bodies:
+        if len(body.surface):
+            surface = Surface.of(body.mesh, color=PALETTE[body.index % len(PALETTE)])
+            surface.positions = body.positions()
+            failure = broken.get(body.index)
+            if failure is not None and failure.tetrahedron is not None:
+                marked = np.zeros(body.vertex_count, dtype=np.bool_)
+                marked[body.tets[failure.tetrahedron]] = True
+                surface.color = highlight(marked, PALETTE[body.index % len(PALETTE)], FLIPPED)
+            surfaces.append(surface)
+    wanted = [body for body in world.bodies if body.index in broken] or list(world.bodies)
+    boxes = [body.aabb() for body in wanted]
+    lower = np.min([low for low, _ in boxes], axis=0) if boxes else np.full(3, -1.0)
+    upper = np.max([high for _, high in boxes], axis=0) if boxes else np.ones(3)
+    renderer = Renderer(
+        1280,
+        720,
+        camera=Camera.framing(lower, upper, aspect=1280 / 720, margin=1.5),
+        floor=world.settings.floor,
+    )
+    image = renderer.render([*Scenery(world).at(1.0), *surfaces])
+    draw_text(image, [f"step {world.step_count}, t = {world.time:.3f} s", *map(failure_line, failures)])
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if path.suffix.lower() != ".png" or not cv2.imwrite(str(path), np.ascontiguousarray(image[:, :, ::-1])):
+        raise VideoError(f"cannot write {str(path)!r}: name a .png file in a folder that takes it")
+
+
+def failure_line(failure: Failure) -> str:
+    """What broke, in one line."""
+    part = "no part that can be named"
+    if failure.tetrahedron is not None:
+        part = f"tetrahedron {failure.tetrahedron}"
+    elif failure.edge is not None:
+        part = f"edge {failure.edge[0]}-{failure.edge[1]}"
+    where = "" if failure.substep is None else f", substep {failure.substep}"
+    return f"body {failure.body}: {part} broke first, in step {failure.step}{where}"

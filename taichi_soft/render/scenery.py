@@ -1,0 +1,90 @@
+"""What is drawn beside the bodies: colliders, and what goes with a collider or a frame."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.contact.colliders import Collider
+from taichi_soft.contact.shapes import HeightFieldShape, PlaneShape, Shape
+from taichi_soft.contact.shapes.shape import Triangles
+from taichi_soft.control.frames import Frame
+from taichi_soft.core.math.rotations import matrix_of, quaternion_of, rotation_vector, turned_by
+from taichi_soft.render import Surface
+from taichi_soft.render.colors import Color
+from taichi_soft.world.world import World
+
+STONE: Color = (0.60, 0.62, 0.66)
+"""Colour of colliders, duller than every body, sRGB from 0 to 1."""
+
+
+@dataclass(frozen=True)
+class Prop:
+    """Something solid that is drawn where a collider or a frame is: a hand, a hook.
+
+    Args:
+        surface: what is drawn, in the axes of `place`, as `surface()` of shapes gives it.
+        place: what it goes with.
+        color: sRGB from 0 to 1.
+    """
+
+    surface: Triangles
+    place: Collider | Frame
+    color: Color = STONE
+
+
+class Scenery:
+    """All colliders of a world but its floor, and further props, as surfaces to draw.
+
+    As bodies are, they are drawn between the last two steps: tell it before each step.
+    """
+
+    def __init__(self, world: World, props: Sequence[Prop] = ()) -> None:
+        seen = [Prop(_drawn(c.shape), c) for c in world.colliders if not _is_level(c)]
+        self._props = [*seen, *props]
+        self._surfaces = [Surface(*prop.surface, color=prop.color) for prop in self._props]
+        self._before: list[Any] = []
+        self.remember()
+
+    def remember(self) -> None:
+        """Note where everything is, before a step."""
+        self._before = [_pose(prop) for prop in self._props]
+
+    def at(self, alpha: float) -> list[Surface]:
+        """The surfaces on their way from where they were remembered (0) to where they are (1)."""
+        for prop, surface, (start, turn) in zip(self._props, self._surfaces, self._before, strict=True):
+            end, last_turn = _pose(prop)
+            rotation = matrix_of(turned_by(turn, alpha * rotation_vector(turn, last_turn)))
+            surface.positions = prop.surface[0] @ rotation.T + (1.0 - alpha) * start + alpha * end
+        return self._surfaces
+
+
+def _pose(prop: Prop) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Position and quaternion."""
+    return np.array(prop.place.position, dtype=np.float64), quaternion_of(
+        np.array(prop.place.rotation, dtype=np.float64)
+    )
+
+
+def _is_level(collider: Collider) -> bool:
+    """Whether it is a level plane, as the floor is, which the renderer draws by itself."""
+    return isinstance(collider.shape, PlaneShape) and np.asarray(collider.shape.normal)[2] > 1.0 - 1e-9
+
+
+def _drawn(shape: Shape) -> Triangles:
+    """The surface of a shape; ground gets sides, down to its lowest place."""
+    vertices, triangles = shape.surface()
+    if not isinstance(shape, HeightFieldShape):
+        return vertices, triangles
+    nx, ny, _ = shape.resolution
+    row = np.arange(nx * ny).reshape(nx, ny)
+    rim = np.concatenate([row[:-1, 0], row[-1, :-1], row[:0:-1, -1], row[0, :0:-1]])
+    bottom = vertices[rim] * (1.0, 1.0, 0.0) + (0.0, 0.0, float(vertices[:, 2].min()))
+    low, low_next = len(vertices) + np.arange(len(rim)), len(vertices) + np.roll(np.arange(len(rim)), -1)
+    top, top_next = rim, np.roll(rim, -1)
+    sides = np.concatenate([np.stack([low, low_next, top], 1), np.stack([low_next, top_next, top], 1)])
+    return np.concatenate([vertices, bottom]), np.concatenate([triangles, sides]).astype(np.int32)

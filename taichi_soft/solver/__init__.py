@@ -1,0 +1,1 @@
+"""The step: schedules, the substep, sleep, and what is done where it fails."""

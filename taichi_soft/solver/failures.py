@@ -1,0 +1,27 @@
+"""What made a body go non-finite: found out afterwards, by making its last step again."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from taichi_soft.bodies.failure import FailedStep, Failure
+from taichi_soft.bodies.layout import Scene
+from taichi_soft.core.constants import LANES
+from taichi_soft.solver.kernels.failures import find_broken_element
+from taichi_soft.solver.program import StepProgram
+from taichi_soft.solver.state import State
+
+
+def find_failure(state: State, program: StepProgram, scene: Scene, body: int, failed: FailedStep) -> Failure:
+    """Make the step that froze a body again and see where it breaks; the body stays as it is."""
+    found = np.full(2, -1, dtype=np.int32)
+    find_broken_element(state, program, body, failed.substeps, failed.h, int(failed.is_braked), found)
+    element, substep = found.tolist()
+    if element < 0:
+        return Failure(body, None, failed.step, None, failed.time)
+    place, arrays = scene.ranges[body], scene.bodies[body]
+    if arrays.bonds is not None:
+        p, q = arrays.order[arrays.edge_vertices[element - place.edges[0]]].tolist()
+        return Failure(body, None, failed.step, substep, failed.time, edge=(p, q))
+    row = min(element - place.blocks[0] * LANES, len(arrays.tet_order) - 1)
+    return Failure(body, int(arrays.tet_order[row]), failed.step, substep, failed.time)

@@ -1,0 +1,48 @@
+"""What broke a frozen body: its last step made again, element by element."""
+
+from taichi_soft.bodies.kernels.evaluate import accumulate_forces_one_by_one
+from taichi_soft.bodies.kernels.motion import restore_particle
+from taichi_soft.control.kernels.loads import forget_loads
+from taichi_soft.core.runtime import ti
+from taichi_soft.elements.kernels.internal_forces import clear_forces
+from taichi_soft.solver.kernels.per_body import advance_body
+
+
+@ti.kernel
+def find_broken_element(
+    state: ti.template(),
+    program: ti.template(),
+    body: ti.i32,
+    substeps: ti.i32,
+    h: ti.f32,
+    is_braked: ti.i32,
+    found: ti.types.ndarray(dtype=ti.i32, ndim=1),
+):
+    """Make the last step of a frozen body again, up to the substep in which it breaks, and undo it.
+
+    Args:
+        found: receives the tetrahedron (block times `LANES` plus lane) or edge that broke first and the
+            substep; left alone where nothing breaks.
+    """
+    ti.loop_config(serialize=True)
+    for _ in range(1):
+        kick = 0.5 * (state.body_velocity_lag[body] + h)
+        is_open = 1
+        state.body_is_braked[body] = is_braked
+        for s in range(substeps + 1):
+            if is_open == 1:
+                broken = accumulate_forces_one_by_one(state, program, body)
+                if broken >= 0:
+                    found[0] = broken
+                    found[1] = s
+                    is_open = 0
+                else:
+                    clear_forces(state, body)
+                    advance_body(state, program, body, h, kick, s, substeps)
+                    kick = h
+        state.body_is_braked[body] = 0
+        particles = state.body_particles[body]
+        for p in range(particles[0], particles[1]):
+            restore_particle(state, p)
+        clear_forces(state, body)
+        forget_loads(state, body)

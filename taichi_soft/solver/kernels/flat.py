@@ -1,0 +1,331 @@
+"""Schedule `flat`: all tetrahedra, then all particles, of all bodies in parallel, substep by substep.
+
+For bodies too large for one thread. Forces are stored per corner and per edge, and each particle gathers
+its own in a fixed order, so the result does not depend on the number of threads.
+
+On a CPU the substeps lie inside one kernel call: one task per thread, which meet at a spinning barrier.
+Waking a thread pool costs 5 to 90 us per loop, a barrier well under one. All tasks of a loop run at
+once because Taichi's pool has exactly that many threads. The price: where other programs keep a core busy,
+every barrier may wait for the operating system, which is why only very large bodies use this by themselves.
+A GPU has no such barrier: there each substep is a launch of its own.
+"""
+
+from taichi_soft.bodies.kernels.motion import (
+    gravity_on,
+    particle_is_sound,
+    remember_particle,
+    restore_particle,
+)
+from taichi_soft.bodies.kernels.plasticity import flow_block
+from taichi_soft.bodies.status import ABSENT, ACTIVE, FROZEN
+from taichi_soft.core.constants import LANES
+from taichi_soft.core.math.tensors import widened
+from taichi_soft.core.runtime import ti
+from taichi_soft.elements.kernels.bonds import lane_pressure, store_block_pressures
+from taichi_soft.elements.kernels.edges import edge_force_of
+from taichi_soft.elements.kernels.elastic import store_block_forces, store_lane_forces
+from taichi_soft.elements.kernels.internal_forces import clear_forces
+from taichi_soft.solver.kernels.motion import moved_particle
+from taichi_soft.solver.kernels.per_body import JOLT
+from taichi_soft.solver.kernels.vibration import damp_vibration, kept_vibration
+
+_FAILING, _DONE = 4, 5  # above the status of any body: the step is made again, or need not be
+
+
+@ti.func
+def _status_of(state: ti.template(), p):
+    return state.body_status[state.particle_body[p]]
+
+
+@ti.func
+def _block_is_active(state: ti.template(), block):
+    return _status_of(state, state.tet_vertices[block * 4 * LANES]) == ACTIVE
+
+
+@ti.func
+def _remember_phase(state: ti.template(), p):
+    if _status_of(state, p) != ABSENT:
+        remember_particle(state, p)
+
+
+@ti.func
+def _block_phase(state: ti.template(), program: ti.template(), block):
+    is_active = _block_is_active(state, block)
+    for m, model in ti.static(enumerate(program.models)):
+        if is_active and state.block_model[block] == m:
+            if ti.static(not model.has_bonds):
+                store_block_forces(state, model, block)
+            elif ti.static(model.reads_expansion):
+                store_block_pressures(state, block)
+
+
+@ti.func
+def _edge_phase(state: ti.template(), program: ti.template(), e):
+    body = state.particle_body[state.edge_vertices[e][0]]
+    is_active = state.body_status[body] == ACTIVE
+    for m, model in ti.static(enumerate(program.models)):
+        if is_active and state.body_model[body] == m:
+            state.edge_force[e] = edge_force_of(state, model, e)
+
+
+@ti.func
+def gathered_force(state: ti.template(), p):
+    """Internal force on one particle [N]: its corners' forces, then its edges'."""
+    total = ti.Vector.zero(state.real, 4)
+    corners = state.particle_corners[p]  # none in bodies whose law looks at edges
+    for k in range(corners[0], corners[1]):
+        total += state.corner_force[state.corner_slot[k]]
+    force = total.xyz
+    edges = state.particle_edges[p]
+    for k in range(edges[0], edges[1]):
+        e = state.incident_edge[k]
+        if e >= 0:
+            force += state.edge_force[e]
+        else:
+            force -= state.edge_force[-1 - e]
+    return force
+
+
+@ti.func
+def _kick_of(state: ti.template(), body, h, s):
+    return ti.select(s == 0, 0.5 * (state.body_velocity_lag[body] + h), h)
+
+
+@ti.func
+def _move_phase(state: ti.template(), program: ti.template(), p, h, s):
+    body = state.particle_body[p]
+    if state.body_status[body] == ACTIVE:
+        kick = _kick_of(state, body, h, s)
+        force, gravity = gathered_force(state, p), gravity_on(state, body)
+        x, v, a = moved_particle(state, program, p, force, gravity, h, kick)
+        state.particle_position[p] = x
+        state.particle_velocity[p] = v
+        if not (kick * a.norm() * h <= JOLT * state.body_edge[body]):
+            state.body_jolted[body] = 1
+
+
+@ti.func
+def _is_damped_now(state: ti.template(), body, h, s, substeps):
+    return state.body_status[body] == ACTIVE and kept_vibration(state, body, h, s, substeps) < 1.0
+
+
+@ti.func
+def _gather_phase(state: ti.template(), p, h, s, substeps):
+    """Forces of bodies whose vibrations are damped now, to where damping reads them."""
+    if _is_damped_now(state, state.particle_body[p], h, s, substeps):
+        state.particle_force[p] = widened(gathered_force(state, p))
+
+
+@ti.func
+def _damp_phase(state: ti.template(), program: ti.template(), body, h, s, substeps):
+    if _is_damped_now(state, body, h, s, substeps):
+        damp_vibration(state, program, body, _kick_of(state, body, h, s), h, s, substeps)
+        clear_forces(state, body)
+
+
+@ti.func
+def _begin_phase(state: ti.template(), p, is_again):
+    """Remember a particle; where its body makes the step again, it was put back."""
+    if is_again == 0:
+        _remember_phase(state, p)
+
+
+@ti.func
+def _check_phase(state: ti.template(), p, is_last):
+    body = state.particle_body[p]
+    if state.body_status[body] == ACTIVE:
+        is_jolted = is_last == 0 and state.body_jolted[body] == 1
+        if is_jolted or particle_is_sound(state, p) == 0:
+            ti.atomic_max(state.body_status[body], _FAILING)
+
+
+@ti.func
+def _fall_back_phase(state: ti.template(), p):
+    if _status_of(state, p) == _FAILING:
+        restore_particle(state, p)
+
+
+@ti.func
+def _flow_phase(state: ti.template(), block, dt):
+    body = state.particle_body[state.tet_vertices[block * 4 * LANES]]
+    if state.body_status[body] == ACTIVE:
+        flow_block(state, body, block, dt)
+
+
+@ti.func
+def _settle_body(state: ti.template(), body, h, is_braked, is_last):
+    """Returns 1 for a body that failed: it makes the step again, or is frozen after the last attempt."""
+    failed = 0
+    state.body_jolted[body] = 0
+    if state.body_status[body] == _FAILING:
+        state.body_status[body] = ti.select(is_last == 1, FROZEN, ACTIVE)
+        state.body_is_braked[body] = is_braked
+        failed = 1
+    elif state.body_status[body] == ACTIVE:
+        state.body_velocity_lag[body] = h
+        state.body_status[body] = _DONE
+    return failed
+
+
+@ti.func
+def _end_step(state: ti.template(), body_count):
+    """After the last attempt: bodies for which the step is done can make the next one."""
+    for body in range(body_count):
+        state.body_is_braked[body] = 0
+        if state.body_status[body] == _DONE:
+            state.body_status[body] = ACTIVE
+
+
+@ti.func
+def _meet(state: ti.template(), worker_count: ti.template()):
+    """Wait until all workers have come here as often as this one."""
+    arrived = ti.atomic_add(state.barrier[0], 1) + 1
+    target = (arrived + worker_count - 1) // worker_count * worker_count
+    # A maximum with -1 changes nothing; it is here because it cannot be optimised into a plain load.
+    while ti.atomic_max(state.barrier[0], -1) < target:
+        pass
+
+
+@ti.kernel
+def step_flat_cpu(
+    state: ti.template(),
+    program: ti.template(),
+    body_count: ti.i32,
+    block_count: ti.i32,
+    edge_count: ti.i32,
+    particle_count: ti.i32,
+    substeps: ti.i32,
+    h: ti.f32,
+    first: ti.i32,
+    last: ti.i32,
+    attempt: ti.i32,
+    attempts: ti.i32,
+) -> ti.i32:
+    """Substeps from `first` to before `last`, of so many in one attempt, of `attempts`, at a fixed step.
+
+    Of all bodies that have not made it yet, by `program.worker_count` threads. Returns how many failed.
+    """
+    failed = 0
+    state.barrier[0] = 0
+    ti.loop_config(block_dim=1)
+    for worker in range(program.worker_count):
+        workers = program.worker_count
+        p0, p1 = particle_count * worker // workers, particle_count * (worker + 1) // workers
+        b0, b1 = block_count * worker // workers, block_count * (worker + 1) // workers
+        e0, e1 = edge_count * worker // workers, edge_count * (worker + 1) // workers
+        if first == 0:
+            for p in range(p0, p1):
+                _begin_phase(state, p, attempt)
+        for s in range(first, last):
+            for block in range(b0, b1):
+                _block_phase(state, program, block)
+            if ti.static(program.reads_expansion):
+                _meet(state, workers)
+            for e in range(e0, e1):
+                _edge_phase(state, program, e)
+            _meet(state, workers)
+            is_damped = 0
+            for body in range(body_count):
+                is_damped = is_damped | int(_is_damped_now(state, body, h, s, substeps))
+            if is_damped == 1:
+                for p in range(p0, p1):
+                    _gather_phase(state, p, h, s, substeps)
+                _meet(state, workers)
+                for i in range((body_count - worker + workers - 1) // workers):
+                    _damp_phase(state, program, worker + i * workers, h, s, substeps)
+                _meet(state, workers)
+            for p in range(p0, p1):
+                _move_phase(state, program, p, h, s)
+            _meet(state, workers)
+        if last == substeps:
+            for p in range(p0, p1):
+                _check_phase(state, p, int(attempt == attempts - 1))
+            _meet(state, workers)
+            for p in range(p0, p1):
+                _fall_back_phase(state, p)
+            if ti.static(program.has_plasticity):
+                for block in range(b0, b1):
+                    _flow_phase(state, block, substeps * h)
+    ti.loop_config(serialize=True)
+    for _ in range(1):
+        if last == substeps:
+            for body in range(body_count):
+                is_last = int(attempt == attempts - 1)
+                failed += _settle_body(state, body, h, int(attempt == attempts - 2), is_last)
+            if failed == 0 or attempt == attempts - 1:
+                _end_step(state, body_count)
+    return failed
+
+
+@ti.kernel
+def begin_flat(state: ti.template(), particle_count: ti.i32):
+    """Remember where every particle is."""
+    for p in range(particle_count):
+        _remember_phase(state, p)
+
+
+@ti.kernel
+def substep_flat(
+    state: ti.template(),
+    program: ti.template(),
+    body_count: ti.i32,
+    block_count: ti.i32,
+    edge_count: ti.i32,
+    particle_count: ti.i32,
+    substeps: ti.i32,
+    h: ti.f32,
+    s: ti.i32,
+):
+    """One substep with one tetrahedron, edge or particle per thread."""
+    for t in range(block_count * LANES):
+        block, lane = t // LANES, t % LANES
+        is_active = _block_is_active(state, block)
+        for m, model in ti.static(enumerate(program.models)):
+            if is_active and state.block_model[block] == m:
+                if ti.static(not model.has_bonds):
+                    store_lane_forces(state, model, block, lane)
+                elif ti.static(model.reads_expansion):
+                    state.tet_pressure[t] = lane_pressure(state, block, lane)
+    for e in range(edge_count):
+        _edge_phase(state, program, e)
+    for p in range(particle_count):
+        _gather_phase(state, p, h, s, substeps)
+    for body in range(body_count):
+        _damp_phase(state, program, body, h, s, substeps)
+    for p in range(particle_count):
+        _move_phase(state, program, p, h, s)
+
+
+@ti.kernel
+def end_flat(
+    state: ti.template(),
+    program: ti.template(),
+    body_count: ti.i32,
+    block_count: ti.i32,
+    particle_count: ti.i32,
+    substeps: ti.i32,
+    h: ti.f32,
+    attempt: ti.i32,
+    attempts: ti.i32,
+) -> ti.i32:
+    """After the substeps of an attempt at a step: put back what failed. Returns how many bodies did."""
+    failed = 0
+    for p in range(particle_count):
+        _check_phase(state, p, int(attempt == attempts - 1))
+    for p in range(particle_count):
+        _fall_back_phase(state, p)
+    if ti.static(program.has_plasticity):
+        for block in range(block_count):
+            _flow_phase(state, block, substeps * h)
+    for body in range(body_count):
+        is_last = int(attempt == attempts - 1)
+        failed += _settle_body(state, body, h, int(attempt == attempts - 2), is_last)
+    return failed
+
+
+@ti.kernel
+def finish_flat(state: ti.template(), body_count: ti.i32):
+    """After the last attempt."""
+    ti.loop_config(serialize=True)
+    for _ in range(1):
+        _end_step(state, body_count)

@@ -1,0 +1,134 @@
+"""Implicit Euler among colliders: a solve gives new velocities, and holds what lies on a collider.
+
+Contact after the solve could take from the particles that touch no more than their own momentum, and a body
+would have to sink into itself until its solve threw them down fast enough. So, as on a floor without
+colliders, a particle that a collider stopped has the velocity of its surface along the normal in the solves
+to come, until it would have to be pulled. Friction acts after the solve, and takes no more than the sliding.
+"""
+
+from taichi_soft.bodies.kernels.motion import gravity_on
+from taichi_soft.contact.distances.distance import signed_distance
+from taichi_soft.contact.distances.sweep import TOUCHING
+from taichi_soft.contact.fields import NO_COLLIDER
+from taichi_soft.contact.kernels.rebound import add_press
+from taichi_soft.core.math.quaternion import spun, turned, turned_back
+from taichi_soft.core.runtime import ti
+from taichi_soft.solver.kernels.implicit_euler import add_pin_reactions, keep_residual, solve_body
+
+HARDEST = 1e24
+"""Impulse [N s] from which the solve of a body torn to pieces has overflowed: a collider is told of none."""
+
+
+@ti.func
+def _surface_velocity(contact: ti.template(), c, x, since, h):
+    """Mean velocity in a substep of the point of a collider that is at `x` [m/s].
+
+    Of a turning one that is the chord: along the tangent, what lies on it would spiral outwards.
+
+    Returns: it, and the way from the collider's position to the point [m].
+    """
+    arm = x - contact.collider_position[c] - since * contact.collider_velocity[c]
+    turn = spun(ti.Vector([0.0, 0.0, 0.0, 1.0]), h * contact.collider_spin[c])
+    return contact.collider_velocity[c] + (turned(turn, arm) - arm) / h, arm
+
+
+@ti.func
+def _surface_below(contact: ti.template(), c, x, since):
+    """Distance of a point from a collider's skin `since` [s] after the start of the step; normal there."""
+    rotation = spun(contact.collider_rotation[c], contact.collider_spin[c] * since)
+    place = x - contact.collider_position[c] - since * contact.collider_velocity[c]
+    kind, parameters = contact.collider_kind[c], contact.collider_parameters[c]
+    resolution, offset = contact.collider_resolution[c], contact.collider_offset[c]
+    distance, normal = signed_distance(
+        contact.samples, kind, parameters, resolution, offset, turned_back(rotation, place)
+    )
+    return distance - contact.collider_surface[c].z, turned(rotation, normal)
+
+
+@ti.func
+def _lay_on_colliders(state: ti.template(), body, h, since):
+    """Give particles that lie on colliders the velocity of the surface along its normal; let others go.
+
+    One lies there as long as gravity alone would have it back within the substep.
+    """
+    fall = h * gravity_on(state, body).norm()
+    outer = state.body_outer[body]
+    for k in range(outer[0], outer[1]):
+        p = state.outer_particle[k]
+        c = state.particle_contact[p] - 1
+        state.particle_contact[p] = 0
+        if c >= 0 and state.particle_inv_mass[p] > 0.0:
+            mine, theirs = state.contact.body_filter[body], state.contact.collider_filter[c]
+            x, v = state.particle_position[p], state.particle_velocity[p]
+            distance, n = _surface_below(state.contact, c, x, since)
+            surface_velocity, _ = _surface_velocity(state.contact, c, x, since, h)
+            leaving = n.dot(v - surface_velocity)
+            is_near = distance + h * leaving <= TOUCHING + h * fall
+            if state.contact.collider_kind[c] != NO_COLLIDER and (mine[0] & theirs[1]) != 0 and is_near:
+                if (theirs[0] & mine[1]) != 0:
+                    change = -ti.max(distance - TOUCHING, 0.0) / h - leaving
+                    state.particle_contact[p] = c + 1
+                    state.particle_velocity[p] = v + change * n
+                    state.particle_hold[p] = ti.Vector([n.x, n.y, n.z, state.particle_mass[p] * change])
+
+
+@ti.func
+def _press(state: ti.template(), body, p, h, since, v):
+    """Velocity of a particle on a collider after the solve and friction; the collider feels both."""
+    c, mass, x = state.particle_contact[p] - 1, state.particle_mass[p], state.particle_position[p]
+    hold = state.particle_hold[p]
+    n = hold.xyz
+    press = hold.w + n.dot(state.image[p] - state.particle_force[p].xyz)  # [N s]
+    if not ti.abs(press) < HARDEST:
+        press = 0.0
+    surface_velocity, arm = _surface_velocity(state.contact, c, x, since, h)
+    sliding = v - surface_velocity
+    sliding -= n.dot(sliding) * n
+    surface = state.contact.collider_surface[c]
+    brake = ti.min(surface.x * ti.max(press, 0.0) / mass, sliding.norm())
+    change = -brake / ti.max(sliding.norm(), 1e-30) * sliding
+    impulse = press * n + mass * change
+    row = body * state.contact.capacity.colliders + c
+    state.contact.impulse[row] = state.contact.impulse[row] - impulse
+    state.contact.angular_impulse[row] = state.contact.angular_impulse[row] - arm.cross(impulse)
+    if press < 0.0:
+        state.particle_contact[p] = 0
+    else:
+        state.contact.particle_touches[p] = 1
+        if surface.y >= 0.0:
+            along = n.dot(surface_velocity)
+            add_press(state.contact, row, press, n, along, along)
+    return v + change
+
+
+@ti.func
+def kick_implicitly(state: ti.template(), program: ti.template(), body, h, since, is_first, common):
+    """New velocities of one body from a solve, and in `direction` where its particles are.
+
+    Args:
+        since: time since the start of the step [s].
+        is_first: 1 in the first substep of a step.
+    Returns: the highest speed [m/s], and the highest beside the `common` velocity.
+    """
+    _lay_on_colliders(state, body, h, since)
+    keep_residual(state, body, solve_body(state, program, body, h), is_first)
+    highest, highest_beside = ti.cast(0.0, state.real), ti.cast(0.0, state.real)
+    particles = state.body_particles[body]
+    for p in range(particles[0], particles[1]):
+        v = state.particle_velocity[p]
+        state.contact.particle_touches[p] = 0
+        if state.particle_inv_mass[p] == 0.0:
+            state.solution[p] = state.particle_force[p].xyz - state.image[p]
+        else:
+            v += state.solution[p]
+            if state.particle_contact[p] > 0:
+                v = _press(state, body, p, h, since, v)
+        state.particle_velocity[p] = v
+        state.direction[p] = state.particle_position[p]
+        state.particle_force[p] = ti.Vector.zero(state.real, 4)
+        highest = ti.max(highest, v.dot(v))
+        if ti.static(program.has_soft_contact):
+            state.soft.particle_speed[p] = (v - common).norm()
+            highest_beside = ti.max(highest_beside, (v - common).dot(v - common))
+    add_pin_reactions(state, body, h)
+    return ti.sqrt(highest), ti.sqrt(highest_beside)

@@ -1,0 +1,206 @@
+"""Implicit Euler (thesis section 3.5.3, eq. 3.26) of one body: one linear solve per substep.
+
+(M + h D + h^2 K) dv = h (f + m g - h K v): forces of the old positions, and how they change on the way. Where
+that is too far a way for them to change evenly, the step is made in pieces. Particles that lie on the floor
+are held at its height within the solve, until it would have to pull them down.
+"""
+
+from taichi_soft.bodies.kernels.motion import gravity_on
+from taichi_soft.bodies.status import FEELS_REACTION
+from taichi_soft.contact.distances.floor import resolve_floor
+from taichi_soft.control.kernels.grabs import add_grabs
+from taichi_soft.core.math.tensors import widened
+from taichi_soft.core.runtime import ti
+from taichi_soft.elements.kernels.internal_forces import accumulate_forces
+from taichi_soft.elements.kernels.linear_system import (
+    add_damping,
+    add_masses,
+    add_stiffness,
+    clear_system,
+    multiply_system,
+)
+from taichi_soft.solver.kernels.conjugate_gradient import invert_blocks, solve_system
+
+FARTHEST = 0.5
+"""Change of an edge in one piece of a step, over its length, beyond which the piece is halved."""
+
+LEAST_LENGTH = 0.1
+"""Of the mean length of edges: shorter ones count as that long."""
+
+MOST_PIECES = 32
+"""Of one step, so that it ends."""
+
+
+@ti.func
+def assemble(state: ti.template(), program: ti.template(), body, h):
+    """Fill the blocks, and `residual` with the right-hand side, kept in `particle_force` as well."""
+    particles = state.body_particles[body]
+    clear_system(state, body)
+    add_stiffness(state, program, body, h * h)
+    multiply_system(state, body, state.particle_velocity, state.image)
+    gravity = gravity_on(state, body)
+    for p in range(particles[0], particles[1]):
+        inv_mass = state.particle_inv_mass[p]
+        weight = gravity / ti.max(inv_mass, 1e-30) * ti.select(inv_mass > 0.0, 1.0, 0.0)
+        rhs = h * (state.particle_force[p].xyz + weight) - state.image[p]
+        state.residual[p] = rhs
+        state.particle_force[p] = widened(rhs)
+    add_grabs(state, body, h)
+    add_damping(state, program, body, h)
+    add_masses(state, body)
+    invert_blocks(state, body)
+
+
+@ti.func
+def solve_body(state: ti.template(), program: ti.template(), body, h):
+    """Changes of velocity in `solution`, and in `image` what the system makes of them [N s].
+
+    Returns: the residual left, over the first.
+    """
+    accumulate_forces(state, program, body)
+    assemble(state, program, body, h)
+    residual = solve_system(state, body)
+    multiply_system(state, body, state.solution, state.image)
+    return residual
+
+
+@ti.func
+def _move(state: ti.template(), program: ti.template(), p, h):
+    """Position and velocity of one particle after the solve; what the floor does with it."""
+    if state.particle_inv_mass[p] == 0.0:  # pinned: goes on with the velocity that it was given
+        state.particle_position[p] = state.particle_position[p] + h * state.particle_velocity[p]
+        # The solve leaves this row open: what it lacks, the particle passes on [N s].
+        state.solution[p] = state.particle_force[p].xyz - state.image[p]
+    else:
+        v = state.particle_velocity[p] + state.solution[p]
+        x = state.particle_position[p] + h * v
+        if ti.static(program.has_floor):
+            if state.particle_contact[p] == 1:
+                push = state.image[p] - state.particle_force[p].xyz  # impulse of the floor [N s]
+                slide = ti.sqrt(v.x * v.x + v.y * v.y)
+                brake = state.floor[None].z * ti.max(push.z, 0.0) * state.particle_inv_mass[p]
+                keep = ti.select(slide > brake, 1.0 - brake / ti.max(slide, 1e-30), 0.0)
+                v.x, v.y, v.z = v.x * keep, v.y * keep, 0.0
+                x = state.particle_position[p] + h * v
+                if push.z < 0.0:
+                    state.particle_contact[p] = 0
+            else:
+                falling = x.z < state.floor[None].x
+                x, v = resolve_floor(x, v, h, state.floor[None])
+                if falling and v.z == 0.0:
+                    state.particle_contact[p] = 1
+        state.particle_position[p] = x
+        state.particle_velocity[p] = v
+    state.particle_force[p] = ti.Vector.zero(state.real, 4)
+
+
+@ti.func
+def _remember(state: ti.template(), body):
+    """Keep where the particles are, in fields that the solver has done with."""
+    particles = state.body_particles[body]
+    for p in range(particles[0], particles[1]):
+        state.direction[p] = state.particle_position[p]
+        state.residual[p] = state.particle_velocity[p]
+        state.prev_contact[p] = state.particle_contact[p]
+
+
+@ti.func
+def _take_back(state: ti.template(), body):
+    particles = state.body_particles[body]
+    for p in range(particles[0], particles[1]):
+        state.particle_position[p] = state.direction[p]
+        state.particle_velocity[p] = state.residual[p]
+        state.particle_contact[p] = state.prev_contact[p]
+
+
+@ti.func
+def add_pin_reactions(state: ti.template(), body, h):
+    """Add up what pinned particles took up in a piece of a step [N s]."""
+    if state.body_drives[body] & FEELS_REACTION != 0:
+        gravity = gravity_on(state, body)
+        particles = state.body_particles[body]
+        for p in range(particles[0], particles[1]):
+            if state.particle_inv_mass[p] == 0.0:
+                impulse = state.solution[p] + h * state.particle_mass[p] * gravity
+                state.particle_reaction[p] = state.particle_reaction[p] + impulse
+
+
+@ti.func
+def keep_residual(state: ti.template(), body, residual, is_first):
+    """Note how exact a solve was, with those of the step before it."""
+    so_far = ti.select(is_first == 1, 0.0, state.body_residual[body])
+    state.body_residual[body] = ti.max(so_far, residual)
+
+
+@ti.func
+def _slow_down(state: ti.template(), body, h, share):
+    """Leave a piece of `h` [s] a share of its motion, but all of what the body's particles have in common.
+
+    What even the finest piece cannot follow loses speed: left to itself it would throw the body apart.
+    """
+    momentum, mass = ti.Vector.zero(state.real, 3), ti.cast(1e-30, state.real)
+    particles = state.body_particles[body]
+    for p in range(particles[0], particles[1]):
+        if state.particle_inv_mass[p] > 0.0:
+            momentum += state.particle_mass[p] * state.particle_velocity[p]
+            mass += state.particle_mass[p]
+    for p in range(particles[0], particles[1]):
+        if state.particle_inv_mass[p] > 0.0:
+            common = momentum / mass
+            if state.particle_contact[p] == 1:
+                common.z = 0.0
+            v = common + share * (state.particle_velocity[p] - common)
+            state.particle_position[p] = state.direction[p] + h * v
+            state.particle_velocity[p] = v
+
+
+@ti.func
+def _largest_change(state: ti.template(), body):
+    """Of an edge since particles were where `direction` says, over its length."""
+    edges = state.body_edges[body]
+    mean = ti.cast(0.0, state.real)
+    for e in range(edges[0], edges[1]):
+        r = state.direction[state.edge_vertices[e][1]] - state.direction[state.edge_vertices[e][0]]
+        mean += r.dot(r)
+    least = LEAST_LENGTH * LEAST_LENGTH * mean / (edges[1] - edges[0]) + 1e-30
+    worst = ti.cast(0.0, state.real)
+    for e in range(edges[0], edges[1]):
+        p, q = state.edge_vertices[e][0], state.edge_vertices[e][1]
+        r = state.direction[q] - state.direction[p]
+        change = state.particle_position[q] - state.particle_position[p] - r
+        worst = ti.max(worst, change.dot(change) / ti.max(r.dot(r), least))
+    return ti.sqrt(worst)
+
+
+@ti.func
+def keeps_shape(state: ti.template(), body):
+    """Whether no edge has changed by more than `FARTHEST` since particles were where `direction` says."""
+    return _largest_change(state, body) <= FARTHEST
+
+
+@ti.func
+def implicit_substep(state: ti.template(), program: ti.template(), body, h, is_first):
+    """One substep of one body: in one piece, or in more where its edges would change too much at once.
+
+    The solve takes the forces as linear. What goes far beyond that, such as a fall that ends within the step,
+    would be thrown anywhere.
+    """
+    piece, left = h, 1
+    largest = ti.cast(0.0, state.real)
+    while left > 0:
+        residual = solve_body(state, program, body, piece)
+        _remember(state, body)
+        particles = state.body_particles[body]
+        for p in range(particles[0], particles[1]):
+            _move(state, program, p, piece)
+        change = _largest_change(state, body)
+        if change > FARTHEST and piece > h / MOST_PIECES:
+            _take_back(state, body)
+            piece, left = 0.5 * piece, 2 * left
+        else:
+            if change > FARTHEST:
+                _slow_down(state, body, piece, FARTHEST / change)
+            largest = ti.max(largest, residual)
+            left -= 1
+            add_pin_reactions(state, body, piece)
+    keep_residual(state, body, largest, is_first)

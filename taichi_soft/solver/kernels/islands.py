@@ -1,0 +1,137 @@
+"""Islands: bodies that may touch each other in a step or are joined, directly or through others.
+
+One thread owns an island, so that what passes between its bodies has one order (see `teamwork.py`). A body
+that stays clear of all others is an island of its own.
+"""
+
+from taichi_soft.bodies.kernels.motion import gravity_on
+from taichi_soft.bodies.status import ABSENT, ASLEEP
+from taichi_soft.contact.kernels.filters import may_touch
+from taichi_soft.control.joint_fields import MOST_JOINTS
+from taichi_soft.control.kernels.joints import mark_held
+from taichi_soft.core.runtime import ti
+
+SPARE = 0.25
+"""Mean edges by which bodies may come nearer than their velocities say, and still be in one island."""
+
+
+@ti.func
+def _find_boxes(state: ti.template(), body_count, dt):
+    """Box round each body's surface and its way through a step of `dt` [s]; of absent ones far away."""
+    for body in range(body_count):
+        if state.body_status[body] == ABSENT:
+            state.contact.body_lower[body] = ti.Vector.one(ti.f32, 3) * 1e30
+            continue
+        if state.body_status[body] == ASLEEP:
+            continue  # in the box that it fell asleep in
+        outer = state.body_outer[body]
+        p = state.outer_particle[outer[0]]
+        lower, upper = state.particle_position[p], state.particle_position[p]
+        slow, fast = state.particle_velocity[p], state.particle_velocity[p]
+        for k in range(outer[0], outer[1]):
+            p = state.outer_particle[k]
+            x, v = state.particle_position[p], state.particle_velocity[p]
+            lower, upper = ti.min(lower, x, x + dt * v), ti.max(upper, x, x + dt * v)
+            slow, fast = ti.min(slow, v), ti.max(fast, v)
+        surface = state.soft.body_surface[body]
+        # What its parts do beside each other, they may do otherwise before the step is over.
+        fall = gravity_on(state, body).norm() * dt * dt
+        reach = 0.5 * (fast - slow) * dt + fall + surface.y + SPARE * surface.z
+        state.contact.body_lower[body] = lower - reach
+        state.contact.body_upper[body] = upper + reach
+
+
+@ti.func
+def _sort_by_lower_x(state: ti.template(), body_count):
+    """Insertion sort: bodies keep nearly the order they had a step ago."""
+    for i in range(1, body_count):
+        body = state.soft.sweep_order[i]
+        x = state.contact.body_lower[body].x
+        j = i - 1
+        while j >= 0 and state.contact.body_lower[state.soft.sweep_order[ti.max(j, 0)]].x > x:
+            state.soft.sweep_order[j + 1] = state.soft.sweep_order[j]
+            j -= 1
+        state.soft.sweep_order[j + 1] = body
+
+
+@ti.func
+def _root(contact: ti.template(), body):
+    root = body
+    while contact.parent[root] != root:
+        root = contact.parent[root]
+    return root
+
+
+@ti.func
+def _join(contact: ti.template(), a, b):
+    p, q = _root(contact, a), _root(contact, b)
+    contact.parent[ti.max(p, q)] = ti.min(p, q)
+
+
+@ti.func
+def _join_overlapping(state: ti.template(), body_count):
+    for i in range(body_count):
+        a = state.soft.sweep_order[i]
+        j = i + 1
+        is_open = int(state.body_status[a] != ABSENT)
+        while is_open == 1 and j < body_count:
+            b = state.soft.sweep_order[j]
+            j += 1
+            if state.contact.body_lower[b].x > state.contact.body_upper[a].x:
+                is_open = 0
+            elif state.body_status[b] != ABSENT and may_touch(state, a, b):
+                apart = 0
+                for k in ti.static(range(1, 3)):
+                    apart = apart | int(state.contact.body_lower[a][k] > state.contact.body_upper[b][k])
+                    apart = apart | int(state.contact.body_lower[b][k] > state.contact.body_upper[a][k])
+                if apart == 0:
+                    _join(state.contact, a, b)
+
+
+@ti.func
+def _join_held(state: ti.template()):
+    for j in range(MOST_JOINTS):
+        ends = state.joints.bodies[j]
+        if ends[0] > 0:
+            _join(state.contact, ends[0] - 1, ends[1] - 1)
+
+
+@ti.func
+def _list_islands(state: ti.template(), body_count, end):
+    """Bodies of a status before `end`, island by island, both in ascending order."""
+    islands, rows = 0, 0
+    for first in range(body_count):
+        if state.contact.parent[first] == first and state.body_status[first] < end:
+            state.contact.island_first[islands] = rows
+            for body in range(first, body_count):
+                if state.body_status[body] < end and _root(state.contact, body) == first:
+                    state.contact.island_body[rows] = body
+                    state.contact.body_island[body] = islands
+                    rows += 1
+            islands += 1
+    state.contact.island_first[islands] = rows
+    state.contact.island_count[None] = islands
+
+
+@ti.func
+def find_islands(state: ti.template(), body_count, dt):
+    """Find which bodies may touch within a step of `dt` [s], and list them."""
+    for body in range(body_count):
+        state.contact.parent[body] = body
+    _find_boxes(state, body_count, dt)
+    _sort_by_lower_x(state, body_count)
+    _join_overlapping(state, body_count)
+    _join_held(state)
+    mark_held(state, 1)
+    _list_islands(state, body_count, ABSENT)
+
+
+@ti.kernel
+def list_joined_islands(state: ti.template(), body_count: ti.i32):
+    """The islands where bodies do not touch each other: what joints make of them, until those change."""
+    ti.loop_config(serialize=True)
+    for _ in range(1):
+        for body in range(body_count):
+            state.contact.parent[body] = body
+        _join_held(state)
+        _list_islands(state, body_count, ABSENT + 1)  # with empty slots, where bodies may come any time

@@ -1,0 +1,33 @@
+"""One phase of the substep by itself, many times: for profiles, not for motion."""
+
+from taichi_soft.core.runtime import ti
+from taichi_soft.elements.kernels.edges import accumulate_edge_forces
+from taichi_soft.elements.kernels.elastic import accumulate_elastic_forces
+from taichi_soft.solver.kernels.per_body import move_body
+
+PHASES = ("elastic", "damping", "motion")
+
+
+@ti.kernel
+def repeat_phase(
+    state: ti.template(),
+    program: ti.template(),
+    phase: ti.template(),
+    body_count: ti.i32,
+    repeats: ti.i32,
+    h: ti.f32,
+):
+    """Run one of `PHASES` `repeats` times on every body, one after the other. Forces pile up meanwhile."""
+    ti.loop_config(serialize=True)
+    for body in range(body_count):
+        for _ in range(repeats):
+            if ti.static(phase == "elastic"):
+                for m, model in ti.static(enumerate(program.models)):
+                    if state.body_model[body] == m:
+                        accumulate_elastic_forces(state, model, body)
+            if ti.static(phase == "damping"):
+                for m, model in ti.static(enumerate(program.models)):
+                    if state.body_model[body] == m:
+                        accumulate_edge_forces(state, model, body)
+            if ti.static(phase == "motion"):
+                move_body(state, program, body, h, h)

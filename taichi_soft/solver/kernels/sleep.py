@@ -1,0 +1,118 @@
+"""Sleep: islands in which nothing has moved for a while are left alone until something comes near."""
+
+from taichi_soft.bodies.status import ACTIVE, ASLEEP
+from taichi_soft.contact.fields import NO_COLLIDER
+from taichi_soft.core.runtime import ti
+
+CALM_TIME = 0.5
+"""Time [s] for which all bodies of an island must be slow: longer than the turning point of a throw."""
+
+NEAR = 0.01
+"""Way [m] beside a sleeping body's box within which what happens wakes it."""
+
+
+@ti.func
+def _wake_in_box(state: ti.template(), body_count, lower, upper):
+    """Wake sleeping bodies whose box is near another. Returns how many."""
+    woken = 0
+    for body in range(body_count):
+        if state.body_status[body] == ASLEEP:
+            above = (lower - state.contact.body_upper[body]).max()
+            if ti.max(above, (state.contact.body_lower[body] - upper).max()) <= NEAR:
+                state.body_status[body] = ACTIVE
+                woken += 1
+    return woken
+
+
+@ti.func
+def wake_by_colliders(state: ti.template(), body_count):
+    """Wake sleeping bodies that a moving collider comes near in this step."""
+    for c in range(state.contact.collider_count[None]):
+        if state.contact.collider_kind[c] != NO_COLLIDER and state.contact.collider_speed[c] > 0.0:
+            _wake_in_box(state, body_count, state.contact.collider_lower[c], state.contact.collider_upper[c])
+
+
+@ti.func
+def wake_island(state: ti.template(), island):
+    """Wake all bodies of an island of which one is awake. Returns whether any is."""
+    first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
+    is_awake = 0
+    for i in range(first, last):
+        is_awake = is_awake | int(state.body_status[state.contact.island_body[i]] == ACTIVE)
+    if is_awake == 1:
+        for i in range(first, last):
+            body = state.contact.island_body[i]
+            if state.body_status[body] == ASLEEP:
+                state.body_status[body] = ACTIVE
+    return is_awake
+
+
+@ti.func
+def note_motion(state: ti.template(), body, speed):
+    """Start to count anew where a body is fast."""
+    if not (speed <= state.contact.sleep_speed[None]) and state.contact.calm[body] != 0.0:
+        state.contact.calm[body] = 0.0
+
+
+@ti.func
+def _put_to_sleep(state: ti.template(), body):
+    """Stop a body where it is, and remember the box round it; when it wakes it counts anew."""
+    particles = state.body_particles[body]
+    lower = state.particle_position[particles[0]]
+    upper = lower
+    for p in range(particles[0], particles[1]):
+        x = state.particle_position[p]
+        lower, upper = ti.min(lower, x), ti.max(upper, x)
+        state.prev_position[p] = x
+        state.particle_velocity[p] = ti.Vector.zero(state.real, 3)
+        state.prev_velocity[p] = ti.Vector.zero(state.real, 3)
+    state.contact.body_lower[body], state.contact.body_upper[body] = lower, upper
+    state.body_velocity_lag[body] = 0.0
+    state.contact.calm[body] = 0.0
+    state.body_status[body] = ASLEEP
+
+
+@ti.func
+def settle_island(state: ti.template(), island, dt):
+    """Count the calm of an island after a step of `dt` [s], and let it fall asleep together.
+
+    Returns: whether it is still awake (1).
+    """
+    first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
+    calm = ti.cast(1e30, ti.f32)
+    for i in range(first, last):
+        body = state.contact.island_body[i]
+        if state.body_status[body] == ACTIVE:
+            state.contact.calm[body] = state.contact.calm[body] + dt
+            calm = ti.min(calm, state.contact.calm[body])
+    is_awake = int(not (calm > CALM_TIME and state.contact.sleep_speed[None] > 0.0))
+    if is_awake == 0:
+        for i in range(first, last):
+            body = state.contact.island_body[i]
+            if state.body_status[body] == ACTIVE:
+                _put_to_sleep(state, body)
+    return is_awake
+
+
+@ti.kernel
+def wake_body(state: ti.template(), body: ti.i32):
+    """Wake one body, or all where `body` is -1; who is awake stays so for a while."""
+    ti.loop_config(serialize=True)
+    for b in range(state.capacity.bodies):
+        if body == b or body == -1:
+            state.contact.calm[b] = 0.0
+            if state.body_status[b] == ASLEEP:
+                state.body_status[b] = ACTIVE
+
+
+@ti.kernel
+def wake_near(
+    state: ti.template(), body_count: ti.i32, box: ti.types.ndarray(dtype=ti.f32, ndim=1)
+) -> ti.i32:
+    """Wake who sleeps near a box, lower and upper corner [m], (6,). Returns how many."""
+    woken = 0
+    ti.loop_config(serialize=True)
+    for _ in range(1):
+        lower, upper = ti.Vector([box[0], box[1], box[2]]), ti.Vector([box[3], box[4], box[5]])
+        woken = _wake_in_box(state, body_count, lower, upper)
+    return woken

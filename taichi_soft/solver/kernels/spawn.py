@@ -1,0 +1,58 @@
+"""Bodies come and go: one slot is written, the rest of the world is left alone."""
+
+from taichi_soft.bodies.kernels.plasticity import restore_shape
+from taichi_soft.bodies.status import ABSENT, ACTIVE
+from taichi_soft.contact.kernels.collide import forget_contacts
+from taichi_soft.core.runtime import ti
+
+
+@ti.kernel
+def spawn_body(state: ti.template(), body: ti.i32, rows: ti.types.ndarray(dtype=ti.f32, ndim=2)):
+    """Put a body into its slot as if the world began with it.
+
+    Args:
+        rows: (n, 8): position [m], velocity [m/s], inverse mass [1/kg] and mass [kg] of each vertex in the
+            caller's order.
+    """
+    ti.loop_config(serialize=True)
+    for _ in range(1):
+        begin = state.body_particles[body][0]
+        for i in range(rows.shape[0]):
+            p = state.particle_of_vertex[begin + i]
+            x = ti.Vector([rows[i, 0], rows[i, 1], rows[i, 2]])
+            v = ti.Vector([rows[i, 3], rows[i, 4], rows[i, 5]])
+            state.particle_position[p] = x
+            state.prev_position[p] = x
+            state.particle_velocity[p] = v
+            state.prev_velocity[p] = v
+            state.particle_force[p] = ti.Vector.zero(state.real, 4)
+            state.particle_inv_mass[p] = rows[i, 6]
+            state.particle_mass[p] = rows[i, 7]
+            state.particle_aim[p] = 0
+            if ti.static(state.capacity.implicit):
+                state.particle_contact[p] = 0
+            if ti.static(state.capacity.contact.soft):
+                state.soft.kept_press[p] = 0.0
+        state.body_velocity_lag[body] = 0.0
+        state.body_drives[body] = 0
+        state.body_gravity_scale[body] = 1.0
+        state.body_damping[body] = 0.0
+        state.body_patience[body] = 0
+        if ti.static(state.capacity.implicit):
+            state.body_residual[body] = 0.0
+        if ti.static(state.capacity.plastic):
+            restore_shape(state, body)
+        if ti.static(state.capacity.contact.colliders > 0):
+            state.contact.calm[body] = 0.0
+            particles = state.body_particles[body]
+            for p in range(particles[0], particles[1]):
+                state.contact.particle_touches[p] = 0
+        state.body_status[body] = ACTIVE
+
+
+@ti.kernel
+def despawn_body(state: ti.template(), body: ti.i32):
+    """Empty a slot. Its particles stay where they are, finite, and nobody moves or reads them."""
+    if ti.static(state.capacity.contact.colliders > 0):
+        forget_contacts(state, body)  # or colliders would be told of its last impulse in every step
+    state.body_status[body] = ABSENT

@@ -1,0 +1,163 @@
+"""What brings back a body that is caught inside out.
+
+Forces drive nearly all tetrahedra that are turned inside out back by themselves. A few may hold each other:
+in a coarse mesh they find a balance that is not the rest shape; and what has shrunk to a point has no
+direction in which to open. So every `PATIENCE` steps it is looked whether any is flat or inside out. Where
+that was so the time before, too, its corners go half of the way to where they lie in the rest shape, as that
+fits best to all of the body now. Until a look finds none, vibrations fade. Of a body that is wrecked
+altogether all of it goes there, within a second.
+"""
+
+from taichi_soft.bodies.status import PLACED
+from taichi_soft.core.constants import LANES
+from taichi_soft.core.math.svd import signed_svd
+from taichi_soft.core.math.tensors import determinant
+from taichi_soft.core.math.tetrahedron import shape
+from taichi_soft.core.runtime import ti
+from taichi_soft.core.types import Flips
+from taichi_soft.elements.kernels.elastic import particles_of, rest_inverse_of
+from taichi_soft.solver.kernels.vibration import fade_vibration
+
+PATIENCE = 15
+"""Fixed steps between two looks: a quarter of a second."""
+
+WRECKED = 0.1
+"""Part of a body's tetrahedra from which on, caught before a step that was made again, it is a wreck."""
+
+RAISING_STEPS, CALMING = 20, 0.8
+"""Steps in which all of a wreck goes there, and part of its vibration that is left each time. What is wound
+about itself twice without being inside out anywhere would stay so otherwise."""
+
+FADING = 20.0
+"""At what rate the vibration of a body fades of which some is caught [1/s]. Slivers that a blow turned inside
+out would keep each other trembling otherwise, light ones for seconds."""
+
+FLAT = 1e-5
+"""Volume over that at rest, from which down a tetrahedron counts as caught."""
+
+
+@ti.func
+def _is_caught(state: ti.template(), positions: ti.template(), t):
+    """Whether tetrahedron `t`, a block times `LANES` plus a lane, is flat or inside out."""
+    block, lane = t // LANES, t % LANES
+    p0, p1, p2, p3 = particles_of(state, block, lane)
+    B = shape(positions[p0], positions[p1], positions[p2], positions[p3])
+    inverse = determinant(rest_inverse_of(state, block, lane))  # 0 in the lanes that pad a last block
+    return inverse != 0.0 and determinant(B) * inverse < FLAT
+
+
+@ti.func
+def _caught_count(state: ti.template(), positions: ti.template(), body):
+    count, blocks = 0, state.body_blocks[body]
+    for t in range(blocks[0] * LANES, blocks[1] * LANES):
+        count += int(_is_caught(state, positions, t))
+    return count
+
+
+@ti.func
+def _is_wrecked(state: ti.template(), body):
+    """Whether much was caught before a step that had to be made again, or to which somebody put the body."""
+    is_wrecked = False
+    if state.body_jolted[body] == 1 or state.body_patience[body] == PLACED:
+        blocks = state.body_blocks[body]
+        caught = _caught_count(state, state.prev_position, body)
+        is_wrecked = caught >= WRECKED * LANES * (blocks[1] - blocks[0])
+    return is_wrecked
+
+
+@ti.func
+def _best_fit(state: ti.template(), body):
+    """How the rest shape fits best to where a body is.
+
+    Returns: its centre at rest and now [m], and the rotation, as rows.
+    """
+    particles = state.body_particles[body]
+    x0, r0 = state.particle_position[particles[0]], state.rest_position[particles[0]]
+    total, now, rest = x0.x * 0.0, x0 * 0.0, x0 * 0.0
+    for p in range(particles[0], particles[1]):
+        mass = state.particle_mass[p]
+        total += mass
+        now += mass * (state.particle_position[p] - x0)
+        rest += mass * (state.rest_position[p] - r0)
+    now, rest = x0 + now / total, r0 + rest / total
+    a, b, c, size = x0 * 0.0, x0 * 0.0, x0 * 0.0, 1e-30
+    for p in range(particles[0], particles[1]):
+        share = state.particle_mass[p] / total
+        x, r = state.particle_position[p] - now, state.rest_position[p] - rest
+        a, b, c = a + share * r.x * x, b + share * r.y * x, c + share * r.z * x
+        size += share * r.dot(r)
+    U, _, V = signed_svd((a / size, b / size, c / size))
+    rows = (
+        U[0].x * V[0] + U[1].x * V[1] + U[2].x * V[2],
+        U[0].y * V[0] + U[1].y * V[1] + U[2].y * V[2],
+        U[0].z * V[0] + U[1].z * V[1] + U[2].z * V[2],
+    )
+    return rest, now, rows
+
+
+@ti.func
+def _pull(state: ti.template(), program: ti.template(), p, fit: ti.template(), share, seconds):
+    """Move a particle a share of the way to where it fits best; a pinned one stays.
+
+    Among colliders, which may be in the way, it is thrown there in the coming step, of so many seconds.
+    """
+    rest, now, rows = fit
+    if state.particle_inv_mass[p] > 0.0:
+        r = state.rest_position[p] - rest
+        goal = now + ti.Vector([rows[0].dot(r), rows[1].dot(r), rows[2].dot(r)])
+        way = share * (goal - state.particle_position[p])
+        if ti.static(program.has_contact):
+            state.particle_velocity[p] = state.particle_velocity[p] + way / seconds
+        else:
+            state.particle_position[p] = state.particle_position[p] + way
+
+
+@ti.func
+def _free(state: ti.template(), program: ti.template(), body):
+    """Move the corners of what is caught half of the way."""
+    fit = _best_fit(state, body)
+    blocks = state.body_blocks[body]
+    for t in range(blocks[0] * LANES, blocks[1] * LANES):
+        if _is_caught(state, state.particle_position, t):
+            for corner in ti.static(range(4)):
+                _pull(state, program, particles_of(state, t // LANES, t % LANES)[corner], fit, 0.5, 1.0)
+
+
+@ti.func
+def _raise(state: ti.template(), program: ti.template(), body, steps_left, seconds):
+    """Move all of a wreck a part of the way, in the last step all of it."""
+    fit = _best_fit(state, body)
+    particles = state.body_particles[body]
+    for p in range(particles[0], particles[1]):
+        _pull(state, program, p, fit, 1.0 / steps_left, seconds)
+
+
+@ti.func
+def untangle_body(state: ti.template(), program: ti.template(), body, seconds):
+    """At the end of a step, of so many seconds: look after what is caught, where the law brings it back."""
+    for m, model in ti.static(enumerate(program.models)):
+        if ti.static(model.flips == Flips.RECOVER):
+            if state.body_model[body] == m:
+                age = ti.max(state.body_patience[body], -RAISING_STEPS - 1) + 1
+                if _is_wrecked(state, body):
+                    age = -RAISING_STEPS
+                elif state.body_patience[body] == PLACED:
+                    age = 0
+                is_look = age >= 0 and age % PATIENCE == 0
+                if is_look:
+                    if _caught_count(state, state.particle_position, body) == 0:
+                        age = 0
+                keep = 1.0
+                if age < 0:
+                    keep = CALMING
+                elif age >= PATIENCE:
+                    keep = ti.exp(-FADING * seconds)
+                if keep < 1.0:
+                    fade_vibration(state, program, body, 0.0, 0.0, keep)
+                if age < 0:
+                    _raise(state, program, body, -age, seconds)
+                elif is_look and age >= 2 * PATIENCE:
+                    if ti.static(not program.has_contact):
+                        _free(state, program, body)
+                state.body_patience[body] = age
+                state.body_jolted[body] = 0

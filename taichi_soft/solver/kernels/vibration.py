@@ -1,0 +1,220 @@
+"""Damping of vibrations: of all motion of a body beside its rigid one.
+
+Velocities v become P v + k (v - P v): P v is the rigid motion with the momentum and angular momentum of v,
+and k = exp(-2 zeta w seconds), w being the angular frequency of the body's first mode and zeta its damping
+ratio. The factor is a contraction that is symmetric in the mass: where it acts on the velocities after a kick
+and before they move anything, leapfrog stays stable for each step for which it is without. With D the factor,
+
+    D^-1 (x_(n+1) - x_n) = x_n - x_(n-1) - h^2 K x_n,
+
+which is leapfrog with the mass D^-1 >= 1 but for a damper that only takes energy.
+"""
+
+from taichi_soft.bodies.kernels.motion import gravity_on
+from taichi_soft.bodies.status import FEELS_REACTION
+from taichi_soft.contact.distances.floor import resolve_floor
+from taichi_soft.core.constants import LANES, ROW_BITS
+from taichi_soft.core.runtime import ti
+
+MOST_FADING = 0.43
+"""What damping takes from a vibration in one substep, at most: exp(-0.43) = 0.65 is left, d below. The kick
+of what is pressed is no part of that vibration, so there a mode of stiffness k and mass 1 becomes d v + h a.
+That is stable for h^2 k < 2 (1 + d), here up to 0.9 of leapfrog's own longest step."""
+
+SHARP_BRAKE = 0.5
+"""Of the vibration that a substep leaves where a step that failed is made for the last time."""
+
+FARTHEST = 0.1
+"""Way of a particle in a substep of such a step, beside the rigid motion, over the surface's mean edge."""
+
+THIN_BODY = 1e-6
+"""Product of the principal moments over the cube of their sum, below which a body is taken for a straight
+line: it does not feel a turn about that."""
+
+
+@ti.func
+def _solved(rows: ti.template(), b):
+    """x of rows x = b for a symmetric matrix given by its rows, scaled so that their trace is 1."""
+    a0, a1, a2 = rows
+    c0, c1, c2 = a1.cross(a2), a2.cross(a0), a0.cross(a1)
+    det = a0.dot(c0)
+    if det < THIN_BODY:
+        more = 1e-3
+        a0, a1, a2 = a0 + ti.Vector([more, 0, 0]), a1 + ti.Vector([0, more, 0]), a2 + ti.Vector([0, 0, more])
+        c0, c1, c2 = a1.cross(a2), a2.cross(a0), a0.cross(a1)
+        det = a0.dot(c0)
+    return ti.Vector([c0.dot(b), c1.dot(b), c2.dot(b)]) / det
+
+
+@ti.func
+def _kicked_velocity(state: ti.template(), p, gravity, kick):
+    """What a kick of the forces [s] will make of a particle's velocity [m/s]; a pinned one keeps its own."""
+    inv_mass = state.particle_inv_mass[p]
+    change = kick * (state.particle_force[p].xyz * inv_mass + gravity)
+    return state.particle_velocity[p] + ti.select(inv_mass > 0.0, 1.0, 0.0) * change
+
+
+@ti.func
+def _felt_velocity(state: ti.template(), program: ti.template(), p, gravity, kick, h, is_held):
+    """The same with what will hold the particle in a substep of `h` [s], where that counts (`is_held` 1).
+
+    What is pressed against something gains speed only to lose it. If that counted as vibration, what lies
+    still would be pushed. What the floor takes is known before; what something else held in the last substep
+    it will hold again.
+    """
+    velocity = _kicked_velocity(state, p, gravity, kick)
+    if is_held == 1:
+        if ti.static(program.has_contact):
+            if state.contact.particle_touches[p] == 1:
+                velocity = state.particle_velocity[p]
+        if ti.static(program.has_floor):
+            if state.particle_inv_mass[p] > 0.0:
+                place = state.particle_position[p] + h * velocity
+                _, velocity = resolve_floor(place, velocity, h, state.floor[None])
+    return velocity
+
+
+@ti.func
+def _column_sums(rows: ti.template()):
+    total = ti.Vector([rows[0, i] * 0.0 for i in ti.static(range(3))])
+    for lane in ti.static(range(LANES)):
+        for i in ti.static(range(3)):
+            total[i] += rows[lane, i]
+    return total
+
+
+@ti.func
+def _rigid_motion(state: ti.template(), program: ti.template(), body, kick, h, is_held, x0, v0):
+    """Of a body after a kick of its forces [s], with what will hold it; `h` and `is_held` as `_felt_velocity`
+    takes them.
+
+    Returns: its centre beside x0 [m], velocity beside v0 [m/s] and angular velocity [rad/s].
+    """
+    particles, gravity = state.body_particles[body], gravity_on(state, body)
+    masses = ti.Vector.zero(state.real, LANES)
+    arms, momenta = ti.Matrix.zero(state.real, LANES, 3), ti.Matrix.zero(state.real, LANES, 3)
+    turns = ti.Matrix.zero(state.real, LANES, 3)
+    squares, products = ti.Matrix.zero(state.real, LANES, 3), ti.Matrix.zero(state.real, LANES, 3)
+    count = particles[1] - particles[0]
+    for block in range((count + LANES - 1) // LANES):
+        first = (particles[0] + block * LANES) & ROW_BITS
+        for lane in range(LANES):
+            p = first + lane
+            # What lies behind belongs to another body, which may be on its way to infinity: times 0 that is
+            # no number.
+            is_own = block * LANES + lane < count
+            mass = ti.select(is_own, state.particle_mass[p], 0.0)
+            x = ti.select(is_own, state.particle_position[p], x0) - x0
+            felt = _felt_velocity(state, program, p, gravity, kick, h, is_held)
+            v = ti.select(is_own, felt, v0) - v0
+            arm, momentum = mass * x, mass * v
+            turn = x.cross(momentum)
+            masses[lane] += mass
+            for i in ti.static(range(3)):
+                arms[lane, i] += arm[i]
+                momenta[lane, i] += momentum[i]
+                turns[lane, i] += turn[i]
+                squares[lane, i] += arm[i] * x[i]
+                products[lane, i] += arm[i] * x[(i + 1) % 3]
+    share = 1.0 / masses.sum()
+    center, velocity = share * _column_sums(arms), share * _column_sums(momenta)
+    spin = share * _column_sums(turns) - center.cross(velocity)
+    s = share * _column_sums(squares) - center * center  # xx, yy, zz
+    d = share * _column_sums(products) - center * ti.Vector([center.y, center.z, center.x])  # xy, yz, zx
+    trace = 2.0 * s.sum()
+    angular_velocity = ti.Vector.zero(state.real, 3)
+    if trace > 0.0:
+        rows = (
+            ti.Vector([s.y + s.z, -d.x, -d.z]) / trace,
+            ti.Vector([-d.x, s.z + s.x, -d.y]) / trace,
+            ti.Vector([-d.z, -d.y, s.x + s.y]) / trace,
+        )
+        angular_velocity = _solved(rows, spin / trace)
+    return center, velocity, angular_velocity
+
+
+@ti.func
+def fade_vibration(state: ti.template(), program: ti.template(), body, kick, h, keep):
+    """Leave a body the share `keep` of the vibration that it has after a kick of its forces [s], in a substep
+    of `h` [s]."""
+    particles, gravity = state.body_particles[body], gravity_on(state, body)
+    x0, v0 = state.particle_position[particles[0]], state.particle_velocity[particles[0]]
+    center, velocity, angular_velocity = _rigid_motion(state, program, body, kick, h, 1, x0, v0)
+    count = particles[1] - particles[0]
+    for block in range((count + LANES - 1) // LANES):
+        first = (particles[0] + block * LANES) & ROW_BITS
+        changes = ti.Matrix.zero(state.real, LANES, 3)
+        for lane in range(LANES):
+            p = first + lane
+            x = state.particle_position[p] - x0
+            rigid = velocity + angular_velocity.cross(x - center)
+            change = (1.0 - keep) * (rigid + v0 - _felt_velocity(state, program, p, gravity, kick, h, 1))
+            for i in ti.static(range(3)):
+                changes[lane, i] = change[i]
+        for lane in range(ti.min(LANES, count - block * LANES)):
+            p = first + lane
+            change = ti.Vector([changes[lane, i] for i in ti.static(range(3))])
+            if state.particle_inv_mass[p] > 0.0:
+                state.particle_velocity[p] = state.particle_velocity[p] + change
+            elif state.body_drives[body] & FEELS_REACTION != 0:
+                impulse = state.particle_mass[p] * change  # which what holds it takes up
+                state.particle_reaction[p] = state.particle_reaction[p] + impulse
+
+
+@ti.func
+def _limit_vibration(state: ti.template(), program: ti.template(), body, kick, farthest):
+    """Let no particle be faster beside the rigid motion than `farthest` [m/s] after a kick.
+
+    Momentum and angular momentum stay.
+    """
+    particles, gravity = state.body_particles[body], gravity_on(state, body)
+    x0, v0 = state.particle_position[particles[0]], state.particle_velocity[particles[0]]
+    center, velocity, spin = _rigid_motion(state, program, body, kick, 0.0, 0, x0, v0)
+    for p in range(particles[0], particles[1]):
+        if state.particle_inv_mass[p] > 0.0:
+            kicked = _kicked_velocity(state, p, gravity, kick)
+            rigid = v0 + velocity + spin.cross(state.particle_position[p] - x0 - center)
+            beside = kicked - rigid
+            speed = beside.norm()
+            slower = ti.select(speed < farthest, beside, beside * (farthest / ti.max(speed, 1e-30)))
+            if not speed < 1e18:  # whose square overflows: its direction is not known
+                slower = beside * 0.0
+            state.particle_velocity[p] = state.particle_velocity[p] + (rigid + slower - kicked)
+    _, velocity_now, spin_now = _rigid_motion(state, program, body, kick, 0.0, 0, x0, v0)
+    for p in range(particles[0], particles[1]):
+        if state.particle_inv_mass[p] > 0.0:
+            arm = state.particle_position[p] - x0 - center
+            back = velocity - velocity_now + (spin - spin_now).cross(arm)
+            state.particle_velocity[p] = state.particle_velocity[p] + back
+
+
+@ti.func
+def kept_vibration(state: ti.template(), body, h, s, substeps):
+    """The share of its vibration that a body keeps in substep `s` of `substeps` of `h` [s] each.
+
+    Below 1 every few substeps only, but many times in a period of the first mode.
+    """
+    keep, rate, interval = 1.0, state.body_fading[body], state.body_fading_interval[body]
+    if state.body_is_braked[body] == 1:
+        keep = SHARP_BRAKE
+    elif rate > 0.0:
+        whole = substeps * h
+        wanted = ti.ceil(whole * ti.max(1.0 / interval, rate / MOST_FADING))
+        times = ti.min(substeps, ti.cast(ti.min(wanted, 1e6), ti.i32))
+        if (s + 1) * times // substeps > s * times // substeps:
+            keep = ti.exp(-ti.min(rate * whole / times, MOST_FADING))
+    return keep
+
+
+@ti.func
+def damp_vibration(state: ti.template(), program: ti.template(), body, kick, h, s, substeps):
+    """What damping takes from a body in substep `s` of `substeps` of `h` [s] each.
+
+    It comes before the kick of `kick` [s] by the forces that the body feels, and takes its share of what that
+    will make of the velocities.
+    """
+    keep = kept_vibration(state, body, h, s, substeps)
+    if keep < 1.0:
+        fade_vibration(state, program, body, kick, h, keep)
+    if state.body_is_braked[body] == 1:
+        _limit_vibration(state, program, body, kick, FARTHEST * state.body_edge[body] / h)

@@ -1,0 +1,100 @@
+"""What is read from the fields of a built world, in the caller's order."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.bodies.kernels.evaluate import compute_body_forces
+from taichi_soft.bodies.kernels.plasticity import read_rest_inverses
+from taichi_soft.bodies.kernels.readout import read_positions, read_velocities
+from taichi_soft.bodies.layout import Scene
+from taichi_soft.control.kernels.joints import add_joint_forces
+from taichi_soft.core.errors import OptionError
+from taichi_soft.core.settings import Settings
+from taichi_soft.core.types import Integrator
+from taichi_soft.solver.program import StepProgram
+from taichi_soft.solver.state import State
+
+if TYPE_CHECKING:
+    from taichi_soft.world.body import Body
+
+Floats = NDArray[np.float64]
+Floats32 = NDArray[np.float32]
+
+
+class Readout:
+    """Positions, velocities and rest shapes of one world's bodies."""
+
+    def __init__(self, settings: Settings, state: State, program: StepProgram, scene: Scene) -> None:
+        self._settings, self._state, self._program, self._scene = settings, state, program, scene
+        self._rows: Floats32 = np.empty((scene.particle_count, 3), dtype=np.float32)  # positions of all
+        self._alpha: float | None = None  # of what `_rows` holds; None once the world has moved on
+
+    def has_moved(self) -> None:
+        """Take note that particles are elsewhere."""
+        self._alpha = None
+
+    def positions(self, body: Body, alpha: float, out: Floats32 | None) -> Floats32:
+        """As `World.read_positions`. Raises: OptionError for an `out` that does not fit."""
+        rows = _as_buffer(out, body.vertex_count)
+        if self._alpha != alpha:
+            read_positions(self._state, alpha, self._rows)
+            self._alpha = alpha
+        begin = self._scene.ranges[body.index].particles[0]
+        rows[:] = self._rows[begin : begin + body.vertex_count]
+        return rows
+
+    def velocities(self, body: Body) -> Floats32:
+        """Velocities at the time of the positions, (n, 3) [m/s]."""
+        state, settings = self._state, self._settings
+        rows = np.empty((body.vertex_count, 3), dtype=np.float32)
+        read_velocities(state, self._scene.ranges[body.index].particles[0], body.vertex_count, rows)
+        lag = float(state.body_velocity_lag[body.index])
+        if settings.integrator is Integrator.LEAPFROG and lag > 0.0 and not body.is_frozen:
+            forces = np.empty_like(rows)
+            compute_body_forces(state, self._program, body.index, forces)
+            if body._joints:
+                add_joint_forces(state, body.index, lag, forces)
+            by_vertex = forces[self._scene.bodies[body.index].rank]
+            acceleration = by_vertex / body.masses[:, None] + settings.gravity * body.gravity_scale
+            acceleration[body.pinned] = 0.0
+            acceleration[self._is_carried(body)] = 0.0  # its velocity already is that after contact
+            rows += (0.5 * lag * acceleration).astype(np.float32)
+        return rows
+
+    def _is_carried(self, body: Body) -> NDArray[np.bool_]:
+        """Which vertices of a body touched something in the last substep, (n,)."""
+        if self._program.has_contact:
+            begin = self._scene.ranges[body.index].particles[0]
+            touches = self._state.contact.particle_touches.to_numpy()[begin : begin + body.vertex_count]
+            return np.asarray(touches[self._scene.bodies[body.index].rank] == 1)
+        floor = self._settings.floor
+        if floor is None:
+            return np.zeros(body.vertex_count, dtype=np.bool_)
+        return np.asarray(body.positions()[:, 2] <= floor)
+
+    def rest_inverses(self, body: Body) -> Floats:
+        """A^-1 of each tetrahedron of a body that may have flowed, (m, 3, 3) [1/m], in the caller's order."""
+        rows = np.empty((len(body.tets), 3, 3), dtype=np.float32)
+        read_rest_inverses(self._state, body.index, rows)
+        inverses = np.empty(rows.shape)
+        inverses[self._scene.bodies[body.index].tet_order] = rows
+        return inverses
+
+
+def _as_buffer(out: Floats32 | None, count: int) -> Floats32:
+    """`out` if it can take (count, 3) positions, or a new array. Raises: OptionError."""
+    if out is None:
+        return np.empty((count, 3), dtype=np.float32)
+    if not isinstance(out, np.ndarray):
+        raise OptionError(f"out must be a numpy array, got {type(out).__name__}")
+    if out.shape != (count, 3) or out.dtype != np.float32:
+        raise OptionError(f"out must be float32 of shape ({count}, 3), got {out.dtype} of shape {out.shape}")
+    if not (out.flags.c_contiguous and out.flags.writeable):
+        raise OptionError(
+            "out must be C-contiguous and writeable: make it with numpy.empty((n, 3), numpy.float32)"
+        )
+    return out

@@ -1,0 +1,239 @@
+"""What `World.build` makes: fields, the kernel that moves them, and all that goes with a step of it."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.bodies.failure import FailedStep, Failure
+from taichi_soft.bodies.kernels.readout import write_motion
+from taichi_soft.bodies.layout import Scene
+from taichi_soft.bodies.slots import Pools
+from taichi_soft.bodies.status import ASLEEP, FROZEN
+from taichi_soft.contact.colliders import Colliders
+from taichi_soft.control.frames import Frames
+from taichi_soft.core.clock import Clock
+from taichi_soft.core.constants import POSITION_LIMIT, VELOCITY_LIMIT
+from taichi_soft.core.errors import DroppedEventsWarning, OptionError, SolverWarning, StateError
+from taichi_soft.core.settings import Settings
+from taichi_soft.events import EventLog
+from taichi_soft.fracture.tearing import Tears
+from taichi_soft.solver.failures import find_failure
+from taichi_soft.solver.kernels.contact_step import ALL_SLEEP
+from taichi_soft.solver.kernels.implicit_euler import MOST_PIECES
+from taichi_soft.solver.kernels.sleep import wake_body, wake_near
+from taichi_soft.solver.kernels.spawn import despawn_body, spawn_body
+from taichi_soft.solver.program import StepProgram
+from taichi_soft.solver.readout import Readout
+from taichi_soft.solver.schedules import Launch
+from taichi_soft.solver.state import State
+
+if TYPE_CHECKING:
+    from taichi_soft.world.body import Body
+
+
+@dataclass(eq=False)
+class Simulation:
+    """A built world without its public face."""
+
+    settings: Settings
+    pools: Pools
+    scene: Scene
+    clock: Clock
+    frames: Frames
+    colliders: Colliders | None  # None in a world without contact
+    sleeps: bool  # whether bodies fall asleep
+    state: State
+    program: StepProgram
+    launch: Launch
+    long_from: int  # substeps of a step beyond which it is made in several calls
+    events: EventLog
+    tears: Tears | None  # None where no body tears
+    readout: Readout = field(init=False)
+    troubled: int = 0  # bodies that failed in the last step, or whose solves were not exact
+    _is_still: bool = False  # none was awake after the last step, and nothing was changed since
+    _warned: set[int] = field(default_factory=set)  # slots of bodies with such solves
+
+    def __post_init__(self) -> None:
+        self.readout = Readout(self.settings, self.state, self.program, self.scene)
+
+    def step(self, seconds: float, substeps: int, h: float) -> list[str]:
+        """Make one fixed step of `seconds`, in substeps of `h` [s]. Returns a line for each body it froze."""
+        clock, colliders = self.clock, self.colliders
+        self.frames.aim(self.state, len(self.pools.slots), seconds)
+        goes_on = not self._is_still or self.frames.has_work
+        if colliders is not None:
+            goes_on = colliders.prepare(seconds) or goes_on
+        if goes_on:
+            self.readout.has_moved()
+            found = self.launch(substeps, h)
+            self.troubled, self._is_still = max(found, 0), found == ALL_SLEEP
+        if colliders is not None:
+            colliders.finish(seconds)
+        reports = self._note_failures(substeps, h) if self.troubled else []
+        clock.steps += 1
+        clock.time += seconds
+        clock.last_dt = seconds
+        loss = self.events.collect(clock.steps - 1, clock.time, seconds)
+        if loss:
+            warnings.warn(loss, DroppedEventsWarning, stacklevel=4)
+        if self.tears is not None:
+            for body, pieces in self.tears.tear():
+                self.events.note_torn(clock.steps - 1, clock.time, body, pieces)
+        return reports
+
+    def rehearse(self, seconds: float) -> None:
+        """Move the fields by a step that nobody takes note of, and that the caller takes back."""
+        self.frames.aim(self.state, len(self.pools.slots), seconds)
+        if self.colliders is not None:
+            self.colliders.prepare(seconds)
+        self.launch(1, seconds)
+        self.state.body_status.to_numpy()  # as where a body fails
+
+    def _note_failures(self, substeps: int, h: float) -> list[str]:
+        """Mark the bodies that the last step froze; a line about each."""
+        clock, reports = self.clock, []
+        # What freezes a body is the last of several attempts.
+        finer, is_braked = 1 << self.settings.retries, self.settings.retries > 0
+        if self.settings.is_implicit:
+            finer, is_braked = MOST_PIECES if self.program.has_contact else 1, False
+        status = self.state.body_status.to_numpy()
+        for body in self.pools.living:
+            if status[body.index] != FROZEN or body.is_frozen:
+                continue
+            body._frozen_in = FailedStep(clock.steps, clock.time, finer * substeps, h / finer, is_braked)
+            self.events.note_frozen(body)
+            reports.append(
+                f"body {body.index} went non-finite in step {clock.steps}: put back to t = "
+                f"{clock.time:.4g} s and frozen; body.failure tells where it broke. {self._way_out(body)}"
+            )
+        return reports
+
+    def _way_out(self, body: Body) -> str:
+        """What may help a body that the last step froze."""
+        lower, upper = body.aabb()
+        way, size = self.frames.way(body), float((upper - lower).max())
+        if way > size:
+            return (
+                f"It is {size:.3g} m large, and its frame moved it by {way:.3g} m in this step: move frames "
+                "in shorter ways, or make the jump by Frame.teleport"
+            )
+        return "Use more substeps or a softer material"
+
+    def check_solves(self) -> None:
+        """Warn of bodies whose implicit solves were not exact in the last step, once of each."""
+        if not self.settings.is_implicit:
+            return
+        residuals = self.state.body_residual.to_numpy()
+        for body in self.pools.living:
+            index = body.index
+            is_exact = residuals[index] <= self.settings.tolerance
+            if is_exact or index in self._warned or body.is_frozen:
+                continue
+            self._warned.add(index)
+            warnings.warn(
+                f"the implicit solve of body {index} ended with a residual of {residuals[index]:.2g} instead "
+                f"of {self.settings.tolerance:g} within {self.settings.most_iterations} iterations: raise "
+                "most_iterations or tolerance, or use more substeps",
+                SolverWarning,
+                stacklevel=4,
+            )
+
+    def fill(self, slot: int, rows: NDArray[np.float32]) -> None:
+        """Let a body begin in an empty slot, as `rows` say (see `SoftBodyAsset.placed`)."""
+        spawn_body(self.state, slot, rows)
+        self.has_changed()
+
+    def empty(self, slot: int) -> None:
+        """Take the body in a slot out of the fields."""
+        self._warned.discard(slot)
+        self._is_still = False
+        despawn_body(self.state, slot)
+
+    def wake(self, slot: int) -> None:
+        """Wake a body, or all for -1."""
+        self._is_still = False
+        if self.sleeps:
+            wake_body(self.state, slot)
+
+    def wake_all(self) -> None:
+        """Wake all bodies."""
+        self.wake(-1)
+
+    def wake_near(self, lower: NDArray[Any], upper: NDArray[Any]) -> None:
+        """Wake who sleeps near a box, given by two corners [m]."""
+        if self.sleeps:
+            box = np.concatenate([lower, upper]).astype(np.float32)
+            if wake_near(self.state, len(self.pools.slots), box):
+                self._is_still = False
+
+    def box_of(self, body: Body) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Corners of a box round a body and its skin, as it is now [m]."""
+        lower, upper = body.aabb()
+        thickness = body.asset.surface_row[1]
+        return lower - thickness, upper + thickness
+
+    def read(self, slot: int, kernel: Callable[..., Any], *arguments: Any) -> Any:
+        """Call a kernel (state, first particle of a body, *arguments) that changes nothing."""
+        return kernel(self.state, self.scene.ranges[slot].particles[0], *arguments)
+
+    def change(self, slot: int, kernel: Callable[..., Any], *arguments: Any) -> Any:
+        """Call a kernel (state, *arguments) that changes a body, or all for -1: the way of all control."""
+        found = self.attempt(kernel, *arguments)
+        self.rouse(slot)
+        return found
+
+    def attempt(self, kernel: Callable[..., Any], *arguments: Any) -> Any:
+        """Call a kernel (state, *arguments) that may refuse: bodies sleep on until `rouse` is called."""
+        return kernel(self.state, *arguments)
+
+    def rouse(self, slot: int) -> None:
+        """Take note that control has changed a body, or all for -1."""
+        self.wake(slot)
+        self.has_changed()
+
+    def write_motion(self, body: Body, positions: NDArray[Any], velocities: NDArray[Any]) -> None:
+        """Put a body somewhere else. Raises: OptionError for what is out of reach or too fast."""
+        x, v = positions.astype(np.float32), velocities.astype(np.float32)
+        for name, rows, limit in (("positions", x, POSITION_LIMIT), ("velocities", v, VELOCITY_LIMIT)):
+            if not np.abs(rows).max() < limit:
+                raise OptionError(f"{name} must lie within {limit:g} of zero")
+        left = self.box_of(body)
+        write_motion(self.state, body.index, x, v)
+        self.rouse(body.index)
+        self.wake_near(*left)
+
+    def has_changed(self) -> None:
+        """Take note that the fields were written to."""
+        self._is_still = False
+        self.readout.has_moved()
+
+    def rows_of(self, slot: int, vertices: NDArray[np.int32]) -> NDArray[np.int32]:
+        """Where vertices of a body lie in the fields."""
+        rows: NDArray[np.int32] = self.scene.bodies[slot].rank[vertices]
+        return (rows + self.scene.ranges[slot].particles[0]).astype(np.int32)
+
+    def is_asleep(self, slot: int) -> bool:
+        """Whether the body in a slot sleeps."""
+        return int(self.state.body_status[slot]) == ASLEEP
+
+    def solve_residual(self, body: Body) -> float | None:
+        """As `Body.solve_residual`."""
+        has_solved = self.settings.is_implicit and self.clock.steps > body._first_step
+        return float(self.state.body_residual[body.index]) if has_solved else None
+
+    def find_failure(self, slot: int, failed: FailedStep) -> Failure:
+        """What broke first in the body in a slot."""
+        return find_failure(self.state, self.program, self.scene, slot, failed)
+
+
+def require_built(simulation: Simulation | None) -> Simulation:
+    """Raises: StateError before `World.build`."""
+    if simulation is None:
+        raise StateError("the world is not built: call world.build() after the last add_body")
+    return simulation

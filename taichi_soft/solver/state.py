@@ -1,0 +1,79 @@
+"""All Taichi fields of one world: those of its bodies, and of what a game switches on."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.bodies.fields import BodyCapacity, BodyFields
+from taichi_soft.bodies.layout import Scene
+from taichi_soft.contact.fields import ContactCapacity, ContactFields, SoftContactFields
+from taichi_soft.control.joint_fields import JointFields
+from taichi_soft.core.runtime import ti
+
+_NO_CONTACT = ContactCapacity()
+
+
+@dataclass(frozen=True)
+class Capacity(BodyCapacity):
+    """Room in a state."""
+
+    contact: ContactCapacity = _NO_CONTACT
+
+    @property
+    def has_contact(self) -> bool:
+        """Whether there are fields of contact."""
+        return self.contact != _NO_CONTACT
+
+
+@ti.data_oriented
+class State(BodyFields):
+    """The fields of bodies, and slice by slice those of contact and joints, where a world has them."""
+
+    capacity: Capacity
+
+    def __init__(self, capacity: Capacity) -> None:
+        """Allocate `capacity`; contents are zero until `load`."""
+        super().__init__(capacity)
+        n, bodies = capacity.particles, capacity.bodies
+        if capacity.has_contact:
+            self.contact = ContactFields(capacity.contact, n, bodies)
+            self.joints = JointFields(n)
+            if capacity.implicit:
+                # Normal of the collider that holds it, and what that gave it before the solve [N s].
+                self.particle_hold = ti.Vector.field(4, self.real, n)
+        if capacity.contact.soft:
+            self.soft = SoftContactFields(n, bodies, capacity.outer, capacity.triangles)
+
+    def load(self, scene: Scene, models: list[int], kinds: NDArray[np.float64] | None = None) -> None:
+        """As `BodyFields.load`."""
+        if self.capacity.has_contact:
+            self._load_contact(scene)
+        super().load(scene, models, kinds)
+
+    def _load_contact(self, scene: Scene) -> None:
+        fill, contact, count = self.loader.fill, self.contact, len(scene.bodies)
+        fill(contact.near_count, np.zeros(0))
+        # Of slots that stay empty too: what colliders are told is a sum over all.
+        fill(contact.impulse, np.zeros((0, 3)))
+        fill(contact.angular_impulse, np.zeros((0, 3)))
+        fill(contact.rebound, np.zeros(0))
+        fill(self.joints.bodies, np.zeros((0, 2)))
+        fill(self.joints.is_held, np.zeros(0))
+        for numbers in (self.joints.particle, self.joints.weight, self.joints.share):
+            fill(numbers, np.zeros(0))
+        # What lies inside a body is never near anything.
+        fill(contact.particle_clearance, np.full(scene.particle_count, np.inf))
+        fill(contact.particle_touches, np.zeros(0))
+        contact.island_count[None] = count
+        fill(contact.island_first, np.arange(count + 1))
+        fill(contact.island_body, np.arange(count))
+        if self.capacity.contact.soft:
+            fill(self.soft.sweep_order, np.arange(count))
+            fill(self.soft.slot_count, np.zeros(0))
+            fill(self.soft.contact_count, np.zeros(0))
+            fill(self.soft.kept_press, np.zeros(0))
+            self.soft.records_touches[None] = 0
+            self.soft.pairs_lost[None] = 0
+            fill(self.soft.pair_bodies, np.zeros((0, 2)))
+            fill(self.soft.pair_impulse, np.zeros((0, 3)))

@@ -1,0 +1,1 @@
+"""The public face: a world and its bodies."""
