@@ -8,8 +8,8 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 
-# From the ground up. A package imports from itself and from lines below, whether the import runs, stands under
-# TYPE_CHECKING or within a function. Names without a prefix are packages of taichi_soft.
+# From the ground up. A package imports from itself and from lines below, whether the import runs, stands
+# under TYPE_CHECKING or within a function. Names without a prefix are packages of taichi_soft.
 LAYERS = """
     core
     meshing

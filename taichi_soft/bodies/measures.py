@@ -2,84 +2,80 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.bodies.pose import Pose, best_fitting_pose
+from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.core.errors import MeshError
 from taichi_soft.elements.laws.law import EnergyLaw
 from taichi_soft.elements.materials import AnisotropicMaterial, Material, SpringMaterial, voigt_stress
 from taichi_soft.meshing import TetMesh
 
-if TYPE_CHECKING:
-    from taichi_soft.world.body import Body
-
 Floats = NDArray[np.float64]
 
 
-def require_tets(body: Body) -> None:
+def require_tets(body: SoftBody) -> None:
     """Raises: MeshError for a body without tetrahedra."""
     if len(body.tets) == 0:
         raise MeshError(f"body {body.index} has no tetrahedra: it is made of particles and edges only")
 
 
-def positions_of(body: Body) -> Floats:
+def positions_of(body: SoftBody) -> Floats:
     """Of its vertices, (n, 3) [m]."""
     return body.positions().astype(np.float64)
 
 
-def velocities_of(body: Body) -> Floats:
+def velocities_of(body: SoftBody) -> Floats:
     """Of its vertices, (n, 3) [m/s]."""
     return body.velocities().astype(np.float64)
 
 
-def tet_volumes(body: Body) -> Floats:
+def tet_volumes(body: SoftBody) -> Floats:
     """As `Body.volumes`."""
     return np.asarray(np.linalg.det(_edge_vectors(body)) / 6.0)
 
 
-def _edge_vectors(body: Body) -> Floats:
+def _edge_vectors(body: SoftBody) -> Floats:
     """From the first vertex of each tetrahedron to the others, as rows, (m, 3, 3) [m]."""
     corners = positions_of(body)[body.tets]
     return np.asarray(corners[:, 1:] - corners[:, :1])
 
 
-def pose(body: Body) -> Pose:
+def pose(body: SoftBody) -> Pose:
     """As `Body.pose`."""
     return best_fitting_pose(body.mesh.vertices, positions_of(body), body.masses)
 
 
-def angular_momentum(body: Body) -> Floats:
+def angular_momentum(body: SoftBody) -> Floats:
     """As `Body.angular_momentum`."""
     impulses = body.masses[:, None] * velocities_of(body)
     return np.asarray(np.cross(positions_of(body), impulses).sum(axis=0))
 
 
-def kinetic_energy(body: Body) -> float:
+def kinetic_energy(body: SoftBody) -> float:
     """As `Body.kinetic_energy`."""
     return float(0.5 * body.masses @ (velocities_of(body) ** 2).sum(axis=1))
 
 
-def gravitational_energy(body: Body) -> float:
+def gravitational_energy(body: SoftBody) -> float:
     """As `Body.gravitational_energy`."""
-    gravity = body._world.settings.gravity * body.gravity_scale
+    gravity = body._context.settings.gravity * body.gravity_scale
     return float(-(body.masses @ positions_of(body)) @ gravity)
 
 
-def _material(body: Body) -> Material | AnisotropicMaterial:
+def _material(body: SoftBody) -> Material | AnisotropicMaterial:
     assert not isinstance(body.material, SpringMaterial), "laws on tetrahedra take none"
     return body.material
 
 
-def tet_mesh(body: Body) -> TetMesh:
+def tet_mesh(body: SoftBody) -> TetMesh:
     """The mesh of a body with tetrahedra."""
     assert isinstance(body.mesh, TetMesh), "meshes without tetrahedra are refused before"
     return body.mesh
 
 
-def elastic_energy(body: Body) -> float:
+def elastic_energy(body: SoftBody) -> float:
     """As `Body.elastic_energy`."""
     model, bonds = body._description.model, body._description.bonds
     law = model.law
@@ -95,26 +91,26 @@ def elastic_energy(body: Body) -> float:
     return float(0.5 * np.einsum("mab,mab->m", strain, stress) @ tet_mesh(body).volumes)
 
 
-def green_strain_and_stress(body: Body) -> tuple[Floats, Floats]:
+def green_strain_and_stress(body: SoftBody) -> tuple[Floats, Floats]:
     """1/2 (F^T F - I), and Hooke's stress of it [Pa], in the axes of the rest shape, (m, 3, 3) each."""
     F = deformations(body)
     strain = 0.5 * (np.swapaxes(F, 1, 2) @ F - np.eye(3))
     return strain, voigt_stress(_material(body).stiffness_matrices(len(body.tets)), strain)
 
 
-def deformations(body: Body) -> Floats:
+def deformations(body: SoftBody) -> Floats:
     """As `Body.deformations`."""
     require_tets(body)
     return np.asarray(np.swapaxes(_edge_vectors(body), 1, 2) @ body._rest_inverses)
 
 
-def strains(body: Body) -> Floats:
+def strains(body: SoftBody) -> Floats:
     """As `Body.strains`."""
     F = deformations(body)
     return np.asarray(0.5 * (F @ np.swapaxes(F, 1, 2) - np.eye(3)))
 
 
-def plastic_strains(body: Body) -> Floats:
+def plastic_strains(body: SoftBody) -> Floats:
     """As `Body.plastic_strains`."""
     body._require_alive()
     require_tets(body)
@@ -123,12 +119,12 @@ def plastic_strains(body: Body) -> Floats:
     return np.asarray(np.sqrt(2.0 / 3.0) * np.linalg.norm(np.log(stretches), axis=1))
 
 
-def tet_stress(body: Body) -> Floats:
+def tet_stress(body: SoftBody) -> Floats:
     """As `Body.tet_stress`."""
     return np.asarray(np.sqrt(1.5) * _deviator_norms(green_strain_and_stress(body)[1]))
 
 
-def tet_strain(body: Body) -> Floats:
+def tet_strain(body: SoftBody) -> Floats:
     """As `Body.tet_strain`."""
     return np.asarray(np.sqrt(2.0 / 3.0) * _deviator_norms(strains(body)))
 
@@ -139,7 +135,7 @@ def _deviator_norms(tensors: Floats) -> Floats:
     return np.asarray(np.linalg.norm(deviators, axis=(1, 2)))
 
 
-def vertex_means(body: Body, values: Floats) -> Floats:
+def vertex_means(body: SoftBody, values: Floats) -> Floats:
     """Values (m,) averaged by volume over the tetrahedra round each vertex, (n,)."""
     flat, shares = body.tets.ravel(), np.repeat(values * tet_mesh(body).volumes / 4.0, 4)
     return np.asarray(np.bincount(flat, shares, minlength=body.vertex_count) / tet_mesh(body).vertex_volumes)

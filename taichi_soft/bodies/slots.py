@@ -3,28 +3,40 @@
 from __future__ import annotations
 
 import heapq
-from typing import TYPE_CHECKING, Any
+from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from taichi_soft.bodies.asset import SoftBodyAsset
 from taichi_soft.core.errors import StateError
 
-if TYPE_CHECKING:
-    from taichi_soft.bodies.asset import SoftBodyAsset
-    from taichi_soft.world.body import Body
+
+class Occupant(Protocol):
+    """What lives in a slot."""
+
+    @property
+    def index(self) -> int:
+        """Of its slot."""
+
+    @property
+    def asset(self) -> SoftBodyAsset:
+        """Whose slots it may have."""
 
 
-class Pools:
+Kind = TypeVar("Kind", bound=Occupant)
+
+
+class Pools(Generic[Kind]):
     """Slots of one world. A body takes the lowest free one of its asset: that follows from who lives."""
 
     def __init__(self) -> None:
         self.assets: list[SoftBodyAsset] = []  # of each slot
-        self.slots: list[Body | None] = []  # who lives there
+        self.slots: list[Kind | None] = []  # who lives there
         self.starts: dict[int, NDArray[np.float32]] = {}  # of bodies that came before build, by slot
         self.added: dict[tuple[Any, ...], SoftBodyAsset] = {}  # by add_body, by their content
         self._free: dict[SoftBodyAsset, list[int]] = {}  # heaps
-        self._living: tuple[Body, ...] | None = ()
+        self._living: tuple[Kind, ...] | None = ()
 
     @property
     def kinds(self) -> tuple[SoftBodyAsset, ...]:
@@ -32,7 +44,7 @@ class Pools:
         return tuple(self._free)
 
     @property
-    def living(self) -> tuple[Body, ...]:
+    def living(self) -> tuple[Kind, ...]:
         """All bodies there are, by slot."""
         if self._living is None:
             self._living = tuple(body for body in self.slots if body is not None)
@@ -61,13 +73,13 @@ class Pools:
             )
         return free[0]
 
-    def enter(self, body: Body) -> None:
+    def enter(self, body: Kind) -> None:
         """Give a body the next slot of its asset, whose number it has."""
         heapq.heappop(self._free[body.asset])
         self.slots[body.index] = body
         self._living = None
 
-    def enter_at(self, body: Body) -> None:
+    def enter_at(self, body: Kind) -> None:
         """Give a body the free slot that has its number, whichever is next."""
         free = self._free[body.asset]
         free.remove(body.index)
@@ -75,7 +87,7 @@ class Pools:
         self.slots[body.index] = body
         self._living = None
 
-    def leave(self, body: Body) -> None:
+    def leave(self, body: Kind) -> None:
         """Free the slot of a body."""
         heapq.heappush(self._free[body.asset], body.index)
         self.slots[body.index] = None

@@ -3,38 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from taichi_soft.bodies.soft_body import Context, SoftBody
 from taichi_soft.core.checks import as_indices
 from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.core.types import Schedule
 
-if TYPE_CHECKING:
-    from taichi_soft.world.body import Body
-    from taichi_soft.world.world import World
-
 Rows32 = NDArray[np.float32]
 
 
-def change(body: Body, kernel: Callable[..., Any], *arguments: Any) -> Any:
+def change(body: SoftBody, kernel: Callable[..., Any], *arguments: Any) -> Any:
     """Call a kernel (state, *arguments) that changes `body` between two steps.
 
     Raises: StateError before `World.build`.
     """
-    return body._world._built.change(body.index, kernel, *arguments)
+    return body._context.built.change(body.index, kernel, *arguments)
 
 
-def attempt(body: Body, kernel: Callable[..., Any], *arguments: Any) -> Any:
+def attempt(body: SoftBody, kernel: Callable[..., Any], *arguments: Any) -> Any:
     """The same by a kernel that may refuse: the body sleeps on until the caller knows and calls `rouse`."""
-    return body._world._built.attempt(kernel, *arguments)
+    return body._context.built.attempt(kernel, *arguments)
 
 
-def rouse(body: Body) -> None:
+def rouse(body: SoftBody) -> None:
     """An attempt has changed `body`."""
-    body._world._built.rouse(body.index)
+    body._context.built.rouse(body.index)
 
 
 def numbers(*values: Any) -> Rows32:
@@ -42,14 +39,14 @@ def numbers(*values: Any) -> Rows32:
     return np.concatenate([np.ravel(value) for value in values]).astype(np.float32)
 
 
-def some_particles(body: Body, particles: ArrayLike | None, name: str = "particles") -> NDArray[np.int32]:
+def some_particles(body: SoftBody, particles: ArrayLike | None, name: str = "particles") -> NDArray[np.int32]:
     """Vertex numbers of a body, ascending; None means all. Raises: OptionError, also for none at all."""
     if particles is None:
         return np.arange(body.vertex_count, dtype=np.int32)
     return named_particles(body, particles, name)
 
 
-def named_particles(body: Body, particles: ArrayLike, name: str = "particles") -> NDArray[np.int32]:
+def named_particles(body: SoftBody, particles: ArrayLike, name: str = "particles") -> NDArray[np.int32]:
     """The same where they have to be named."""
     vertices = as_indices(particles, name, body.vertex_count)
     if len(vertices) == 0:
@@ -57,12 +54,12 @@ def named_particles(body: Body, particles: ArrayLike, name: str = "particles") -
     return vertices
 
 
-def rows_of(body: Body, vertices: NDArray[np.int32]) -> NDArray[np.int32]:
+def rows_of(body: SoftBody, vertices: NDArray[np.int32]) -> NDArray[np.int32]:
     """Where vertices of a body lie in the fields. Raises: StateError before `World.build`."""
-    return body._world._built.rows_of(body.index, vertices)
+    return body._context.built.rows_of(body.index, vertices)
 
 
-def require_substeps(world: World, what: str) -> None:
+def require_substeps(context: Context, what: str) -> None:
     """Raises: StateError where the schedule has no place for `what` within a substep."""
-    if world.settings.schedule is Schedule.FLAT:
+    if context.settings.schedule is Schedule.FLAT:
         raise StateError(f"schedule 'flat' has no {what}: make the world with schedule='per_body'")

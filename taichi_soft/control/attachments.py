@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.control.access import change, named_particles, require_substeps, rows_of
-from taichi_soft.control.frames import Frame
+from taichi_soft.control.frames import Frame, Frames
 from taichi_soft.control.kernels.pins import attach_particles, free_particles, read_reaction, write_feeling
 from taichi_soft.core.checks import as_flag
 from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.core.handles import Handle, recorded
-
-if TYPE_CHECKING:
-    from taichi_soft.world.body import Body
 
 
 class Attachment(Handle):
@@ -27,7 +25,7 @@ class Attachment(Handle):
     its own, in its `Body.attachments`.
     """
 
-    def __init__(self, body: Body, particles: NDArray[np.int32], frame: Frame, *, two_way: bool) -> None:
+    def __init__(self, body: SoftBody, particles: NDArray[np.int32], frame: Frame, *, two_way: bool) -> None:
         """Made by `Body.attach`."""
         self.body = body
         self.particles = particles
@@ -77,35 +75,35 @@ class Attachment(Handle):
         if not self.two_way:
             raise StateError("this attachment feels nothing: make it with two_way=True")
         impulses = np.empty(6)
-        world = self.body._world
+        context = self.body._context
         rows = rows_of(self.body, self.particles)
-        world._built.read(self.body.index, read_reaction, rows, self.frame.position, impulses)
-        return impulses / max(world.last_dt, 1e-30)
+        context.built.read(self.body.index, read_reaction, rows, self.frame.position, impulses)
+        return impulses / max(context.clock.last_dt, 1e-30)
 
 
-def attach(body: Body, particles: ArrayLike, frame: Any, two_way: bool) -> Attachment:
+def attach(body: SoftBody, particles: ArrayLike, frame: Any, two_way: bool) -> Attachment:
     """As `Body.attach`."""
     body._require_alive()
     vertices = named_particles(body, particles)
-    if not isinstance(frame, Frame) or frame._frames is not body._world._frames:
+    if not isinstance(frame, Frame) or frame._frames is not body._context.of(Frames):
         raise OptionError(f"frame must come from add_frame of the same world, got {frame!r}")
     frame._require_alive()
     feels = as_flag(two_way, "two_way")
     require_unattached(body, vertices)
     rows = rows_of(body, vertices)
     if feels:
-        require_substeps(body._world, "forces on frames (two_way=True)")
+        require_substeps(body._context, "forces on frames (two_way=True)")
     offsets = body.positions()[vertices].astype(np.float64) - frame.position
     local = (offsets @ frame.rotation).astype(np.float32)
     change(body, attach_particles, body.index, frame._number, int(feels), rows, local)
-    body._world._frames.has_work = True
+    body._context.of(Frames).has_work = True
     attachment = Attachment(body, vertices, frame, two_way=feels)
     body._handles.enlist(attachment)
     body._attachments.append(attachment)
     return attachment
 
 
-def share_attachments(body: Body, pieces: Sequence[tuple[Body, NDArray[np.int64]]]) -> None:
+def share_attachments(body: SoftBody, pieces: Sequence[tuple[SoftBody, NDArray[np.int64]]]) -> None:
     """Let go on what holds a body that was cut.
 
     Args:
@@ -127,12 +125,12 @@ def share_attachments(body: Body, pieces: Sequence[tuple[Body, NDArray[np.int64]
             change(each, write_feeling, each.index, int(any(held.two_way for held in each._attachments)))
 
 
-def attached_vertices(body: Body) -> NDArray[np.int32]:
+def attached_vertices(body: SoftBody) -> NDArray[np.int32]:
     """All that frames hold, (k,)."""
     return np.concatenate([np.zeros(0, np.int32), *(each.particles for each in body._attachments)])
 
 
-def require_unattached(body: Body, vertices: NDArray[np.int32]) -> None:
+def require_unattached(body: SoftBody, vertices: NDArray[np.int32]) -> None:
     """Raises: StateError with the first of `vertices` that a frame holds."""
     held = np.intersect1d(vertices, attached_vertices(body))
     if len(held):

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from taichi_soft.bodies.soft_body import Context, SoftBody
 from taichi_soft.control.access import change, numbers, require_substeps, rows_of, some_particles
 from taichi_soft.control.impulses import LARGEST_IMPULSE
 from taichi_soft.control.kernels.drives import (
@@ -22,10 +23,6 @@ from taichi_soft.core.checks import as_array, as_flag, as_number, as_vector
 from taichi_soft.core.constants import VELOCITY_LIMIT
 from taichi_soft.core.errors import OptionError
 
-if TYPE_CHECKING:
-    from taichi_soft.world.body import Body
-    from taichi_soft.world.world import World
-
 ForceField = Callable[[NDArray[np.float32], float], ArrayLike]
 """(positions (n, 3) [m], time [s]) -> accelerations (n, 3) [m/s^2]."""
 
@@ -33,7 +30,7 @@ LARGEST_PUSH = 1e9
 """[m/s^2]; within 20 us it throws a particle faster than any that counts as sound."""
 
 
-def apply_force(body: Body, force: ArrayLike, particles: ArrayLike | None) -> None:
+def apply_force(body: SoftBody, force: ArrayLike, particles: ArrayLike | None) -> None:
     """As `Body.apply_force`."""
     total = as_vector(force, "force", "N", LARGEST_IMPULSE)
     vertices = some_particles(body, particles)
@@ -43,36 +40,36 @@ def apply_force(body: Body, force: ArrayLike, particles: ArrayLike | None) -> No
             f"force would accelerate vertices by {np.abs(acceleration).max():.4g} m/s^2: "
             f"keep below {LARGEST_PUSH:g} m/s^2"
         )
-    require_substeps(body._world, "forces")
+    require_substeps(body._context, "forces")
     change(body, add_push, body.index, rows_of(body, vertices), numbers(acceleration))
 
 
-def set_gravity_scale(body: Body, scale: float) -> None:
+def set_gravity_scale(body: SoftBody, scale: float) -> None:
     """As `Body.set_gravity_scale`."""
     change(body, write_gravity_scale, body.index, as_number(scale, "scale", -1e3, 1e3))
 
 
-def set_linear_damping(body: Body, rate: float) -> None:
+def set_linear_damping(body: SoftBody, rate: float) -> None:
     """As `Body.set_linear_damping`."""
     per_second = as_number(rate, "rate", 0.0, 1e6, "a number from 0 to 1e6 per second")
-    require_substeps(body._world, "linear damping")
+    require_substeps(body._context, "linear damping")
     change(body, write_linear_damping, body.index, per_second)
 
 
-def set_sheltered(body: Body, is_sheltered: bool) -> None:
+def set_sheltered(body: SoftBody, is_sheltered: bool) -> None:
     """As `Body.set_sheltered`."""
     change(body, write_shelter, body.index, int(as_flag(is_sheltered, "is_sheltered")))
 
 
-def set_wind(world: World, velocity: ArrayLike | None, density: float, drag: float) -> None:
+def set_wind(context: Context, velocity: ArrayLike | None, density: float, drag: float) -> None:
     """As `World.set_wind`."""
     blows = velocity is not None
     speed = as_vector(velocity if blows else (0, 0, 0), "velocity", "m/s", VELOCITY_LIMIT)  # type: ignore[arg-type]
     kilograms = as_number(density, "density", 0.0, 1e5, "a number from 0 to 100,000 kg/m^3")
     coefficient = as_number(drag, "drag", 0.0, 1e3)
-    require_substeps(world, "wind")
-    if world._built.attempt(write_wind, numbers(speed, kilograms * coefficient * blows)):
-        world._built.rouse(-1)
+    require_substeps(context, "wind")
+    if context.built.attempt(write_wind, numbers(speed, kilograms * coefficient * blows)):
+        context.built.rouse(-1)
 
 
 def require_field(field: Any) -> ForceField | None:
@@ -82,16 +79,16 @@ def require_field(field: Any) -> ForceField | None:
     return field  # type: ignore[no-any-return]
 
 
-def push_by_field(world: World, field: ForceField) -> list[tuple[Body, NDArray[np.float32]]]:
+def push_by_field(context: Context, field: ForceField) -> list[tuple[SoftBody, NDArray[np.float32]]]:
     """Ask a force field for every body that moves, then push them all.
 
     Returns: bodies and their accelerations, (n, 3) [m/s^2].
     Raises: what the field raises, or OptionError for what it returns; then no body is pushed.
     """
     rows = []
-    for body in world.bodies:
+    for body in context.slots.living:
         if not body.is_frozen:
-            given = field(body.positions(), world.time)
+            given = field(body.positions(), context.clock.time)
             found = as_array(given, "what the force field returns", (body.vertex_count, 3), "m/s^2")
             if not np.abs(found).max() < LARGEST_PUSH:
                 raise OptionError(f"the force field must stay below {LARGEST_PUSH:g} m/s^2")
@@ -100,7 +97,7 @@ def push_by_field(world: World, field: ForceField) -> list[tuple[Body, NDArray[n
     return rows
 
 
-def push_bodies(rows: list[tuple[Body, Any]]) -> None:
+def push_bodies(rows: Sequence[tuple[SoftBody, Any]]) -> None:
     """Push bodies throughout the coming step, vertex by vertex: accelerations float32 (n, 3) [m/s^2].
 
     Where all are zero, who sleeps sleeps on.

@@ -2,30 +2,26 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from taichi_soft.bodies.fields import BodyFields
+from taichi_soft.bodies.soft_body import Context, Slice, SoftBody
 from taichi_soft.control.jumps import carry
 from taichi_soft.control.kernels.pins import aim_pinned
 from taichi_soft.core.checks import as_flag, as_rotation, as_vector
 from taichi_soft.core.errors import StateError
 from taichi_soft.core.handles import Handle, recorded
 
-if TYPE_CHECKING:
-    from taichi_soft.bodies.fields import BodyFields
-    from taichi_soft.bodies.slots import Pools
-    from taichi_soft.control.attachments import Attachment
-    from taichi_soft.world.body import Body
 
-
-class Frames:
+class Frames(Slice):
     """Poses of all frames of one world: rotation row by row, and position [m], (f, 12)."""
 
-    def __init__(self, pools: Pools) -> None:
+    def __init__(self, context: Context) -> None:
         """None yet; one row, as a kernel takes no empty array."""
-        self._pools = pools
+        super().__init__(context)
         self.rows: list[Frame | None] = []  # None where one was removed: the next frame takes the first such
         self.present = np.zeros((1, 12), dtype=np.float32)
         self.coming = self.present.copy()  # at the end of the coming step
@@ -49,9 +45,16 @@ class Frames:
         self.present[number] = self.coming[number] = pose
         return number
 
-    def attachments(self, frame: Frame) -> list[Attachment]:
+    def attachments(self, frame: Frame) -> list[Any]:
         """What hangs from a frame, body by body."""
-        return [each for body in self._pools.living for each in body._attachments if each.frame is frame]
+        return [
+            each for body in self.context.slots.living for each in body._attachments if each.frame is frame
+        ]
+
+    def let_go(self, body: SoftBody) -> None:
+        """Release all that hold a body."""
+        for attachment in list(body._attachments):
+            attachment.release()
 
     def aim(self, state: BodyFields, body_count: int, dt: float) -> None:
         """Give pinned particles the velocities of the coming step."""
@@ -59,7 +62,7 @@ class Frames:
             self.has_work = aim_pinned(state, body_count, dt, self.coming) > 0
         self.past, self.present = self.present, self.coming.copy()
 
-    def way(self, body: Body) -> float:
+    def way(self, body: SoftBody) -> float:
         """How far frames moved a particle of a body in the last step, which was undone for it [m]."""
         x, longest = body.positions().astype(np.float64), 0.0
         for each in body._attachments:

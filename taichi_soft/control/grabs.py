@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies.fields import MOST_GRABS
+from taichi_soft.bodies.soft_body import Context, Slice, SoftBody
 from taichi_soft.control.access import change, numbers, require_substeps, rows_of
 from taichi_soft.control.kernels.grabs import end_grab, read_grab_force, write_grab, write_grab_target
 from taichi_soft.control.patches import patch_round
@@ -15,9 +16,6 @@ from taichi_soft.core.checks import as_array, as_count, as_number, as_vector
 from taichi_soft.core.constants import GRAVITY_EARTH
 from taichi_soft.core.errors import MeshError, OptionError, StateError
 from taichi_soft.core.handles import Handle, recorded
-
-if TYPE_CHECKING:
-    from taichi_soft.world.body import Body
 
 WEIGHTS = 10.0
 """Strongest pull in weights of the body on Earth, where nothing else is asked for."""
@@ -29,7 +27,7 @@ HIGHEST_SPEED = 50.0
 class Grab(Handle):
     """A hand on a body. Made by `Body.grab` and `World.grab`."""
 
-    def __init__(self, body: Body, number: int, point: NDArray[np.float64]) -> None:
+    def __init__(self, body: SoftBody, number: int, point: NDArray[np.float64]) -> None:
         """Made by `Body.grab`."""
         self.body = body
         self._number = number
@@ -41,7 +39,7 @@ class Grab(Handle):
     @property
     def is_held(self) -> bool:
         """False once released, and once the body was removed."""
-        return self.body.is_alive and self.body._world._grabs.get(self._number) is self
+        return self.body.is_alive and self.body._context.of(Grabs).by_number.get(self._number) is self
 
     @property
     def point(self) -> NDArray[np.float64]:
@@ -56,7 +54,7 @@ class Grab(Handle):
         """
         self._require_held()
         found = np.empty(3, dtype=np.float32)
-        read_grab_force(self.body._world._built.state, self._number, found)
+        read_grab_force(self.body._context.built.state, self._number, found)
         return found
 
     @recorded
@@ -72,11 +70,34 @@ class Grab(Handle):
         """Let go. Raises: StateError if it was done before."""
         self._require_held()
         change(self.body, end_grab, self._number, self.body.index)
-        del self.body._world._grabs[self._number]
+        del self.body._context.of(Grabs).by_number[self._number]
 
     def _require_held(self) -> None:
         if not self.is_held:
             raise StateError(f"this grab of body {self.body.index} was released: grab again")
+
+
+class Grabs(Slice):
+    """All grabs of one world, by number."""
+
+    def __init__(self, context: Context) -> None:
+        """None yet."""
+        super().__init__(context)
+        self.by_number: dict[int, Grab] = {}
+
+    @property
+    def handles(self) -> list[Grab]:
+        """Of all grabs there are, by number."""
+        return [grab for _, grab in sorted(self.by_number.items())]
+
+    def holds(self, body: SoftBody) -> bool:
+        """Whether it is grabbed."""
+        return any(grab.body is body for grab in self.by_number.values())
+
+    def let_go(self, body: SoftBody) -> None:
+        """Release all that hold a body."""
+        for grab in [each for each in self.by_number.values() if each.body is body]:
+            grab.release()
 
 
 def as_pull(frequency: Any, max_force: Any) -> tuple[float, float | None]:
@@ -88,7 +109,7 @@ def as_pull(frequency: Any, max_force: Any) -> tuple[float, float | None]:
 
 
 def grab_at(
-    body: Body,
+    body: SoftBody,
     triangle: int,
     barycentrics: ArrayLike,
     point: ArrayLike | None,
@@ -106,12 +127,12 @@ def grab_at(
     hertz, limit = as_pull(frequency, max_force)
     omega, mass = 2 * np.pi * hertz, float(body.masses.sum())
     strongest = WEIGHTS * GRAVITY_EARTH * mass if limit is None else limit
-    require_substeps(body._world, "grabs")
+    require_substeps(body._context, "grabs")
     corners = body.surface[number]
     target = weights @ body.positions()[corners].astype(np.float64)
     if point is not None:
         target = as_vector(point, "point", "m")
-    grabs = body._world._grabs
+    grabs = body._context.of(Grabs).by_number
     free = next((slot for slot in range(MOST_GRABS) if slot not in grabs), None)
     if free is None:
         raise StateError(f"all {MOST_GRABS} grabs of this world are in use: release one first")

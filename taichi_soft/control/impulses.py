@@ -5,26 +5,21 @@ A pinned particle passes its share on to what holds it.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import ArrayLike
 
+from taichi_soft.bodies.soft_body import Context, SoftBody
 from taichi_soft.control.access import attempt, change, numbers, rouse, rows_of, some_particles
 from taichi_soft.control.kernels.impulses import add_impulse_near, add_radial_impulse, add_velocity
 from taichi_soft.core.checks import as_number, as_vector
 from taichi_soft.core.constants import VELOCITY_LIMIT
 from taichi_soft.core.errors import OptionError
 
-if TYPE_CHECKING:
-    from taichi_soft.world.body import Body
-    from taichi_soft.world.world import World
-
 LARGEST_IMPULSE = 1e20
 """[N s], and for forces [N]: beyond, float32 has no room for squares."""
 
 
-def apply_impulse(body: Body, impulse: ArrayLike, particles: ArrayLike | None) -> None:
+def apply_impulse(body: SoftBody, impulse: ArrayLike, particles: ArrayLike | None) -> None:
     """As `Body.apply_impulse`."""
     momentum = as_vector(impulse, "impulse", "N s", LARGEST_IMPULSE)
     vertices = some_particles(body, particles)
@@ -33,7 +28,7 @@ def apply_impulse(body: Body, impulse: ArrayLike, particles: ArrayLike | None) -
     change(body, add_velocity, rows_of(body, vertices), numbers(velocity))
 
 
-def apply_impulse_at_point(body: Body, impulse: ArrayLike, point: ArrayLike, radius: float) -> None:
+def apply_impulse_at_point(body: SoftBody, impulse: ArrayLike, point: ArrayLike, radius: float) -> None:
     """As `Body.apply_impulse_at_point`."""
     momentum = as_vector(impulse, "impulse", "N s", LARGEST_IMPULSE)
     center = as_vector(point, "point", "m")
@@ -50,15 +45,15 @@ def apply_impulse_at_point(body: Body, impulse: ArrayLike, point: ArrayLike, rad
     rouse(body)
 
 
-def apply_radial_impulse(world: World, center: ArrayLike, impulse: float, radius: float) -> None:
+def apply_radial_impulse(context: Context, center: ArrayLike, impulse: float, radius: float) -> None:
     """As `World.apply_radial_impulse`."""
     origin = as_vector(center, "center", "m")
     momentum = as_number(impulse, "impulse", -LARGEST_IMPULSE, LARGEST_IMPULSE)
     reach = as_number(radius, "radius", 1e-9, 1e9, "a number above 0 m, from 1e-9 to 1e9")
     row = numbers(origin, reach, momentum)
-    _require_speed(world._built.attempt(add_radial_impulse, world.slot_count, row), "impulse")
-    world._built.has_changed()
-    world._built.wake_near(origin - reach, origin + reach)
+    _require_speed(context.built.attempt(add_radial_impulse, len(context.slots.slots), row), "impulse")
+    context.built.has_changed()
+    context.built.wake_near(origin - reach, origin + reach)
 
 
 def _require_speed(speed: float, name: str) -> None:

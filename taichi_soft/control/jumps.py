@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.control.access import attempt, rouse
 from taichi_soft.control.kernels.placement import jump
 from taichi_soft.core.constants import POSITION_LIMIT
 from taichi_soft.core.errors import OptionError
 
-if TYPE_CHECKING:
-    from taichi_soft.world.body import Body
-
 Floats = NDArray[np.float64]
 
 
 def jump_to(
-    body: Body, center: Floats, turn: Floats, *, lowest: float, keep: bool
+    body: SoftBody, center: Floats, turn: Floats, *, lowest: float, keep: bool
 ) -> tuple[float, float, float]:
     """Turn a body about its centre of mass and put that at `center`, its velocity turned or stopped.
 
@@ -33,7 +30,7 @@ def jump_to(
     return bottom, top, farthest
 
 
-def carry(bodies: Sequence[Body], turn: Floats, start: Floats, end: Floats, *, keep: bool) -> None:
+def carry(bodies: Sequence[SoftBody], turn: Floats, start: Floats, end: Floats, *, keep: bool) -> None:
     """Move bodies by the rigid motion that takes the point `start` to `end` [m], and wake what lay on them.
 
     Raises: OptionError, with nothing changed, where one of them would be out of reach.
@@ -46,7 +43,7 @@ def carry(bodies: Sequence[Body], turn: Floats, start: Floats, end: Floats, *, k
                 f"position puts body {body.index} beyond {POSITION_LIMIT:g} m: stay nearer the origin"
             )
     for body, center in zip(bodies, centers, strict=True):
-        simulation = body._world._built
+        simulation = body._context.built
         left = simulation.box_of(body)
         jump_to(body, center, turn, lowest=-np.inf, keep=keep)
         rouse(body)

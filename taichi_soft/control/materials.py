@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from taichi_soft.bodies.fields import BodyFields
 from taichi_soft.bodies.kernels.constants import write_fours, write_masses, write_numbers
 from taichi_soft.bodies.layout import BodyArrays, BodyDescription, Ranges, blocks_of, rearrange
+from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.control.access import change
 from taichi_soft.core.constants import LANES
 from taichi_soft.core.errors import MaterialError
 from taichi_soft.elements.laws import fit_model
 
-if TYPE_CHECKING:
-    from taichi_soft.bodies.fields import BodyFields
-    from taichi_soft.world.body import Body
 
-
-def set_material(body: Body, material: Any) -> None:
+def set_material(body: SoftBody, material: Any) -> None:
     """As `Body.set_material`."""
     before = body._description
     if type(material) is not type(before.material):
@@ -31,14 +29,14 @@ def set_material(body: Body, material: Any) -> None:
     change(body, write_constants, body, replace(before, material=material))
 
 
-def set_damping(body: Body, damping: Any) -> None:
+def set_damping(body: SoftBody, damping: Any) -> None:
     """As `Body.set_damping`."""
     set_material(body, replace(body.material, damping=damping))
 
 
-def write_constants(state: BodyFields, body: Body, description: BodyDescription) -> None:
+def write_constants(state: BodyFields, body: SoftBody, description: BodyDescription) -> None:
     """Not a kernel, but called like one: what a body is made of lies in several fields."""
-    arrays = rearrange(body._world._scene.bodies[body.index], description)
+    arrays = rearrange(body._context.layout.bodies[body.index], description)
     place = body._redescribe(description, arrays)
     masses = arrays.mass
     write_masses(state, place.particles[0], masses.astype(np.float32), (1.0 / masses).astype(np.float32))

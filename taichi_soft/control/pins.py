@@ -2,37 +2,34 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.control.access import attempt, change, named_particles, rouse, rows_of, some_particles
 from taichi_soft.control.attachments import attached_vertices, require_unattached
+from taichi_soft.control.frames import Frames
 from taichi_soft.control.kernels.pins import free_particles, pin_particles, read_pinned, write_targets
 from taichi_soft.core.checks import as_array
 from taichi_soft.core.constants import POSITION_LIMIT
 from taichi_soft.core.errors import OptionError, StateError
 
-if TYPE_CHECKING:
-    from taichi_soft.world.body import Body
 
-
-def pinned_vertices(body: Body) -> NDArray[np.int32]:
+def pinned_vertices(body: SoftBody) -> NDArray[np.int32]:
     """As `Body.pinned`, of a built world."""
     flags = np.empty(body.vertex_count, dtype=np.int32)
-    body._world._built.read(body.index, read_pinned, flags)
+    body._context.built.read(body.index, read_pinned, flags)
     return np.flatnonzero(flags).astype(np.int32)
 
 
-def pin(body: Body, particles: ArrayLike) -> None:
+def pin(body: SoftBody, particles: ArrayLike) -> None:
     """As `Body.pin`."""
     vertices = named_particles(body, particles)
     require_unattached(body, vertices)
     change(body, pin_particles, rows_of(body, vertices))
 
 
-def unpin(body: Body, particles: ArrayLike | None) -> None:
+def unpin(body: SoftBody, particles: ArrayLike | None) -> None:
     """As `Body.unpin`."""
     if particles is None:
         vertices = np.setdiff1d(body.pinned, attached_vertices(body))
@@ -42,7 +39,7 @@ def unpin(body: Body, particles: ArrayLike | None) -> None:
     change(body, free_particles, rows_of(body, vertices))
 
 
-def set_targets(body: Body, particles: ArrayLike, positions: ArrayLike) -> None:
+def set_targets(body: SoftBody, particles: ArrayLike, positions: ArrayLike) -> None:
     """As `Body.set_targets`."""
     vertices = named_particles(body, particles)
     given = np.asarray(particles)
@@ -57,4 +54,4 @@ def set_targets(body: Body, particles: ArrayLike, positions: ArrayLike) -> None:
     if loose >= 0:
         raise StateError(f"vertex {vertices[loose]} of body {body.index} is not pinned: call body.pin first")
     rouse(body)
-    body._world._frames.has_work = True
+    body._context.of(Frames).has_work = True

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from taichi_soft.bodies.layout import outer_vertices
-from taichi_soft.contact.clearance import require_clear
+from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.control.access import attempt, numbers, rouse, some_particles
 from taichi_soft.control.attachments import require_unattached
 from taichi_soft.control.jumps import jump_to
@@ -17,11 +17,8 @@ from taichi_soft.core.checks import as_flag, as_rotation, as_vector
 from taichi_soft.core.constants import POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.core.errors import OptionError
 
-if TYPE_CHECKING:
-    from taichi_soft.world.body import Body
 
-
-def set_velocity(body: Body, linear: ArrayLike, angular: ArrayLike) -> None:
+def set_velocity(body: SoftBody, linear: ArrayLike, angular: ArrayLike) -> None:
     """As `Body.set_velocity`."""
     motion = numbers(
         as_vector(linear, "linear", "m/s", VELOCITY_LIMIT), as_vector(angular, "angular", "rad/s")
@@ -34,17 +31,17 @@ def set_velocity(body: Body, linear: ArrayLike, angular: ArrayLike) -> None:
     rouse(body)
 
 
-def teleport(body: Body, position: ArrayLike, rotation: Any, keep_velocity: bool) -> None:
+def teleport(body: SoftBody, position: ArrayLike, rotation: Any, keep_velocity: bool) -> None:
     """As `Body.teleport`."""
     target, turn = as_vector(position, "position", "m"), as_rotation(rotation)
     keep = as_flag(keep_velocity, "keep_velocity")
     require_unattached(body, some_particles(body, None))
-    floor, simulation = body._world.settings.floor, body._world._built
-    left = simulation.box_of(body)
+    floor, built = body._context.settings.floor, body._context.built
+    left = built.box_of(body)
     free = np.setdiff1d(outer_vertices(body.mesh), body.pinned)
-    if len(free) and simulation.colliders is not None:
+    if len(free):
         points = (body.positions()[free].astype(np.float64) - body.center_of_mass()) @ turn.T + target
-        require_clear(body._world.colliders, body.asset, points, f"body {body.index}")
+        built.require_clear(body, points)
     lowest = -np.inf if floor is None else floor
     bottom, top, farthest = jump_to(body, target, turn, lowest=lowest, keep=keep)
     if not farthest < POSITION_LIMIT:
@@ -54,4 +51,4 @@ def teleport(body: Body, position: ArrayLike, rotation: Any, keep_velocity: bool
             f"position={target.tolist()} puts the body {lowest - bottom:.4g} m below the floor: raise it"
         )
     rouse(body)
-    simulation.wake_near(*left)
+    built.wake_near(*left)

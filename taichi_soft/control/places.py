@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.core.errors import OptionError
-
-if TYPE_CHECKING:
-    from taichi_soft.world.body import Body
 
 Floats = NDArray[np.float64]
 
@@ -27,7 +24,7 @@ class Places:
     weights: Floats  # (n, 4)
 
 
-def places_at(body: Body, points: Floats, names: list[str]) -> Places:
+def places_at(body: SoftBody, points: Floats, names: list[str]) -> Places:
     """Points (n, 3) [m] in the tetrahedra of a body as it is now; a point outside in that which it is least
     outside of.
 
@@ -60,7 +57,7 @@ def places_at(body: Body, points: Floats, names: list[str]) -> Places:
     return Places(tets[chosen], weights / weights.sum(axis=1, keepdims=True))
 
 
-def places_on(body: Body, vertices: NDArray[np.int32]) -> Places:
+def places_on(body: SoftBody, vertices: NDArray[np.int32]) -> Places:
     """The places of vertices, each by the first tetrahedron that has it, if there is one."""
     corners = np.repeat(vertices[:, None], 4, axis=1)
     if len(body.tets):

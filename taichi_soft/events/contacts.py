@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from taichi_soft.bodies.soft_body import SoftBody
+from taichi_soft.contact.colliders import Collider
 from taichi_soft.contact.kernels.touches import OF_BODY
 from taichi_soft.events.kinds import ContactBegan, ContactEnded
 from taichi_soft.events.memory import CONTACT_WIDTH, Known
-
-if TYPE_CHECKING:
-    from taichi_soft.contact.colliders import Collider
-    from taichi_soft.world.body import Body
 
 CONTACT_PAUSE = 0.05
 """Time without an impulse [s] after which a contact has ended. Single vertices of what rests, rolls or slides
@@ -29,8 +26,8 @@ Vector = tuple[float, float, float]
 
 @dataclass(eq=False)
 class _Contact:
-    a: Body
-    b: Collider | Body
+    a: SoftBody
+    b: Collider | SoftBody
     began: float  # [s], start of the first step with an impulse
     touched: float  # [s], end of the last, or of rest
     pause: float = 0.0  # [s] in which either of them has moved since
@@ -66,7 +63,7 @@ class Contacts:
     def follow(
         self,
         touches: dict[Key, Vector],
-        handles: Callable[[Key], tuple[Body, Collider | Body]],
+        handles: Callable[[Key], tuple[SoftBody, Collider | SoftBody]],
         moving: set[int],
         step: int,
         time: float,

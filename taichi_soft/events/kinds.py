@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from taichi_soft.bodies.failure import Failure
-    from taichi_soft.contact.colliders import Collider
-    from taichi_soft.world.body import Body
+from taichi_soft.bodies.failure import Failure
+from taichi_soft.bodies.soft_body import SoftBody
+from taichi_soft.contact.colliders import Collider
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -29,8 +27,8 @@ class Event:
 class ContactBegan(Event):
     """A body has begun to touch a collider (the floor is one) or another body."""
 
-    a: Body
-    b: Collider | Body  # of two bodies the one with the larger index
+    a: SoftBody
+    b: Collider | SoftBody  # of two bodies the one with the larger index
     impulse: Floats  # (3,) that `a` gave `b` in that step [N s]; a hit may go on in the next one
 
 
@@ -38,8 +36,8 @@ class ContactBegan(Event):
 class ContactEnded(Event):
     """They have not touched for `CONTACT_PAUSE`, or one of them was removed."""
 
-    a: Body
-    b: Collider | Body
+    a: SoftBody
+    b: Collider | SoftBody
     impulse: Floats  # (3,) that `a` gave `b` from beginning to end [N s]; what sleeps gives none
     duration: float  # [s] from the start of the first step with one to the end of the last, or of sleep
 
@@ -51,7 +49,7 @@ class StressExceeded(Event):
     Of a body that `watch_stress` was not called for nothing is told.
     """
 
-    body: Body
+    body: SoftBody
     tetrahedra: Ints  # (k,) those that were not over it before, ascending
     stress: Floats  # (k,) von Mises [Pa]
 
@@ -63,7 +61,7 @@ class TearCandidates(Event):
     Of a body that `watch_tearing` was not called for nothing is told. Nothing tears by it: see `Torn`.
     """
 
-    body: Body
+    body: SoftBody
     tetrahedra: Ints  # (k,) those that were not before, ascending
     stress: Floats  # (k,) largest principal stress [Pa]
     normals: Floats  # (k, 3) its direction, which is the normal of the tear; either sign
@@ -73,21 +71,21 @@ class TearCandidates(Event):
 class FellAsleep(Event):
     """A body has come to rest, and is not moved until something wakes it."""
 
-    body: Body
+    body: SoftBody
 
 
 @dataclass(frozen=True, eq=False)
 class Woke(Event):
     """A sleeping body moves again."""
 
-    body: Body
+    body: SoftBody
 
 
 @dataclass(frozen=True, eq=False)
 class Froze(Event):
     """A body went non-finite and was put back to where it was before the step."""
 
-    body: Body
+    body: SoftBody
 
     @property
     def failure(self) -> Failure | None:
@@ -99,9 +97,9 @@ class Froze(Event):
 class Torn(Event):
     """A body with `Tearing` has torn after that step; whoever calls `Body.cut` knows without being told."""
 
-    body: Body  # what is left of it; see `Body.topology_version`
+    body: SoftBody  # what is left of it; see `Body.topology_version`
     pieces: tuple[
-        Body, ...
+        SoftBody, ...
     ]  # new bodies that fell off, the largest first; none where it still holds together
 
 

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.events.kinds import CONTACT_KINDS, KINDS, Event, Torn
 from taichi_soft.events.memory import Known, Memory
 from taichi_soft.events.witness import Witness
-
-if TYPE_CHECKING:
-    from taichi_soft.world.body import Body
 
 MOST_EVENTS = 10_000
 """That wait to be drained; then the oldest are dropped."""
@@ -87,22 +85,22 @@ class EventLog:
         self._listeners.append(listener)
         return listener
 
-    def watch(self, kind: type[Event], body: Body, threshold: float | None) -> None:
+    def watch(self, kind: type[Event], body: SoftBody, threshold: float | None) -> None:
         """Look at a body's stress for one of `STRESS_KINDS`, from a threshold [Pa] on; None for no longer."""
         self._witness.stress.set(kind, body, threshold)
         if threshold is not None:
             self._record(self._kinds | {kind})
 
-    def renew_watches(self, body: Body) -> None:
+    def renew_watches(self, body: SoftBody) -> None:
         """Look at the tetrahedra that a cut has left of a body."""
         self._witness.stress.renew(body)
 
-    def note_frozen(self, body: Body) -> None:
+    def note_frozen(self, body: SoftBody) -> None:
         """The step that is being made has frozen a body."""
         if self._kinds:
             self._witness.note_frozen(body)
 
-    def note_torn(self, step: int, time: float, body: Body, pieces: tuple[Body, ...]) -> None:
+    def note_torn(self, step: int, time: float, body: SoftBody, pieces: tuple[SoftBody, ...]) -> None:
         """What the step that ended at `time` [s] has pulled too hard has torn a body."""
         if Torn in self._kinds:
             self._waiting.append(Torn(step, time, body, pieces))

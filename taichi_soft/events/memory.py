@@ -7,18 +7,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.bodies.status import ABSENT
+from taichi_soft.contact.colliders import Collider
 from taichi_soft.core.serialisation import as_plain, from_plain
 from taichi_soft.events.kinds import STRESS_KINDS, Event
-
-if TYPE_CHECKING:
-    from taichi_soft.contact.colliders import Collider
-    from taichi_soft.world.body import Body
 
 CONTACT_WIDTH = 11
 """A row of a contact: key (3), serial numbers of the two, began, touched, pause [s], impulse (3) [N s]."""
@@ -30,7 +28,7 @@ _KINDS = {kind.__name__: kind for kind in STRESS_KINDS}
 class Known:
     """Handles that somebody holds, by their serial numbers."""
 
-    body: Callable[[int], Body | None]
+    body: Callable[[int], SoftBody | None]
     collider: Callable[[int], Collider | None]
 
 

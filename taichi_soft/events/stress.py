@@ -4,20 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.bodies.fields import BodyFields
 from taichi_soft.bodies.layout import Scene
+from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.core.constants import LANES
 from taichi_soft.elements.kernels.stress import NO_LIMIT, read_stress
 from taichi_soft.events.kinds import Event, StressExceeded, TearCandidates
 from taichi_soft.events.memory import Known, WatchNote
-
-if TYPE_CHECKING:
-    from taichi_soft.world.body import Body
 
 BACK_BELOW = 0.9
 """Part of a threshold below which a tetrahedron has to come before it can come over it again: or one that
@@ -29,7 +26,7 @@ VON_MISES, PRINCIPAL, AXIS = 0, 1, slice(2, 5)
 
 @dataclass(eq=False)
 class _Watch:
-    body: Body
+    body: SoftBody
     threshold: float  # [Pa]
     is_over: NDArray[np.bool_]  # (m,) in kernel order
 
@@ -49,13 +46,13 @@ class StressWatches:
         """Nothing is watched yet."""
         self._state = state
         self._scene = scene
-        self._watches: dict[tuple[type[Event], Body], _Watch] = {}
-        self._places: dict[Body, slice] = {}  # of each one's tetrahedra in what is read
+        self._watches: dict[tuple[type[Event], SoftBody], _Watch] = {}
+        self._places: dict[SoftBody, slice] = {}  # of each one's tetrahedra in what is read
         self._blocks = np.zeros(0, dtype=np.int32)
         self._limits = np.zeros(0, dtype=np.float32)  # of each block, for tears [Pa]
         self._read = np.zeros((0, 5), dtype=np.float32)
 
-    def set(self, kind: type[Event], body: Body, threshold: float | None) -> None:
+    def set(self, kind: type[Event], body: SoftBody, threshold: float | None) -> None:
         """Watch a body for a kind of event from a stress [Pa] on; None for no longer."""
         self._watches.pop((kind, body), None)
         if threshold is not None:
@@ -64,10 +61,10 @@ class StressWatches:
         if len(self._blocks):
             self._evaluate()  # so that nothing compiles in the game's next step
 
-    def _none_over(self, body: Body) -> NDArray[np.bool_]:
+    def _none_over(self, body: SoftBody) -> NDArray[np.bool_]:
         return np.zeros(len(self._scene.bodies[body.index].tet_vertices), dtype=np.bool_)
 
-    def renew(self, body: Body) -> None:
+    def renew(self, body: SoftBody) -> None:
         """Go on with a body that has lost tetrahedra; those over a threshold count as new."""
         for (kind, watched), watch in list(self._watches.items()):
             if watched is body:

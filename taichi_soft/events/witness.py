@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from taichi_soft.bodies.layout import Scene
+from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.bodies.status import ACTIVE, ASLEEP
+from taichi_soft.contact.colliders import Collider, Colliders
 from taichi_soft.contact.fields import PAIR_ROWS
 from taichi_soft.contact.kernels.touches import OF_BODY, read_touches
 from taichi_soft.events.contacts import Contacts, Key
@@ -26,24 +28,20 @@ from taichi_soft.events.kinds import (
 from taichi_soft.events.memory import Known, Memory
 from taichi_soft.events.stress import StressWatches
 
-if TYPE_CHECKING:
-    from taichi_soft.contact.colliders import Collider, Colliders
-    from taichi_soft.world.body import Body
-
 
 class Witness:
     """Compares each step with the one before it."""
 
     def __init__(
-        self, state: Any, scene: Scene, slots: Sequence[Body | None], colliders: Colliders | None
+        self, state: Any, scene: Scene, slots: Sequence[SoftBody | None], colliders: Colliders | None
     ) -> None:
         """Args: state: all fields of a world; slots: the body in each; colliders: None without contact."""
         self._state = state
         self._slots = slots
         self._colliders = colliders
         self._contacts = Contacts()
-        self._sleepers: dict[int, Body] = {}
-        self._frozen: list[Body] = []
+        self._sleepers: dict[int, SoftBody] = {}
+        self._frozen: list[SoftBody] = []
         self.stress = StressWatches(state, scene)
         room = state.capacity.contact
         rows = len(slots) * (room.colliders + (PAIR_ROWS if room.soft else 0)) + 1
@@ -69,7 +67,7 @@ class Witness:
         if not before & SLEEP_KINDS:
             self._sleepers = self._sleeping()
 
-    def note_frozen(self, body: Body) -> None:
+    def note_frozen(self, body: SoftBody) -> None:
         """The step that is being made has frozen a body."""
         self._frozen.append(body)
 
@@ -135,7 +133,7 @@ class Witness:
         self._count = read_touches(self._state, len(self._slots), self._status, self._who, self._impulses)
         self.lost_touches = bool(self._status[-1])
 
-    def _handles(self, key: Key) -> tuple[Body, Collider | Body]:
+    def _handles(self, key: Key) -> tuple[SoftBody, Collider | SoftBody]:
         a, kind, b = key
         body = self._slots[a]
         assert body is not None
@@ -144,7 +142,7 @@ class Witness:
         assert other is not None
         return body, other
 
-    def _sleeping(self) -> dict[int, Body]:
+    def _sleeping(self) -> dict[int, SoftBody]:
         """Sleeping bodies by their slots, ascending."""
         slots = np.flatnonzero(self._status[:-1] == ASLEEP).tolist()
         return {slot: body for slot in slots if (body := self._slots[slot]) is not None}

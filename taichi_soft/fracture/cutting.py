@@ -8,7 +8,7 @@ stay.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,17 +16,15 @@ from numpy.typing import NDArray
 from taichi_soft.bodies.fields import BodyFields, with_spare_rows
 from taichi_soft.bodies.kernels.plasticity import read_rest_inverses
 from taichi_soft.bodies.layout import BodyArrays, BodyDescription, arrange_part, blocks_of
+from taichi_soft.bodies.part import Part
+from taichi_soft.bodies.soft_body import Context, SoftBody
 from taichi_soft.bodies.status import ABSENT, ACTIVE
+from taichi_soft.control.attachments import share_attachments
 from taichi_soft.core.checks import as_array, as_vector
 from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.fracture.kernels.topology import MOTION_WIDTH, read_motion, write_body
-from taichi_soft.fracture.parts import Part
 from taichi_soft.meshing import TetMesh
 from taichi_soft.meshing.splitting import InnerFaces, loose_parts, split_vertices
-
-if TYPE_CHECKING:
-    from taichi_soft.world.body import Body
-    from taichi_soft.world.world import World
 
 Floats = NDArray[np.float64]
 
@@ -34,7 +32,7 @@ CRUMB = 0.02
 """Part of the whole body's volume below which what is torn off takes no slot: those are for larger parts."""
 
 
-def cut(body: Body, plane: Any, triangle: Any) -> tuple[Body, ...]:
+def cut(body: SoftBody, plane: Any, triangle: Any) -> tuple[SoftBody, ...]:
     """As `Body.cut`."""
     require_cuttable(body)
     corners, normal, is_endless = _blade(plane, triangle)
@@ -45,14 +43,14 @@ def cut(body: Body, plane: Any, triangle: Any) -> tuple[Body, ...]:
     return divide(body, faces, is_cut)
 
 
-def require_cuttable(body: Body) -> None:
+def require_cuttable(body: SoftBody) -> None:
     """Raises: OptionError for a body that was not made to be cut; StateError for one that cannot be now."""
-    world = body._world
+    context = body._context
     if body.asset.spare_vertices == 0:
         raise OptionError(
             f"body {body.index} has no room for copies of vertices: make its asset with spare_vertices"
         )
-    if not world.is_built:
+    if context.fields is None:
         raise StateError("the world is not built: call world.build() first, and cut what moves")
     if body._is_pulled:
         raise StateError(
@@ -106,14 +104,14 @@ class _Piece:
 
 
 def divide(
-    body: Body, faces: InnerFaces, is_cut: NDArray[np.bool_], *, keeps_crumbs: bool = False
-) -> tuple[Body, ...]:
+    body: SoftBody, faces: InnerFaces, is_cut: NDArray[np.bool_], *, keeps_crumbs: bool = False
+) -> tuple[SoftBody, ...]:
     """Open a body along faces. Returns the bodies that fell off, the largest first.
 
     Args:
         keeps_crumbs: small parts stay in the body, and so do those for which there is no slot.
     """
-    world, mesh = body._world, body.mesh
+    context, mesh = body._context, body.mesh
     assert isinstance(mesh, TetMesh), "others are refused before"
     tets, vertices = split_vertices(mesh.tets, len(mesh.vertices), faces, is_cut)
     if len(vertices) == len(mesh.vertices):
@@ -121,7 +119,7 @@ def divide(
     part = loose_parts(tets, len(vertices))
     sizes = np.bincount(part, mesh.volumes)
     numbers = np.argsort(-sizes, kind="stable")  # largest first
-    slots = world._pools.free_slots(body.asset)
+    slots = context.slots.free_slots(body.asset)
     if keeps_crumbs:
         own = numbers[1 : 1 + len(slots)]
         volume = body.asset.mesh.volumes.sum()  # type: ignore[attr-defined]
@@ -135,12 +133,12 @@ def divide(
         )
     pieces = [_piece(body, tets, vertices, np.flatnonzero(part == number)) for number in numbers]
     for piece in pieces:
-        require_room(world, body.index, piece.arrays)
-    return _settle(world, body, pieces, slots)
+        require_room(context, body.index, piece.arrays)
+    return _settle(context, body, pieces, slots)
 
 
 def _piece(
-    body: Body, tets: NDArray[np.int32], vertices: NDArray[np.int64], rows: NDArray[np.int64]
+    body: SoftBody, tets: NDArray[np.int32], vertices: NDArray[np.int64], rows: NDArray[np.int64]
 ) -> _Piece:
     """A body of some of the tetrahedra."""
     before = body._description
@@ -153,13 +151,13 @@ def _piece(
         before.model,
         np.flatnonzero(np.isin(origins, before.pinned)).astype(np.int32),
     )
-    arrays = arrange_part(description, body._world._scene.bodies[body.index], origins, rows)
+    arrays = arrange_part(description, body._context.layout.bodies[body.index], origins, rows)
     return _Piece(description, arrays, origins, rows)
 
 
-def require_room(world: World, slot: int, arrays: BodyArrays) -> None:
+def require_room(context: Context, slot: int, arrays: BodyArrays) -> None:
     """Raises: StateError where a part of a body does not fit into its slot."""
-    place = world._scene.ranges[slot]
+    place = context.layout.ranges[slot]
     for name, rows, (begin, end) in (
         ("vertices", arrays.mass, place.particles),
         ("edges", arrays.edge_vertices, place.edges),
@@ -169,21 +167,21 @@ def require_room(world: World, slot: int, arrays: BodyArrays) -> None:
             raise StateError(
                 f"the cut would leave {len(rows)} {name} in body {slot}, and there is room for "
                 f"{end - begin}: make its asset with more spare_vertices than "
-                f"{world._pools.assets[slot].spare_vertices}"
+                f"{context.slots.assets[slot].spare_vertices}"
             )
 
 
-def _settle(world: World, body: Body, pieces: list[_Piece], slots: list[int]) -> tuple[Body, ...]:
+def _settle(context: Context, body: SoftBody, pieces: list[_Piece], slots: list[int]) -> tuple[SoftBody, ...]:
     """Write the first piece into the body's slot and the others into free ones. Refuses nothing."""
-    simulation = world._built
-    state = simulation.state
+    built = context.built
+    state = built.state
     motion = np.empty((body.vertex_count, MOTION_WIDTH), dtype=np.float32)
     read_motion(state, body.index, motion)
     inverses = None
     if state.capacity.plastic:
         inverses = np.empty((len(body.tets), 3, 3), dtype=np.float32)
         read_rest_inverses(state, body.index, inverses)
-        inverses = inverses[np.argsort(world._scene.bodies[body.index].tet_order)]
+        inverses = inverses[np.argsort(context.layout.bodies[body.index].tet_order)]
     for slot, piece in zip([body.index, *slots], pieces, strict=False):
         rows = motion[piece.vertices]
         free = rows[:, 12] > 0.0
@@ -193,32 +191,34 @@ def _settle(world: World, body: Body, pieces: list[_Piece], slots: list[int]) ->
         rows[:, 15] = masses
         present = None if inverses is None else inverses[piece.tets][piece.arrays.tet_order]
         _write(state, slot, piece.arrays, rows, ACTIVE, body.index, present)
-    simulation.has_changed()
-    fallen = tuple(world._take_in(body.asset) for _ in pieces[1:])
+    built.has_changed()
+    fallen = tuple(context.take_in(context, body.asset) for _ in pieces[1:])
     vertices, tets = body.vertex_origins, body.tet_origins
     for each, piece in zip((body, *fallen), pieces, strict=True):
         each._redescribe(piece.description, piece.arrays)
         corners, order = piece.description.mesh.tets, piece.arrays.order
         each._become(Part(vertices[piece.vertices], order, tets[piece.tets], corners))
-    body._share_attachments(
-        [(each, piece.vertices) for each, piece in zip((body, *fallen), pieces, strict=True)]
+    share_attachments(
+        body, [(each, piece.vertices) for each, piece in zip((body, *fallen), pieces, strict=True)]
     )
-    simulation.events.renew_watches(body)
+    built.was_cut(body)
     return fallen
 
 
-def warm_up(world: World, state: BodyFields, slot: int) -> None:
+def warm_up(context: Context, state: BodyFields, slot: int) -> None:
     """Make a body's slot what it is, so that nothing compiles where the first cut comes in the game."""
-    read_motion(state, slot, np.empty((len(world._scene.bodies[slot].mass), MOTION_WIDTH), dtype=np.float32))
-    refill_slot(world, state, slot)
+    read_motion(
+        state, slot, np.empty((len(context.layout.bodies[slot].mass), MOTION_WIDTH), dtype=np.float32)
+    )
+    refill_slot(context, state, slot)
 
 
-def refill_slot(world: World, state: BodyFields, slot: int, part: BodyArrays | None = None) -> None:
+def refill_slot(context: Context, state: BodyFields, slot: int, part: BodyArrays | None = None) -> None:
     """Write the whole body of its asset, or a part of it, into a slot where another part was, at rest."""
-    arrays = world._pools.assets[slot].arrays if part is None else part
+    arrays = context.slots.assets[slot].arrays if part is None else part
     rows = np.zeros((len(arrays.mass), MOTION_WIDTH), dtype=np.float32)
     _write(state, slot, arrays, rows, ABSENT, slot, None)
-    world._scene.bodies[slot] = arrays
+    context.layout.bodies[slot] = arrays
 
 
 def _write(

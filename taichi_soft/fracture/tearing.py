@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from taichi_soft.bodies.fields import BodyFields
 from taichi_soft.bodies.measures import green_strain_and_stress
+from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.core.errors import StateError
 from taichi_soft.fracture.cutting import divide
 from taichi_soft.fracture.kernels.tearing import find_overloaded
 from taichi_soft.meshing.splitting import InnerFaces
-
-if TYPE_CHECKING:
-    from taichi_soft.bodies.fields import BodyFields
-    from taichi_soft.world.body import Body
 
 Floats = NDArray[np.float64]
 
@@ -31,27 +28,27 @@ that a tear runs on before another begins."""
 class Tears:
     """Where a world's bodies may tear, after every step."""
 
-    def __init__(self, state: BodyFields, slots: Sequence[Body | None]) -> None:
+    def __init__(self, state: BodyFields, slots: Sequence[SoftBody | None]) -> None:
         """Args: slots: the body in each."""
         self._state, self._slots = state, slots
         self._limits = np.zeros(len(slots), dtype=np.float32)
         self._found = np.zeros(len(slots), dtype=np.int32)
         find_overloaded(state, self._limits, self._found)  # compiles
 
-    def watch(self, body: Body) -> None:
+    def watch(self, body: SoftBody) -> None:
         """Look at a body from now on, if it can tear; its slot may have held another."""
         tearing = body.asset.tearing
         self._limits[body.index] = 0.0 if tearing is None else tearing.stress
 
-    def rests(self, body: Body) -> bool:
+    def rests(self, body: SoftBody) -> bool:
         """Whether a body that can tear has no room for it any more."""
         return body.asset.tearing is not None and bool(self._limits[body.index] == 0.0)
 
-    def rest(self, body: Body) -> None:
+    def rest(self, body: SoftBody) -> None:
         """Look at a body no more."""
         self._limits[body.index] = 0.0
 
-    def tear(self) -> Iterator[tuple[Body, tuple[Body, ...]]]:
+    def tear(self) -> Iterator[tuple[SoftBody, tuple[SoftBody, ...]]]:
         """Tear what the last step has pulled too hard. Yields: each body that tore, and what fell off it."""
         find_overloaded(self._state, self._limits, self._found)
         for slot in np.flatnonzero(self._found).tolist():
@@ -68,7 +65,7 @@ class Tears:
                 yield body, pieces
 
 
-def _tear(body: Body) -> tuple[Body, ...]:
+def _tear(body: SoftBody) -> tuple[SoftBody, ...]:
     tearing, mesh = body.asset.tearing, body.mesh
     assert tearing is not None
     stress = green_strain_and_stress(body)[1]

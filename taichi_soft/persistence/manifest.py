@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,20 +11,21 @@ from numpy.typing import NDArray
 from taichi_soft.bodies.failure import FailedStep
 from taichi_soft.bodies.fields import MOST_GRABS
 from taichi_soft.bodies.layout import BodyArrays, BodyDescription
+from taichi_soft.bodies.part import Part, name_of
+from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.contact.colliders import Collider, ColliderRow
 from taichi_soft.contact.shapes import Shape
+from taichi_soft.control.frames import Frames
+from taichi_soft.control.grabs import Grabs
 from taichi_soft.control.joint_fields import MOST_JOINTS
+from taichi_soft.control.joints import Joints
 from taichi_soft.core.checks import as_count, as_flag, as_number
 from taichi_soft.core.constants import ALL_GROUPS, POSITION_LIMIT
 from taichi_soft.core.errors import SnapshotError, TaichiSoftError
 from taichi_soft.core.serialisation import as_plain, digest_of, from_plain, plain_of
 from taichi_soft.elements.laws import fit_model
 from taichi_soft.fracture.cutting import require_room
-from taichi_soft.fracture.parts import Part, name_of
-from taichi_soft.world.body import Body
-
-if TYPE_CHECKING:
-    from taichi_soft.world.world import World
+from taichi_soft.solver.context import WorldContext
 
 _MOST = 1 << 53
 """No count of steps or handles, and no time [s], is larger."""
@@ -33,19 +34,19 @@ _FARTHEST = 1e12
 """No collider has got so far [m], however long it moved at the highest speed."""
 
 
-def take_notes(world: World) -> dict[str, Any]:
+def take_notes(context: WorldContext) -> dict[str, Any]:
     """What Python knows of a world's state, as plain data."""
-    frames = world._frames
+    frames = context.of(Frames)
     return {
-        "steps": world._clock.steps,
-        "time": world._clock.time,
-        "last_dt": world._clock.last_dt,
-        "handles": world._handles.count,
-        "bodies": [None if body is None else _body_note(body) for body in world._pools.slots],
-        "colliders": [_collider_note(handle) for handle in world._colliders.all_handles],
+        "steps": context.clock.steps,
+        "time": context.clock.time,
+        "last_dt": context.clock.last_dt,
+        "handles": context.handles.count,
+        "bodies": [None if body is None else _body_note(context, body) for body in context.slots.slots],
+        "colliders": [_collider_note(handle) for handle in context.colliders.all_handles],
         "shapes": {
             digest_of(row.shape): plain_of(row.shape)
-            for row in (handle._row for handle in world._colliders.all_handles)
+            for row in (handle._row for handle in context.colliders.all_handles)
             if not len(row.shape.samples)
         },
         "frames": [None if frame is None else frame._serial for frame in frames.rows],
@@ -54,17 +55,17 @@ def take_notes(world: World) -> dict[str, Any]:
         "aims": frames.has_work,
         "grabs": [
             [grab._serial, number, grab.body.index, grab.point.tolist()]
-            for number, grab in sorted(world._grabs.items())
+            for number, grab in sorted(context.of(Grabs).by_number.items())
         ],
         "joints": [
             [joint._serial, number, joint.body.index, joint.other.index, joint.particles.tolist()]
-            for number, joint in sorted(world._joints.items())
+            for number, joint in sorted(context.of(Joints).by_number.items())
         ],
     }
 
 
-def _body_note(body: Body) -> list[Any]:
-    failed, tears = body._frozen_in, body._world._built.tears
+def _body_note(context: WorldContext, body: SoftBody) -> list[Any]:
+    failed, tears = body._frozen_in, context.built.tears
     is_own = body._description is not body.asset.description
     return [
         body._serial,
@@ -121,7 +122,7 @@ class Notes:
     joints: list[tuple[int, int, int, int, NDArray[np.int32]]]
 
 
-def read_parts(world: World, notes: list[Any], rows: NDArray[np.int32]) -> dict[int, Part]:
+def read_parts(context: WorldContext, notes: list[Any], rows: NDArray[np.int32]) -> dict[int, Part]:
     """What cuts have left of bodies, by slot, from the notes of these and the rows of all parts one by one.
 
     Raises: as `read_notes`.
@@ -132,7 +133,7 @@ def read_parts(world: World, notes: list[Any], rows: NDArray[np.int32]) -> dict[
             n, m = (_below(count, len(rows) + 1) for count in note[5][:2])
             size = 2 * n + 5 * m
             parts[slot] = Part.of_rows(rows[:size], n, m)
-            parts[slot].require_of(world._pools.assets[slot])
+            parts[slot].require_of(context.slots.assets[slot])
             if parts[slot].digest != note[5][2]:
                 raise ValueError(f"what was cut off body {slot} has another name")
             rows = rows[size:]
@@ -141,7 +142,7 @@ def read_parts(world: World, notes: list[Any], rows: NDArray[np.int32]) -> dict[
     return parts
 
 
-def read_notes(world: World, notes: dict[str, Any], parts: dict[int, Part]) -> Notes:
+def read_notes(context: WorldContext, notes: dict[str, Any], parts: dict[int, Part]) -> Notes:
     """Notes of `take_notes`. Raises: SnapshotError, or what Python raises where they are not in order."""
     frames = [None if serial is None else int(serial) for serial in notes["frames"]]
     poses = {
@@ -150,10 +151,10 @@ def read_notes(world: World, notes: dict[str, Any], parts: dict[int, Part]) -> N
     }
     if not all((np.abs(rows) <= POSITION_LIMIT).all() for rows in poses.values()):
         raise ValueError("a frame is out of reach")
-    slots = world.slot_count
+    slots = len(context.slots.slots)
     if len(notes["bodies"]) != slots:
         raise ValueError("it has another number of bodies")
-    bodies = [_read_body(world, i, note, frames, parts.get(i)) for i, note in enumerate(notes["bodies"])]
+    bodies = [_read_body(context, i, note, frames, parts.get(i)) for i, note in enumerate(notes["bodies"])]
     grabs = [
         (int(serial), _below(number, MOST_GRABS), _below(slot, slots), _vector(point, 3))
         for serial, number, slot, point in notes["grabs"]
@@ -167,13 +168,13 @@ def read_notes(world: World, notes: dict[str, Any], parts: dict[int, Part]) -> N
         as_number(notes["last_dt"], "last_dt", 0.0, _MOST),
         as_count(notes["handles"], "handles", 1, _MOST),
         bodies,
-        [_read_collider(world, note, notes["shapes"]) for note in _some(notes["colliders"], world)],
+        [_read_collider(context, note, notes["shapes"]) for note in _some(notes["colliders"], context)],
         frames,
         poses["present"].astype(np.float32),
         poses["coming"].astype(np.float32),
         bool(notes["aims"]),
         grabs,
-        [_read_joint(world, bodies, note) for note in notes["joints"]],
+        [_read_joint(context, bodies, note) for note in notes["joints"]],
     )
 
 
@@ -188,20 +189,20 @@ def _require_serials(notes: dict[str, Any]) -> None:
         raise ValueError("two handles have the same number")
 
 
-def _some(notes: list[Any], world: World) -> list[Any]:
-    if len(notes) > world._built.state.capacity.contact.colliders:
+def _some(notes: list[Any], context: WorldContext) -> list[Any]:
+    if len(notes) > context.built.state.capacity.contact.colliders:
         raise ValueError(f"it has {len(notes)} colliders, and there is no room for them")
     return notes
 
 
 def _read_body(
-    world: World, slot: int, note: Any, frames: list[int | None], part: Part | None
+    context: WorldContext, slot: int, note: Any, frames: list[int | None], part: Part | None
 ) -> BodyNote | None:
     if note is None:
         return None
     serial, first_step, failed, material, attachments, _, rests = note
-    asset = world._pools.assets[slot]
-    whole, present = asset.description, world._pools.slots[slot]
+    asset = context.slots.assets[slot]
+    whole, present = asset.description, context.slots.slots[slot]
     if present is not None and (present._serial != serial or name_of(present._part) != name_of(part)):
         present = None
     own = None if present is None or present._description is whole else present._description
@@ -224,7 +225,7 @@ def _read_body(
         raise ValueError(f"body {slot} was cut and has no material")
     if part is not None and present is None:
         arrays = part.arrange(asset, description)
-        require_room(world, slot, arrays)
+        require_room(context, slot, arrays)
     n = len(description.mesh.vertices)
     return BodyNote(
         int(serial),
@@ -243,9 +244,9 @@ def _read_body(
     )
 
 
-def _read_collider(world: World, note: Any, shapes: dict[str, Any]) -> tuple[int, ColliderRow]:
+def _read_collider(context: WorldContext, note: Any, shapes: dict[str, Any]) -> tuple[int, ColliderRow]:
     serial, is_alive, digest, offset, surface, motion, target = note
-    shape = world._colliders.shapes.get(digest)
+    shape = context.colliders.shapes.get(digest)
     if shape is None:
         shape = from_plain(shapes.get(digest))
     if not isinstance(shape, Shape):
@@ -274,18 +275,18 @@ def _read_collider(world: World, note: Any, shapes: dict[str, Any]) -> tuple[int
         None if target is None else (_vector(target[0], 3), _vector(target[1], 4)),
         as_flag(is_alive, "is_alive"),
     )
-    if not row.offset <= world._built.state.capacity.contact.samples - len(shape.samples):
+    if not row.offset <= context.built.state.capacity.contact.samples - len(shape.samples):
         raise ValueError("a collider's grid lies outside the room for grids")
     return int(serial), row
 
 
 def _read_joint(
-    world: World, bodies: list[BodyNote | None], note: Any
+    context: WorldContext, bodies: list[BodyNote | None], note: Any
 ) -> tuple[int, int, int, int, NDArray[np.int32]]:
     serial, number, body, other, particles = note
     a, b = (_below(slot, len(bodies)) for slot in (body, other))
     held = bodies[a]
-    if a == b or held is None or bodies[b] is None or not world._built.program.has_contact:
+    if a == b or held is None or bodies[b] is None or not context.built.program.has_contact:
         raise ValueError("a joint holds no bodies")
     n = len(held.description.mesh.vertices)
     return int(serial), _below(number, MOST_JOINTS), a, b, _indices(particles, n)

@@ -11,7 +11,7 @@ import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,13 +20,12 @@ from taichi_soft.bodies.asset import SoftBodyAsset
 from taichi_soft.contact.shapes import Shape
 from taichi_soft.core.checks import as_path
 from taichi_soft.core.container import name_of_sealed, seal, unseal
-from taichi_soft.core.errors import SnapshotError, StateError
+from taichi_soft.core.errors import SnapshotError
 from taichi_soft.core.handles import Handle
 from taichi_soft.core.serialisation import as_plain, digest_of, from_json, plain_of, to_json
+from taichi_soft.persistence.snapshot import state_hash, take_snapshot
 from taichi_soft.persistence.structure import asset_digest
-
-if TYPE_CHECKING:
-    from taichi_soft.world.world import World
+from taichi_soft.solver.context import WorldContext
 
 MARK, VERSION = b"TSOFTREC", 1
 
@@ -65,11 +64,11 @@ class _Stretch:
 class Recorder:
     """Takes notes of what is done to one world."""
 
-    def __init__(self, world: World, ticks: int) -> None:
-        """Begins now, with a built world."""
-        self._ticks = ticks
+    def __init__(self, context: WorldContext, ticks: int, path: Path) -> None:
+        """Begins now, with a built world. `path`: where it writes where a body freezes."""
+        self._ticks, self._path = ticks, path
         self._before: _Stretch | None = None
-        self._present = _Stretch(world.snapshot())
+        self._present = _Stretch(take_snapshot(context))
         self._is_inside = False
         self._has_written = False
         self.pushes: Pushes = []  # of a force field in the coming step
@@ -89,24 +88,26 @@ class Recorder:
         self._present.entries.append(["call", handle._serial, method.__name__, *kept])
         return found
 
-    def note_step(self, world: World, seconds: float, substeps: int, *, is_broken: bool) -> list[str]:
+    def note_step(
+        self, context: WorldContext, seconds: float, substeps: int, *, is_broken: bool
+    ) -> list[str]:
         """Note a step that was made, and the name of the state after it; write all where a body froze in it.
 
         Returns: what to tell the user.
         """
         pushes = [[serial, rows] for serial, rows in self.pushes]
         self.pushes = []
-        self._present.entries.append(["step", seconds, substeps, world.state_hash(), pushes])
+        self._present.entries.append(["step", seconds, substeps, state_hash(context), pushes])
         self._present.steps += 1
-        told = [self._write(world)] if is_broken and not self._has_written else []
+        told = [self._write(context)] if is_broken and not self._has_written else []
         if self._present.steps >= self._ticks:
-            self._before, self._present = self._present, _Stretch(world.snapshot())
+            self._before, self._present = self._present, _Stretch(take_snapshot(context))
         return told
 
-    def _write(self, world: World) -> str:
+    def _write(self, context: WorldContext) -> str:
         self._has_written = True
         try:
-            file = save_recording(world, world._record_to)
+            file = self.save(context, self._path)
         except SnapshotError as error:
             return f"no recording: {error}"
         return f"`taichi-soft replay {file}` shows how it came to that"
@@ -115,7 +116,7 @@ class Recorder:
         """Note that one was taken now."""
         self._present.mark(snapshot)
 
-    def go_back(self, world: World, snapshot: bytes) -> None:
+    def go_back(self, context: WorldContext, snapshot: bytes) -> None:
         """Note that `World.restore` has undone what was done since; begin again where that was not here."""
         name = name_of_sealed(snapshot)
         self.pushes = []
@@ -125,20 +126,20 @@ class Recorder:
             self._before.go_back(name)
             self._present, self._before = self._before, None
         else:
-            self._before, self._present = None, _Stretch(world.snapshot())
+            self._before, self._present = None, _Stretch(take_snapshot(context))
 
-    def content(self, world: World) -> bytes:
+    def content(self, context: WorldContext) -> bytes:
         """The recording as it stands."""
         first = self._before or self._present
         entries = [*(self._before.entries if self._before else []), *self._present.entries]
-        shapes = {name: plain_of(shape) for name, shape in world._colliders.shapes.items()}
-        assets = {asset_digest(asset): asset for asset in world._pools.kinds}
+        shapes = {name: plain_of(shape) for name, shape in context.colliders.shapes.items()}
+        assets = {asset_digest(asset): asset for asset in context.slots.kinds}
         made_of = {
-            "world": _world_options(world),
-            "slots": [asset_digest(asset) for asset in world._pools.assets],
+            "world": _world_options(context),
+            "slots": [asset_digest(asset) for asset in context.slots.assets],
             "assets": {name: _asset_options(asset) for name, asset in assets.items()},
             "shapes": shapes,
-            "built_with": world._built_with,
+            "built_with": context.built_with,
             "entries": [[as_plain(each) for each in entry[:3]] + _plain(entry[3:]) for entry in entries],
         }
         plain = to_json(made_of)
@@ -149,20 +150,16 @@ class Recorder:
             )
         return seal(MARK, VERSION, [zlib.compress(plain, 1), first.snapshot])
 
-
-def save_recording(world: World, path: Any) -> Path:
-    """As `World.save_recording`."""
-    recorder = world._recorder
-    file = as_path(path)
-    if recorder is None:
-        raise StateError("this world records nothing: make it with World(record=240)")
-    content = recorder.content(world)
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_bytes(content)
-    except OSError as error:
-        raise SnapshotError(f"cannot write {str(file)!r}: {error.strerror or error}") from None
-    return file
+    def save(self, context: WorldContext, path: Any) -> Path:
+        """As `World.save_recording`."""
+        file = as_path(path)
+        content = self.content(context)
+        try:
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_bytes(content)
+        except OSError as error:
+            raise SnapshotError(f"cannot write {str(file)!r}: {error.strerror or error}") from None
+        return file
 
 
 def read_recording(path: Any) -> tuple[dict[str, Any], bytes]:
@@ -185,9 +182,9 @@ def read_recording(path: Any) -> tuple[dict[str, Any], bytes]:
     return made_of, bytes(snapshot)
 
 
-def _world_options(world: World) -> dict[str, Any]:
+def _world_options(context: WorldContext) -> dict[str, Any]:
     """Arguments of `World`, beside what the snapshot holds."""
-    chosen = world.settings
+    chosen = context.settings
     names = (
         "restitution",
         "friction",
@@ -201,10 +198,10 @@ def _world_options(world: World) -> dict[str, Any]:
     return {
         **{name: as_plain(getattr(chosen, name)) for name in names},
         "gravity": chosen.gravity.tolist(),
-        "soft_contact": world._contact.soft,
-        "sleep_speed": world._contact.sleep_speed,
-        "collider_room": world._contact.collider_room,
-        "sample_room": world._contact.sample_room,
+        "soft_contact": context.contact.soft,
+        "sleep_speed": context.contact.sleep_speed,
+        "collider_room": context.contact.collider_room,
+        "sample_room": context.contact.sample_room,
     }
 
 

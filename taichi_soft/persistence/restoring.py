@@ -3,119 +3,117 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from taichi_soft.bodies.part import name_of
+from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.contact.colliders import Collider
 from taichi_soft.control.attachments import Attachment
-from taichi_soft.control.frames import Frame
-from taichi_soft.control.grabs import Grab
-from taichi_soft.control.joints import Joint
+from taichi_soft.control.frames import Frame, Frames
+from taichi_soft.control.grabs import Grab, Grabs
+from taichi_soft.control.joints import Joint, Joints
 from taichi_soft.control.materials import write_constants
 from taichi_soft.core.serialisation import as_plain
 from taichi_soft.fracture.cutting import refill_slot
-from taichi_soft.fracture.parts import name_of
 from taichi_soft.persistence.manifest import BodyNote, Notes
+from taichi_soft.solver.context import WorldContext
 from taichi_soft.solver.state import State
-from taichi_soft.world.body import Body
-
-if TYPE_CHECKING:
-    from taichi_soft.world.world import World
 
 
-def put_back(world: World, notes: Notes) -> None:
+def put_back(context: WorldContext, notes: Notes) -> None:
     """Let a world be as its notes say, but for what the fields hold. Nothing here can be refused any more."""
-    simulation, clock = world._built, world._clock
+    simulation, clock = context.built, context.clock
     clock.steps, clock.time, clock.last_dt = notes.steps, notes.time, notes.last_dt
-    handles = world._handles
-    _apply_frames(world, notes)
-    colliders = world._colliders
+    handles = context.handles
+    _apply_frames(context, notes)
+    colliders = context.colliders
     colliders.restore(
         [row for _, row in notes.colliders],
-        lambda i, row: _handle(world, notes.colliders[i][0], Collider, lambda: Collider(colliders, i, row)),
+        lambda i, row: _handle(context, notes.colliders[i][0], Collider, lambda: Collider(colliders, i, row)),
     )
     for slot, wanted in enumerate(notes.bodies):
-        _apply_body(world, simulation.state, slot, wanted)
-    world._grabs.clear()
+        _apply_body(context, simulation.state, slot, wanted)
+    context.of(Grabs).by_number.clear()
     for serial, number, slot, point in notes.grabs:
-        body = world._pools.slots[slot]
+        body = context.slots.slots[slot]
         assert body is not None
-        grab = _handle(world, serial, Grab, lambda b=body, n=number, x=point: Grab(b, n, x))  # type: ignore[misc]
+        grab = _handle(context, serial, Grab, lambda b=body, n=number, x=point: Grab(b, n, x))  # type: ignore[misc]
         grab.body, grab._number, grab._point = body, number, point
-        world._grabs[number] = grab
-    _apply_joints(world, notes)
+        context.of(Grabs).by_number[number] = grab
+    _apply_joints(context, notes)
     handles.count = notes.handles
     if simulation.tears is not None:
-        for body, wanted in zip(world._pools.slots, notes.bodies, strict=True):
+        for body, wanted in zip(context.slots.slots, notes.bodies, strict=True):
             if body is not None and wanted is not None:
                 simulation.tears.watch(body)
                 if wanted.rests:
                     simulation.tears.rest(body)
     simulation.has_changed()
-    world._substeps.forget()
+    context.substeps.forget()
 
 
-def _handle(world: World, serial: int, kind: type[Any], make: Callable[[], Any]) -> Any:
+def _handle(context: WorldContext, serial: int, kind: type[Any], make: Callable[[], Any]) -> Any:
     """The handle of that number: the one that the caller has, or a new one."""
-    found = world._handles.find(serial, kind)
+    found = context.handles.find(serial, kind)
     if found is None:
         found = make()
-        world._handles.enlist(found, serial)
+        context.handles.enlist(found, serial)
     return found
 
 
-def _apply_joints(world: World, notes: Notes) -> None:
-    world._joints.clear()
+def _apply_joints(context: WorldContext, notes: Notes) -> None:
+    context.of(Joints).by_number.clear()
     for serial, number, a, b, particles in notes.joints:
-        body, other = world._pools.slots[a], world._pools.slots[b]
+        body, other = context.slots.slots[a], context.slots.slots[b]
         assert body is not None
         assert other is not None
-        joint = world._handles.find(serial, Joint) or Joint(body, other, number, particles)
-        world._handles.enlist(joint, serial)
+        joint = context.handles.find(serial, Joint) or Joint(body, other, number, particles)
+        context.handles.enlist(joint, serial)
         joint.body, joint.other, joint._number, joint.particles = body, other, number, particles
-        world._joints[number] = joint
+        context.of(Joints).by_number[number] = joint
 
 
-def _apply_frames(world: World, notes: Notes) -> None:
-    frames = world._frames
+def _apply_frames(context: WorldContext, notes: Notes) -> None:
+    frames = context.of(Frames)
     frames.present, frames.coming, frames.has_work = notes.present, notes.coming, notes.aims
     frames.rows = [None] * len(notes.frames)
     for number, serial in enumerate(notes.frames):
         if serial is None:
             continue
-        frame = world._handles.find(serial, Frame)
+        frame = context.handles.find(serial, Frame)
         if frame is None or frame._number != number:
             frame = Frame._at(frames, number)
-        world._handles.enlist(frame, serial)
+        context.handles.enlist(frame, serial)
         frames.rows[number] = frame
 
 
-def _apply_body(world: World, state: State, slot: int, wanted: BodyNote | None) -> None:
+def _apply_body(context: WorldContext, state: State, slot: int, wanted: BodyNote | None) -> None:
     """Put the right body into a slot, of the right material."""
-    present, asset = world._pools.slots[slot], world._pools.assets[slot]
+    present, asset = context.slots.slots[slot], context.slots.assets[slot]
     if present is not None and (wanted is None or present._serial != wanted.serial):
         if present._description is not asset.description and not present.is_cut:
             write_constants(state, present, asset.description)
             present._description = asset.description
         present._attachments.clear()
-        world._pools.leave(present)
-        present._removed_in = world.step_count
+        context.slots.leave(present)
+        present._removed_in = context.clock.steps
         present = None
     if wanted is None:
         return
     if present is not None and name_of(present._part) != name_of(wanted.part):
-        refill_slot(world, state, slot, wanted.arrays)
+        refill_slot(context, state, slot, wanted.arrays)
     if present is None:
-        if wanted.part is not None or world._scene.bodies[slot] is not asset.arrays:
-            refill_slot(world, state, slot, wanted.arrays)
-        known = world._handles.find(wanted.serial, Body)
+        if wanted.part is not None or context.layout.bodies[slot] is not asset.arrays:
+            refill_slot(context, state, slot, wanted.arrays)
+        known = context.handles.find(wanted.serial, SoftBody)
         if known is not None and known.index == slot and known.asset is asset:
             present = known
         else:
-            present = Body(world, slot, asset)
-            world._handles.enlist(present, wanted.serial)
+            present = context.make_body(context, slot, asset)
+            context.handles.enlist(present, wanted.serial)
         present._removed_in = None
         present._description = asset.description if wanted.part is None else wanted.description
-        world._pools.enter_at(present)
+        context.slots.enter_at(present)
     if name_of(present._part) != name_of(wanted.part):
         present._become(wanted.part)
         present._description = asset.description if wanted.part is None else wanted.description
@@ -126,11 +124,11 @@ def _apply_body(world: World, state: State, slot: int, wanted: BodyNote | None) 
     present._description = wanted.description
     present._attachments.clear()
     for serial, number, two_way, particles in wanted.attachments:
-        frame = world._frames.rows[number]
+        frame = context.of(Frames).rows[number]
         assert frame is not None
-        held = world._handles.find(serial, Attachment) or Attachment(
+        held = context.handles.find(serial, Attachment) or Attachment(
             present, particles, frame, two_way=two_way
         )
         held.body, held.frame, held.particles, held.two_way = present, frame, particles, two_way
-        world._handles.enlist(held, serial)
+        context.handles.enlist(held, serial)
         present._attachments.append(held)

@@ -10,16 +10,18 @@ meshes that cuts have left (see `fracture.parts`). The last part is what events 
 from __future__ import annotations
 
 from hashlib import blake2b
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.bodies.fields import PATCH_ROWS
+from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.bodies.status import ABSENT
 from taichi_soft.contact.colliders import Collider
+from taichi_soft.control.grabs import Grabs
 from taichi_soft.control.joint_fields import JOINT_ROWS
-from taichi_soft.control.joints import renew_islands, rows_in_use
+from taichi_soft.control.joints import Joints
 from taichi_soft.control.kernels.joints import forget_held
 from taichi_soft.control.kernels.pins import WITH_FRAME
 from taichi_soft.core.constants import POSITION_LIMIT, VELOCITY_LIMIT
@@ -44,12 +46,9 @@ from taichi_soft.persistence.kernels.words import (
 )
 from taichi_soft.persistence.manifest import Notes, read_notes, read_parts, take_notes
 from taichi_soft.persistence.restoring import put_back
-from taichi_soft.persistence.structure import require_structure
+from taichi_soft.persistence.structure import require_structure, structure_of
+from taichi_soft.solver.context import WorldContext
 from taichi_soft.solver.state import State
-from taichi_soft.world.body import Body
-
-if TYPE_CHECKING:
-    from taichi_soft.world.world import World
 
 MARK, VERSION = b"TSOFTSNP", 4
 
@@ -59,58 +58,66 @@ MOST_PRESS = 1e30
 Words = NDArray[np.int32]
 
 
-def take_snapshot(world: World) -> bytes:
+def take_snapshot(context: WorldContext) -> bytes:
     """As `World.snapshot`."""
-    state = world._built.state
-    table = _table(world, max(world._grabs, default=-1) + 1, rows_in_use(world))
+    state = context.built.state
+    table = _table(context, max(context.of(Grabs).by_number, default=-1) + 1, context.of(Joints).rows_in_use)
     words = np.empty(int(table[-1, 2]), dtype=np.int32)
     copy_state(state, table, words, True)
-    words = np.concatenate([words, *(body._part.rows for body in world.bodies if body._part is not None)])
-    notes, memory = to_json(take_notes(world)), to_json(world._built.events.remember().plain)
-    return seal(MARK, VERSION, [world._structure, notes, words.astype("<i4").tobytes(), memory])
+    parts = [body._part for body in context.slots.living]
+    words = np.concatenate([words, *(part.rows for part in parts if part is not None)])
+    notes, memory = to_json(take_notes(context)), to_json(context.built.events.remember().plain)
+    return seal(MARK, VERSION, [_structure(context), notes, words.astype("<i4").tobytes(), memory])
 
 
-def state_hash(world: World) -> str:
+def _structure(context: WorldContext) -> bytes:
+    """What a snapshot's world must be built of: as `structure_of`, worked out once."""
+    if not context.structure:
+        context.structure = structure_of(context)
+    return context.structure
+
+
+def state_hash(context: WorldContext) -> str:
     """As `World.state_hash`."""
-    code = int(hash_bodies(world._built.state, world.slot_count))
-    return blake2b(to_json([code, take_notes(world)]), digest_size=8).hexdigest()
+    code = int(hash_bodies(context.built.state, len(context.slots.slots)))
+    return blake2b(to_json([code, take_notes(context)]), digest_size=8).hexdigest()
 
 
-def _table(world: World, held: int, joint_rows: int) -> Words:
-    state, scene, slots = world._built.state, world._scene, world.slot_count
+def _table(context: WorldContext, held: int, joint_rows: int) -> Words:
+    state, scene, slots = context.built.state, context.layout, len(context.slots.slots)
     return row_table(state, scene.particle_count, slots, scene.block_count, held, joint_rows)
 
 
-def restore_snapshot(world: World, data: Any) -> None:
+def restore_snapshot(context: WorldContext, data: Any) -> None:
     """As `World.restore`."""
-    state = world._built.state
+    state = context.built.state
     structure, content, rows, remembered = _four(unseal(data, MARK, VERSION, "snapshot"))
-    require_structure(bytes(structure), world._structure)
+    require_structure(bytes(structure), _structure(context))
     plain = from_json(content)
     try:
         words = np.frombuffer(rows, "<i4").astype(np.int32)
         grabs = (int(number) for _, number, _, _ in plain["grabs"])
         joined = sum(len(each[-1]) for each in plain["joints"])
-        table = _table(world, max(grabs, default=-1) + 1, joined)
+        table = _table(context, max(grabs, default=-1) + 1, joined)
         if len(words) < table[-1, 2]:
             raise ValueError(f"it has {len(words)} words, where this world takes {table[-1, 2]}")
-        parts = read_parts(world, plain["bodies"], words[table[-1, 2] :])
+        parts = read_parts(context, plain["bodies"], words[table[-1, 2] :])
         words = words[: table[-1, 2]]
-        notes = read_notes(world, plain, parts)
-        memory = Memory.of(from_json(remembered), world.slot_count)
+        notes = read_notes(context, plain, parts)
+        memory = Memory.of(from_json(remembered), len(context.slots.slots))
     except (KeyError, TypeError, ValueError, IndexError, OverflowError, AttributeError, StateError) as error:
         if isinstance(error, SnapshotError):
             raise
         raise SnapshotError(f"this snapshot is not in order: {error}") from None
-    _require_words(world, notes, table, words)
-    put_back(world, notes)
-    if world._built.program.has_contact:
+    _require_words(context, notes, table, words)
+    put_back(context, notes)
+    if context.built.program.has_contact:
         forget_held(state)
     copy_state(state, table, words, False)
-    renew_islands(world)
-    find = world._handles.find
-    known = Known(lambda serial: find(serial, Body), lambda serial: find(serial, Collider))
-    world._built.events.recall(memory, notes.steps, known)
+    context.built.joints_have_changed()
+    find = context.handles.find
+    known = Known(lambda serial: find(serial, SoftBody), lambda serial: find(serial, Collider))
+    context.built.events.recall(memory, notes.steps, known)
 
 
 def _four(parts: list[memoryview]) -> list[memoryview]:
@@ -119,10 +126,10 @@ def _four(parts: list[memoryview]) -> list[memoryview]:
     return parts
 
 
-def _require_words(world: World, notes: Notes, table: Words, words: Words) -> None:
+def _require_words(context: WorldContext, notes: Notes, table: Words, words: Words) -> None:
     """Raises: SnapshotError where a kernel would read beyond its fields, or begin with what is not finite."""
-    state = world._built.state
-    particles, slots = world._scene.particle_count, world.slot_count
+    state = context.built.state
+    particles, slots = context.layout.particle_count, len(context.slots.slots)
     limits: list[tuple[int, Any, int]] = [
         (PARTICLE, state.particle_aim, WITH_FRAME + len(notes.frames)),
         (BODY, state.body_status, ABSENT + 1),
@@ -133,7 +140,7 @@ def _require_words(world: World, notes: Notes, table: Words, words: Words) -> No
     ]
     if state.capacity.implicit:
         limits.append((PARTICLE, state.particle_contact, max(state.capacity.contact.colliders, 1) + 1))
-    if world._built.program.has_contact:
+    if context.built.program.has_contact:
         limits += [
             (JOINT, state.joints.bodies, slots + 1),
             (JOINT, state.joints.rows, JOINT_ROWS + 1),
@@ -158,7 +165,7 @@ def _require_words(world: World, notes: Notes, table: Words, words: Words) -> No
     for owner, field in _steering(state):
         if not np.isfinite(_rows(table, words, state, owner, field).view(np.float32)).all():
             raise SnapshotError("this snapshot is not in order: what moves its bodies is not finite")
-    if world._built.program.has_contact:
+    if context.built.program.has_contact:
         _require_joints(state, notes, table, words)
     lives = _rows(table, words, state, BODY, state.body_status)[:, 0] != ABSENT
     if lives.tolist() != [body is not None for body in notes.bodies]:

@@ -5,30 +5,28 @@ from __future__ import annotations
 from dataclasses import asdict
 from hashlib import blake2b
 from importlib.metadata import PackageNotFoundError, version
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from taichi_soft.bodies.asset import SoftBodyAsset
 from taichi_soft.bodies.fields import ROOMS
 from taichi_soft.core.errors import SnapshotError
 from taichi_soft.core.serialisation import as_plain, digest_of, from_json, to_json
-
-if TYPE_CHECKING:
-    from taichi_soft.bodies.asset import SoftBodyAsset
-    from taichi_soft.world.world import World
+from taichi_soft.solver.context import WorldContext
 
 
-def structure_of(world: World) -> bytes:
+def structure_of(context: WorldContext) -> bytes:
     """What a snapshot's world must be built of, as JSON."""
-    settings = {name: as_plain(value) for name, value in asdict(world.settings).items()}
-    capacity = asdict(world._built.state.capacity)
+    settings = {name: as_plain(value) for name, value in asdict(context.settings).items()}
+    capacity = asdict(context.built.state.capacity)
     return to_json(
         {
             "package": _package_version(),
             # The rooms may be another world's, and follow from the bodies.
             "capacity": {name: value for name, value in capacity.items() if name not in ROOMS},
-            "soft_contact": world._contact.soft,
-            "sleep_speed": world._contact.sleep_speed,
+            "soft_contact": context.contact.soft,
+            "sleep_speed": context.contact.sleep_speed,
             **settings,
-            "bodies": [asset_digest(asset) for asset in world._pools.assets],
+            "bodies": [asset_digest(asset) for asset in context.slots.assets],
         }
     )
 

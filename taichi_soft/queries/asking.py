@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.core.checks import as_number
 from taichi_soft.core.errors import OptionError
-
-if TYPE_CHECKING:
-    from taichi_soft.world.body import Body
 
 Floats = NDArray[np.float64]
 
@@ -36,7 +33,7 @@ def just_beyond(limit: float) -> float:
     return float(np.nextafter(np.float32(min(limit, _ENDLESS)), np.float32(np.inf)))
 
 
-def as_chosen(bodies: Iterable[Body] | None, handles: Sequence[Body | None]) -> NDArray[np.int32]:
+def as_chosen(bodies: Iterable[SoftBody] | None, handles: Sequence[SoftBody | None]) -> NDArray[np.int32]:
     """Indices of the bodies asked, ascending; all for None. Raises: OptionError.
 
     `handles`: the body in each slot, None where there is none.
@@ -57,6 +54,6 @@ def as_chosen(bodies: Iterable[Body] | None, handles: Sequence[Body | None]) -> 
 
 
 def read_answer(row: NDArray[np.float32]) -> tuple[int, int, float, Floats, Floats, Floats]:
-    """Body, face, distance, weights, point and normal."""
+    """SoftBody, face, distance, weights, point and normal."""
     real = row.astype(np.float64)
     return int(real[10]), int(real[11]), float(real[0]), real[1:4], real[4:7], real[7:10]

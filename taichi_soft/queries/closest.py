@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies.fields import BodyFields
+from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.core.checks import as_vector
 from taichi_soft.queries.asking import as_chosen, as_reach, just_beyond, read_answer
 from taichi_soft.queries.kernels import find_closest
-
-if TYPE_CHECKING:
-    from taichi_soft.world.body import Body
 
 Floats = NDArray[np.float64]
 
@@ -24,7 +21,7 @@ Floats = NDArray[np.float64]
 class ClosestPoint:
     """The point of all surfaces that is nearest to a given one."""
 
-    body: Body
+    body: SoftBody
     triangle: int | None  # row of body.surface; None for a body without triangles
     vertices: NDArray[np.int32]  # (3,) of that triangle, or the nearest vertex three times
     barycentrics: Floats  # (3,) weights of these vertices; their sum is 1
@@ -36,10 +33,10 @@ class ClosestPoint:
 
 def find_closest_point(
     state: BodyFields,
-    handles: Sequence[Body | None],
+    handles: Sequence[SoftBody | None],
     point: ArrayLike,
     max_distance: float,
-    bodies: Iterable[Body] | None,
+    bodies: Iterable[SoftBody] | None,
 ) -> ClosestPoint | None:
     """The nearest point of all surfaces. Raises: OptionError, see `World.closest_point`."""
     asked = np.empty(4, dtype=np.float32)

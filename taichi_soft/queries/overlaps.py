@@ -4,27 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies.fields import BodyFields
+from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.core.checks import as_number, as_rotation, as_vector
 from taichi_soft.core.constants import POSITION_LIMIT
 from taichi_soft.core.errors import OptionError
 from taichi_soft.queries.asking import as_chosen
 from taichi_soft.queries.kernels import find_overlaps
 
-if TYPE_CHECKING:
-    from taichi_soft.world.body import Body
-
 
 @dataclass(frozen=True, eq=False)
 class Overlap:
     """A body that touches a shape."""
 
-    body: Body
+    body: SoftBody
     vertices: NDArray[np.int32]  # that lie in the shape, ascending; none where a face or the whole body does
 
 
@@ -34,10 +32,10 @@ SMALLEST = 1e-9
 
 def find_in_sphere(
     state: BodyFields,
-    handles: Sequence[Body | None],
+    handles: Sequence[SoftBody | None],
     center: ArrayLike,
     radius: float,
-    bodies: Iterable[Body] | None,
+    bodies: Iterable[SoftBody] | None,
 ) -> tuple[Overlap, ...]:
     """Bodies that touch a sphere. Raises: OptionError, see `World.overlap_sphere`."""
     shape = np.zeros((5, 3), dtype=np.float32)
@@ -49,11 +47,11 @@ def find_in_sphere(
 
 def find_in_box(
     state: BodyFields,
-    handles: Sequence[Body | None],
+    handles: Sequence[SoftBody | None],
     center: ArrayLike,
     size: ArrayLike,
     rotation: Any,
-    bodies: Iterable[Body] | None,
+    bodies: Iterable[SoftBody] | None,
 ) -> tuple[Overlap, ...]:
     """Bodies that touch a box. Raises: OptionError, see `World.overlap_box`."""
     shape = np.zeros((5, 3), dtype=np.float32)
@@ -68,10 +66,10 @@ def find_in_box(
 
 def _overlaps(
     state: BodyFields,
-    handles: Sequence[Body | None],
+    handles: Sequence[SoftBody | None],
     is_box: bool,
     shape: NDArray[np.float32],
-    bodies: Iterable[Body] | None,
+    bodies: Iterable[SoftBody] | None,
 ) -> tuple[Overlap, ...]:
     first_vertex = np.full(len(handles), -1, dtype=np.int32)
     inside = np.zeros(state.capacity.particles, dtype=np.int32)

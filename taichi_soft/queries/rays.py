@@ -4,20 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies.fields import BodyFields
+from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.core.checks import as_array, as_vector
 from taichi_soft.core.constants import POSITION_LIMIT
 from taichi_soft.core.errors import OptionError
 from taichi_soft.queries.asking import as_chosen, as_reach, just_beyond, read_answer
 from taichi_soft.queries.kernels import find_hits
-
-if TYPE_CHECKING:
-    from taichi_soft.world.body import Body
 
 Floats = NDArray[np.float64]
 
@@ -26,7 +23,7 @@ Floats = NDArray[np.float64]
 class RayHit:
     """Where a ray meets a surface first."""
 
-    body: Body
+    body: SoftBody
     triangle: int  # row of body.surface
     vertices: NDArray[np.int32]  # (3,) of that triangle
     barycentrics: Floats  # (3,) weights of these vertices; their sum is 1
@@ -53,11 +50,11 @@ class RayHits:
 
 def cast_ray(
     state: BodyFields,
-    handles: Sequence[Body | None],
+    handles: Sequence[SoftBody | None],
     origin: ArrayLike,
     direction: ArrayLike,
     max_distance: float,
-    bodies: Iterable[Body] | None,
+    bodies: Iterable[SoftBody] | None,
     cull_back: bool,
 ) -> RayHit | None:
     """The first hit of one ray. Raises: OptionError, see `World.raycast`."""
@@ -75,11 +72,11 @@ def cast_ray(
 
 def cast_rays(
     state: BodyFields,
-    handles: Sequence[Body | None],
+    handles: Sequence[SoftBody | None],
     origins: ArrayLike,
     directions: ArrayLike,
     max_distance: float,
-    bodies: Iterable[Body] | None,
+    bodies: Iterable[SoftBody] | None,
     cull_back: bool,
 ) -> RayHits:
     """The first hit of each ray. Raises: OptionError, see `World.raycasts`."""
@@ -99,10 +96,10 @@ def cast_rays(
 
 def _hits(
     state: BodyFields,
-    handles: Sequence[Body | None],
+    handles: Sequence[SoftBody | None],
     rays: NDArray[np.float32],
     max_distance: float,
-    bodies: Iterable[Body] | None,
+    bodies: Iterable[SoftBody] | None,
     cull_back: bool,
 ) -> NDArray[np.float32]:
     """One row for each ray, see `write_place`; body -1 where it hits nothing."""

@@ -82,7 +82,7 @@ def _rebuilt(made_of: dict[str, Any]) -> tuple[World, dict[str, Any]]:
     for name in made_of["built_with"]:
         world.add_collider(shapes[name])
     world.build()
-    world._colliders.shapes.update(shapes)
+    world._context.colliders.shapes.update(shapes)
     return world, {**shapes, **assets}
 
 

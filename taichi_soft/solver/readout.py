@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,15 +9,14 @@ from taichi_soft.bodies.kernels.evaluate import compute_body_forces
 from taichi_soft.bodies.kernels.plasticity import read_rest_inverses
 from taichi_soft.bodies.kernels.readout import read_positions, read_velocities
 from taichi_soft.bodies.layout import Scene
+from taichi_soft.bodies.soft_body import SoftBody
+from taichi_soft.control.joints import Joints
 from taichi_soft.control.kernels.joints import add_joint_forces
 from taichi_soft.core.errors import OptionError
 from taichi_soft.core.settings import Settings
 from taichi_soft.core.types import Integrator
 from taichi_soft.solver.program import StepProgram
 from taichi_soft.solver.state import State
-
-if TYPE_CHECKING:
-    from taichi_soft.world.body import Body
 
 Floats = NDArray[np.float64]
 Floats32 = NDArray[np.float32]
@@ -28,8 +25,11 @@ Floats32 = NDArray[np.float32]
 class Readout:
     """Positions, velocities and rest shapes of one world's bodies."""
 
-    def __init__(self, settings: Settings, state: State, program: StepProgram, scene: Scene) -> None:
+    def __init__(
+        self, settings: Settings, state: State, program: StepProgram, scene: Scene, joints: Joints
+    ) -> None:
         self._settings, self._state, self._program, self._scene = settings, state, program, scene
+        self._joints = joints
         self._rows: Floats32 = np.empty((scene.particle_count, 3), dtype=np.float32)  # positions of all
         self._alpha: float | None = None  # of what `_rows` holds; None once the world has moved on
 
@@ -37,7 +37,7 @@ class Readout:
         """Take note that particles are elsewhere."""
         self._alpha = None
 
-    def positions(self, body: Body, alpha: float, out: Floats32 | None) -> Floats32:
+    def positions(self, body: SoftBody, alpha: float, out: Floats32 | None) -> Floats32:
         """As `World.read_positions`. Raises: OptionError for an `out` that does not fit."""
         rows = _as_buffer(out, body.vertex_count)
         if self._alpha != alpha:
@@ -47,7 +47,7 @@ class Readout:
         rows[:] = self._rows[begin : begin + body.vertex_count]
         return rows
 
-    def velocities(self, body: Body) -> Floats32:
+    def velocities(self, body: SoftBody) -> Floats32:
         """Velocities at the time of the positions, (n, 3) [m/s]."""
         state, settings = self._state, self._settings
         rows = np.empty((body.vertex_count, 3), dtype=np.float32)
@@ -56,7 +56,7 @@ class Readout:
         if settings.integrator is Integrator.LEAPFROG and lag > 0.0 and not body.is_frozen:
             forces = np.empty_like(rows)
             compute_body_forces(state, self._program, body.index, forces)
-            if body._joints:
+            if self._joints.holds(body):
                 add_joint_forces(state, body.index, lag, forces)
             by_vertex = forces[self._scene.bodies[body.index].rank]
             acceleration = by_vertex / body.masses[:, None] + settings.gravity * body.gravity_scale
@@ -65,7 +65,7 @@ class Readout:
             rows += (0.5 * lag * acceleration).astype(np.float32)
         return rows
 
-    def _is_carried(self, body: Body) -> NDArray[np.bool_]:
+    def _is_carried(self, body: SoftBody) -> NDArray[np.bool_]:
         """Which vertices of a body touched something in the last substep, (n,)."""
         if self._program.has_contact:
             begin = self._scene.ranges[body.index].particles[0]
@@ -76,7 +76,7 @@ class Readout:
             return np.zeros(body.vertex_count, dtype=np.bool_)
         return np.asarray(body.positions()[:, 2] <= floor)
 
-    def rest_inverses(self, body: Body) -> Floats:
+    def rest_inverses(self, body: SoftBody) -> Floats:
         """A^-1 of each tetrahedron of a body that may have flowed, (m, 3, 3) [1/m], in the caller's order."""
         rows = np.empty((len(body.tets), 3, 3), dtype=np.float32)
         read_rest_inverses(self._state, body.index, rows)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +14,13 @@ from taichi_soft.bodies.failure import FailedStep, Failure
 from taichi_soft.bodies.kernels.readout import write_motion
 from taichi_soft.bodies.layout import Scene
 from taichi_soft.bodies.slots import Pools
+from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.bodies.status import ASLEEP, FROZEN
+from taichi_soft.contact.clearance import require_clear
 from taichi_soft.contact.colliders import Colliders
 from taichi_soft.control.frames import Frames
+from taichi_soft.control.joints import Joints
+from taichi_soft.control.pins import pinned_vertices
 from taichi_soft.core.clock import Clock
 from taichi_soft.core.constants import POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.core.errors import DroppedEventsWarning, OptionError, SolverWarning, StateError
@@ -26,6 +30,7 @@ from taichi_soft.fracture.tearing import Tears
 from taichi_soft.solver.failures import find_failure
 from taichi_soft.solver.kernels.contact_step import ALL_SLEEP
 from taichi_soft.solver.kernels.implicit_euler import MOST_PIECES
+from taichi_soft.solver.kernels.islands import list_joined_islands
 from taichi_soft.solver.kernels.sleep import wake_body, wake_near
 from taichi_soft.solver.kernels.spawn import despawn_body, spawn_body
 from taichi_soft.solver.program import StepProgram
@@ -33,19 +38,17 @@ from taichi_soft.solver.readout import Readout
 from taichi_soft.solver.schedules import Launch
 from taichi_soft.solver.state import State
 
-if TYPE_CHECKING:
-    from taichi_soft.world.body import Body
-
 
 @dataclass(eq=False)
 class Simulation:
     """A built world without its public face."""
 
     settings: Settings
-    pools: Pools
+    pools: Pools[SoftBody]
     scene: Scene
     clock: Clock
     frames: Frames
+    joints: Joints
     colliders: Colliders | None  # None in a world without contact
     sleeps: bool  # whether bodies fall asleep
     state: State
@@ -60,7 +63,7 @@ class Simulation:
     _warned: set[int] = field(default_factory=set)  # slots of bodies with such solves
 
     def __post_init__(self) -> None:
-        self.readout = Readout(self.settings, self.state, self.program, self.scene)
+        self.readout = Readout(self.settings, self.state, self.program, self.scene, self.joints)
 
     def step(self, seconds: float, substeps: int, h: float) -> list[str]:
         """Make one fixed step of `seconds`, in substeps of `h` [s]. Returns a line for each body it froze."""
@@ -114,7 +117,7 @@ class Simulation:
             )
         return reports
 
-    def _way_out(self, body: Body) -> str:
+    def _way_out(self, body: SoftBody) -> str:
         """What may help a body that the last step froze."""
         lower, upper = body.aabb()
         way, size = self.frames.way(body), float((upper - lower).max())
@@ -172,7 +175,7 @@ class Simulation:
             if wake_near(self.state, len(self.pools.slots), box):
                 self._is_still = False
 
-    def box_of(self, body: Body) -> tuple[NDArray[Any], NDArray[Any]]:
+    def box_of(self, body: SoftBody) -> tuple[NDArray[Any], NDArray[Any]]:
         """Corners of a box round a body and its skin, as it is now [m]."""
         lower, upper = body.aabb()
         thickness = body.asset.surface_row[1]
@@ -197,7 +200,7 @@ class Simulation:
         self.wake(slot)
         self.has_changed()
 
-    def write_motion(self, body: Body, positions: NDArray[Any], velocities: NDArray[Any]) -> None:
+    def write_motion(self, body: SoftBody, positions: NDArray[Any], velocities: NDArray[Any]) -> None:
         """Put a body somewhere else. Raises: OptionError for what is out of reach or too fast."""
         x, v = positions.astype(np.float32), velocities.astype(np.float32)
         for name, rows, limit in (("positions", x, POSITION_LIMIT), ("velocities", v, VELOCITY_LIMIT)):
@@ -207,6 +210,36 @@ class Simulation:
         write_motion(self.state, body.index, x, v)
         self.rouse(body.index)
         self.wake_near(*left)
+
+    def positions(self, body: SoftBody, alpha: float, out: NDArray[np.float32] | None) -> NDArray[np.float32]:
+        """Of the vertices, between the previous step and the last one, (n, 3) [m]."""
+        return self.readout.positions(body, alpha, out)
+
+    def velocities(self, body: SoftBody) -> NDArray[np.float32]:
+        """Of the vertices at the time of their positions, (n, 3) [m/s]."""
+        return self.readout.velocities(body)
+
+    def rest_inverses(self, body: SoftBody) -> NDArray[np.float64]:
+        """A^-1 of each tetrahedron of a body that may have flowed, (m, 3, 3) [1/m]."""
+        return self.readout.rest_inverses(body)
+
+    def pinned(self, body: SoftBody) -> NDArray[np.int32]:
+        """Vertices that are held now, ascending."""
+        return pinned_vertices(body)
+
+    def require_clear(self, body: SoftBody, points: NDArray[np.float64]) -> None:
+        """Raises: OptionError where points of a body's surface, (k, 3) [m], are crushed in a collider."""
+        if self.colliders is not None:
+            require_clear(self.colliders.handles, body.asset, points, f"body {body.index}")
+
+    def joints_have_changed(self) -> None:
+        """Let bodies that are joined be stepped together, where no step finds out by itself."""
+        if self.program.has_contact and not self.program.has_soft_contact:
+            list_joined_islands(self.state, len(self.pools.slots))
+
+    def was_cut(self, body: SoftBody) -> None:
+        """Take note that a body has other vertices."""
+        self.events.renew_watches(body)
 
     def has_changed(self) -> None:
         """Take note that the fields were written to."""
@@ -222,7 +255,7 @@ class Simulation:
         """Whether the body in a slot sleeps."""
         return int(self.state.body_status[slot]) == ASLEEP
 
-    def solve_residual(self, body: Body) -> float | None:
+    def solve_residual(self, body: SoftBody) -> float | None:
         """As `Body.solve_residual`."""
         has_solved = self.settings.is_implicit and self.clock.steps > body._first_step
         return float(self.state.body_residual[body.index]) if has_solved else None

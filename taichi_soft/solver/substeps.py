@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import math
 import warnings
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from taichi_soft.bodies.layout import BodyDescription
+from taichi_soft.bodies.slots import Pools
+from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.bodies.stability import StableStep, stable_step
 from taichi_soft.core.checks import as_count, as_step
 from taichi_soft.core.errors import OptionError, SlowStepWarning, StateError, UnstableStepWarning
-
-if TYPE_CHECKING:
-    from taichi_soft.bodies.slots import Pools
-    from taichi_soft.world.body import Body
 
 _PLAIN = {float, int, np.float64, type(None)}
 """Types whose values can be compared with those of the last step."""
@@ -41,7 +39,9 @@ TET_TIME = 15e-9
 class Substeps:
     """How long the substeps of one world can be, and how long they are."""
 
-    def __init__(self, pools: Pools, *, is_implicit: bool, soft_contact: bool, most: int | None) -> None:
+    def __init__(
+        self, pools: Pools[SoftBody], *, is_implicit: bool, soft_contact: bool, most: int | None
+    ) -> None:
         """`is_implicit`: its integrator takes substeps of any length. `most`: as `World(max_substeps=)`."""
         self._pools = pools
         self._is_implicit, self._soft_contact = is_implicit, soft_contact
@@ -51,7 +51,7 @@ class Substeps:
         self._warned: set[float] = set()
         self._most, self._is_said = most, False
 
-    def stable_step(self, body: Body) -> StableStep:
+    def stable_step(self, body: SoftBody) -> StableStep:
         """As `World.stable_step`."""
         described = body._description
         if described is body.asset.description:

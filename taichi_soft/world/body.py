@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import weakref
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies import measures
-from taichi_soft.bodies.failure import FailedStep, Failure
-from taichi_soft.bodies.layout import BodyArrays, BodyDescription, Ranges
 from taichi_soft.bodies.pose import Pose
+from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.bodies.stability import StableStep
 from taichi_soft.bodies.status import SHELTERED
-from taichi_soft.control.attachments import Attachment, attach, share_attachments
+from taichi_soft.control.attachments import Attachment, attach
 from taichi_soft.control.drives import (
     apply_force,
     set_gravity_scale,
@@ -24,167 +21,40 @@ from taichi_soft.control.drives import (
 )
 from taichi_soft.control.grabs import Grab, grab_at
 from taichi_soft.control.impulses import apply_impulse, apply_impulse_at_point
-from taichi_soft.control.joints import Joint, attach_to
+from taichi_soft.control.joints import Joint, Joints
 from taichi_soft.control.materials import set_damping, set_material
-from taichi_soft.control.pins import pin, pinned_vertices, set_targets, unpin
+from taichi_soft.control.pins import pin, set_targets, unpin
 from taichi_soft.control.placement import set_velocity, teleport
 from taichi_soft.core.checks import as_array, as_positive
-from taichi_soft.core.errors import StateError
-from taichi_soft.core.handles import Handle, recorded
-from taichi_soft.core.turns import one_thread
+from taichi_soft.core.handles import recorded
 from taichi_soft.elements.materials import AnyMaterial
 from taichi_soft.events import Event, StressExceeded, TearCandidates
 from taichi_soft.fracture.cutting import cut
-from taichi_soft.fracture.parts import Part
-from taichi_soft.meshing import BodyMesh
+from taichi_soft.solver.context import WorldContext
 
 if TYPE_CHECKING:
-    from taichi_soft.bodies.asset import SoftBodyAsset
     from taichi_soft.control.frames import Frame
-    from taichi_soft.world.world import World
 
 Floats32 = NDArray[np.float32]
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-class Body(Handle):
+class Body(SoftBody):
     """A handle to one body. Positions and velocities come back in the caller's vertex order.
 
     Energies, momentum and volume are computed in float64 from the float32 state, at the time of the call.
     """
 
-    def __init__(self, world: World, index: int, asset: SoftBodyAsset) -> None:
-        """Made by `World.add_body` and `World.spawn`."""
-        # Weak, or a world that is dropped would wait for the garbage collector to give its state back.
-        self._world_ref = weakref.ref(world)
-        self._asset = asset
-        self._description = asset.description
-        self._index = index
-        self._first_step = world.step_count
-        self._removed_in: int | None = None
-        self._frozen_in: FailedStep | None = None
-        self._failure: Failure | None = None
-        self._attachments: list[Attachment] = []
-        self._topology_version = 0
-        self._part: Part | None = None  # of the asset's mesh, once it was cut
-
-    def _require_alive(self) -> None:
-        """Raises: StateError once the body was removed."""
-        if self._removed_in is not None:
-            raise StateError(f"body {self.index} was removed by despawn in step {self._removed_in}")
-
     @property
-    def _world(self) -> World:
-        self._require_alive()
-        world = self._world_ref()
-        if world is None:
-            raise StateError(f"the world of body {self.index} is gone: keep a reference to it")
-        return world
-
-    def __repr__(self) -> str:
-        state = "removed" if not self.is_alive else "frozen" if self.is_frozen else "active"
-        kind = f"{len(self.tets)} tetrahedra" if len(self.tets) else f"{len(self.mesh.edges)} edges"
-        return f"Body({self.index}, {self.vertex_count} vertices, {kind}, {state})"
-
-    @property
-    def asset(self) -> SoftBodyAsset:
-        """What it shares with other bodies of its kind; `World.spawn` takes it."""
-        return self._asset
-
-    @property
-    def index(self) -> int:
-        """Number of its slot in the world, which another body may get after `World.despawn`."""
-        return self._index
-
-    @property
-    def is_alive(self) -> bool:
-        """False once `World.despawn` has removed it: what asks the world then raises StateError."""
-        return self._removed_in is None
-
-    @property
-    def mesh(self) -> BodyMesh:
-        """The rest shape, as added, or as cuts have left it."""
-        return self._description.mesh
-
-    @property
-    def material(self) -> AnyMaterial:
-        """The material, as added or set since."""
-        return self._description.material
-
-    @property
-    def vertex_count(self) -> int:
-        """Number of vertices, n."""
-        return len(self._description.mesh.vertices)
-
-    @property
-    def tets(self) -> NDArray[np.int32]:
-        """Vertices of each tetrahedron, (m, 4)."""
-        return self._description.mesh.tets
-
-    @property
-    def surface(self) -> NDArray[np.int32]:
-        """Surface triangles, outward, (f, 3)."""
-        return np.asarray(self.mesh.surface)
-
-    @property
-    def is_held(self) -> bool:
-        """Whether it is attached, to a frame or another body, or grabbed."""
-        return self._is_pulled or bool(self._attachments)
-
-    @property
-    def _is_pulled(self) -> bool:
-        """Whether it is grabbed, or joined to another body."""
-        grabs = self._world._grabs.values()
-        return bool(self._joints) or any(grab.body is self for grab in grabs)
+    def _context(self) -> WorldContext:
+        return cast(WorldContext, super()._context)
 
     @property
     def attachments(self) -> tuple[Attachment, ...]:
         """What holds it to frames; of a piece that was cut or torn off, what it took along of these."""
         self._require_alive()
         return tuple(self._attachments)
-
-    @property
-    def _joints(self) -> list[Joint]:
-        """Those that hold it, from either side."""
-        return [joint for joint in self._world._joints.values() if self in (joint.body, joint.other)]
-
-    @property
-    def topology_version(self) -> int:
-        """How often its vertices and tetrahedra have changed: where this does, read `surface` again."""
-        return self._topology_version
-
-    @property
-    def is_cut(self) -> bool:
-        """Whether it is no longer what its asset says, but what cuts have left."""
-        return self._part is not None
-
-    @property
-    def vertex_origins(self) -> Ints:
-        """The vertex of the asset's mesh that each vertex is, or is a copy of, (n,)."""
-        return np.arange(self.vertex_count) if self._part is None else self._part.vertices
-
-    @property
-    def tet_origins(self) -> Ints:
-        """The tetrahedron of the asset's mesh that each one is, (m,)."""
-        return np.arange(len(self.tets)) if self._part is None else self._part.tets
-
-    def _become(self, part: Part | None) -> None:
-        """Take note of what cuts have left of the asset's mesh, None for all of it."""
-        self._part = part
-        self._topology_version += 1
-
-    def _share_attachments(self, pieces: Sequence[tuple[Body, Ints]]) -> None:
-        """As `control.attachments.share_attachments`."""
-        share_attachments(self, pieces)
-
-    def _redescribe(self, description: BodyDescription, arrays: BodyArrays) -> Ranges:
-        """Take note that the body is made of something else. Returns where it lies in the fields."""
-        world = self._world
-        self._description = description
-        world._scene.bodies[self.index] = arrays
-        world._substeps.renew()
-        return world._scene.ranges[self.index]
 
     @recorded
     def cut(
@@ -209,70 +79,23 @@ class Body(Handle):
             joined to another, and before `build`.
             Nothing is changed then.
         """
-        return cut(self, plane, triangle)
-
-    @property
-    def masses(self) -> Floats:
-        """Mass of each vertex, (n,) [kg]."""
-        return self._description.masses
-
-    @property
-    def pinned(self) -> NDArray[np.int32]:
-        """Vertices that are held now, ascending."""
-        return pinned_vertices(self) if self._world.is_built else self._description.pinned
-
-    @property
-    def _rest_inverses(self) -> Floats:
-        """A^-1 of each tetrahedron at rest as it is now, (m, 3, 3) [1/m]."""
-        if self.asset.plasticity is None or not self._world.is_built:
-            return self._description.rest_inverses
-        return self._world._built.readout.rest_inverses(self)
+        return cast("tuple[Body, ...]", cut(self, plane, triangle))
 
     @property
     def stable_step(self) -> StableStep:
         """Estimate of the largest stable substep."""
-        return self._world.stable_step(self)
-
-    @property
-    def is_frozen(self) -> bool:
-        """True once the body went non-finite; it stays in its last finite state from then on."""
-        return self._frozen_in is not None
+        return self._context.substeps.stable_step(self)
 
     @property
     def is_asleep(self) -> bool:
         """True while the body rests and costs nothing (see `World.sleep_speed`)."""
-        simulation = self._world._simulation
+        simulation = self._context.fields
         return simulation is not None and simulation.is_asleep(self.index)
-
-    @property
-    @one_thread
-    def failure(self) -> Failure | None:
-        """What broke first, None while the body is sound. Found out when first asked, not within a step."""
-        self._require_alive()
-        if self._frozen_in is not None and self._failure is None:
-            self._failure = self._world._built.find_failure(self.index, self._frozen_in)
-        return self._failure
 
     @property
     def solve_residual(self) -> float | None:
         """Largest residual of the last step's implicit solves, over their right-hand sides; None before."""
-        return self._world._built.solve_residual(self)
-
-    def positions(self, out: Floats32 | None = None) -> Floats32:
-        """Vertex positions after the last step, float32 (n, 3) [m].
-
-        Args:
-            out: C-contiguous float32 array to fill and return; None makes a new one.
-        Raises: OptionError if `out` does not fit.
-        """
-        return self._world.read_positions(self, 1.0, out)
-
-    def velocities(self) -> Floats32:
-        """Vertex velocities at the time of the positions, float32 (n, 3) [m/s].
-
-        Leapfrog keeps them half a substep behind; they are brought up with the present acceleration.
-        """
-        return self._world._built.readout.velocities(self)
+        return self._context.built.solve_residual(self)
 
     @recorded
     def set_motion(self, positions: ArrayLike, velocities: ArrayLike) -> None:
@@ -285,7 +108,7 @@ class Body(Handle):
         """
         shape = (self.vertex_count, 3)
         x, v = as_array(positions, "positions", shape, "m"), as_array(velocities, "velocities", shape, "m/s")
-        self._world._built.write_motion(self, x, v)
+        self._context.built.write_motion(self, x, v)
         self._frozen_in = self._failure = None
 
     @recorded
@@ -299,12 +122,6 @@ class Body(Handle):
         """
         apply_force(self, force, particles)
 
-    @property
-    def gravity_scale(self) -> float:
-        """By what the world's gravity is multiplied for this body."""
-        simulation = self._world._simulation
-        return 1.0 if simulation is None else float(simulation.state.body_gravity_scale[self.index])
-
     @recorded
     def set_gravity_scale(self, scale: float) -> None:
         """Multiply the world's gravity for this body, from now on: 0 floats, -1 rises."""
@@ -313,13 +130,13 @@ class Body(Handle):
     @property
     def linear_damping(self) -> float:
         """Rate at which its velocities fade [1/s], 0 unless it was set."""
-        simulation = self._world._simulation
+        simulation = self._context.fields
         return 0.0 if simulation is None else float(simulation.state.body_damping[self.index])
 
     @property
     def is_sheltered(self) -> bool:
         """Whether no wind blows on it."""
-        simulation = self._world._simulation
+        simulation = self._context.fields
         drives = 0 if simulation is None else int(simulation.state.body_drives[self.index])
         return bool(drives & SHELTERED)
 
@@ -436,7 +253,7 @@ class Body(Handle):
             too far away; StateError before `build`, in a world without contact, under implicit Euler, and
             where the world's 64 joints, or the 2,048 particles that they may hold, are all in use.
         """
-        return attach_to(self, other, particles, onto)
+        return self._context.of(Joints).join(self, other, particles, onto)
 
     @recorded
     def grab(
@@ -498,11 +315,6 @@ class Body(Handle):
         """Tetrahedra that are inside out, ascending."""
         return np.flatnonzero(self.volumes() < 0)
 
-    def aabb(self) -> tuple[Floats, Floats]:
-        """Least and greatest coordinates of the vertices, (3,) each [m]."""
-        positions = measures.positions_of(self)
-        return positions.min(axis=0), positions.max(axis=0)
-
     def pose(self) -> Pose:
         """The rigid motion of the rest shape that comes nearest to the body, weighted by mass.
 
@@ -511,10 +323,6 @@ class Body(Handle):
         possible.
         """
         return measures.pose(self)
-
-    def center_of_mass(self) -> Floats:
-        """(3,) [m]."""
-        return np.asarray(self.masses @ measures.positions_of(self) / self.masses.sum())
 
     def momentum(self) -> Floats:
         """Linear momentum, (3,) [kg m/s]."""
@@ -582,7 +390,7 @@ class Body(Handle):
         self._watch(TearCandidates, tear_stress, "tear_stress")
 
     def _watch(self, kind: type[Event], threshold: float | None, name: str) -> None:
-        log = self._world._built.events
+        log = self._context.built.events
         measures.require_tets(self)
         limit = None if threshold is None else as_positive(threshold, name, "Pa")
         log.watch(kind, self, limit)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import warnings
 import weakref
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,6 +15,9 @@ from taichi_soft.contact.clearance import free_points, require_clear
 from taichi_soft.contact.colliders import ignore
 from taichi_soft.contact.fields import ContactCapacity
 from taichi_soft.contact.shapes import PlaneShape
+from taichi_soft.control.frames import Frames
+from taichi_soft.control.joints import Joints
+from taichi_soft.core.constants import ALL_GROUPS
 from taichi_soft.core.errors import OptionError, StateError, UnstableStepWarning
 from taichi_soft.core.runtime import Device, init
 from taichi_soft.core.serialisation import digest_of
@@ -24,36 +26,34 @@ from taichi_soft.core.types import Integrator, Schedule
 from taichi_soft.events import EventLog, Witness
 from taichi_soft.fracture.cutting import warm_up
 from taichi_soft.fracture.tearing import Tears
+from taichi_soft.solver.context import WorldContext
 from taichi_soft.solver.kernels.spawn import despawn_body, spawn_body
 from taichi_soft.solver.program import StepProgram
 from taichi_soft.solver.schedules import choose_schedule, make_launch, most_substeps
 from taichi_soft.solver.simulation import Simulation
 from taichi_soft.solver.state import Capacity, State
 
-if TYPE_CHECKING:
-    from taichi_soft.world.world import World
 
-
-def build(world: World) -> Simulation:
+def build(context: WorldContext) -> Simulation:
     """As `World.build`, of a world that was not."""
-    pools, scene, colliders, contact = world._pools, world._scene, world._colliders, world._contact
+    pools, scene, colliders, contact = context.slots, context.layout, context.colliders, context.contact
     if not pools.slots:
         raise StateError("the world is empty: call add_body or reserve before build")
-    world._substeps.review()
-    review_weight(pools.kinds, world.settings.gravity)
+    context.substeps.review()
+    review_weight(pools.kinds, context.settings.gravity)
     for slot, rows in pools.starts.items():
         asset = pools.assets[slot]
         require_clear(colliders.handles, asset, free_points(asset, rows), f"body {slot}")
     device = init()
-    world._built_with = [digest_of(handle.shape) for handle in colliders.all_handles]
+    context.built_with = [digest_of(handle.shape) for handle in colliders.all_handles]
     has_contact = (
         contact.soft or contact.sleep_speed > 0.0 or len(colliders.handles) + contact.collider_room > 0
     )
     if has_contact:
-        _add_floor(world)
-    settings = replace(world.settings, schedule=_schedule(world, device, has_contact))
-    capacity = _capacity(world, settings, has_contact)
-    program = _program(world, settings, device, has_contact)
+        _add_floor(context)
+    settings = replace(context.settings, schedule=_schedule(context, device, has_contact))
+    capacity = _capacity(context, settings, has_contact)
+    program = _program(context, settings, device, has_contact)
     if settings.integrator is Integrator.EXPLICIT_EULER:
         warnings.warn(
             "explicit_euler gains energy at every substep, however short, and explodes sooner or later: "
@@ -62,9 +62,9 @@ def build(world: World) -> Simulation:
             stacklevel=4,
         )
     state = acquire(State, capacity, program)
-    weakref.finalize(world, release, state)
-    _fill(world, state, program)
-    _warm_up(world, state)
+    weakref.finalize(context, release, state)
+    _fill(context, state, program)
+    _warm_up(context, state)
     for slot, rows in pools.starts.items():
         spawn_body(state, slot, rows)
     pools.starts.clear()
@@ -74,8 +74,9 @@ def build(world: World) -> Simulation:
         settings,
         pools,
         scene,
-        world._clock,
-        world._frames,
+        context.clock,
+        context.of(Frames),
+        context.of(Joints),
         colliders if has_contact else None,
         contact.sleep_speed > 0.0,
         state,
@@ -96,64 +97,69 @@ def build(world: World) -> Simulation:
     return simulation
 
 
-def _add_floor(world: World) -> None:
+def _add_floor(context: WorldContext) -> None:
     """Make the floor one of the colliders. Raises: OptionError for what takes no colliders."""
-    settings = world.settings
+    settings = context.settings
     if settings.schedule is Schedule.FLAT:
         raise OptionError("schedule 'flat' has no colliders: it takes 'per_body' or 'auto'")
     if settings.integrator is Integrator.EXPLICIT_EULER:
         raise OptionError("integrator 'explicit_euler' has no colliders: any other has")
     if settings.floor is not None:
-        world._floor_collider = world.add_collider(
+        floor = context.floor_collider = context.colliders.add(
             PlaneShape(),
             position=(0.0, 0.0, settings.floor),
+            rotation=None,
             friction=settings.friction,
             restitution=settings.restitution,
+            thickness=0.0,
+            group=1,
+            mask=ALL_GROUPS,
         )
+        context.handles.enlist(floor)
 
 
-def _schedule(world: World, device: Device, has_contact: bool) -> Schedule:
-    asked = world.settings.schedule
-    is_cut = any(asset.spare_vertices for asset in world._pools.kinds)
+def _schedule(context: WorldContext, device: Device, has_contact: bool) -> Schedule:
+    asked = context.settings.schedule
+    is_cut = any(asset.spare_vertices for asset in context.slots.kinds)
     if is_cut and asked is Schedule.FLAT:
         raise OptionError("schedule 'flat' cuts no bodies: take 'per_body' or 'auto', or no spare_vertices")
-    needs_bodies = world.settings.is_implicit or has_contact or is_cut
-    return choose_schedule(asked, world._scene, device, needs_bodies=needs_bodies)
+    needs_bodies = context.settings.is_implicit or has_contact or is_cut
+    return choose_schedule(asked, context.layout, device, needs_bodies=needs_bodies)
 
 
-def _capacity(world: World, settings: Settings, has_contact: bool) -> Capacity:
+def _capacity(context: WorldContext, settings: Settings, has_contact: bool) -> Capacity:
     contact = ContactCapacity()
     if has_contact:
-        chosen = world._contact
-        contact = world._colliders.capacity(chosen.collider_room, chosen.sample_room, soft=chosen.soft)
+        chosen = context.contact
+        contact = context.colliders.capacity(chosen.collider_room, chosen.sample_room, soft=chosen.soft)
     return Capacity.of(
-        world._scene,
+        context.layout,
         parallel=settings.schedule is Schedule.FLAT,
         implicit=settings.is_implicit,
         contact=contact,
-        plastic=_is_plastic(world),
+        plastic=_is_plastic(context),
     )
 
 
-def _program(world: World, settings: Settings, device: Device, has_contact: bool) -> StepProgram:
+def _program(context: WorldContext, settings: Settings, device: Device, has_contact: bool) -> StepProgram:
     return StepProgram(
-        tuple(dict.fromkeys(asset.description.model for asset in world._pools.kinds)),
+        tuple(dict.fromkeys(asset.description.model for asset in context.slots.kinds)),
         settings.integrator,
         settings.floor is not None and not has_contact,
         has_contact,
-        world._contact.soft,
-        _is_plastic(world),
+        context.contact.soft,
+        _is_plastic(context),
         device.threads,
     )
 
 
-def _is_plastic(world: World) -> bool:
-    return any(asset.plasticity is not None for asset in world._pools.kinds)
+def _is_plastic(context: WorldContext) -> bool:
+    return any(asset.plasticity is not None for asset in context.slots.kinds)
 
 
-def _fill(world: World, state: State, program: StepProgram) -> None:
+def _fill(context: WorldContext, state: State, program: StepProgram) -> None:
     """Write all bodies into the fields, in slots that are empty yet."""
-    fill, assets = state.loader.fill, world._pools.assets
+    fill, assets = state.loader.fill, context.slots.assets
     if program.has_plasticity:
         flows = [a.plasticity.row if a.plasticity else RIGID_ROW for a in assets]
         fill(state.body_plasticity, np.array(flows))
@@ -164,15 +170,15 @@ def _fill(world: World, state: State, program: StepProgram) -> None:
         fill(state.soft.body_touches_itself, np.array([a.contact.itself for a in assets]))
     models = [program.models.index(asset.description.model) for asset in assets]
     kinds = np.array([(a.surface_row[2], *a.vibration_row(a.description)) for a in assets])
-    state.load(world._scene, models, kinds)
+    state.load(context.layout, models, kinds)
 
 
-def _warm_up(world: World, state: State) -> None:
+def _warm_up(context: WorldContext, state: State) -> None:
     """A body that comes and goes, so that nothing compiles where the first does in the game."""
-    for asset in world._pools.kinds:
-        slot = world._pools.assets.index(asset)
+    for asset in context.slots.kinds:
+        slot = context.slots.assets.index(asset)
         if asset.spare_vertices:
-            warm_up(world, state, slot)
+            warm_up(context, state, slot)
         spawn_body(state, slot, asset.rest_rows)
         despawn_body(state, slot)
 

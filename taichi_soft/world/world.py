@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable, Iterable, Sequence
-from functools import cached_property
 from pathlib import Path
-from typing import TypeVar
+from typing import TypeVar, cast
 
 from numpy.typing import ArrayLike
 
@@ -16,6 +15,7 @@ from taichi_soft.bodies.contact import DEFAULT_CONTACT, Contact
 from taichi_soft.bodies.layout import Scene
 from taichi_soft.bodies.plasticity import Plasticity
 from taichi_soft.bodies.slots import Pools
+from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.bodies.stability import StableStep
 from taichi_soft.bodies.tearing import Tearing
 from taichi_soft.contact.colliders import MOST_SAMPLES, Collider, Colliders
@@ -23,9 +23,9 @@ from taichi_soft.contact.shapes import Shape
 from taichi_soft.control.access import require_substeps
 from taichi_soft.control.drives import ForceField, push_by_field, require_field, set_wind
 from taichi_soft.control.frames import Frame, Frames
-from taichi_soft.control.grabs import Grab, as_pull
+from taichi_soft.control.grabs import Grab, Grabs, as_pull
 from taichi_soft.control.impulses import apply_radial_impulse
-from taichi_soft.control.joints import Joint
+from taichi_soft.control.joints import Joint, Joints
 from taichi_soft.core.checks import as_count, as_flag, as_number, as_path, as_vector
 from taichi_soft.core.clock import Clock
 from taichi_soft.core.constants import ALL_GROUPS, GRAVITY_EARTH, VELOCITY_LIMIT
@@ -37,9 +37,8 @@ from taichi_soft.core.types import DampingModel, Flips, Integrator, Schedule, St
 from taichi_soft.elements.materials import AnyMaterial
 from taichi_soft.events import Event, Listener
 from taichi_soft.meshing import BodyMesh
-from taichi_soft.persistence.recorder import Recorder, save_recording
+from taichi_soft.persistence.recorder import Recorder
 from taichi_soft.persistence.snapshot import restore_snapshot, state_hash, take_snapshot
-from taichi_soft.persistence.structure import structure_of
 from taichi_soft.queries import (
     ClosestPoint,
     Overlap,
@@ -51,7 +50,8 @@ from taichi_soft.queries import (
     find_in_box,
     find_in_sphere,
 )
-from taichi_soft.solver.simulation import Simulation, require_built
+from taichi_soft.solver.context import WorldContext
+from taichi_soft.solver.simulation import Simulation
 from taichi_soft.solver.substeps import Substeps
 from taichi_soft.world.body import Body
 from taichi_soft.world.building import build
@@ -124,7 +124,7 @@ class World(Handle):
     ) -> None:
         downwards = as_vector(gravity, "gravity", "m/s^2")
         downwards.flags.writeable = False
-        self._settings = Settings(
+        settings = Settings(
             gravity=downwards,
             floor=None if floor is None else as_number(floor, "floor", -1e6, 1e6, "a height [m] or None"),
             restitution=None
@@ -137,11 +137,11 @@ class World(Handle):
             retries=as_count(retries, "retries", 0, MOST_RETRIES),
             schedule=Schedule.parse(schedule),
         )
-        if self.settings.is_implicit and self.settings.schedule is Schedule.FLAT:
+        if settings.is_implicit and settings.schedule is Schedule.FLAT:
             raise OptionError("schedule 'flat' has no implicit_euler: it takes 'per_body' or 'auto'")
         self._handles, self._serial = Handles(), 0
         self._record, self._record_to = as_count(record, "record", 0), as_path(record_to)
-        self._contact = ContactSettings(
+        touching = ContactSettings(
             collider_room=as_count(collider_room, "collider_room", 0),
             sample_room=as_count(sample_room, "sample_room", 0, MOST_SAMPLES),
             soft=as_flag(soft_contact, "soft_contact"),
@@ -149,59 +149,67 @@ class World(Handle):
                 sleep_speed, "sleep_speed", 0.0, VELOCITY_LIMIT, "a speed of 0 m/s or more"
             ),
         )
-        self._clock = Clock()
-        self._pools, self._scene = Pools(), Scene()
-        self._substeps = Substeps(
-            self._pools,
-            is_implicit=self.settings.is_implicit,
-            soft_contact=self._contact.soft,
+        pools: Pools[SoftBody] = Pools()
+        substeps = Substeps(
+            pools,
+            is_implicit=settings.is_implicit,
+            soft_contact=touching.soft,
             most=None if max_substeps is None else as_count(max_substeps, "max_substeps"),
         )
-        self._colliders = Colliders()
-        self._floor_collider: Collider | None = None
-        self._built_with: list[str] = []  # shapes of colliders that came before `build`, by digest
-        self._frames = Frames(self._pools)
-        self._grabs: dict[int, Grab] = {}
-        self._joints: dict[int, Joint] = {}
+        self._context = WorldContext(
+            settings=settings,
+            clock=Clock(),
+            handles=self._handles,
+            slots=pools,
+            layout=Scene(),
+            renew_substeps=substeps.renew,
+            take_in=take_in,
+            contact=touching,
+            colliders=Colliders(),
+            substeps=substeps,
+            make_body=Body,
+        )
+        self._frames, self._grabs = Frames(self._context), Grabs(self._context)
+        self._joints = Joints(self._context)
+        self._context.slices += [self._frames, self._grabs, self._joints]
         self._force_field: ForceField | None = None
         self._recorder: Recorder | None = None
-        self._simulation: Simulation | None = None
         self._restore_count = 0
 
     @property
     def settings(self) -> Settings:
         """Gravity, floor, integrator and schedule, as they were checked and chosen."""
-        return self._settings
+        return self._context.settings
 
     @property
     def step_count(self) -> int:
         """Fixed steps made so far."""
-        return self._clock.steps
+        return self._context.clock.steps
 
     @property
     def time(self) -> float:
         """Simulated time [s]."""
-        return self._clock.time
+        return self._context.clock.time
 
     @property
     def last_dt(self) -> float:
         """Length of the last fixed step [s], 0 before the first."""
-        return self._clock.last_dt
+        return self._context.clock.last_dt
 
     @property
     def bodies(self) -> Sequence[Body]:
         """All bodies that live, by the number of their slots: bodies of `add_body` in the order of adding."""
-        return self._pools.living
+        return cast("tuple[Body, ...]", self._context.slots.living)
 
     @property
     def slot_count(self) -> int:
         """Slots for bodies, empty ones among them."""
-        return len(self._pools.slots)
+        return len(self._context.slots.slots)
 
     @property
     def is_built(self) -> bool:
         """True from `build` on."""
-        return self._simulation is not None
+        return self._context.fields is not None
 
     def add_body(
         self,
@@ -231,7 +239,7 @@ class World(Handle):
         Returns: a handle.
         Raises: MeshError, MaterialError or OptionError for bad input; StateError after `build`.
         """
-        require_open(self)
+        require_open(self._context)
         asset = SoftBodyAsset(
             mesh,
             material,
@@ -245,7 +253,7 @@ class World(Handle):
             spare_vertices=spare_vertices,
             tearing=tearing,
         )
-        return add_body(self, asset, position, rotation, velocity)
+        return add_body(self._context, asset, position, rotation, velocity)
 
     def reserve(self, asset: SoftBodyAsset, count: int) -> None:
         """Make room for `count` more bodies of an asset, before `build`; `spawn` fills it.
@@ -254,7 +262,7 @@ class World(Handle):
         Raises: OptionError for what is no asset or no count, or an asset that the integrator cannot take;
             StateError after `build`.
         """
-        reserve(self, asset, count)
+        reserve(self._context, asset, count)
 
     @recorded
     def spawn(
@@ -278,7 +286,7 @@ class World(Handle):
         Raises: OptionError for a value out of range, or a place out of reach, below the floor or inside a
             collider; StateError for an asset without a pool in this world, or whose pool is full.
         """
-        return spawn(self, asset, position, rotation, velocity, angular_velocity)
+        return spawn(self._context, asset, position, rotation, velocity, angular_velocity)
 
     @recorded
     def despawn(self, body: Body) -> None:
@@ -286,15 +294,12 @@ class World(Handle):
 
         Raises: OptionError for what is no body of this world; StateError for one that was removed before.
         """
-        despawn(self, body)
-
-    def _take_in(self, asset: SoftBodyAsset) -> Body:
-        return take_in(self, asset)
+        despawn(self._context, body)
 
     @property
     def colliders(self) -> Sequence[Collider]:
         """All colliders; from `build` on the floor is among them."""
-        return self._colliders.handles
+        return self._context.colliders.handles
 
     @property
     def frames(self) -> Sequence[Frame]:
@@ -304,17 +309,17 @@ class World(Handle):
     @property
     def grabs(self) -> Sequence[Grab]:
         """All grabs that hold a body, also those that `restore` brought along."""
-        return [grab for _, grab in sorted(self._grabs.items())]
+        return self._grabs.handles
 
     @property
     def joints(self) -> Sequence[Joint]:
         """All joints between bodies (`Body.attach_to`), also those that `restore` brought along."""
-        return [joint for _, joint in sorted(self._joints.items())]
+        return self._joints.handles
 
     @property
     def floor_collider(self) -> Collider | None:
         """The floor where there are colliders, from `build` on: to read what bodies do to it."""
-        return self._floor_collider
+        return self._context.floor_collider
 
     @recorded
     def add_collider(
@@ -347,12 +352,12 @@ class World(Handle):
         Returns: a handle, to move it and to read the impulse on it.
         Raises: OptionError for bad values; StateError where there is no room left.
         """
-        if self._simulation is not None and self._simulation.colliders is None:
+        if self._context.fields is not None and self._context.fields.colliders is None:
             raise StateError(
                 "the world was built without colliders: add one before build(), or make the world with "
                 "collider_room"
             )
-        collider = self._colliders.add(
+        collider = self._context.colliders.add(
             shape,
             position=position,
             rotation=rotation,
@@ -375,15 +380,15 @@ class World(Handle):
         """
         if self.is_built:
             raise StateError("the world is already built")
-        self._simulation = build(self)
-        self._settings = self._simulation.settings
+        self._context.fields = build(self._context)
+        self._context.settings = self._context.fields.settings
         if self._record:
-            self._handles.recorder = self._recorder = Recorder(self, self._record)
+            self._handles.recorder = self._recorder = Recorder(self._context, self._record, self._record_to)
 
     @property
     def _built(self) -> Simulation:
         """Raises: StateError before `build`."""
-        return require_built(self._simulation)
+        return self._context.built
 
     def stable_step(self, body: Body) -> StableStep:
         """Estimate of the largest stable substep of a body; bodies of one asset share it until they are cut.
@@ -392,7 +397,7 @@ class World(Handle):
         """
         if not isinstance(body, Body):
             raise OptionError(f"body must be one that a world made, got {body!r}")
-        return self._substeps.stable_step(body)
+        return self._context.substeps.stable_step(body)
 
     def stable_substeps(self, dt: float) -> int:
         """Number of substeps that a fixed step of `dt` [s] needs, with a margin, for the stiffest asset.
@@ -403,7 +408,7 @@ class World(Handle):
         several times as much with `damping`: give substeps where that is too long. 1 for implicit Euler,
         which needs none; with `soft_contact` so many that they last no longer than 1/240 s.
         """
-        return self._substeps.stable_count(dt)
+        return self._context.substeps.stable_count(dt)
 
     def step(self, dt: float, substeps: int | None = None) -> None:
         """Make one fixed step of `dt` [s] in `substeps` equal substeps; None chooses their number.
@@ -418,8 +423,8 @@ class World(Handle):
         Raises: OptionError if dt is not a positive number or substeps not a positive whole one, and where
             there are more than `max_substeps`; StateError before `build`.
         """
-        simulation = self._simulation or self._built  # which raises
-        seconds, count, h = self._substeps.choose(dt, substeps)
+        simulation = self._context.fields or self._built  # which raises
+        seconds, count, h = self._context.substeps.choose(dt, substeps)
         if count > simulation.long_from:
             reports = self._make_long_step(simulation, seconds, count, h)
         else:
@@ -427,7 +432,7 @@ class World(Handle):
             with Whole():
                 reports = simulation.step(seconds, count, h)
         if self._recorder is not None:
-            reports += self._recorder.note_step(self, seconds, count, is_broken=bool(reports))
+            reports += self._recorder.note_step(self._context, seconds, count, is_broken=bool(reports))
         if reports:
             warnings.warn("; ".join(reports), FrozenBodyWarning, stacklevel=3)
         if simulation.troubled:
@@ -436,18 +441,18 @@ class World(Handle):
     def _push(self) -> None:
         """Let the force field act in the coming step, if there is one."""
         if self._force_field is not None:
-            rows = push_by_field(self, self._force_field)
+            rows = push_by_field(self._context, self._force_field)
             if self._recorder is not None:
                 self._recorder.pushes = [(body._serial, accelerations) for body, accelerations in rows]
 
     def _make_long_step(self, simulation: Simulation, seconds: float, substeps: int, h: float) -> list[str]:
         """One that Ctrl-C may end, and then all is as before."""
-        before = take_snapshot(self)
+        before = take_snapshot(self._context)
         try:
             self._push()
             return simulation.step(seconds, substeps, h)
         except KeyboardInterrupt:
-            restore_snapshot(self, before)
+            restore_snapshot(self._context, before)
             raise
 
     @recorded
@@ -459,13 +464,13 @@ class World(Handle):
         compiled. The world stays as it is, to the bit.
         Raises: StateError before `build`.
         """
-        rehearse(self)
+        rehearse(self._context)
 
     @recorded
     def wake(self) -> None:
         """Wake all bodies that sleep."""
-        if self._simulation is not None:
-            self._simulation.wake_all()
+        if self._context.fields is not None:
+            self._context.fields.wake_all()
 
     @recorded
     def add_frame(self, position: ArrayLike = (0.0, 0.0, 0.0), rotation: ArrayLike | None = None) -> Frame:
@@ -506,7 +511,8 @@ class World(Handle):
         hit = self.raycast(origin, direction, max_distance=max_distance, bodies=bodies)
         if hit is None:
             return None
-        return hit.body.grab(hit.triangle, hit.barycentrics, frequency=frequency, max_force=max_force)
+        body = cast(Body, hit.body)
+        return body.grab(hit.triangle, hit.barycentrics, frequency=frequency, max_force=max_force)
 
     @recorded
     def apply_radial_impulse(self, center: ArrayLike, impulse: float, radius: float) -> None:
@@ -521,7 +527,7 @@ class World(Handle):
             radius: where nothing is felt any more [m].
         Raises: OptionError for a number out of range; StateError before `build`.
         """
-        apply_radial_impulse(self, center, impulse, radius)
+        apply_radial_impulse(self._context, center, impulse, radius)
 
     @recorded
     def set_wind(self, velocity: ArrayLike | None, *, density: float = 1.2, drag: float = 1.0) -> None:
@@ -537,7 +543,7 @@ class World(Handle):
             drag: coefficient of a plate across the wind.
         Raises: OptionError for a number out of range; StateError before `build` and under schedule "flat".
         """
-        set_wind(self, velocity, density, drag)
+        set_wind(self._context, velocity, density, drag)
 
     def set_force_field(self, function: ForceField | None) -> None:
         """Accelerate all bodies by a function of place and time, from now on; None ends it.
@@ -549,8 +555,8 @@ class World(Handle):
         Raises: OptionError for what cannot be called; StateError under schedule "flat".
         """
         field = require_field(function)
-        require_built(self._simulation)
-        require_substeps(self, "force field")
+        _ = self._built
+        require_substeps(self._context, "force field")
         self._force_field = field
 
     def read_positions(self, body: Body, alpha: float, out: Floats32 | None = None) -> Floats32:
@@ -562,7 +568,7 @@ class World(Handle):
             fit; StateError before `build`.
         """
         simulation = self._built
-        require_own(self, body)
+        require_own(self._context, body)
         if type(alpha) is not float or not 0.0 <= alpha <= 1.0:
             alpha = as_number(alpha, "alpha", 0.0, 1.0, "a number from 0 to 1")
         return simulation.readout.positions(body, alpha, out)
@@ -635,7 +641,7 @@ class World(Handle):
         Raises: OptionError for numbers that are not finite, a direction or max_distance of zero, a negative
             max_distance or a body of another world; StateError before `build`.
         """
-        state, slots = self._built.state, self._pools.slots
+        state, slots = self._built.state, self._context.slots.slots
         return cast_ray(state, slots, origin, direction, max_distance, bodies, cull_back)
 
     def raycasts(
@@ -655,7 +661,7 @@ class World(Handle):
         Returns: arrays with a row for each ray, the same as `raycast` finds.
         Raises: as `raycast`.
         """
-        state, slots = self._built.state, self._pools.slots
+        state, slots = self._built.state, self._context.slots.slots
         return cast_rays(state, slots, origins, directions, max_distance, bodies, cull_back)
 
     def closest_point(
@@ -672,7 +678,7 @@ class World(Handle):
         Raises: OptionError for numbers that are not finite, a max_distance that is not above 0 or a body of
             another world; StateError before `build`.
         """
-        return find_closest_point(self._built.state, self._pools.slots, point, max_distance, bodies)
+        return find_closest_point(self._built.state, self._context.slots.slots, point, max_distance, bodies)
 
     def overlap_sphere(
         self, center: ArrayLike, radius: float, *, bodies: Iterable[Body] | None = None
@@ -687,7 +693,7 @@ class World(Handle):
         Raises: OptionError for numbers that are not finite, a radius not above 0 or a body of another world;
             StateError before `build`.
         """
-        return find_in_sphere(self._built.state, self._pools.slots, center, radius, bodies)
+        return find_in_sphere(self._built.state, self._context.slots.slots, center, radius, bodies)
 
     def overlap_box(
         self,
@@ -708,7 +714,7 @@ class World(Handle):
         Raises: OptionError for numbers that are not finite, a size not above 0, what is no rotation or a body
             of another world; StateError before `build`.
         """
-        return find_in_box(self._built.state, self._pools.slots, center, size, rotation, bodies)
+        return find_in_box(self._built.state, self._context.slots.slots, center, size, rotation, bodies)
 
     def snapshot(self) -> bytes:
         """The whole state between two steps, to `restore` it here or in a world that was built alike.
@@ -719,7 +725,7 @@ class World(Handle):
         at most.
         Raises: StateError before `build`.
         """
-        data = take_snapshot(self)
+        data = take_snapshot(self._context)
         if self._recorder is not None:
             self._recorder.note_snapshot(data)
         return data
@@ -735,10 +741,10 @@ class World(Handle):
         Raises: SnapshotError for what is damaged, or of a world that was built of other things, with the
             first that differs; OptionError for what is not bytes; StateError before `build`.
         """
-        restore_snapshot(self, data)
+        restore_snapshot(self._context, data)
         self._restore_count += 1
         if self._recorder is not None:
-            self._recorder.go_back(self, data)
+            self._recorder.go_back(self._context, data)
 
     @property
     def restore_count(self) -> int:
@@ -752,7 +758,7 @@ class World(Handle):
         grabs and joints; the same for any number of threads.
         Raises: StateError before `build`.
         """
-        return state_hash(self)
+        return state_hash(self._context)
 
     def save_recording(self, path: str | Path) -> Path:
         """Write what was done in the last `record` steps or more, and the snapshot before them, to a file.
@@ -764,9 +770,7 @@ class World(Handle):
         Returns: the path.
         Raises: StateError without `record` or before `build`; SnapshotError where the file cannot be written.
         """
-        require_built(self._simulation)
-        return save_recording(self, path)
-
-    @cached_property
-    def _structure(self) -> bytes:
-        return structure_of(self)
+        _ = self._built
+        if self._recorder is None:
+            raise StateError("this world records nothing: make it with World(record=240)")
+        return self._recorder.save(self._context, path)

@@ -89,7 +89,7 @@ def test_ten_thousand_equal_frames_make_one_step_each(adapter, monkeypatch):
 
     def step(dt, substeps):
         calls.append((dt, substeps))
-        adapter.world._clock.steps += 1
+        adapter.world._context.clock.steps += 1
 
     monkeypatch.setattr(adapter.world, "step", step)
     assert {adapter.advance(DT) for _ in range(10_000)} == {1}

@@ -393,7 +393,7 @@ def _is_full(game, world, given):
 
 
 def _has_no_room(game, world, given):
-    return None if len(world._colliders.all_handles) >= 8 else False
+    return None if len(world._context.colliders.all_handles) >= 8 else False
 
 
 def _is_not_kept(game, adapter, given):

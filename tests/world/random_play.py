@@ -159,14 +159,14 @@ def _detach(world, cube, rng):
 
 
 def _join(world, cube, rng):
-    if len(world.bodies) > 1 and len(world._joints) < 3:
+    if len(world.bodies) > 1 and len(world.joints) < 3:
         a, b = (world.bodies[i] for i in rng.permutation(len(world.bodies))[:2])
         count = min(3, a.vertex_count, b.vertex_count)
         a.attach_to(b, _some(a, rng, count), onto=_some(b, rng, count))
 
 
 def _part(world, cube, rng):
-    for _, joint in sorted(world._joints.items())[:1]:
+    for joint in world.joints[:1]:
         joint.release()
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from taichi_soft import Material, StateError, World, beam, box, sphere
-from taichi_soft.solver import state as states
+from taichi_soft.bodies import fields as states
 
 # mesh, material, options: everything in which bodies can differ.
 KINDS = {

@@ -34,7 +34,7 @@ def kept_momentum(world, body):
 
 
 def at_rest(world, body):
-    for frame in world._frames.handles:
+    for frame in world.frames:
         frame.remove()
     body.unpin()
     body.set_linear_damping(0.0)

@@ -38,7 +38,7 @@ def made():
 
 
 def at_rest(world):
-    for grab in list(world._grabs.values()):
+    for grab in list(world.grabs):
         grab.release()
     for i, body in enumerate(world.bodies):
         body.unpin()
@@ -222,11 +222,11 @@ BAD_CALLS = {
 def test_a_refused_call_changes_nothing(plain, name):
     world, body, other = plain
     grab = other.grab(TOP)
-    before = [b.positions().tobytes() for b in world.bodies], grab.point.tolist(), len(world._grabs)
+    before = [b.positions().tobytes() for b in world.bodies], grab.point.tolist(), len(world.grabs)
     with pytest.raises(OptionError):
         BAD_CALLS[name](body, grab)
     world.step(1 / 60)
-    now = [b.positions().tobytes() for b in world.bodies], grab.point.tolist(), len(world._grabs)
+    now = [b.positions().tobytes() for b in world.bodies], grab.point.tolist(), len(world.grabs)
     assert now[1:] == before[1:]
     assert body.positions().tobytes() == before[0][0]
 

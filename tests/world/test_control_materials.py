@@ -158,7 +158,7 @@ def test_the_number_of_substeps_follows_at_once():
             world.step(1 / 60)
     assert counts[1] > 5 * counts[0] == 5 * counts[2]
     assert not body.is_frozen
-    assert len(world._substeps._estimates) == 1  # of materials that are gone nothing is kept
+    assert len(world._context.substeps._estimates) == 1  # of materials that are gone nothing is kept
 
 
 @pytest.mark.parametrize(

@@ -58,7 +58,7 @@ def swinging():
     def again():
         for each in world.bodies:
             world.despawn(each)
-        body = world.spawn(world._pools.assets[0])
+        body = world.spawn(world._context.slots.assets[0])
         body.set_motion(*start)
         return world, body
 

@@ -86,7 +86,7 @@ def fresh():
 
     def make(kind):
         world.despawn(world.bodies[list(KINDS).index(kind)])
-        return world.spawn(world._pools.assets[list(KINDS).index(kind)])
+        return world.spawn(world._context.slots.assets[list(KINDS).index(kind)])
 
     make.world = world
     return make
@@ -101,7 +101,7 @@ def worlds():
 def deform(body, F, steps=1, dt=DT):
     body.set_motion(MESH.vertices @ np.asarray(F, dtype=float).T, np.zeros_like(MESH.vertices))
     for _ in range(steps):
-        body._world.step(dt, 1)
+        body._context.built.step(dt, 1, dt)
 
 
 def test_below_yield_nothing_changes_to_the_bit(fresh):
@@ -119,7 +119,7 @@ def test_below_yield_nothing_changes_to_the_bit(fresh):
 def test_beyond_yield_the_elastic_strain_is_that_of_return_mapping(mode, stretches, worlds):
     world = worlds(mode)
     world.despawn(world.bodies[0])
-    body = world.spawn(world._pools.assets[0])
+    body = world.spawn(world._context.slots.assets[0])
     deform(body, np.diag(stretches))
     elastic = yielded(np.array(stretches), 0.1)
     np.testing.assert_allclose(body.deformations(), np.tile(np.diag(elastic), (40, 1, 1)), atol=3e-6)

@@ -2,7 +2,10 @@
 
 import gc
 
-from taichi_soft import Material, World, box, state
+from taichi_soft import Material, World, box
+from taichi_soft.bodies import fields
+from taichi_soft.contact.fields import ContactCapacity
+from taichi_soft.solver.state import Capacity
 
 CUBE = box(cells=(1, 1, 1))
 JELLY = Material(1e5, 0.2, 1000.0, 20.0)
@@ -25,7 +28,7 @@ def room(world):
 
 def test_a_world_moves_the_same_in_the_fields_of_a_larger_one(monkeypatch):
     gc.collect()  # worlds of earlier tests give back their fields before, not into the empty list
-    monkeypatch.setattr(state, "_free", [])
+    monkeypatch.setattr(fields, "_free", [])
     large = fallen(10)
     assert room(large) == 16
     del large
@@ -47,17 +50,17 @@ def test_a_world_moves_the_same_in_the_fields_of_a_larger_one(monkeypatch):
 def test_fields_for_what_a_world_does_not_do_are_not_taken(monkeypatch):
     """Nor such as are too short in any respect."""
     least = {"particles": 8, "edges": 8, "blocks": 8, "bodies": 8, "triangles": 8, "outer": 8}
-    plain = state.Capacity(**least, parallel=False)
+    plain = Capacity(**least, parallel=False)
     for other in (
-        state.Capacity(**least, parallel=True),
-        state.Capacity(**least, parallel=False, rings=512),
-        state.Capacity(**least, parallel=False, implicit=True),
-        state.Capacity(**least, parallel=False, double=True),
-        state.Capacity(**least, parallel=False, contact=state.ContactCapacity(8)),
+        Capacity(**least, parallel=True),
+        Capacity(**least, parallel=False, rings=512),
+        Capacity(**least, parallel=False, implicit=True),
+        Capacity(**least, parallel=False, double=True),
+        Capacity(**least, parallel=False, contact=ContactCapacity(8)),
     ):
         assert not plain.has_room_for(other)
         assert not other.has_room_for(plain)
     for name in least:
-        longer = state.Capacity(**{**least, name: 16}, parallel=False)
+        longer = Capacity(**{**least, name: 16}, parallel=False)
         assert longer.has_room_for(plain)
         assert not plain.has_room_for(longer)

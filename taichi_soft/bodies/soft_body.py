@@ -1,0 +1,327 @@
+"""A body, and the part of its world that it shares with all that a game does to it.
+
+Slices see a `Context` and `SoftBody`, never the world that stands above them.
+"""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.bodies.asset import SoftBodyAsset
+from taichi_soft.bodies.failure import FailedStep, Failure
+from taichi_soft.bodies.layout import BodyArrays, BodyDescription, Ranges, Scene
+from taichi_soft.bodies.part import Part
+from taichi_soft.bodies.slots import Pools
+from taichi_soft.core.clock import Clock
+from taichi_soft.core.errors import StateError
+from taichi_soft.core.handles import Handle, Handles
+from taichi_soft.core.settings import Settings
+from taichi_soft.core.turns import one_thread
+from taichi_soft.elements.materials import AnyMaterial
+from taichi_soft.meshing import BodyMesh
+
+Floats32 = NDArray[np.float32]
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+SomeSlice = TypeVar("SomeSlice", bound="Slice")
+
+
+class Built(Protocol):
+    """A built world's fields, and what has to be said of a change to them."""
+
+    state: Any
+    program: Any
+
+    def change(self, slot: int, kernel: Callable[..., Any], *arguments: Any) -> Any:
+        """Call a kernel (state, *arguments) that changes a body, or all for -1."""
+
+    def attempt(self, kernel: Callable[..., Any], *arguments: Any) -> Any:
+        """Call a kernel (state, *arguments) that may refuse: bodies sleep on until `rouse` is called."""
+
+    def rouse(self, slot: int) -> None:
+        """Take note that control has changed a body, or all for -1."""
+
+    def read(self, slot: int, kernel: Callable[..., Any], *arguments: Any) -> Any:
+        """Call a kernel (state, first particle of a body, *arguments) that changes nothing."""
+
+    def rows_of(self, slot: int, vertices: NDArray[np.int32]) -> NDArray[np.int32]:
+        """Where vertices of a body lie in the fields."""
+
+    def has_changed(self) -> None:
+        """Take note that the fields were written to."""
+
+    def wake(self, slot: int) -> None:
+        """Wake a body, or all for -1."""
+
+    def wake_near(self, lower: NDArray[Any], upper: NDArray[Any]) -> None:
+        """Wake who sleeps near a box, given by two corners [m]."""
+
+    def box_of(self, body: SoftBody) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Corners of a box round a body and its skin, as it is now [m]."""
+
+    def positions(self, body: SoftBody, alpha: float, out: NDArray[np.float32] | None) -> NDArray[np.float32]:
+        """Of the vertices, between the previous step and the last one, (n, 3) [m]."""
+
+    def velocities(self, body: SoftBody) -> NDArray[np.float32]:
+        """Of the vertices at the time of their positions, (n, 3) [m/s]."""
+
+    def pinned(self, body: SoftBody) -> NDArray[np.int32]:
+        """Vertices that are held now, ascending."""
+
+    def rest_inverses(self, body: SoftBody) -> NDArray[np.float64]:
+        """A^-1 of each tetrahedron of a body that may have flowed, (m, 3, 3) [1/m]."""
+
+    def require_clear(self, body: SoftBody, points: NDArray[np.float64]) -> None:
+        """Raises: OptionError where points of a body's surface, (k, 3) [m], are crushed in a collider."""
+
+    def joints_have_changed(self) -> None:
+        """Take note of who is joined to whom."""
+
+    def find_failure(self, slot: int, failed: FailedStep) -> Failure:
+        """What broke first in the body in a slot."""
+
+    def was_cut(self, body: SoftBody) -> None:
+        """Take note that a body has other vertices."""
+
+
+@dataclass(eq=False, kw_only=True)
+class Context:
+    """The small part of a world that its slices share."""
+
+    settings: Settings
+    clock: Clock
+    handles: Handles
+    slots: Pools[SoftBody]
+    layout: Scene
+    renew_substeps: Callable[[], None]  # where a body is made of something else
+    take_in: Callable[
+        [Any, SoftBodyAsset], SoftBody
+    ]  # a new handle to what is in the next free slot of an asset
+    slices: list[Slice] = field(default_factory=list)
+    fields: Built | None = None  # from `World.build` on
+
+    @property
+    def built(self) -> Built:
+        """Raises: StateError before `World.build`."""
+        if self.fields is None:
+            raise StateError("the world is not built: call world.build() after the last add_body")
+        return self.fields
+
+    def of(self, kind: type[SomeSlice]) -> SomeSlice:
+        """The slice of a kind."""
+        return next(each for each in self.slices if isinstance(each, kind))
+
+
+class Slice:
+    """One thing that a game switches on. What there is of it in a world is known here and nowhere else."""
+
+    def __init__(self, context: Context) -> None:
+        """Nothing yet."""
+        self._context_ref = weakref.ref(context)  # handles keep their slice, and no world
+
+    @property
+    def context(self) -> Context:
+        """Raises: StateError where the world is gone."""
+        context = self._context_ref()
+        if context is None:
+            raise StateError("the world is gone: keep a reference to it")
+        return context
+
+    def holds(self, body: SoftBody) -> bool:
+        """Whether it pulls at a body, which then is not cut."""
+        return False
+
+    def let_go(self, body: SoftBody) -> None:
+        """Give up all that is tied to a body, which leaves the world."""
+
+
+class SoftBody(Handle):
+    """What is known of a body without the world that it lives in. `Body` is what users hold."""
+
+    def __init__(self, context: Context, index: int, asset: SoftBodyAsset) -> None:
+        """Made by `World.add_body` and `World.spawn`."""
+        # Weak, or a world that is dropped would wait for the garbage collector to give its state back.
+        self._context_ref = weakref.ref(context)
+        self._asset = asset
+        self._description = asset.description
+        self._index = index
+        self._first_step = context.clock.steps
+        self._removed_in: int | None = None
+        self._frozen_in: FailedStep | None = None
+        self._failure: Failure | None = None
+        self._attachments: list[Any] = []
+        self._topology_version = 0
+        self._part: Part | None = None  # of the asset's mesh, once it was cut
+
+    def _require_alive(self) -> None:
+        """Raises: StateError once the body was removed."""
+        if self._removed_in is not None:
+            raise StateError(f"body {self.index} was removed by despawn in step {self._removed_in}")
+
+    @property
+    def _context(self) -> Context:
+        self._require_alive()
+        context = self._context_ref()
+        if context is None:
+            raise StateError(f"the world of body {self.index} is gone: keep a reference to it")
+        return context
+
+    def __repr__(self) -> str:
+        state = "removed" if not self.is_alive else "frozen" if self.is_frozen else "active"
+        kind = f"{len(self.tets)} tetrahedra" if len(self.tets) else f"{len(self.mesh.edges)} edges"
+        return f"Body({self.index}, {self.vertex_count} vertices, {kind}, {state})"
+
+    @property
+    def asset(self) -> SoftBodyAsset:
+        """What it shares with other bodies of its kind; `World.spawn` takes it."""
+        return self._asset
+
+    @property
+    def index(self) -> int:
+        """Number of its slot in the world, which another body may get after `World.despawn`."""
+        return self._index
+
+    @property
+    def is_alive(self) -> bool:
+        """False once `World.despawn` has removed it: what asks the world then raises StateError."""
+        return self._removed_in is None
+
+    @property
+    def mesh(self) -> BodyMesh:
+        """The rest shape, as added, or as cuts have left it."""
+        return self._description.mesh
+
+    @property
+    def material(self) -> AnyMaterial:
+        """The material, as added or set since."""
+        return self._description.material
+
+    @property
+    def vertex_count(self) -> int:
+        """Number of vertices, n."""
+        return len(self._description.mesh.vertices)
+
+    @property
+    def tets(self) -> NDArray[np.int32]:
+        """Vertices of each tetrahedron, (m, 4)."""
+        return self._description.mesh.tets
+
+    @property
+    def surface(self) -> NDArray[np.int32]:
+        """Surface triangles, outward, (f, 3)."""
+        return np.asarray(self.mesh.surface)
+
+    @property
+    def is_held(self) -> bool:
+        """Whether it is attached, to a frame or another body, or grabbed."""
+        return self._is_pulled or bool(self._attachments)
+
+    @property
+    def _is_pulled(self) -> bool:
+        """Whether it is grabbed, or joined to another body."""
+        return any(each.holds(self) for each in self._context.slices)
+
+    @property
+    def topology_version(self) -> int:
+        """How often its vertices and tetrahedra have changed: where this does, read `surface` again."""
+        return self._topology_version
+
+    @property
+    def is_cut(self) -> bool:
+        """Whether it is no longer what its asset says, but what cuts have left."""
+        return self._part is not None
+
+    @property
+    def vertex_origins(self) -> Ints:
+        """The vertex of the asset's mesh that each vertex is, or is a copy of, (n,)."""
+        return np.arange(self.vertex_count) if self._part is None else self._part.vertices
+
+    @property
+    def tet_origins(self) -> Ints:
+        """The tetrahedron of the asset's mesh that each one is, (m,)."""
+        return np.arange(len(self.tets)) if self._part is None else self._part.tets
+
+    def _become(self, part: Part | None) -> None:
+        """Take note of what cuts have left of the asset's mesh, None for all of it."""
+        self._part = part
+        self._topology_version += 1
+
+    def _redescribe(self, description: BodyDescription, arrays: BodyArrays) -> Ranges:
+        """Take note that the body is made of something else. Returns where it lies in the fields."""
+        context = self._context
+        self._description = description
+        context.layout.bodies[self.index] = arrays
+        context.renew_substeps()
+        return context.layout.ranges[self.index]
+
+    @property
+    def masses(self) -> Floats:
+        """Mass of each vertex, (n,) [kg]."""
+        return self._description.masses
+
+    @property
+    def pinned(self) -> NDArray[np.int32]:
+        """Vertices that are held now, ascending."""
+        fields = self._context.fields
+        return self._description.pinned if fields is None else fields.pinned(self)
+
+    @property
+    def _rest_inverses(self) -> Floats:
+        """A^-1 of each tetrahedron at rest as it is now, (m, 3, 3) [1/m]."""
+        fields = self._context.fields
+        if self.asset.plasticity is None or fields is None:
+            return self._description.rest_inverses
+        return fields.rest_inverses(self)
+
+    @property
+    def is_frozen(self) -> bool:
+        """True once the body went non-finite; it stays in its last finite state from then on."""
+        return self._frozen_in is not None
+
+    @property
+    @one_thread
+    def failure(self) -> Failure | None:
+        """What broke first, None while the body is sound. Found out when first asked, not within a step."""
+        self._require_alive()
+        if self._frozen_in is not None and self._failure is None:
+            self._failure = self._context.built.find_failure(self.index, self._frozen_in)
+        return self._failure
+
+    def positions(self, out: Floats32 | None = None) -> Floats32:
+        """Vertex positions after the last step, float32 (n, 3) [m].
+
+        Args:
+            out: C-contiguous float32 array to fill and return; None makes a new one.
+        Raises: OptionError if `out` does not fit.
+        """
+        return self._context.built.positions(self, 1.0, out)
+
+    def velocities(self) -> Floats32:
+        """Vertex velocities at the time of the positions, float32 (n, 3) [m/s].
+
+        Leapfrog keeps them half a substep behind; they are brought up with the present acceleration.
+        """
+        return self._context.built.velocities(self)
+
+    @property
+    def gravity_scale(self) -> float:
+        """By what the world's gravity is multiplied for this body."""
+        fields = self._context.fields
+        return 1.0 if fields is None else float(fields.state.body_gravity_scale[self.index])
+
+    def aabb(self) -> tuple[Floats, Floats]:
+        """Least and greatest coordinates of the vertices, (3,) each [m]."""
+        positions = self.positions().astype(np.float64)
+        return positions.min(axis=0), positions.max(axis=0)
+
+    def center_of_mass(self) -> Floats:
+        """(3,) [m]."""
+        return np.asarray(self.masses @ self.positions().astype(np.float64) / self.masses.sum())
