@@ -221,6 +221,17 @@ class BodyFields:
         self.wind = ti.Vector.field(4, real, ())  # [m/s], density times drag coefficient [kg/m^3]
         self.floor = ti.Vector.field(3, real, ())  # height [m], restitution, friction
 
+    def carried_grabs(self) -> list[list[Any]]:
+        """What the next step depends on: of each grab, of each in use, of each row of its patch."""
+        return [
+            [self.grab_body],
+            [
+                *(self.grab_corners, self.grab_weights, self.grab_target, self.grab_spring),
+                *(self.grab_limits, self.grab_force, self.grab_count),
+            ],
+            [self.patch_particle, self.patch_share],
+        ]
+
     def load(self, scene: Scene, models: list[int], kinds: NDArray[np.float64] | None = None) -> None:
         """Fill every field from `scene`, and those that `loader` has rows for already.
 

@@ -6,7 +6,7 @@ Slices see a `Context` and `SoftBody`, never the world that stands above them.
 from __future__ import annotations
 
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeVar
 
@@ -30,6 +30,9 @@ Floats32 = NDArray[np.float32]
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+
+RowsOf = Callable[[Any], NDArray[Any]]
+"""What a snapshot has for a field, (rows, width): whole numbers, or float32."""
 
 SomeSlice = TypeVar("SomeSlice", bound="Slice")
 
@@ -123,6 +126,8 @@ class Context:
 class Slice:
     """One thing that a game switches on. What there is of it in a world is known here and nowhere else."""
 
+    name = ""  # of its part of a snapshot; slices without one have none
+
     def __init__(self, context: Context) -> None:
         """Nothing yet."""
         self._context_ref = weakref.ref(context)  # handles keep their slice, and no world
@@ -141,6 +146,37 @@ class Slice:
 
     def let_go(self, body: SoftBody) -> None:
         """Give up all that is tied to a body, which leaves the world."""
+
+    def rehearse(self, body: SoftBody, other: SoftBody | None, step: Callable[[], None]) -> None:
+        """Do to a body, and another one if there is one, all that a game may: see `World.warm_up`.
+
+        Args: step: makes a step that is taken back.
+        """
+
+    # What a snapshot has of it. All of this is called in a world that is built.
+
+    def note(self) -> list[list[Any]]:
+        """What Python knows of it, as plain data: a row for each handle, which begins with its number."""
+        return []
+
+    def row_counts(self, notes: list[list[Any]]) -> list[int]:
+        """How many rows of each group of its fields `carried` are in use, by notes of `note`."""
+        return []
+
+    def read(self, notes: list[list[Any]], vertex_counts: Sequence[int]) -> Any:
+        """Notes of `note`, checked against the bodies that are to live in each slot, 0 vertices for nobody.
+
+        Raises: ValueError, or what Python raises, where they are not in order.
+        """
+
+    def require(self, read: Any, rows_of: RowsOf) -> None:
+        """Raises: ValueError where the rows of its fields are not in order, or do not say what was `read`."""
+
+    def clear(self) -> None:
+        """Its fields are going to be written anew."""
+
+    def restore(self, read: Any) -> None:
+        """Let handles be as was `read`; bodies and fields are so already."""
 
 
 class SoftBody(Handle):

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.bodies.fields import MOST_GRABS
-from taichi_soft.bodies.soft_body import Context, Slice, SoftBody
+from taichi_soft.bodies.fields import MOST_GRABS, PATCH_ROWS
+from taichi_soft.bodies.soft_body import Context, RowsOf, Slice, SoftBody
 from taichi_soft.control.access import change, numbers, require_substeps, rows_of
 from taichi_soft.control.kernels.grabs import end_grab, read_grab_force, write_grab, write_grab_target
 from taichi_soft.control.patches import patch_round
@@ -16,6 +18,7 @@ from taichi_soft.core.checks import as_array, as_count, as_number, as_vector
 from taichi_soft.core.constants import GRAVITY_EARTH
 from taichi_soft.core.errors import MeshError, OptionError, StateError
 from taichi_soft.core.handles import Handle, recorded
+from taichi_soft.core.serialisation import below, require_below, require_finite, vector_of
 
 WEIGHTS = 10.0
 """Strongest pull in weights of the body on Earth, where nothing else is asked for."""
@@ -80,6 +83,8 @@ class Grab(Handle):
 class Grabs(Slice):
     """All grabs of one world, by number."""
 
+    name = "grabs"
+
     def __init__(self, context: Context) -> None:
         """None yet."""
         super().__init__(context)
@@ -98,6 +103,58 @@ class Grabs(Slice):
         """Release all that hold a body."""
         for grab in [each for each in self.by_number.values() if each.body is body]:
             grab.release()
+
+    def rehearse(self, body: SoftBody, other: SoftBody | None, step: Callable[[], None]) -> None:
+        """Take hold of a body, move it and let go."""
+        with contextlib.suppress(StateError):  # all are in use, which compiles them too
+            grab = grab_at(body, 0, (1 / 3, 1 / 3, 1 / 3), None, 5.0, None)
+            grab.move(grab.point)
+            _ = grab.force
+            grab.release()
+
+    def note(self) -> list[list[Any]]:
+        """Numbers of handle, grab and body, and where each pulls to."""
+        return [
+            [grab._serial, number, grab.body.index, grab.point.tolist()]
+            for number, grab in sorted(self.by_number.items())
+        ]
+
+    def row_counts(self, notes: list[list[Any]]) -> list[int]:
+        """Of grabs; of those up to the last in use; of the rows of their patches."""
+        used = max((int(number) for _, number, _, _ in notes), default=-1) + 1
+        return [MOST_GRABS, used, used * PATCH_ROWS]
+
+    def read(
+        self, notes: list[list[Any]], vertex_counts: Sequence[int]
+    ) -> list[tuple[int, int, int, NDArray[np.float64]]]:
+        """Rows of `note`. Raises: ValueError for a grab of nobody."""
+        found = []
+        for serial, number, slot, point in notes:
+            if not vertex_counts[below(slot, len(vertex_counts))]:
+                raise ValueError("a grab holds no body")
+            found.append((int(serial), below(number, MOST_GRABS), int(slot), vector_of(point, 3)))
+        return found
+
+    def require(self, read: Any, rows_of: RowsOf) -> None:
+        """Raises: ValueError where the fields name what there is not, or are not finite."""
+        fields, particles = self.context.built.state, self.context.layout.particle_count
+        require_below(rows_of(fields.grab_body), len(self.context.slots.slots) + 1)
+        require_below(rows_of(fields.grab_corners), particles)
+        require_below(rows_of(fields.grab_count), PATCH_ROWS + 1)
+        require_below(rows_of(fields.patch_particle), particles)
+        for field in (fields.grab_weights, fields.grab_target, fields.grab_spring, fields.patch_share):
+            require_finite(rows_of(field))
+
+    def restore(self, read: Any) -> None:
+        """Let there be the grabs that were `read`, and no other."""
+        self.by_number.clear()
+        for serial, number, slot, point in read:
+            body = self.context.slots.slots[slot]
+            assert body is not None
+            grab = self.context.handles.find(serial, Grab) or Grab(body, number, point)
+            self.context.handles.enlist(grab, serial)
+            grab.body, grab._number, grab._point = body, number, point
+            self.by_number[number] = grab
 
 
 def as_pull(frequency: Any, max_force: Any) -> tuple[float, float | None]:

@@ -1,5 +1,7 @@
 """The Taichi fields of joints: which particles are held where in another body, row by row."""
 
+from typing import Any
+
 from taichi_soft.core.runtime import ti
 
 MOST_JOINTS, JOINT_ROWS = 64, 2048
@@ -29,3 +31,11 @@ class JointFields:
         self.row_impulse = ti.Vector.field(3, ti.f32, JOINT_ROWS)  # on the first end, in the last substep
         self.approach = ti.Vector.field(3, ti.f32, JOINT_ROWS)  # at which the gap is to change [m/s]
         self.is_held = ti.field(ti.i32, particles)  # 1 where it is the first end of a row
+
+    def carried(self) -> list[list[Any]]:
+        """What the next step depends on: of each joint, of each row in use, of each of its ends."""
+        return [
+            [self.bodies, self.rows, self.draw_speed, self.impulse],
+            [self.row_impulse],
+            [self.particle, self.weight, self.share],
+        ]

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.bodies.soft_body import Context, Slice, SoftBody
+from taichi_soft.bodies.soft_body import Context, RowsOf, Slice, SoftBody
 from taichi_soft.control.access import change, named_particles, rows_of
-from taichi_soft.control.joint_fields import JOINT_ROWS, MOST_JOINTS
-from taichi_soft.control.kernels.joints import end_joint, read_joint_impulse, write_joint
+from taichi_soft.control.joint_fields import ENDS, JOINT_ROWS, MOST_JOINTS
+from taichi_soft.control.kernels.joints import end_joint, forget_held, read_joint_impulse, write_joint
 from taichi_soft.control.patches import wave_speed
 from taichi_soft.control.places import Places, places_at, places_on
 from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.core.handles import Handle, recorded
+from taichi_soft.core.serialisation import below, indices_below, require_below
 
 DRAW = 0.25
 """Speed at which a gap closes at most, over that of waves in the body times the root of the part of its mass
@@ -80,6 +82,8 @@ class Joint(Handle):
 class Joints(Slice):
     """All joints of one world, by number."""
 
+    name = "joints"
+
     def __init__(self, context: Context) -> None:
         """None yet."""
         super().__init__(context)
@@ -107,6 +111,77 @@ class Joints(Slice):
         """Release all that hold a body."""
         for joint in self.holding(body):
             joint.release()
+
+    def rehearse(self, body: SoftBody, other: SoftBody | None, step: Callable[[], None]) -> None:
+        """Join two bodies, where they can be."""
+        context = self.context
+        if other is None or context.settings.is_implicit or not context.built.program.has_contact:
+            return
+        joint = self.join(body, other, [0], [0])
+        step()
+        _ = joint.force, body.velocities()
+        joint.release()
+
+    def note(self) -> list[list[Any]]:
+        """Numbers of handle, joint and both bodies, and the particles that are held."""
+        return [
+            [joint._serial, number, joint.body.index, joint.other.index, joint.particles.tolist()]
+            for number, joint in sorted(self.by_number.items())
+        ]
+
+    def row_counts(self, notes: list[list[Any]]) -> list[int]:
+        """Of joints, their rows, and the ends of these."""
+        rows = sum(len(particles) for *_, particles in notes)
+        return [MOST_JOINTS, rows, rows * ENDS]
+
+    def read(
+        self, notes: list[list[Any]], vertex_counts: Sequence[int]
+    ) -> list[tuple[int, int, int, int, NDArray[np.int32]]]:
+        """Rows of `note`. Raises: ValueError for joints of nobody, or in a world that has none."""
+        found = []
+        for serial, number, body, other, particles in notes:
+            a, b = (below(slot, len(vertex_counts)) for slot in (body, other))
+            has_contact = self.context.built.program.has_contact
+            if a == b or not (vertex_counts[a] and vertex_counts[b] and has_contact):
+                raise ValueError("a joint holds no bodies")
+            held = indices_below(particles, vertex_counts[a])
+            found.append((int(serial), below(number, MOST_JOINTS), a, b, held))
+        return found
+
+    def require(self, read: Any, rows_of: RowsOf) -> None:
+        """Raises: ValueError where the fields do not say what was `read`."""
+        if not self.context.built.program.has_contact:
+            return
+        fields = self.context.built.state.joints
+        bodies, rows, weights = rows_of(fields.bodies), rows_of(fields.rows), rows_of(fields.weight)
+        require_below(bodies, len(self.context.slots.slots) + 1)
+        require_below(rows, JOINT_ROWS + 1)
+        require_below(rows_of(fields.particle), self.context.layout.particle_count)
+        noted = {number: (a + 1, b + 1, len(particles)) for _, number, a, b, particles in read}
+        used = np.flatnonzero(bodies[:, 0])
+        told = {int(j): (*bodies[j].tolist(), int(rows[j, 1] - rows[j, 0])) for j in used}
+        spans = sorted(rows[used].tolist())
+        ends = [0, *(end for _, end in spans)]
+        if told != noted or [start for start, _ in spans] != ends[:-1] or not (np.abs(weights) < 1e3).all():
+            raise ValueError("its joints are not those that it names")
+
+    def clear(self) -> None:
+        """Forget which particles are held: each step finds anew which are."""
+        if self.context.built.program.has_contact:
+            forget_held(self.context.built.state)
+
+    def restore(self, read: Any) -> None:
+        """Let there be the joints that were `read`, and no other."""
+        self.by_number.clear()
+        for serial, number, a, b, particles in read:
+            body, other = (self.context.slots.slots[slot] for slot in (a, b))
+            assert body is not None
+            assert other is not None
+            joint = self.context.handles.find(serial, Joint) or Joint(body, other, number, particles)
+            self.context.handles.enlist(joint, serial)
+            joint.body, joint.other, joint._number, joint.particles = body, other, number, particles
+            self.by_number[number] = joint
+        self.context.built.joints_have_changed()
 
     def join(self, body: SoftBody, other: Any, particles: ArrayLike, onto: ArrayLike | None) -> Joint:
         """As `Body.attach_to`."""

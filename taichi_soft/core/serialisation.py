@@ -15,6 +15,7 @@ from hashlib import blake2b
 from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from taichi_soft.core.errors import SnapshotError
 
@@ -122,3 +123,41 @@ def plain_of(value: Any) -> Any:
 def digest_of(value: Any) -> str:
     """A name of an immutable object that another object has only if it is made of the same numbers."""
     return blake2b(to_json(as_plain(value)), digest_size=8).hexdigest()
+
+
+# Parts of data that somebody may have damaged.
+
+
+def below(number: Any, limit: int) -> int:
+    """A whole number from 0 to below `limit`. Raises: ValueError, TypeError."""
+    if not 0 <= int(number) < limit:
+        raise ValueError(f"it names number {number} of {limit}")
+    return int(number)
+
+
+def vector_of(numbers: Any, count: int, most: float = 1e12) -> NDArray[np.float64]:
+    """So many finite numbers, all under `most`. Raises: ValueError."""
+    vector = np.array(numbers, dtype=np.float64)
+    if vector.shape != (count,) or not (np.abs(vector) < most).all():
+        raise ValueError("a vector is none")
+    return vector
+
+
+def indices_below(numbers: Any, limit: int) -> NDArray[np.int32]:
+    """One whole number or more, from 0 to below `limit`. Raises: ValueError."""
+    found = np.array(numbers, dtype=np.int32)
+    if found.ndim != 1 or len(found) == 0 or found.min() < 0 or found.max() >= limit:
+        raise ValueError("it names vertices that there are not")
+    return found
+
+
+def require_below(rows: NDArray[Any], limit: int) -> None:
+    """Raises: ValueError where whole numbers are not from 0 to below `limit`."""
+    if rows.size and not (rows.min() >= 0 and rows.max() < limit):
+        raise ValueError("it names particles or bodies that there are not")
+
+
+def require_finite(rows: NDArray[Any]) -> None:
+    """Raises: ValueError where numbers are not."""
+    if not np.isfinite(rows).all():
+        raise ValueError("what moves its bodies is not finite")

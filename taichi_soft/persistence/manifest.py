@@ -9,29 +9,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.bodies.failure import FailedStep
-from taichi_soft.bodies.fields import MOST_GRABS
 from taichi_soft.bodies.layout import BodyArrays, BodyDescription
 from taichi_soft.bodies.part import Part, name_of
 from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.contact.colliders import Collider, ColliderRow
 from taichi_soft.contact.shapes import Shape
 from taichi_soft.control.frames import Frames
-from taichi_soft.control.grabs import Grabs
-from taichi_soft.control.joint_fields import MOST_JOINTS
-from taichi_soft.control.joints import Joints
 from taichi_soft.core.checks import as_count, as_flag, as_number
 from taichi_soft.core.constants import ALL_GROUPS, POSITION_LIMIT
 from taichi_soft.core.errors import SnapshotError, TaichiSoftError
-from taichi_soft.core.serialisation import as_plain, digest_of, from_plain, plain_of
+from taichi_soft.core.serialisation import (
+    as_plain,
+    below,
+    digest_of,
+    from_plain,
+    indices_below,
+    plain_of,
+    vector_of,
+)
 from taichi_soft.elements.laws import fit_model
 from taichi_soft.fracture.cutting import require_room
 from taichi_soft.solver.context import WorldContext
 
 _MOST = 1 << 53
 """No count of steps or handles, and no time [s], is larger."""
-
-_FARTHEST = 1e12
-"""No collider has got so far [m], however long it moved at the highest speed."""
 
 
 def take_notes(context: WorldContext) -> dict[str, Any]:
@@ -53,14 +54,7 @@ def take_notes(context: WorldContext) -> dict[str, Any]:
         "present": frames.present.tolist(),
         "coming": frames.coming.tolist(),
         "aims": frames.has_work,
-        "grabs": [
-            [grab._serial, number, grab.body.index, grab.point.tolist()]
-            for number, grab in sorted(context.of(Grabs).by_number.items())
-        ],
-        "joints": [
-            [joint._serial, number, joint.body.index, joint.other.index, joint.particles.tolist()]
-            for number, joint in sorted(context.of(Joints).by_number.items())
-        ],
+        "slices": {each.name: each.note() for each in context.slices if each.name},
     }
 
 
@@ -118,8 +112,7 @@ class Notes:
     present: NDArray[np.float32]
     coming: NDArray[np.float32]
     aims: bool
-    grabs: list[tuple[int, int, int, NDArray[np.float64]]]
-    joints: list[tuple[int, int, int, int, NDArray[np.int32]]]
+    slices: dict[str, Any]  # what each has read
 
 
 def read_parts(context: WorldContext, notes: list[Any], rows: NDArray[np.int32]) -> dict[int, Part]:
@@ -130,7 +123,7 @@ def read_parts(context: WorldContext, notes: list[Any], rows: NDArray[np.int32])
     parts: dict[int, Part] = {}
     for slot, note in enumerate(notes):
         if note is not None and note[5] is not None:
-            n, m = (_below(count, len(rows) + 1) for count in note[5][:2])
+            n, m = (below(count, len(rows) + 1) for count in note[5][:2])
             size = 2 * n + 5 * m
             parts[slot] = Part.of_rows(rows[:size], n, m)
             parts[slot].require_of(context.slots.assets[slot])
@@ -155,12 +148,8 @@ def read_notes(context: WorldContext, notes: dict[str, Any], parts: dict[int, Pa
     if len(notes["bodies"]) != slots:
         raise ValueError("it has another number of bodies")
     bodies = [_read_body(context, i, note, frames, parts.get(i)) for i, note in enumerate(notes["bodies"])]
-    grabs = [
-        (int(serial), _below(number, MOST_GRABS), _below(slot, slots), _vector(point, 3))
-        for serial, number, slot, point in notes["grabs"]
-    ]
-    if any(bodies[slot] is None for _, _, slot, _ in grabs):
-        raise ValueError("a grab holds no body")
+    vertex_counts = [0 if each is None else len(each.description.mesh.vertices) for each in bodies]
+    named = [each for each in context.slices if each.name]
     _require_serials(notes)
     return Notes(
         as_count(notes["steps"], "steps", 0, _MOST),
@@ -173,8 +162,7 @@ def read_notes(context: WorldContext, notes: dict[str, Any], parts: dict[int, Pa
         poses["present"].astype(np.float32),
         poses["coming"].astype(np.float32),
         bool(notes["aims"]),
-        grabs,
-        [_read_joint(context, bodies, note) for note in notes["joints"]],
+        {each.name: each.read(notes["slices"][each.name], vertex_counts) for each in named},
     )
 
 
@@ -182,7 +170,8 @@ def _require_serials(notes: dict[str, Any]) -> None:
     """Raises: ValueError where two handles have the same number, or one that the next could have."""
     bodies = [note for note in notes["bodies"] if note is not None]
     hanging = [each for note in bodies for each in note[4]]
-    held = [*bodies, *hanging, *notes["colliders"], *notes["grabs"], *notes["joints"]]
+    sliced = [each for rows in notes["slices"].values() for each in rows]
+    held = [*bodies, *hanging, *notes["colliders"], *sliced]
     numbers = [each[0] for each in held] + [number for number in notes["frames"] if number is not None]
     serials = {as_count(number, "a handle", 1, _MOST) for number in numbers}
     if len(serials) < len(numbers) or max(serials, default=0) >= notes["handles"]:
@@ -237,7 +226,7 @@ def _read_body(
         description,
         arrays,
         [
-            (int(each), _row_of_frame(frame, frames), bool(two_way), _indices(particles, n))
+            (int(each), _row_of_frame(frame, frames), bool(two_way), indices_below(particles, n))
             for each, frame, two_way, particles in attachments
         ],
         bool(rests),
@@ -256,7 +245,7 @@ def _read_collider(context: WorldContext, note: Any, shapes: dict[str, Any]) -> 
         )
     friction, restitution, thickness, group, mask = surface
     position, rotation, velocity, spin = (
-        _vector(each, n) for each, n in zip(motion, (3, 4, 3, 3), strict=True)
+        vector_of(each, n) for each, n in zip(motion, (3, 4, 3, 3), strict=True)
     )
     if abs(np.linalg.norm(rotation) - 1.0) > 1e-3:
         raise ValueError("a rotation is none")
@@ -272,7 +261,7 @@ def _read_collider(context: WorldContext, note: Any, shapes: dict[str, Any]) -> 
         velocity,
         spin,
         as_count(offset, "offset", 0),
-        None if target is None else (_vector(target[0], 3), _vector(target[1], 4)),
+        None if target is None else (vector_of(target[0], 3), vector_of(target[1], 4)),
         as_flag(is_alive, "is_alive"),
     )
     if not row.offset <= context.built.state.capacity.contact.samples - len(shape.samples):
@@ -280,39 +269,7 @@ def _read_collider(context: WorldContext, note: Any, shapes: dict[str, Any]) -> 
     return int(serial), row
 
 
-def _read_joint(
-    context: WorldContext, bodies: list[BodyNote | None], note: Any
-) -> tuple[int, int, int, int, NDArray[np.int32]]:
-    serial, number, body, other, particles = note
-    a, b = (_below(slot, len(bodies)) for slot in (body, other))
-    held = bodies[a]
-    if a == b or held is None or bodies[b] is None or not context.built.program.has_contact:
-        raise ValueError("a joint holds no bodies")
-    n = len(held.description.mesh.vertices)
-    return int(serial), _below(number, MOST_JOINTS), a, b, _indices(particles, n)
-
-
 def _row_of_frame(number: Any, frames: list[int | None]) -> int:
-    if frames[_below(number, len(frames))] is None:
+    if frames[below(number, len(frames))] is None:
         raise ValueError("an attachment hangs from no frame")
     return int(number)
-
-
-def _below(number: Any, limit: int) -> int:
-    if not 0 <= int(number) < limit:
-        raise ValueError(f"it names number {number} of {limit}")
-    return int(number)
-
-
-def _vector(numbers: Any, count: int) -> NDArray[np.float64]:
-    vector = np.array(numbers, dtype=np.float64)
-    if vector.shape != (count,) or not (np.abs(vector) < _FARTHEST).all():
-        raise ValueError("a vector is none")
-    return vector
-
-
-def _indices(numbers: Any, limit: int) -> NDArray[np.int32]:
-    found = np.array(numbers, dtype=np.int32)
-    if found.ndim != 1 or len(found) == 0 or found.min() < 0 or found.max() >= limit:
-        raise ValueError("an attachment names vertices that there are not")
-    return found

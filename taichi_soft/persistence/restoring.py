@@ -10,8 +10,6 @@ from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.contact.colliders import Collider
 from taichi_soft.control.attachments import Attachment
 from taichi_soft.control.frames import Frame, Frames
-from taichi_soft.control.grabs import Grab, Grabs
-from taichi_soft.control.joints import Joint, Joints
 from taichi_soft.control.materials import write_constants
 from taichi_soft.core.serialisation import as_plain
 from taichi_soft.fracture.cutting import refill_slot
@@ -33,14 +31,6 @@ def put_back(context: WorldContext, notes: Notes) -> None:
     )
     for slot, wanted in enumerate(notes.bodies):
         _apply_body(context, simulation.state, slot, wanted)
-    context.of(Grabs).by_number.clear()
-    for serial, number, slot, point in notes.grabs:
-        body = context.slots.slots[slot]
-        assert body is not None
-        grab = _handle(context, serial, Grab, lambda b=body, n=number, x=point: Grab(b, n, x))  # type: ignore[misc]
-        grab.body, grab._number, grab._point = body, number, point
-        context.of(Grabs).by_number[number] = grab
-    _apply_joints(context, notes)
     handles.count = notes.handles
     if simulation.tears is not None:
         for body, wanted in zip(context.slots.slots, notes.bodies, strict=True):
@@ -59,18 +49,6 @@ def _handle(context: WorldContext, serial: int, kind: type[Any], make: Callable[
         found = make()
         context.handles.enlist(found, serial)
     return found
-
-
-def _apply_joints(context: WorldContext, notes: Notes) -> None:
-    context.of(Joints).by_number.clear()
-    for serial, number, a, b, particles in notes.joints:
-        body, other = context.slots.slots[a], context.slots.slots[b]
-        assert body is not None
-        assert other is not None
-        joint = context.handles.find(serial, Joint) or Joint(body, other, number, particles)
-        context.handles.enlist(joint, serial)
-        joint.body, joint.other, joint._number, joint.particles = body, other, number, particles
-        context.of(Joints).by_number[number] = joint
 
 
 def _apply_frames(context: WorldContext, notes: Notes) -> None:

@@ -9,39 +9,32 @@ meshes that cuts have left (see `fracture.parts`). The last part is what events 
 
 from __future__ import annotations
 
+from functools import partial
 from hashlib import blake2b
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.bodies.fields import PATCH_ROWS
 from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.bodies.status import ABSENT
 from taichi_soft.contact.colliders import Collider
-from taichi_soft.control.grabs import Grabs
-from taichi_soft.control.joint_fields import JOINT_ROWS
-from taichi_soft.control.joints import Joints
-from taichi_soft.control.kernels.joints import forget_held
 from taichi_soft.control.kernels.pins import WITH_FRAME
 from taichi_soft.core.constants import POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.core.container import seal, unseal
 from taichi_soft.core.errors import SnapshotError, StateError
+from taichi_soft.core.runtime import ti
 from taichi_soft.core.serialisation import from_json, to_json
 from taichi_soft.events import Known, Memory
 from taichi_soft.persistence.kernels.words import (
     BODY,
-    GRAB,
-    HELD,
-    JOINT,
-    JOINT_END,
     PARTICLE,
-    PATCH,
     SHAPE,
     WORLD,
     carried,
     copy_state,
     hash_bodies,
+    owners,
     row_table,
 )
 from taichi_soft.persistence.manifest import Notes, read_notes, read_parts, take_notes
@@ -50,7 +43,7 @@ from taichi_soft.persistence.structure import require_structure, structure_of
 from taichi_soft.solver.context import WorldContext
 from taichi_soft.solver.state import State
 
-MARK, VERSION = b"TSOFTSNP", 4
+MARK, VERSION = b"TSOFTSNP", 5
 
 MOST_PRESS = 1e30
 """Impulse [N s] that no contact has reached: what is beyond is not finite."""
@@ -61,7 +54,7 @@ Words = NDArray[np.int32]
 def take_snapshot(context: WorldContext) -> bytes:
     """As `World.snapshot`."""
     state = context.built.state
-    table = _table(context, max(context.of(Grabs).by_number, default=-1) + 1, context.of(Joints).rows_in_use)
+    table = _table(context, {each.name: each.note() for each in context.slices})
     words = np.empty(int(table[-1, 2]), dtype=np.int32)
     copy_state(state, table, words, True)
     parts = [body._part for body in context.slots.living]
@@ -83,9 +76,11 @@ def state_hash(context: WorldContext) -> str:
     return blake2b(to_json([code, take_notes(context)]), digest_size=8).hexdigest()
 
 
-def _table(context: WorldContext, held: int, joint_rows: int) -> Words:
+def _table(context: WorldContext, notes: dict[str, Any]) -> Words:
     state, scene, slots = context.built.state, context.layout, len(context.slots.slots)
-    return row_table(state, scene.particle_count, slots, scene.block_count, held, joint_rows)
+    of_slices = {each.name: each.row_counts(notes[each.name]) for each in context.slices if each.name}
+    counts = [count for name in state.carried for count in of_slices[name]]
+    return row_table(state, scene.particle_count, slots, scene.block_count, counts)
 
 
 def restore_snapshot(context: WorldContext, data: Any) -> None:
@@ -96,9 +91,7 @@ def restore_snapshot(context: WorldContext, data: Any) -> None:
     plain = from_json(content)
     try:
         words = np.frombuffer(rows, "<i4").astype(np.int32)
-        grabs = (int(number) for _, number, _, _ in plain["grabs"])
-        joined = sum(len(each[-1]) for each in plain["joints"])
-        table = _table(context, max(grabs, default=-1) + 1, joined)
+        table = _table(context, plain["slices"])
         if len(words) < table[-1, 2]:
             raise ValueError(f"it has {len(words)} words, where this world takes {table[-1, 2]}")
         parts = read_parts(context, plain["bodies"], words[table[-1, 2] :])
@@ -111,10 +104,12 @@ def restore_snapshot(context: WorldContext, data: Any) -> None:
         raise SnapshotError(f"this snapshot is not in order: {error}") from None
     _require_words(context, notes, table, words)
     put_back(context, notes)
-    if context.built.program.has_contact:
-        forget_held(state)
+    for each in context.slices:
+        each.clear()
     copy_state(state, table, words, False)
-    context.built.joints_have_changed()
+    for each in context.slices:
+        if each.name:
+            each.restore(notes.slices[each.name])
     find = context.handles.find
     known = Known(lambda serial: find(serial, SoftBody), lambda serial: find(serial, Collider))
     context.built.events.recall(memory, notes.steps, known)
@@ -129,23 +124,12 @@ def _four(parts: list[memoryview]) -> list[memoryview]:
 def _require_words(context: WorldContext, notes: Notes, table: Words, words: Words) -> None:
     """Raises: SnapshotError where a kernel would read beyond its fields, or begin with what is not finite."""
     state = context.built.state
-    particles, slots = context.layout.particle_count, len(context.slots.slots)
     limits: list[tuple[int, Any, int]] = [
         (PARTICLE, state.particle_aim, WITH_FRAME + len(notes.frames)),
         (BODY, state.body_status, ABSENT + 1),
-        (GRAB, state.grab_body, slots + 1),
-        (HELD, state.grab_corners, particles),
-        (HELD, state.grab_count, PATCH_ROWS + 1),
-        (PATCH, state.patch_particle, particles),
     ]
     if state.capacity.implicit:
         limits.append((PARTICLE, state.particle_contact, max(state.capacity.contact.colliders, 1) + 1))
-    if context.built.program.has_contact:
-        limits += [
-            (JOINT, state.joints.bodies, slots + 1),
-            (JOINT, state.joints.rows, JOINT_ROWS + 1),
-            (JOINT_END, state.joints.particle, particles),
-        ]
     for owner, field, limit in limits:
         rows = _rows(table, words, state, owner, field)
         if rows.size and not (rows.min() >= 0 and rows.max() < limit):
@@ -165,8 +149,12 @@ def _require_words(context: WorldContext, notes: Notes, table: Words, words: Wor
     for owner, field in _steering(state):
         if not np.isfinite(_rows(table, words, state, owner, field).view(np.float32)).all():
             raise SnapshotError("this snapshot is not in order: what moves its bodies is not finite")
-    if context.built.program.has_contact:
-        _require_joints(state, notes, table, words)
+    for each in context.slices:
+        if each.name:
+            try:
+                each.require(notes.slices[each.name], partial(_field_rows, table, words, state))
+            except ValueError as error:
+                raise SnapshotError(f"this snapshot is not in order: {error}") from None
     lives = _rows(table, words, state, BODY, state.body_status)[:, 0] != ABSENT
     if lives.tolist() != [body is not None for body in notes.bodies]:
         raise SnapshotError("this snapshot is not in order: it is not sure who lives")
@@ -177,24 +165,16 @@ def _steering(state: State) -> list[tuple[int, Any]]:
     particle = [state.prev_position, state.prev_velocity, state.particle_mass, state.particle_inv_mass]
     particle += [state.particle_target, state.particle_push]
     body = [state.body_velocity_lag, state.body_gravity_scale, state.body_damping]
-    held = [state.grab_weights, state.grab_target, state.grab_spring]
     shape = [state.tet_rest_inverse] if state.capacity.plastic else []
-    owners = (PARTICLE, particle), (BODY, body), (HELD, held), (PATCH, [state.patch_share]), (SHAPE, shape)
+    owners = (PARTICLE, particle), (BODY, body), (SHAPE, shape)
     return [(owner, field) for owner, fields in owners for field in fields] + [(WORLD, state.wind)]
 
 
-def _require_joints(state: State, notes: Notes, table: Words, words: Words) -> None:
-    """Raises: SnapshotError where the words of joints do not say what the notes do."""
-    bodies = _rows(table, words, state, JOINT, state.joints.bodies)
-    rows = _rows(table, words, state, JOINT, state.joints.rows)
-    noted = {number: (a + 1, b + 1, len(particles)) for _, number, a, b, particles in notes.joints}
-    used = np.flatnonzero(bodies[:, 0])
-    told = {int(j): (*bodies[j].tolist(), int(rows[j, 1] - rows[j, 0])) for j in used}
-    weights = _rows(table, words, state, JOINT_END, state.joints.weight).view(np.float32)
-    spans = sorted(rows[used].tolist())
-    ends = [0, *(end for _, end in spans)]
-    if told != noted or [start for start, _ in spans] != ends[:-1] or not (np.abs(weights) < 1e3).all():
-        raise SnapshotError("this snapshot is not in order: its joints are not those that it names")
+def _field_rows(table: Words, words: Words, state: State, field: Any) -> NDArray[Any]:
+    """What a snapshot holds for a field of a slice, (rows, width), in the field's type."""
+    owner = next(each for each in owners(state) if any(f is field for f, _, _ in carried(state, each)))
+    rows = _rows(table, words, state, owner, field)
+    return rows if field.dtype == ti.i32 else rows.view(np.float32)
 
 
 def _rows(table: Words, words: Words, state: State, owner: int, wanted: Any) -> Words:

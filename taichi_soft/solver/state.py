@@ -1,6 +1,7 @@
 """All Taichi fields of one world: those of its bodies, and of what a game switches on."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +45,14 @@ class State(BodyFields):
                 self.particle_hold = ti.Vector.field(4, self.real, n)
         if capacity.contact.soft:
             self.soft = SoftContactFields(n, bodies, capacity.outer, capacity.triangles)
+
+    @property
+    def carried(self) -> dict[str, list[list[Any]]]:
+        """Fields of slices that the next step depends on, in groups: see `Slice.row_counts`."""
+        groups = {"grabs": self.carried_grabs()}
+        if self.capacity.has_contact:
+            groups["joints"] = self.joints.carried()
+        return groups
 
     def load(self, scene: Scene, models: list[int], kinds: NDArray[np.float64] | None = None) -> None:
         """As `BodyFields.load`."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import math
 import sys
+from functools import partial
 from typing import cast
 
 import numpy as np
@@ -134,17 +135,8 @@ def _hold(context: WorldContext, body: Body, other: Body | None, free: NDArray[n
         context.built.rehearse(SHORTEST)
         _ = held.force, held.torque
         held.release()
-    with contextlib.suppress(StateError):  # all grabs are in use, which compiles them too
-        grab = body.grab(0)
-        grab.move(grab.point)
-        _ = grab.force
-        grab.release()
-    has_joints = context.built.colliders is not None and not context.settings.is_implicit
-    if other is not None and has_joints:
-        joint = body.attach_to(other, [0], onto=[0])
-        context.built.rehearse(SHORTEST)
-        _ = joint.force, body.velocities()
-        joint.release()
+    for each in context.slices:
+        each.rehearse(body, other, partial(context.built.rehearse, SHORTEST))
 
 
 def _measure(context: WorldContext, body: Body) -> None:

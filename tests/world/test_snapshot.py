@@ -362,7 +362,7 @@ def set_word(at, to):
     return change
 
 
-# From behind: wind (4), grabs (16), eight words for each of the two bodies.
+# From behind: grabs (16), wind (4), eight words for each of the two bodies.
 @pytest.mark.parametrize(
     "change",
     [
@@ -373,8 +373,8 @@ def set_word(at, to):
         set_note("bodies", 0, 3, to={"kind": "os.system"}),
         set_note("bodies", 0, 4, to=[[9, 0, False, [0]]]),
         set_note("steps", to="many"),
-        set_note("grabs", to=[[9, 99, 0, [0, 0, 0]]]),
-        set_note("grabs", to=[[9, 0, 0, [0, 0, 0]]]),
+        set_note("slices", "grabs", to=[[9, 99, 0, [0, 0, 0]]]),
+        set_note("slices", "grabs", to=[[9, 0, 0, [0, 0, 0]]]),
         set_note("frames", to=[1, 2, 3]),
         set_note("colliders", to=[[9, True, "none", 0, [0, 0, 0, 1, 1], [], None]]),
         set_note("time", to=np.nan),
@@ -385,9 +385,9 @@ def set_word(at, to):
         set_word(12, np.float32(np.nan).view(np.int32)),
         set_word(0, np.float32(1e30).view(np.int32)),
         set_word(14, 77),
-        set_word(-4 - 16, 99),
-        set_word(-4 - 16 - 16, 9),
-        set_word(-4 - 16 - 4, np.float32(np.nan).view(np.int32)),
+        set_word(-16, 99),
+        set_word(-16 - 4 - 16, 9),
+        set_word(-16 - 4 - 4, np.float32(np.nan).view(np.int32)),
     ],
 )
 def test_what_is_whole_but_makes_no_sense_is_refused(small, change):

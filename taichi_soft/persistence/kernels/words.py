@@ -5,17 +5,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.bodies.fields import MOST_GRABS, PATCH_ROWS
 from taichi_soft.bodies.status import ABSENT
-from taichi_soft.control.joint_fields import ENDS, MOST_JOINTS
 from taichi_soft.core.constants import LANES
 from taichi_soft.core.runtime import ti
 from taichi_soft.solver.state import State
 
-OWNERS = PARTICLE, BODY, GRAB, HELD, PATCH, PAIR, SHAPE, JOINT, JOINT_ROW, JOINT_END, WORLD = range(11)
-"""What a field has a row for: a particle, a body, a grab, a grab up to the last that is in use, a row of the
-patch of such a one, a pair of a body and a collider, a number of a rest shape, a joint, a row of it, an end
-of such a row; or only one row."""
+OWNERS = PARTICLE, BODY, PAIR, SHAPE, WORLD = range(5)
+"""What a field has a row for: a particle, a body, a pair of a body and a collider, a number of a rest shape,
+or the world. Behind these come the groups of slices."""
 
 
 def carried(state: State, owner: int) -> list[tuple[Any, int, int]]:
@@ -25,7 +22,7 @@ def carried(state: State, owner: int) -> list[tuple[Any, int, int]]:
     read: forces, boxes, candidates of contacts, islands.
     """
     is_implicit, touches = state.capacity.implicit, state.capacity.contact.colliders > 0
-    contact, joints = (state.contact, state.joints) if touches else (None, None)
+    contact = state.contact if touches else None
     fields: list[Any] = []
     if owner == PARTICLE:
         fields += [state.particle_position, state.particle_velocity, state.prev_position, state.prev_velocity]
@@ -42,43 +39,39 @@ def carried(state: State, owner: int) -> list[tuple[Any, int, int]]:
         fields += [state.body_residual] if is_implicit else []
         # The box is the one in which a body sleeps.
         fields += [contact.calm, contact.body_lower, contact.body_upper] if contact else []
-    elif owner == GRAB:
-        fields += [state.grab_body]
-    elif owner == HELD:
-        fields += [state.grab_corners, state.grab_weights, state.grab_target, state.grab_spring]
-        fields += [state.grab_limits, state.grab_force, state.grab_count]
-    elif owner == PATCH:
-        fields += [state.patch_particle, state.patch_share]
     elif owner == PAIR:
         fields += [contact.impulse, contact.angular_impulse, contact.rebound] if contact else []
     elif owner == SHAPE:
         fields += [state.tet_rest_inverse] if state.capacity.plastic else []
-    elif owner == JOINT:
-        fields += [joints.bodies, joints.rows, joints.draw_speed, joints.impulse] if joints else []
-    elif owner == JOINT_ROW and joints:
-        fields += [joints.row_impulse]
-    elif owner == JOINT_END and joints:
-        fields += [joints.particle, joints.weight, joints.share]
     elif owner == WORLD:
         fields += [state.wind]
+    else:
+        fields += slice_groups(state)[owner - len(OWNERS)]
     widths = [getattr(field, "n", 1) for field in fields]
     return [(field, sum(widths[:i]), widths[i]) for i, field in enumerate(fields)]
 
 
-def row_table(
-    state: State, particles: int, bodies: int, blocks: int, held: int, joint_rows: int
-) -> NDArray[np.int32]:
-    """Rows of each owner, their width and where they begin: (12, 3), the last row being the end.
+def slice_groups(state: State) -> list[list[Any]]:
+    """Groups of fields of all slices."""
+    return [group for groups in state.carried.values() for group in groups]
 
-    Args:
-        held: number of the last grab in use, plus 1.
-        joint_rows: that joints use.
+
+def owners(state: State) -> range:
+    """All groups of fields."""
+    return range(len(OWNERS) + len(slice_groups(state)))
+
+
+def row_table(
+    state: State, particles: int, bodies: int, blocks: int, of_slices: list[int]
+) -> NDArray[np.int32]:
+    """Rows of each owner, their width and where they begin: (owners + 1, 3), the last row being the end.
+
+    Args: of_slices: rows in use of each group of `slice_groups`.
     """
     pairs = bodies * state.capacity.contact.colliders
-    counts = [particles, bodies, MOST_GRABS, held, held * PATCH_ROWS, pairs, blocks * 9 * LANES]
-    counts += [MOST_JOINTS, joint_rows, joint_rows * ENDS, 1]
+    counts = [particles, bodies, pairs, blocks * 9 * LANES, 1, *of_slices]
     rows, at = [], 0
-    for owner in OWNERS:
+    for owner in owners(state):
         width = sum(each for _, _, each in carried(state, owner))
         rows.append((counts[owner], width, at))
         at += counts[owner] * width
@@ -93,7 +86,7 @@ def copy_state(
     packs: ti.template(),
 ):
     """Copy everything that is `carried` into `words`, row by row as `table` says; back where not `packs`."""
-    for owner in ti.static(OWNERS):
+    for owner in ti.static(owners(state)):
         ti.loop_config(serialize=True)
         for i in range(table[owner, 0]):
             for field, column, width in ti.static(carried(state, owner)):
