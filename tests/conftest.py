@@ -11,7 +11,7 @@ import pytest
 from hypothesis import settings
 from xdist.scheduler import LoadFileScheduling
 
-from taichi_soft import init
+from taichi_soft import Material, World, box, init, load_mesh
 
 settings.register_profile("same every time", derandomize=True, deadline=None)
 settings.load_profile("same every time")
@@ -23,19 +23,27 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 TOGETHER = (
-    *("tests/experiments/", "tests/integrators/", "tests/laws/", "tests/demos/"),
-    *("tests/world/test_cut", "tests/world/test_control"),
+    *("tests/lab/experiments/", "tests/solver/integrators/", "tests/elements/laws/", "tests/demos/"),
+    *("tests/fracture/test_cut", "tests/control/"),
 )
 """Files that begin alike share most of their kernels, which one worker compiles for all of them; experiments
 share what they measure, too."""
 
-RANDOM_GAMES = ("world/test_threads", "world/test_snapshot", "world/test_recorder", "world/test_rollback")
+RANDOM_GAMES = (
+    *("solver/test_threads", "persistence/test_snapshot"),
+    *("persistence/test_recorder", "persistence/test_rollback"),
+)
 """Files with the same game: the same again."""
 
 LONGEST = (
-    *("world/test_threads", "cli/test_cli", "world/test_implicit_contact", "world/test_joints"),
-    *("world/test_plasticity", "world/test_bodies", "world/test_colliders", "world/test_states"),
-    *("world/test_particle_bodies", "profiling/test_profiling", "drops/test_drops", "test_readme"),
+    *("solver/test_threads", "cli/test_cli", "contact/test_implicit_contact", "control/test_joints"),
+    *("solver/test_plasticity", "world/test_bodies", "contact/test_colliders", "bodies/test_states"),
+    *(
+        "bodies/test_particle_bodies",
+        "lab/profiling/test_profiling",
+        "lab/drop_test/test_drops",
+        "test_readme",
+    ),
 )
 """Files that take longest where nothing is compiled yet. They begin first, so that no worker ends alone."""
 
@@ -104,3 +112,59 @@ def _read_only(n):
 def unfit_buffer(request):
     """Makes what is no C-contiguous, writeable float32 array of shape (n, 3)."""
     return request.param
+
+
+ASSETS = Path(__file__).parents[1] / "assets"
+
+
+@pytest.fixture(scope="session")
+def thesis_mesh():
+    """The thesis's sphere, diameter about 2 m."""
+    return load_mesh(ASSETS / "sphere.npz")
+
+
+@pytest.fixture(scope="session")
+def cube():
+    """A cube of 1 m about the origin: 27 vertices, 40 tetrahedra."""
+    return box(cells=(2, 2, 2))
+
+
+@pytest.fixture(scope="session")
+def jelly():
+    return Material(young=1e5, poisson=0.2, density=1000.0, damping=20.0, damping_ratio=0.0)
+
+
+@pytest.fixture(scope="session")
+def turned():
+    """A rotation matrix about a skew axis, from the exponential of its generator."""
+    axis = np.array([0.3, -0.5, 0.8])
+    axis = axis / np.linalg.norm(axis) * 0.9
+    generator = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    matrix, term = np.eye(3), np.eye(3)
+    for power in range(1, 25):
+        term = term @ generator / power
+        matrix = matrix + term
+    return matrix
+
+
+@pytest.fixture
+def solo():
+    """Builds a world with one body, without a floor where the body lies at the origin. Returns both."""
+
+    def build(mesh, material, world_options=None, **body_options):
+        usual = {} if "position" in body_options else {"floor": None}
+        world = World(**{**usual, **(world_options or {})})
+        body = world.add_body(mesh, material, **{"law": "virial", **body_options})
+        world.build()
+        return world, body
+
+    return build
+
+
+@pytest.fixture
+def empty(play):
+    """The built world with pools of a test file's `play`, and their assets, without bodies."""
+    world, kinds = play
+    for body in world.bodies:
+        world.despawn(body)
+    return world, kinds

@@ -18,7 +18,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 if __name__ == "__main__":
-    sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "world")]
+    sys.path.insert(0, str(ROOT))
 
 # ruff: noqa: E402
 import random_play

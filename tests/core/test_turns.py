@@ -24,7 +24,7 @@ from taichi_soft import (
 )
 from taichi_soft.core.handles import Handle
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 CUBE, JELLY = box(cells=(2, 2, 2)), Material(1e5, 0.2, 1000.0, 20.0)
 DT = 1 / 60
 

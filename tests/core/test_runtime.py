@@ -13,7 +13,7 @@ from taichi_soft import OptionError, init
 from taichi_soft.core.cores import available_cores, can_bind
 from taichi_soft.core.runtime import ti
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 CORES = available_cores()
 
 binding = pytest.mark.skipif(

@@ -2,7 +2,7 @@
 
 By hand, for as long as you like and any number of threads:
 
-    python tests/world/random_play.py --ticks 10000 --threads 2
+    python tests/shared/random_play.py --ticks 10000 --threads 2
 """
 
 import argparse

@@ -10,7 +10,7 @@ from thread_scenes import SCENES
 
 from taichi_soft import init
 
-PROGRAM = Path(__file__).with_name("thread_scenes.py")
+PROGRAM = Path(__file__).parents[1] / "shared" / "thread_scenes.py"
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,6 @@
 """What happens to many bodies, as bits. Started as a program, all of it on so many threads, into a file:
 
-    python tests/world/thread_scenes.py 2 out.json
+    python tests/shared/thread_scenes.py 2 out.json
 
 The scene with the most bodies comes first: the others take over its kernels.
 """

@@ -184,7 +184,7 @@ init("cpu", threads=1)
 sys.stdout.buffer.write(MeshShape(torus(0.8, 0.25), cell=0.04, cache=False).samples.tobytes())
 """
     done = subprocess.run(
-        [sys.executable, "-c", script], cwd=Path(__file__).parents[2], capture_output=True, timeout=120
+        [sys.executable, "-c", script], cwd=Path(__file__).parents[3], capture_output=True, timeout=120
     )
     assert done.stdout == MeshShape(torus(0.8, 0.25), cell=0.04, cache=False).samples.tobytes()
 
