@@ -6,6 +6,7 @@ imported, and only this module calls `ti.init` (which would reset every field in
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import ctypes
 import functools
@@ -274,9 +275,16 @@ def _start(arch: str, reason: str, threads: int, cores: tuple[int, ...], is_left
         _let_whole_numbers_overflow()
     ti.lang.impl.get_runtime().materialize()  # once, by the first kernel otherwise, in whichever thread
     _process = os.getpid()
+    atexit.register(_end)
     _device = Device(arch=arch, threads=threads if arch == "cpu" else 1, reason=reason)
     if cores:
         _device = _bound(_device, thread_ids() - before, since, cores, is_left_to_us)
+
+
+def _end() -> None:
+    """Let Taichi keep the kernels that it compiled: at the end of a process its own parts may go in any order."""
+    if os.getpid() == _process:
+        ti.reset()
 
 
 def _bound(

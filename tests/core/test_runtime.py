@@ -158,7 +158,8 @@ assert len(asked) > 2 and all(os.sched_getaffinity(thread) == there for thread i
 def test_left_alone_a_thread_that_somebody_else_starts_meanwhile_is_not_bound():
     script = """
 import os, threading, time
-from taichi_soft import init, runtime
+from taichi_soft import init
+from taichi_soft.core import runtime
 inner, other = runtime.ti.init, threading.Thread(target=time.sleep, args=(60,), daemon=True)
 def crowded(**options):
     inner(**options)
@@ -173,7 +174,8 @@ assert os.sched_getaffinity(other.native_id) == os.sched_getaffinity(0)
 @binding
 def test_left_alone_threads_are_free_where_the_system_does_not_list_them():
     script = """
-from taichi_soft import cores, init
+from taichi_soft import init
+from taichi_soft.core import cores
 cores._TASKS = "/nowhere"
 print(init().cores)
 """

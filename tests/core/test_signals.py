@@ -65,7 +65,9 @@ def test_ctrl_c_while_taichi_starts_or_makes_fields_leaves_it_whole():
     """Pressed within each, by the code that is called there."""
     script = """
 import os, signal, time
-from taichi_soft import Material, World, box, init, runtime, state
+from taichi_soft import Material, World, box, init
+from taichi_soft.bodies import fields
+from taichi_soft.core import runtime
 def pressed_in(inner):
     def call(*arguments, **options):
         os.kill(os.getpid(), signal.SIGINT)
@@ -74,7 +76,7 @@ def pressed_in(inner):
     return call
 world = World()
 world.add_body(box(cells=(1, 1, 1)), Material(1e5, 0.2, 1000.0), position=(0, 0, 1))
-for place, name in ((runtime.ti, "init"), (state, "Loader")):
+for place, name in ((runtime.ti, "init"), (fields, "Loader")):
     inner = getattr(place, name)
     setattr(place, name, pressed_in(inner))
     try:

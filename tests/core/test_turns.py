@@ -22,6 +22,7 @@ from taichi_soft import (
     init,
     internal_forces,
 )
+from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.core.handles import Handle
 
 ROOT = Path(__file__).parents[2]
@@ -156,10 +157,11 @@ def test_every_call_of_a_second_thread_is_refused_by_name_and_changes_nothing():
 
 
 def test_all_handles_let_one_thread_in():
-    assert {kind.__name__ for kind in Handle.__subclasses__()} == {
-        *("World", "Body", "Collider", "Frame", "Grab", "Attachment", "Joint")
+    kinds = [*Handle.__subclasses__(), *SoftBody.__subclasses__()]
+    assert {kind.__name__ for kind in kinds} == {
+        *("World", "SoftBody", "Body", "Collider", "Frame", "Grab", "Attachment", "Joint")
     }
-    for kind in Handle.__subclasses__():
+    for kind in kinds:
         public = [m for name, m in vars(kind).items() if inspect.isfunction(m) and not name.startswith("_")]
         assert public
         assert all(hasattr(method, "__wrapped__") for method in public)
