@@ -282,7 +282,7 @@ def _start(arch: str, reason: str, threads: int, cores: tuple[int, ...], is_left
 
 
 def _end() -> None:
-    """Let Taichi keep the kernels that it compiled: at the end of a process its own parts may go in any order."""
+    """Let Taichi keep the kernels that it compiled: its own parts may go in any order."""
     if os.getpid() == _process:
         ti.reset()
 
