@@ -4,8 +4,6 @@ By `make test-bounds` only, as they compile slowly and nothing of them is kept.
 """
 
 import os
-import sys
-from pathlib import Path
 
 import pytest
 
@@ -14,8 +12,6 @@ from taichi_soft.core.runtime import DEBUG
 
 if os.environ.get(DEBUG) != "1":
     collect_ignore_glob = ["test_*.py"]
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "world"))  # for `random_play` and `public_face`
 
 
 @pytest.fixture(autouse=True)

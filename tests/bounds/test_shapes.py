@@ -10,7 +10,7 @@ from taichi_soft import HeightFieldShape, MeshError, MeshShape, init
 from taichi_soft.contact.distances.distance import signed_distance
 from taichi_soft.core.runtime import ti
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "collision"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "contact" / "distances"))
 
 from test_mesh import MESHES, random_blocks, random_tetrahedra, sliver_at_a_junction
 
