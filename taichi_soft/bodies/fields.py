@@ -201,6 +201,7 @@ class BodyFields:
         # Where a body is in a step that is made in several calls: attempt, next substep, 1 if gentle so far.
         self.body_pause = ti.Vector.field(3, ti.i32, bodies)
         self.body_edge = ti.field(real, bodies)  # mean edge of its surface [m]
+        self.body_sound_speed = ti.field(real, bodies)  # [m/s]
         self.retries = ti.field(
             ti.i32, ()
         )  # how often a step that fails is made again, twice as fine each time
@@ -235,8 +236,8 @@ class BodyFields:
     def load(self, scene: Scene, models: list[int], kinds: NDArray[np.float64] | None = None) -> None:
         """Fill every field from `scene`, and those that `loader` has rows for already.
 
-        `models[i]` is the number of body i's force model, `kinds[i]` its `body_edge`, `body_fading` and
-        `body_fading_interval`.
+        `models[i]` is the number of body i's force model, `kinds[i]` its `body_edge`, `body_sound_speed`,
+        `body_fading` and `body_fading_interval`.
 
         All bodies are absent, and their particles where their meshes are, until `spawn_body` places them.
         """
@@ -308,10 +309,11 @@ class BodyFields:
         fill(self.body_jolted, np.zeros(0))
         fill(self.body_patience, np.zeros(0))
         fill(self.rest_position, position)
-        own = np.zeros((len(bodies), 3)) if kinds is None else kinds
+        own = np.zeros((len(bodies), 4)) if kinds is None else kinds
         fill(self.body_edge, own[:, 0])
-        fill(self.body_fading, own[:, 1])
-        fill(self.body_fading_interval, own[:, 2])
+        fill(self.body_sound_speed, own[:, 1])
+        fill(self.body_fading, own[:, 2])
+        fill(self.body_fading_interval, own[:, 3])
         self.wind[None] = [0.0, 0.0, 0.0, 0.0]
         fill(self.body_gravity_scale, np.ones(self.capacity.bodies))
         fill(self.block_model, np.repeat(models, [r.blocks[1] - r.blocks[0] for r in ranges]))

@@ -69,6 +69,23 @@ class BodyDescription:
         return read_only(rest_inverses(self.mesh))
 
     @cached_property
+    def sound_speed(self) -> float:
+        """Of the fastest waves in it at rest [m/s]: sqrt((lambda + 2 mu) / density), the largest of its
+        tetrahedra; in given springs a sqrt(k / m), the largest of its edges."""
+        mesh, material = self.mesh, self.material
+        if isinstance(material, SpringMaterial):
+            assert self.bonds is not None
+            ends = mesh.vertices[mesh.edges]
+            lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+            lightest = self.masses[mesh.edges].min(axis=1)
+            return float((lengths * np.sqrt(self.bonds.constants[:, 1] / lightest)).max())
+        if isinstance(material, Material):
+            modulus = self.lame @ np.array([1.0, 2.0])
+        else:
+            modulus = material.stiffness_matrices(len(mesh.tets))[:, range(3), range(3)].max(axis=1)
+        return float(np.sqrt((modulus / self.per_tet("density")).max()))
+
+    @cached_property
     def inner_faces(self) -> InnerFaces:
         """Where it can be cut."""
         return inner_faces(self.mesh.tets)

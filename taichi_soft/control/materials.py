@@ -42,6 +42,8 @@ def write_constants(state: BodyFields, body: SoftBody, description: BodyDescript
     write_masses(state, place.particles[0], masses.astype(np.float32), (1.0 / masses).astype(np.float32))
     write_numbers(state.edge_damping, place.edges[0], arrays.edge_damping.astype(np.float32))
     fading, interval = np.array(body.asset.vibration_row(description), dtype=np.float32).reshape(2, 1)
+    speed = np.array([description.sound_speed], dtype=np.float32)
+    write_numbers(state.body_sound_speed, body.index, speed)
     write_numbers(state.body_fading, body.index, fading)
     write_numbers(state.body_fading_interval, body.index, interval)
     for field, rows in _tet_constants(state, arrays):

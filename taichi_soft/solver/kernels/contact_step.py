@@ -5,7 +5,7 @@ A substep goes in the order velocity, joints, contact, position: contact takes v
 move anything, and what it changes of joints they make good in the next substep.
 
 Substeps are chosen for small deformation; an impact faster than sound flattens tetrahedra, which are stiffer
-then. Where a step ends non-finite, or forces moved a particle by more than `JOLT` edges at once, the island
+then. Where a step ends non-finite, or forces changed a velocity by more than `JOLT` at once, the island
 is put back to where it was, and makes the step again with twice as many substeps, and so on, as a body alone
 does in `per_body`.
 """

@@ -140,7 +140,7 @@ def push_body(state: ti.template(), program: ti.template(), body, h, since, way,
         pull_grabs(state, body, h, lasting)
         damp_vibration(state, program, body, lasting, h, s, substeps)
         speed, speed_beside, mean_beside, change = _kick_body(state, program, body, kick, way, common)
-        is_gentle = int(change * h <= JOLT * edge)
+        is_gentle = int(change <= JOLT * state.body_sound_speed[body])
     # Bodies beside each other in a field share a cache line, which every write takes from other threads: what
     # is as it was is not written.
     state.contact.body_speed[body] = speed

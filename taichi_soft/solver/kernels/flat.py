@@ -100,7 +100,7 @@ def _move_phase(state: ti.template(), program: ti.template(), p, h, s):
         x, v, a = moved_particle(state, program, p, force, gravity, h, kick)
         state.particle_position[p] = x
         state.particle_velocity[p] = v
-        if not (kick * a.norm() * h <= JOLT * state.body_edge[body]):
+        if not (kick * a.norm() <= JOLT * state.body_sound_speed[body]):
             state.body_jolted[body] = 1
 
 

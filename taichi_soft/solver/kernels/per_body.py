@@ -4,8 +4,9 @@ Nothing waits between substeps and a body stays in one core's cache. The result 
 of threads.
 
 Substeps are chosen for small deformation; what is flattened is stiffer. Where a step ends non-finite, or
-forces moved a particle by more than `JOLT` edges at once, the body is put back and makes the step again with
-twice as many substeps, and so on. The last attempt brakes its vibrations sharply: momentum and spin stay.
+forces changed a particle's velocity by more than `JOLT` at once, the body is put back and makes the step
+again with twice as many substeps, and so on. The last attempt brakes its vibrations sharply: momentum and
+spin stay.
 
 A long step is made in several calls, so that Ctrl-C can come between: each body goes on where it stopped.
 """
@@ -31,8 +32,9 @@ from taichi_soft.solver.kernels.untangling import untangle_body
 from taichi_soft.solver.kernels.vibration import damp_vibration
 
 JOLT = 1.0
-"""Way by which the forces of one substep may move a particle within it, over the mean edge of its body's
-surface. Vibrations of a stable substep stay below it."""
+"""By how much the forces of one substep may change a particle's velocity, over the speed of sound in its
+body. Stable vibrations stay below it, on slivers too: a stable substep is about as long as sound takes to
+cross the smallest tetrahedron."""
 
 
 UNFINISHED = -2
@@ -94,7 +96,7 @@ def move_body(state: ti.template(), program: ti.template(), body, h, kick):
         first = (particles[0] + block * LANES) & ROW_BITS
         a2 = _move_block(state, program, first, particles[1] - first, gravity, h, kick)
         acceleration2 = ti.max(acceleration2, a2)
-    return int(kick * ti.sqrt(acceleration2.max()) * h <= JOLT * state.body_edge[body])
+    return int(kick * ti.sqrt(acceleration2.max()) <= JOLT * state.body_sound_speed[body])
 
 
 @ti.func

@@ -138,11 +138,13 @@ def untangle_body(state: ti.template(), program: ti.template(), body, seconds):
     for m, model in ti.static(enumerate(program.models)):
         if ti.static(model.flips == Flips.RECOVER):
             if state.body_model[body] == m:
-                age = ti.max(state.body_patience[body], -RAISING_STEPS - 1) + 1
-                if _is_wrecked(state, body):
-                    age = -RAISING_STEPS
-                elif state.body_patience[body] == PLACED:
-                    age = 0
+                before = state.body_patience[body]
+                age = ti.max(before, -RAISING_STEPS - 1) + 1
+                if before >= 0 or before == PLACED:  # what has begun to be raised is, to the end
+                    if _is_wrecked(state, body):
+                        age = -RAISING_STEPS
+                    elif before == PLACED:
+                        age = 0
                 is_look = age >= 0 and age % PATIENCE == 0
                 if is_look:
                     if _caught_count(state, state.particle_position, body) == 0:
