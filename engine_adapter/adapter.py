@@ -12,6 +12,7 @@ from engine_adapter.fixed_step import Accumulator, FixedStep
 from engine_adapter.rollback import Rollback
 from taichi_soft import Body, Event, OptionError, StateError, World
 from taichi_soft.core.checks import as_count, as_number
+from taichi_soft.core.handles import handles_of
 from taichi_soft.core.turns import one_thread
 
 
@@ -54,7 +55,7 @@ class EngineAdapter:
         if not world.is_built:
             raise StateError("the world is not built: call world.build() before EngineAdapter(world)")
         self._world = world
-        self._handles = world._handles
+        self._handles = handles_of(world)
         self._fixed_step = fixed_step
         self._before_step = before_step
         self._accumulator = Accumulator(fixed_step)

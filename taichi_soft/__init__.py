@@ -11,7 +11,7 @@ from taichi_soft.bodies.plasticity import Plasticity
 from taichi_soft.bodies.pose import Pose
 from taichi_soft.bodies.stability import StableStep, stable_step
 from taichi_soft.bodies.tearing import Tearing
-from taichi_soft.contact.colliders import Collider
+from taichi_soft.contact.collider import Collider
 from taichi_soft.contact.shapes import (
     BoxShape,
     CapsuleShape,

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.bodies.pose import Pose, best_fitting_pose
-from taichi_soft.bodies.soft_body import SoftBody
+from taichi_soft.bodies.soft_body import SoftBody, context_of, record_of, require_alive, rest_inverses_of
 from taichi_soft.core.errors import MeshError
 from taichi_soft.elements.laws.law import EnergyLaw
 from taichi_soft.elements.materials import AnisotropicMaterial, Material, SpringMaterial, voigt_stress
@@ -60,7 +60,7 @@ def kinetic_energy(body: SoftBody) -> float:
 
 def gravitational_energy(body: SoftBody) -> float:
     """As `Body.gravitational_energy`."""
-    gravity = body._context.settings.gravity * body.gravity_scale
+    gravity = context_of(body).settings.gravity * body.gravity_scale
     return float(-(body.masses @ positions_of(body)) @ gravity)
 
 
@@ -77,7 +77,7 @@ def tet_mesh(body: SoftBody) -> TetMesh:
 
 def elastic_energy(body: SoftBody) -> float:
     """As `Body.elastic_energy`."""
-    model, bonds = body._description.model, body._description.bonds
+    model, bonds = record_of(body).description.model, record_of(body).description.bonds
     law = model.law
     if bonds is not None and law.name == "springs":
         ends = positions_of(body)[body.mesh.edges]
@@ -101,7 +101,7 @@ def green_strain_and_stress(body: SoftBody) -> tuple[Floats, Floats]:
 def deformations(body: SoftBody) -> Floats:
     """As `Body.deformations`."""
     require_tets(body)
-    return np.asarray(np.swapaxes(_edge_vectors(body), 1, 2) @ body._rest_inverses)
+    return np.asarray(np.swapaxes(_edge_vectors(body), 1, 2) @ rest_inverses_of(body))
 
 
 def strains(body: SoftBody) -> Floats:
@@ -112,9 +112,9 @@ def strains(body: SoftBody) -> Floats:
 
 def plastic_strains(body: SoftBody) -> Floats:
     """As `Body.plastic_strains`."""
-    body._require_alive()
+    require_alive(body)
     require_tets(body)
-    flowed = np.linalg.inv(body._rest_inverses) @ body._description.rest_inverses  # Fp
+    flowed = np.linalg.inv(rest_inverses_of(body)) @ record_of(body).description.rest_inverses  # Fp
     stretches = np.linalg.svd(flowed, compute_uv=False)
     return np.asarray(np.sqrt(2.0 / 3.0) * np.linalg.norm(np.log(stretches), axis=1))
 

@@ -140,8 +140,10 @@ class Slice:
             raise StateError("the world is gone: keep a reference to it")
         return context
 
+    bars_cuts = True  # whether a body that it holds is not cut and does not tear
+
     def holds(self, body: SoftBody) -> bool:
-        """Whether it pulls at a body, which then is not cut."""
+        """Whether it holds a body, or a part of one."""
         return False
 
     def let_go(self, body: SoftBody) -> None:
@@ -155,17 +157,22 @@ class Slice:
 
     # What a snapshot has of it. All of this is called in a world that is built.
 
-    def note(self) -> list[list[Any]]:
-        """What Python knows of it, as plain data: a row for each handle, which begins with its number."""
+    def entries(self) -> list[list[Any]]:
+        """What Python knows of it, as plain data, in rows."""
         return []
 
-    def row_counts(self, notes: list[list[Any]]) -> list[int]:
-        """How many rows of each group of its fields `carried` are in use, by notes of `note`."""
+    def serials(self, entries: list[list[Any]]) -> list[int]:
+        """Numbers of the handles that have a row: the first of each."""
+        return [row[0] for row in entries]
+
+    def row_counts(self, entries: list[list[Any]]) -> list[int]:
+        """How many rows of each group of its fields `carried` are in use, by `entries`."""
         return []
 
-    def read(self, notes: list[list[Any]], vertex_counts: Sequence[int]) -> Any:
-        """Notes of `note`, checked against the bodies that are to live in each slot, 0 vertices for nobody.
+    def read(self, entries: list[list[Any]], vertex_counts: Sequence[int], earlier: dict[str, Any]) -> Any:
+        """Rows of `entries`, checked against the bodies that are to live in each slot, 0 vertices for nobody.
 
+        Args: earlier: what slices before this one have read, by name.
         Raises: ValueError, or what Python raises, where they are not in order.
         """
 
@@ -179,6 +186,24 @@ class Slice:
         """Let handles be as was `read`; bodies and fields are so already."""
 
 
+@dataclass(eq=False)
+class BodyRecord:
+    """What the library keeps of a body behind the handle that a user holds: see `record_of`."""
+
+    description: BodyDescription  # as added, or as set or cut since
+    first_step: int
+    removed_in: int | None = None  # step
+    frozen_in: FailedStep | None = None
+    failure: Failure | None = None  # once it was asked for
+    part: Part | None = None  # of the asset's mesh, once it was cut
+    topology_version: int = 0
+
+    def become(self, part: Part | None) -> None:
+        """Take note of what cuts have left of the asset's mesh, None for all of it."""
+        self.part = part
+        self.topology_version += 1
+
+
 class SoftBody(Handle):
     """What is known of a body without the world that it lives in. `Body` is what users hold."""
 
@@ -187,24 +212,12 @@ class SoftBody(Handle):
         # Weak, or a world that is dropped would wait for the garbage collector to give its state back.
         self._context_ref = weakref.ref(context)
         self._asset = asset
-        self._description = asset.description
         self._index = index
-        self._first_step = context.clock.steps
-        self._removed_in: int | None = None
-        self._frozen_in: FailedStep | None = None
-        self._failure: Failure | None = None
-        self._attachments: list[Any] = []
-        self._topology_version = 0
-        self._part: Part | None = None  # of the asset's mesh, once it was cut
-
-    def _require_alive(self) -> None:
-        """Raises: StateError once the body was removed."""
-        if self._removed_in is not None:
-            raise StateError(f"body {self.index} was removed by despawn in step {self._removed_in}")
+        self._record = BodyRecord(asset.description, context.clock.steps)
 
     @property
     def _context(self) -> Context:
-        self._require_alive()
+        require_alive(self)
         context = self._context_ref()
         if context is None:
             raise StateError(f"the world of body {self.index} is gone: keep a reference to it")
@@ -228,27 +241,27 @@ class SoftBody(Handle):
     @property
     def is_alive(self) -> bool:
         """False once `World.despawn` has removed it: what asks the world then raises StateError."""
-        return self._removed_in is None
+        return self._record.removed_in is None
 
     @property
     def mesh(self) -> BodyMesh:
         """The rest shape, as added, or as cuts have left it."""
-        return self._description.mesh
+        return self._record.description.mesh
 
     @property
     def material(self) -> AnyMaterial:
         """The material, as added or set since."""
-        return self._description.material
+        return self._record.description.material
 
     @property
     def vertex_count(self) -> int:
         """Number of vertices, n."""
-        return len(self._description.mesh.vertices)
+        return len(self._record.description.mesh.vertices)
 
     @property
     def tets(self) -> NDArray[np.int32]:
         """Vertices of each tetrahedron, (m, 4)."""
-        return self._description.mesh.tets
+        return self._record.description.mesh.tets
 
     @property
     def surface(self) -> NDArray[np.int32]:
@@ -258,78 +271,55 @@ class SoftBody(Handle):
     @property
     def is_held(self) -> bool:
         """Whether it is attached, to a frame or another body, or grabbed."""
-        return self._is_pulled or bool(self._attachments)
-
-    @property
-    def _is_pulled(self) -> bool:
-        """Whether it is grabbed, or joined to another body."""
         return any(each.holds(self) for each in self._context.slices)
 
     @property
     def topology_version(self) -> int:
         """How often its vertices and tetrahedra have changed: where this does, read `surface` again."""
-        return self._topology_version
+        return self._record.topology_version
 
     @property
     def is_cut(self) -> bool:
         """Whether it is no longer what its asset says, but what cuts have left."""
-        return self._part is not None
+        return self._record.part is not None
 
     @property
     def vertex_origins(self) -> Ints:
         """The vertex of the asset's mesh that each vertex is, or is a copy of, (n,)."""
-        return np.arange(self.vertex_count) if self._part is None else self._part.vertices
+        part = self._record.part
+        return np.arange(self.vertex_count) if part is None else part.vertices
 
     @property
     def tet_origins(self) -> Ints:
         """The tetrahedron of the asset's mesh that each one is, (m,)."""
-        return np.arange(len(self.tets)) if self._part is None else self._part.tets
-
-    def _become(self, part: Part | None) -> None:
-        """Take note of what cuts have left of the asset's mesh, None for all of it."""
-        self._part = part
-        self._topology_version += 1
-
-    def _redescribe(self, description: BodyDescription, arrays: BodyArrays) -> Ranges:
-        """Take note that the body is made of something else. Returns where it lies in the fields."""
-        context = self._context
-        self._description = description
-        context.layout.bodies[self.index] = arrays
-        context.renew_substeps()
-        return context.layout.ranges[self.index]
+        part = self._record.part
+        return np.arange(len(self.tets)) if part is None else part.tets
 
     @property
     def masses(self) -> Floats:
         """Mass of each vertex, (n,) [kg]."""
-        return self._description.masses
+        return self._record.description.masses
 
     @property
     def pinned(self) -> NDArray[np.int32]:
         """Vertices that are held now, ascending."""
         fields = self._context.fields
-        return self._description.pinned if fields is None else fields.pinned(self)
-
-    @property
-    def _rest_inverses(self) -> Floats:
-        """A^-1 of each tetrahedron at rest as it is now, (m, 3, 3) [1/m]."""
-        fields = self._context.fields
-        if self.asset.plasticity is None or fields is None:
-            return self._description.rest_inverses
-        return fields.rest_inverses(self)
+        return self._record.description.pinned if fields is None else fields.pinned(self)
 
     @property
     def is_frozen(self) -> bool:
         """True once the body went non-finite; it stays in its last finite state from then on."""
-        return self._frozen_in is not None
+        return self._record.frozen_in is not None
 
     @property
     @one_thread
     def failure(self) -> Failure | None:
         """What broke first, None while the body is sound. Found out when first asked, not within a step."""
-        self._require_alive()
-        if self._frozen_in is not None and self._failure is None:
-            self._failure = self._context.built.find_failure(self.index, self._frozen_in)
-        return self._failure
+        require_alive(self)
+        record = self._record
+        if record.frozen_in is not None and record.failure is None:
+            record.failure = self._context.built.find_failure(self.index, record.frozen_in)
+        return record.failure
 
     def positions(self, out: Floats32 | None = None) -> Floats32:
         """Vertex positions after the last step, float32 (n, 3) [m].
@@ -361,3 +351,49 @@ class SoftBody(Handle):
     def center_of_mass(self) -> Floats:
         """(3,) [m]."""
         return np.asarray(self.masses @ self.positions().astype(np.float64) / self.masses.sum())
+
+
+# What the library asks of a body, and no user does.
+
+
+def record_of(body: SoftBody) -> BodyRecord:
+    """What is kept of a body, to read and to write."""
+    return body._record
+
+
+def context_of(body: SoftBody) -> Context:
+    """The context that a body lives in. Raises: StateError where the body or its world is gone."""
+    return body._context
+
+
+def lives_in(body: SoftBody, context: Context) -> bool:
+    """Whether a body was made in a context; it may have been removed since."""
+    return body._context_ref() is context
+
+
+def require_alive(body: SoftBody) -> None:
+    """Raises: StateError once a body was removed."""
+    if body._record.removed_in is not None:
+        raise StateError(f"body {body.index} was removed by despawn in step {body._record.removed_in}")
+
+
+def may_be_cut(body: SoftBody) -> bool:
+    """Whether nothing holds a body that could not follow a cut."""
+    return not any(each.bars_cuts and each.holds(body) for each in body._context.slices)
+
+
+def redescribe(body: SoftBody, description: BodyDescription, arrays: BodyArrays) -> Ranges:
+    """Take note that a body is made of something else. Returns where it lies in the fields."""
+    context = body._context
+    body._record.description = description
+    context.layout.bodies[body.index] = arrays
+    context.renew_substeps()
+    return context.layout.ranges[body.index]
+
+
+def rest_inverses_of(body: SoftBody) -> Floats:
+    """A^-1 of each tetrahedron at rest as it is now, (m, 3, 3) [1/m]."""
+    fields = body._context.fields
+    if body.asset.plasticity is None or fields is None:
+        return body._record.description.rest_inverses
+    return fields.rest_inverses(body)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.bodies.layout import outer_vertices
-from taichi_soft.contact.colliders import Collider
+from taichi_soft.contact.collider import Collider
 from taichi_soft.core.errors import OptionError
 
 if TYPE_CHECKING:

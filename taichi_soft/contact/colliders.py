@@ -1,15 +1,16 @@
-"""What bodies hit: solid shapes that stand still, or move as the engine says."""
+"""All colliders of a world, and what a snapshot has of them."""
 
 from __future__ import annotations
 
-import weakref
+import contextlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from taichi_soft.bodies.soft_body import Context, RowsOf, Slice, SoftBody
+from taichi_soft.contact.collider import Collider, ColliderRow, rebind, row_of
 from taichi_soft.contact.fields import NO_COLLIDER, ContactCapacity, ContactFields
 from taichi_soft.contact.kernels.collider_rows import (
     MOTION_WIDTH,
@@ -17,197 +18,35 @@ from taichi_soft.contact.kernels.collider_rows import (
     write_collider_motion,
     write_samples,
 )
-from taichi_soft.contact.shapes import Shape
-from taichi_soft.core.checks import as_count, as_number, as_rotation, as_vector
-from taichi_soft.core.constants import ALL_GROUPS, VELOCITY_LIMIT
-from taichi_soft.core.errors import OptionError, StateError
-from taichi_soft.core.handles import Handle, recorded
-from taichi_soft.core.math.rotations import matrix_of, quaternion_of, rotation_vector, turned_by
-from taichi_soft.core.serialisation import digest_of
+from taichi_soft.contact.shapes import Shape, SphereShape
+from taichi_soft.core.checks import as_count, as_flag, as_number, as_rotation, as_vector
+from taichi_soft.core.constants import ALL_GROUPS
+from taichi_soft.core.errors import OptionError, SnapshotError, StateError
+from taichi_soft.core.handles import serial_of
+from taichi_soft.core.math.rotations import quaternion_of, rotation_vector, turned_by
+from taichi_soft.core.serialisation import digest_of, from_plain, plain_of, vector_of
 
 Floats = NDArray[np.float64]
 
 MOST_SAMPLES = 100_000_000
 """Of all grids that come after `World.build`: 400 MB."""
 
-_FASTEST_SPIN = 1e4  # [rad/s]
-
-
-@dataclass(eq=False)
-class ColliderRow:
-    """One collider: what it is, where it is, and how it moves through the next step."""
-
-    shape: Shape
-    friction: float
-    restitution: float  # -1 for that of the bodies
-    thickness: float
-    group: int
-    mask: int
-    position: Floats
-    rotation: Floats  # quaternion
-    velocity: Floats
-    spin: Floats
-    offset: int  # of its samples, from `World.build` on
-    target: tuple[Floats, Floats] | None = None  # pose at the end of the next step
-    is_alive: bool = True
-
-    @property
-    def skin(self) -> float:
-        """How far outside of the shape its surface is felt [m]."""
-        return self.thickness + self.shape.seam
-
-    @property
-    def constants(self) -> tuple[Any, ...]:
-        """All that does not move."""
-        surface = (self.friction, self.restitution, self.thickness, self.group, self.mask)
-        return (id(self.shape), self.offset, self.is_alive, *surface)
-
-
-class Collider(Handle):
-    """A handle to one collider. What it does to bodies it does through its surface: friction, restitution."""
-
-    def __init__(self, colliders: Colliders, index: int, row: ColliderRow) -> None:
-        """Made by `World.add_collider`."""
-        self._set = weakref.ref(colliders)
-        self._row = row
-        self.index = index
-
-    def __repr__(self) -> str:
-        return f"Collider({self.index}, {self.shape!r}{'' if self.is_alive else ', removed'})"
-
-    def _colliders(self) -> Colliders:
-        """The set it belongs to. Raises: StateError where it, or its world, is gone."""
-        colliders = self._set()
-        if colliders is None:
-            raise StateError(f"the world of collider {self.index} is gone: keep a reference to it")
-        if not self.is_alive:
-            raise StateError(f"collider {self.index} was removed: add another")
-        return colliders
-
-    @property
-    def is_alive(self) -> bool:
-        """False once it was removed."""
-        return self._row.is_alive
-
-    @property
-    def shape(self) -> Shape:
-        """What it is."""
-        return self._row.shape
-
-    @property
-    def position(self) -> Floats:
-        """Of its origin, (3,) [m]."""
-        return np.array(self._row.position)
-
-    @property
-    def rotation(self) -> Floats:
-        """Its axes as columns, (3, 3)."""
-        matrix: Floats = matrix_of(self._row.rotation)
-        return matrix
-
-    @property
-    def velocity(self) -> Floats:
-        """Of its origin from the coming step on, (3,) [m/s]; zero where `move_to` takes it somewhere."""
-        return np.array(self._row.velocity)
-
-    @property
-    def angular_velocity(self) -> Floats:
-        """The same of its rotation, (3,) [rad/s]."""
-        return np.array(self._row.spin)
-
-    @property
-    def friction(self) -> float:
-        """Coulomb's coefficient."""
-        return self._row.friction
-
-    @property
-    def restitution(self) -> float | None:
-        """Of whole bodies; None for their own elasticity."""
-        return None if self._row.restitution < 0.0 else self._row.restitution
-
-    @property
-    def thickness(self) -> float:
-        """How far outside of its shape bodies meet it [m]."""
-        return self._row.thickness
-
-    @property
-    def group(self) -> int:
-        """Bits that bodies' masks are compared with."""
-        return self._row.group
-
-    @property
-    def mask(self) -> int:
-        """Bits of the groups of bodies that it touches."""
-        return self._row.mask
-
-    @property
-    def impulse(self) -> Floats:
-        """What bodies gave it in the last step, (3,) [N s]: apply it to the engine's rigid body.
-
-        To that body's velocity for the coming step add half of it beforehand: it is about what that step
-        will bring, and comes too late otherwise.
-        """
-        return self._colliders().impulses()[self.index, :3]
-
-    @property
-    def angular_impulse(self) -> Floats:
-        """The same about its position, (3,) [N m s]."""
-        return self._colliders().impulses()[self.index, 3:]
-
-    @recorded
-    def move_to(self, position: ArrayLike, rotation: ArrayLike | None = None) -> None:
-        """Be there at the end of the next step, on a straight way and an even turn; then stand still.
-
-        Bodies in the way are pushed with the velocity that this takes.
-        Args:
-            position: (3,) [m].
-            rotation: matrix (3, 3) or quaternion (x, y, z, w); None keeps the present one.
-        Raises: OptionError for bad values.
-        """
-        colliders = self._colliders()
-        self._row.target = self._pose(position, rotation)
-        colliders.moved(self._row)
-
-    @recorded
-    def set_velocity(self, linear: ArrayLike, angular: ArrayLike = (0.0, 0.0, 0.0)) -> None:
-        """Move on like this until told otherwise: (3,) [m/s] and (3,) [rad/s] about its position."""
-        colliders, row = self._colliders(), self._row
-        velocity = as_vector(linear, "linear", "m/s", VELOCITY_LIMIT)
-        spin = as_vector(angular, "angular", "rad/s", _FASTEST_SPIN)
-        row.velocity, row.spin, row.target = velocity, spin, None
-        colliders.moved(row)
-
-    @recorded
-    def teleport(self, position: ArrayLike, rotation: ArrayLike | None = None) -> None:
-        """Be there at once, without pushing anything on the way; what it then covers is pressed out."""
-        colliders, row = self._colliders(), self._row
-        pose = self._pose(position, rotation)
-        colliders.on_jump(*_box(row))
-        row.position, row.rotation = pose
-        row.target = None
-        colliders.moved(row)
-        colliders.on_jump(*_box(row))
-
-    def _pose(self, position: ArrayLike, rotation: ArrayLike | None) -> tuple[Floats, Floats]:
-        where = as_vector(position, "position", "m")
-        return where, self._row.rotation if rotation is None else quaternion_of(as_rotation(rotation))
-
-    @recorded
-    def remove(self) -> None:
-        """Take it out of the world; its place is free for another."""
-        colliders = self._colliders()
-        self._row.is_alive = False
-        colliders.write(self.index)
+MOST_IMPULSE = 1e30
+"""Impulse [N s] that no contact has reached: what is beyond is not finite."""
 
 
 def ignore(lower: Floats, upper: Floats) -> None:
     """What is told of jumps where nobody listens."""
 
 
-class Colliders:
+class Colliders(Slice):
     """All colliders of one world: Python's side of `ContactFields`."""
 
-    def __init__(self) -> None:
+    name = "colliders"
+
+    def __init__(self, context: Context) -> None:
+        """None yet."""
+        super().__init__(context)
         self._rows: list[ColliderRow] = []
         self.shapes: dict[str, Shape] = {}  # all that there ever were, by their digests
         self._handles: list[Collider] = []
@@ -336,7 +175,7 @@ class Colliders:
         self._write_samples(row)
         self._write_constants()
         self._is_dirty = True
-        self.on_jump(*_box(row))
+        self.on_jump(*row.box)
 
     def _write_samples(self, row: ColliderRow) -> None:
         if row.is_alive and len(row.shape.samples):
@@ -377,7 +216,7 @@ class Colliders:
                 row.spin = rotation_vector(row.rotation, rotation) / dt
         motion = np.empty((len(self._rows), MOTION_WIDTH), dtype=np.float32)
         for line, row in zip(motion, self._rows, strict=True):
-            line[:] = np.concatenate([row.position, row.rotation, row.velocity, row.spin, *_way(row, dt)])
+            line[:] = np.concatenate([row.position, row.rotation, row.velocity, row.spin, *row.way(dt)])
         write_collider_motion(self._contact, motion)
         self._is_dirty = False
         return True
@@ -398,27 +237,114 @@ class Colliders:
         """Of each row, removed ones among them."""
         return tuple(self._handles)
 
-    def restore(
-        self,
-        rows: list[ColliderRow],
-        handle_of: Callable[[int, ColliderRow], Collider],
-    ) -> None:
-        """Put back all rows, with the handles that `handle_of` finds."""
-        before, after = [row.constants for row in self._rows], rows
+    def entries(self) -> list[list[Any]]:
+        """Number of handle, what each row is and how it moves. A shape without a grid is there in full."""
+        return [_entry(handle) for handle in self._handles]
+
+    def row_counts(self, entries: list[list[Any]]) -> list[int]:
+        """Of particles, of bodies, of pairs of a body and a collider."""
+        bodies = len(self.context.slots.slots)
+        assert self._contact is not None
+        return [self.context.layout.particle_count, bodies, bodies * self._contact.capacity.colliders]
+
+    def read(
+        self, entries: list[list[Any]], vertex_counts: Sequence[int], earlier: dict[str, Any]
+    ) -> list[tuple[int, ColliderRow]]:
+        """Rows of `entries`, with their handles' numbers.
+
+        Raises: ValueError, SnapshotError or OptionError for what is no collider, or finds no room.
+        """
+        room = ContactCapacity() if self._contact is None else self._contact.capacity
+        if len(entries) > room.colliders:
+            raise ValueError(f"it has {len(entries)} colliders, and there is no room for them")
+        return [(int(entry[0]), self._read_row(entry, room.samples)) for entry in entries]
+
+    def _read_row(self, entry: list[Any], room: int) -> ColliderRow:
+        _, is_alive, digest, plain, offset, surface, motion, target = entry
+        shape = self.shapes.get(digest)
+        if shape is None:
+            shape = from_plain(plain)
+        if not isinstance(shape, Shape):
+            raise SnapshotError(
+                "this snapshot has a collider with a grid that this world never had: add one of each "
+                "MeshShape and HeightFieldShape (and remove it again) before restoring"
+            )
+        friction, restitution, thickness, group, mask = surface
+        position, rotation, velocity, spin = (
+            vector_of(each, n) for each, n in zip(motion, (3, 4, 3, 3), strict=True)
+        )
+        if abs(np.linalg.norm(rotation) - 1.0) > 1e-3:
+            raise ValueError("a rotation is none")
+        row = ColliderRow(
+            shape,
+            as_number(friction, "friction", 0.0, 1e6),
+            -1.0 if restitution == -1.0 else as_number(restitution, "restitution", 0.0, 1.0),
+            as_number(thickness, "thickness", 0.0, 1e3),
+            as_count(group, "group", 0, ALL_GROUPS),
+            as_count(mask, "mask", 0, ALL_GROUPS),
+            position,
+            rotation,
+            velocity,
+            spin,
+            as_count(offset, "offset", 0),
+            None if target is None else (vector_of(target[0], 3), vector_of(target[1], 4)),
+            as_flag(is_alive, "is_alive"),
+        )
+        if not row.offset <= room - len(shape.samples):
+            raise ValueError("a collider's grid lies outside the room for grids")
+        return row
+
+    def require(self, read: Any, rows_of: RowsOf) -> None:
+        """Raises: ValueError where an impulse that contact goes on with is not finite."""
+        if self._contact is not None and self._contact.capacity.soft:
+            soft = self.context.built.state.soft
+            for field in (soft.kept_press, soft.kept_rub):
+                if not np.abs(rows_of(field)).max() <= MOST_IMPULSE:
+                    raise ValueError("particles are out of reach, or not finite")
+
+    def restore(self, read: Any) -> None:
+        """Let there be the colliders that were `read`, and no other."""
+        before, handles = [row.constants for row in self._rows], self.context.handles
         for handle in self._handles:
-            handle._row.is_alive = False
-        self._rows = after
-        self._handles = [handle_of(index, row) for index, row in enumerate(after)]
-        for index, (handle, row) in enumerate(zip(self._handles, after, strict=True)):
-            handle.index, handle._row = index, row
+            row_of(handle).is_alive = False
+        self._rows, self._handles = [row for _, row in read], []
+        for index, (serial, row) in enumerate(read):
+            handle = handles.find(serial, Collider) or Collider(self, index, row)
+            handles.enlist(handle, serial)
+            rebind(handle, index, row)
+            self._handles.append(handle)
         self._impulses, self._is_dirty, self._movers = None, True, []
-        for row in after:
+        for row in self._rows:
             self.moved(row)
-        if self._contact is None or before == [row.constants for row in after]:
+        if self._contact is None or before == [row.constants for row in self._rows]:
             return
-        for row in after:
+        for row in self._rows:
             self._write_samples(row)
         self._write_constants()
+
+    def rehearse(self, body: SoftBody, other: SoftBody | None, step: Callable[[], None]) -> None:
+        """Add one, move it, ask what it felt and remove it."""
+        if self._contact is None:
+            return
+        added: Collider | None = None
+        with contextlib.suppress(StateError):  # there is no room for it, nor will there be
+            added = self.add(
+                SphereShape(1.0),
+                position=(0.0, 0.0, 0.0),
+                rotation=None,
+                friction=0.5,
+                restitution=None,
+                thickness=0.0,
+                group=1,
+                mask=ALL_GROUPS,
+            )
+            self.context.handles.enlist(added)
+            added.move_to((0.0, 0.0, 1.0))
+        step()
+        for collider in self.handles[:1]:
+            _ = collider.impulse
+        if added is not None:
+            added.remove()
 
     def impulses(self) -> Floats:
         """Of the last step on each, (n, 6) [N s, N m s]; zero before the first."""
@@ -430,27 +356,11 @@ class Colliders:
         return np.array(self._impulses)
 
 
-def _box(row: ColliderRow) -> tuple[Floats, Floats]:
-    """Corners of a box round a collider where it is, (3,) [m] each."""
-    lower, upper, _ = _way(row, 0.0)
-    return lower, upper
-
-
-def _way(row: ColliderRow, dt: float) -> tuple[Floats, Floats, Floats]:
-    """Corners of a box round its way through `dt` [s], (3,) [m] each; its highest speed, (1,) [m/s]."""
-    lower, upper = row.shape.bounds
-    speed, spin = float(np.linalg.norm(row.velocity)), float(np.linalg.norm(row.spin))
-    if not np.isfinite([lower, upper]).all():
-        far = np.full(3, 1e30)
-        return -far, far, np.array([speed if spin == 0.0 else 1e30])
-    corners = np.array([[(lower, upper)[i >> k & 1][k] for k in range(3)] for i in range(8)])
-    radius = float(np.linalg.norm(corners, axis=1).max())
-    places = corners @ matrix_of(row.rotation).T
-    if spin > 0.0:
-        places = radius * np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]])
-    start, end = row.position + places, row.position + dt * row.velocity + places
-    both = np.concatenate([start, end])
-    fastest = np.array([speed + spin * (radius + row.skin)])
-    lowest: Floats = both.min(axis=0) - row.skin
-    highest: Floats = both.max(axis=0) + row.skin
-    return lowest, highest, fastest
+def _entry(collider: Collider) -> list[Any]:
+    row = row_of(collider)
+    target = None if row.target is None else [each.tolist() for each in row.target]
+    motion = [each.tolist() for each in (row.position, row.rotation, row.velocity, row.spin)]
+    surface = [row.friction, row.restitution, row.thickness, row.group, row.mask]
+    plain = None if len(row.shape.samples) else plain_of(row.shape)
+    digest = digest_of(row.shape)
+    return [serial_of(collider), row.is_alive, digest, plain, row.offset, surface, motion, target]

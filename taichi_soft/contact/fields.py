@@ -1,6 +1,7 @@
 """The Taichi fields of contact: colliders, and what each body has to do with them in the present step."""
 
 from dataclasses import dataclass
+from typing import Any
 
 from taichi_soft.core.constants import LANES
 from taichi_soft.core.loading import Loader
@@ -113,6 +114,14 @@ class ContactFields:
         self.untaken = ti.field(ti.i32, MOST_PARTS * bodies)  # bodies of each part that wait for a thread
         self.unfinished = ti.field(ti.i32, bodies)
 
+    def carried(self) -> list[list[Any]]:
+        """What the next step depends on: of each particle, each body, each body and collider."""
+        return [
+            [self.particle_touches],
+            [self.calm, self.body_lower, self.body_upper],  # the box in which it sleeps
+            [self.impulse, self.angular_impulse, self.rebound],
+        ]
+
 
 @ti.data_oriented
 class SoftContactFields:
@@ -176,3 +185,7 @@ class SoftContactFields:
         self.pair_bodies = ti.Vector.field(2, ti.i32, bodies * PAIR_ROWS)
         self.pair_impulse = ti.Vector.field(3, ti.f32, bodies * PAIR_ROWS)  # on the second in a step [N s]
         self.pairs_lost = ti.field(ti.i32, ())  # 1 where some had no row
+
+    def carried(self) -> list[Any]:
+        """What the next step depends on, of each particle."""
+        return [self.kept_triangle, self.kept_press, self.kept_rub]

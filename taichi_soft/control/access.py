@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.bodies.soft_body import Context, SoftBody
+from taichi_soft.bodies.soft_body import Context, SoftBody, context_of
 from taichi_soft.core.checks import as_indices
 from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.core.types import Schedule
@@ -21,17 +21,17 @@ def change(body: SoftBody, kernel: Callable[..., Any], *arguments: Any) -> Any:
 
     Raises: StateError before `World.build`.
     """
-    return body._context.built.change(body.index, kernel, *arguments)
+    return context_of(body).built.change(body.index, kernel, *arguments)
 
 
 def attempt(body: SoftBody, kernel: Callable[..., Any], *arguments: Any) -> Any:
     """The same by a kernel that may refuse: the body sleeps on until the caller knows and calls `rouse`."""
-    return body._context.built.attempt(kernel, *arguments)
+    return context_of(body).built.attempt(kernel, *arguments)
 
 
 def rouse(body: SoftBody) -> None:
     """An attempt has changed `body`."""
-    body._context.built.rouse(body.index)
+    context_of(body).built.rouse(body.index)
 
 
 def numbers(*values: Any) -> Rows32:
@@ -56,7 +56,7 @@ def named_particles(body: SoftBody, particles: ArrayLike, name: str = "particles
 
 def rows_of(body: SoftBody, vertices: NDArray[np.int32]) -> NDArray[np.int32]:
     """Where vertices of a body lie in the fields. Raises: StateError before `World.build`."""
-    return body._context.built.rows_of(body.index, vertices)
+    return context_of(body).built.rows_of(body.index, vertices)
 
 
 def require_substeps(context: Context, what: str) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.bodies.soft_body import Context, SoftBody
+from taichi_soft.bodies.soft_body import Context, SoftBody, context_of
 from taichi_soft.control.access import change, numbers, require_substeps, rows_of, some_particles
 from taichi_soft.control.impulses import LARGEST_IMPULSE
 from taichi_soft.control.kernels.drives import (
@@ -40,7 +40,7 @@ def apply_force(body: SoftBody, force: ArrayLike, particles: ArrayLike | None) -
             f"force would accelerate vertices by {np.abs(acceleration).max():.4g} m/s^2: "
             f"keep below {LARGEST_PUSH:g} m/s^2"
         )
-    require_substeps(body._context, "forces")
+    require_substeps(context_of(body), "forces")
     change(body, add_push, body.index, rows_of(body, vertices), numbers(acceleration))
 
 
@@ -52,7 +52,7 @@ def set_gravity_scale(body: SoftBody, scale: float) -> None:
 def set_linear_damping(body: SoftBody, rate: float) -> None:
     """As `Body.set_linear_damping`."""
     per_second = as_number(rate, "rate", 0.0, 1e6, "a number from 0 to 1e6 per second")
-    require_substeps(body._context, "linear damping")
+    require_substeps(context_of(body), "linear damping")
     change(body, write_linear_damping, body.index, per_second)
 
 

@@ -2,26 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies.fields import BodyFields
-from taichi_soft.bodies.soft_body import Context, Slice, SoftBody
+from taichi_soft.bodies.soft_body import Context, RowsOf, Slice, SoftBody
 from taichi_soft.control.jumps import carry
-from taichi_soft.control.kernels.pins import aim_pinned
+from taichi_soft.control.kernels.pins import ARRIVED, STILL, TO_TARGET, WITH_FRAME, aim_pinned
 from taichi_soft.core.checks import as_flag, as_rotation, as_vector
-from taichi_soft.core.errors import StateError
-from taichi_soft.core.handles import Handle, recorded
+from taichi_soft.core.constants import POSITION_LIMIT
+from taichi_soft.core.errors import OptionError, StateError
+from taichi_soft.core.handles import Handle, recorded, serial_of
+from taichi_soft.core.serialisation import below, vector_of
+
+MOST_FRAMES = 1 << 20
+"""A snapshot that names more is not in order."""
 
 
 class Frames(Slice):
     """Poses of all frames of one world: rotation row by row, and position [m], (f, 12)."""
 
+    name = "frames"
+
     def __init__(self, context: Context) -> None:
         """None yet; one row, as a kernel takes no empty array."""
         super().__init__(context)
+        self.attachments: dict[SoftBody, list[Any]] = {}  # by the body that they hold, in their order
         self.rows: list[Frame | None] = []  # None where one was removed: the next frame takes the first such
         self.present = np.zeros((1, 12), dtype=np.float32)
         self.coming = self.present.copy()  # at the end of the coming step
@@ -45,16 +54,22 @@ class Frames(Slice):
         self.present[number] = self.coming[number] = pose
         return number
 
-    def attachments(self, frame: Frame) -> list[Any]:
-        """What hangs from a frame, body by body."""
-        return [
-            each for body in self.context.slots.living for each in body._attachments if each.frame is frame
-        ]
+    def number_of(self, frame: Any) -> int:
+        """The row of a frame. Raises: OptionError for what is no frame of this world; StateError if it was
+        removed."""
+        if not isinstance(frame, Frame) or frame._frames is not self:
+            raise OptionError(f"frame must come from add_frame of the same world, got {frame!r}")
+        frame._require_alive()
+        return frame._number
 
-    def let_go(self, body: SoftBody) -> None:
-        """Release all that hold a body."""
-        for attachment in list(body._attachments):
-            attachment.release()
+    def holding(self, body: SoftBody) -> list[Any]:
+        """The attachments that hold a body."""
+        return self.attachments.get(body, [])
+
+    def hanging(self, frame: Frame) -> list[Any]:
+        """The attachments to a frame, body by body."""
+        bodies = sorted(self.attachments, key=lambda body: body.index)
+        return [each for body in bodies for each in self.attachments[body] if each.frame is frame]
 
     def aim(self, state: BodyFields, body_count: int, dt: float) -> None:
         """Give pinned particles the velocities of the coming step."""
@@ -65,13 +80,58 @@ class Frames(Slice):
     def way(self, body: SoftBody) -> float:
         """How far frames moved a particle of a body in the last step, which was undone for it [m]."""
         x, longest = body.positions().astype(np.float64), 0.0
-        for each in body._attachments:
+        for each in self.holding(body):
             (a, start), (b, end) = (
                 _axes_and_place(poses[each.frame._number]) for poses in (self.past, self.present)
             )
             moved = (x[each.particles] - start) @ a @ b.T + end
             longest = max(longest, float(np.linalg.norm(moved - x[each.particles], axis=1).max()))
         return longest
+
+    def entries(self) -> list[list[Any]]:
+        """Numbers of handle and row, and both poses."""
+        return [
+            [serial_of(frame), number, self.present[number].tolist(), self.coming[number].tolist()]
+            for number, frame in enumerate(self.rows)
+            if frame is not None
+        ]
+
+    def read(
+        self, entries: list[list[Any]], vertex_counts: Sequence[int], earlier: dict[str, Any]
+    ) -> list[tuple[int, int, NDArray[np.float32], NDArray[np.float32]]]:
+        """Rows of `entries`. Raises: ValueError for two in one row, or one out of reach."""
+        found = []
+        for serial, number, *poses in entries:
+            present, coming = (vector_of(pose, 12) for pose in poses)
+            if not max(np.abs(present).max(), np.abs(coming).max()) <= POSITION_LIMIT:
+                raise ValueError("a frame is out of reach")
+            row = below(number, MOST_FRAMES)
+            found.append((int(serial), row, present.astype(np.float32), coming.astype(np.float32)))
+        if len({row for _, row, _, _ in found}) < len(found):
+            raise ValueError("two frames are in one row")
+        return found
+
+    def require(self, read: Any, rows_of: RowsOf) -> None:
+        """Raises: ValueError where a particle goes with a frame that there is not."""
+        aims = rows_of(self.context.built.state.particle_aim)
+        alive = {WITH_FRAME + row for _, row, _, _ in read}
+        if not set(np.unique(aims).tolist()) <= {STILL, TO_TARGET, ARRIVED, *alive}:
+            raise ValueError("a particle goes with no frame")
+
+    def restore(self, read: Any) -> None:
+        """Let there be the frames that were `read`, and no other. Pins are aimed before the next step."""
+        count = max((row for _, row, _, _ in read), default=-1) + 1
+        self.rows = [None] * count
+        self.present = np.zeros((max(count, 1), 12), dtype=np.float32)
+        self.coming = self.present.copy()
+        self.past, self.has_work = self.present.copy(), True
+        handles = self.context.handles
+        for serial, row, present, coming in read:
+            frame = handles.find(serial, Frame)
+            if frame is None or frame._number != row:
+                frame = Frame._at(self, row)
+            handles.enlist(frame, serial)
+            self.rows[row], self.present[row], self.coming[row] = frame, present, coming
 
 
 class Frame(Handle):
@@ -157,9 +217,9 @@ class Frame(Handle):
         pose, present = _pose(position, rotation), frames.present[self._number].copy()
         if rotation is None:
             pose[:9] = present[:9]
-        bodies = list(dict.fromkeys(each.body for each in frames.attachments(self)))
+        bodies = list(dict.fromkeys(each.body for each in frames.hanging(self)))
         for body in bodies:
-            if any(each.frame is not self for each in body._attachments):
+            if any(each.frame is not self for each in frames.holding(body)):
                 raise StateError(
                     f"body {body.index} hangs from another frame as well: release it there before this jumps"
                 )
@@ -172,7 +232,7 @@ class Frame(Handle):
     def remove(self) -> None:
         """Take it out of the world; what is attached to it is released, with the velocity that it had."""
         self._require_alive()
-        for attachment in self._frames.attachments(self):
+        for attachment in self._frames.hanging(self):
             attachment.release()
         self._frames.rows[self._number] = None
 

@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies.fields import MOST_GRABS, PATCH_ROWS
-from taichi_soft.bodies.soft_body import Context, RowsOf, Slice, SoftBody
+from taichi_soft.bodies.soft_body import Context, RowsOf, Slice, SoftBody, context_of, record_of
 from taichi_soft.control.access import change, numbers, require_substeps, rows_of
 from taichi_soft.control.kernels.grabs import end_grab, read_grab_force, write_grab, write_grab_target
 from taichi_soft.control.patches import patch_round
 from taichi_soft.core.checks import as_array, as_count, as_number, as_vector
 from taichi_soft.core.constants import GRAVITY_EARTH
 from taichi_soft.core.errors import MeshError, OptionError, StateError
-from taichi_soft.core.handles import Handle, recorded
+from taichi_soft.core.handles import Handle, handles_of, recorded, serial_of
 from taichi_soft.core.serialisation import below, require_below, require_finite, vector_of
 
 WEIGHTS = 10.0
@@ -42,7 +42,7 @@ class Grab(Handle):
     @property
     def is_held(self) -> bool:
         """False once released, and once the body was removed."""
-        return self.body.is_alive and self.body._context.of(Grabs).by_number.get(self._number) is self
+        return self.body.is_alive and context_of(self.body).of(Grabs).by_number.get(self._number) is self
 
     @property
     def point(self) -> NDArray[np.float64]:
@@ -57,7 +57,7 @@ class Grab(Handle):
         """
         self._require_held()
         found = np.empty(3, dtype=np.float32)
-        read_grab_force(self.body._context.built.state, self._number, found)
+        read_grab_force(context_of(self.body).built.state, self._number, found)
         return found
 
     @recorded
@@ -73,7 +73,7 @@ class Grab(Handle):
         """Let go. Raises: StateError if it was done before."""
         self._require_held()
         change(self.body, end_grab, self._number, self.body.index)
-        del self.body._context.of(Grabs).by_number[self._number]
+        del context_of(self.body).of(Grabs).by_number[self._number]
 
     def _require_held(self) -> None:
         if not self.is_held:
@@ -112,24 +112,24 @@ class Grabs(Slice):
             _ = grab.force
             grab.release()
 
-    def note(self) -> list[list[Any]]:
+    def entries(self) -> list[list[Any]]:
         """Numbers of handle, grab and body, and where each pulls to."""
         return [
-            [grab._serial, number, grab.body.index, grab.point.tolist()]
+            [serial_of(grab), number, grab.body.index, grab.point.tolist()]
             for number, grab in sorted(self.by_number.items())
         ]
 
-    def row_counts(self, notes: list[list[Any]]) -> list[int]:
+    def row_counts(self, entries: list[list[Any]]) -> list[int]:
         """Of grabs; of those up to the last in use; of the rows of their patches."""
-        used = max((int(number) for _, number, _, _ in notes), default=-1) + 1
+        used = max((int(number) for _, number, _, _ in entries), default=-1) + 1
         return [MOST_GRABS, used, used * PATCH_ROWS]
 
     def read(
-        self, notes: list[list[Any]], vertex_counts: Sequence[int]
+        self, entries: list[list[Any]], vertex_counts: Sequence[int], earlier: dict[str, Any]
     ) -> list[tuple[int, int, int, NDArray[np.float64]]]:
-        """Rows of `note`. Raises: ValueError for a grab of nobody."""
+        """Rows of `entries`. Raises: ValueError for a grab of nobody."""
         found = []
-        for serial, number, slot, point in notes:
+        for serial, number, slot, point in entries:
             if not vertex_counts[below(slot, len(vertex_counts))]:
                 raise ValueError("a grab holds no body")
             found.append((int(serial), below(number, MOST_GRABS), int(slot), vector_of(point, 3)))
@@ -184,20 +184,20 @@ def grab_at(
     hertz, limit = as_pull(frequency, max_force)
     omega, mass = 2 * np.pi * hertz, float(body.masses.sum())
     strongest = WEIGHTS * GRAVITY_EARTH * mass if limit is None else limit
-    require_substeps(body._context, "grabs")
+    require_substeps(context_of(body), "grabs")
     corners = body.surface[number]
     target = weights @ body.positions()[corners].astype(np.float64)
     if point is not None:
         target = as_vector(point, "point", "m")
-    grabs = body._context.of(Grabs).by_number
+    grabs = context_of(body).of(Grabs).by_number
     free = next((slot for slot in range(MOST_GRABS) if slot not in grabs), None)
     if free is None:
         raise StateError(f"all {MOST_GRABS} grabs of this world are in use: release one first")
-    patch = patch_round(body._description, corners, weights)
+    patch = patch_round(record_of(body).description, corners, weights)
     spring = (mass * omega**2, 2 * mass * omega, 2 * HIGHEST_SPEED / omega)
     row = numbers(weights, target, *spring, min(strongest, patch.strength), strongest, 1 / mass)
     rows, shares = rows_of(body, patch.vertices), patch.shares.astype(np.float32)
     change(body, write_grab, free, body.index, rows_of(body, corners), row, rows, shares)
     grabs[free] = Grab(body, free, target)
-    body._handles.enlist(grabs[free])
+    handles_of(body).enlist(grabs[free])
     return grabs[free]

@@ -8,14 +8,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.bodies.soft_body import Context, RowsOf, Slice, SoftBody
+from taichi_soft.bodies.soft_body import (
+    Context,
+    RowsOf,
+    Slice,
+    SoftBody,
+    context_of,
+    lives_in,
+    record_of,
+    require_alive,
+)
 from taichi_soft.control.access import change, named_particles, rows_of
 from taichi_soft.control.joint_fields import ENDS, JOINT_ROWS, MOST_JOINTS
 from taichi_soft.control.kernels.joints import end_joint, forget_held, read_joint_impulse, write_joint
 from taichi_soft.control.patches import wave_speed
 from taichi_soft.control.places import Places, places_at, places_on
 from taichi_soft.core.errors import OptionError, StateError
-from taichi_soft.core.handles import Handle, recorded
+from taichi_soft.core.handles import Handle, handles_of, recorded, serial_of
 from taichi_soft.core.serialisation import below, indices_below, require_below
 
 DRAW = 0.25
@@ -45,7 +54,7 @@ class Joint(Handle):
 
     @property
     def _joints(self) -> Joints:
-        return self.body._context.of(Joints)
+        return context_of(self.body).of(Joints)
 
     @property
     def force(self) -> NDArray[np.float64]:
@@ -54,7 +63,7 @@ class Joint(Handle):
         Raises: StateError once released.
         """
         self._require_attached()
-        context = self.body._context
+        context = context_of(self.body)
         impulse = np.empty(3, dtype=np.float32)
         read_joint_impulse(context.built.state, self._number, impulse)
         return impulse.astype(np.float64) / max(context.clock.last_dt, 1e-30)
@@ -66,7 +75,7 @@ class Joint(Handle):
         Raises: StateError if it was done before.
         """
         self._require_attached()
-        built = self.body._context.built
+        built = context_of(self.body).built
         built.wake(self.other.index)
         change(self.body, end_joint, self._number)
         del self._joints.by_number[self._number]
@@ -122,24 +131,24 @@ class Joints(Slice):
         _ = joint.force, body.velocities()
         joint.release()
 
-    def note(self) -> list[list[Any]]:
+    def entries(self) -> list[list[Any]]:
         """Numbers of handle, joint and both bodies, and the particles that are held."""
         return [
-            [joint._serial, number, joint.body.index, joint.other.index, joint.particles.tolist()]
+            [serial_of(joint), number, joint.body.index, joint.other.index, joint.particles.tolist()]
             for number, joint in sorted(self.by_number.items())
         ]
 
-    def row_counts(self, notes: list[list[Any]]) -> list[int]:
+    def row_counts(self, entries: list[list[Any]]) -> list[int]:
         """Of joints, their rows, and the ends of these."""
-        rows = sum(len(particles) for *_, particles in notes)
+        rows = sum(len(particles) for *_, particles in entries)
         return [MOST_JOINTS, rows, rows * ENDS]
 
     def read(
-        self, notes: list[list[Any]], vertex_counts: Sequence[int]
+        self, entries: list[list[Any]], vertex_counts: Sequence[int], earlier: dict[str, Any]
     ) -> list[tuple[int, int, int, int, NDArray[np.int32]]]:
-        """Rows of `note`. Raises: ValueError for joints of nobody, or in a world that has none."""
+        """Rows of `entries`. Raises: ValueError for joints of nobody, or in a world that has none."""
         found = []
-        for serial, number, body, other, particles in notes:
+        for serial, number, body, other, particles in entries:
             a, b = (below(slot, len(vertex_counts)) for slot in (body, other))
             has_contact = self.context.built.program.has_contact
             if a == b or not (vertex_counts[a] and vertex_counts[b] and has_contact):
@@ -186,9 +195,9 @@ class Joints(Slice):
     def join(self, body: SoftBody, other: Any, particles: ArrayLike, onto: ArrayLike | None) -> Joint:
         """As `Body.attach_to`."""
         context = self.context
-        if not isinstance(other, SoftBody) or other is body or other._context_ref() is not context:
+        if not isinstance(other, SoftBody) or other is body or not lives_in(other, context):
             raise OptionError(f"other must be another body of the same world, got {other!r}")
-        other._require_alive()
+        require_alive(other)
         vertices, places = _find_places(body, other, particles, onto)
         if context.settings.is_implicit:
             raise StateError("implicit_euler has no joints: make the world with integrator='leapfrog'")
@@ -221,7 +230,7 @@ class Joints(Slice):
             weights,
         )
         joint = self.by_number[free] = Joint(body, other, free, vertices)
-        body._handles.enlist(joint)
+        handles_of(body).enlist(joint)
         context.built.joints_have_changed()
         return joint
 
@@ -249,7 +258,7 @@ def _draw_speed(body: SoftBody, other: SoftBody, vertices: NDArray[np.int32], pl
     """[m/s] at which a gap between the two may close."""
     holders = np.unique(places.vertices[places.weights != 0.0])
     slowest = min(
-        wave_speed(each._description) * np.sqrt(each.masses[held].sum() / each.masses.sum())
+        wave_speed(record_of(each).description) * np.sqrt(each.masses[held].sum() / each.masses.sum())
         for each, held in ((body, vertices), (other, holders))
     )
     return DRAW * float(slowest)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.bodies.soft_body import SoftBody
+from taichi_soft.bodies.soft_body import SoftBody, context_of
 from taichi_soft.control.access import attempt, rouse
 from taichi_soft.control.kernels.placement import jump
 from taichi_soft.core.constants import POSITION_LIMIT
@@ -43,7 +43,7 @@ def carry(bodies: Sequence[SoftBody], turn: Floats, start: Floats, end: Floats, 
                 f"position puts body {body.index} beyond {POSITION_LIMIT:g} m: stay nearer the origin"
             )
     for body, center in zip(bodies, centers, strict=True):
-        simulation = body._context.built
+        simulation = context_of(body).built
         left = simulation.box_of(body)
         jump_to(body, center, turn, lowest=-np.inf, keep=keep)
         rouse(body)

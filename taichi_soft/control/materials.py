@@ -10,7 +10,7 @@ import numpy as np
 from taichi_soft.bodies.fields import BodyFields
 from taichi_soft.bodies.kernels.constants import write_fours, write_masses, write_numbers
 from taichi_soft.bodies.layout import BodyArrays, BodyDescription, Ranges, blocks_of, rearrange
-from taichi_soft.bodies.soft_body import SoftBody
+from taichi_soft.bodies.soft_body import SoftBody, context_of, record_of, redescribe
 from taichi_soft.control.access import change
 from taichi_soft.core.constants import LANES
 from taichi_soft.core.errors import MaterialError
@@ -19,7 +19,7 @@ from taichi_soft.elements.laws import fit_model
 
 def set_material(body: SoftBody, material: Any) -> None:
     """As `Body.set_material`."""
-    before = body._description
+    before = record_of(body).description
     if type(material) is not type(before.material):
         raise MaterialError(
             f"body {body.index} is made of a {type(before.material).__name__} and stays so: "
@@ -36,8 +36,8 @@ def set_damping(body: SoftBody, damping: Any) -> None:
 
 def write_constants(state: BodyFields, body: SoftBody, description: BodyDescription) -> None:
     """Not a kernel, but called like one: what a body is made of lies in several fields."""
-    arrays = rearrange(body._context.layout.bodies[body.index], description)
-    place = body._redescribe(description, arrays)
+    arrays = rearrange(context_of(body).layout.bodies[body.index], description)
+    place = redescribe(body, description, arrays)
     masses = arrays.mass
     write_masses(state, place.particles[0], masses.astype(np.float32), (1.0 / masses).astype(np.float32))
     write_numbers(state.edge_damping, place.edges[0], arrays.edge_damping.astype(np.float32))

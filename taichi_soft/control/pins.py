@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.bodies.soft_body import SoftBody
+from taichi_soft.bodies.soft_body import SoftBody, context_of
 from taichi_soft.control.access import attempt, change, named_particles, rouse, rows_of, some_particles
 from taichi_soft.control.attachments import attached_vertices, require_unattached
 from taichi_soft.control.frames import Frames
@@ -18,7 +18,7 @@ from taichi_soft.core.errors import OptionError, StateError
 def pinned_vertices(body: SoftBody) -> NDArray[np.int32]:
     """As `Body.pinned`, of a built world."""
     flags = np.empty(body.vertex_count, dtype=np.int32)
-    body._context.built.read(body.index, read_pinned, flags)
+    context_of(body).built.read(body.index, read_pinned, flags)
     return np.flatnonzero(flags).astype(np.int32)
 
 
@@ -54,4 +54,4 @@ def set_targets(body: SoftBody, particles: ArrayLike, positions: ArrayLike) -> N
     if loose >= 0:
         raise StateError(f"vertex {vertices[loose]} of body {body.index} is not pinned: call body.pin first")
     rouse(body)
-    body._context.of(Frames).has_work = True
+    context_of(body).of(Frames).has_work = True

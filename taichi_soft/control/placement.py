@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from taichi_soft.bodies.layout import outer_vertices
-from taichi_soft.bodies.soft_body import SoftBody
+from taichi_soft.bodies.soft_body import SoftBody, context_of
 from taichi_soft.control.access import attempt, numbers, rouse, some_particles
 from taichi_soft.control.attachments import require_unattached
 from taichi_soft.control.jumps import jump_to
@@ -36,7 +36,7 @@ def teleport(body: SoftBody, position: ArrayLike, rotation: Any, keep_velocity: 
     target, turn = as_vector(position, "position", "m"), as_rotation(rotation)
     keep = as_flag(keep_velocity, "keep_velocity")
     require_unattached(body, some_particles(body, None))
-    floor, built = body._context.settings.floor, body._context.built
+    floor, built = context_of(body).settings.floor, context_of(body).built
     left = built.box_of(body)
     free = np.setdiff1d(outer_vertices(body.mesh), body.pinned)
     if len(free):

@@ -68,6 +68,16 @@ class Handles:
         return handle if isinstance(handle, kind) else None
 
 
+def serial_of(handle: Handle) -> int:
+    """Its number, 0 for the world."""
+    return handle._serial
+
+
+def handles_of(handle: Handle) -> Handles:
+    """All handles of the same world."""
+    return handle._handles
+
+
 def recorded(method: Method) -> Method:
     """Lets the recorder of a world that has one take note of the calls of a public method that changes it."""
 

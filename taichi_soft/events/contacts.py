@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.bodies.soft_body import SoftBody
-from taichi_soft.contact.colliders import Collider
+from taichi_soft.contact.collider import Collider
 from taichi_soft.contact.kernels.touches import OF_BODY
+from taichi_soft.core.handles import serial_of
 from taichi_soft.events.kinds import ContactBegan, ContactEnded
 from taichi_soft.events.memory import CONTACT_WIDTH, Known
 
@@ -98,7 +99,7 @@ class Contacts:
     def rows(self) -> NDArray[np.float64]:
         """All of them, as `Memory` keeps them."""
         rows = [
-            (*key, c.a._serial, c.b._serial, c.began, c.touched, c.pause, *c.impulse)
+            (*key, serial_of(c.a), serial_of(c.b), c.began, c.touched, c.pause, *c.impulse)
             for key, c in sorted(self._going_on.items())
         ]
         return np.array(rows, dtype=np.float64).reshape(-1, CONTACT_WIDTH)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from taichi_soft.bodies.failure import Failure
 from taichi_soft.bodies.soft_body import SoftBody
-from taichi_soft.contact.colliders import Collider
+from taichi_soft.contact.collider import Collider
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.bodies.status import ABSENT
-from taichi_soft.contact.colliders import Collider
+from taichi_soft.contact.collider import Collider
 from taichi_soft.core.serialisation import as_plain, from_plain
 from taichi_soft.events.kinds import STRESS_KINDS, Event
 

@@ -12,6 +12,7 @@ from taichi_soft.bodies.fields import BodyFields
 from taichi_soft.bodies.layout import Scene
 from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.core.constants import LANES
+from taichi_soft.core.handles import serial_of
 from taichi_soft.elements.kernels.stress import NO_LIMIT, read_stress
 from taichi_soft.events.kinds import Event, StressExceeded, TearCandidates
 from taichi_soft.events.memory import Known, WatchNote
@@ -74,7 +75,7 @@ class StressWatches:
     def notes(self) -> list[WatchNote]:
         """Of all bodies that are alive."""
         return [
-            WatchNote(kind, body._serial, watch.threshold, np.packbits(watch.is_over).tobytes())
+            WatchNote(kind, serial_of(body), watch.threshold, np.packbits(watch.is_over).tobytes())
             for (kind, body), watch in self._watches.items()
             if body.is_alive
         ]

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 from taichi_soft.bodies.layout import Scene
-from taichi_soft.bodies.soft_body import SoftBody
+from taichi_soft.bodies.soft_body import SoftBody, record_of
 from taichi_soft.bodies.status import ACTIVE, ASLEEP
-from taichi_soft.contact.colliders import Collider, Colliders
+from taichi_soft.contact.collider import Collider
+from taichi_soft.contact.colliders import Colliders
 from taichi_soft.contact.fields import PAIR_ROWS
 from taichi_soft.contact.kernels.touches import OF_BODY, read_touches
 from taichi_soft.events.contacts import Contacts, Key
@@ -122,7 +123,7 @@ class Witness:
             self._status[:-1] = memory.status
             # Who came after the last step took the slot of one who may have slept in it.
             asleep = self._sleeping().items()
-            self._sleepers = {slot: body for slot, body in asleep if body._first_step < step}
+            self._sleepers = {slot: body for slot, body in asleep if record_of(body).first_step < step}
         elif kinds & (CONTACT_KINDS | SLEEP_KINDS):
             self._look()
             self._sleepers = self._sleeping()

@@ -17,7 +17,7 @@ from taichi_soft.bodies.fields import BodyFields, with_spare_rows
 from taichi_soft.bodies.kernels.plasticity import read_rest_inverses
 from taichi_soft.bodies.layout import BodyArrays, BodyDescription, arrange_part, blocks_of
 from taichi_soft.bodies.part import Part
-from taichi_soft.bodies.soft_body import Context, SoftBody
+from taichi_soft.bodies.soft_body import Context, SoftBody, context_of, may_be_cut, record_of, redescribe
 from taichi_soft.bodies.status import ABSENT, ACTIVE
 from taichi_soft.control.attachments import share_attachments
 from taichi_soft.core.checks import as_array, as_vector
@@ -37,7 +37,7 @@ def cut(body: SoftBody, plane: Any, triangle: Any) -> tuple[SoftBody, ...]:
     require_cuttable(body)
     corners, normal, is_endless = _blade(plane, triangle)
     mesh = body.mesh
-    faces = body._description.inner_faces
+    faces = record_of(body).description.inner_faces
     centers = body.positions().astype(np.float64)[mesh.tets].mean(axis=1)
     is_cut = _crosses(corners, normal, is_endless, centers[faces.tets[:, 0]], centers[faces.tets[:, 1]])
     return divide(body, faces, is_cut)
@@ -45,14 +45,14 @@ def cut(body: SoftBody, plane: Any, triangle: Any) -> tuple[SoftBody, ...]:
 
 def require_cuttable(body: SoftBody) -> None:
     """Raises: OptionError for a body that was not made to be cut; StateError for one that cannot be now."""
-    context = body._context
+    context = context_of(body)
     if body.asset.spare_vertices == 0:
         raise OptionError(
             f"body {body.index} has no room for copies of vertices: make its asset with spare_vertices"
         )
     if context.fields is None:
         raise StateError("the world is not built: call world.build() first, and cut what moves")
-    if body._is_pulled:
+    if not may_be_cut(body):
         raise StateError(
             f"body {body.index} is grabbed or joined to another body: release it before it is cut"
         )
@@ -111,7 +111,7 @@ def divide(
     Args:
         keeps_crumbs: small parts stay in the body, and so do those for which there is no slot.
     """
-    context, mesh = body._context, body.mesh
+    context, mesh = context_of(body), body.mesh
     assert isinstance(mesh, TetMesh), "others are refused before"
     tets, vertices = split_vertices(mesh.tets, len(mesh.vertices), faces, is_cut)
     if len(vertices) == len(mesh.vertices):
@@ -141,7 +141,7 @@ def _piece(
     body: SoftBody, tets: NDArray[np.int32], vertices: NDArray[np.int64], rows: NDArray[np.int64]
 ) -> _Piece:
     """A body of some of the tetrahedra."""
-    before = body._description
+    before = record_of(body).description
     assert isinstance(before.mesh, TetMesh)
     used, corners = np.unique(tets[rows], return_inverse=True)
     origins = vertices[used]
@@ -151,7 +151,7 @@ def _piece(
         before.model,
         np.flatnonzero(np.isin(origins, before.pinned)).astype(np.int32),
     )
-    arrays = arrange_part(description, body._context.layout.bodies[body.index], origins, rows)
+    arrays = arrange_part(description, context_of(body).layout.bodies[body.index], origins, rows)
     return _Piece(description, arrays, origins, rows)
 
 
@@ -195,9 +195,9 @@ def _settle(context: Context, body: SoftBody, pieces: list[_Piece], slots: list[
     fallen = tuple(context.take_in(context, body.asset) for _ in pieces[1:])
     vertices, tets = body.vertex_origins, body.tet_origins
     for each, piece in zip((body, *fallen), pieces, strict=True):
-        each._redescribe(piece.description, piece.arrays)
+        redescribe(each, piece.description, piece.arrays)
         corners, order = piece.description.mesh.tets, piece.arrays.order
-        each._become(Part(vertices[piece.vertices], order, tets[piece.tets], corners))
+        record_of(each).become(Part(vertices[piece.vertices], order, tets[piece.tets], corners))
     share_attachments(
         body, [(each, piece.vertices) for each, piece in zip((body, *fallen), pieces, strict=True)]
     )

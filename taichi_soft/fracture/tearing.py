@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.bodies.fields import BodyFields
 from taichi_soft.bodies.measures import green_strain_and_stress
-from taichi_soft.bodies.soft_body import SoftBody
+from taichi_soft.bodies.soft_body import Context, Slice, SoftBody, may_be_cut, record_of
 from taichi_soft.core.errors import StateError
+from taichi_soft.core.serialisation import below
 from taichi_soft.fracture.cutting import divide
 from taichi_soft.fracture.kernels.tearing import find_overloaded
 from taichi_soft.meshing.splitting import InnerFaces
@@ -25,18 +27,36 @@ _TIP = 2.0
 that a tear runs on before another begins."""
 
 
-class Tears:
+class Tears(Slice):
     """Where a world's bodies may tear, after every step."""
 
-    def __init__(self, state: BodyFields, slots: Sequence[SoftBody | None]) -> None:
-        """Args: slots: the body in each."""
-        self._state, self._slots = state, slots
-        self._limits = np.zeros(len(slots), dtype=np.float32)
-        self._found = np.zeros(len(slots), dtype=np.int32)
-        find_overloaded(state, self._limits, self._found)  # compiles
+    name = "tears"
+
+    def __init__(self, context: Context) -> None:
+        """Nobody tears."""
+        super().__init__(context)
+        self._limits = np.zeros(0, dtype=np.float32)
+        self._found = np.zeros(0, dtype=np.int32)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether any body of the world can tear."""
+        return len(self._limits) > 0
+
+    def open(self, state: BodyFields) -> None:
+        """Look from now on, in a world that is being built, if anything in it can tear."""
+        slots = self.context.slots
+        if any(asset.tearing for asset in slots.kinds):
+            self._limits = np.zeros(len(slots.slots), dtype=np.float32)
+            self._found = np.zeros(len(slots.slots), dtype=np.int32)
+            find_overloaded(state, self._limits, self._found)  # compiles
+            for body in slots.living:
+                self.watch(body)
 
     def watch(self, body: SoftBody) -> None:
         """Look at a body from now on, if it can tear; its slot may have held another."""
+        if not self.is_open:
+            return
         tearing = body.asset.tearing
         self._limits[body.index] = 0.0 if tearing is None else tearing.stress
 
@@ -48,12 +68,38 @@ class Tears:
         """Look at a body no more."""
         self._limits[body.index] = 0.0
 
+    def entries(self) -> list[list[Any]]:
+        """Slots of the bodies that tear no more."""
+        return [[body.index] for body in self.context.slots.living if self.is_open and self.rests(body)]
+
+    def serials(self, entries: list[list[Any]]) -> list[int]:
+        """None."""
+        return []
+
+    def read(
+        self, entries: list[list[Any]], vertex_counts: Sequence[int], earlier: dict[str, Any]
+    ) -> list[int]:
+        """Rows of `entries`. Raises: ValueError for a slot that holds nobody."""
+        slots = [below(slot, len(vertex_counts)) for (slot,) in entries]
+        if slots and not (self.is_open and all(vertex_counts[slot] for slot in slots)):
+            raise ValueError("nobody tears there")
+        return slots
+
+    def restore(self, read: Any) -> None:
+        """Look at all bodies but those that were `read`."""
+        for body in self.context.slots.living:
+            self.watch(body)
+            if body.index in read:
+                self.rest(body)
+
     def tear(self) -> Iterator[tuple[SoftBody, tuple[SoftBody, ...]]]:
         """Tear what the last step has pulled too hard. Yields: each body that tore, and what fell off it."""
-        find_overloaded(self._state, self._limits, self._found)
+        if not self.is_open:
+            return
+        find_overloaded(self.context.built.state, self._limits, self._found)
         for slot in np.flatnonzero(self._found).tolist():
-            body = self._slots[slot]
-            if body is None or body._is_pulled:
+            body = self.context.slots.slots[slot]
+            if body is None or not may_be_cut(body):
                 continue
             version = body.topology_version
             try:
@@ -69,7 +115,7 @@ def _tear(body: SoftBody) -> tuple[SoftBody, ...]:
     tearing, mesh = body.asset.tearing, body.mesh
     assert tearing is not None
     stress = green_strain_and_stress(body)[1]
-    faces = body._description.inner_faces
+    faces = record_of(body).description.inner_faces
     pulls, axes = np.linalg.eigh(stress[faces.tets].mean(axis=1))
     pull, axis = pulls[:, -1], axes[:, :, -1]
     is_torn = np.bincount(body.vertex_origins)[body.vertex_origins] > 1

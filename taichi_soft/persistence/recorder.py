@@ -21,7 +21,7 @@ from taichi_soft.contact.shapes import Shape
 from taichi_soft.core.checks import as_path
 from taichi_soft.core.container import name_of_sealed, seal, unseal
 from taichi_soft.core.errors import SnapshotError
-from taichi_soft.core.handles import Handle
+from taichi_soft.core.handles import Handle, serial_of
 from taichi_soft.core.serialisation import as_plain, digest_of, from_json, plain_of, to_json
 from taichi_soft.persistence.snapshot import state_hash, take_snapshot
 from taichi_soft.persistence.structure import asset_digest
@@ -85,7 +85,7 @@ class Recorder:
             found = method(handle, *arguments, **options)
         finally:
             self._is_inside = False
-        self._present.entries.append(["call", handle._serial, method.__name__, *kept])
+        self._present.entries.append(["call", serial_of(handle), method.__name__, *kept])
         return found
 
     def note_step(
@@ -231,7 +231,7 @@ def _kept(value: Any) -> Any:
 def _plain(value: Any) -> Any:
     """An argument as plain data; handles by number, assets and shapes by their digests."""
     if isinstance(value, Handle):
-        return {"handle": value._serial}
+        return {"handle": serial_of(value)}
     if isinstance(value, SoftBodyAsset):
         return {"part": asset_digest(value)}
     if isinstance(value, Shape):

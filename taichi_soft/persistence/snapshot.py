@@ -1,10 +1,10 @@
 """The state of a world between two steps, as bytes and back.
 
 A snapshot has four parts. The *structure* is what the world was built of; a world of another structure
-refuses it. The *notes* are what Python knows: time, who lives in which slot, colliders, frames, grabs and
-joints. The *words* are what the fields hold, bit by bit (see `persistence.kernels.words`), and the parts of
-meshes that cuts have left (see `fracture.parts`). The last part is what events go on with (see
-`events.memory`).
+refuses it. The *manifest* is what Python knows: time, who lives in which slot, and what each slice enters
+(colliders, frames, joints ...). The *words* are what the fields hold, bit by bit (see
+`persistence.kernels.words`), and the parts of meshes that cuts have left (see `bodies.part`). The last part
+is what events go on with (see `events.memory`).
 """
 
 from __future__ import annotations
@@ -16,10 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.bodies.soft_body import SoftBody
+from taichi_soft.bodies.soft_body import SoftBody, record_of
 from taichi_soft.bodies.status import ABSENT
-from taichi_soft.contact.colliders import Collider
-from taichi_soft.control.kernels.pins import WITH_FRAME
+from taichi_soft.contact.collider import Collider
 from taichi_soft.core.constants import POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.core.container import seal, unseal
 from taichi_soft.core.errors import SnapshotError, StateError
@@ -37,16 +36,13 @@ from taichi_soft.persistence.kernels.words import (
     owners,
     row_table,
 )
-from taichi_soft.persistence.manifest import Notes, read_notes, read_parts, take_notes
+from taichi_soft.persistence.manifest import Manifest, read_manifest, read_parts, write_manifest
 from taichi_soft.persistence.restoring import put_back
 from taichi_soft.persistence.structure import require_structure, structure_of
 from taichi_soft.solver.context import WorldContext
 from taichi_soft.solver.state import State
 
-MARK, VERSION = b"TSOFTSNP", 5
-
-MOST_PRESS = 1e30
-"""Impulse [N s] that no contact has reached: what is beyond is not finite."""
+MARK, VERSION = b"TSOFTSNP", 6
 
 Words = NDArray[np.int32]
 
@@ -54,13 +50,15 @@ Words = NDArray[np.int32]
 def take_snapshot(context: WorldContext) -> bytes:
     """As `World.snapshot`."""
     state = context.built.state
-    table = _table(context, {each.name: each.note() for each in context.slices})
+    manifest = write_manifest(context)
+    table = _table(context, manifest["slices"])
     words = np.empty(int(table[-1, 2]), dtype=np.int32)
     copy_state(state, table, words, True)
-    parts = [body._part for body in context.slots.living]
+    parts = [record_of(body).part for body in context.slots.living]
     words = np.concatenate([words, *(part.rows for part in parts if part is not None)])
-    notes, memory = to_json(take_notes(context)), to_json(context.built.events.remember().plain)
-    return seal(MARK, VERSION, [_structure(context), notes, words.astype("<i4").tobytes(), memory])
+    memory = to_json(context.built.events.remember().plain)
+    content = [to_json(manifest), words.astype("<i4").tobytes(), memory]
+    return seal(MARK, VERSION, [_structure(context), *content])
 
 
 def _structure(context: WorldContext) -> bytes:
@@ -73,13 +71,14 @@ def _structure(context: WorldContext) -> bytes:
 def state_hash(context: WorldContext) -> str:
     """As `World.state_hash`."""
     code = int(hash_bodies(context.built.state, len(context.slots.slots)))
-    return blake2b(to_json([code, take_notes(context)]), digest_size=8).hexdigest()
+    return blake2b(to_json([code, write_manifest(context)]), digest_size=8).hexdigest()
 
 
-def _table(context: WorldContext, notes: dict[str, Any]) -> Words:
+def _table(context: WorldContext, entries: dict[str, list[list[Any]]]) -> Words:
+    """Where the words of each group of fields are, by what slices have entered in a manifest."""
     state, scene, slots = context.built.state, context.layout, len(context.slots.slots)
-    of_slices = {each.name: each.row_counts(notes[each.name]) for each in context.slices if each.name}
-    counts = [count for name in state.carried for count in of_slices[name]]
+    of_slices = {each.name: each for each in context.slices}
+    counts = [count for name in state.carried for count in of_slices[name].row_counts(entries[name])]
     return row_table(state, scene.particle_count, slots, scene.block_count, counts)
 
 
@@ -96,23 +95,23 @@ def restore_snapshot(context: WorldContext, data: Any) -> None:
             raise ValueError(f"it has {len(words)} words, where this world takes {table[-1, 2]}")
         parts = read_parts(context, plain["bodies"], words[table[-1, 2] :])
         words = words[: table[-1, 2]]
-        notes = read_notes(context, plain, parts)
+        manifest = read_manifest(context, plain, parts)
         memory = Memory.of(from_json(remembered), len(context.slots.slots))
     except (KeyError, TypeError, ValueError, IndexError, OverflowError, AttributeError, StateError) as error:
         if isinstance(error, SnapshotError):
             raise
         raise SnapshotError(f"this snapshot is not in order: {error}") from None
-    _require_words(context, notes, table, words)
-    put_back(context, notes)
+    _require_words(context, manifest, table, words)
+    put_back(context, manifest)
     for each in context.slices:
         each.clear()
     copy_state(state, table, words, False)
     for each in context.slices:
-        if each.name:
-            each.restore(notes.slices[each.name])
+        each.restore(manifest.slices[each.name])
+    context.handles.count = manifest.handles
     find = context.handles.find
     known = Known(lambda serial: find(serial, SoftBody), lambda serial: find(serial, Collider))
-    context.built.events.recall(memory, notes.steps, known)
+    context.built.events.recall(memory, manifest.steps, known)
 
 
 def _four(parts: list[memoryview]) -> list[memoryview]:
@@ -121,11 +120,10 @@ def _four(parts: list[memoryview]) -> list[memoryview]:
     return parts
 
 
-def _require_words(context: WorldContext, notes: Notes, table: Words, words: Words) -> None:
+def _require_words(context: WorldContext, manifest: Manifest, table: Words, words: Words) -> None:
     """Raises: SnapshotError where a kernel would read beyond its fields, or begin with what is not finite."""
     state = context.built.state
     limits: list[tuple[int, Any, int]] = [
-        (PARTICLE, state.particle_aim, WITH_FRAME + len(notes.frames)),
         (BODY, state.body_status, ABSENT + 1),
     ]
     if state.capacity.implicit:
@@ -140,8 +138,6 @@ def _require_words(context: WorldContext, notes: Notes, table: Words, words: Wor
         (state.particle_position, POSITION_LIMIT),
         (state.particle_velocity, VELOCITY_LIMIT),
     ]
-    if state.capacity.contact.soft:
-        bounds += [(state.soft.kept_press, MOST_PRESS), (state.soft.kept_rub, MOST_PRESS)]
     for field, highest in bounds:
         values = _rows(table, words, state, PARTICLE, field).view(np.float32)
         if not np.abs(values).max() <= highest:
@@ -150,13 +146,12 @@ def _require_words(context: WorldContext, notes: Notes, table: Words, words: Wor
         if not np.isfinite(_rows(table, words, state, owner, field).view(np.float32)).all():
             raise SnapshotError("this snapshot is not in order: what moves its bodies is not finite")
     for each in context.slices:
-        if each.name:
-            try:
-                each.require(notes.slices[each.name], partial(_field_rows, table, words, state))
-            except ValueError as error:
-                raise SnapshotError(f"this snapshot is not in order: {error}") from None
+        try:
+            each.require(manifest.slices[each.name], partial(_field_rows, table, words, state))
+        except ValueError as error:
+            raise SnapshotError(f"this snapshot is not in order: {error}") from None
     lives = _rows(table, words, state, BODY, state.body_status)[:, 0] != ABSENT
-    if lives.tolist() != [body is not None for body in notes.bodies]:
+    if lives.tolist() != [body is not None for body in manifest.bodies]:
         raise SnapshotError("this snapshot is not in order: it is not sure who lives")
 
 

@@ -15,13 +15,13 @@ from taichi_soft.bodies.failure import Failure
 from taichi_soft.control.drives import push_bodies
 from taichi_soft.core.checks import as_path
 from taichi_soft.core.errors import FrozenBodyWarning, SnapshotError, TaichiSoftError, VideoError
-from taichi_soft.core.handles import CALLS, Handle
+from taichi_soft.core.handles import CALLS, Handle, handles_of
 from taichi_soft.core.serialisation import from_plain
 from taichi_soft.persistence.recorder import read_recording
 from taichi_soft.render import FLIPPED, PALETTE, Camera, Renderer, Surface, draw_text, highlight
 from taichi_soft.render.scenery import Scenery
 from taichi_soft.world.body import Body
-from taichi_soft.world.world import World
+from taichi_soft.world.world import World, context_of_world
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ def _rebuilt(made_of: dict[str, Any]) -> tuple[World, dict[str, Any]]:
     for name in made_of["built_with"]:
         world.add_collider(shapes[name])
     world.build()
-    world._context.colliders.shapes.update(shapes)
+    context_of_world(world).colliders.shapes.update(shapes)
     return world, {**shapes, **assets}
 
 
@@ -96,7 +96,7 @@ def _asset(options: dict[str, Any]) -> SoftBodyAsset:
 
 def _call(world: World, parts: dict[str, Any], serial: int, name: str, arguments: Any, options: Any) -> None:
     """One of the calls that a recorder notes, and no other."""
-    handle: Handle | None = world if serial == 0 else world._handles.find(serial, Handle)
+    handle: Handle | None = world if serial == 0 else handles_of(world).find(serial, Handle)
     if handle is None or name not in CALLS.get(type(handle).__name__, ()):
         raise SnapshotError(f"{name!r} of handle {serial} is no call that is recorded")
     given = [_value(world, parts, each) for each in arguments]
@@ -108,7 +108,7 @@ def _value(world: World, parts: dict[str, Any], data: Any) -> Any:
     if isinstance(data, list):
         return [_value(world, parts, each) for each in data]
     if isinstance(data, dict) and "handle" in data:
-        return world._handles.find(data["handle"], Handle)
+        return handles_of(world).find(data["handle"], Handle)
     if isinstance(data, dict) and "part" in data:
         return parts[data["part"]]
     return from_plain(data)
@@ -118,7 +118,7 @@ def _step(world: World, seconds: float, substeps: int, expected: str, pushes: li
     """Make a step again. Returns the name that the state had."""
     rows = []
     for serial, data in pushes:
-        body = world._handles.find(serial, Body)
+        body = handles_of(world).find(serial, Body)
         if body is None:
             raise SnapshotError(f"there is no body with the number {serial}")
         rows.append((body, from_plain(data)))

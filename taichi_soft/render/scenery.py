@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.contact.colliders import Collider
+from taichi_soft.contact.collider import Collider
 from taichi_soft.contact.shapes import HeightFieldShape, PlaneShape, Shape
 from taichi_soft.contact.shapes.shape import Triangles
 from taichi_soft.control.frames import Frame

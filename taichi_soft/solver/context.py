@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 
 from taichi_soft.bodies.asset import SoftBodyAsset
 from taichi_soft.bodies.soft_body import Context, SoftBody
-from taichi_soft.contact.colliders import Collider, Colliders
+from taichi_soft.contact.collider import Collider
+from taichi_soft.contact.colliders import Colliders
 from taichi_soft.core.errors import StateError
 from taichi_soft.core.settings import ContactSettings
 from taichi_soft.solver.simulation import Simulation
@@ -19,13 +20,17 @@ class WorldContext(Context):
     """A world without its public face."""
 
     contact: ContactSettings
-    colliders: Colliders
     substeps: Substeps
     make_body: Callable[[WorldContext, int, SoftBodyAsset], SoftBody]  # a handle to what is in a slot
     fields: Simulation | None = None
     built_with: list[str] = field(default_factory=list)  # shapes of colliders from before `build`, by digest
     floor_collider: Collider | None = None  # the floor where there are colliders, from `build` on
     structure: bytes = b""  # what a snapshot's world must be built of, once it was asked for
+
+    @property
+    def colliders(self) -> Colliders:
+        """All of them."""
+        return self.of(Colliders)
 
     @property
     def built(self) -> Simulation:

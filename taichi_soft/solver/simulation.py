@@ -14,7 +14,7 @@ from taichi_soft.bodies.failure import FailedStep, Failure
 from taichi_soft.bodies.kernels.readout import write_motion
 from taichi_soft.bodies.layout import Scene
 from taichi_soft.bodies.slots import Pools
-from taichi_soft.bodies.soft_body import SoftBody
+from taichi_soft.bodies.soft_body import SoftBody, record_of
 from taichi_soft.bodies.status import ASLEEP, FROZEN
 from taichi_soft.contact.clearance import require_clear
 from taichi_soft.contact.colliders import Colliders
@@ -56,7 +56,7 @@ class Simulation:
     launch: Launch
     long_from: int  # substeps of a step beyond which it is made in several calls
     events: EventLog
-    tears: Tears | None  # None where no body tears
+    tears: Tears
     readout: Readout = field(init=False)
     troubled: int = 0  # bodies that failed in the last step, or whose solves were not exact
     _is_still: bool = False  # none was awake after the last step, and nothing was changed since
@@ -85,9 +85,8 @@ class Simulation:
         loss = self.events.collect(clock.steps - 1, clock.time, seconds)
         if loss:
             warnings.warn(loss, DroppedEventsWarning, stacklevel=4)
-        if self.tears is not None:
-            for body, pieces in self.tears.tear():
-                self.events.note_torn(clock.steps - 1, clock.time, body, pieces)
+        for body, pieces in self.tears.tear():
+            self.events.note_torn(clock.steps - 1, clock.time, body, pieces)
         return reports
 
     def rehearse(self, seconds: float) -> None:
@@ -109,7 +108,9 @@ class Simulation:
         for body in self.pools.living:
             if status[body.index] != FROZEN or body.is_frozen:
                 continue
-            body._frozen_in = FailedStep(clock.steps, clock.time, finer * substeps, h / finer, is_braked)
+            record_of(body).frozen_in = FailedStep(
+                clock.steps, clock.time, finer * substeps, h / finer, is_braked
+            )
             self.events.note_frozen(body)
             reports.append(
                 f"body {body.index} went non-finite in step {clock.steps}: put back to t = "
@@ -257,7 +258,7 @@ class Simulation:
 
     def solve_residual(self, body: SoftBody) -> float | None:
         """As `Body.solve_residual`."""
-        has_solved = self.settings.is_implicit and self.clock.steps > body._first_step
+        has_solved = self.settings.is_implicit and self.clock.steps > record_of(body).first_step
         return float(self.state.body_residual[body.index]) if has_solved else None
 
     def find_failure(self, slot: int, failed: FailedStep) -> Failure:

@@ -51,7 +51,9 @@ class State(BodyFields):
         """Fields of slices that the next step depends on, in groups: see `Slice.row_counts`."""
         groups = {"grabs": self.carried_grabs()}
         if self.capacity.has_contact:
-            groups["joints"] = self.joints.carried()
+            groups["joints"], groups["colliders"] = self.joints.carried(), self.contact.carried()
+        if self.capacity.contact.soft:
+            groups["colliders"][0] += self.soft.carried()
         return groups
 
     def load(self, scene: Scene, models: list[int], kinds: NDArray[np.float64] | None = None) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from taichi_soft.bodies.layout import BodyDescription
 from taichi_soft.bodies.slots import Pools
-from taichi_soft.bodies.soft_body import SoftBody
+from taichi_soft.bodies.soft_body import SoftBody, record_of
 from taichi_soft.bodies.stability import StableStep, stable_step
 from taichi_soft.core.checks import as_count, as_step
 from taichi_soft.core.errors import OptionError, SlowStepWarning, StateError, UnstableStepWarning
@@ -53,7 +53,7 @@ class Substeps:
 
     def stable_step(self, body: SoftBody) -> StableStep:
         """As `World.stable_step`."""
-        described = body._description
+        described = record_of(body).description
         if described is body.asset.description:
             return body.asset.stable_step
         if described not in self._estimates:
@@ -69,7 +69,7 @@ class Substeps:
             return max(1, math.ceil(0.999 * seconds / SOFT_CONTACT_STEP)) if self._soft_contact else 1
         longest = min(asset.stable_step.recommended for asset in self._pools.kinds)
         for body in self._pools.living:
-            if body._description is not body.asset.description:
+            if record_of(body).description is not body.asset.description:
                 longest = min(longest, self.stable_step(body).recommended)
         return max(1, math.ceil(as_step(dt) / longest))
 
@@ -145,7 +145,7 @@ class Substeps:
 
     def renew(self) -> None:
         """Take note that a body is made of something else."""
-        used = {each._description for each in self._pools.living}
+        used = {record_of(each).description for each in self._pools.living}
         self._estimates = {key: step for key, step in self._estimates.items() if key in used}
         if self._asked[1:2] == (None,):  # whose number was chosen for what was there before
             self.forget()

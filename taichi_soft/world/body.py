@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,6 +19,7 @@ from taichi_soft.control.drives import (
     set_linear_damping,
     set_sheltered,
 )
+from taichi_soft.control.frames import Frame, Frames
 from taichi_soft.control.grabs import Grab, grab_at
 from taichi_soft.control.impulses import apply_impulse, apply_impulse_at_point
 from taichi_soft.control.joints import Joint, Joints
@@ -31,9 +32,6 @@ from taichi_soft.elements.materials import AnyMaterial
 from taichi_soft.events import Event, StressExceeded, TearCandidates
 from taichi_soft.fracture.cutting import cut
 from taichi_soft.solver.context import WorldContext
-
-if TYPE_CHECKING:
-    from taichi_soft.control.frames import Frame
 
 Floats32 = NDArray[np.float32]
 Floats = NDArray[np.float64]
@@ -53,8 +51,7 @@ class Body(SoftBody):
     @property
     def attachments(self) -> tuple[Attachment, ...]:
         """What holds it to frames; of a piece that was cut or torn off, what it took along of these."""
-        self._require_alive()
-        return tuple(self._attachments)
+        return tuple(self._context.of(Frames).holding(self))
 
     @recorded
     def cut(
@@ -109,7 +106,7 @@ class Body(SoftBody):
         shape = (self.vertex_count, 3)
         x, v = as_array(positions, "positions", shape, "m"), as_array(velocities, "velocities", shape, "m/s")
         self._context.built.write_motion(self, x, v)
-        self._frozen_in = self._failure = None
+        self._record.frozen_in = self._record.failure = None
 
     @recorded
     def apply_force(self, force: ArrayLike, particles: ArrayLike | None = None) -> None:

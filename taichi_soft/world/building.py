@@ -69,7 +69,8 @@ def build(context: WorldContext) -> Simulation:
         spawn_body(state, slot, rows)
     pools.starts.clear()
     _set(settings, state)
-    tears = Tears(state, pools.slots) if any(asset.tearing for asset in pools.kinds) else None
+    tears = context.of(Tears)
+    tears.open(state)
     simulation = Simulation(
         settings,
         pools,
@@ -91,9 +92,6 @@ def build(context: WorldContext) -> Simulation:
         colliders.load(state.contact, len(pools.slots))
         woken = weakref.WeakMethod(simulation.wake_near)  # or the two would keep each other
         colliders.on_jump = lambda lower, upper: (woken() or ignore)(lower, upper)
-    if tears is not None:
-        for body in pools.living:
-            tears.watch(body)
     return simulation
 
 

@@ -7,11 +7,13 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from taichi_soft.bodies.asset import Floats32, SoftBodyAsset
+from taichi_soft.bodies.soft_body import lives_in, record_of, require_alive
 from taichi_soft.contact.clearance import free_points, require_clear
 from taichi_soft.control.materials import set_material
 from taichi_soft.core.checks import as_count
 from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.fracture.cutting import refill_slot
+from taichi_soft.fracture.tearing import Tears
 from taichi_soft.solver.context import WorldContext
 from taichi_soft.world.body import Body
 
@@ -27,9 +29,9 @@ def require_open(context: WorldContext) -> None:
 
 def require_own(context: WorldContext, body: Any) -> None:
     """Raises: OptionError for what is no body of this world; StateError for one that was removed."""
-    if not isinstance(body, Body) or body._context_ref() is not context:
+    if not isinstance(body, Body) or not lives_in(body, context):
         raise OptionError(f"body must be one that this world made, got {body!r}")
-    body._require_alive()
+    require_alive(body)
 
 
 def add_body(
@@ -104,7 +106,7 @@ def despawn(context: WorldContext, body: Body) -> None:
         _let_go(context, body)
         simulation.wake_near(*simulation.box_of(body))  # what may have lain on it
     context.slots.leave(body)
-    body._removed_in = context.clock.steps
+    record_of(body).removed_in = context.clock.steps
     if simulation is not None:
         simulation.empty(body.index)
 
@@ -113,7 +115,7 @@ def _let_go(context: WorldContext, body: Body) -> None:
     """Give up what is tied to a body, and a material that it was given, before its slot is emptied."""
     for each in context.slices:
         each.let_go(body)
-    if body._description is not body.asset.description and not body.is_cut:
+    if record_of(body).description is not body.asset.description and not body.is_cut:
         set_material(body, body.asset.material)
 
 
@@ -144,7 +146,5 @@ def take_in(context: WorldContext, asset: SoftBodyAsset) -> Body:
     body = Body(context, context.slots.next_slot(asset), asset)
     context.handles.enlist(body)
     context.slots.enter(body)
-    simulation = context.fields
-    if simulation is not None and simulation.tears is not None:
-        simulation.tears.watch(body)
+    context.of(Tears).watch(body)
     return body

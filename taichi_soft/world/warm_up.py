@@ -5,23 +5,18 @@ Taichi compiles a kernel where it is called first: a tenth of a second to one wi
 
 from __future__ import annotations
 
-import contextlib
 import math
 import sys
 from functools import partial
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from taichi_soft.bodies.soft_body import SoftBody
-from taichi_soft.contact.shapes import SphereShape
 from taichi_soft.control.drives import push_bodies, set_wind
-from taichi_soft.control.frames import Frame, Frames
 from taichi_soft.control.impulses import apply_radial_impulse
 from taichi_soft.control.jumps import carry
-from taichi_soft.core.constants import ALL_GROUPS, LANES
-from taichi_soft.core.errors import StateError
+from taichi_soft.core.constants import LANES
 from taichi_soft.elements.kernels.stress import read_stress
 from taichi_soft.persistence.snapshot import restore_snapshot, state_hash, take_snapshot
 from taichi_soft.queries import cast_ray, cast_rays, find_closest_point, find_in_box, find_in_sphere
@@ -62,10 +57,7 @@ def rehearse(context: WorldContext) -> None:
             _measure(context, body)
         _say("queries")
         _ask(context)
-        _add_collider(context)
         context.built.rehearse(SHORTEST)
-        for collider in context.colliders.handles[:1]:
-            _ = collider.impulse
     finally:
         restore_snapshot(context, before)
         _say()
@@ -89,23 +81,6 @@ def _slots_of(context: WorldContext, asset: object) -> list[SoftBody | None]:
     return [body for body, kind in zip(pools.slots, pools.assets, strict=True) if kind is asset]
 
 
-def _add_collider(context: WorldContext) -> None:
-    if context.built.colliders is not None:
-        with contextlib.suppress(StateError):  # there is no room for it, nor will there be
-            added = context.colliders.add(
-                SphereShape(1.0),
-                position=0.0 * UP,
-                rotation=None,
-                friction=0.5,
-                restitution=None,
-                thickness=0.0,
-                group=1,
-                mask=ALL_GROUPS,
-            )
-            context.handles.enlist(added)
-            added.move_to((0.0, 0.0, 1.0))
-
-
 def _control(context: WorldContext, body: Body, other: Body | None) -> None:
     """Push, set, pin and hold a body in every way."""
     place, free = body.center_of_mass(), np.setdiff1d(np.arange(body.vertex_count), body.pinned)
@@ -122,21 +97,11 @@ def _control(context: WorldContext, body: Body, other: Body | None) -> None:
     body.set_targets(free[:1], body.positions()[free[:1]])
     context.built.rehearse(SHORTEST)
     body.unpin(free[:1])
-    _hold(context, body, other, free)
+    for each in context.slices:
+        each.rehearse(body, other, partial(context.built.rehearse, SHORTEST))
     if not body.is_held and not len(body.pinned):
         carry([body], np.eye(3), place, place + 100.0 * UP, keep=True)  # as `teleport`, whatever is there
     body.set_motion(body.positions(), body.velocities())
-
-
-def _hold(context: WorldContext, body: Body, other: Body | None, free: NDArray[np.int64]) -> None:
-    """Attach and grab a body, as far as there is anything free to hold it by."""
-    if len(free):
-        held = body.attach(free[:1], _frame(context), two_way=True)
-        context.built.rehearse(SHORTEST)
-        _ = held.force, held.torque
-        held.release()
-    for each in context.slices:
-        each.rehearse(body, other, partial(context.built.rehearse, SHORTEST))
 
 
 def _measure(context: WorldContext, body: Body) -> None:
@@ -146,12 +111,6 @@ def _measure(context: WorldContext, body: Body) -> None:
     read_stress(state, np.zeros(1, np.int32), np.zeros(1, np.float32), np.zeros((LANES, 5), np.float32))
     if body.asset.plasticity is not None:
         _ = body.plastic_strains
-
-
-def _frame(context: WorldContext) -> Frame:
-    frame = Frame(context.of(Frames), 0.0 * UP, None)
-    context.handles.enlist(frame)
-    return frame
 
 
 def _ask(context: WorldContext) -> None:

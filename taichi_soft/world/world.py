@@ -15,12 +15,14 @@ from taichi_soft.bodies.contact import DEFAULT_CONTACT, Contact
 from taichi_soft.bodies.layout import Scene
 from taichi_soft.bodies.plasticity import Plasticity
 from taichi_soft.bodies.slots import Pools
-from taichi_soft.bodies.soft_body import SoftBody
+from taichi_soft.bodies.soft_body import Slice, SoftBody
 from taichi_soft.bodies.stability import StableStep
 from taichi_soft.bodies.tearing import Tearing
-from taichi_soft.contact.colliders import MOST_SAMPLES, Collider, Colliders
+from taichi_soft.contact.collider import Collider
+from taichi_soft.contact.colliders import MOST_SAMPLES, Colliders
 from taichi_soft.contact.shapes import Shape
 from taichi_soft.control.access import require_substeps
+from taichi_soft.control.attachments import Attachments
 from taichi_soft.control.drives import ForceField, push_by_field, require_field, set_wind
 from taichi_soft.control.frames import Frame, Frames
 from taichi_soft.control.grabs import Grab, Grabs, as_pull
@@ -30,12 +32,13 @@ from taichi_soft.core.checks import as_count, as_flag, as_number, as_path, as_ve
 from taichi_soft.core.clock import Clock
 from taichi_soft.core.constants import ALL_GROUPS, GRAVITY_EARTH, VELOCITY_LIMIT
 from taichi_soft.core.errors import FrozenBodyWarning, OptionError, StateError
-from taichi_soft.core.handles import Handle, Handles, recorded
+from taichi_soft.core.handles import Handle, Handles, recorded, serial_of
 from taichi_soft.core.settings import ContactSettings, Settings
 from taichi_soft.core.signals import Whole
 from taichi_soft.core.types import DampingModel, Flips, Integrator, Schedule, Strain
 from taichi_soft.elements.materials import AnyMaterial
 from taichi_soft.events import Event, Listener
+from taichi_soft.fracture.tearing import Tears
 from taichi_soft.meshing import BodyMesh
 from taichi_soft.persistence.recorder import Recorder
 from taichi_soft.persistence.snapshot import restore_snapshot, state_hash, take_snapshot
@@ -60,6 +63,10 @@ from taichi_soft.world.warm_up import rehearse
 
 MOST_RETRIES = 10
 """A thousand times as many substeps as were asked for."""
+
+SLICES: tuple[type[Slice], ...] = (Colliders, Frames, Attachments, Grabs, Joints, Tears)
+"""What a game switches on, in the order in which a snapshot puts it back: what hangs comes after what it
+hangs from."""
 
 Happened = TypeVar("Happened", bound=Event)
 
@@ -165,13 +172,10 @@ class World(Handle):
             renew_substeps=substeps.renew,
             take_in=take_in,
             contact=touching,
-            colliders=Colliders(),
             substeps=substeps,
             make_body=Body,
         )
-        self._frames, self._grabs = Frames(self._context), Grabs(self._context)
-        self._joints = Joints(self._context)
-        self._context.slices += [self._frames, self._grabs, self._joints]
+        self._context.slices += [kind(self._context) for kind in SLICES]
         self._force_field: ForceField | None = None
         self._recorder: Recorder | None = None
         self._restore_count = 0
@@ -304,17 +308,17 @@ class World(Handle):
     @property
     def frames(self) -> Sequence[Frame]:
         """All frames that bodies are, or can be, attached to."""
-        return self._frames.handles
+        return self._context.of(Frames).handles
 
     @property
     def grabs(self) -> Sequence[Grab]:
         """All grabs that hold a body, also those that `restore` brought along."""
-        return self._grabs.handles
+        return self._context.of(Grabs).handles
 
     @property
     def joints(self) -> Sequence[Joint]:
         """All joints between bodies (`Body.attach_to`), also those that `restore` brought along."""
-        return self._joints.handles
+        return self._context.of(Joints).handles
 
     @property
     def floor_collider(self) -> Collider | None:
@@ -443,7 +447,7 @@ class World(Handle):
         if self._force_field is not None:
             rows = push_by_field(self._context, self._force_field)
             if self._recorder is not None:
-                self._recorder.pushes = [(body._serial, accelerations) for body, accelerations in rows]
+                self._recorder.pushes = [(serial_of(body), accelerations) for body, accelerations in rows]
 
     def _make_long_step(self, simulation: Simulation, seconds: float, substeps: int, h: float) -> list[str]:
         """One that Ctrl-C may end, and then all is as before."""
@@ -481,7 +485,7 @@ class World(Handle):
             rotation: matrix (3, 3) or quaternion (x, y, z, w).
         Raises: OptionError for bad numbers.
         """
-        frame = Frame(self._frames, position, rotation)
+        frame = Frame(self._context.of(Frames), position, rotation)
         self._handles.enlist(frame)
         return frame
 
@@ -774,3 +778,8 @@ class World(Handle):
         if self._recorder is None:
             raise StateError("this world records nothing: make it with World(record=240)")
         return self._recorder.save(self._context, path)
+
+
+def context_of_world(world: World) -> WorldContext:
+    """What is behind its public face, for what the library builds upon it."""
+    return world._context

@@ -79,7 +79,7 @@ def readings(world):
         *((each.impulse.tolist(), each.angular_impulse.tolist()) for each in world.colliders),
         *(grab.force.tolist() for grab in world.grabs),
         *(joint.force.tolist() for joint in world.joints),
-        *(a.force.tolist() for body in bodies for a in body._attachments if a.two_way),
+        *(a.force.tolist() for body in bodies for a in body.attachments if a.two_way),
         *(world.read_positions(body, 0.25).tobytes() for body in bodies),
         (world.step_count, world.time, world.last_dt),
     ]  # fmt: skip
@@ -129,7 +129,7 @@ def tidy(world):
         grab.release()
     for body in world.bodies[1:]:
         world.despawn(body)
-    for attachment in list(world.bodies[0]._attachments):
+    for attachment in list(world.bodies[0].attachments):
         attachment.release()
     for collider in world.colliders[3:]:
         collider.remove()

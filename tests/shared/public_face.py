@@ -126,7 +126,7 @@ class Game:
 
     @property
     def holds(self):
-        return [each for body in self.world.bodies for each in body._attachments]
+        return [each for body in self.world.bodies for each in body.attachments]
 
     @property
     def joints(self):
@@ -371,7 +371,7 @@ def if_wild_or_far(game, body, given):
 
 
 def _touches_attached(game, body, given):
-    held = {p for each in body._attachments for p in each.particles.tolist()}
+    held = {p for each in body.attachments for p in each.particles.tolist()}
     return bool(held & set(given["particles"])) if given.get("particles") is not None else False
 
 
@@ -401,12 +401,12 @@ def _is_not_kept(game, adapter, given):
 
 
 def _cannot_turn(game, body, given):
-    return bool(body._attachments) or if_wild(game, body, given)
+    return bool(body.attachments) or if_wild(game, body, given)
 
 
 def _hangs_elsewhere(game, frame, given):
-    bodies = [each for each in game.world.bodies if any(hold.frame is frame for hold in each._attachments)]
-    if any(hold.frame is not frame for each in bodies for hold in each._attachments):
+    bodies = [each for each in game.world.bodies if any(hold.frame is frame for hold in each.attachments)]
+    if any(hold.frame is not frame for each in bodies for hold in each.attachments):
         return True
     return None if any(_is_wild(each) for each in bodies) else False
 

@@ -99,7 +99,7 @@ def _pin(world, cube, rng):
 
 def _unpin(world, cube, rng):
     body = _body(world, rng)
-    if len(body.pinned) and not body._attachments:
+    if len(body.pinned) and not body.attachments:
         body.unpin()
 
 
@@ -144,7 +144,7 @@ def _move_frames(world, cube, rng):
 
 def _jump_frame(world, cube, rng):
     for frame in world.frames[:1]:
-        if all(len({each.frame for each in body._attachments}) < 2 for body in world.bodies):
+        if all(len({each.frame for each in body.attachments}) < 2 for body in world.bodies):
             frame.teleport(rng.uniform((-1, -1, 1), (1, 1, 2)), rng.permutation(np.eye(4))[0])
 
 
@@ -154,7 +154,7 @@ def _remove_frame(world, cube, rng):
 
 
 def _detach(world, cube, rng):
-    for attachment in list(_body(world, rng)._attachments):
+    for attachment in list(_body(world, rng).attachments):
         attachment.release()
 
 
@@ -211,7 +211,7 @@ def _tune(world, cube, rng):
 
 def _throw(world, cube, rng):
     body = _body(world, rng)
-    if not body._attachments:
+    if not body.attachments:
         body.teleport(rng.uniform((-1, -1, 1), (1, 1, 2)))
         body.set_velocity(rng.uniform(-3, 3, 3), rng.uniform(-2, 2, 3))
 

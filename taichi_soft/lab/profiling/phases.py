@@ -12,7 +12,7 @@ from taichi_soft.elements.materials import Material
 from taichi_soft.lab.profiling.spread import Spread, time_calls
 from taichi_soft.meshing import TetMesh, sphere
 from taichi_soft.solver.kernels.phases import PHASES, repeat_phase
-from taichi_soft.world.world import World
+from taichi_soft.world.world import World, context_of_world
 
 MATERIAL = Material(young=1.0e6, poisson=0.1, density=1000.0, damping=100.0, damping_ratio=0.0)
 SPACING = 3.0  # of spheres of radius 1 [m]
@@ -79,7 +79,7 @@ def measure_phases(count: int = 16, dt: float = 1 / 60, repeats: int = 121) -> P
 
 
 def _phase_call(world: World, phase: str, substeps: int) -> Callable[[], object]:
-    built, count = world._built, len(world.bodies)
+    built, count = context_of_world(world).built, len(world.bodies)
     return lambda: repeat_phase(built.state, built.program, phase, count, substeps, TINY_H)
 
 

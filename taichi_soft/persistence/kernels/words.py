@@ -10,9 +10,9 @@ from taichi_soft.core.constants import LANES
 from taichi_soft.core.runtime import ti
 from taichi_soft.solver.state import State
 
-OWNERS = PARTICLE, BODY, PAIR, SHAPE, WORLD = range(5)
-"""What a field has a row for: a particle, a body, a pair of a body and a collider, a number of a rest shape,
-or the world. Behind these come the groups of slices."""
+OWNERS = PARTICLE, BODY, SHAPE, WORLD = range(4)
+"""What a field has a row for: a particle, a body, a number of a rest shape, or the world. Behind these come
+the groups of slices."""
 
 
 def carried(state: State, owner: int) -> list[tuple[Any, int, int]]:
@@ -21,26 +21,18 @@ def carried(state: State, owner: int) -> list[tuple[Any, int, int]]:
     All others are constant, follow from what bodies are made of, or are written in each step before they are
     read: forces, boxes, candidates of contacts, islands.
     """
-    is_implicit, touches = state.capacity.implicit, state.capacity.contact.colliders > 0
-    contact = state.contact if touches else None
+    is_implicit = state.capacity.implicit
     fields: list[Any] = []
     if owner == PARTICLE:
         fields += [state.particle_position, state.particle_velocity, state.prev_position, state.prev_velocity]
         fields += [state.particle_mass, state.particle_inv_mass, state.particle_aim, state.particle_target]
         fields += [state.particle_push, state.particle_reaction]
         fields += [state.particle_contact] if is_implicit else []
-        fields += [contact.particle_touches] if contact else []
-        if state.capacity.contact.soft:
-            fields += [state.soft.kept_triangle, state.soft.kept_press, state.soft.kept_rub]
     elif owner == BODY:
         fields += [state.body_status, state.body_velocity_lag, state.body_drives]
         fields += [state.body_gravity_scale, state.body_damping, state.body_patience]
         fields += [state.body_fading, state.body_fading_interval]
         fields += [state.body_residual] if is_implicit else []
-        # The box is the one in which a body sleeps.
-        fields += [contact.calm, contact.body_lower, contact.body_upper] if contact else []
-    elif owner == PAIR:
-        fields += [contact.impulse, contact.angular_impulse, contact.rebound] if contact else []
     elif owner == SHAPE:
         fields += [state.tet_rest_inverse] if state.capacity.plastic else []
     elif owner == WORLD:
@@ -68,8 +60,7 @@ def row_table(
 
     Args: of_slices: rows in use of each group of `slice_groups`.
     """
-    pairs = bodies * state.capacity.contact.colliders
-    counts = [particles, bodies, pairs, blocks * 9 * LANES, 1, *of_slices]
+    counts = [particles, bodies, blocks * 9 * LANES, 1, *of_slices]
     rows, at = [], 0
     for owner in owners(state):
         width = sum(each for _, _, each in carried(state, owner))
