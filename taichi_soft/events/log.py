@@ -91,6 +91,10 @@ class EventLog:
         if threshold is not None:
             self._record(self._kinds | {kind})
 
+    def rehearse(self) -> None:
+        """Look at the world as after a step, and tell nobody: see `World.warm_up`."""
+        self._witness.rehearse()
+
     def renew_watches(self, body: SoftBody) -> None:
         """Look at the tetrahedra that a cut has left of a body."""
         self._witness.stress.renew(body)

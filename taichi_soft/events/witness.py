@@ -68,6 +68,11 @@ class Witness:
         if not before & SLEEP_KINDS:
             self._sleepers = self._sleeping()
 
+    def rehearse(self) -> None:
+        """Read what touches, and take no note. What has touched is forgotten, as where it is read."""
+        who, impulses = np.empty_like(self._who), np.empty_like(self._impulses)
+        read_touches(self._state, len(self._slots), self._status.copy(), who, impulses)
+
     def note_frozen(self, body: SoftBody) -> None:
         """The step that is being made has frozen a body."""
         self._frozen.append(body)

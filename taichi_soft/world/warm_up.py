@@ -13,7 +13,6 @@ from typing import cast
 import numpy as np
 
 from taichi_soft.bodies.failure import FailedStep
-from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.control.drives import push_bodies, set_wind
 from taichi_soft.control.impulses import apply_radial_impulse
 from taichi_soft.control.jumps import carry
@@ -59,6 +58,7 @@ def rehearse(context: WorldContext) -> None:
         _say("queries")
         _ask(context)
         context.built.rehearse(SHORTEST)
+        context.built.events.rehearse()
     finally:
         restore_snapshot(context, before)
         _say()
@@ -69,17 +69,13 @@ def rehearse(context: WorldContext) -> None:
 
 def _fill_pools(context: WorldContext) -> None:
     """Let there be one body of every kind, and two in all, where there are slots for them."""
-    living = {body.asset for body in context.slots.living}
-    for asset in context.slots.kinds:
-        is_needed = asset not in living or len(context.slots.living) < 2
-        if is_needed and any(slot is None for slot in _slots_of(context, asset)):
-            above = (context.settings.floor or 0.0) + float(np.abs(asset.mesh.vertices).max())
-            enter(context, asset, asset.placed(above * UP, None, 0.0 * UP, 0.0 * UP, None))
-
-
-def _slots_of(context: WorldContext, asset: object) -> list[SoftBody | None]:
     pools = context.slots
-    return [body for body, kind in zip(pools.slots, pools.assets, strict=True) if kind is asset]
+    for wanted in (1, 2):
+        for asset in pools.kinds:
+            is_needed = len(pools.living) < wanted or all(body.asset is not asset for body in pools.living)
+            if is_needed and pools.free_slots(asset):
+                above = (context.settings.floor or 0.0) + float(np.abs(asset.mesh.vertices).max())
+                enter(context, asset, asset.placed(above * UP, None, 0.0 * UP, 0.0 * UP, None))
 
 
 def _control(context: WorldContext, body: Body, other: Body | None) -> None:

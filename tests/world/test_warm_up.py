@@ -36,15 +36,21 @@ def compiled():
 
 @pytest.fixture(scope="module")
 def game(tmp_path_factory, compiled):
-    """A game that was warmed up when it had nothing but empty slots, in fields that no other test uses."""
-    return Game(tmp_path_factory.mktemp("game"), slots=66, warm=True)
+    """A game that was warmed up when it had nothing but empty slots, in fields that no other test uses.
 
+    `compiled_at_start`: what was compiled between that and its first tick.
+    """
+    warm_up = World.warm_up
 
-def test_it_leaves_the_world_as_it_is(game):
-    world = game.world
-    before = world.snapshot(), world.state_hash(), world.bodies, world.colliders, world.step_count
-    world.warm_up()
-    assert (world.snapshot(), world.state_hash(), world.bodies, world.colliders, world.step_count) == before
+    def warmed(world):
+        warm_up(world)
+        compiled.clear()
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(World, "warm_up", warmed)
+        made = Game(tmp_path_factory.mktemp("game"), slots=66, warm=True)
+    made.compiled_at_start = list(compiled)
+    return made
 
 
 def test_nothing_is_compiled_where_what_yields_tears(compiled):
@@ -76,6 +82,10 @@ def test_nothing_is_compiled_where_what_yields_tears(compiled):
         world.step(DT, SUBSTEPS)
     assert lost.failure is not None
     assert compiled == []
+
+
+def test_nothing_is_compiled_while_the_game_is_filled(game):
+    assert game.compiled_at_start == []
 
 
 NAMES = [f"{kind}.{name}" for kind, calls in CALLS.items() for name in calls]
@@ -110,3 +120,12 @@ def test_nothing_is_compiled_where_the_game_looks(game, compiled, kind):
         if inspect.ismethod(found):
             found()
     assert compiled == []
+
+
+def test_it_leaves_the_world_as_it_is(game):
+    """Last of all: it would compile what the other tests are to find."""
+    game.begin()
+    world = game.world
+    before = world.snapshot(), world.state_hash(), world.bodies, world.colliders, world.step_count
+    world.warm_up()
+    assert (world.snapshot(), world.state_hash(), world.bodies, world.colliders, world.step_count) == before
