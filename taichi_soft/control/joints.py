@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -126,10 +127,11 @@ class Joints(Slice):
         context = self.context
         if other is None or context.settings.is_implicit or not context.built.program.has_contact:
             return
-        joint = self.join(body, other, [0], [0])
-        step()
-        _ = joint.force, body.velocities()
-        joint.release()
+        with contextlib.suppress(StateError):  # all are in use already
+            joint = self.join(body, other, [0], [0])
+            step()
+            _ = joint.force, body.velocities()
+            joint.release()
 
     def entries(self) -> list[list[Any]]:
         """Numbers of handle, joint and both bodies, and the particles that are held."""

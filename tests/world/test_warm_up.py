@@ -18,6 +18,8 @@ from taichi_soft import (
     World,
     box,
 )
+from taichi_soft.bodies.fields import MOST_GRABS
+from taichi_soft.control.joint_fields import MOST_JOINTS
 
 
 @pytest.fixture(scope="module")
@@ -129,3 +131,15 @@ def test_it_leaves_the_world_as_it_is(game):
     before = world.snapshot(), world.state_hash(), world.bodies, world.colliders, world.step_count
     world.warm_up()
     assert (world.snapshot(), world.state_hash(), world.bodies, world.colliders, world.step_count) == before
+
+
+def test_it_is_no_trouble_where_all_joints_and_grabs_are_in_use(game):
+    game.begin()
+    world = game.world
+    for _ in range(MOST_JOINTS - len(world.joints)):
+        game.hanging.attach_to(game.held, [0], onto=[0])
+    for _ in range(MOST_GRABS - len(world.grabs)):
+        game.free.grab(0)
+    before = world.snapshot()
+    world.warm_up()
+    assert world.snapshot() == before
