@@ -12,3 +12,7 @@ class ShapeKind(IntEnum):
     CAPSULE = 3
     HEIGHT_FIELD = 4
     MESH = 5
+
+
+CONVEX = frozenset({ShapeKind.PLANE, ShapeKind.SPHERE, ShapeKind.BOX, ShapeKind.CAPSULE})
+"""Kinds of which every solid is convex, and its signed distance too: see `first_touch`."""

@@ -5,7 +5,7 @@ is clear of the solid if it ends in front of it.
 """
 
 from taichi_soft.contact.distances.distance import signed_distance
-from taichi_soft.contact.distances.kinds import ShapeKind
+from taichi_soft.contact.distances.kinds import CONVEX
 from taichi_soft.core.runtime import ti
 
 TOUCHING = 1e-5
@@ -55,7 +55,9 @@ def first_touch(contact: ti.template(), c, start, end, slack):
     kind, parameters = contact.collider_kind[c], contact.collider_parameters[c]
     resolution, offset = contact.collider_resolution[c], contact.collider_offset[c]
     thickness = contact.collider_surface[c].z
-    is_convex = kind <= ShapeKind.CAPSULE
+    is_convex = 0
+    for each in ti.static(sorted(CONVEX)):
+        is_convex = is_convex | int(kind == each)
     part, distance, beyond, normal = 0.0, 0.0, 0.0, ti.Vector([0.0, 0.0, 1.0])
     is_open = 1
     while is_open == 1:
@@ -68,11 +70,11 @@ def first_touch(contact: ti.template(), c, start, end, slack):
         is_clear = beyond >= ti.select(rests_at(distance), distance, 0.0) - slack
         if distance <= TOUCHING and not is_clear:
             is_open = 0
-        elif is_clear and is_convex:
+        elif is_clear and is_convex == 1:
             part, is_open = NEVER, 0
         else:
             step = ti.max(ti.abs(distance) / length, 1.0 / MOST_MARCHES)
-            if is_convex:
+            if is_convex == 1:
                 step = ti.max(distance / ti.max(-climb, 1e-30), 1.0 / MOST_MARCHES / MOST_MARCHES)
             if part == 1.0:
                 part, is_open = NEVER, 0
