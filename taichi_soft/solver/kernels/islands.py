@@ -97,20 +97,42 @@ def _join_held(state: ti.template()):
 
 
 @ti.func
+def _is_listed(state: ti.template(), body, end):
+    """Whether a body, whose parent is the root, and its root have a status before `end`."""
+    root = state.contact.parent[body]
+    return int(state.body_status[body] < end) & int(state.body_status[root] < end)
+
+
+@ti.func
 def _list_islands(state: ti.template(), body_count, end):
-    """Bodies of a status before `end`, island by island, both in ascending order."""
-    islands, rows = 0, 0
-    for first in range(body_count):
-        if state.contact.parent[first] == first and state.body_status[first] < end:
-            state.contact.island_first[islands] = rows
-            for body in range(first, body_count):
-                if state.body_status[body] < end and _root(state.contact, body) == first:
-                    state.contact.island_body[rows] = body
-                    state.contact.body_island[body] = islands
-                    rows += 1
-            islands += 1
-    state.contact.island_first[islands] = rows
-    state.contact.island_count[None] = islands
+    """Bodies of a status before `end`, island by island, both in ascending order: a counting sort."""
+    contact = state.contact
+    islands = 0
+    for body in range(body_count):
+        # No parent has a larger number than its child: the parent's parent is the root already.
+        root = contact.parent[contact.parent[body]]
+        contact.parent[body] = root
+        if _is_listed(state, body, end):
+            if root == body:
+                contact.body_island[body] = islands
+                contact.island_first[islands] = 0  # bodies in it so far
+                islands += 1
+            island = contact.body_island[root]
+            contact.body_island[body] = island
+            contact.island_first[island] = contact.island_first[island] + 1
+    rows = 0
+    for island in range(islands):
+        rows += contact.island_first[island]
+        contact.island_first[island] = rows  # the row after its last one
+    for i in range(body_count):
+        body = body_count - 1 - i
+        if _is_listed(state, body, end):
+            island = contact.body_island[body]
+            row = contact.island_first[island] - 1
+            contact.island_first[island] = row
+            contact.island_body[row] = body
+    contact.island_first[islands] = rows
+    contact.island_count[None] = islands
 
 
 @ti.func
