@@ -241,7 +241,7 @@ def test_a_record_is_kept_of_what_happens_to_cut_bodies(played, tmp_path):
 
 def _note(world, row, to):
     def change(notes, words):
-        notes["bodies"][0][5][row] = to
+        notes["bodies"][0][4][row] = to
         return words
 
     return change
@@ -264,7 +264,7 @@ def _swap(notes, words):
 
 
 def _nothing(notes, words):
-    notes["bodies"][0][5] = None
+    notes["bodies"][0][4] = None
     return words
 
 
