@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from taichi_soft.bodies.pose import Pose, best_fitting_pose
 from taichi_soft.bodies.soft_body import SoftBody, context_of, record_of, require_alive, rest_inverses_of
 from taichi_soft.core.errors import MeshError
+from taichi_soft.elements.kernels.stress import compute_stress
 from taichi_soft.elements.laws.law import EnergyLaw
 from taichi_soft.elements.materials import AnisotropicMaterial, Material, SpringMaterial, voigt_stress
 from taichi_soft.meshing import TetMesh
@@ -92,10 +93,21 @@ def elastic_energy(body: SoftBody) -> float:
 
 
 def green_strain_and_stress(body: SoftBody) -> tuple[Floats, Floats]:
-    """1/2 (F^T F - I), and Hooke's stress of it [Pa], in the axes of the rest shape, (m, 3, 3) each."""
+    """1/2 (F^T F - I), and Hooke's stress of it [Pa], in the axes of the rest shape, (m, 3, 3) each.
+
+    Whatever the law: see `Body.elastic_energy`.
+    """
     F = deformations(body)
     strain = 0.5 * (np.swapaxes(F, 1, 2) @ F - np.eye(3))
     return strain, voigt_stress(_material(body).stiffness_matrices(len(body.tets)), strain)
+
+
+def tet_stresses(body: SoftBody) -> Floats:
+    """Cauchy stress of each tetrahedron by the body's own law, in the axes of the world, (m, 3, 3) [Pa]."""
+    F = deformations(body)
+    stress = np.empty_like(F)
+    compute_stress(record_of(body).description.model, F, _material(body).stiffness_matrices(len(F)), stress)
+    return stress
 
 
 def deformations(body: SoftBody) -> Floats:
@@ -121,7 +133,7 @@ def plastic_strains(body: SoftBody) -> Floats:
 
 def tet_stress(body: SoftBody) -> Floats:
     """As `Body.tet_stress`."""
-    return np.asarray(np.sqrt(1.5) * _deviator_norms(green_strain_and_stress(body)[1]))
+    return np.asarray(np.sqrt(1.5) * _deviator_norms(tet_stresses(body)))
 
 
 def tet_strain(body: SoftBody) -> Floats:

@@ -25,7 +25,8 @@ class Plasticity:
     within one leaves no dent.
 
     Args:
-        yield_stress: von Mises stress [Pa], as `Body.tet_stress` tells it, below which all is elastic.
+        yield_stress: von Mises stress [Pa] by Hooke's law and linear strain, whatever the law, below which
+            all is elastic.
         yield_strain: the same as a strain, as `Body.tet_strain` tells it; give one of the two. They belong
             together by yield_stress = 3 G yield_strain, with the shear modulus G.
         creep: rate of flow [1/s]: within 1/creep the excess falls to 1/e. Infinity: within a step.

@@ -14,11 +14,12 @@ class Tearing:
     """Tear vertices in two where the material is pulled beyond its strength (O'Brien and Hodgins 1999).
 
     Looked for after each step. The face between two tetrahedra tears where the largest principal stress of
-    their mean, of Hooke's law and linear strain, is above the strength: its vertices are split across the
-    pull, along the faces of the tetrahedra round them. A body tears as long as its `spare_vertices` last;
-    what falls off becomes a body while slots are free, the largest first; the rest, and crumbs of less than
-    2 % of the whole, stay loose in the body. What a frame holds it goes on holding, copies of it as well;
-    while a body is grabbed, or joined to another one, it does not tear.
+    their mean is above the strength: its vertices are split across the pull, along the faces of the
+    tetrahedra round them. It is the Cauchy stress of the body's own law: see `Body.tet_stress`. A body tears
+    as long as its `spare_vertices` last; what falls off becomes a body while slots are free, the largest
+    first; the rest, and crumbs of less than 2 % of the whole, stay loose in the body. What a frame holds it
+    goes on holding, copies of it as well; while a body is grabbed, or joined to another one, it does not
+    tear.
 
     Args:
         stress: tensile strength [Pa].

@@ -51,7 +51,7 @@ class StressExceeded(Event):
 
     body: SoftBody
     tetrahedra: Ints  # (k,) those that were not over it before, ascending
-    stress: Floats  # (k,) von Mises [Pa]
+    stress: Floats  # (k,) von Mises, as `Body.tet_stress` [Pa]
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from taichi_soft.bodies.layout import Scene
+from taichi_soft.bodies.program import Program
 from taichi_soft.bodies.soft_body import SoftBody, record_of
 from taichi_soft.bodies.status import ACTIVE, ASLEEP
 from taichi_soft.contact.collider import Collider
@@ -34,7 +35,12 @@ class Witness:
     """Compares each step with the one before it."""
 
     def __init__(
-        self, state: Any, scene: Scene, slots: Sequence[SoftBody | None], colliders: Colliders | None
+        self,
+        state: Any,
+        program: Program,
+        scene: Scene,
+        slots: Sequence[SoftBody | None],
+        colliders: Colliders | None,
     ) -> None:
         """Args: state: all fields of a world; slots: the body in each; colliders: None without contact."""
         self._state = state
@@ -43,7 +49,7 @@ class Witness:
         self._contacts = Contacts()
         self._sleepers: dict[int, SoftBody] = {}
         self._frozen: list[SoftBody] = []
-        self.stress = StressWatches(state, scene)
+        self.stress = StressWatches(state, program, scene)
         room = state.capacity.contact
         rows = len(slots) * (room.colliders + (PAIR_ROWS if room.soft else 0)) + 1
         self._status = np.zeros(len(slots) + 1, dtype=np.int32)
@@ -69,7 +75,8 @@ class Witness:
             self._sleepers = self._sleeping()
 
     def rehearse(self) -> None:
-        """Read what touches, and take no note. What has touched is forgotten, as where it is read."""
+        """Read stress and what touches, and take no note. What touched is forgotten, as where it is read."""
+        self.stress.rehearse()
         who, impulses = np.empty_like(self._who), np.empty_like(self._impulses)
         read_touches(self._state, len(self._slots), self._status.copy(), who, impulses)
 

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.bodies.fields import BodyFields
-from taichi_soft.bodies.measures import green_strain_and_stress
+from taichi_soft.bodies.measures import positions_of, tet_stresses
+from taichi_soft.bodies.program import Program
 from taichi_soft.bodies.soft_body import Context, Slice, SoftBody, may_be_cut, record_of
 from taichi_soft.core.errors import StateError
 from taichi_soft.core.serialisation import below
@@ -43,13 +44,13 @@ class Tears(Slice):
         """Whether any body of the world can tear."""
         return len(self._limits) > 0
 
-    def open(self, state: BodyFields) -> None:
+    def open(self, state: BodyFields, program: Program) -> None:
         """Look from now on, in a world that is being built, if anything in it can tear."""
         slots = self.context.slots
         if any(asset.tearing for asset in slots.kinds):
             self._limits = np.zeros(len(slots.slots), dtype=np.float32)
             self._found = np.zeros(len(slots.slots), dtype=np.int32)
-            find_overloaded(state, self._limits, self._found)  # compiles
+            find_overloaded(state, program, self._limits, self._found)  # compiles
             for body in slots.living:
                 self.watch(body)
 
@@ -96,7 +97,8 @@ class Tears(Slice):
         """Tear what the last step has pulled too hard. Yields: each body that tore, and what fell off it."""
         if not self.is_open:
             return
-        find_overloaded(self.context.built.state, self._limits, self._found)
+        built = self.context.built
+        find_overloaded(built.state, built.program, self._limits, self._found)
         for slot in np.flatnonzero(self._found).tolist():
             body = self.context.slots.slots[slot]
             if body is None or not may_be_cut(body):
@@ -114,7 +116,7 @@ class Tears(Slice):
 def _tear(body: SoftBody) -> tuple[SoftBody, ...]:
     tearing, mesh = body.asset.tearing, body.mesh
     assert tearing is not None
-    stress = green_strain_and_stress(body)[1]
+    stress, x = tet_stresses(body), positions_of(body)
     faces = record_of(body).description.inner_faces
     pulls, axes = np.linalg.eigh(stress[faces.tets].mean(axis=1))
     pull, axis = pulls[:, -1], axes[:, :, -1]
@@ -125,13 +127,13 @@ def _tear(body: SoftBody) -> tuple[SoftBody, ...]:
     if not over.any():
         return ()
     pull[is_torn[corners].any(axis=1)] *= _TIP
-    chosen = _worst_faces(mesh.vertices, mesh.tets, faces, np.where(over, pull, 0.0), axis, tearing.most)
+    chosen = _worst_faces(x, mesh.tets, faces, np.where(over, pull, 0.0), axis, tearing.most)
     is_cut = np.zeros(len(pull), dtype=np.bool_)
     is_cut[chosen] = True
-    centers = mesh.vertices[mesh.tets].mean(axis=1)
+    centers = x[mesh.tets].mean(axis=1)
     for face in chosen:
         near = np.flatnonzero(np.isin(corners, corners[face]).any(axis=1))
-        side = (centers[faces.tets[near]] - mesh.vertices[corners[face]].mean(axis=0)) @ axis[face] > 0
+        side = (centers[faces.tets[near]] - x[corners[face]].mean(axis=0)) @ axis[face] > 0
         is_cut[near[side[:, 0] != side[:, 1]]] = True
     return divide(body, faces, is_cut, keeps_crumbs=True)
 
@@ -142,7 +144,7 @@ def _corners(tets: NDArray[np.int32], faces: InnerFaces) -> NDArray[np.int32]:
 
 
 def _worst_faces(
-    vertices: Floats,
+    positions: Floats,
     tets: NDArray[np.int32],
     faces: InnerFaces,
     pull: Floats,
@@ -155,9 +157,10 @@ def _worst_faces(
     """
     over = np.flatnonzero((pull > 0.0) & (pull >= _WORST * pull.max()))
     corners = _corners(tets, faces)
-    x = vertices[corners[over]]
+    x = positions[corners[over]]
     normal = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
-    across = np.abs(np.einsum("fa,fa->f", normal, axis[over])) / np.linalg.norm(normal, axis=1)
+    length = np.maximum(np.linalg.norm(normal, axis=1), 1e-30)  # drawn to a line, a face has no normal
+    across = np.abs(np.einsum("fa,fa->f", normal, axis[over])) / length
     chosen: list[int] = []
     used: set[int] = set()
     for face in over[np.argsort(-pull[over] * across, kind="stable")].tolist():

@@ -363,7 +363,12 @@ class Body(SoftBody):
         return measures.plastic_strains(self)
 
     def tet_stress(self) -> Floats:
-        """Von Mises stress of each tetrahedron by Hooke's law and linear strain, (m,) [Pa]."""
+        """Von Mises stress of each tetrahedron, (m,) [Pa].
+
+        Of the Cauchy stress, force by area as it is now, of the body's own law. Laws along edges know none:
+        theirs is by Hooke's law and linear strain. Inside out it is finite: that of the mirror image, by law
+        "neo_hookean" that of a negative volume.
+        """
         return measures.tet_stress(self)
 
     def watch_stress(self, threshold: float | None) -> None:
@@ -381,8 +386,8 @@ class Body(SoftBody):
         """Record a `TearCandidates` in every step in which tetrahedra are pulled harder than they can bear.
 
         Args:
-            tear_stress: of the largest principal stress, which pulls; by Hooke's law and linear strain [Pa].
-                None for no longer.
+            tear_stress: of the largest principal stress, which pulls, of that of which `tet_stress` is the
+                von Mises stress [Pa]. None for no longer.
         """
         self._watch(TearCandidates, tear_stress, "tear_stress")
 

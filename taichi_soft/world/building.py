@@ -70,7 +70,7 @@ def build(context: WorldContext) -> Simulation:
     pools.starts.clear()
     _set(settings, state)
     tears = context.of(Tears)
-    tears.open(state)
+    tears.open(state, program)
     simulation = Simulation(
         settings,
         pools,
@@ -84,7 +84,7 @@ def build(context: WorldContext) -> Simulation:
         program,
         make_launch(settings.schedule, state, program, scene, device, settings.retries),
         most_substeps(scene, settings.integrator),
-        EventLog(Witness(state, scene, pools.slots, colliders if has_contact else None)),
+        EventLog(Witness(state, program, scene, pools.slots, colliders if has_contact else None)),
         tears,
     )
     if has_contact:

@@ -16,8 +16,6 @@ from taichi_soft.bodies.failure import FailedStep
 from taichi_soft.control.drives import push_bodies, set_wind
 from taichi_soft.control.impulses import apply_radial_impulse
 from taichi_soft.control.jumps import carry
-from taichi_soft.core.constants import LANES
-from taichi_soft.elements.kernels.stress import read_stress
 from taichi_soft.persistence.snapshot import restore_snapshot, state_hash, take_snapshot
 from taichi_soft.queries import cast_ray, cast_rays, find_closest_point, find_in_box, find_in_sphere
 from taichi_soft.solver.context import WorldContext
@@ -103,9 +101,9 @@ def _control(context: WorldContext, body: Body, other: Body | None) -> None:
 
 def _measure(context: WorldContext, body: Body) -> None:
     """Read all there is to read of a body."""
-    state = context.built.state
     _ = body.positions(), body.velocities(), body.pinned
-    read_stress(state, np.zeros(1, np.int32), np.zeros(1, np.float32), np.zeros((LANES, 5), np.float32))
+    if len(body.tets):
+        body.tet_stress()
     if body.asset.plasticity is not None:
         body.plastic_strains()  # reads what has flowed, as stress does, and a tear within a step
     context.built.find_failure(body.index, FailedStep(0, 0.0, 1, SHORTEST, is_braked=False))

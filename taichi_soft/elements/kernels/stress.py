@@ -2,19 +2,10 @@
 
 from taichi_soft.core.constants import LANES
 from taichi_soft.core.math.eigen import symmetric_eigen
-from taichi_soft.core.math.tensors import (
-    determinant,
-    inner_square,
-    plus,
-    product,
-    scaled_plus_identity,
-    times,
-    trace,
-)
+from taichi_soft.core.math.tensors import determinant, product, scaled_plus_identity, trace
 from taichi_soft.core.runtime import ti
-from taichi_soft.elements.kernels.elastic import BLOCK_BITS, particles_of, rest_inverse_of, stiffness_of
-from taichi_soft.elements.laws.anisotropy import anisotropic_stress
-from taichi_soft.elements.laws.hooke import hooke_stress
+from taichi_soft.elements.kernels.elastic import BLOCK_BITS, elasticity_of, particles_of, rest_inverse_of
+from taichi_soft.elements.laws.model import cauchy_stress
 
 NO_LIMIT = 1e30
 """[Pa]; infinity would not do, because fast-math compilers may assume that there is none."""
@@ -30,15 +21,10 @@ def deformation_of(state: ti.template(), block, lane):
 
 
 @ti.func
-def stress_of(state: ti.template(), F, block, lane):
-    """Hooke's stress of 1/2 (F^T F - I) [Pa], as columns, in the axes of the rest shape."""
-    strain = scaled_plus_identity(inner_square(F), 0.5, -0.5)
-    base = block * 2 * LANES + lane
-    isotropic = hooke_stress(strain, state.tet_lame[base], state.tet_lame[base + LANES])
-    if ti.static(state.capacity.anisotropic):  # one of the two has no constants but zeros
-        return plus(isotropic, 1.0, anisotropic_stress(strain, stiffness_of(state, block, lane)), 1.0)
-    else:
-        return isotropic
+def stress_of(state: ti.template(), model: ti.template(), block, lane):
+    """`cauchy_stress` of a tetrahedron [Pa], as columns."""
+    F = deformation_of(state, block, lane)
+    return cauchy_stress(model, F, elasticity_of(state, model, block, lane))
 
 
 @ti.func
@@ -53,9 +39,33 @@ def _largest_principal(mean, squares, determinant):
     return mean + 2.0 * radius * ti.cos(ti.acos(ti.max(ti.min(cosine, 1.0), -1.0)) / 3.0)
 
 
+@ti.func
+def _read_block(state: ti.template(), model: ti.template(), block, limit, first, out: ti.template()):
+    """Write the rows of `read_stress` of a block's tetrahedra, of which the first goes to row `first`."""
+    means, squares = ti.Vector.zero(state.real, LANES), ti.Vector.zero(state.real, LANES)
+    determinants = ti.Vector.zero(state.real, LANES)
+    for lane in range(LANES):  # vector registers take all of them at once, see `elements.kernels.elastic`
+        stress = stress_of(state, model, block, lane)
+        means[lane] = trace(stress) / 3.0
+        deviator = scaled_plus_identity(stress, 1.0, -means[lane])
+        squares[lane] = deviator[0].norm_sqr() + deviator[1].norm_sqr() + deviator[2].norm_sqr()
+        determinants[lane] = determinant(deviator)
+    for lane in range(LANES):
+        row = first + lane
+        out[row, 0] = ti.sqrt(1.5 * squares[lane])
+        if limit < NO_LIMIT:
+            out[row, 1] = _largest_principal(means[lane], squares[lane], determinants[lane])
+            if out[row, 1] > limit:
+                values, axes = symmetric_eigen(stress_of(state, model, block, lane))
+                out[row, 1] = values[0]
+                for k in ti.static(range(3)):
+                    out[row, 2 + k] = axes[0][k]
+
+
 @ti.kernel
 def read_stress(
     state: ti.template(),
+    program: ti.template(),
     blocks: ti.types.ndarray(dtype=ti.i32, ndim=1),
     limits: ti.types.ndarray(dtype=ti.f32, ndim=1),
     out: ti.types.ndarray(dtype=ti.f32, ndim=2),
@@ -69,24 +79,45 @@ def read_stress(
     """
     for i in range(blocks.shape[0]):
         block = blocks[i] & BLOCK_BITS
-        means, squares = ti.Vector.zero(state.real, LANES), ti.Vector.zero(state.real, LANES)
-        determinants = ti.Vector.zero(state.real, LANES)
-        for lane in range(LANES):  # vector registers take all of them at once, see `elements.kernels.elastic`
-            stress = stress_of(state, deformation_of(state, block, lane), block, lane)
-            means[lane] = trace(stress) / 3.0
-            deviator = scaled_plus_identity(stress, 1.0, -means[lane])
-            squares[lane] = deviator[0].norm_sqr() + deviator[1].norm_sqr() + deviator[2].norm_sqr()
-            determinants[lane] = determinant(deviator)
-        for lane in range(LANES):
-            row = i * LANES + lane
-            out[row, 0] = ti.sqrt(1.5 * squares[lane])
-            if limits[i] < NO_LIMIT:
-                out[row, 1] = _largest_principal(means[lane], squares[lane], determinants[lane])
-                if out[row, 1] > limits[i]:
-                    F = deformation_of(state, block, lane)
-                    values, axes = symmetric_eigen(stress_of(state, F, block, lane))
-                    # F carries an axis of a stretch to where that stretch is now; of others it comes near.
-                    along = times(F, axes[0]).normalized(1e-30)
-                    out[row, 1] = values[0]
-                    for k in ti.static(range(3)):
-                        out[row, 2 + k] = along[k]
+        body = state.particle_body[state.tet_vertices[block * 4 * LANES]]
+        for m, model in ti.static(enumerate(program.models)):
+            if state.body_model[body] == m:
+                _read_block(state, model, block, limits[i], i * LANES, out)
+
+
+@ti.func
+def _columns_of(matrices: ti.template(), t, row: ti.template(), column: ti.template()):
+    """The 3x3 part of a matrix that begins at a row and a column, as columns."""
+    a = ti.Vector([matrices[t, row + i, column] for i in ti.static(range(3))])
+    b = ti.Vector([matrices[t, row + i, column + 1] for i in ti.static(range(3))])
+    c = ti.Vector([matrices[t, row + i, column + 2] for i in ti.static(range(3))])
+    return a, b, c
+
+
+@ti.func
+def _elasticity_from(model: ti.template(), stiffness: ti.template(), t):
+    """As `elasticity_of`, of a matrix (6, 6)."""
+    if ti.static(model.is_anisotropic):
+        normal, mixed = _columns_of(stiffness, t, 0, 0), _columns_of(stiffness, t, 0, 3)
+        return normal, mixed, _columns_of(stiffness, t, 3, 3)
+    else:
+        return stiffness[t, 0, 1], stiffness[t, 5, 5]
+
+
+@ti.kernel
+def compute_stress(
+    model: ti.template(),
+    deformations: ti.types.ndarray(dtype=ti.f64, ndim=3),
+    stiffness: ti.types.ndarray(dtype=ti.f64, ndim=3),
+    out: ti.types.ndarray(dtype=ti.f64, ndim=3),
+):
+    """`cauchy_stress` of many deformations F, (m, 3, 3) [Pa], in float64.
+
+    Args:
+        stiffness: (m, 6, 6) [Pa], as `Stiffness.matrix`.
+    """
+    for t in range(deformations.shape[0]):
+        F = _columns_of(deformations, t, 0, 0)
+        stress = cauchy_stress(model, F, _elasticity_from(model, stiffness, t))
+        for i, k in ti.static(ti.ndrange(3, 3)):
+            out[t, i, k] = stress[k][i]

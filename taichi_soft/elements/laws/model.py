@@ -6,7 +6,7 @@ A model holds choices, never numbers, so that one compiled kernel serves every m
 from dataclasses import dataclass
 
 from taichi_soft.core.errors import OptionError
-from taichi_soft.core.math.tensors import determinant, product
+from taichi_soft.core.math.tensors import determinant, product, transposed
 from taichi_soft.core.math.tetrahedron import shape
 from taichi_soft.core.runtime import ti
 from taichi_soft.core.types import DampingModel, Flips, Integrator, Strain
@@ -17,6 +17,9 @@ from taichi_soft.elements.laws.energy import energy_forces
 from taichi_soft.elements.laws.hooke import hooke_stress
 from taichi_soft.elements.laws.law import BondLaw, EnergyLaw, Law
 from taichi_soft.elements.laws.recovery import recovering_piola
+
+LEAST_VOLUME = 1 / 1024
+"""Part of its volume at rest that a flatter tetrahedron is taken to have, where stress is force by area."""
 
 
 @dataclass(frozen=True)
@@ -77,9 +80,41 @@ class ElementModel:
 
 @ti.func
 def hooke_stress_of(model: ti.template(), F, lame_lambda, lame_mu):
-    """Hooke's stress of the strain that the model names [Pa], as columns."""
-    strain = strains.linear_strain(F) if ti.static(model.strain == Strain.LINEAR) else strains.exact_strain(F)
+    """Hooke's stress of the strain that the model names, or linear strain [Pa], as columns."""
+    strain = strains.exact_strain(F) if ti.static(model.strain == Strain.EXACT) else strains.linear_strain(F)
     return hooke_stress(strain, lame_lambda, lame_mu)
+
+
+@ti.func
+def piola_of(model: ti.template(), F, elasticity):
+    """Derivative of the energy that the model's law has by F [Pa], as columns."""
+    if ti.static(model.is_anisotropic):
+        return product(F, green_stress(F, elasticity))
+    else:
+        return model.law.piola(F, elasticity[0], elasticity[1])
+
+
+@ti.func
+def cauchy_stress(model: ti.template(), F, elasticity):
+    """Force by deformed area that the model's law answers a deformation with [Pa], as columns.
+
+    In the axes of the world. Laws along edges have none: theirs is Hooke's, of the linear strain. What is
+    inside out has the stress of its mirror image; under an energy that turns it round again that of the
+    negative volume, or what was crushed would count as pulled.
+    Args:
+        elasticity: as in `elastic_forces`.
+    """
+    if ti.static(model.has_energy):
+        J = determinant(F)
+        volume = ti.max(ti.abs(J), LEAST_VOLUME)
+        if ti.static(model.flips == Flips.RECOVER):
+            volume = ti.select(J < 0.0, -volume, volume)
+        stress = product(piola_of(model, F, elasticity), transposed(F))
+        return stress[0] / volume, stress[1] / volume, stress[2] / volume
+    elif ti.static(model.is_anisotropic):
+        return turned_stress(model, F, elasticity)
+    else:
+        return hooke_stress_of(model, F, elasticity[0], elasticity[1])
 
 
 @ti.func
@@ -90,10 +125,7 @@ def elastic_forces(model: ti.template(), B, F, rest_inverse, elasticity):
         elasticity: lambda and mu [Pa], or a stiffness as `anisotropic_stress` takes it.
     """
     if ti.static(model.has_energy):
-        if ti.static(model.is_anisotropic):
-            return energy_forces(product(F, green_stress(F, elasticity)), rest_inverse)
-        else:
-            return energy_forces(model.law.piola(F, elasticity[0], elasticity[1]), rest_inverse)
+        return energy_forces(piola_of(model, F, elasticity), rest_inverse)
     elif ti.static(model.is_anisotropic):
         return model.law.forces(B, turned_stress(model, F, elasticity))
     else:

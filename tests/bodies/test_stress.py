@@ -1,0 +1,173 @@
+"""The stress of a body is that of its own law: against closed forms, and against its forces by the virial."""
+
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from taichi_soft import (
+    AnisotropicMaterial,
+    Material,
+    Stiffness,
+    StressExceeded,
+    TearCandidates,
+    World,
+    box,
+    internal_forces,
+)
+from taichi_soft.bodies.measures import tet_stresses
+
+DT = 1 / 60
+MESH = box((1, 1, 1), cells=(1, 1, 1))
+YOUNG, NU = 1e5, 0.3
+MU, LAM = YOUNG / (2 * (1 + NU)), YOUNG * NU / ((1 + NU) * (1 - 2 * NU))
+RUBBER = Material(YOUNG, NU, 1000.0)
+GRAIN = Stiffness.orthotropic(young=(4e5, 1e5, 5e4), poisson=(0.2, 0.1, 0.3), shear=(6e4, 5e4, 2e4))
+WOOD = AnisotropicMaterial(GRAIN, 1000.0)
+STRETCHES = (1.3, 0.8)
+I3 = np.eye(3)
+
+
+def hooke(material, strain):
+    """Stress [Pa] of a strain along x alone."""
+    if material is RUBBER:
+        return np.diag([LAM + 2 * MU, LAM, LAM]) * strain
+    return np.diag(GRAIN.matrix[:3, 0]) * strain
+
+
+def linear(material, s):
+    return hooke(material, (s**2 - 1) / 2)
+
+
+def exact(material, s):
+    return hooke(material, s - 1)
+
+
+def st_venant_kirchhoff(material, s):
+    """1/J F S F^T with S = Hooke's stress of Green's strain, and J = s."""
+    return np.diag([s, 1, 1]) @ linear(material, s) @ np.diag([s, 1, 1]) / s
+
+
+def neo_hookean(_, s):
+    """1/J dpsi/dF F^T of psi = m/2 (I - 3) + l/2 (J - a)^2 - m/2 log(I + 1), with I = s^2 + 2 and J = s."""
+    m, l = 4 / 3 * MU, LAM + 5 / 6 * MU  # noqa: E741
+    along = m * (1 - 1 / (s**2 + 3))
+    return along * np.diag([s, 1 / s, 1 / s]) + l * (s - 1 - MU / l) * I3
+
+
+class Case(NamedTuple):
+    """A law, and its stress on paper."""
+
+    oracle: object  # (material, stretch along x) -> (3, 3) [Pa]
+    material: object
+    options: dict
+
+
+CASES = {
+    "virial": Case(linear, RUBBER, {"law": "virial"}),
+    "virial, exact": Case(exact, RUBBER, {"law": "virial", "strain": "exact"}),
+    "virial, wood": Case(linear, WOOD, {"law": "virial"}),
+    "virial, wood, exact": Case(exact, WOOD, {"law": "virial", "strain": "exact"}),
+    "face": Case(linear, RUBBER, {"law": "face"}),
+    "face, wood, exact": Case(exact, WOOD, {"law": "face", "strain": "exact"}),
+    "st_venant_kirchhoff": Case(st_venant_kirchhoff, RUBBER, {"law": "st_venant_kirchhoff"}),
+    "st_venant_kirchhoff, wood": Case(st_venant_kirchhoff, WOOD, {"law": "st_venant_kirchhoff"}),
+    "neo_hookean": Case(neo_hookean, RUBBER, {"law": "neo_hookean"}),
+    "volume_springs": Case(linear, RUBBER, {"law": "volume_springs"}),
+}
+
+
+def von_mises(stress):
+    deviator = stress - np.trace(stress) / 3 * I3
+    return np.sqrt(1.5 * np.sum(deviator**2))
+
+
+@pytest.fixture(scope="module")
+def still():
+    """A world with a box of every case, of which all vertices are held."""
+    world = World(gravity=(0, 0, 0), floor=None)
+    for k, case in enumerate(CASES.values()):
+        world.add_body(MESH, case.material, pinned=range(8), position=(0, 3 * k, 0), **case.options)
+    world.build()
+    world.record_events()
+    return world
+
+
+def deform(world, name, F):
+    """The body of a case, and no body else out of shape."""
+    world.drain_events()
+    for body in world.bodies:
+        body.watch_stress(None)
+        body.watch_tearing(None)
+        body.set_motion(MESH.vertices, np.zeros((8, 3)))
+    body = world.bodies[list(CASES).index(name)]
+    body.set_motion(MESH.vertices @ np.asarray(F).T, np.zeros((8, 3)))
+    return body
+
+
+def look(world):
+    """The events of a step that moves nobody. Its kernel would take minutes to compile, for so many laws."""
+    world._context.built.events.collect(world.step_count, world.time, DT)
+    return world.drain_events()
+
+
+@pytest.mark.parametrize("s", STRETCHES)
+@pytest.mark.parametrize("name", CASES)
+def test_stress_of_a_stretch_along_one_axis_is_that_of_the_law(name, s, still, turned):
+    case = CASES[name]
+    wanted = case.oracle(case.material, s)
+    body = deform(still, name, turned @ np.diag([s, 1, 1]))
+    count = len(MESH.tets)
+    np.testing.assert_allclose(body.tet_stress(), np.full(count, von_mises(wanted)), rtol=2e-5)
+    np.testing.assert_allclose(body.vertex_stress(), np.full(8, von_mises(wanted)), rtol=2e-5)
+    in_world = np.tile(turned @ wanted @ turned.T, (count, 1, 1))
+    np.testing.assert_allclose(tet_stresses(body), in_world, atol=2e-6 * YOUNG)
+
+
+@pytest.mark.parametrize("s", STRETCHES)
+@pytest.mark.parametrize("name", CASES)
+def test_a_watch_fires_just_below_the_stress_of_the_law_and_not_above_it(name, s, still, turned):
+    case = CASES[name]
+    wanted = case.oracle(case.material, s)
+    mises, pull = von_mises(wanted), np.linalg.eigvalsh(wanted)[-1]
+    body = deform(still, name, turned @ np.diag([s, 1, 1]))
+    kinds = [StressExceeded, TearCandidates] if pull > 0 else [StressExceeded]
+    for part, told in ((1.001, []), (0.999, kinds)):
+        body.watch_stress(part * mises)
+        body.watch_tearing(part * pull if pull > 0 else 1.0)
+        events = look(still)
+        assert [type(event) for event in events] == told
+    assert all(event.body is body and len(event.tetrahedra) == len(MESH.tets) for event in events)
+    np.testing.assert_allclose(events[0].stress, mises, rtol=1e-4)
+    if pull > 0:
+        np.testing.assert_allclose(events[1].stress, pull, rtol=1e-4)
+        np.testing.assert_allclose(np.abs(events[1].normals @ turned[:, 0]), 1.0, atol=1e-5)
+
+
+@pytest.mark.parametrize("mirror", [1.0, -1.0])
+@pytest.mark.parametrize("name", [name for name in CASES if name != "volume_springs"])
+def test_stress_is_that_of_the_forces(name, mirror, still, turned):
+    """Virial theorem (thesis eq. 6.16) on bodies of which all tetrahedra are deformed alike.
+
+    Inside out, of the volume as a mirror shows it; where a law turns that round again, of the negative one.
+    """
+    case, F = CASES[name], turned @ np.array([[1.2, 0.3, 0.0], [0.1, 0.8, -0.2], [0.0, 0.2, mirror]])
+    body = deform(still, name, F)
+    x = body.positions().astype(np.float64)
+    forces = internal_forces(MESH, case.material, x, **case.options)
+    volume = np.linalg.det(F) if name == "neo_hookean" else abs(np.linalg.det(F))
+    expected = np.tile(-forces.T @ x / volume, (len(MESH.tets), 1, 1))
+    np.testing.assert_allclose(tet_stresses(body), expected, atol=2e-6 * 4e5)
+
+
+@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize(
+    "F", [np.diag([1.0, 1, 0]), np.diag([2.0, 0, 0]), np.zeros((3, 3)), -I3, np.diag([1, 1, -1e-7])]
+)
+def test_flat_and_inside_out_the_stress_is_finite(name, F, still):
+    body = deform(still, name, F)
+    body.watch_stress(1.0)
+    body.watch_tearing(1.0)
+    told = [event.stress for event in look(still)]
+    assert np.isfinite(body.tet_stress()).all()
+    assert all(np.isfinite(stress).all() for stress in told)
