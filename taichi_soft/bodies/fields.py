@@ -198,8 +198,6 @@ class BodyFields:
         self.body_is_braked = ti.field(ti.i32, bodies)  # 1 while a step is made for the last time
         self.body_patience = ti.field(ti.i32, bodies)  # steps in trouble; see `untangling`
         self.body_jolted = ti.field(ti.i32, bodies)  # 1 where a step was too coarse
-        # Where a body is in a step that is made in several calls: attempt, next substep, 1 if gentle so far.
-        self.body_pause = ti.Vector.field(3, ti.i32, bodies)
         self.body_edge = ti.field(real, bodies)  # mean edge of its surface [m]
         self.body_sound_speed = ti.field(real, bodies)  # [m/s]
         self.retries = ti.field(

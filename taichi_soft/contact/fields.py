@@ -20,9 +20,6 @@ PAIR_ROWS = 32
 """Pairs of bodies whose impulses can be recorded, per body of an island: room for all pairs of 65 bodies, and
 for each of more to touch 64 others."""
 
-MOST_PARTS = 16
-"""Parts of an island's bodies: threads beyond these share theirs."""
-
 NO_CONTACT = 1e30
 """Gap of a candidate that is out of reach."""
 
@@ -95,24 +92,9 @@ class ContactFields:
 
         self.island_count = ti.field(ti.i32, ())
         self.island_first = ti.field(ti.i32, bodies + 1)  # row of its first body
-        # Where an island is in a step that is made in several calls: attempt, next substep, 1 if gentle so
-        # far, state of its candidates; way shared since these were found [m], velocity shared [m/s], speed.
-        self.island_pause = ti.Vector.field(4, ti.i32, bodies)
-        self.island_way = ti.Vector.field(3, ti.f32, bodies)
-        self.island_common = ti.Vector.field(3, ti.f32, bodies)
-        self.island_speed = ti.field(ti.f32, bodies)
         self.island_body = ti.field(ti.i32, bodies)  # bodies that may touch or are joined, island by island
         self.body_island = ti.field(ti.i32, bodies)
         self.parent = ti.field(ti.i32, bodies)  # in the forest of islands
-        # What threads do together for the bodies of an island: see `kernels/teamwork.py`.
-        self.unfinished_crowds = ti.field(ti.i32, ())  # islands of several bodies
-        self.useful_helpers = ti.field(ti.i32, ())  # threads beside their owners that could find a body there
-        self.task = ti.field(ti.i32, bodies)  # of each island
-        self.task_numbers = ti.Vector.field(4, ti.f32, bodies)
-        self.task_common = ti.Vector.field(3, ti.f32, bodies)  # velocity or way that its bodies share
-        self.parts = ti.field(ti.i32, ())  # of the bodies of an island, one for each thread
-        self.untaken = ti.field(ti.i32, MOST_PARTS * bodies)  # bodies of each part that wait for a thread
-        self.unfinished = ti.field(ti.i32, bodies)
 
     def carried(self) -> list[list[Any]]:
         """What the next step depends on: of each particle, each body, each body and collider."""

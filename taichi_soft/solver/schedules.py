@@ -5,9 +5,8 @@ from collections.abc import Callable
 from taichi_soft.bodies.layout import Scene
 from taichi_soft.core.runtime import Device
 from taichi_soft.core.types import Integrator, Schedule
-from taichi_soft.solver.kernels.contact_step import step_islands
 from taichi_soft.solver.kernels.flat import begin_flat, end_flat, finish_flat, step_flat_cpu, substep_flat
-from taichi_soft.solver.kernels.per_body import UNFINISHED, step_in_turn, step_per_body
+from taichi_soft.solver.kernels.step import UNFINISHED, step_in_turn, step_islands, step_per_body
 from taichi_soft.solver.program import StepProgram
 from taichi_soft.solver.state import State
 

@@ -28,11 +28,11 @@ from taichi_soft.core.settings import Settings
 from taichi_soft.events import EventLog
 from taichi_soft.fracture.tearing import Tears
 from taichi_soft.solver.failures import find_failure
-from taichi_soft.solver.kernels.contact_step import ALL_SLEEP
 from taichi_soft.solver.kernels.implicit_euler import MOST_PIECES
 from taichi_soft.solver.kernels.islands import list_joined_islands
 from taichi_soft.solver.kernels.sleep import wake_body, wake_near
 from taichi_soft.solver.kernels.spawn import despawn_body, spawn_body
+from taichi_soft.solver.kernels.step import ALL_SLEEP
 from taichi_soft.solver.program import StepProgram
 from taichi_soft.solver.readout import Readout
 from taichi_soft.solver.schedules import Launch

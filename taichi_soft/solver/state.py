@@ -11,6 +11,7 @@ from taichi_soft.bodies.layout import Scene
 from taichi_soft.contact.fields import ContactCapacity, ContactFields, SoftContactFields
 from taichi_soft.control.joint_fields import JointFields
 from taichi_soft.core.runtime import ti
+from taichi_soft.solver.step_fields import JobFields, Progress
 
 _NO_CONTACT = ContactCapacity()
 
@@ -45,6 +46,9 @@ class State(BodyFields):
                 self.particle_hold = ti.Vector.field(4, self.real, n)
         if capacity.contact.soft:
             self.soft = SoftContactFields(n, bodies, capacity.outer, capacity.triangles)
+        self.progress = Progress.field(shape=bodies)  # type: ignore[attr-defined]  # of each island
+        if capacity.has_contact:
+            self.jobs = JobFields(bodies)
 
     @property
     def carried(self) -> dict[str, list[list[Any]]]:

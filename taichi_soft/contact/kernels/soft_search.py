@@ -395,7 +395,7 @@ def begin_search(state: ti.template(), body, given, h, left, forgets):
         given: speed that it may get from others [m/s].
         h, left: substep, and time until the end of the step [s].
     """
-    if forgets > 0.0:
+    if forgets == 1:
         forget_candidates(state, body)
     _find_box(state, body)
     speed, edge = state.contact.body_speed_beside[body], state.soft.body_surface[body].z

@@ -5,7 +5,8 @@ from taichi_soft.bodies.kernels.motion import restore_particle
 from taichi_soft.control.kernels.loads import forget_loads
 from taichi_soft.core.runtime import ti
 from taichi_soft.elements.kernels.internal_forces import clear_forces
-from taichi_soft.solver.kernels.per_body import advance_body
+from taichi_soft.solver.kernels.substep import advance_body
+from taichi_soft.solver.step_fields import Moment
 
 
 @ti.kernel
@@ -26,7 +27,6 @@ def find_broken_element(
     """
     ti.loop_config(serialize=True)
     for _ in range(1):
-        kick = 0.5 * (state.body_velocity_lag[body] + h)
         is_open = 1
         state.body_is_braked[body] = is_braked
         for s in range(substeps + 1):
@@ -38,8 +38,8 @@ def find_broken_element(
                     is_open = 0
                 else:
                     clear_forces(state, body)
-                    advance_body(state, program, body, h, kick, s, substeps)
-                    kick = h
+                    now = Moment(s=s, substeps=substeps, h=h)
+                    advance_body(state, program, body, now, True)
         state.body_is_braked[body] = 0
         particles = state.body_particles[body]
         for p in range(particles[0], particles[1]):

@@ -25,8 +25,7 @@ from taichi_soft.elements.kernels.bonds import lane_pressure, store_block_pressu
 from taichi_soft.elements.kernels.edges import edge_force_of
 from taichi_soft.elements.kernels.elastic import store_block_forces, store_lane_forces
 from taichi_soft.elements.kernels.internal_forces import clear_forces
-from taichi_soft.solver.kernels.motion import moved_particle
-from taichi_soft.solver.kernels.per_body import JOLT
+from taichi_soft.solver.kernels.motion import JOLT, moved_particle
 from taichi_soft.solver.kernels.vibration import damp_vibration, kept_vibration
 
 _FAILING, _DONE = 4, 5  # above the status of any body: the step is made again, or need not be

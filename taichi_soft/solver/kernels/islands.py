@@ -1,6 +1,6 @@
 """Islands: bodies that may touch each other in a step or are joined, directly or through others.
 
-One thread owns an island, so that what passes between its bodies has one order (see `teamwork.py`). A body
+One thread owns an island, so that what passes between its bodies has one order (see `jobs.py`). A body
 that stays clear of all others is an island of its own.
 """
 

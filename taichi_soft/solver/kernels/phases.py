@@ -3,7 +3,7 @@
 from taichi_soft.core.runtime import ti
 from taichi_soft.elements.kernels.edges import accumulate_edge_forces
 from taichi_soft.elements.kernels.elastic import accumulate_elastic_forces
-from taichi_soft.solver.kernels.per_body import move_body
+from taichi_soft.solver.kernels.motion import move_body
 
 PHASES = ("elastic", "damping", "motion")
 

@@ -1,0 +1,142 @@
+"""A step is made in attempts: where bodies were before it, and whether an attempt was fine enough.
+
+Substeps are chosen for small deformation. An impact faster than sound flattens tetrahedra, and flat ones are
+stiffer. Where an attempt ends non-finite, or forces changed a velocity by more than `JOLT` at once, the
+island is put back. It makes the step again with twice as many substeps, and so on. The last attempt brakes
+vibrations sharply; momentum and spin stay.
+"""
+
+from taichi_soft.bodies.kernels.motion import particle_is_sound, remember_particle, restore_particle
+from taichi_soft.bodies.status import ABSENT, ACTIVE, FEELS_REACTION, FROZEN
+from taichi_soft.contact.kernels.collide import forget_contacts
+from taichi_soft.contact.kernels.rebound import begin_rebounds, take_back_rebounds
+from taichi_soft.contact.kernels.soft_search import forget_candidates
+from taichi_soft.contact.kernels.touches import forget_touches
+from taichi_soft.core.runtime import ti
+from taichi_soft.core.types import Integrator
+from taichi_soft.elements.kernels.internal_forces import clear_forces
+from taichi_soft.solver.kernels.implicit_euler import MOST_PIECES
+
+
+@ti.func
+def rows_of(state: ti.template(), program: ti.template(), island):
+    """First row of an island's bodies, and the row behind the last."""
+    first, end = island, island + 1
+    if ti.static(program.has_contact):
+        first, end = state.contact.island_first[island], state.contact.island_first[island + 1]
+    return first, end
+
+
+@ti.func
+def body_at(state: ti.template(), program: ti.template(), row):
+    """The body in such a row."""
+    body = row
+    if ti.static(program.has_contact):
+        body = state.contact.island_body[row]
+    return body
+
+
+@ti.func
+def attempts_of(state: ti.template(), program: ti.template()):
+    """How often substeps are halved; and the number of the last attempt, which is as fine as the one before
+    and braked, or the same number."""
+    halvings = state.retries[None]
+    last = ti.select(halvings > 0, halvings + 1, 0)
+    if ti.static(program.integrator == Integrator.IMPLICIT_EULER):
+        # Without contact it cuts its substeps by itself.
+        halvings = ti.static(MOST_PIECES.bit_length() - 1 if program.has_contact else 0)
+        last = halvings
+    return halvings, last
+
+
+@ti.func
+def begin_body(state: ti.template(), program: ti.template(), body):
+    """Remember how a body is before the step: to interpolate from, and to put it back there. Forget what it
+    touched in the last one."""
+    if state.body_status[body] != ABSENT:
+        particles = state.body_particles[body]
+        for p in range(particles[0], particles[1]):
+            remember_particle(state, p)
+        if state.body_drives[body] & FEELS_REACTION != 0:
+            for p in range(particles[0], particles[1]):
+                if state.body_status[body] == FROZEN:  # nobody aims at where its pins go, and begins anew
+                    state.particle_reaction[p] = ti.Vector.zero(state.real, 3)
+                state.prev_reaction[p] = state.particle_reaction[p]
+        if ti.static(program.has_contact):
+            _begin_contacts(state, program, body)
+
+
+@ti.func
+def _begin_contacts(state: ti.template(), program: ti.template(), body):
+    particles = state.body_particles[body]
+    if ti.static(state.capacity.implicit):
+        for p in range(particles[0], particles[1]):
+            state.prev_contact[p] = state.particle_contact[p]
+    begin_rebounds(state, body)
+    forget_contacts(state, body)
+    state.contact.is_wild[body] = 0
+    if ti.static(program.has_soft_contact):
+        if state.body_status[body] != ACTIVE:
+            state.contact.body_speed_beside[body] = 0.0
+            for p in range(particles[0], particles[1]):
+                state.soft.particle_speed[p] = 0.0
+
+
+@ti.func
+def _put_back_body(state: ti.template(), program: ti.template(), body):
+    """Put a body back to where it was before the step."""
+    state.body_jolted[body] = 1
+    particles = state.body_particles[body]
+    for p in range(particles[0], particles[1]):
+        restore_particle(state, p)
+        if state.body_drives[body] & FEELS_REACTION != 0:
+            state.particle_reaction[p] = state.prev_reaction[p]
+    clear_forces(state, body)
+    if ti.static(program.has_contact):
+        if ti.static(state.capacity.implicit):
+            for p in range(particles[0], particles[1]):
+                state.particle_contact[p] = state.prev_contact[p]
+        take_back_rebounds(state, body)
+        forget_contacts(state, body)
+        if ti.static(program.has_soft_contact):
+            forget_candidates(state, body)  # for good, as the island looks for others before it goes on
+
+
+@ti.func
+def put_back_island(state: ti.template(), program: ti.template(), island):
+    """Put an island back to where it was before the step."""
+    first, end = rows_of(state, program, island)
+    for row in range(first, end):
+        _put_back_body(state, program, body_at(state, program, row))
+    if ti.static(program.has_soft_contact):
+        forget_touches(state, island)
+
+
+@ti.func
+def brake_island(state: ti.template(), program: ti.template(), island, is_braked):
+    """Brake the vibrations of all that is in an island sharply (1), or no longer (0)."""
+    first, end = rows_of(state, program, island)
+    for row in range(first, end):
+        state.body_is_braked[body_at(state, program, row)] = is_braked
+
+
+@ti.func
+def body_is_sound(state: ti.template(), body):
+    """Whether all of a body can still be computed with (1)."""
+    particles = state.body_particles[body]
+    sound = 1
+    for p in range(particles[0], particles[1]):
+        sound = sound & particle_is_sound(state, p)
+    return sound
+
+
+@ti.func
+def island_is_sound(state: ti.template(), program: ti.template(), island):
+    """Whether all that moves in an island can still be computed with (1)."""
+    sound = 1
+    first, end = rows_of(state, program, island)
+    for row in range(first, end):
+        body = body_at(state, program, row)
+        if state.body_status[body] == ACTIVE:
+            sound = sound & body_is_sound(state, body)
+    return sound

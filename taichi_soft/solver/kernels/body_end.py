@@ -1,0 +1,61 @@
+"""What comes after the last substep of a step, body by body."""
+
+from taichi_soft.bodies.kernels.motion import restore_particle
+from taichi_soft.bodies.kernels.plasticity import flow_body
+from taichi_soft.bodies.status import ACTIVE, FROZEN, PUSHED
+from taichi_soft.contact.kernels.collide import forget_contacts
+from taichi_soft.contact.kernels.soft_search import forget_candidates
+from taichi_soft.control.kernels.drives import push_particles
+from taichi_soft.control.kernels.loads import forget_loads
+from taichi_soft.core.runtime import ti
+from taichi_soft.core.types import Integrator
+from taichi_soft.elements.kernels.internal_forces import clear_forces
+from taichi_soft.solver.kernels.attempts import body_is_sound
+from taichi_soft.solver.kernels.untangling import untangle_body
+
+
+@ti.func
+def _freeze_if_broken(state: ti.template(), body):
+    """Freeze a body that went non-finite in its last sound state. Returns 1 where that happened."""
+    sound = body_is_sound(state, body)
+    if sound == 0:
+        particles = state.body_particles[body]
+        for p in range(particles[0], particles[1]):
+            restore_particle(state, p)
+        clear_forces(state, body)
+        forget_loads(state, body)
+        state.body_status[body] = FROZEN
+    return 1 - sound
+
+
+@ti.func
+def _end_active_body(state: ti.template(), program: ti.template(), body, substeps, h):
+    """Returns 1 where it failed, or was not solved as exactly as asked."""
+    if ti.static(program.integrator == Integrator.LEAPFROG):
+        push_particles(state, body, 0.5 * h)
+    failed = _freeze_if_broken(state, body)
+    if failed == 0:
+        state.body_velocity_lag[body] = h
+        state.body_drives[body] = state.body_drives[body] & ~PUSHED
+        if ti.static(program.has_plasticity):
+            flow_body(state, body, substeps * h)
+        untangle_body(state, program, body, substeps * h)
+        if ti.static(program.integrator == Integrator.IMPLICIT_EULER):
+            failed = int(state.body_residual[body] > state.solver[None][0])
+    elif ti.static(program.has_contact):
+        forget_contacts(state, body)  # it was put back: nothing has touched it
+    return failed
+
+
+@ti.func
+def end_body(state: ti.template(), program: ti.template(), body, substeps, h):
+    """After the last of so many substeps of `h` [s]: drives end, plasticity flows, what is caught is freed.
+
+    Returns: whether the body failed, or was not solved as exactly as asked (1).
+    """
+    failed = 0
+    if state.body_status[body] == ACTIVE:
+        failed = _end_active_body(state, program, body, substeps, h)
+    if ti.static(program.has_soft_contact):
+        forget_candidates(state, body)
+    return failed

@@ -1,0 +1,144 @@
+"""Kick among colliders: new velocities from forces. Positions follow in the drift.
+
+Between the two the island takes velocities away, in joints and in contact of bodies with each other.
+"""
+
+from taichi_soft.bodies.kernels.motion import gravity_on
+from taichi_soft.core.constants import LANES, ROW_BITS
+from taichi_soft.core.math.tensors import widened
+from taichi_soft.core.runtime import ti
+from taichi_soft.core.types import Integrator
+from taichi_soft.solver.kernels.implicit_contact import kick_implicitly
+from taichi_soft.solver.kernels.motion import JOLT
+
+WILD = 20.0
+"""Way of a particle within one substep, over the mean edge of its body's surface, from which the body is
+taken to be exploding: others pass through it until it is frozen or calm."""
+
+
+@ti.func
+def _put_block(
+    state: ti.template(),
+    program: ti.template(),
+    first,
+    count,
+    positions: ti.template(),
+    velocities: ti.template(),
+    speeds_beside: ti.template(),
+):
+    """Write what a kick made of `count` particles from `first` on, and clear what the next one begins with.
+
+    Field by field: a loop over one field, of a length that the compiler knows, becomes a few wide stores.
+    """
+    for lane in range(count):
+        for i in ti.static(range(3)):
+            state.particle_position[first + lane][i] = positions[lane, i]
+    for lane in range(count):
+        for i in ti.static(range(3)):
+            state.particle_velocity[first + lane][i] = velocities[lane, i]
+    if ti.static(program.has_soft_contact):
+        for lane in range(count):
+            state.soft.particle_speed[first + lane] = speeds_beside[lane]
+    for lane in range(count):
+        state.contact.particle_touches[first + lane] = 0
+    for lane in range(count):
+        state.particle_force[first + lane] = ti.Vector.zero(state.real, 4)
+
+
+@ti.func
+def _kick_block(state: ti.template(), program: ti.template(), first, count, gravity, kick, way, common):
+    """New velocities from the forces, which are cleared, of up to `LANES` particles from `first` on, and
+    positions after `way` [s] with them. What lies behind them is computed too, and counts nothing.
+
+    Returns: of each the square of its speed, of that beside the `common` velocity, and of its acceleration.
+    """
+    positions = ti.Matrix.zero(state.real, LANES, 3)
+    velocities = ti.Matrix.zero(state.real, LANES, 3)
+    speeds_beside = ti.Vector.zero(state.real, LANES)
+    speed2, beside2 = ti.Vector.zero(state.real, LANES), ti.Vector.zero(state.real, LANES)
+    acceleration2 = ti.Vector.zero(state.real, LANES)
+    # It reads fields and stores here only: whether field and field overlap, the compiler could not tell.
+    for lane in range(LANES):
+        p = first + lane
+        inv_mass = state.particle_inv_mass[p]
+        # All four numbers of a force, of which the last is 0: wide loads leave no gaps.
+        acceleration = state.particle_force[p] * inv_mass + widened(gravity)
+        acceleration *= ti.select(inv_mass > 0.0, 1.0, 0.0)
+        v_before = state.particle_velocity[p]
+        x, v = program.advance(state.particle_position[p], v_before, acceleration.xyz, way, kick)
+        for i in ti.static(range(3)):
+            positions[lane, i] = x[i]
+            velocities[lane, i] = v[i]
+        if ti.static(program.has_soft_contact):
+            speeds_beside[lane] = (v - common).norm()
+            # What presses against others gains speed only to lose it to them.
+            was_touched = state.contact.particle_touches[p] == 1
+            beside = ti.select(was_touched, v_before, v) - common
+            beside2[lane] = ti.select(lane < count, beside.dot(beside), 0.0)
+        speed2[lane] = ti.select(lane < count, v.dot(v), 0.0)
+        acceleration2[lane] = ti.select(lane < count, acceleration.dot(acceleration), 0.0)
+    if count >= LANES:
+        _put_block(state, program, first, LANES, positions, velocities, speeds_beside)
+    else:
+        _put_block(state, program, first, count, positions, velocities, speeds_beside)
+    return speed2, beside2, acceleration2
+
+
+@ti.func
+def _kick_body(state: ti.template(), program: ti.template(), body, kick, way, common):
+    """New velocities from the forces, which are cleared, and positions after `way` [s] with them.
+
+    Returns: the highest speed [m/s], the highest and the mean beside the `common` velocity, and the largest
+    change.
+    """
+    particles, gravity = state.body_particles[body], gravity_on(state, body)
+    count = particles[1] - particles[0]
+    speed2, beside2 = ti.Vector.zero(state.real, LANES), ti.Vector.zero(state.real, LANES)
+    acceleration2, total2 = ti.Vector.zero(state.real, LANES), ti.Vector.zero(state.real, LANES)
+    for block in range((count + LANES - 1) // LANES):
+        first = (particles[0] + block * LANES) & ROW_BITS
+        v2, b2, a2 = _kick_block(state, program, first, particles[1] - first, gravity, kick, way, common)
+        speed2, beside2 = ti.max(speed2, v2), ti.max(beside2, b2)
+        acceleration2, total2 = ti.max(acceleration2, a2), total2 + b2
+    change = kick * ti.sqrt(acceleration2.max())
+    return ti.sqrt(speed2.max()), ti.sqrt(beside2.max()), ti.sqrt(total2.sum() / count), change
+
+
+@ti.func
+def _note_speeds(
+    state: ti.template(), program: ti.template(), body, h, speed, beside, mean_beside, is_stable
+):
+    """For the island, and for the search for contacts."""
+    # Bodies beside each other in a field share a cache line, which every write takes from other threads: what
+    # is as it was is not written.
+    state.contact.body_speed[body] = speed
+    if state.contact.is_gentle[body] != is_stable:
+        state.contact.is_gentle[body] = is_stable
+    if ti.static(program.has_soft_contact):
+        state.contact.body_speed_beside[body] = beside
+        state.contact.body_mean_beside[body] = mean_beside
+        is_wild = int(not (speed * h <= WILD * state.body_edge[body]))
+        if state.contact.is_wild[body] != is_wild:
+            state.contact.is_wild[body] = is_wild
+
+
+@ti.func
+def kick_among_colliders(state: ti.template(), program: ti.template(), body, job, kick):
+    """New velocities of one body after `kick` [s] of its forces, and positions after the job's `drift_time`.
+
+    Notes the highest speed [m/s], the highest and the mean beside the job's `velocity`, and what it returns.
+    Returns: whether forces changed no velocity by too much at once (1).
+    """
+    is_stable = 1
+    speed, beside = ti.cast(0.0, state.real), ti.cast(0.0, state.real)
+    mean_beside = ti.cast(0.0, state.real)
+    if ti.static(program.integrator == Integrator.IMPLICIT_EULER):
+        speed, beside = kick_implicitly(state, program, body, job.h, job.since, int(job.s == 0), job.velocity)
+        mean_beside = beside
+    else:
+        speed, beside, mean_beside, change = _kick_body(
+            state, program, body, kick, job.drift_time, job.velocity
+        )
+        is_stable = int(change <= JOLT * state.body_sound_speed[body])
+    _note_speeds(state, program, body, job.h, speed, beside, mean_beside, is_stable)
+    return is_stable

@@ -1,0 +1,251 @@
+"""One fixed step of the schedule `per_body`: as many attempts as it takes, each of many substeps.
+
+One thread makes all substeps of an island, and islands go side by side. Nothing waits between substeps, and
+a body stays in one core's cache. With contact an island is all bodies that may touch in the step or are
+joined, and threads that have nothing else to do help with it (`jobs.py`). Without contact each body is an
+island of its own. The result does not depend on the number of threads.
+
+A long step is made in several calls, so that Ctrl-C can come between: each island goes on where it stopped.
+"""
+
+from taichi_soft.bodies.status import ACTIVE
+from taichi_soft.core.runtime import ti
+from taichi_soft.solver.kernels.attempts import (
+    attempts_of,
+    begin_body,
+    brake_island,
+    island_is_sound,
+    put_back_island,
+)
+from taichi_soft.solver.kernels.body_end import end_body
+from taichi_soft.solver.kernels.islands import find_islands
+from taichi_soft.solver.kernels.jobs import close_shared_island, help_others, open_shared_islands
+from taichi_soft.solver.kernels.sleep import settle_island, wake_by_colliders, wake_island
+from taichi_soft.solver.kernels.substep import BEGIN, END, NONE, OUTDATED, do_phase, each_body, substep
+from taichi_soft.solver.step_fields import Job, Moment, Progress
+
+ALL_SLEEP = -1
+"""Instead of a number of bodies: none is awake, and the next step would find all as it is."""
+
+UNFINISHED = -2
+"""Instead of a number of bodies: the call made the substeps that it was given, and the step needs more."""
+
+DONE = -1
+"""Instead of the number of an attempt: the step is made."""
+
+
+@ti.func
+def fixed_step(state: ti.template(), program: ti.template(), island, substeps, h, most, goes_on):
+    """One fixed step of an island, as fine as it needs, or the next `most` substeps of it.
+
+    Returns: how many of its bodies failed, or UNFINISHED; and whether it is awake (1).
+    """
+    if goes_on == 0:
+        _begin(state, program, island)
+    run, left = state.progress[island], most
+    halvings, last = attempts_of(state, program)
+    finer, is_good = 1, 0
+    while run.attempt != DONE and is_good == 0 and left > 0:
+        finer = 1 << ti.min(run.attempt, halvings)
+        count, first = finer * substeps, run.s
+        end = ti.min(first + left, count)
+        if first == 0:
+            _begin_attempt(state, program, island, run)
+        _make_substeps(state, program, island, first, end, count, h / finer, run)
+        left -= end - first
+        if end == count:
+            if run.attempt == last or (run.is_stable & island_is_sound(state, program, island)) == 1:
+                is_good = 1
+            else:
+                _put_back(state, program, island, run, halvings)
+    if is_good == 1:
+        _end(state, program, island, run, finer * substeps, h / finer)
+        _settle(state, program, island, run, substeps * h)
+    state.progress[island] = run
+    return ti.select(run.attempt == DONE, run.failed, UNFINISHED), run.is_awake
+
+
+@ti.func
+def _begin(state: ti.template(), program: ti.template(), island):
+    """Wake bodies that one awake may touch, and remember where all are."""
+    is_awake = 0
+    if ti.static(program.has_contact):
+        is_awake = wake_island(state, island)
+        if is_awake == 1:
+            each_body(state, program, island, Job(phase=BEGIN))
+    else:
+        is_awake = int(state.body_status[island] == ACTIVE)
+        begin_body(state, program, island)
+    attempt = ti.select(is_awake == 1, 0, DONE)
+    state.progress[island] = Progress(attempt=attempt, is_stable=1, is_awake=is_awake, candidates=NONE)
+
+
+@ti.func
+def _begin_attempt(state: ti.template(), program: ti.template(), island, run: ti.template()):
+    if ti.static(program.has_soft_contact):
+        run.velocity = _mean_velocity(state, island)
+
+
+@ti.func
+def _make_substeps(
+    state: ti.template(), program: ti.template(), island, first, end, count, h, run: ti.template()
+):
+    """Substeps from `first` to before `end`, of so many in an attempt."""
+    for s in range(first, end):
+        now = Moment(s=s, substeps=count, h=h, since=s * h, left=h * (count - s))
+        substep(state, program, island, now, run)
+    run.s = end
+
+
+@ti.func
+def _mean_velocity(state: ti.template(), island):
+    """Of the particles of an island [m/s]: what its bodies share brings none nearer.
+
+    Zero where one of them does not move.
+    """
+    total, count, moves = ti.Vector.zero(ti.f32, 3), 0, ti.cast(1.0, ti.f32)
+    for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
+        body = state.contact.island_body[i]
+        if state.body_status[body] == ACTIVE:
+            particles = state.body_particles[body]
+            for p in range(particles[0], particles[1]):
+                total += state.particle_velocity[p]
+            count += particles[1] - particles[0]
+        else:
+            moves = 0.0
+    return moves * total / ti.max(count, 1)
+
+
+@ti.func
+def _put_back(state: ti.template(), program: ti.template(), island, run: ti.template(), halvings):
+    """Put an island back to where it was, for the next attempt."""
+    put_back_island(state, program, island)
+    run.attempt += 1
+    run.s, run.is_stable, run.candidates = 0, 1, OUTDATED
+    run.fastest, run.shift = 0.0, ti.Vector.zero(ti.f32, 3)
+    if run.attempt > halvings:
+        brake_island(state, program, island, 1)
+
+
+@ti.func
+def _end(state: ti.template(), program: ti.template(), island, run: ti.template(), substeps, h):
+    """End the step of each body; freeze what is broken."""
+    failed = 0
+    if ti.static(program.has_contact):
+        each_body(state, program, island, Job(phase=END, substeps=substeps, h=h))
+        for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
+            failed += state.contact.has_failed[state.contact.island_body[i]]
+    else:
+        failed = end_body(state, program, island, substeps, h)
+    brake_island(state, program, island, 0)
+    run.attempt, run.failed = DONE, failed
+
+
+@ti.func
+def _settle(state: ti.template(), program: ti.template(), island, run: ti.template(), dt):
+    """Let an island that was calm for long enough fall asleep, after a step of `dt` [s]."""
+    if ti.static(program.has_contact):
+        run.is_awake = settle_island(state, island, dt)
+
+
+@ti.real_func
+def _step_alone(
+    state: ti.template(),
+    program: ti.template(),
+    body: ti.i32,
+    substeps: ti.i32,
+    h: ti.f32,
+    most: ti.i32,
+    goes_on: ti.i32,
+) -> ti.i32:
+    """As `fixed_step`, without contact.
+
+    By itself, so that sums are rounded alike in the kernels for one thread and for several; and there is no
+    other such function in them, because Taichi's cache would not find them again otherwise.
+    """
+    failed, _ = fixed_step(state, program, body, substeps, h, most, goes_on)
+    return failed
+
+
+@ti.kernel
+def step_per_body(
+    state: ti.template(),
+    program: ti.template(),
+    body_count: ti.i32,
+    substeps: ti.i32,
+    h: ti.f32,
+    most: ti.i32,
+    goes_on: ti.i32,
+) -> ti.i32:
+    """One fixed step of every active body, side by side, or the next `most` substeps of it.
+
+    Returns: how many had trouble in it, or UNFINISHED: then it is to be called again, with `goes_on` 1.
+    """
+    failed, unfinished = 0, 0
+    ti.loop_config(block_dim=1)
+    for body in range(body_count):
+        found = _step_alone(state, program, body, substeps, h, most, goes_on)
+        failed += ti.max(found, 0)
+        unfinished += int(found == UNFINISHED)
+    return ti.select(unfinished > 0, UNFINISHED, failed)
+
+
+@ti.kernel
+def step_in_turn(
+    state: ti.template(),
+    program: ti.template(),
+    body_count: ti.i32,
+    substeps: ti.i32,
+    h: ti.f32,
+    most: ti.i32,
+    goes_on: ti.i32,
+) -> ti.i32:
+    """As `step_per_body` in the calling thread: a single body need not wait for another thread to wake up."""
+    failed, unfinished = 0, 0
+    ti.loop_config(serialize=True)
+    for body in range(body_count):
+        found = _step_alone(state, program, body, substeps, h, most, goes_on)
+        failed += ti.max(found, 0)
+        unfinished += int(found == UNFINISHED)
+    return ti.select(unfinished > 0, UNFINISHED, failed)
+
+
+@ti.kernel
+def step_islands(
+    state: ti.template(),
+    program: ti.template(),
+    body_count: ti.i32,
+    helpers: ti.i32,
+    substeps: ti.i32,
+    h: ti.f32,
+    most: ti.i32,
+    goes_on: ti.i32,
+) -> ti.i32:
+    """One fixed step of every active body with contact, or the next `most` substeps of it.
+
+    One kernel, which calls one real function, because Taichi's cache would not find it again otherwise.
+
+    Args:
+        helpers: threads that may work on islands of others when there is none left for themselves.
+    Returns: how many failed, or `ALL_SLEEP`; or UNFINISHED: then it is to be called again, with `goes_on` 1.
+    """
+    failed, awake, unfinished = 0, 0, 0
+    ti.loop_config(serialize=True)
+    for _ in range(1):
+        if goes_on == 0:
+            wake_by_colliders(state, body_count)
+            if ti.static(program.has_soft_contact):
+                find_islands(state, body_count, substeps * h)
+        open_shared_islands(state, helpers)
+    ti.loop_config(block_dim=1)
+    for i in range(state.contact.island_count[None] + helpers):
+        if i < state.contact.island_count[None]:
+            failed_here, is_awake = fixed_step(state, program, i, substeps, h, most, goes_on)
+            failed += ti.max(failed_here, 0)
+            awake += is_awake
+            unfinished += int(failed_here == UNFINISHED)
+            close_shared_island(state, i)
+        else:
+            help_others(state, program, do_phase, i - state.contact.island_count[None])
+    found = ti.select(failed + awake == 0, ALL_SLEEP, failed)
+    return ti.select(unfinished > 0, UNFINISHED, found)

@@ -1,0 +1,286 @@
+"""One substep, phase by phase, in the order in which they run: with contact and without.
+
+    each body by itself     wind, drives
+                            internal forces, reactions of pins, grabs
+                            vibrations fade
+                            kick: new velocities
+    its island              joints
+                            contact: broad phase, narrow phase, solver
+    each body by itself     drift: new positions
+
+Contact takes velocities away before they move anything. Joints make good in the next substep what it changes
+of them. Without contact each body is an island of its own, and its kick and drift are one pass over its
+particles.
+"""
+
+from taichi_soft.bodies.status import ACTIVE, JOINED
+from taichi_soft.contact.fields import NO_CONTACT
+from taichi_soft.contact.kernels.soft_contact import solve_island
+from taichi_soft.contact.kernels.soft_gaps import find_gaps
+from taichi_soft.contact.kernels.soft_search import (
+    begin_search,
+    is_outdated,
+    is_social,
+    note_way,
+    search_body,
+)
+from taichi_soft.contact.kernels.touches import add_touches
+from taichi_soft.control.kernels.drives import add_reactions, blow_on, push_particles
+from taichi_soft.control.kernels.grabs import pull_grabs
+from taichi_soft.control.kernels.joints import solve_joints
+from taichi_soft.core.runtime import ti
+from taichi_soft.core.types import Integrator
+from taichi_soft.elements.kernels.internal_forces import accumulate_forces
+from taichi_soft.solver.kernels.attempts import begin_body
+from taichi_soft.solver.kernels.body_end import end_body
+from taichi_soft.solver.kernels.drift import drift_body, has_drifted, is_clear
+from taichi_soft.solver.kernels.implicit_euler import implicit_substep, keeps_shape
+from taichi_soft.solver.kernels.jobs import OWNER, run_job
+from taichi_soft.solver.kernels.kick import kick_among_colliders
+from taichi_soft.solver.kernels.motion import move_body
+from taichi_soft.solver.kernels.vibration import damp_vibration
+from taichi_soft.solver.step_fields import Job
+
+BEGIN, KICK, BOXES, SEARCH, GAPS, DRIFT, END = range(7)
+"""Phases that each body makes by itself. The first and the last belong to the whole step."""
+
+NONE, OUTDATED, VALID = range(3)
+"""Candidates of an island: the last step has forgotten its own; those of an attempt at this one; usable."""
+
+BLOW = 0.1
+"""Mean edges within a substep from which a body that is struck may strike the next one in the same substep.
+A slower one may go into the next body by that much, and is moved out again."""
+
+
+@ti.func
+def substep(state: ti.template(), program: ti.template(), island, now, run: ti.template()):
+    """One substep of an island.
+
+    Args:
+        now: a `Moment`.
+        run: a `Progress`, which becomes that after the substep.
+    """
+    if ti.static(program.has_contact):
+        drift_time = _kick_bodies(state, program, island, now, run)
+        speed, impact_speed = _compare_speeds(state, island, now, run)
+        if _has_drifted(state, island, now, run, drift_time) == 0:
+            joint_speed, joint_impact = _solve_joints(state, program, island, now, run)
+            _solve_contact(state, program, island, now, run, ti.max(impact_speed, joint_impact))
+            _drift_bodies(state, program, island, now, run, ti.max(speed, joint_speed))
+        _check_shapes(state, program, island, run)
+    else:
+        run.is_stable = run.is_stable & advance_body(state, program, island, now, True)
+
+
+@ti.func
+def advance_body(state: ti.template(), program: ti.template(), body, now, drifts: ti.template()):
+    """The phases of one body by itself.
+
+    Args:
+        now: a `Moment`, or a `Job` where the body is among colliders.
+        drifts: whether its particles drift in the kick, as nothing but the floor can be in the way.
+    Returns: whether forces changed no velocity by too much at once (1); by implicit Euler always.
+    """
+    kick = _kick_time(state, body, now)
+    felt = _felt_time(program, kick, now)
+    blow_on(state, body, now.h)
+    push_particles(state, body, _drive_time(program, now))
+    if ti.static(program.integrator != Integrator.IMPLICIT_EULER):  # which has these in its equations
+        accumulate_forces(state, program, body)
+        add_reactions(state, body, felt)
+        pull_grabs(state, body, now.h, felt)
+    damp_vibration(state, program, body, felt, now.h, now.s, now.substeps)
+    return _kick(state, program, body, now, kick, drifts)
+
+
+@ti.func
+def do_phase(state: ti.template(), program: ti.template(), island, body, job):
+    """One phase of one body, in whichever thread."""
+    if job.phase != KICK:
+        _do_other_phase(state, program, island, body, job)
+    elif state.body_status[body] == ACTIVE:
+        advance_body(state, program, body, job, False)
+
+
+@ti.real_func
+def _do_other_phase(state: ti.template(), program: ti.template(), island: ti.i32, body: ti.i32, job: Job):
+    """All phases but the kick; by itself, because Taichi takes more than twice as long for twice the code."""
+    if job.phase == BEGIN:
+        begin_body(state, program, body)
+    if job.phase == END:
+        state.contact.has_failed[body] = end_body(state, program, body, job.substeps, job.h)
+    if job.phase == DRIFT and state.body_status[body] == ACTIVE:
+        drift_body(state, body, job)
+    if ti.static(program.has_soft_contact):
+        if job.phase == DRIFT and is_social(state, island) == 1:
+            note_way(state, body, job.shift)
+        if job.phase == BOXES:
+            begin_search(state, body, job.impact_speed, job.h, job.left, job.forgets)
+        if job.phase == SEARCH:
+            search_body(state, body, island)
+        if job.phase == GAPS:
+            find_gaps(state, body, job.impact_speed, job.h)
+
+
+@ti.func
+def each_body(state: ti.template(), program: ti.template(), island, job):
+    """Have every body of an island make a phase, and wait for all."""
+    run_job(state, program, do_phase, island, OWNER, job)
+
+
+@ti.func
+def _kick_time(state: ti.template(), body, job):
+    """For how long forces act before a substep's drift [s]. The first ends the lag of the velocities."""
+    kick = ti.cast(job.h, ti.f32)
+    if job.s == 0:
+        kick = 0.5 * (state.body_velocity_lag[body] + job.h)
+    return kick
+
+
+@ti.func
+def _felt_time(program: ti.template(), kick, job):
+    """How long pins and grabs feel that [s]."""
+    felt = ti.cast(0.0, ti.f32)
+    if ti.static(program.integrator == Integrator.LEAPFROG):
+        felt = kick
+    elif ti.static(program.integrator != Integrator.IMPLICIT_EULER):
+        felt = job.h
+    return felt
+
+
+@ti.func
+def _drive_time(program: ti.template(), job):
+    """For how long drives act before a substep [s]: by leapfrog the last half comes after the last one."""
+    return 0.5 * job.h if ti.static(program.integrator == Integrator.LEAPFROG) and job.s == 0 else job.h
+
+
+@ti.func
+def _kick(state: ti.template(), program: ti.template(), body, job, kick, drifts: ti.template()):
+    is_stable = 1
+    if ti.static(not drifts):
+        is_stable = kick_among_colliders(state, program, body, job, kick)
+    elif ti.static(program.integrator == Integrator.IMPLICIT_EULER):
+        implicit_substep(state, program, body, job.h, int(job.s == 0))
+    else:
+        is_stable = move_body(state, program, body, job.h, kick)
+    return is_stable
+
+
+@ti.func
+def _kick_bodies(state: ti.template(), program: ti.template(), island, now, run: ti.template()):
+    """Returns: for how long bodies have drifted with their new velocities already [s]."""
+    body = state.contact.island_body[state.contact.island_first[island]]
+    is_free = _is_alone(state, program, island) & is_clear(state, body, run.fastest * now.h)
+    drift_time = now.h * ti.cast(is_free, ti.f32)
+    each_body(
+        state,
+        program,
+        island,
+        Job(
+            phase=KICK,
+            s=now.s,
+            substeps=now.substeps,
+            h=now.h,
+            since=now.since,
+            drift_time=drift_time,
+            velocity=run.velocity,
+        ),
+    )
+    return drift_time
+
+
+@ti.func
+def _is_alone(state: ti.template(), program: ti.template(), island):
+    """Whether nothing but colliders can touch what is in an island (1); by implicit Euler, never."""
+    body = state.contact.island_body[state.contact.island_first[island]]
+    bodies = state.contact.island_first[island + 1] - state.contact.island_first[island]
+    is_explicit = ti.static(program.integrator != Integrator.IMPLICIT_EULER)
+    alone = int(is_explicit) & int(bodies == 1) & int(state.body_drives[body] & JOINED == 0)
+    if ti.static(program.has_soft_contact):
+        alone = alone & (1 - is_social(state, island))
+    return alone
+
+
+@ti.func
+def _compare_speeds(state: ti.template(), island, now, run: ti.template()):
+    """What the bodies of an island noted in the kick, and whether forces changed no velocity by too much at once.
+
+    Returns: the highest speed [m/s]; that which one may give to another that it strikes, beside what they
+    share. What explodes is not counted in the second: others would be searched again and again because of it.
+    """
+    highest, striking = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32)
+    least_edge = ti.cast(NO_CONTACT, ti.f32)
+    for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
+        body = state.contact.island_body[i]
+        if state.body_status[body] == ACTIVE:
+            highest = ti.max(highest, state.contact.body_speed[body])
+            if state.contact.is_wild[body] == 0:
+                striking = ti.max(striking, 2.0 * state.contact.body_mean_beside[body])
+            run.is_stable = run.is_stable & state.contact.is_gentle[body]
+        least_edge = ti.min(least_edge, state.body_edge[body])
+    run.fastest = highest
+    return highest, ti.select(striking * now.h > BLOW * least_edge, striking, 0.0)
+
+
+@ti.func
+def _has_drifted(state: ti.template(), island, now, run: ti.template(), drift_time):
+    """Whether the bodies of an island are at new positions already (1): a body alone that meets nothing."""
+    has_moved = 0
+    body = state.contact.island_body[state.contact.island_first[island]]
+    if drift_time > 0.0 and state.body_status[body] == ACTIVE:
+        has_moved = has_drifted(state, body, run.fastest, now.h)
+    return has_moved
+
+
+@ti.func
+def _solve_joints(state: ti.template(), program: ti.template(), island, now, run: ti.template()):
+    """Returns: the highest speed of what joints hold [m/s], and the highest beside what the island shares."""
+    speed, beside = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32)
+    if ti.static(program.integrator != Integrator.IMPLICIT_EULER):
+        speed, beside = solve_joints(state, island, now.h, int(now.since == 0.0), run.velocity)
+    return speed, beside
+
+
+@ti.func
+def _solve_contact(
+    state: ti.template(), program: ti.template(), island, now, run: ti.template(), impact_speed
+):
+    """Contact between the bodies of an island: candidates, where they have aged; contacts; impulses."""
+    if ti.static(program.has_soft_contact):
+        if is_social(state, island) == 1:
+            if run.candidates != VALID or is_outdated(state, island, impact_speed, now.h) == 1:
+                run.shift = ti.Vector.zero(ti.f32, 3)
+                forgets = int(run.candidates != NONE)
+                each_body(
+                    state,
+                    program,
+                    island,
+                    Job(phase=BOXES, h=now.h, left=now.left, impact_speed=impact_speed, forgets=forgets),
+                )
+                each_body(state, program, island, Job(phase=SEARCH))
+            each_body(state, program, island, Job(phase=GAPS, h=now.h, impact_speed=impact_speed))
+            solve_island(state, island, now.h)
+            if state.soft.records_touches[None] == 1:
+                add_touches(state, island)
+    run.candidates = VALID
+
+
+@ti.func
+def _drift_bodies(state: ti.template(), program: ti.template(), island, now, run: ti.template(), fastest):
+    run.shift += now.h * run.velocity
+    each_body(
+        state,
+        program,
+        island,
+        Job(phase=DRIFT, h=now.h, since=now.since, left=now.left, fastest=fastest, shift=run.shift),
+    )
+
+
+@ti.func
+def _check_shapes(state: ti.template(), program: ti.template(), island, run: ti.template()):
+    """By implicit Euler, which takes forces as linear: whether no body changed its shape by too much."""
+    if ti.static(program.integrator == Integrator.IMPLICIT_EULER):
+        for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
+            body = state.contact.island_body[i]
+            if state.body_status[body] == ACTIVE:
+                run.is_stable = run.is_stable & int(keeps_shape(state, body))

@@ -1,0 +1,68 @@
+"""Fields of the step itself: how far each island has come in it, and what threads have to know of each other.
+
+Without contact each body is an island of its own, with the same number.
+"""
+
+from taichi_soft.core.runtime import ti
+
+MOST_PARTS = 16
+"""Parts of an island's bodies: threads beyond these share theirs."""
+
+
+@ti.dataclass
+class Progress:
+    """How far an island has come in a step, which a long one is made of several calls for."""
+
+    attempt: ti.i32  # number of the attempt at the step, from 0; or DONE
+    s: ti.i32  # next substep of the attempt
+    is_stable: ti.i32  # 0 where forces changed a velocity by too much at once in the attempt
+    failed: ti.i32  # bodies that did, once the step is made
+    is_awake: ti.i32
+    # With contact only.
+    candidates: ti.i32  # NONE, OUTDATED or VALID
+    fastest: ti.f32  # highest speed in the last substep [m/s]
+    velocity: ti.math.vec3  # mean velocity of the particles before the attempt [m/s]
+    shift: ti.math.vec3  # way with that velocity since candidates were searched for [m]
+
+
+@ti.dataclass
+class Moment:
+    """Where an attempt at a step is."""
+
+    s: ti.i32  # number of the substep, from 0
+    substeps: ti.i32  # of the attempt
+    h: ti.f32  # length of the substep [s]
+    since: ti.f32  # time since the start of the step, and until its end [s]
+    left: ti.f32
+
+
+@ti.dataclass
+class Job:
+    """A phase that each body of an island makes by itself, and what it has to know."""
+
+    phase: ti.i32
+    s: ti.i32  # number of the substep, from 0
+    substeps: ti.i32  # of the attempt at a step
+    forgets: ti.i32  # 1 where a search drops the candidates there are
+    h: ti.f32  # length of the substep [s]
+    since: ti.f32  # time since the start of the step, and until its end [s]
+    left: ti.f32
+    drift_time: ti.f32  # for how long particles drift with the kick already [s]
+    fastest: ti.f32  # highest speed in the island [m/s]
+    impact_speed: ti.f32  # that a body may get within the substep from others [m/s]
+    velocity: ti.math.vec3  # as in `Progress`
+    shift: ti.math.vec3
+
+
+@ti.data_oriented
+class JobFields:
+    """What threads share islands by: see `kernels/jobs.py`."""
+
+    def __init__(self, bodies: int) -> None:
+        """Allocate; contents are zero."""
+        self.job = Job.field(shape=bodies)  # type: ignore[attr-defined]  # of each island, what is called for
+        self.unfinished_islands = ti.field(ti.i32, ())  # of several bodies
+        self.useful_helpers = ti.field(ti.i32, ())  # threads beside their owners that could find a body there
+        self.parts = ti.field(ti.i32, ())  # of the bodies of an island, one for each thread
+        self.untaken = ti.field(ti.i32, MOST_PARTS * bodies)  # bodies of each part that wait for a thread
+        self.unfinished = ti.field(ti.i32, bodies)  # bodies of each island whose phase is not made yet
