@@ -203,7 +203,7 @@ def _is_alone(state: ti.template(), program: ti.template(), island):
 
 @ti.func
 def _compare_speeds(state: ti.template(), island, now, run: ti.template()):
-    """What the bodies of an island noted in the kick, and whether forces changed no velocity by too much at once.
+    """What the bodies of an island noted in the kick; whether forces changed no velocity by too much at once.
 
     Returns: the highest speed [m/s]; that which one may give to another that it strikes, beside what they
     share. What explodes is not counted in the second: others would be searched again and again because of it.
