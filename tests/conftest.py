@@ -48,6 +48,31 @@ LONGEST = (
 """Files that take longest where nothing is compiled yet. They begin first, so that no worker ends alone."""
 
 
+NUMPY = ("meshing/", "elements/materials/", "test_layers")
+KERNEL = ("elements/", "contact/distances/", "contact/shapes/", "core/math/")
+SOAK = (
+    *("lab/", "demos/", "cli/"),
+    *(
+        "solver/integrators/test_implicit_euler",
+        "solver/integrators/test_motion",
+        "contact/test_implicit_contact",
+    ),
+    *("solver/test_threads", "solver/test_long_steps", "solver/test_plasticity", "solver/test_gpu_launch"),
+    *("solver/test_damping_ratio", "world/test_bodies", "world/test_pools", "world/test_finite_readout"),
+    *("elements/laws/test_anisotropy", "control/test_materials", "bodies/test_particle_bodies"),
+    *("fracture/test_cutting", "fracture/test_cut_snapshots"),
+)
+"""Tiers, by the beginnings of files. SOAK compiles or runs for more than some 40 s with an empty cache and is
+left to `make test-all`; NUMPY runs no kernel, KERNEL some by themselves; the rest are whole worlds."""
+
+
+def tier_of(item):
+    """The marker of a test."""
+    file = item.nodeid.removeprefix("tests/")
+    tiers = {"soak": SOAK, "numpy": NUMPY, "kernel": KERNEL}
+    return next((name for name, starts in tiers.items() if file.startswith(starts)), "world")
+
+
 class ByKernels(LoadFileScheduling):
     """Whole files to one worker, and those that share their kernels to the same one."""
 
@@ -63,7 +88,10 @@ def pytest_xdist_make_scheduler(config, log):
     return ByKernels(config, log) if config.getvalue("dist") == "loadfile" else None
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
+    for item in items:
+        item.add_marker(tier_of(item))
     first = [*TOGETHER, *(f"tests/{name}.py" for name in LONGEST)]
 
     def place(item):
