@@ -133,7 +133,7 @@ class Attachments(Slice):
         self, entries: list[list[Any]], vertex_counts: Sequence[int], earlier: dict[str, Any]
     ) -> list[tuple[int, int, int, bool, NDArray[np.int32]]]:
         """Rows of `entries`. Raises: ValueError for what holds nobody, or hangs from no frame."""
-        rows = {row for _, row, _, _ in earlier[Frames.name]}
+        rows = {row for row, (serial, _, _) in enumerate(earlier[Frames.name]) if serial != 0}
         found = []
         for serial, slot, number, two_way, particles in entries:
             count = vertex_counts[below(slot, len(vertex_counts))]

@@ -11,15 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 from taichi_soft.bodies.fields import BodyFields
 from taichi_soft.bodies.soft_body import Context, RowsOf, Slice, SoftBody
 from taichi_soft.control.jumps import carry
-from taichi_soft.control.kernels.pins import ARRIVED, STILL, TO_TARGET, WITH_FRAME, aim_pinned
+from taichi_soft.control.kernels.pins import WITH_FRAME, aim_pinned
 from taichi_soft.core.checks import as_flag, as_rotation, as_vector
 from taichi_soft.core.constants import POSITION_LIMIT
 from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.core.handles import Handle, recorded, serial_of
-from taichi_soft.core.serialisation import below, vector_of
-
-MOST_FRAMES = 1 << 20
-"""A snapshot that names more is not in order."""
+from taichi_soft.core.serialisation import require_below, vector_of
 
 
 class Frames(Slice):
@@ -89,49 +86,48 @@ class Frames(Slice):
         return longest
 
     def entries(self) -> list[list[Any]]:
-        """Numbers of handle and row, and both poses."""
+        """Of each row the number of its handle, 0 where it is free, and both poses."""
         return [
-            [serial_of(frame), number, self.present[number].tolist(), self.coming[number].tolist()]
-            for number, frame in enumerate(self.rows)
-            if frame is not None
+            [0 if frame is None else serial_of(frame), present.tolist(), coming.tolist()]
+            for frame, present, coming in zip(self.rows, self.present, self.coming, strict=False)
         ]
+
+    def serials(self, entries: list[list[Any]]) -> list[int]:
+        """Of those rows that are not free."""
+        return [serial for serial, _, _ in entries if serial != 0]
 
     def read(
         self, entries: list[list[Any]], vertex_counts: Sequence[int], earlier: dict[str, Any]
-    ) -> list[tuple[int, int, NDArray[np.float32], NDArray[np.float32]]]:
-        """Rows of `entries`. Raises: ValueError for two in one row, or one out of reach."""
+    ) -> list[tuple[int, NDArray[np.float32], NDArray[np.float32]]]:
+        """Rows of `entries`. Raises: ValueError for one out of reach."""
         found = []
-        for serial, number, *poses in entries:
+        for serial, *poses in entries:
             present, coming = (vector_of(pose, 12) for pose in poses)
             if not max(np.abs(present).max(), np.abs(coming).max()) <= POSITION_LIMIT:
                 raise ValueError("a frame is out of reach")
-            row = below(number, MOST_FRAMES)
-            found.append((int(serial), row, present.astype(np.float32), coming.astype(np.float32)))
-        if len({row for _, row, _, _ in found}) < len(found):
-            raise ValueError("two frames are in one row")
+            found.append((int(serial), present.astype(np.float32), coming.astype(np.float32)))
         return found
 
     def require(self, read: Any, rows_of: RowsOf) -> None:
-        """Raises: ValueError where a particle goes with a frame that there is not."""
-        aims = rows_of(self.context.built.state.particle_aim)
-        alive = {WITH_FRAME + row for _, row, _, _ in read}
-        if not set(np.unique(aims).tolist()) <= {STILL, TO_TARGET, ARRIVED, *alive}:
-            raise ValueError("a particle goes with no frame")
+        """Raises: ValueError where a particle goes with a frame that there never was."""
+        require_below(rows_of(self.context.built.state.particle_aim), WITH_FRAME + len(read))
 
     def restore(self, read: Any) -> None:
         """Let there be the frames that were `read`, and no other. Pins are aimed before the next step."""
-        count = max((row for _, row, _, _ in read), default=-1) + 1
-        self.rows = [None] * count
-        self.present = np.zeros((max(count, 1), 12), dtype=np.float32)
+        self.rows = [None] * len(read)
+        self.present = np.zeros((max(len(read), 1), 12), dtype=np.float32)
         self.coming = self.present.copy()
         self.past, self.has_work = self.present.copy(), True
         handles = self.context.handles
-        for serial, row, present, coming in read:
+        for row, (serial, present, coming) in enumerate(read):
+            self.present[row], self.coming[row] = present, coming
+            if serial == 0:
+                continue
             frame = handles.find(serial, Frame)
             if frame is None or frame._number != row:
                 frame = Frame._at(self, row)
             handles.enlist(frame, serial)
-            self.rows[row], self.present[row], self.coming[row] = frame, present, coming
+            self.rows[row] = frame
 
 
 class Frame(Handle):

@@ -378,7 +378,7 @@ def set_word(at, to):
         set_note("slices", "grabs", to=[[9, 99, 0, [0, 0, 0]]]),
         set_note("slices", "grabs", to=[[9, 0, 0, [0, 0, 0]]]),
         set_note("slices", "frames", to=[1, 2, 3]),
-        set_note("slices", "frames", to=[[9, 0, [1e30] * 12, [0.0] * 12]]),
+        set_note("slices", "frames", to=[[9, [1e30] * 12, [0.0] * 12]]),
         set_note("slices", "colliders", to=[[9, True, "none", None, 0, [0, 0, 0, 1, 1], [], None]]),
         set_note("time", to=np.nan),
         set_note("last_dt", to=np.inf),
