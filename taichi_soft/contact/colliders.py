@@ -298,7 +298,7 @@ class Colliders(Slice):
         """Raises: ValueError where an impulse that contact goes on with is not finite."""
         if self._contact is not None and self._contact.capacity.soft:
             soft = self.context.built.state.soft
-            for field in (soft.kept_press, soft.kept_rub):
+            for field in (soft.kept_normal_impulse, soft.kept_friction_impulse):
                 if not np.abs(rows_of(field)).max() <= MOST_IMPULSE:
                     raise ValueError("particles are out of reach, or not finite")
 

@@ -68,10 +68,10 @@ class ContactFields:
         self.gone = ti.field(ti.f32, bodies)  # way [m] since it was looked which are near, at most
         self.impulse = ti.Vector.field(3, ti.f32, bodies * c)  # on the collider in this step [N s]
         self.angular_impulse = ti.Vector.field(3, ti.f32, bodies * c)  # about its position [N m s]
-        self.press = ti.Vector.field(3, ti.f32, bodies * c)  # on the body in this substep [N s]
+        self.normal_impulse = ti.Vector.field(3, ti.f32, bodies * c)  # on the body in this substep [N s]
         # Of the presses of its particles: their sum [N s], and those times the speed along the normal with
         # which the surface came, and with which particle and surface came together [N].
-        self.press_rates = ti.Vector.field(3, ti.f32, bodies * c)
+        self.normal_impulse_rates = ti.Vector.field(3, ti.f32, bodies * c)
         self.rebound = ti.field(ti.f32, bodies * c)  # speed at which the body may leave [m/s]; 0 where apart
         self.prev_rebound = ti.field(ti.f32, bodies * c)  # before the step
         # Corners of a box [m]: of the way through a step, of the search in an island, or where a body sleeps.
@@ -79,9 +79,11 @@ class ContactFields:
         self.body_upper = ti.Vector.field(3, ti.f32, bodies)
         self.sleep_speed = ti.field(ti.f32, ())  # [m/s] below which bodies fall asleep; 0 for never
         self.calm = ti.field(ti.f32, bodies)  # time since a body was faster [s]
-        self.is_wild = ti.field(ti.i32, bodies)  # 1 where it flies apart, and must not take others with it
+        self.is_exploding = ti.field(
+            ti.i32, bodies
+        )  # 1 where it flies apart, and must not take others with it
         self.body_filter = ti.Vector.field(2, ti.i32, bodies)  # group, mask
-        self.is_gentle = ti.field(ti.i32, bodies)  # 0 where forces moved a particle too far in one substep
+        self.is_stable = ti.field(ti.i32, bodies)  # 0 where forces moved a particle too far in one substep
         self.has_failed = ti.field(ti.i32, bodies)  # 1 where it broke or was not solved well in this step
         self.body_speed = ti.field(ti.f32, bodies)  # of its fastest particle in this substep [m/s]
         # Beside the velocity that its island shares [m/s]; by leapfrog of what was touched before the push.
@@ -144,8 +146,8 @@ class SoftContactFields:
         self.slot_gap = ti.field(ti.f32, outer * SLOTS)  # [m], beyond the thickness; or NO_CONTACT
         self.slot_weights = ti.Vector.field(3, ti.f32, outer * SLOTS)  # barycentric, of the nearest point
         self.slot_normal = ti.Vector.field(3, ti.f32, outer * SLOTS)  # from the triangle to the vertex
-        self.slot_press = ti.field(ti.f32, outer * SLOTS)  # impulse along it in this substep [N s]
-        self.slot_rub = ti.Vector.field(3, ti.f32, outer * SLOTS)  # friction on the vertex [N s]
+        self.slot_normal_impulse = ti.field(ti.f32, outer * SLOTS)  # impulse along it in this substep [N s]
+        self.slot_friction_impulse = ti.Vector.field(3, ti.f32, outer * SLOTS)  # friction on the vertex [N s]
         # Contacts of this substep; between a search and the gaps, those of the last one. Slots of each body
         # from its first slot on; no other slot has an impulse. Of each what its solves share: inverse masses
         # of the vertex and the corners [1/kg]; whether the bodies of the two move (1); normal of the
@@ -153,15 +155,15 @@ class SoftContactFields:
         # gradients of the weights.
         self.contact_count = ti.field(ti.i32, bodies)
         self.contact_slot = ti.field(ti.i32, outer * SLOTS)
-        self.slot_mobility = ti.Vector.field(4, ti.f32, outer * SLOTS)
+        self.slot_inv_mass = ti.Vector.field(4, ti.f32, outer * SLOTS)
         self.slot_moves = ti.Vector.field(2, ti.f32, outer * SLOTS)
         self.slot_face = ti.Vector.field(3, ti.f32, outer * SLOTS)
         self.slot_shares = ti.Vector.field(3, ti.f32, outer * SLOTS)
         self.slot_levers = ti.Matrix.field(3, 3, ti.f32, outer * SLOTS)
         # The contact in which a particle was pressed most at the end of the last step.
         self.kept_triangle = ti.field(ti.i32, particles)
-        self.kept_press = ti.field(ti.f32, particles)  # as `slot_press`; 0 for none
-        self.kept_rub = ti.Vector.field(3, ti.f32, particles)
+        self.kept_normal_impulse = ti.field(ti.f32, particles)  # as `slot_normal_impulse`; 0 for none
+        self.kept_friction_impulse = ti.Vector.field(3, ti.f32, particles)
         self.records_touches = ti.field(ti.i32, ())  # 1 where the rows below are filled
         # Two bodies, the smaller index first; both 0 in a free row. Island by island, as in `island_body`.
         self.pair_bodies = ti.Vector.field(2, ti.i32, bodies * PAIR_ROWS)
@@ -170,4 +172,4 @@ class SoftContactFields:
 
     def carried(self) -> list[Any]:
         """What the next step depends on, of each particle."""
-        return [self.kept_triangle, self.kept_press, self.kept_rub]
+        return [self.kept_triangle, self.kept_normal_impulse, self.kept_friction_impulse]

@@ -87,7 +87,7 @@ class State(BodyFields):
             fill(self.soft.sweep_order, np.arange(count))
             fill(self.soft.slot_count, np.zeros(0))
             fill(self.soft.contact_count, np.zeros(0))
-            fill(self.soft.kept_press, np.zeros(0))
+            fill(self.soft.kept_normal_impulse, np.zeros(0))
             self.soft.records_touches[None] = 0
             self.soft.pairs_lost[None] = 0
             fill(self.soft.pair_bodies, np.zeros((0, 2)))

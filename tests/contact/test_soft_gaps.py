@@ -33,7 +33,7 @@ class Candidates:
         self.world, self.state = world, world._built.state
         assert isinstance(self.state, State)
         contact, soft = self.state.contact, self.state.soft
-        for field in (contact.is_wild, soft.particle_gone, soft.particle_speed):
+        for field in (contact.is_exploding, soft.particle_gone, soft.particle_speed):
             field.fill(0)  # a step writes them first; here they may be of the last world of this size
         outer = self.state.body_outer.to_numpy()[BODY][0]
         self.first, self.vertex = outer * SLOTS, self.state.outer_particle[outer]
@@ -52,12 +52,12 @@ class Candidates:
         self.state.particle_position.from_numpy(x)
         soft.slot_count[BODY] = len(triangles)
 
-    def bear(self, row: int, press: float, rub) -> None:
+    def bear(self, row: int, normal_impulse: float, friction_impulse) -> None:
         """Make one the only contact there was, with these impulses [N s]."""
         soft = self.state.soft
         for other in range(3):
-            soft.slot_press[self.first + other] = press if other == row else 0.0
-            soft.slot_rub[self.first + other] = rub if other == row else [0.0] * 3
+            soft.slot_normal_impulse[self.first + other] = normal_impulse if other == row else 0.0
+            soft.slot_friction_impulse[self.first + other] = friction_impulse if other == row else [0.0] * 3
         soft.contact_count[BODY], soft.contact_slot[self.first] = 1, self.first + row
 
     def contacts(self) -> list[int]:
@@ -65,11 +65,11 @@ class Candidates:
         count = self.state.soft.contact_count[BODY]
         return [self.state.soft.contact_slot[self.first + k] - self.first for k in range(count)]
 
-    def press(self) -> list[float]:
-        return [self.state.soft.slot_press[self.first + row] for row in range(3)]
+    def normal_impulse(self) -> list[float]:
+        return [self.state.soft.slot_normal_impulse[self.first + row] for row in range(3)]
 
-    def rub(self) -> list[list[float]]:
-        return [list(self.state.soft.slot_rub[self.first + row]) for row in range(3)]
+    def friction_impulse(self) -> list[list[float]]:
+        return [list(self.state.soft.slot_friction_impulse[self.first + row]) for row in range(3)]
 
 
 @pytest.fixture(scope="module")
@@ -87,14 +87,14 @@ def test_none_but_the_contacts_keep_an_impulse(candidates):
     candidates.place((0, 0, 0), [level(0.02), level(-0.001), level(0.01)])
     candidates.bear(1, 5.0, [1.0, 2.0, 0.0])
     assert candidates.contacts() == [2]
-    assert candidates.press() == [0.0, 0.0, 5.0]
-    assert candidates.rub() == [[0.0] * 3, [0.0] * 3, [1.0, 2.0, 0.0]]
+    assert candidates.normal_impulse() == [0.0, 0.0, 5.0]
+    assert candidates.friction_impulse() == [[0.0] * 3, [0.0] * 3, [1.0, 2.0, 0.0]]
     wall = level(0.01)[:, [2, 0, 1]]
     candidates.place((0, 0, 0), [level(0.02), level(-0.001), wall])
     candidates.bear(1, 5.0, [1.0, 2.0, 0.0])
     assert candidates.contacts() == [2]
-    assert candidates.press() == [0.0] * 3
-    assert candidates.rub() == [[0.0] * 3] * 3
+    assert candidates.normal_impulse() == [0.0] * 3
+    assert candidates.friction_impulse() == [[0.0] * 3] * 3
 
 
 @pytest.mark.parametrize("bears", [0, 1])
@@ -114,7 +114,7 @@ def test_in_front_of_an_edge_the_triangle_that_bears_goes_on_whatever_rounding_s
         candidates.place(turn @ vertex + away, [corners @ turn.T + away for corners in roof])
         candidates.bear(bears, 2.0, [0.1, 0.0, 0.0])
         assert candidates.contacts() == [bears]
-        assert candidates.press()[bears] == 2.0
+        assert candidates.normal_impulse()[bears] == 2.0
 
 
 def test_on_a_flat_surface_the_nearest_triangle_bears_however_it_was_before(candidates):
@@ -126,8 +126,8 @@ def test_on_a_flat_surface_the_nearest_triangle_bears_however_it_was_before(cand
             candidates.bear(bears, 2.0, [0.1, 0.0, 0.0])
             over = int(side > 0.0)
             assert candidates.contacts() == [over]
-            assert candidates.press()[over] == 2.0
-            assert candidates.rub()[over] == pytest.approx([0.1, 0.0, 0.0])
+            assert candidates.normal_impulse()[over] == 2.0
+            assert candidates.friction_impulse()[over] == pytest.approx([0.1, 0.0, 0.0])
 
 
 def test_a_tip_in_a_valley_rests_on_both_its_sides():

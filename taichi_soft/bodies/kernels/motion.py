@@ -40,7 +40,7 @@ def moves(state: ti.template(), p):
 
 
 @ti.func
-def mobility(state: ti.template(), p):
+def inv_mass_of(state: ti.template(), p):
     """Inverse mass [1/kg]; zero where the body does not move."""
     return state.particle_inv_mass[p] * moves(state, p)
 

@@ -3,7 +3,7 @@
 from taichi_soft.contact.distances.response import resolved_velocity
 from taichi_soft.contact.distances.sweep import NEVER, TOUCHING, distance_from, first_touch, rests_at
 from taichi_soft.contact.fields import NO_COLLIDER
-from taichi_soft.contact.kernels.rebound import add_press
+from taichi_soft.contact.kernels.rebound import add_normal_impulse
 from taichi_soft.core.math.quaternion import spun, turned, turned_back
 from taichi_soft.core.runtime import ti
 
@@ -89,8 +89,8 @@ def forget_contacts(state: ti.template(), body):
     for row in range(body * state.contact.capacity.colliders, (body + 1) * state.contact.capacity.colliders):
         state.contact.impulse[row] = ti.Vector.zero(ti.f32, 3)
         state.contact.angular_impulse[row] = ti.Vector.zero(ti.f32, 3)
-        state.contact.press[row] = ti.Vector.zero(ti.f32, 3)
-        state.contact.press_rates[row] = ti.Vector.zero(ti.f32, 3)
+        state.contact.normal_impulse[row] = ti.Vector.zero(ti.f32, 3)
+        state.contact.normal_impulse_rates[row] = ti.Vector.zero(ti.f32, 3)
     was_deep = state.contact.reach[body] > DEEP * state.body_edge[body]
     if was_deep and state.contact.near_count[body] > 0:
         for p in range(state.body_particles[body][0], state.body_particles[body][1]):
@@ -154,7 +154,9 @@ def collided(state: ti.template(), body, p, start, way_velocity, h, since):
             mass = 1.0 / ti.max(state.particle_inv_mass[p], 1e-30)
             impulse = -mass * push
             if surface.y >= 0.0:
-                add_press(state.contact, row + c, -n.dot(impulse), n, n.dot(v), n.dot(surface_velocity))
+                add_normal_impulse(
+                    state.contact, row + c, -n.dot(impulse), n, n.dot(v), n.dot(surface_velocity)
+                )
             # With what the shift of the path, which v takes no part in, does to the angular momentum.
             angular_impulse = (end - centre).cross(impulse) - mass * (end - before).cross(v)
             state.contact.impulse[row + c] = state.contact.impulse[row + c] + impulse

@@ -31,16 +31,16 @@ def take_back_rebounds(state: ti.template(), body):
 
 
 @ti.func
-def add_press(contact: ti.template(), row, press, normal, before, surface):
+def add_normal_impulse(contact: ti.template(), row, normal_impulse, normal, before, surface):
     """Note how a collider pressed a particle.
 
     Args:
-        press: impulse along the normal [N s].
+        normal_impulse: impulse along the normal [N s].
         before, surface: velocities along the normal, of the particle until then and of the surface [m/s].
     """
-    contact.press[row] = contact.press[row] + press * normal
-    rates = ti.Vector([press, press * surface, press * (surface - before)])
-    contact.press_rates[row] = contact.press_rates[row] + rates
+    contact.normal_impulse[row] = contact.normal_impulse[row] + normal_impulse * normal
+    rates = ti.Vector([normal_impulse, normal_impulse * surface, normal_impulse * (surface - before)])
+    contact.normal_impulse_rates[row] = contact.normal_impulse_rates[row] + rates
 
 
 @ti.func
@@ -55,10 +55,10 @@ def limit_rebounds(state: ti.template(), body, time):
     for k in range(state.contact.near_count[body]):
         c = state.contact.near[first + k]
         row = first + c
-        rates = state.contact.press_rates[row]
-        press = state.contact.press[row].norm()
-        if press > 0.0:
-            n = state.contact.press[row] / press
+        rates = state.contact.normal_impulse_rates[row]
+        normal_impulse = state.contact.normal_impulse[row].norm()
+        if normal_impulse > 0.0:
+            n = state.contact.normal_impulse[row] / normal_impulse
             mass, along = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32)
             moment = ti.Vector.zero(ti.f32, 3)
             for p in range(particles[0], particles[1]):
@@ -67,7 +67,7 @@ def limit_rebounds(state: ti.template(), body, time):
                     along += state.particle_mass[p] * state.particle_velocity[p].dot(n)
                     moment += state.particle_mass[p] * state.particle_position[p]
             speed = along / mass - rates.y / rates.x
-            approach = press / mass - speed
+            approach = normal_impulse / mass - speed
             leave = state.contact.rebound[row]
             if leave == 0.0:
                 # Where a body strikes because it turns, its centre may leave though it did not come near.
@@ -75,7 +75,7 @@ def limit_rebounds(state: ti.template(), body, time):
             if approach > RESTITUTION_SPEED:
                 leave = ti.max(leave, state.contact.collider_surface[c].y * approach)
             state.contact.rebound[row] = leave
-            excess = ti.min(mass * (speed - leave), press)
+            excess = ti.min(mass * (speed - leave), normal_impulse)
             if excess > 0.0:
                 for p in range(particles[0], particles[1]):
                     if state.particle_inv_mass[p] > 0.0:
@@ -85,5 +85,5 @@ def limit_rebounds(state: ti.template(), body, time):
                 state.contact.impulse[row] = state.contact.impulse[row] + excess * n
                 turn = state.contact.angular_impulse[row] + excess * arm.cross(n)
                 state.contact.angular_impulse[row] = turn
-            state.contact.press[row] = ti.Vector.zero(ti.f32, 3)
-            state.contact.press_rates[row] = ti.Vector.zero(ti.f32, 3)
+            state.contact.normal_impulse[row] = ti.Vector.zero(ti.f32, 3)
+            state.contact.normal_impulse_rates[row] = ti.Vector.zero(ti.f32, 3)

@@ -5,7 +5,7 @@ with it of its sliding: projected Gauss-Seidel over velocities, begun with the i
 Impulses are equal and opposite. What is too near already is moved apart without giving it a velocity.
 """
 
-from taichi_soft.bodies.kernels.motion import mobility, moves
+from taichi_soft.bodies.kernels.motion import inv_mass_of, moves
 from taichi_soft.contact.fields import SLOTS
 from taichi_soft.core.math.finite import is_finite
 from taichi_soft.core.runtime import ti
@@ -46,12 +46,12 @@ def note_levers(state: ti.template(), slot):
     state.soft.slot_face[slot] = n
     state.soft.slot_shares[slot] = weights + gradients @ way
     state.soft.slot_levers[slot] = way.dot(n) * gradients
-    state.soft.slot_mobility[slot] = ti.Vector(
+    state.soft.slot_inv_mass[slot] = ti.Vector(
         [
-            mobility(state, p),
-            mobility(state, corners[0]),
-            mobility(state, corners[1]),
-            mobility(state, corners[2]),
+            inv_mass_of(state, p),
+            inv_mass_of(state, corners[0]),
+            inv_mass_of(state, corners[1]),
+            inv_mass_of(state, corners[2]),
         ]
     )
     state.soft.slot_moves[slot] = ti.Vector([moves(state, p), moves(state, corners[0])])
@@ -61,15 +61,15 @@ def note_levers(state: ti.template(), slot):
 def _push_apart(state: ti.template(), p, corners, slot, depth):
     """Move apart what is too near by `depth` [m], by a part of it, without giving it a velocity."""
     normal, weights = state.soft.slot_normal[slot], state.soft.slot_weights[slot]
-    total = mobility(state, p)
+    total = inv_mass_of(state, p)
     for i in range(3):
-        total += weights[i] * weights[i] * mobility(state, corners[i])
+        total += weights[i] * weights[i] * inv_mass_of(state, corners[i])
     if total > 0.0:
         push = PUSH_OUT * depth / total
-        state.particle_position[p] = state.particle_position[p] + mobility(state, p) * push * normal
+        state.particle_position[p] = state.particle_position[p] + inv_mass_of(state, p) * push * normal
         for i in range(3):
             q = corners[i]
-            back = weights[i] * mobility(state, q) * push
+            back = weights[i] * inv_mass_of(state, q) * push
             state.particle_position[q] = state.particle_position[q] - back * normal
 
 
@@ -82,7 +82,7 @@ def _solve_contact(state: ti.template(), soft: ti.template(), slot, p, corners, 
     """
     normal, weights, shares = soft.slot_normal[slot], soft.slot_weights[slot], soft.slot_shares[slot]
     face, levers, moves = soft.slot_face[slot], soft.slot_levers[slot], soft.slot_moves[slot]
-    m, corner_m = soft.slot_mobility[slot][0], soft.slot_mobility[slot].yzw
+    m, corner_m = soft.slot_inv_mass[slot][0], soft.slot_inv_mass[slot].yzw
     v = moves[0] * state.particle_velocity[p]
     corner_v = moves[1] * ti.Matrix.rows(
         [
@@ -92,33 +92,33 @@ def _solve_contact(state: ti.template(), soft: ti.template(), slot, p, corners, 
         ]
     )
 
-    press = soft.slot_press[slot]
-    push = press
+    normal_impulse = soft.slot_normal_impulse[slot]
+    push = normal_impulse
     if is_first == 0:
         allowed = -ti.max(soft.slot_gap[slot], 0.0) / h
         approach = v.dot(normal) - weights.dot(corner_v @ normal)
         total = m + (weights * weights).dot(corner_m)
-        wanted_press = ti.max(press + (allowed - approach) / ti.max(total, 1e-30), 0.0)
-        push = wanted_press - press
-        press = wanted_press
-        soft.slot_press[slot] = press
+        wanted_impulse = ti.max(normal_impulse + (allowed - approach) / ti.max(total, 1e-30), 0.0)
+        push = wanted_impulse - normal_impulse
+        normal_impulse = wanted_impulse
+        soft.slot_normal_impulse[slot] = normal_impulse
     if is_finite(push * normal):
         v += m * push * normal
         corner_v -= (push * weights * corner_m).outer_product(normal)
 
-    rub = soft.slot_rub[slot]
-    # Where no press is left, friction takes back what it gave in an earlier sweep.
-    if press > 0.0 or ti.abs(rub).max() > 0.0:
-        change = rub
+    friction_impulse = soft.slot_friction_impulse[slot]
+    # Where nothing presses any more, friction takes back what it gave in an earlier sweep.
+    if normal_impulse > 0.0 or ti.abs(friction_impulse).max() > 0.0:
+        change = friction_impulse
         if is_first == 0:
             relative = v - corner_v.transpose() @ shares + levers.transpose() @ (corner_v @ face)
             sliding = relative - relative.dot(normal) * normal
             tilt = levers @ (sliding / ti.max(sliding.norm(), 1e-30))
             total = m + corner_m.dot(shares * shares + tilt * tilt)
-            wanted = rub - sliding / ti.max(total, 1e-30)
-            wanted *= ti.min(1.0, friction * press / ti.max(wanted.norm(), 1e-30))
-            soft.slot_rub[slot] = wanted
-            change = wanted - rub
+            wanted = friction_impulse - sliding / ti.max(total, 1e-30)
+            wanted *= ti.min(1.0, friction * normal_impulse / ti.max(wanted.norm(), 1e-30))
+            soft.slot_friction_impulse[slot] = wanted
+            change = wanted - friction_impulse
         if is_finite(change):
             v += m * change
             taken = (corner_m * shares).outer_product(change)
@@ -129,7 +129,7 @@ def _solve_contact(state: ti.template(), soft: ti.template(), slot, p, corners, 
     if moves[1] > 0.0:
         for i in ti.static(range(3)):
             state.particle_velocity[corners[i]] = ti.Vector([corner_v[i, 0], corner_v[i, 1], corner_v[i, 2]])
-    return int(press > 0.0)
+    return int(normal_impulse > 0.0)
 
 
 @ti.func

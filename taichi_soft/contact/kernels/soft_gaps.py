@@ -93,22 +93,22 @@ def _reach_of(state: ti.template(), slot, given, h):
     for i in ti.static(range(1, 4)):
         speed = ti.max(speed, state.soft.particle_speed[who[i]])
     way = h * (speed + ti.max(given, state.soft.particle_speed[who[0]]))
-    is_wild = state.contact.is_wild[mine] + state.contact.is_wild[other]
-    return thickness, ti.select(is_wild > 0, -NO_CONTACT, way)
+    is_exploding = state.contact.is_exploding[mine] + state.contact.is_exploding[other]
+    return thickness, ti.select(is_exploding > 0, -NO_CONTACT, way)
 
 
 @ti.func
 def _clear_impulses(soft: ti.template(), slot):
-    soft.slot_press[slot] = 0.0
-    soft.slot_rub[slot] = ti.Vector.zero(ti.f32, 3)
+    soft.slot_normal_impulse[slot] = 0.0
+    soft.slot_friction_impulse[slot] = ti.Vector.zero(ti.f32, 3)
 
 
 @ti.func
 def _give_way(soft: ti.template(), lost, kept):
     """One contact ends, and another goes on with its impulses."""
     soft.slot_gap[lost] = NO_CONTACT
-    soft.slot_press[kept] = soft.slot_press[kept] + soft.slot_press[lost]
-    soft.slot_rub[kept] = soft.slot_rub[kept] + soft.slot_rub[lost]
+    soft.slot_normal_impulse[kept] = soft.slot_normal_impulse[kept] + soft.slot_normal_impulse[lost]
+    soft.slot_friction_impulse[kept] = soft.slot_friction_impulse[kept] + soft.slot_friction_impulse[lost]
     _clear_impulses(soft, lost)
 
 
@@ -132,7 +132,7 @@ def _drop_twins(soft: ti.template(), first, at, lead):
             inside = is_inside + int(soft.slot_weights[other].min() > OUTSIDE)
             same = ti.select(inside == 2, SAME_INSIDE, SAME)
             if soft.slot_normal[other].dot(soft.slot_normal[slot]) > same:
-                bears = int(soft.slot_press[other] > 0.0) - int(soft.slot_press[slot] > 0.0)
+                bears = int(soft.slot_normal_impulse[other] > 0.0) - int(soft.slot_normal_impulse[slot] > 0.0)
                 ahead = ti.select(inside == 0, bears * lead, 0.0)
                 kept, lost = other, slot
                 if soft.slot_gap[other] > soft.slot_gap[slot] + ahead:

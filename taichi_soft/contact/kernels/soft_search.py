@@ -144,15 +144,15 @@ def forget_candidates(state: ti.template(), body):
     outer = state.body_outer[body]
     for k in range(outer[0], outer[1]):
         p = state.outer_particle[k]
-        state.soft.kept_press[p] = 0.0
+        state.soft.kept_normal_impulse[p] = 0.0
     first_slot = outer[0] * SLOTS
     for k in range(first_slot, first_slot + state.soft.contact_count[body]):
         slot = state.soft.contact_slot[k]
         p = state.soft.slot_vertices[slot].x
-        if state.soft.slot_press[slot] > state.soft.kept_press[p]:
+        if state.soft.slot_normal_impulse[slot] > state.soft.kept_normal_impulse[p]:
             state.soft.kept_triangle[p] = state.soft.slot_triangle[slot]
-            state.soft.kept_press[p] = state.soft.slot_press[slot]
-            state.soft.kept_rub[p] = state.soft.slot_rub[slot]
+            state.soft.kept_normal_impulse[p] = state.soft.slot_normal_impulse[slot]
+            state.soft.kept_friction_impulse[p] = state.soft.slot_friction_impulse[slot]
     state.soft.slot_count[body] = 0
     state.soft.contact_count[body] = 0
 
@@ -225,11 +225,11 @@ def _list_candidates(state: ti.template(), body, thickness):
             state.soft.slot_vertices[slot] = ti.Vector([p, corners[0], corners[1], corners[2]])
             state.soft.slot_triangle[slot] = triangle
             state.soft.slot_spare[slot] = state.soft.found_distance[row] - mutual
-            state.soft.slot_press[slot] = 0.0
-            state.soft.slot_rub[slot] = ti.Vector.zero(ti.f32, 3)
-            if state.soft.kept_triangle[p] == triangle and state.soft.kept_press[p] > 0.0:
-                state.soft.slot_press[slot] = state.soft.kept_press[p]
-                state.soft.slot_rub[slot] = state.soft.kept_rub[p]
+            state.soft.slot_normal_impulse[slot] = 0.0
+            state.soft.slot_friction_impulse[slot] = ti.Vector.zero(ti.f32, 3)
+            if state.soft.kept_triangle[p] == triangle and state.soft.kept_normal_impulse[p] > 0.0:
+                state.soft.slot_normal_impulse[slot] = state.soft.kept_normal_impulse[p]
+                state.soft.slot_friction_impulse[slot] = state.soft.kept_friction_impulse[p]
                 state.soft.contact_slot[outer[0] * SLOTS + contacts] = slot
                 contacts += 1
             slot += 1
@@ -359,7 +359,7 @@ def search_body(state: ti.template(), body: ti.i32, island: ti.i32):
 
 
 @ti.func
-def is_social(state: ti.template(), island):
+def has_contact_pairs(state: ti.template(), island):
     """Whether anything in an island may touch a body (1)."""
     first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
     return int(last - first > 1 or state.soft.body_touches_itself[state.contact.island_body[first]] == 1)
@@ -377,7 +377,7 @@ def is_outdated(state: ti.template(), island, given, h):
     outdated, farthest, nearest_lost = 0, ti.cast(0.0, ti.f32), ti.cast(NO_CONTACT, ti.f32)
     for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
         body = state.contact.island_body[i]
-        if state.contact.is_wild[body] == 0:
+        if state.contact.is_exploding[body] == 0:
             speed = ti.max(given, state.contact.body_speed_beside[body])
             gone = state.soft.body_gone[body] + h * speed
             farthest = ti.max(farthest, gone)
@@ -399,7 +399,7 @@ def begin_search(state: ti.template(), body, given, h, left, forgets):
         forget_candidates(state, body)
     _find_box(state, body)
     speed, edge = state.contact.body_speed_beside[body], state.soft.body_surface[body].z
-    speed *= 1.0 - state.contact.is_wild[body]
+    speed *= 1.0 - state.contact.is_exploding[body]
     way = ti.min(ti.max(FORESIGHT * left * speed, SHORTEST * edge), LONGEST * edge)
     state.soft.body_reach[body] = ti.max(way, h * speed) + h * given
     state.soft.body_gone[body] = 0.0

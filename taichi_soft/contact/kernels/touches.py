@@ -39,15 +39,17 @@ def add_touches(state: ti.template(), island):
         first_slot = state.body_outer[body][0] * SLOTS
         for k in range(first_slot, first_slot + state.soft.contact_count[body]):
             slot = state.soft.contact_slot[k]
-            press = state.soft.slot_press[slot]
+            normal_impulse = state.soft.slot_normal_impulse[slot]
             other = state.particle_body[state.soft.slot_vertices[slot].y]
-            if press > 0.0 and other != body:
+            if normal_impulse > 0.0 and other != body:
                 a, b = ti.min(body, other), ti.max(body, other)
                 row = _find_pair(state.soft, first * PAIR_ROWS, (last - first) * PAIR_ROWS, a, b)
                 if row < 0:
                     state.soft.pairs_lost[None] = 1  # the same from whichever thread
                 else:
-                    on_vertex = press * state.soft.slot_normal[slot] + state.soft.slot_rub[slot]
+                    on_vertex = (
+                        normal_impulse * state.soft.slot_normal[slot] + state.soft.slot_friction_impulse[slot]
+                    )
                     on_b = ti.select(body == b, 1.0, -1.0) * on_vertex
                     state.soft.pair_impulse[row] = state.soft.pair_impulse[row] + on_b
 

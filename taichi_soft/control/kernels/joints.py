@@ -11,7 +11,7 @@ The impulse on the place is shared out so that it acts where the particle is. So
 momentum stay, also where there is a gap.
 """
 
-from taichi_soft.bodies.kernels.motion import mobility, velocity
+from taichi_soft.bodies.kernels.motion import inv_mass_of, velocity
 from taichi_soft.bodies.status import FEELS_REACTION, JOINED
 from taichi_soft.control.joint_fields import ENDS, MOST_JOINTS
 from taichi_soft.core.math.finite import is_finite
@@ -66,13 +66,13 @@ def _solve_row(state: ti.template(), j, r):
     total, wanted = ti.cast(0.0, ti.f32), state.joints.approach[r]
     for k in range(at, at + ENDS):
         p, share = state.joints.particle[k], state.joints.share[k]
-        total += share * share * mobility(state, p)
+        total += share * share * inv_mass_of(state, p)
         wanted -= share * velocity(state, p)
     impulse = wanted / ti.max(total, 1e-30)
     if total > 0.0 and is_finite(impulse) == 1:
         for k in range(at, at + ENDS):
             p, part = state.joints.particle[k], state.joints.share[k] * impulse
-            state.particle_velocity[p] = state.particle_velocity[p] + mobility(state, p) * part
+            state.particle_velocity[p] = state.particle_velocity[p] + inv_mass_of(state, p) * part
             feels = state.body_drives[state.particle_body[p]] & FEELS_REACTION
             if state.particle_inv_mass[p] == 0.0 and feels != 0:
                 state.particle_reaction[p] = state.particle_reaction[p] + part
@@ -109,8 +109,10 @@ def solve_joints(state: ti.template(), island, h, is_first, common):
                 j = _turned(step, 0, MOST_JOINTS, back)
                 ends = state.joints.bodies[j]
                 # What explodes takes no other with it.
-                is_wild = state.contact.is_wild[body] + state.contact.is_wild[ti.max(ends[1] - 1, 0)]
-                if ends[0] == body + 1 and is_wild == 0:
+                is_exploding = (
+                    state.contact.is_exploding[body] + state.contact.is_exploding[ti.max(ends[1] - 1, 0)]
+                )
+                if ends[0] == body + 1 and is_exploding == 0:
                     if sweep == 0 and is_first == 1:
                         state.joints.impulse[j] = ti.Vector.zero(ti.f32, 3)
                     rows = state.joints.rows[j]

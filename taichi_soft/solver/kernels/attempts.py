@@ -74,7 +74,7 @@ def _begin_contacts(state: ti.template(), program: ti.template(), body):
             state.prev_contact[p] = state.particle_contact[p]
     begin_rebounds(state, body)
     forget_contacts(state, body)
-    state.contact.is_wild[body] = 0
+    state.contact.is_exploding[body] = 0
     if ti.static(program.has_soft_contact):
         if state.body_status[body] != ACTIVE:
             state.contact.body_speed_beside[body] = 0.0

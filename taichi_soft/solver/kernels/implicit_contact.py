@@ -10,7 +10,7 @@ from taichi_soft.bodies.kernels.motion import gravity_on
 from taichi_soft.contact.distances.distance import signed_distance
 from taichi_soft.contact.distances.sweep import TOUCHING
 from taichi_soft.contact.fields import NO_COLLIDER
-from taichi_soft.contact.kernels.rebound import add_press
+from taichi_soft.contact.kernels.rebound import add_normal_impulse
 from taichi_soft.core.math.quaternion import spun, turned, turned_back
 from taichi_soft.core.runtime import ti
 from taichi_soft.solver.kernels.implicit_euler import add_pin_reactions, keep_residual, solve_body
@@ -78,26 +78,26 @@ def _press(state: ti.template(), body, p, h, since, v):
     c, mass, x = state.particle_contact[p] - 1, state.particle_mass[p], state.particle_position[p]
     hold = state.particle_hold[p]
     n = hold.xyz
-    press = hold.w + n.dot(state.image[p] - state.particle_force[p].xyz)  # [N s]
-    if not ti.abs(press) < HARDEST:
-        press = 0.0
+    normal_impulse = hold.w + n.dot(state.image[p] - state.particle_force[p].xyz)  # [N s]
+    if not ti.abs(normal_impulse) < HARDEST:
+        normal_impulse = 0.0
     surface_velocity, arm = _surface_velocity(state.contact, c, x, since, h)
     sliding = v - surface_velocity
     sliding -= n.dot(sliding) * n
     surface = state.contact.collider_surface[c]
-    brake = ti.min(surface.x * ti.max(press, 0.0) / mass, sliding.norm())
+    brake = ti.min(surface.x * ti.max(normal_impulse, 0.0) / mass, sliding.norm())
     change = -brake / ti.max(sliding.norm(), 1e-30) * sliding
-    impulse = press * n + mass * change
+    impulse = normal_impulse * n + mass * change
     row = body * state.contact.capacity.colliders + c
     state.contact.impulse[row] = state.contact.impulse[row] - impulse
     state.contact.angular_impulse[row] = state.contact.angular_impulse[row] - arm.cross(impulse)
-    if press < 0.0:
+    if normal_impulse < 0.0:
         state.particle_contact[p] = 0
     else:
         state.contact.particle_touches[p] = 1
         if surface.y >= 0.0:
             along = n.dot(surface_velocity)
-            add_press(state.contact, row, press, n, along, along)
+            add_normal_impulse(state.contact, row, normal_impulse, n, along, along)
     return v + change
 
 

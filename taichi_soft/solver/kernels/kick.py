@@ -11,7 +11,7 @@ from taichi_soft.core.types import Integrator
 from taichi_soft.solver.kernels.implicit_contact import kick_implicitly
 from taichi_soft.solver.kernels.motion import JOLT
 
-WILD = 20.0
+EXPLODING = 20.0
 """Way of a particle within one substep, over the mean edge of its body's surface, from which the body is
 taken to be exploding: others pass through it until it is frozen or calm."""
 
@@ -112,14 +112,14 @@ def _note_speeds(
     # Bodies beside each other in a field share a cache line, which every write takes from other threads: what
     # is as it was is not written.
     state.contact.body_speed[body] = speed
-    if state.contact.is_gentle[body] != is_stable:
-        state.contact.is_gentle[body] = is_stable
+    if state.contact.is_stable[body] != is_stable:
+        state.contact.is_stable[body] = is_stable
     if ti.static(program.has_soft_contact):
         state.contact.body_speed_beside[body] = beside
         state.contact.body_mean_beside[body] = mean_beside
-        is_wild = int(not (speed * h <= WILD * state.body_edge[body]))
-        if state.contact.is_wild[body] != is_wild:
-            state.contact.is_wild[body] = is_wild
+        is_exploding = int(not (speed * h <= EXPLODING * state.body_edge[body]))
+        if state.contact.is_exploding[body] != is_exploding:
+            state.contact.is_exploding[body] = is_exploding
 
 
 @ti.func

@@ -32,7 +32,7 @@ def spawn_body(state: ti.template(), body: ti.i32, rows: ti.types.ndarray(dtype=
             if ti.static(state.capacity.implicit):
                 state.particle_contact[p] = 0
             if ti.static(state.capacity.contact.soft):
-                state.soft.kept_press[p] = 0.0
+                state.soft.kept_normal_impulse[p] = 0.0
         state.body_velocity_lag[body] = 0.0
         state.body_drives[body] = 0
         state.body_gravity_scale[body] = 1.0

@@ -19,8 +19,8 @@ from taichi_soft.contact.kernels.soft_contact import solve_island
 from taichi_soft.contact.kernels.soft_gaps import find_gaps
 from taichi_soft.contact.kernels.soft_search import (
     begin_search,
+    has_contact_pairs,
     is_outdated,
-    is_social,
     note_way,
     search_body,
 )
@@ -112,7 +112,7 @@ def _do_other_phase(state: ti.template(), program: ti.template(), island: ti.i32
     if job.phase == DRIFT and state.body_status[body] == ACTIVE:
         drift_body(state, body, job)
     if ti.static(program.has_soft_contact):
-        if job.phase == DRIFT and is_social(state, island) == 1:
+        if job.phase == DRIFT and has_contact_pairs(state, island) == 1:
             note_way(state, body, job.shift)
         if job.phase == BOXES:
             begin_search(state, body, job.impact_speed, job.h, job.left, job.forgets)
@@ -197,7 +197,7 @@ def _is_alone(state: ti.template(), program: ti.template(), island):
     is_explicit = ti.static(program.integrator != Integrator.IMPLICIT_EULER)
     alone = int(is_explicit) & int(bodies == 1) & int(state.body_drives[body] & JOINED == 0)
     if ti.static(program.has_soft_contact):
-        alone = alone & (1 - is_social(state, island))
+        alone = alone & (1 - has_contact_pairs(state, island))
     return alone
 
 
@@ -214,9 +214,9 @@ def _compare_speeds(state: ti.template(), island, now, run: ti.template()):
         body = state.contact.island_body[i]
         if state.body_status[body] == ACTIVE:
             highest = ti.max(highest, state.contact.body_speed[body])
-            if state.contact.is_wild[body] == 0:
+            if state.contact.is_exploding[body] == 0:
                 striking = ti.max(striking, 2.0 * state.contact.body_mean_beside[body])
-            run.is_stable = run.is_stable & state.contact.is_gentle[body]
+            run.is_stable = run.is_stable & state.contact.is_stable[body]
         least_edge = ti.min(least_edge, state.body_edge[body])
     run.fastest = highest
     return highest, ti.select(striking * now.h > BLOW * least_edge, striking, 0.0)
@@ -247,7 +247,7 @@ def _solve_contact(
 ):
     """Contact between the bodies of an island: candidates, where they have aged; contacts; impulses."""
     if ti.static(program.has_soft_contact):
-        if is_social(state, island) == 1:
+        if has_contact_pairs(state, island) == 1:
             if run.candidates != VALID or is_outdated(state, island, impact_speed, now.h) == 1:
                 run.shift = ti.Vector.zero(ti.f32, 3)
                 forgets = int(run.candidates != NONE)
