@@ -149,7 +149,7 @@ class Slice:
     def let_go(self, body: SoftBody) -> None:
         """Give up all that is tied to a body, which leaves the world."""
 
-    def rehearse(self, body: SoftBody, other: SoftBody | None, step: Callable[[], None]) -> None:
+    def warm_up(self, body: SoftBody, other: SoftBody | None, step: Callable[[], None]) -> None:
         """Do to a body, and another one if there is one, all that a game may: see `World.warm_up`.
 
         Args: step: makes a step that is taken back.

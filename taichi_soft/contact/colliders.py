@@ -322,7 +322,7 @@ class Colliders(Slice):
             self._write_samples(row)
         self._write_constants()
 
-    def rehearse(self, body: SoftBody, other: SoftBody | None, step: Callable[[], None]) -> None:
+    def warm_up(self, body: SoftBody, other: SoftBody | None, step: Callable[[], None]) -> None:
         """Add one, move it, ask what it felt and remove it."""
         if self._contact is None:
             return

@@ -107,7 +107,7 @@ class Attachments(Slice):
         for attachment in list(self._frames.holding(body)):
             attachment.release()
 
-    def rehearse(self, body: SoftBody, other: SoftBody | None, step: Callable[[], None]) -> None:
+    def warm_up(self, body: SoftBody, other: SoftBody | None, step: Callable[[], None]) -> None:
         """Attach a vertex that is free to a frame, and ask what it pulls with."""
         free = np.setdiff1d(np.arange(body.vertex_count), body.pinned)
         if not len(free):

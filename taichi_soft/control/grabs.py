@@ -104,7 +104,7 @@ class Grabs(Slice):
         for grab in [each for each in self.by_number.values() if each.body is body]:
             grab.release()
 
-    def rehearse(self, body: SoftBody, other: SoftBody | None, step: Callable[[], None]) -> None:
+    def warm_up(self, body: SoftBody, other: SoftBody | None, step: Callable[[], None]) -> None:
         """Take hold of a body, move it and let go."""
         with contextlib.suppress(StateError):  # all are in use, which compiles them too
             grab = grab_at(body, 0, (1 / 3, 1 / 3, 1 / 3), None, 5.0, None)

@@ -122,7 +122,7 @@ class Joints(Slice):
         for joint in self.holding(body):
             joint.release()
 
-    def rehearse(self, body: SoftBody, other: SoftBody | None, step: Callable[[], None]) -> None:
+    def warm_up(self, body: SoftBody, other: SoftBody | None, step: Callable[[], None]) -> None:
         """Join two bodies, where they can be."""
         context = self.context
         if other is None or context.settings.is_implicit or not context.built.program.has_contact:

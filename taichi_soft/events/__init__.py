@@ -13,7 +13,7 @@ from taichi_soft.events.kinds import (
 )
 from taichi_soft.events.log import EventLog, Listener
 from taichi_soft.events.memory import Known, Memory
-from taichi_soft.events.witness import Witness
+from taichi_soft.events.observer import Observer
 
 __all__ = [
     "ContactBegan",
@@ -25,9 +25,9 @@ __all__ = [
     "Known",
     "Listener",
     "Memory",
+    "Observer",
     "StressExceeded",
     "TearCandidates",
     "Torn",
-    "Witness",
     "Woke",
 ]

@@ -10,7 +10,7 @@ from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.events.kinds import CONTACT_KINDS, KINDS, Event, Torn
 from taichi_soft.events.memory import Known, Memory
-from taichi_soft.events.witness import Witness
+from taichi_soft.events.observer import Observer
 
 MOST_EVENTS = 10_000
 """That wait to be drained; then the oldest are dropped."""
@@ -35,9 +35,9 @@ class Listener:
 class EventLog:
     """The events of one world. Nothing is recorded until somebody asks."""
 
-    def __init__(self, witness: Witness) -> None:
-        """Args: witness: who looks at the world."""
-        self._witness = witness
+    def __init__(self, observer: Observer) -> None:
+        """Args: observer: who looks at the world."""
+        self._observer = observer
         self._kinds: frozenset[type[Event]] = frozenset()
         self._was_asked = False
         self._waiting: deque[Event] = deque()
@@ -62,7 +62,7 @@ class EventLog:
         parts = frozenset(part for part in KINDS if is_class and issubclass(part, kind))
         if not parts:
             raise OptionError(f"kind must be a class of events such as ContactBegan, or Event, got {kind!r}")
-        if parts <= CONTACT_KINDS and not self._witness.knows_contacts:
+        if parts <= CONTACT_KINDS and not self._observer.knows_contacts:
             raise StateError(
                 f"{kind.__name__} is not seen in a world without colliders and soft_contact: make it with "
                 "collider_room=1, then its floor is a collider too"
@@ -70,9 +70,9 @@ class EventLog:
         return parts
 
     def _record(self, kinds: frozenset[type[Event]]) -> None:
-        if not self._witness.knows_contacts:
+        if not self._observer.knows_contacts:
             kinds = kinds - CONTACT_KINDS
-        self._witness.begin(kinds, self._kinds)
+        self._observer.begin(kinds, self._kinds)
         self._kinds, self._was_asked = kinds, True
 
     def on(self, kind: type[Event], function: Callable[[Any], object]) -> Listener:
@@ -87,22 +87,22 @@ class EventLog:
 
     def watch(self, kind: type[Event], body: SoftBody, threshold: float | None) -> None:
         """Look at a body's stress for one of `STRESS_KINDS`, from a threshold [Pa] on; None for no longer."""
-        self._witness.stress.set(kind, body, threshold)
+        self._observer.stress.set(kind, body, threshold)
         if threshold is not None:
             self._record(self._kinds | {kind})
 
-    def rehearse(self) -> None:
+    def warm_up(self) -> None:
         """Look at the world as after a step, and tell nobody: see `World.warm_up`."""
-        self._witness.rehearse()
+        self._observer.warm_up()
 
     def renew_watches(self, body: SoftBody) -> None:
         """Look at the tetrahedra that a cut has left of a body."""
-        self._witness.stress.renew(body)
+        self._observer.stress.renew(body)
 
     def note_frozen(self, body: SoftBody) -> None:
         """The step that is being made has frozen a body."""
         if self._kinds:
-            self._witness.note_frozen(body)
+            self._observer.note_frozen(body)
 
     def note_torn(self, step: int, time: float, body: SoftBody, pieces: tuple[SoftBody, ...]) -> None:
         """What the step that ended at `time` [s] has pulled too hard has torn a body."""
@@ -111,14 +111,14 @@ class EventLog:
 
     def remember(self) -> Memory:
         """What the events of coming steps depend on."""
-        return self._witness.remember(self._kinds)
+        return self._observer.remember(self._kinds)
 
     def recall(self, memory: Memory, step: int, known: Known) -> None:
         """The world was put back to a state of that step count: what waits of later steps never happened."""
         while self._waiting and self._waiting[-1].step >= step:
             self._waiting.pop()
         self._heard = min(self._heard, len(self._waiting))
-        self._witness.recall(self._kinds, memory, step, known)
+        self._observer.recall(self._kinds, memory, step, known)
 
     def collect(self, step: int, time: float, dt: float) -> str:
         """Take down what happened in a step.
@@ -129,7 +129,7 @@ class EventLog:
         """
         if not self._kinds:
             return ""
-        for event in self._witness.events(self._kinds, step, time, dt):
+        for event in self._observer.events(self._kinds, step, time, dt):
             if type(event) in self._kinds:
                 self._waiting.append(event)
         loss = ""
@@ -138,7 +138,7 @@ class EventLog:
             self._heard = max(self._heard - 1, 0)
             self.dropped += 1
             loss = f"more than {MOST_EVENTS:,} events wait and the oldest are dropped: {_WAY_OUT}"
-        if self._witness.lost_touches:
+        if self._observer.lost_touches:
             loss = "more pairs of bodies touch than can be told apart: some contacts have no events"
         is_news, self._has_lost = not self._has_lost, self._has_lost or bool(loss)
         return loss if is_news else ""

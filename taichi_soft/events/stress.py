@@ -114,7 +114,7 @@ class StressWatches:
     def _evaluate(self) -> None:
         read_stress(self._state, self._program, self._blocks, self._limits, self._read)
 
-    def rehearse(self) -> None:
+    def warm_up(self) -> None:
         """Read a stress, and take no note."""
         read_stress(
             *(self._state, self._program, np.zeros(1, np.int32), np.zeros(1, np.float32)),

@@ -89,7 +89,7 @@ class Simulation:
             self.events.note_torn(clock.steps - 1, clock.time, body, pieces)
         return reports
 
-    def rehearse(self, seconds: float) -> None:
+    def trial_step(self, seconds: float) -> None:
         """Move the fields by a step that nobody takes note of, and that the caller takes back."""
         self.frames.aim(self.state, len(self.pools.slots), seconds)
         if self.colliders is not None:

@@ -23,7 +23,7 @@ from taichi_soft.core.runtime import Device, init
 from taichi_soft.core.serialisation import digest_of
 from taichi_soft.core.settings import Settings
 from taichi_soft.core.types import Integrator, Schedule
-from taichi_soft.events import EventLog, Witness
+from taichi_soft.events import EventLog, Observer
 from taichi_soft.fracture.cutting import warm_up
 from taichi_soft.fracture.tearing import Tears
 from taichi_soft.solver.context import WorldContext
@@ -84,7 +84,7 @@ def build(context: WorldContext) -> Simulation:
         program,
         make_launch(settings.schedule, state, program, scene, device, settings.retries),
         most_substeps(scene, settings.integrator),
-        EventLog(Witness(state, program, scene, pools.slots, colliders if has_contact else None)),
+        EventLog(Observer(state, program, scene, pools.slots, colliders if has_contact else None)),
         tears,
     )
     if has_contact:

@@ -36,13 +36,13 @@ def _say(what: str = "") -> None:
         print(f"\r{told:<79}\r", end="", file=sys.stderr, flush=True)
 
 
-def rehearse(context: WorldContext) -> None:
+def warm_up(context: WorldContext) -> None:
     """As `World.warm_up`."""
     _say("snapshots")
     before = take_snapshot(context)
     try:
         _say("the step")
-        context.built.rehearse(SHORTEST)
+        context.built.trial_step(SHORTEST)
         _say("what a game does to bodies")
         _fill_pools(context)
         living = cast("tuple[Body, ...]", context.slots.living)
@@ -55,8 +55,8 @@ def rehearse(context: WorldContext) -> None:
             _measure(context, body)
         _say("queries")
         _ask(context)
-        context.built.rehearse(SHORTEST)
-        context.built.events.rehearse()
+        context.built.trial_step(SHORTEST)
+        context.built.events.warm_up()
     finally:
         restore_snapshot(context, before)
         _say()
@@ -90,10 +90,10 @@ def _control(context: WorldContext, body: Body, other: Body | None) -> None:
     body.set_material(body.material)
     body.pin(free[:1])
     body.set_targets(free[:1], body.positions()[free[:1]])
-    context.built.rehearse(SHORTEST)
+    context.built.trial_step(SHORTEST)
     body.unpin(free[:1])
     for each in context.slices:
-        each.rehearse(body, other, partial(context.built.rehearse, SHORTEST))
+        each.warm_up(body, other, partial(context.built.trial_step, SHORTEST))
     if not body.is_held and not len(body.pinned):
         carry([body], np.eye(3), place, place + 100.0 * UP, keep=True)  # as `teleport`, whatever is there
     body.set_motion(body.positions(), body.velocities())

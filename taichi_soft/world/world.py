@@ -59,7 +59,7 @@ from taichi_soft.solver.substeps import Substeps
 from taichi_soft.world.body import Body
 from taichi_soft.world.building import build
 from taichi_soft.world.spawning import add_body, despawn, require_open, require_own, reserve, spawn, take_in
-from taichi_soft.world.warm_up import rehearse
+from taichi_soft.world.warm_up import warm_up
 
 MOST_RETRIES = 10
 """A thousand times as many substeps as were asked for."""
@@ -468,7 +468,7 @@ class World(Handle):
         compiled. The world stays as it is, to the bit.
         Raises: StateError before `build`.
         """
-        rehearse(self._context)
+        warm_up(self._context)
 
     @recorded
     def wake(self) -> None:

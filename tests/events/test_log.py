@@ -18,7 +18,7 @@ from taichi_soft.events.log import MOST_EVENTS
 
 
 class Script:
-    """In place of a witness: says that in each step body 0 falls asleep and body 1 wakes."""
+    """In place of an observer: says that in each step body 0 falls asleep and body 1 wakes."""
 
     knows_contacts = True
     lost_touches = False
@@ -36,13 +36,13 @@ class Script:
 
 
 @pytest.fixture
-def witness():
+def observer():
     return Script()
 
 
 @pytest.fixture
-def log(witness):
-    return EventLog(witness)
+def log(observer):
+    return EventLog(observer)
 
 
 def told(events):
@@ -63,16 +63,16 @@ def test_all_events_since_the_last_drain_come_once_and_step_by_step(log):
     assert told(log.drain()) == both(2)
 
 
-def test_only_the_kinds_asked_for_are_recorded(log, witness):
+def test_only_the_kinds_asked_for_are_recorded(log, observer):
     log.record([Woke, ContactEnded])
     log.collect(0, 0.1, 0.1)
     assert told(log.drain()) == [(0, Woke)]
-    assert witness.kinds == {Woke, ContactEnded}
+    assert observer.kinds == {Woke, ContactEnded}
     log.record([])
     log.collect(1, 0.2, 0.1)
     assert log.drain() == []
     log.record((Event,))
-    assert len(witness.kinds) == 8
+    assert len(observer.kinds) == 8
 
 
 def test_listeners_hear_only_within_drain_and_only_of_their_kind(log):
@@ -151,8 +151,8 @@ def test_a_listener_cannot_drain_and_the_log_goes_on(log):
     assert told(log.drain()) == [(0, Woke)]
 
 
-def test_memory_is_bounded_by_dropping_the_oldest_with_one_word_per_drain(log, witness):
-    witness.times = MOST_EVENTS // 4
+def test_memory_is_bounded_by_dropping_the_oldest_with_one_word_per_drain(log, observer):
+    observer.times = MOST_EVENTS // 4
     log.record([Event])
     assert [log.collect(step, step, 1.0) for step in range(2)] == ["", ""]
     assert "10,000 events wait" in log.collect(2, 2.0, 1.0)
@@ -161,12 +161,12 @@ def test_memory_is_bounded_by_dropping_the_oldest_with_one_word_per_drain(log, w
     events = log.drain()
     assert len(events) == MOST_EVENTS
     assert (events[0].step, events[-1].step) == (2, 3)
-    witness.times = MOST_EVENTS
+    observer.times = MOST_EVENTS
     assert "drain_events" in log.collect(4, 4.0, 1.0)
     assert log.dropped == 2 * MOST_EVENTS
 
 
-def test_listeners_hear_of_what_follows_dropped_events(log, witness):
+def test_listeners_hear_of_what_follows_dropped_events(log, observer):
     """What was heard, kept after a failure and then dropped does not count as heard in place of others."""
     heard = []
 
@@ -179,15 +179,15 @@ def test_listeners_hear_of_what_follows_dropped_events(log, witness):
     log.collect(0, 0.0, 1.0)
     with pytest.raises(KeyError):
         log.drain()
-    witness.times = MOST_EVENTS // 2
+    observer.times = MOST_EVENTS // 2
     log.collect(1, 1.0, 1.0)
     assert len(log.drain()) == MOST_EVENTS
     assert heard == [0, 0] + MOST_EVENTS * [1]
 
 
-def test_pairs_without_room_are_reported(log, witness):
+def test_pairs_without_room_are_reported(log, observer):
     log.record([ContactBegan])
-    witness.lost_touches = True
+    observer.lost_touches = True
     assert "more pairs of bodies" in log.collect(0, 0.1, 0.1)
     assert log.collect(1, 0.2, 0.1) == ""
     log.drain()
@@ -204,7 +204,7 @@ def test_what_is_no_list_of_kinds_is_refused_and_changes_nothing(log, kinds):
     assert log.drain() == []
 
 
-def test_other_refusals(log, witness):
+def test_other_refusals(log, observer):
     class Mine(Event):
         pass
 
@@ -215,7 +215,7 @@ def test_other_refusals(log, witness):
             log.on(kind, print)
     with pytest.raises(OptionError, match="callable"):
         log.on(Woke, 3)
-    witness.knows_contacts = False
+    observer.knows_contacts = False
     for kind in (ContactBegan, ContactEnded):
         with pytest.raises(StateError, match="collider_room"):
             log.on(kind, print)
@@ -223,4 +223,4 @@ def test_other_refusals(log, witness):
         log.drain()
     log.on(StressExceeded, print)
     log.record([Event])
-    assert witness.kinds.isdisjoint({ContactBegan, ContactEnded})
+    assert observer.kinds.isdisjoint({ContactBegan, ContactEnded})

@@ -31,7 +31,7 @@ from taichi_soft.events.memory import Known, Memory
 from taichi_soft.events.stress import StressWatches
 
 
-class Witness:
+class Observer:
     """Compares each step with the one before it."""
 
     def __init__(
@@ -74,9 +74,9 @@ class Witness:
         if not before & SLEEP_KINDS:
             self._sleepers = self._sleeping()
 
-    def rehearse(self) -> None:
+    def warm_up(self) -> None:
         """Read stress and what touches, and take no note. What touched is forgotten, as where it is read."""
-        self.stress.rehearse()
+        self.stress.warm_up()
         who, impulses = np.empty_like(self._who), np.empty_like(self._impulses)
         read_touches(self._state, len(self._slots), self._status.copy(), who, impulses)
 
