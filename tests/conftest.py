@@ -60,6 +60,7 @@ SOAK = (
     *("solver/test_threads", "solver/test_long_steps", "solver/test_plasticity", "solver/test_gpu_launch"),
     *("solver/test_damping_ratio", "world/test_bodies", "world/test_pools", "world/test_finite_readout"),
     *("elements/laws/test_anisotropy", "control/test_materials", "bodies/test_particle_bodies"),
+    *("bodies/test_stress", "bodies/test_states"),
     *("fracture/test_cutting", "fracture/test_cut_snapshots"),
 )
 """Tiers, by the beginnings of files. SOAK compiles or runs for more than some 40 s with an empty cache and is
