@@ -126,7 +126,8 @@ class Context:
 class Slice:
     """One thing that a game switches on. What there is of it in a world is known here and nowhere else."""
 
-    name = ""  # of its part of a snapshot; slices without one have none
+    name = ""  # of its part of a snapshot
+    bars_cuts = True  # whether a body that it holds is not cut and does not tear
 
     def __init__(self, context: Context) -> None:
         """Nothing yet."""
@@ -139,8 +140,6 @@ class Slice:
         if context is None:
             raise StateError("the world is gone: keep a reference to it")
         return context
-
-    bars_cuts = True  # whether a body that it holds is not cut and does not tear
 
     def holds(self, body: SoftBody) -> bool:
         """Whether it holds a body, or a part of one."""

@@ -69,8 +69,8 @@ class ContactFields:
         self.impulse = ti.Vector.field(3, ti.f32, bodies * c)  # on the collider in this step [N s]
         self.angular_impulse = ti.Vector.field(3, ti.f32, bodies * c)  # about its position [N m s]
         self.normal_impulse = ti.Vector.field(3, ti.f32, bodies * c)  # on the body in this substep [N s]
-        # Of the presses of its particles: their sum [N s], and those times the speed along the normal with
-        # which the surface came, and with which particle and surface came together [N].
+        # Of the normal impulses of its particles: their sum [N s], and those times the speed along the normal
+        # with which the surface came, and with which particle and surface came together [N].
         self.normal_impulse_rates = ti.Vector.field(3, ti.f32, bodies * c)
         self.rebound = ti.field(ti.f32, bodies * c)  # speed at which the body may leave [m/s]; 0 where apart
         self.prev_rebound = ti.field(ti.f32, bodies * c)  # before the step
@@ -79,11 +79,9 @@ class ContactFields:
         self.body_upper = ti.Vector.field(3, ti.f32, bodies)
         self.sleep_speed = ti.field(ti.f32, ())  # [m/s] below which bodies fall asleep; 0 for never
         self.calm = ti.field(ti.f32, bodies)  # time since a body was faster [s]
-        self.is_exploding = ti.field(
-            ti.i32, bodies
-        )  # 1 where it flies apart, and must not take others with it
+        self.is_exploding = ti.field(ti.i32, bodies)  # 1 where it must not take others with it
         self.body_filter = ti.Vector.field(2, ti.i32, bodies)  # group, mask
-        self.is_stable = ti.field(ti.i32, bodies)  # 0 where forces moved a particle too far in one substep
+        self.is_stable = ti.field(ti.i32, bodies)  # 0 where forces changed a velocity by too much
         self.has_failed = ti.field(ti.i32, bodies)  # 1 where it broke or was not solved well in this step
         self.body_speed = ti.field(ti.f32, bodies)  # of its fastest particle in this substep [m/s]
         # Beside the velocity that its island shares [m/s]; by leapfrog of what was touched before the push.
