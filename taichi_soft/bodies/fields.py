@@ -17,7 +17,7 @@ from taichi_soft.bodies.program import Program
 from taichi_soft.bodies.status import ABSENT
 from taichi_soft.core.constants import LANES
 from taichi_soft.core.loading import Loader
-from taichi_soft.core.runtime import make_fields, ti
+from taichi_soft.core.runtime import holds_fields, make_fields, ti
 from taichi_soft.core.turns import in_turn
 
 ROOMS = "particles", "edges", "blocks", "triangles", "outer", "rings", "bodies"
@@ -93,7 +93,7 @@ def _power_of_two(count: int, least: int) -> int:
     return max(least, 1 << max(count - 1, 0).bit_length())
 
 
-@ti.data_oriented
+@holds_fields
 class BodyFields:
     """Particles, edges, tetrahedra and bodies, each quantity one field.
 

@@ -5,7 +5,7 @@ from typing import Any
 
 from taichi_soft.core.constants import LANES
 from taichi_soft.core.loading import Loader
-from taichi_soft.core.runtime import ti
+from taichi_soft.core.runtime import holds_fields, ti
 
 NO_COLLIDER = -1
 """Kind of a row of which the collider was removed."""
@@ -33,7 +33,7 @@ class ContactCapacity:
     soft: bool = False  # whether bodies touch each other
 
 
-@ti.data_oriented
+@holds_fields
 class ContactFields:
     """Colliders as rows of fields, and for each pair of a body and a collider a row of what passes between.
 
@@ -105,7 +105,7 @@ class ContactFields:
         ]
 
 
-@ti.data_oriented
+@holds_fields
 class SoftContactFields:
     """What bodies need to touch each other: a grid of vertices, and candidates.
 

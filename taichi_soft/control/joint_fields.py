@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from taichi_soft.core.runtime import ti
+from taichi_soft.core.runtime import holds_fields, ti
 
 MOST_JOINTS, JOINT_ROWS = 64, 2048
 """Joints of one world at a time, and particles that all of them hold together."""
@@ -12,7 +12,7 @@ ENDS = 5
 times their weights, 1 and four that add up to -1, add up to the gap between the particle and its place."""
 
 
-@ti.data_oriented
+@holds_fields
 class JointFields:
     """Joints, and the rows that they are made of, packed to the front in the order of joining.
 

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.core.runtime import ti
+from taichi_soft.core.runtime import holds_fields, ti
 
 
-@ti.data_oriented
+@holds_fields
 class Loader:
     """Fields that are always written together, in the same order."""
 

@@ -41,9 +41,10 @@ from taichi_soft.core.errors import DeviceError, OptionError
 from taichi_soft.core.subnormals import learn, without_subnormals
 from taichi_soft.core.turns import in_turn, leave_behind
 
-__all__ = ["Device", "device", "init", "is_initialized", "make_fields", "ti"]
+__all__ = ["Device", "device", "holds_fields", "init", "is_initialized", "make_fields", "ti"]
 
 Result = TypeVar("Result")
+Class = TypeVar("Class", bound=type)
 
 DEBUG = "TAICHI_SOFT_DEBUG"
 """Name of the environment variable that at 1 has every index in a kernel checked: slow, for tests only."""
@@ -55,6 +56,16 @@ _ARCHS = ("cpu", "cuda", "vulkan", "metal")
 # Taichi 1.7 puts branches and loops of a `ti.func` called in it into the kernel, and crashes. With this
 # they go into what is being compiled.
 ti.lang.kernel_impl.Kernel.ast_builder = lambda _: ti.lang.impl.get_runtime().compiling_callable.ast_builder()
+
+
+def holds_fields(cls: Class) -> Class:
+    """Lets a kernel take an object with all its fields as one argument.
+
+    It is `ti.data_oriented` for classes without kernels of their own. That one makes a call in Python of each
+    attribute that is read, and two where a base class has it too.
+    """
+    cls._data_oriented = True  # type: ignore[attr-defined]
+    return cls
 
 
 def _remember(look_up: Callable[[Any], Any]) -> Callable[[Any], Any]:

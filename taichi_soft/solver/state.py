@@ -10,7 +10,7 @@ from taichi_soft.bodies.fields import BodyCapacity, BodyFields
 from taichi_soft.bodies.layout import Scene
 from taichi_soft.contact.fields import ContactCapacity, ContactFields, SoftContactFields
 from taichi_soft.control.joint_fields import JointFields
-from taichi_soft.core.runtime import ti
+from taichi_soft.core.runtime import holds_fields, ti
 from taichi_soft.solver.step_fields import JobFields, Progress
 
 _NO_CONTACT = ContactCapacity()
@@ -28,7 +28,7 @@ class Capacity(BodyCapacity):
         return self.contact != _NO_CONTACT
 
 
-@ti.data_oriented
+@holds_fields
 class State(BodyFields):
     """The fields of bodies, and slice by slice those of contact and joints, where a world has them."""
 

@@ -3,7 +3,7 @@
 Without contact each body is an island of its own, with the same number.
 """
 
-from taichi_soft.core.runtime import ti
+from taichi_soft.core.runtime import holds_fields, ti
 
 MOST_PARTS = 16
 """Parts of an island's bodies: threads beyond these share theirs."""
@@ -54,7 +54,7 @@ class Job:
     shift: ti.math.vec3
 
 
-@ti.data_oriented
+@holds_fields
 class JobFields:
     """What threads share islands by: see `kernels/jobs.py`."""
 
