@@ -37,21 +37,21 @@ FLAT = 1e-5
 
 
 @ti.func
-def _is_caught(state: ti.template(), positions: ti.template(), t):
-    """Whether tetrahedron `t`, a block times `LANES` plus a lane, is flat or inside out."""
-    block, lane = t // LANES, t % LANES
+def _is_caught(state: ti.template(), positions: ti.template(), block, lane):
+    """Whether a tetrahedron is flat or inside out (1)."""
     p0, p1, p2, p3 = particles_of(state, block, lane)
     B = shape(positions[p0], positions[p1], positions[p2], positions[p3])
     inverse = determinant(rest_inverse_of(state, block, lane))  # 0 in the lanes that pad a last block
-    return inverse != 0.0 and determinant(B) * inverse < FLAT
+    return int(inverse != 0.0) & int(determinant(B) * inverse < FLAT)
 
 
 @ti.func
 def _caught_count(state: ti.template(), positions: ti.template(), body):
-    count, blocks = 0, state.body_blocks[body]
-    for t in range(blocks[0] * LANES, blocks[1] * LANES):
-        count += int(_is_caught(state, positions, t))
-    return count
+    caught, blocks = ti.Vector.zero(ti.i32, LANES), state.body_blocks[body]
+    for block in range(blocks[0], blocks[1]):
+        for lane in range(LANES):
+            caught[lane] += _is_caught(state, positions, block, lane)
+    return caught.sum()
 
 
 @ti.func
@@ -117,10 +117,11 @@ def _free(state: ti.template(), program: ti.template(), body):
     """Move the corners of what is caught half of the way."""
     fit = _best_fit(state, body)
     blocks = state.body_blocks[body]
-    for t in range(blocks[0] * LANES, blocks[1] * LANES):
-        if _is_caught(state, state.particle_position, t):
-            for corner in ti.static(range(4)):
-                _pull(state, program, particles_of(state, t // LANES, t % LANES)[corner], fit, 0.5, 1.0)
+    for block in range(blocks[0], blocks[1]):
+        for lane in range(LANES):
+            if _is_caught(state, state.particle_position, block, lane) == 1:
+                for corner in ti.static(range(4)):
+                    _pull(state, program, particles_of(state, block, lane)[corner], fit, 0.5, 1.0)
 
 
 @ti.func
