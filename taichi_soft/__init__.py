@@ -25,6 +25,7 @@ from taichi_soft.control.attachments import Attachment
 from taichi_soft.control.frames import Frame
 from taichi_soft.control.grabs import Grab
 from taichi_soft.control.joints import Joint
+from taichi_soft.control.motors import Motor
 from taichi_soft.core.errors import (
     DeviceError,
     DroppedEventsWarning,
@@ -123,6 +124,7 @@ __all__ = [
     "MeshError",
     "MeshQuality",
     "MeshShape",
+    "Motor",
     "OptionError",
     "Overlap",
     "ParticleMesh",

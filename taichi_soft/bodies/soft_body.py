@@ -269,7 +269,7 @@ class SoftBody(Handle):
 
     @property
     def is_held(self) -> bool:
-        """Whether it is attached, to a frame or another body, or grabbed."""
+        """Whether it is attached, to a frame or another body, grabbed, or driven by a motor."""
         return any(each.holds(self) for each in self._context.slices)
 
     @property
@@ -376,9 +376,9 @@ def require_alive(body: SoftBody) -> None:
         raise StateError(f"body {body.index} was removed by despawn in step {body._record.removed_in}")
 
 
-def may_be_cut(body: SoftBody) -> bool:
-    """Whether nothing holds a body that could not follow a cut."""
-    return not any(each.bars_cuts and each.holds(body) for each in body._context.slices)
+def bars_to_cut(body: SoftBody) -> list[str]:
+    """Names of the slices that hold a body and could not follow a cut."""
+    return [each.name for each in body._context.slices if each.bars_cuts and each.holds(body)]
 
 
 def redescribe(body: SoftBody, description: BodyDescription, arrays: BodyArrays) -> Ranges:

@@ -18,8 +18,8 @@ class Tearing:
     tetrahedra round them. It is the Cauchy stress of the body's own law: see `Body.tet_stress`. A body tears
     as long as its `spare_vertices` last; what falls off becomes a body while slots are free, the largest
     first; the rest, and crumbs of less than 2 % of the whole, stay loose in the body. What a frame holds it
-    goes on holding, copies of it as well; while a body is grabbed, or joined to another one, it does not
-    tear.
+    goes on holding, copies of it as well; while a body is grabbed, joined to another one or driven by a
+    motor, it does not tear.
 
     Args:
         stress: tensile strength [Pa].

@@ -17,7 +17,7 @@ from taichi_soft.bodies.fields import BodyFields, with_spare_rows
 from taichi_soft.bodies.kernels.plasticity import read_rest_inverses
 from taichi_soft.bodies.layout import BodyArrays, BodyDescription, arrange_part, blocks_of
 from taichi_soft.bodies.part import Part
-from taichi_soft.bodies.soft_body import Context, SoftBody, context_of, may_be_cut, record_of, redescribe
+from taichi_soft.bodies.soft_body import Context, SoftBody, bars_to_cut, context_of, record_of, redescribe
 from taichi_soft.bodies.status import ABSENT, ACTIVE
 from taichi_soft.control.attachments import share_attachments
 from taichi_soft.core.checks import as_array, as_vector
@@ -52,9 +52,10 @@ def require_cuttable(body: SoftBody) -> None:
         )
     if context.fields is None:
         raise StateError("the world is not built: call world.build() first, and cut what moves")
-    if not may_be_cut(body):
+    bars = bars_to_cut(body)
+    if bars:
         raise StateError(
-            f"body {body.index} is grabbed or joined to another body: release it before it is cut"
+            f"body {body.index} has {' and '.join(bars)}: release or remove them before it is cut"
         )
     if body.is_frozen:
         raise StateError(f"body {body.index} is frozen: bring it back with set_motion before it is cut")

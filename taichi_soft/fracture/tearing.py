@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from taichi_soft.bodies.fields import BodyFields
 from taichi_soft.bodies.measures import positions_of, tet_stresses
 from taichi_soft.bodies.program import Program
-from taichi_soft.bodies.soft_body import Context, Slice, SoftBody, may_be_cut, record_of
+from taichi_soft.bodies.soft_body import Context, Slice, SoftBody, bars_to_cut, record_of
 from taichi_soft.core.errors import StateError
 from taichi_soft.core.serialisation import below
 from taichi_soft.fracture.cutting import divide
@@ -101,7 +101,7 @@ class Tears(Slice):
         find_overloaded(built.state, built.program, self._limits, self._found)
         for slot in np.flatnonzero(self._found).tolist():
             body = self.context.slots.slots[slot]
-            if body is None or not may_be_cut(body):
+            if body is None or bars_to_cut(body):
                 continue
             version = body.topology_version
             try:

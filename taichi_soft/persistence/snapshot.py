@@ -42,7 +42,7 @@ from taichi_soft.persistence.structure import require_structure, structure_of
 from taichi_soft.solver.context import WorldContext
 from taichi_soft.solver.state import State
 
-MARK, VERSION = b"TSOFTSNP", 6
+MARK, VERSION = b"TSOFTSNP", 7
 
 Words = NDArray[np.int32]
 

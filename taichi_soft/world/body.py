@@ -72,8 +72,8 @@ class Body(SoftBody):
             triangle: corners, (3, 3) [m]; the cut ends where it ends.
         Returns: the bodies that fell off, the largest first; none where nothing does.
         Raises: OptionError for a blade without direction or area and for a body whose asset has no
-            `spare_vertices`; StateError where room or slots run out, for a body that is frozen, grabbed or
-            joined to another, and before `build`.
+            `spare_vertices`; StateError where room or slots run out, for a body that is frozen, grabbed,
+            joined to another or driven by a motor, and before `build`.
             Nothing is changed then.
         """
         return cast("tuple[Body, ...]", cut(self, plane, triangle))

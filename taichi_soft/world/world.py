@@ -28,6 +28,7 @@ from taichi_soft.control.frames import Frame, Frames
 from taichi_soft.control.grabs import Grab, Grabs, as_pull
 from taichi_soft.control.impulses import apply_radial_impulse
 from taichi_soft.control.joints import Joint, Joints
+from taichi_soft.control.motors import Motor, Motors
 from taichi_soft.core.checks import as_count, as_flag, as_number, as_path, as_vector
 from taichi_soft.core.clock import Clock
 from taichi_soft.core.constants import ALL_GROUPS, GRAVITY_EARTH, VELOCITY_LIMIT
@@ -64,7 +65,7 @@ from taichi_soft.world.warm_up import warm_up
 MOST_RETRIES = 10
 """A thousand times as many substeps as were asked for."""
 
-SLICES: tuple[type[Slice], ...] = (Colliders, Frames, Attachments, Grabs, Joints, Tears)
+SLICES: tuple[type[Slice], ...] = (Colliders, Frames, Attachments, Grabs, Joints, Motors, Tears)
 """What a game switches on, in the order in which a snapshot puts it back: what hangs comes after what it
 hangs from."""
 
@@ -321,6 +322,11 @@ class World(Handle):
         return self._context.of(Joints).handles
 
     @property
+    def motors(self) -> Sequence[Motor]:
+        """All motors that drive bodies, also those that `restore` brought along."""
+        return self._context.of(Motors).handles
+
+    @property
     def floor_collider(self) -> Collider | None:
         """The floor where there are colliders, from `build` on: to read what bodies do to it."""
         return self._context.floor_collider
@@ -517,6 +523,44 @@ class World(Handle):
             return None
         body = cast(Body, hit.body)
         return body.grab(hit.triangle, hit.barycentrics, frequency=frequency, max_force=max_force)
+
+    @recorded
+    def add_motor(
+        self,
+        body: Body,
+        particles: ArrayLike,
+        axis: ArrayLike,
+        *,
+        speed: float,
+        max_torque: float | None = None,
+        max_force: float | None = None,
+        is_fixed: bool = False,
+        point: ArrayLike | None = None,
+    ) -> Motor:
+        """Turn a part of a body about an axis, or push it along one, towards a speed, until `Motor.remove`.
+
+        The particles are moved as one rigid thing; the rest of the body follows by its elasticity. What the
+        motor gives comes from outside, as from a shaft in the level: no other body feels the reaction. It
+        does not hold the body on the axis. By implicit Euler the elastic forces of a substep act after the
+        motor, so the particles stay behind the speed where much hangs on them; more substeps help.
+        Args:
+            body: of this world.
+            particles: vertices of it that are driven; pinned ones stay where they are.
+            axis: direction (3,), of any length but zero, as the body lies now.
+            speed: to reach and to hold [rad/s], right-handed about the axis; or along it [m/s]. 0 brakes.
+            max_torque: give this to turn: largest torque about the axis [N m].
+            max_force: give this to push: largest force along the axis [N].
+            is_fixed: False lets the axis turn with the particles, as in a wheel or a rocket. True keeps its
+                direction in space, as of a mill, or of what steers.
+            point: on an axis that stays in space, (3,) [m], with `is_fixed` and `max_torque`. None lets the
+                axis pass through the centre of mass of the particles, wherever that goes.
+        Returns: a handle to change the speed and the limit with, to read the effort, and to remove it.
+        Raises: OptionError for bad numbers, vertices or a body of another world, for both limits or none, and
+            without `is_fixed` for particles on a line; StateError before `build`, under schedule "flat", and
+            where the world's 64 motors, or the 16,384 particles that they may drive, are all in use.
+        """
+        motors = self._context.of(Motors)
+        return motors.add(body, particles, axis, speed, max_torque, max_force, is_fixed, point)
 
     @recorded
     def apply_radial_impulse(self, center: ArrayLike, impulse: float, radius: float) -> None:

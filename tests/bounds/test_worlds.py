@@ -115,6 +115,7 @@ def crowd(**options):
     held = world.bodies[0]
     held.attach([0, 1], world.add_frame(position=held.center_of_mass()), two_way=True)
     held.grab(3)
+    world.add_motor(world.bodies[1], range(8), (0, 1, 0), speed=20.0, max_torque=50.0)
     world.record_events([Event])
     return world
 

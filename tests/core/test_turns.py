@@ -159,7 +159,7 @@ def test_every_call_of_a_second_thread_is_refused_by_name_and_changes_nothing():
 def test_all_handles_let_one_thread_in():
     kinds = [*Handle.__subclasses__(), *SoftBody.__subclasses__()]
     assert {kind.__name__ for kind in kinds} == {
-        *("World", "SoftBody", "Body", "Collider", "Frame", "Grab", "Attachment", "Joint")
+        *("World", "SoftBody", "Body", "Collider", "Frame", "Grab", "Attachment", "Joint", "Motor")
     }
     for kind in kinds:
         public = [m for name, m in vars(kind).items() if inspect.isfunction(m) and not name.startswith("_")]

@@ -107,6 +107,13 @@ def test_all_bodies_that_the_hand_throws_land_in_the_crate():
     assert stage.act.grab is None
 
 
+def test_all_wheels_are_driven_up_the_steps_and_stand_there():
+    at_top, stage = run("wheels", 7.0)
+    assert at_top == len(stage.actors) == 3
+    for actor in stage.actors:
+        assert actor.body.flipped_count() == 0
+
+
 def test_what_is_cut_off_is_what_lay_below_the_blade_and_falls_freely():
     """Mass by how much of each tetrahedron lies below the plane, to a fifth of a layer of them; the height
     from the place and speed that the lower part of the bar had at the cut, until it is near the floor."""
@@ -209,7 +216,7 @@ def test_a_film_shows_what_was_cut_off(tmp_path):
 def test_there_are_the_demos_of_the_readme():
     assert demo_names() == [
         *("attach", "bars", "bounce", "bowl", "cloth", "compare", "cut", "density", "dents", "grab"),
-        *("many", "playground", "rollback"),
+        *("many", "playground", "rollback", "wheels"),
     ]
 
 

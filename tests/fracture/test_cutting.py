@@ -368,7 +368,7 @@ def test_a_part_keeps_its_pins_its_fibres_and_its_dents():
 def test_what_is_held_is_not_cut_and_what_is_watched_is_watched_on(swinging):
     world, body = swinging()
     grab = body.grab(0)
-    with pytest.raises(StateError, match="body 0 is grabbed or joined to another body: release it"):
+    with pytest.raises(StateError, match="body 0 has grabs: release or remove them"):
         body.cut(plane=ALONG)
     grab.release()
     body.watch_stress(10.0)

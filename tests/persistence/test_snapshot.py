@@ -79,6 +79,7 @@ def readings(world):
         *((each.impulse.tolist(), each.angular_impulse.tolist()) for each in world.colliders),
         *(grab.force.tolist() for grab in world.grabs),
         *(joint.force.tolist() for joint in world.joints),
+        *((motor.effort, motor.measured_speed, motor.speed, motor.limit) for motor in world.motors),
         *(a.force.tolist() for body in bodies for a in body.attachments if a.two_way),
         *(world.read_positions(body, 0.25).tobytes() for body in bodies),
         (world.step_count, world.time, world.last_dt),
@@ -399,7 +400,7 @@ def test_what_is_whole_but_makes_no_sense_is_refused(small, change):
 
 @pytest.fixture(scope="module")
 def held():
-    """A world with everything that notes tell of: colliders, a frame, a grab, an attachment, a joint."""
+    """A world with all that notes tell of: colliders, a frame, a grab, an attachment, a joint, a motor."""
     world = World(collider_room=2)
     mesh = box(cells=(1, 1, 1))
     a, b = (world.add_body(mesh, Material(1e5, 0.2, 1000.0), position=(0, 0, z)) for z in (0.6, 1.7))
@@ -413,6 +414,7 @@ def held():
         a.attach([0], world.add_frame((0, 0, 2)), two_way=True),
         a.grab(0),
         a.attach_to(b, [4], onto=[0]),
+        world.add_motor(b, [0, 1, 2, 4], (0, 0, 1), speed=1.0, max_torque=5.0),
     )
 
 

@@ -35,6 +35,7 @@ DT, SUBSTEPS = 1 / 60, 8
 SOFT, FIRM = Material(3e4, 0.3, 500.0, 5.0), Material(6e4, 0.2, 700.0, 3.0)
 BLOCK = box((0.4, 0.4, 0.4), cells=(2, 2, 2))
 N, M = len(BLOCK.vertices), len(BLOCK.tets)
+TOP_FACE = np.flatnonzero(BLOCK.vertices[:, 2] > 0.19)
 
 
 class Game:
@@ -77,6 +78,8 @@ class Game:
         self.dead_grab, self.dead_hold = body.grab(0), body.attach([0], world.add_frame(), two_way=True)
         neighbour = world.spawn(self.cube, position=(0.5, 0.0, 2.0))
         self.dead_joint = body.attach_to(neighbour, [0], onto=[0])
+        self.dead_motor = world.add_motor(body, [0], (0, 0, 1), speed=1.0, max_force=1.0, is_fixed=True)
+        self.dead_motor.remove()
         self.dead_grab.release()
         self.dead_hold.release()
         self.dead_joint.release()
@@ -95,6 +98,7 @@ class Game:
         self.hand = self.held.grab(3)
         self.hanging = world.spawn(self.cube, position=(1.9, 0.0, 1.0))
         self.joint = self.hanging.attach_to(self.held, np.flatnonzero(BLOCK.vertices[:, 0] < -0.19))
+        self.motor = world.add_motor(self.hanging, TOP_FACE, (0, 0, 1), speed=2.0, max_torque=3.0)
         self.collider = world.colliders[0]
         for _ in range(5):
             world.step(DT, SUBSTEPS)
@@ -146,6 +150,7 @@ class Game:
             "Grab": self.grabs,
             "Attachment": self.holds,
             "Joint": self.joints,
+            "Motor": self.world.motors,
             "Listener": [self.listener],
         }
         return list(lists[kind])
@@ -230,6 +235,11 @@ def _turn(game, rng):
 
 def _some(game, rng):
     return rng.permutation(game.receiver.vertex_count)[: rng.integers(1, 6)].tolist()
+
+
+def _few(game, rng):
+    """Of whichever body: all have this many."""
+    return rng.permutation(4)[: rng.integers(1, 5)].tolist()
 
 
 PLACE = vector((-2.0, -2.0, 1.2), (2.0, 2.0, 3.0), far=(1e7, 0.0, 0.0), **{
@@ -379,6 +389,15 @@ def _has_no_pins(game, body, given):
     return not set(given["particles"]) <= set(body.pinned.tolist()) or _touches_attached(game, body, given)
 
 
+def _drives_too_much(game, world, given):
+    """Both limits or none, a point without a fixed axis that turns; too few vertices to go with, or too many
+    motors."""
+    turns, pushes = given["max_torque"] is not None, given["max_force"] is not None
+    if turns == pushes or (given["point"] is not None and not (turns and given["is_fixed"])):
+        return True
+    return None if len(given["particles"]) < 3 or len(world.motors) >= 60 else False
+
+
 def _has_full_hands(game, handle, given):
     return len(game.world.grabs) == 16
 
@@ -436,6 +455,11 @@ CALLS: dict[str, dict[str, Call]] = {
         "warm_up": NOTHING,
         "add_frame": Call({"position": POINT, "rotation": ROTATION}),
         "grab": Call({"origin": RAY, "direction": WAY, "max_distance": REACH, "bodies": BODIES, "frequency": FREQUENCY, "max_force": LOAD}, _is_sound_grab),
+        "add_motor": Call({
+            "body": BODY, "particles": Kind(_few, NOT_VERTICES), "axis": vector(0.1, 1.0, zero=(0.0, 0.0, 0.0)),
+            "speed": number(-5.0, 5.0, fast=1e5), "max_torque": or_none(number(0.0, 9.0, below=-1.0, strong=1e13)),
+            "max_force": or_none(number(0.0, 90.0, below=-1.0, strong=1e13)), "is_fixed": FLAG, "point": or_none(POINT),
+        }, _drives_too_much),
         "apply_radial_impulse": Call({"center": POINT, "impulse": number(-20.0, 60.0, strong=1e21, **{"too strong for a body": 1e13}), "radius": number(0.5, 3.0, zero=0.0, below=-1.0)}),
         "set_wind": Call({"velocity": or_none(SPEED), "density": number(0.5, 2.0, below=-1.0), "drag": number(0.1, 2.0, below=-1.0)}),
         "set_force_field": Call({"function": FIELD}),
@@ -514,6 +538,11 @@ CALLS: dict[str, dict[str, Call]] = {
     "Grab": {"move": Call({"point": POINT}), "release": NOTHING},
     "Attachment": {"release": NOTHING},
     "Joint": {"release": NOTHING},
+    "Motor": {
+        "set_speed": Call({"speed": number(-5.0, 5.0, fast=1e5)}),
+        "set_limit": Call({"limit": number(0.0, 9.0, below=-1.0, strong=1e13)}),
+        "remove": NOTHING,
+    },
     "Listener": {"remove": NOTHING},
     "EngineAdapter": {
         "step": NOTHING,
@@ -532,7 +561,7 @@ CALLS: dict[str, dict[str, Call]] = {
 }  # fmt: skip
 
 READERS: dict[str, str] = {
-    "World": """bodies colliders dropped_events floor_collider frames grabs is_built joints last_dt restore_count settings slot_count step_count
+    "World": """bodies colliders dropped_events floor_collider frames grabs is_built joints last_dt motors restore_count settings slot_count step_count
         time""",
     "Body": """aabb angular_momentum asset attachments center_of_mass deformations elastic_energy failure flipped_count flipped_tets
         gravitational_energy gravity_scale index is_alive is_asleep is_cut is_frozen is_held is_sheltered
@@ -545,6 +574,7 @@ READERS: dict[str, str] = {
     "Grab": """body force is_held point""",
     "Attachment": """body force frame is_attached particles torque two_way""",
     "Joint": """body force is_attached other particles""",
+    "Motor": """body effort is_mounted limit measured_speed particles speed turns""",
     "Listener": """function is_active kind""",
     "EngineAdapter": """alpha dropped_time fixed_step time total_dropped_time world""",
     "Rollback": """steps""",
@@ -552,7 +582,7 @@ READERS: dict[str, str] = {
 """What is asked without arguments and changes nothing."""
 
 DEAD = {"Body": "dead_body", "Collider": "dead_collider", "Frame": "dead_frame", "Grab": "dead_grab"}
-DEAD |= {"Attachment": "dead_hold", "Joint": "dead_joint"}
+DEAD |= {"Attachment": "dead_hold", "Joint": "dead_joint", "Motor": "dead_motor"}
 
 READABLE_WHEN_DEAD: dict[str, str] = {
     "Body": """asset index is_alive is_cut is_frozen masses material mesh surface tet_origins tets topology_version
@@ -563,6 +593,7 @@ READABLE_WHEN_DEAD: dict[str, str] = {
     "Grab": "body is_held point",
     "Attachment": "body frame is_attached particles two_way",
     "Joint": "body is_attached other particles",
+    "Motor": "body is_mounted limit particles speed turns",
 }
 
 LENGTH = number(0.1, 1.0, zero=0.0, below=-1.0, long=1e7)

@@ -171,6 +171,27 @@ def _part(world, cube, rng):
         joint.release()
 
 
+def _drive(world, cube, rng):
+    body = _body(world, rng)
+    if len(world.motors) < 3 and body.vertex_count > 3:
+        limit = {"max_torque": 20.0} if rng.integers(2) else {"max_force": 200.0}
+        is_fixed = bool(rng.integers(2))
+        axis, speed = rng.normal(size=3), rng.uniform(-5, 5)
+        with contextlib.suppress(OptionError):  # they lie on a line
+            world.add_motor(body, _some(body, rng, 4), axis, speed=speed, is_fixed=is_fixed, **limit)
+
+
+def _shift_gear(world, cube, rng):
+    for motor in world.motors[:1]:
+        motor.set_speed(rng.uniform(-5, 5))
+        motor.set_limit(rng.uniform(0, 50))
+
+
+def _brake(world, cube, rng):
+    for motor in world.motors[:1]:
+        motor.remove()
+
+
 def _move_collider(world, cube, rng):
     world.colliders[0].move_to(world.colliders[0].position + rng.uniform(-0.05, 0.05, 3))
 
@@ -222,6 +243,7 @@ ACTIONS = (
     _spawn, _despawn, _push, _force, _explode, _pin, _unpin, _grab, _move_grabs, _release, _attach, _move_frames,
     _detach, _move_collider, _drive_collider, _add_collider, _remove_collider, _blow, _remake, _tune, _throw,
     _join, _part, _pick, _cut, _jump_frame, _remove_frame, _add_ground,
+    _drive, _shift_gear, _brake,
 )  # fmt: skip
 
 

@@ -36,6 +36,7 @@ def readings(world, adapter):
         "Grab": world.grabs,
         "Attachment": [each for body in world.bodies for each in body.attachments],
         "Joint": world.joints,
+        "Motor": world.motors,
         "EngineAdapter": [adapter],
     }
     for kind, each in handles.items():

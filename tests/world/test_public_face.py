@@ -34,6 +34,7 @@ def public_names(kind):
     """Of methods, properties and fields."""
     handle_fields = {"Collider": ["index"], "Grab": ["body"], "Listener": ["function", "is_active", "kind"]}
     handle_fields["Attachment"] = ["body", "frame", "particles", "two_way"]
+    handle_fields["Motor"] = ["body", "particles"]
     handle_fields["Joint"] = ["body", "other", "particles"]
     return {n for n in [*dir(CLASSES[kind]), *handle_fields.get(kind, [])] if not n.startswith("_")}
 

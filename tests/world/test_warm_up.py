@@ -20,6 +20,7 @@ from taichi_soft import (
 )
 from taichi_soft.bodies.fields import MOST_GRABS
 from taichi_soft.control.joint_fields import MOST_JOINTS
+from taichi_soft.control.kernels.motors import MOST_MOTORS
 
 
 @pytest.fixture(scope="module")
@@ -133,13 +134,15 @@ def test_it_leaves_the_world_as_it_is(game):
     assert (world.snapshot(), world.state_hash(), world.bodies, world.colliders, world.step_count) == before
 
 
-def test_it_is_no_trouble_where_all_joints_and_grabs_are_in_use(game):
+def test_it_is_no_trouble_where_all_joints_grabs_and_motors_are_in_use(game):
     game.begin()
     world = game.world
     for _ in range(MOST_JOINTS - len(world.joints)):
         game.hanging.attach_to(game.held, [0], onto=[0])
     for _ in range(MOST_GRABS - len(world.grabs)):
         game.free.grab(0)
+    for _ in range(MOST_MOTORS - len(world.motors)):
+        world.add_motor(game.free, [0], (0, 0, 1), speed=1.0, max_force=1.0, is_fixed=True)
     before = world.snapshot()
     world.warm_up()
     assert world.snapshot() == before

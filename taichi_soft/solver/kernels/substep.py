@@ -1,7 +1,7 @@
 """One substep, phase by phase, in the order in which they run: with contact and without.
 
     each body by itself     wind, drives
-                            internal forces, reactions of pins, grabs
+                            internal forces, reactions of pins, grabs, motors
                             vibrations fade
                             kick: new velocities
     its island              joints
@@ -28,6 +28,7 @@ from taichi_soft.contact.kernels.touches import add_touches
 from taichi_soft.control.kernels.drives import add_reactions, blow_on, push_particles
 from taichi_soft.control.kernels.grabs import pull_grabs
 from taichi_soft.control.kernels.joints import solve_joints
+from taichi_soft.control.kernels.motors import run_motors
 from taichi_soft.core.runtime import ti
 from taichi_soft.core.types import Integrator
 from taichi_soft.elements.kernels.internal_forces import accumulate_forces
@@ -89,6 +90,7 @@ def advance_body(state: ti.template(), program: ti.template(), body, now, drifts
         accumulate_forces(state, program, body)
         add_reactions(state, body, felt)
         pull_grabs(state, body, now.h, felt)
+    run_motors(state, program, body, now.h, felt, int(now.s == 0))
     damp_vibration(state, program, body, felt, now.h, now.s, now.substeps)
     return _kick(state, program, body, now, kick, drifts)
 

@@ -1,0 +1,102 @@
+"""Soft wheels, driven at their hubs, climb a flight of steps and are braked at the top."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine_adapter import FixedStep
+from taichi_soft import Body, BoxShape, Contact, Material, Motor, World, cylinder
+from taichi_soft.cli import main
+from taichi_soft.render import PALETTE, Camera
+from taichi_soft.render.film import Actor, Stage
+
+STIFFNESSES = (6e4, 1.5e5, 5e5)  # Young's moduli, from the softest wheel to the firmest [Pa]
+RADIUS, WIDTH, HUB = 0.5, 0.7, 0.2  # of the wheels; radius of what the motor drives [m]
+SPEED, TORQUE = 3.0, 1500.0  # [rad/s] and [N m]
+LANE, ASIDE = 1.4, 0.3  # from wheel to wheel, and how much wider than these the steps are on each side [m]
+RISE, TREAD, STEPS = 0.14, 0.9, 3  # of the steps [m], and how many there are
+FOOT, TOP = 1.4, 2.8  # where the first step begins, and how long the last one is [m]
+GOAL = FOOT + (STEPS - 1) * TREAD + TOP / 2 - 0.2  # where the motors brake [m]
+BEGIN = 0.8  # when they set out [s]
+DRAG = 2.0  # [1/s] of a wheel that brakes, or it would rock to and fro about its hub
+STEP = FixedStep(dt=1 / 50)
+
+
+class Drivers:
+    """Start the motors, and brake each at the top."""
+
+    def __init__(self, motors: list[Motor]) -> None:
+        """Waiting."""
+        self.motors = motors
+
+    def __call__(self, world: World) -> None:
+        """Before a step."""
+        for motor in self.motors:
+            is_there = motor.body.center_of_mass()[0] > GOAL
+            speed = SPEED if world.time >= BEGIN and not is_there else 0.0
+            if motor.speed != speed:
+                motor.set_speed(speed)
+                motor.body.set_linear_damping(DRAG if is_there else 0.0)
+
+    def caption(self) -> str:
+        """For the picture."""
+        return "torque " + "  ".join(f"{motor.effort:6.0f}" for motor in self.motors) + " N m"
+
+
+def stage() -> Stage:
+    """Wheels side by side before the steps."""
+    world = World(soft_contact=True)
+    width = LANE * len(STIFFNESSES) + 2 * ASIDE
+    for i in range(STEPS):
+        length = TREAD if i < STEPS - 1 else TOP
+        size = (length, width, RISE * (i + 1))
+        middle = FOOT + i * TREAD + length / 2
+        world.add_collider(BoxShape(size), position=(middle, 0.0, size[2] / 2), friction=0.9)
+    mesh = cylinder(RADIUS, WIDTH, rings=4, layers=5)
+    upright = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # its axis along y
+    actors = []
+    for i, young in enumerate(STIFFNESSES):
+        body = world.add_body(
+            mesh,
+            Material(young, 0.3, 400.0, damping_ratio=0.2),
+            position=(0.0, LANE * (i - 1), RADIUS + 0.01),
+            rotation=upright,
+            contact=Contact(friction=0.9),
+        )
+        actors.append(Actor(body, paint=_sectors(PALETTE[i]), label=f"{young / 1e3:.0f} kPa"))
+    world.build()
+    hub = np.flatnonzero(np.hypot(*mesh.vertices[:, :2].T) < HUB)
+    motors = [
+        world.add_motor(body, hub, (0.0, 1.0, 0.0), speed=0.0, max_torque=TORQUE) for body in world.bodies
+    ]
+    camera = Camera.framing((-0.4, -1.9, 0.0), (5.4, 1.9, 1.2), aspect=16 / 9, azimuth=-122, elevation=24)
+    for body in world.bodies:  # or the tetrahedra, which all lean to one side, would steer
+        world.add_motor(body, hub, (0.0, 0.0, 1.0), speed=0.0, max_torque=TORQUE, is_fixed=True)
+    drivers = Drivers(motors)
+    title = "soft wheels with motors at their hubs"
+    found = Stage(title, world, actors, camera, STEP, 7.0, act=drivers)
+    found.caption = drivers.caption
+    return found
+
+
+def _sectors(color):  # type: ignore[no-untyped-def]
+    """Every other twelfth of a wheel is paler, so that one sees it turn."""
+
+    def paint(body: Body) -> NDArray[np.float32]:
+        x, y, _ = body.mesh.vertices.T
+        is_pale = np.floor(np.arctan2(y, x) / (np.pi / 6)).astype(int) % 2 == 0
+        pale = 0.5 * np.array(color) + 0.5
+        return np.where(is_pale[:, None], pale, color).astype(np.float32)
+
+    return paint
+
+
+def proof(stage: Stage) -> float:
+    """How many wheels stand on the last step."""
+    height = STEPS * RISE
+    begin = FOOT + (STEPS - 1) * TREAD
+    places = [actor.body.center_of_mass() for actor in stage.actors]
+    return float(sum(begin < x < begin + TOP and z > height + 0.5 * RADIUS for x, _, z in places))
+
+
+if __name__ == "__main__":
+    main("demo", "wheels")

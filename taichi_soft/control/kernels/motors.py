@@ -1,0 +1,225 @@
+"""Motors: their fields, and how they bring a part of a body to a speed about an axis, or along it.
+
+A motor moves its particles by one pattern d: where it turns them about the axis a through c,
+d = a x (x - c) [m]; where it pushes them along the axis, d = a. With velocities v after the forces of a
+substep of h seconds
+
+    inertia  I = sum m d.d        speed  w = sum m d.v / I
+    impulse  J = I (wanted - w), no larger than limit h
+    v += J / I d
+
+The pattern is that of a rigid motion, so a motor deforms only what lies between its particles and the rest of
+the body. The particles have the wanted speed after the substep's forces, unless that takes more than the
+limit. An axis that turns with the particles lies in them as it lay in the rest shape.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from taichi_soft.bodies.kernels.motion import gravity_on
+from taichi_soft.core.loading import Loader
+from taichi_soft.core.math.svd import signed_svd
+from taichi_soft.core.runtime import holds_fields, ti
+from taichi_soft.core.types import Integrator
+
+MOST_MOTORS, MOTOR_ROWS = 64, 16384
+"""Motors of one world at a time, and particles that all of them drive together."""
+
+MOST_CHANGE = 0.25
+"""Of a particle's velocity in a substep, over the speed of sound in its body: what is moved faster than that
+leaves the rest of the body behind, torn."""
+
+
+@ti.dataclass
+class MotorRow:
+    """One motor."""
+
+    body: ti.i32  # its number plus 1, 0 where there is no motor
+    first: ti.i32  # of its rows in `MotorFields.particle`, and the row behind the last
+    end: ti.i32
+    turns: ti.i32  # 1 where it turns particles about its axis, 0 where it pushes them along that
+    is_fixed: ti.i32  # 1 where the axis keeps its direction, 0 where it turns with the particles
+    has_point: ti.i32  # 1 where it passes through a point, 0 where through the centre of the particles
+    axis: ti.math.vec3  # of unit length, in space or in the rest shape
+    point: ti.math.vec3  # [m]
+    speed: ti.f32  # wanted [rad/s] or [m/s]
+    limit: ti.f32  # of torque [N m] or force [N]
+
+
+@holds_fields
+class MotorFields:
+    """All motors of a world."""
+
+    def __init__(self, bodies: int) -> None:
+        """Allocate; contents are zero."""
+        self.motor = MotorRow.field(shape=MOST_MOTORS)  # type: ignore[attr-defined]
+        self.particle = ti.field(ti.i32, MOTOR_ROWS)
+        self.is_driven = ti.field(ti.i32, bodies)  # 1 where a motor drives it
+        self.impulse = ti.field(ti.f32, MOST_MOTORS)  # in the last step [N m s] or [N s]
+
+    def clear(self, loader: Loader) -> None:
+        """Let there be no motor."""
+        loader.fill(self.motor.body, np.zeros(0))
+        loader.fill(self.is_driven, np.zeros(0))
+        loader.fill(self.impulse, np.zeros(0))
+
+    def carried(self) -> list[list[Any]]:
+        """What is read of each motor after a step. The next step depends on what Python knows of it."""
+        return [[self.impulse]]
+
+
+@ti.func
+def _axis_now(state: ti.template(), motor):
+    """A point on the axis of a motor [m], and its direction.
+
+    One that turns with the particles does so by the rotation R that comes nearest to them: R = U V^T of
+    sum m x r^T = U S V^T, x now and r at rest from their centres.
+    """
+    first = state.motors.particle[motor.first]
+    x0, r0 = state.particle_position[first], state.rest_position[first]
+    mass, now, rest = x0.x * 0.0, x0 * 0.0, x0 * 0.0
+    a, b, c, size = x0 * 0.0, x0 * 0.0, x0 * 0.0, x0.x * 0.0
+    for row in range(motor.first, motor.end):
+        p = state.motors.particle[row]
+        m = state.particle_mass[p]
+        x, r = state.particle_position[p] - x0, state.rest_position[p] - r0
+        mass += m
+        now, rest = now + m * x, rest + m * r
+        a, b, c, size = a + m * r.x * x, b + m * r.y * x, c + m * r.z * x, size + m * r.dot(r)
+    point, axis = motor.point, motor.axis
+    if motor.has_point == 0:
+        point = x0 + now / mass
+    if motor.is_fixed == 0:
+        size = ti.max(size, 1e-30)
+        a, b, c = a - rest.x / mass * now, b - rest.y / mass * now, c - rest.z / mass * now
+        U, _, V = signed_svd((a / size, b / size, c / size))
+        axis = U[0] * V[0].dot(motor.axis) + U[1] * V[1].dot(motor.axis) + U[2] * V[2].dot(motor.axis)
+    return point, axis
+
+
+@ti.func
+def _pattern(state: ti.template(), motor, p, point, axis):
+    return ti.select(motor.turns == 1, axis.cross(state.particle_position[p] - point), axis)
+
+
+@ti.func
+def _run_motor(state: ti.template(), program: ti.template(), motor, h, kick):
+    """Returns: the impulse that it gave [N m s] or [N s]."""
+    gravity, sound_speed = gravity_on(state, motor.body - 1), state.body_sound_speed[motor.body - 1]
+    point, axis = _axis_now(state, motor)
+    inertia, momentum, longest = point.x * 0.0, point.x * 0.0, point.x * 0.0
+    for row in range(motor.first, motor.end):
+        p = state.motors.particle[row]
+        inv_mass = state.particle_inv_mass[p]
+        if inv_mass > 0.0:
+            d = _pattern(state, motor, p, point, axis)
+            velocity = state.particle_velocity[p]
+            if ti.static(program.integrator == Integrator.IMPLICIT_EULER):  # which finds its forces later
+                velocity += h * gravity
+            else:
+                velocity += kick * (inv_mass * state.particle_force[p].xyz + gravity)
+            inertia += state.particle_mass[p] * d.dot(d)
+            momentum += state.particle_mass[p] * d.dot(velocity)
+            longest = ti.max(longest, d.dot(d))
+    impulse = point.x * 0.0
+    if inertia > 0.0:
+        speed = momentum / inertia
+        most = ti.min(motor.limit * h / inertia, MOST_CHANGE * sound_speed / ti.sqrt(longest))
+        change = ti.max(-most, ti.min(motor.speed - speed, most))
+        if ti.abs(speed) < 1e18 and ti.abs(change) < 1e18:  # or the body is on its way to infinity
+            for row in range(motor.first, motor.end):
+                p = state.motors.particle[row]
+                if state.particle_inv_mass[p] > 0.0:
+                    d = _pattern(state, motor, p, point, axis)
+                    state.particle_velocity[p] = state.particle_velocity[p] + change * d
+            impulse = inertia * change
+    return impulse
+
+
+@ti.func
+def run_motors(state: ti.template(), program: ti.template(), body, h, kick, is_first):
+    """Let the motors of one body act for a substep of `h` [s].
+
+    They look at the velocities after a kick of the forces [s]: so they feel what holds against them.
+
+    Args:
+        is_first: 1 in the first substep of a step.
+    """
+    if state.motors.is_driven[body] == 1:
+        for number in range(MOST_MOTORS):
+            if state.motors.motor[number].body == body + 1:
+                motor = state.motors.motor[number]
+                before = ti.select(is_first == 1, 0.0, state.motors.impulse[number])
+                state.motors.impulse[number] = before + _run_motor(state, program, motor, h, kick)
+                if ti.static(program.has_contact):
+                    if motor.speed != 0.0 and motor.limit > 0.0:
+                        state.contact.calm[body] = 0.0  # however slowly it begins to move
+
+
+@ti.kernel
+def write_motors(
+    state: ti.template(),
+    rows: ti.types.ndarray(dtype=ti.i32, ndim=2),
+    numbers: ti.types.ndarray(dtype=ti.f32, ndim=2),
+    particles: ti.types.ndarray(dtype=ti.i32, ndim=1),
+):
+    """Let there be these motors, and no other.
+
+    Args:
+        rows: of each its number, its body, first row, the row behind the last, `turns`, `is_fixed`,
+            `has_point`, (k, 7).
+        numbers: axis, point [m], wanted speed, limit, (k, 8).
+        particles: of all rows.
+    """
+    ti.loop_config(serialize=True)
+    for _ in range(1):
+        for body in range(state.motors.is_driven.shape[0]):
+            state.motors.is_driven[body] = 0
+        for number in range(MOST_MOTORS):
+            state.motors.motor[number].body = 0
+        for k in range(rows.shape[0]):
+            state.motors.motor[rows[k, 0]] = MotorRow(
+                body=rows[k, 1] + 1,
+                first=rows[k, 2],
+                end=rows[k, 3],
+                turns=rows[k, 4],
+                is_fixed=rows[k, 5],
+                has_point=rows[k, 6],
+                axis=ti.Vector([numbers[k, 0], numbers[k, 1], numbers[k, 2]]),
+                point=ti.Vector([numbers[k, 3], numbers[k, 4], numbers[k, 5]]),
+                speed=numbers[k, 6],
+                limit=numbers[k, 7],
+            )
+            state.motors.is_driven[rows[k, 1]] = 1
+        for row in range(particles.shape[0]):
+            state.motors.particle[row] = particles[row]
+
+
+@ti.kernel
+def write_drive(state: ti.template(), number: ti.i32, speed: ti.f32, limit: ti.f32):
+    """What speed a motor drives towards from now on, and how strongly at most."""
+    state.motors.motor[number].speed = speed
+    state.motors.motor[number].limit = limit
+
+
+@ti.kernel
+def read_speed(state: ti.template(), number: ti.i32) -> ti.f32:
+    """Of the particles that a motor drives, about its axis [rad/s] or along it [m/s]."""
+    inertia, momentum = 0.0, 0.0
+    ti.loop_config(serialize=True)
+    for _ in range(1):
+        motor = state.motors.motor[number]
+        point, axis = _axis_now(state, motor)
+        for row in range(motor.first, motor.end):
+            p = state.motors.particle[row]
+            d = _pattern(state, motor, p, point, axis)
+            inertia += state.particle_mass[p] * d.dot(d)
+            momentum += state.particle_mass[p] * d.dot(state.particle_velocity[p])
+    return momentum / ti.max(inertia, 1e-30)
+
+
+@ti.kernel
+def forget_impulse(state: ti.template(), number: ti.i32):
+    """What the last motor of that number did is not what the next one did."""
+    state.motors.impulse[number] = 0.0

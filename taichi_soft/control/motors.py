@@ -1,0 +1,344 @@
+"""Motors: a part of a body turned about an axis, or pushed along it, towards a speed."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taichi_soft.bodies.pose import best_fitting_pose
+from taichi_soft.bodies.soft_body import (
+    Context,
+    RowsOf,
+    Slice,
+    SoftBody,
+    context_of,
+    lives_in,
+    require_alive,
+)
+from taichi_soft.control.access import change, named_particles, numbers, require_substeps, rows_of
+from taichi_soft.control.kernels.motors import (
+    MOST_MOTORS,
+    MOTOR_ROWS,
+    forget_impulse,
+    read_speed,
+    write_drive,
+    write_motors,
+)
+from taichi_soft.core.checks import as_flag, as_number, as_vector
+from taichi_soft.core.constants import VELOCITY_LIMIT
+from taichi_soft.core.errors import OptionError, StateError
+from taichi_soft.core.handles import Handle, handles_of, recorded, serial_of
+from taichi_soft.core.serialisation import below, indices_below, require_finite, vector_of
+
+LARGEST_LIMIT = 1e12
+"""Of torque [N m] and force [N]."""
+
+
+@dataclass
+class Drive:
+    """What a motor does."""
+
+    turns: bool  # about the axis, or pushes along it
+    is_fixed: bool  # the axis keeps its direction, or turns with the particles
+    axis: NDArray[np.float64]  # of unit length, (3,), in space or in the rest shape
+    point: NDArray[np.float64] | None  # on the axis, (3,) [m]; None for the centre of the particles
+    speed: float  # [rad/s] or [m/s]
+    limit: float  # [N m] or [N]
+
+    @property
+    def unit(self) -> str:
+        """Of its speed."""
+        return "rad/s" if self.turns else "m/s"
+
+
+THINNEST = 1e-3
+"""Width of the driven part over its length, below which nobody can see how it has turned about that."""
+
+
+class Motor(Handle):
+    """What turns a part of a body, or pushes it. Made by `World.add_motor`."""
+
+    def __init__(self, body: SoftBody, number: int, particles: NDArray[np.int32], drive: Drive) -> None:
+        """Made by `World.add_motor`."""
+        self.body = body
+        self.particles = particles
+        self._number = number
+        self._drive = drive
+
+    def __repr__(self) -> str:
+        state = f"{self.speed:g} {self._drive.unit}" if self.is_mounted else "removed"
+        return f"Motor(body {self.body.index}, {len(self.particles)} particles, {state})"
+
+    @property
+    def is_mounted(self) -> bool:
+        """False once removed, and once the body was."""
+        return self.body.is_alive and self._motors.by_number.get(self._number) is self
+
+    @property
+    def turns(self) -> bool:
+        """Whether it turns its particles about the axis; otherwise it pushes them along it."""
+        return self._drive.turns
+
+    @property
+    def speed(self) -> float:
+        """Towards which it drives [rad/s], or [m/s] where it pushes."""
+        return self._drive.speed
+
+    @property
+    def limit(self) -> float:
+        """Largest torque [N m], or force [N] where it pushes."""
+        return self._drive.limit
+
+    @property
+    def measured_speed(self) -> float:
+        """That its particles have about the axis, or along it [rad/s] or [m/s]; 0 while the body is frozen.
+
+        Raises: StateError once removed.
+        """
+        self._require_mounted()
+        state = context_of(self.body).built.state
+        return 0.0 if self.body.is_frozen else float(read_speed(state, self._number))
+
+    @property
+    def effort(self) -> float:
+        """Torque [N m] or force [N] that it gave, mean over the last step; 0 while the body is frozen.
+
+        Raises: StateError once removed.
+        """
+        self._require_mounted()
+        context = context_of(self.body)
+        impulse = 0.0 if self.body.is_frozen else float(context.built.state.motors.impulse[self._number])
+        return impulse / max(context.clock.last_dt, 1e-30)
+
+    @recorded
+    def set_speed(self, speed: float) -> None:
+        """Drive towards another speed from now on [rad/s], or [m/s] where it pushes.
+
+        Raises: OptionError for a number out of range; StateError once removed.
+        """
+        self._set(_as_speed(speed, self._drive.turns), self.limit)
+
+    @recorded
+    def set_limit(self, limit: float) -> None:
+        """Allow another torque [N m] or force [N] from now on; with 0 the particles coast.
+
+        Raises: as `set_speed`.
+        """
+        self._set(self.speed, _as_limit(limit, "limit"))
+
+    @recorded
+    def remove(self) -> None:
+        """Drive no longer; the particles keep their velocities. Raises: StateError if it was done before."""
+        self._require_mounted()
+        motors = self._motors
+        del motors.by_number[self._number]
+        change(self.body, write_motors, *motors.rows())
+
+    @property
+    def _motors(self) -> Motors:
+        return context_of(self.body).of(Motors)
+
+    def _set(self, speed: float, limit: float) -> None:
+        self._require_mounted()
+        change(self.body, write_drive, self._number, speed, limit)
+        self._drive.speed, self._drive.limit = speed, limit
+
+    def _require_mounted(self) -> None:
+        if not self.is_mounted:
+            raise StateError(f"this motor of body {self.body.index} was removed: add another")
+
+
+class Motors(Slice):
+    """All motors of one world, by number."""
+
+    name = "motors"
+
+    def __init__(self, context: Context) -> None:
+        """None yet."""
+        super().__init__(context)
+        self.by_number: dict[int, Motor] = {}
+
+    @property
+    def handles(self) -> list[Motor]:
+        """Of all motors there are, by number."""
+        return [motor for _, motor in sorted(self.by_number.items())]
+
+    @property
+    def rows_in_use(self) -> int:
+        """Particles that all motors drive together."""
+        return sum(len(motor.particles) for motor in self.by_number.values())
+
+    def holds(self, body: SoftBody) -> bool:
+        """Whether one drives it."""
+        return any(motor.body is body for motor in self.by_number.values())
+
+    def let_go(self, body: SoftBody) -> None:
+        """Remove all that drive a body."""
+        for motor in [each for each in self.by_number.values() if each.body is body]:
+            motor.remove()
+
+    def warm_up(self, body: SoftBody, other: SoftBody | None, step: Callable[[], None]) -> None:
+        """Drive a body, and read what that did."""
+        with contextlib.suppress(StateError):  # all are in use already, which compiles them too
+            motor = self.add(body, [0], (0.0, 0.0, 1.0), 0.0, None, 0.0, True, None)
+            motor.set_speed(1.0)
+            step()
+            _ = motor.effort, motor.measured_speed
+            motor.remove()
+
+    def rows(self) -> tuple[NDArray[np.int32], NDArray[np.float32], NDArray[np.int32]]:
+        """All motors as `write_motors` takes them, their particles one after the other."""
+        wholes, reals, particles, first = [], [], [], 0
+        for number, motor in sorted(self.by_number.items()):
+            drive, end = motor._drive, first + len(motor.particles)
+            has_point, point = drive.point is not None, np.zeros(3) if drive.point is None else drive.point
+            wholes.append([number, motor.body.index, first, end, drive.turns, drive.is_fixed, has_point])
+            reals.append(numbers(drive.axis, point, drive.speed, drive.limit))
+            particles.append(rows_of(motor.body, motor.particles))
+            first = end
+        return (
+            np.array(wholes, dtype=np.int32).reshape(-1, 7),
+            np.array(reals, dtype=np.float32).reshape(-1, 8),
+            np.concatenate([*particles, np.zeros(0)]).astype(np.int32),
+        )
+
+    def entries(self) -> list[list[Any]]:
+        """Numbers of handle, motor and body, the particles, and what it does."""
+        return [
+            [
+                *(serial_of(motor), number, motor.body.index, motor.particles.tolist()),
+                *(motor._drive.turns, motor._drive.is_fixed, motor._drive.axis.tolist()),
+                None if motor._drive.point is None else motor._drive.point.tolist(),
+                *(motor.speed, motor.limit),
+            ]
+            for number, motor in sorted(self.by_number.items())
+        ]
+
+    def row_counts(self, entries: list[list[Any]]) -> list[int]:
+        """Of motors up to the last in use."""
+        return [max((int(number) for _, number, *_ in entries), default=-1) + 1]
+
+    def read(
+        self, entries: list[list[Any]], vertex_counts: Sequence[int], earlier: dict[str, Any]
+    ) -> list[tuple[int, int, int, NDArray[np.int32], Drive]]:
+        """Rows of `entries`. Raises: ValueError for a motor of nobody, or what no motor does."""
+        found = []
+        for serial, number, slot, particles, turns, is_fixed, axis, point, speed, limit in entries:
+            count = vertex_counts[below(slot, len(vertex_counts))]
+            if not count:
+                raise ValueError("a motor drives no body")
+            drive = Drive(
+                as_flag(turns, "turns"),
+                as_flag(is_fixed, "is_fixed"),
+                vector_of(axis, 3, 1.001),
+                None if point is None else vector_of(point, 3),
+                _as_speed(speed, turns),
+                _as_limit(limit, "limit"),
+            )
+            driven = indices_below(particles, count)
+            found.append((int(serial), below(number, MOST_MOTORS), int(slot), driven, drive))
+        is_twice = len({number for _, number, *_ in found}) < len(found)
+        if is_twice or sum(len(driven) for *_, driven, _ in found) > MOTOR_ROWS:
+            raise ValueError("it has more motors than a world can have")
+        return found
+
+    def require(self, read: Any, rows_of: RowsOf) -> None:
+        """Raises: ValueError where what motors did is not finite."""
+        require_finite(rows_of(self.context.built.state.motors.impulse))
+
+    def restore(self, read: Any) -> None:
+        """Let there be the motors that were `read`, and no other."""
+        had_any = bool(self.by_number)
+        self.by_number.clear()
+        for serial, number, slot, particles, drive in read:
+            body = self.context.slots.slots[slot]
+            assert body is not None
+            motor = self.context.handles.find(serial, Motor) or Motor(body, number, particles, drive)
+            self.context.handles.enlist(motor, serial)
+            motor.body, motor.particles, motor._number, motor._drive = body, particles, number, drive
+            self.by_number[number] = motor
+        if had_any or self.by_number:
+            write_motors(self.context.built.state, *self.rows())
+
+    def add(
+        self,
+        body: Any,
+        particles: ArrayLike,
+        axis: ArrayLike,
+        speed: float,
+        max_torque: float | None,
+        max_force: float | None,
+        is_fixed: bool,
+        point: ArrayLike | None,
+    ) -> Motor:
+        """As `World.add_motor`."""
+        context = self.context
+        if not isinstance(body, SoftBody) or not lives_in(body, context):
+            raise OptionError(f"body must be one that this world made, got {body!r}")
+        require_alive(body)
+        vertices = named_particles(body, particles)
+        if (max_torque is None) == (max_force is None):
+            raise OptionError(
+                "a motor turns with max_torque [N m] or pushes with max_force [N]: give one of the two, got "
+                f"max_torque={max_torque!r}, max_force={max_force!r}"
+            )
+        turns = max_torque is not None
+        limit = _as_limit(max_torque if turns else max_force, "max_torque" if turns else "max_force")
+        wanted, stays = _as_speed(speed, turns), as_flag(is_fixed, "is_fixed")
+        direction = as_vector(axis, "axis", "")
+        length = float(np.linalg.norm(direction))
+        if not length > 0.0:
+            raise OptionError(f"axis must have a direction, got {direction.tolist()}")
+        if point is not None and not (turns and stays):
+            raise OptionError(
+                "point is of an axis that particles turn about, and that stays in space: give max_torque and "
+                "is_fixed=True with it, or leave it out"
+            )
+        place = None if point is None else as_vector(point, "point", "m")
+        require_substeps(context, "motors")
+        positions, masses = body.positions()[vertices].astype(np.float64), body.masses[vertices]
+        drive = Drive(turns, stays, direction / length, place, wanted, limit)
+        if not stays:
+            rest = body.mesh.vertices[vertices]
+            _require_width(rest, masses)
+            drive.axis = best_fitting_pose(rest, positions, masses).rotation.T @ drive.axis
+        free = next((number for number in range(MOST_MOTORS) if number not in self.by_number), None)
+        if free is None:
+            raise StateError(f"all {MOST_MOTORS} motors of this world are in use: remove one first")
+        used = self.rows_in_use
+        if used + len(vertices) > MOTOR_ROWS:
+            raise StateError(
+                f"the motors of a world drive at most {MOTOR_ROWS} particles: {used} are driven, and "
+                f"{len(vertices)} more were asked for. Remove a motor, or name fewer"
+            )
+        change(body, forget_impulse, free)
+        motor = self.by_number[free] = Motor(body, free, vertices, drive)
+        change(body, write_motors, *self.rows())
+        handles_of(body).enlist(motor)
+        return motor
+
+
+def _as_speed(speed: Any, turns: bool) -> float:
+    unit = "rad/s" if turns else "m/s"
+    return as_number(
+        speed, "speed", -VELOCITY_LIMIT, VELOCITY_LIMIT, f"a number up to {VELOCITY_LIMIT:g} {unit}"
+    )
+
+
+def _as_limit(limit: Any, name: str) -> float:
+    return as_number(limit, name, 0.0, LARGEST_LIMIT, f"a number from 0 to {LARGEST_LIMIT:g}")
+
+
+def _require_width(rest: NDArray[np.float64], masses: NDArray[np.float64]) -> None:
+    """Raises: OptionError where particles lie on a line, so that their turn about it cannot be seen."""
+    arms = (rest - masses @ rest / masses.sum()) * np.sqrt(masses)[:, None]
+    spreads = np.linalg.svd(arms, compute_uv=False)
+    if len(spreads) < 2 or not spreads[1] > THINNEST * spreads[0]:
+        raise OptionError(
+            "particles lie on a line, so an axis cannot turn with them: name more, or give is_fixed=True"
+        )
