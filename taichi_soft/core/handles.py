@@ -14,10 +14,6 @@ Kind = TypeVar("Kind", bound="Handle")
 Method = TypeVar("Method", bound=Callable[..., Any])
 
 
-CALLS: dict[str, set[str]] = {}
-"""Names of the methods that are recorded, by class: what a file may ask for."""
-
-
 class Recorder(Protocol):
     """Who takes note of calls, where a world has one."""
 
@@ -81,9 +77,6 @@ def handles_of(handle: Handle) -> Handles:
 def recorded(method: Method) -> Method:
     """Lets the recorder of a world that has one take note of the calls of a public method that changes it."""
 
-    kind, _, name = method.__qualname__.partition(".")
-    CALLS.setdefault(kind, set()).add(name)
-
     @wraps(method)
     def call(self: Handle, *arguments: Any, **options: Any) -> Any:
         recorder = self._handles.recorder
@@ -91,4 +84,10 @@ def recorded(method: Method) -> Method:
             return method(self, *arguments, **options)
         return recorder.call(method, self, arguments, options)
 
+    call.is_recorded = True  # type: ignore[attr-defined]
     return cast("Method", call)
+
+
+def is_recorded(handle: Handle, name: str) -> bool:
+    """Whether a handle has a method of that name that is recorded: what a file may ask for."""
+    return hasattr(getattr(type(handle), name, None), "is_recorded")

@@ -15,7 +15,7 @@ from taichi_soft.bodies.failure import Failure
 from taichi_soft.control.drives import push_bodies
 from taichi_soft.core.checks import as_path
 from taichi_soft.core.errors import FrozenBodyWarning, SnapshotError, TaichiSoftError, VideoError
-from taichi_soft.core.handles import CALLS, Handle, handles_of
+from taichi_soft.core.handles import Handle, handles_of, is_recorded
 from taichi_soft.core.serialisation import from_plain
 from taichi_soft.persistence.recorder import read_recording
 from taichi_soft.render import FLIPPED, PALETTE, Camera, Renderer, Surface, draw_text, highlight
@@ -97,7 +97,7 @@ def _asset(options: dict[str, Any]) -> SoftBodyAsset:
 def _call(world: World, parts: dict[str, Any], serial: int, name: str, arguments: Any, options: Any) -> None:
     """One of the calls that a recorder notes, and no other."""
     handle: Handle | None = world if serial == 0 else handles_of(world).find(serial, Handle)
-    if handle is None or name not in CALLS.get(type(handle).__name__, ()):
+    if handle is None or not is_recorded(handle, name):
         raise SnapshotError(f"{name!r} of handle {serial} is no call that is recorded")
     given = [_value(world, parts, each) for each in arguments]
     named = {key: _value(world, parts, each) for key, each in options["options"].items()}

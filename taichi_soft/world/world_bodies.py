@@ -1,0 +1,145 @@
+"""The bodies of a world: added, spawned, removed, read."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import cast
+
+from numpy.typing import ArrayLike
+
+from taichi_soft.bodies.asset import Floats32, SoftBodyAsset
+from taichi_soft.bodies.contact import DEFAULT_CONTACT, Contact
+from taichi_soft.bodies.plasticity import Plasticity
+from taichi_soft.bodies.stability import StableStep
+from taichi_soft.bodies.tearing import Tearing
+from taichi_soft.core.checks import as_number
+from taichi_soft.core.errors import OptionError
+from taichi_soft.core.handles import recorded
+from taichi_soft.core.types import DampingModel, Flips, Strain
+from taichi_soft.elements.materials import AnyMaterial
+from taichi_soft.meshing import BodyMesh
+from taichi_soft.world.body import Body
+from taichi_soft.world.spawning import add_body, despawn, require_open, require_own, reserve, spawn
+from taichi_soft.world.world_parts import WorldParts
+
+
+class WorldBodies(WorldParts):
+    """What of a world is about its bodies."""
+
+    @property
+    def bodies(self) -> Sequence[Body]:
+        """All bodies that live, by the number of their slots: bodies of `add_body` in the order of adding."""
+        return cast("tuple[Body, ...]", self._context.slots.living)
+
+    @property
+    def slot_count(self) -> int:
+        """Slots for bodies, empty ones among them."""
+        return len(self._context.slots.slots)
+
+    def add_body(
+        self,
+        mesh: BodyMesh,
+        material: AnyMaterial,
+        *,
+        law: str | None = None,
+        strain: str | Strain | None = None,
+        flips: str | Flips | None = None,
+        damping_model: str | DampingModel = DampingModel.EDGE,
+        position: ArrayLike = (0.0, 0.0, 0.0),
+        rotation: ArrayLike | None = None,
+        velocity: ArrayLike = (0.0, 0.0, 0.0),
+        pinned: ArrayLike = (),
+        contact: Contact = DEFAULT_CONTACT,
+        plasticity: Plasticity | None = None,
+        spare_vertices: int = 0,
+        tearing: Tearing | None = None,
+    ) -> Body:
+        """Add a body before `build`: an asset of its own, one slot for it, and a body in that.
+
+        Copies, of the same mesh and material with the same options, share the asset.
+        Args:
+            mesh, material, law, strain, flips, damping_model, pinned, contact, plasticity, spare_vertices,
+                tearing: as `SoftBodyAsset` takes them.
+            position, rotation, velocity: as `spawn` takes them.
+        Returns: a handle.
+        Raises: MeshError, MaterialError or OptionError for bad input; StateError after `build`.
+        """
+        require_open(self._context)
+        asset = SoftBodyAsset(
+            mesh,
+            material,
+            law=law,
+            strain=strain,
+            flips=flips,
+            damping_model=damping_model,
+            pinned=pinned,
+            contact=contact,
+            plasticity=plasticity,
+            spare_vertices=spare_vertices,
+            tearing=tearing,
+        )
+        return add_body(self._context, asset, position, rotation, velocity)
+
+    def reserve(self, asset: SoftBodyAsset, count: int) -> None:
+        """Make room for `count` more bodies of an asset, before `build`; `spawn` fills it.
+
+        Empty slots take memory, and no time in a step.
+        Raises: OptionError for what is no asset or no count, or an asset that the integrator cannot take;
+            StateError after `build`.
+        """
+        reserve(self._context, asset, count)
+
+    @recorded
+    def spawn(
+        self,
+        asset: SoftBodyAsset,
+        *,
+        position: ArrayLike = (0.0, 0.0, 0.0),
+        rotation: ArrayLike | None = None,
+        velocity: ArrayLike = (0.0, 0.0, 0.0),
+        angular_velocity: ArrayLike = (0.0, 0.0, 0.0),
+    ) -> Body:
+        """Put a body into the lowest free slot of its asset, before `build` or between two steps.
+
+        Args:
+            asset: one that `reserve` made room for, or the `asset` of a body that was added.
+            position: where the mesh's origin goes, (3,) [m].
+            rotation: about the mesh's origin, matrix (3, 3) or quaternion (x, y, z, w).
+            velocity: of the centre of mass, (3,) [m/s].
+            angular_velocity: about the centre of mass, (3,) [rad/s]. Pinned vertices rest.
+        Returns: a new handle.
+        Raises: OptionError for a value out of range, or a place out of reach, below the floor or inside a
+            collider; StateError for an asset without a pool in this world, or whose pool is full.
+        """
+        return spawn(self._context, asset, position, rotation, velocity, angular_velocity)
+
+    @recorded
+    def despawn(self, body: Body) -> None:
+        """Take a body out of the world: its slot is free, and its handle dead.
+
+        Raises: OptionError for what is no body of this world; StateError for one that was removed before.
+        """
+        despawn(self._context, body)
+
+    def stable_step(self, body: Body) -> StableStep:
+        """Estimate of the largest stable substep of a body; bodies of one asset share it until they are cut.
+
+        Raises: OptionError for what is no body.
+        """
+        if not isinstance(body, Body):
+            raise OptionError(f"body must be one that a world made, got {body!r}")
+        return self._context.substeps.stable_step(body)
+
+    def read_positions(self, body: Body, alpha: float, out: Floats32 | None = None) -> Floats32:
+        """Positions of a body between the previous step (alpha 0) and the last one (alpha 1), (n, 3) [m].
+
+        The first read after a step copies all bodies at once; further bodies at the same alpha come from
+        that copy, because calling a kernel costs more than copying a thousand vertices.
+        Raises: OptionError for a body of another world, an alpha out of range or an `out` that does not
+            fit; StateError before `build`.
+        """
+        simulation = self._built
+        require_own(self._context, body)
+        if type(alpha) is not float or not 0.0 <= alpha <= 1.0:
+            alpha = as_number(alpha, "alpha", 0.0, 1.0, "a number from 0 to 1")
+        return simulation.readout.positions(body, alpha, out)
