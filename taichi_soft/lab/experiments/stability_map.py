@@ -334,12 +334,10 @@ def _draw(figure: Any, results: Results, names: list[str]) -> None:
             axes.plot([low, low, high, high], [nu + 0.01, nu + 0.025, nu + 0.025, nu + 0.01], color="black")
         limits = sorted((p["poisson"], n["young"]) for p, n in results.where(part="limit", mesh="thesis"))
         axes.plot([E for _, E in limits], [nu for nu, _ in limits], "--", color="gray")
-        axes.set_xscale("log")
-        axes.set_xlabel("Young's modulus [Pa]")
-        axes.set_title(f"flips: {flips}")
+        axes.set(xscale="log", xlabel="Young's modulus [Pa]", title=f"flips: {flips}")
     panels[0].set_ylabel("Poisson's ratio [1]")
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(OUTCOMES))
+    legend = panels[0].get_legend_handles_labels()
+    figure.legend(*legend, loc="outside lower center", ncols=len(OUTCOMES))
 
 
 STABILITY_MAP = Experiment(

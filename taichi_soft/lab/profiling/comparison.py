@@ -8,7 +8,8 @@ from functools import partial
 
 import numpy as np
 
-from taichi_soft.bodies.layout import BodyDescription, arrange
+from taichi_soft.bodies.description import BodyDescription
+from taichi_soft.bodies.layout import arrange
 from taichi_soft.elements.laws import element_model
 from taichi_soft.elements.materials import Material
 from taichi_soft.lab.profiling.baseline import Baseline

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.bodies.layout import edge_damping, rest_inverses, vertex_masses
+from taichi_soft.bodies.description import edge_damping, rest_inverses, vertex_masses
 from taichi_soft.core.constants import GRAVITY_EARTH
 from taichi_soft.core.errors import OptionError
 from taichi_soft.elements.materials import Material

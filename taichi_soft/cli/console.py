@@ -1,0 +1,39 @@
+"""What all commands have in common: the terminal, options, facts of the machine."""
+
+from __future__ import annotations
+
+from importlib.metadata import PackageNotFoundError, version
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+
+from taichi_soft.core.runtime import Device
+
+console = Console()
+errors = Console(stderr=True)
+
+Arch = Annotated[str, typer.Option(help="Device: auto (the CPU), cpu; untried: cuda, vulkan, metal.")]
+Threads = Annotated[
+    int | None, typer.Option(help="CPU threads; by default one per core, bound to it on Linux.")
+]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON and nothing else.")]
+
+
+def say(line: str) -> None:
+    """Print one line as one line, however narrow the terminal is."""
+    console.print(line, soft_wrap=True, highlight=False)
+
+
+def device_facts(device: Device) -> dict[str, Any]:
+    """What was chosen, for people and for JSON."""
+    facts = {"device": device.arch, "threads": device.threads, "chosen because": device.reason}
+    return {**facts, "bound to cores": list(device.cores)} if device.cores else facts
+
+
+def version_of(name: str) -> str:
+    """Of an installed package."""
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return "not installed"

@@ -1,0 +1,72 @@
+"""Demos, filmed without a display."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from statistics import median
+from typing import Annotated
+
+import typer
+from rich.markup import escape
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from taichi_soft.cli.console import Arch, Threads, errors, say
+from taichi_soft.core.errors import OptionError
+from taichi_soft.core.runtime import init
+
+
+def demo(
+    name: Annotated[str | None, typer.Argument(help="Which demo; without a name, lists them.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Film to write: .mp4, .webm, .gif, or .png for pictures.")
+    ] = None,
+    seconds: Annotated[float | None, typer.Option(help="Length of the film [s].")] = None,
+    fps: Annotated[float, typer.Option(help="Frames per second.")] = 50.0,
+    size: Annotated[str, typer.Option(help="Width x height in pixels.")] = "1280x720",
+    video: Annotated[bool, typer.Option(help="Write a film, or only run and time the steps.")] = True,
+    arch: Arch = "auto",
+    threads: Threads = None,
+) -> None:
+    """Run a demo without a display, film it, and say how much faster than real time it ran."""
+    from taichi_soft.render.stages import demo_names, load_demo
+
+    if name is None:
+        for each in demo_names():
+            summary = (load_demo(each).__doc__ or "").strip().splitlines()[0]
+            say(f"[bold]{each:12}[/]{escape(summary)}")
+        return
+    pixels = _size_of(size)
+    module = load_demo(name)
+    path = (out or Path("out") / f"{name}.mp4") if video else None
+    init(arch, threads)
+    from taichi_soft.render.film import film
+
+    stage = module.stage()
+    columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
+    with Progress(*columns, console=errors, disable=not errors.is_terminal) as progress:
+        task = progress.add_task(name)
+        report = film(
+            stage,
+            path,
+            fps=fps,
+            size=pixels,
+            seconds=seconds,
+            on_frame=lambda done, total: progress.update(task, completed=done, total=total),
+        )
+    if report.path is not None:
+        say(f"wrote {escape(str(report.path))}: {report.frames} frames, {report.frames / fps:.1f} s")
+    if len(report.step_times):
+        frame = f"median {median(report.step_times) * 1e3:.2f} ms per frame of {1e3 / fps:.1f} ms"
+        say(
+            f"{name}: {report.simulated:.2f} s simulated, {frame}: "
+            f"{report.real_time_factor:.1f} x faster than real time"
+        )
+    if len(report.draw_times):
+        say(f"a picture of {size} took {median(report.draw_times) * 1e3:.1f} ms to draw, at the median")
+
+
+def _size_of(text: str) -> tuple[int, int]:
+    width, _, height = text.lower().partition("x")
+    if not (width.isdecimal() and height.isdecimal()):
+        raise OptionError(f"size must be width x height in pixels, such as 1280x720, got {text!r}")
+    return int(width), int(height)

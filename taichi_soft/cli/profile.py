@@ -1,0 +1,91 @@
+"""What a frame costs."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from typing import Annotated, Any
+
+import typer
+from rich.markup import escape
+
+from taichi_soft.cli.console import Arch, AsJson, Threads, console, device_facts, errors, say
+from taichi_soft.core.errors import OptionError
+from taichi_soft.core.runtime import init
+
+
+def profile(
+    bodies: Annotated[int, typer.Option(min=1, max=4096, help="Spheres of 1,280 tetrahedra.")] = 16,
+    baseline: Annotated[
+        bool, typer.Option("--baseline", help="Compare with plain C++ on one thread.")
+    ] = False,
+    crossover: Annotated[
+        bool, typer.Option("--crossover", help="Compare the schedules on one body of growing size.")
+    ] = False,
+    scaling: Annotated[
+        bool, typer.Option("--scaling", help="Compare 64 spheres on one thread and on all.")
+    ] = False,
+    implicit: Annotated[
+        bool, typer.Option("--implicit", help="Compare implicit Euler with leapfrog and with scipy.")
+    ] = False,
+    startup: Annotated[
+        bool, typer.Option("--startup", help="Time a new process to its first frame, cold and warm.")
+    ] = False,
+    game: Annotated[
+        bool, typer.Option("--game", help="What contact, sleep, spawning and unused features cost.")
+    ] = False,
+    repeats: Annotated[int, typer.Option(min=3, help="Measurements of each figure.")] = 121,
+    as_json: AsJson = False,
+    arch: Arch = "auto",
+    threads: Threads = None,
+    cores: Annotated[
+        str | None,
+        typer.Option(help="Cores to bind a thread each to, as 0,1 (Linux); --threads alone binds none."),
+    ] = None,
+) -> None:
+    """Measure what a frame costs and how many bodies fit one of 60 Hz and of 120 Hz."""
+    device = init(arch, threads, _cores_of(cores))
+    from taichi_soft.lab import profiling
+    from taichi_soft.lab.profiling import report
+
+    library = profiling.compile_baseline() if baseline else None
+    with errors.status("measuring frames") as status:
+        found: dict[str, Any] = {"budget": profiling.measure_budget(bodies, repeats)}
+        if library:
+            status.update("measuring against C++")
+            found["baseline"] = profiling.compare_with_baseline(library, max(3, repeats // 4))
+        if crossover:
+            status.update("measuring schedules")
+            found["crossover"] = profiling.measure_crossover(max(3, repeats // 6))
+        if scaling:
+            status.update("measuring threads")
+            found["scaling"] = profiling.measure_scaling(device.threads, device.cores, max(3, repeats // 3))
+        if implicit:
+            status.update("measuring implicit steps")
+            found["implicit"] = profiling.measure_implicit(max(3, repeats // 12))
+        if startup:
+            status.update("starting new processes")
+            found["startup"] = [profiling.measure_startup(device.arch, device.threads, device.cores)]
+        if game:
+            status.update("measuring what a game does")
+            found["features"] = profiling.measure_features(max(3, repeats // 3))
+            found["heap"] = profiling.measure_heaps(device.threads, max(3, repeats // 2))
+            found["moments"] = profiling.measure_moments(max(3, repeats // 2))
+    if as_json:
+        rows = {key: [asdict(row) for row in value] for key, value in found.items()}
+        print(json.dumps({"device": device_facts(device), **rows}, indent=2))
+        return
+    where = f", bound to cores {', '.join(map(str, device.cores))}" if device.cores else ""
+    say(f"{device.arch}, {device.threads} threads ({device.reason}){where}")
+    for title, table in report.tables(found):
+        say(f"\n[bold]{escape(title)}[/]")  # not the table's own title, which breaks at the table's width
+        console.print(table)
+
+
+def _cores_of(text: str | None) -> tuple[int, ...] | None:
+    if text is None:
+        return None
+    numbers = text.split(",")
+    if not all(number.strip().isdecimal() for number in numbers):
+        raise OptionError(f"cores must be numbers of processor cores, such as 0,1, got {text!r}")
+    return tuple(map(int, numbers))
