@@ -1,7 +1,7 @@
 """Taichi, started once.
 
-Every other module takes `ti` from here, so that the environment below is set before Taichi is
-imported, and only this module calls `ti.init` (which would reset every field in the process).
+Every other module takes `ti` from here, so that it is mended before it is used, and only this module calls
+`ti.init` (which would reset every field in the process).
 """
 
 from __future__ import annotations
@@ -12,22 +12,13 @@ import ctypes
 import functools
 import io
 import os
-import textwrap
 import threading
-import types
-import weakref
 from _thread import start_new_thread
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
-from importlib import import_module
 from queue import SimpleQueue
-from typing import Any, TypeVar
-
-os.environ.setdefault("TI_SKIP_VERSION_CHECK", "ON")
-os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
-
-import taichi as ti
+from typing import TypeVar
 
 from taichi_soft.core.cores import (
     available_cores,
@@ -38,7 +29,15 @@ from taichi_soft.core.cores import (
     thread_ids,
 )
 from taichi_soft.core.errors import DeviceError, OptionError
-from taichi_soft.core.subnormals import learn, without_subnormals
+from taichi_soft.core.subnormals import learn
+from taichi_soft.core.taichi_patches import (
+    check_real_functions,
+    has_pending_fields,
+    let_threads_in,
+    let_whole_numbers_overflow,
+    remember_sources,
+    ti,
+)
 from taichi_soft.core.turns import in_turn, leave_behind
 
 __all__ = ["Device", "device", "holds_fields", "init", "is_initialized", "make_fields", "ti"]
@@ -52,11 +51,6 @@ DEBUG = "TAICHI_SOFT_DEBUG"
 _MOST_THREADS = 256
 _ARCHS = ("cpu", "cuda", "vulkan", "metal")
 
-# A `ti.real_func` is compiled once and by itself, where a `ti.func` is copied to wherever it is called. But
-# Taichi 1.7 puts branches and loops of a `ti.func` called in it into the kernel, and crashes. With this
-# they go into what is being compiled.
-ti.lang.kernel_impl.Kernel.ast_builder = lambda _: ti.lang.impl.get_runtime().compiling_callable.ast_builder()
-
 
 def holds_fields(cls: Class) -> Class:
     """Lets a kernel take an object with all its fields as one argument.
@@ -66,101 +60,6 @@ def holds_fields(cls: Class) -> Class:
     """
     cls._data_oriented = True  # type: ignore[attr-defined]
     return cls
-
-
-def _remember(look_up: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """`look_up`, which asks once about each object, for as long as the object lives."""
-    known: weakref.WeakKeyDictionary[Any, Any] = weakref.WeakKeyDictionary()
-
-    def remembered(key: Any) -> Any:
-        if key not in known:
-            known[key] = look_up(key)
-        return known[key]
-
-    return remembered
-
-
-def _remember_sources() -> None:
-    """Wherever a `ti.func` is called, Taichi 1.7 reads its source again, and wraps the line of every name and
-    operator in it for messages of errors: a third of a first step whose kernels are in the cache. The answers
-    are always the same, so they are kept."""
-    kernels, nodes = ti.lang.kernel_impl, ti.lang.ast.ast_transformer_utils
-    kernels.getsourcefile = _remember(kernels.getsourcefile)
-    kernels.getsourcelines = _remember(kernels.getsourcelines)
-    kernels.textwrap = types.SimpleNamespace(
-        fill=functools.cache(textwrap.fill), dedent=functools.cache(textwrap.dedent)
-    )
-    wrapper = types.SimpleNamespace(wrap=functools.cache(nodes.TextWrapper(width=80).wrap))
-    nodes.TextWrapper = lambda width: wrapper
-
-
-def _let_threads_in() -> None:
-    """Taichi 1.7 takes what one thread compiles for what all do, and two that compile at once for one. Here
-    each kernel and each number in a field is a turn of one thread, for which others wait, and what is being
-    compiled is known to the thread that does it."""
-    compiling, accessor = threading.local(), import_module("taichi.lang.field").SNodeHostAccessor
-    ti.lang.impl.PyTaichi.inside_kernel = property(
-        lambda _: getattr(compiling, "is_on", False), lambda _, is_on: setattr(compiling, "is_on", is_on)
-    )
-    ti.lang.kernel_impl.Kernel.__call__ = in_turn(without_subnormals(ti.lang.kernel_impl.Kernel.__call__))
-    make = accessor.__init__
-
-    def make_in_turn(self: Any, snode: Any) -> None:
-        make(self, snode)
-        self.getter, self.setter = in_turn(self.getter), in_turn(self.setter)
-
-    accessor.__init__ = make_in_turn
-    lay_out = ti.lang.impl.PyTaichi.materialize_root_fb
-
-    def lay_out_at_home(is_first_call: bool) -> None:
-        """Fields that somebody else made, which Taichi lays out where a kernel is called first."""
-        is_pending = not (ti.lang.impl._root_fb.finalized or ti.lang.impl._root_fb.empty)
-        if _device is not None and is_pending and threading.get_ident() != _home:
-            _at_home(functools.partial(lay_out, is_first_call), _device.arch)
-        else:
-            lay_out(is_first_call)
-
-    ti.lang.impl.PyTaichi.materialize_root_fb = staticmethod(lay_out_at_home)
-
-
-if ti.__version__[:2] == (1, 7):
-    _remember_sources()
-    _let_threads_in()
-
-
-def _check_real_functions() -> None:
-    """Taichi 1.7's own bounds check leaves out what a `ti.real_func` reads and writes. An index there is
-    asserted before its row is used, and made 0 where it is wrong, so that the process lives to tell."""
-    impl = ti.lang.impl
-    plain = impl.subscript
-
-    def checked(builder: Any, value: Any, *indices: Any, **options: Any) -> Any:
-        is_real = isinstance(impl.get_runtime().compiling_callable, ti._lib.core.Function)
-        if is_real and isinstance(value, ti.Field) and value.shape:
-            (index,), (size,) = indices, value.shape  # the fields of a world have one dimension
-            is_inside = ti.lang.ops.logical_and(index >= 0, index < size)
-            place = ti._lib.core.DebugInfo(impl.get_runtime().get_current_src_info())
-            message = f"Accessing a field of size ({size}) in a real function with index (%d)"
-            impl.ti_assert(is_inside, message, [impl.Expr(index).ptr], place)
-            indices = (ti.select(is_inside, index, 0),)
-        return plain(builder, value, *indices, **options)
-
-    impl.subscript = checked
-
-
-def _let_whole_numbers_overflow() -> None:
-    """Where Taichi 1.7 checks bounds it prints a line for each whole number that overflows; hashes are to."""
-    program = ti._lib.core.Program
-    plain = program.compile_kernel
-
-    def compiled(self: Any, config: Any, *arguments: Any) -> Any:
-        config.debug = False  # the bounds check has a switch of its own; the rest looks here
-        try:
-            return plain(self, config, *arguments)
-        finally:
-            config.debug = True  # looked at by the launch, which raises what was found
-
-    program.compile_kernel = compiled
 
 
 @dataclass(frozen=True)
@@ -282,8 +181,8 @@ def _start(arch: str, reason: str, threads: int, cores: tuple[int, ...], is_left
             log_level=ti.ERROR,
         )
     if is_checked:
-        _check_real_functions()
-        _let_whole_numbers_overflow()
+        check_real_functions()
+        let_whole_numbers_overflow()
     ti.lang.impl.get_runtime().materialize()  # once, by the first kernel otherwise, in whichever thread
     _process = os.getpid()
     atexit.register(_end)
@@ -352,6 +251,19 @@ def _at_home(function: Callable[[], Result], arch: str) -> Result:
         _jobs.put(last.set)
         last.wait()
         raise
+
+
+def _lay_out(lay_out: Callable[[bool], None], is_first_call: bool) -> None:
+    """Lay out fields that somebody else made, which Taichi does where a kernel is called first."""
+    if _device is not None and has_pending_fields() and threading.get_ident() != _home:
+        _at_home(functools.partial(lay_out, is_first_call), _device.arch)
+    else:
+        lay_out(is_first_call)
+
+
+if ti.__version__[:2] == (1, 7):
+    remember_sources()
+    let_threads_in(_lay_out)
 
 
 def _serve() -> None:

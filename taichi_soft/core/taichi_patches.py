@@ -1,0 +1,125 @@
+"""Taichi with its environment, and with what Taichi 1.7 does not do as we need it."""
+
+from __future__ import annotations
+
+import functools
+import os
+import textwrap
+import threading
+import types
+import weakref
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any
+
+os.environ.setdefault("TI_SKIP_VERSION_CHECK", "ON")
+os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
+
+import taichi as ti
+
+from taichi_soft.core.subnormals import without_subnormals
+from taichi_soft.core.turns import in_turn
+
+__all__ = [
+    "check_real_functions",
+    "has_pending_fields",
+    "let_threads_in",
+    "let_whole_numbers_overflow",
+    "remember_sources",
+    "ti",
+]
+
+# A `ti.real_func` is compiled once and by itself, where a `ti.func` is copied to wherever it is called. But
+# Taichi 1.7 puts branches and loops of a `ti.func` called in it into the kernel, and crashes. With this
+# they go into what is being compiled.
+ti.lang.kernel_impl.Kernel.ast_builder = lambda _: ti.lang.impl.get_runtime().compiling_callable.ast_builder()
+
+
+def _remember(look_up: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """`look_up`, which asks once about each object, for as long as the object lives."""
+    known: weakref.WeakKeyDictionary[Any, Any] = weakref.WeakKeyDictionary()
+
+    def remembered(key: Any) -> Any:
+        if key not in known:
+            known[key] = look_up(key)
+        return known[key]
+
+    return remembered
+
+
+def remember_sources() -> None:
+    """Wherever a `ti.func` is called, Taichi 1.7 reads its source again, and wraps the line of every name and
+    operator in it for messages of errors: a third of a first step whose kernels are in the cache. The answers
+    are always the same, so they are kept."""
+    kernels, nodes = ti.lang.kernel_impl, ti.lang.ast.ast_transformer_utils
+    kernels.getsourcefile = _remember(kernels.getsourcefile)
+    kernels.getsourcelines = _remember(kernels.getsourcelines)
+    kernels.textwrap = types.SimpleNamespace(
+        fill=functools.cache(textwrap.fill), dedent=functools.cache(textwrap.dedent)
+    )
+    wrapper = types.SimpleNamespace(wrap=functools.cache(nodes.TextWrapper(width=80).wrap))
+    nodes.TextWrapper = lambda width: wrapper
+
+
+def let_threads_in(lay_out_now: Callable[[Callable[[bool], None], bool], None]) -> None:
+    """Taichi 1.7 takes what one thread compiles for what all do, and two that compile at once for one. Here
+    each kernel and each number in a field is a turn of one thread, for which others wait, and what is being
+    compiled is known to the thread that does it.
+
+    Args:
+        lay_out_now: calls Taichi's own function, which lays out fields, with its argument.
+    """
+    compiling, accessor = threading.local(), import_module("taichi.lang.field").SNodeHostAccessor
+    ti.lang.impl.PyTaichi.inside_kernel = property(
+        lambda _: getattr(compiling, "is_on", False), lambda _, is_on: setattr(compiling, "is_on", is_on)
+    )
+    ti.lang.kernel_impl.Kernel.__call__ = in_turn(without_subnormals(ti.lang.kernel_impl.Kernel.__call__))
+    make = accessor.__init__
+
+    def make_in_turn(self: Any, snode: Any) -> None:
+        make(self, snode)
+        self.getter, self.setter = in_turn(self.getter), in_turn(self.setter)
+
+    accessor.__init__ = make_in_turn
+    lay_out = ti.lang.impl.PyTaichi.materialize_root_fb
+    ti.lang.impl.PyTaichi.materialize_root_fb = staticmethod(functools.partial(lay_out_now, lay_out))
+
+
+def has_pending_fields() -> bool:
+    """Whether there are fields that Taichi has not laid out yet."""
+    return not (ti.lang.impl._root_fb.finalized or ti.lang.impl._root_fb.empty)
+
+
+def check_real_functions() -> None:
+    """Taichi 1.7's own bounds check leaves out what a `ti.real_func` reads and writes. An index there is
+    asserted before its row is used, and made 0 where it is wrong, so that the process lives to tell."""
+    impl = ti.lang.impl
+    plain = impl.subscript
+
+    def checked(builder: Any, value: Any, *indices: Any, **options: Any) -> Any:
+        is_real = isinstance(impl.get_runtime().compiling_callable, ti._lib.core.Function)
+        if is_real and isinstance(value, ti.Field) and value.shape:
+            (index,), (size,) = indices, value.shape  # the fields of a world have one dimension
+            is_inside = ti.lang.ops.logical_and(index >= 0, index < size)
+            place = ti._lib.core.DebugInfo(impl.get_runtime().get_current_src_info())
+            message = f"Accessing a field of size ({size}) in a real function with index (%d)"
+            impl.ti_assert(is_inside, message, [impl.Expr(index).ptr], place)
+            indices = (ti.select(is_inside, index, 0),)
+        return plain(builder, value, *indices, **options)
+
+    impl.subscript = checked
+
+
+def let_whole_numbers_overflow() -> None:
+    """Where Taichi 1.7 checks bounds it prints a line for each whole number that overflows; hashes are to."""
+    program = ti._lib.core.Program
+    plain = program.compile_kernel
+
+    def compiled(self: Any, config: Any, *arguments: Any) -> Any:
+        config.debug = False  # the bounds check has a switch of its own; the rest looks here
+        try:
+            return plain(self, config, *arguments)
+        finally:
+            config.debug = True  # looked at by the launch, which raises what was found
+
+    program.compile_kernel = compiled
