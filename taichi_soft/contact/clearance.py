@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.bodies.layout import outer_vertices
+from taichi_soft.bodies.description import outer_vertices
 from taichi_soft.contact.collider import Collider
 from taichi_soft.core.errors import OptionError
 

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies.soft_body import Context, RowsOf, Slice, SoftBody
 from taichi_soft.contact.collider import Collider, ColliderRow, rebind, row_of
+from taichi_soft.contact.collider_entries import entry_of, read_row
 from taichi_soft.contact.fields import NO_COLLIDER, ContactCapacity, ContactFields
 from taichi_soft.contact.kernels.collider_rows import (
     MOTION_WIDTH,
@@ -19,12 +20,11 @@ from taichi_soft.contact.kernels.collider_rows import (
     write_samples,
 )
 from taichi_soft.contact.shapes import Shape, SphereShape
-from taichi_soft.core.checks import as_count, as_flag, as_number, as_rotation, as_vector
+from taichi_soft.core.checks import as_count, as_number, as_rotation, as_vector
 from taichi_soft.core.constants import ALL_GROUPS
-from taichi_soft.core.errors import OptionError, SnapshotError, StateError
-from taichi_soft.core.handles import serial_of
+from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.core.math.rotations import quaternion_of, rotation_vector, turned_by
-from taichi_soft.core.serialisation import digest_of, from_plain, plain_of, vector_of
+from taichi_soft.core.serialisation import digest_of
 
 Floats = NDArray[np.float64]
 
@@ -239,7 +239,7 @@ class Colliders(Slice):
 
     def entries(self) -> list[list[Any]]:
         """Number of handle, what each row is and how it moves. A shape without a grid is there in full."""
-        return [_entry(handle) for handle in self._handles]
+        return [entry_of(handle) for handle in self._handles]
 
     def row_counts(self, entries: list[list[Any]]) -> list[int]:
         """Of particles, of bodies, of pairs of a body and a collider."""
@@ -257,42 +257,7 @@ class Colliders(Slice):
         room = ContactCapacity() if self._contact is None else self._contact.capacity
         if len(entries) > room.colliders:
             raise ValueError(f"it has {len(entries)} colliders, and there is no room for them")
-        return [(int(entry[0]), self._read_row(entry, room.samples)) for entry in entries]
-
-    def _read_row(self, entry: list[Any], room: int) -> ColliderRow:
-        _, is_alive, digest, plain, offset, surface, motion, target = entry
-        shape = self.shapes.get(digest)
-        if shape is None:
-            shape = from_plain(plain)
-        if not isinstance(shape, Shape):
-            raise SnapshotError(
-                "this snapshot has a collider with a grid that this world never had: add one of each "
-                "MeshShape and HeightFieldShape (and remove it again) before restoring"
-            )
-        friction, restitution, thickness, group, mask = surface
-        position, rotation, velocity, spin = (
-            vector_of(each, n) for each, n in zip(motion, (3, 4, 3, 3), strict=True)
-        )
-        if abs(np.linalg.norm(rotation) - 1.0) > 1e-3:
-            raise ValueError("a rotation is none")
-        row = ColliderRow(
-            shape,
-            as_number(friction, "friction", 0.0, 1e6),
-            -1.0 if restitution == -1.0 else as_number(restitution, "restitution", 0.0, 1.0),
-            as_number(thickness, "thickness", 0.0, 1e3),
-            as_count(group, "group", 0, ALL_GROUPS),
-            as_count(mask, "mask", 0, ALL_GROUPS),
-            position,
-            rotation,
-            velocity,
-            spin,
-            as_count(offset, "offset", 0),
-            None if target is None else (vector_of(target[0], 3), vector_of(target[1], 4)),
-            as_flag(is_alive, "is_alive"),
-        )
-        if not row.offset <= room - len(shape.samples):
-            raise ValueError("a collider's grid lies outside the room for grids")
-        return row
+        return [(int(entry[0]), read_row(entry, self.shapes, room.samples)) for entry in entries]
 
     def require(self, read: Any, rows_of: RowsOf) -> None:
         """Raises: ValueError where an impulse that contact goes on with is not finite."""
@@ -354,13 +319,3 @@ class Colliders(Slice):
                 sum_collider_impulses(self._contact, self._body_count, rows)
             self._impulses = rows.astype(np.float64)
         return np.array(self._impulses)
-
-
-def _entry(collider: Collider) -> list[Any]:
-    row = row_of(collider)
-    target = None if row.target is None else [each.tolist() for each in row.target]
-    motion = [each.tolist() for each in (row.position, row.rotation, row.velocity, row.spin)]
-    surface = [row.friction, row.restitution, row.thickness, row.group, row.mask]
-    plain = None if len(row.shape.samples) else plain_of(row.shape)
-    digest = digest_of(row.shape)
-    return [serial_of(collider), row.is_alive, digest, plain, row.offset, surface, motion, target]

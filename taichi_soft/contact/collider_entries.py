@@ -1,0 +1,66 @@
+"""What a snapshot says of a collider, as plain data and back."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from taichi_soft.contact.collider import Collider, ColliderRow, row_of
+from taichi_soft.contact.shapes import Shape
+from taichi_soft.core.checks import as_count, as_flag, as_number
+from taichi_soft.core.constants import ALL_GROUPS
+from taichi_soft.core.errors import SnapshotError
+from taichi_soft.core.handles import serial_of
+from taichi_soft.core.serialisation import digest_of, from_plain, plain_of, vector_of
+
+
+def entry_of(collider: Collider) -> list[Any]:
+    """Number of handle, what its row is and how it moves. A shape without a grid is there in full."""
+    row = row_of(collider)
+    target = None if row.target is None else [each.tolist() for each in row.target]
+    motion = [each.tolist() for each in (row.position, row.rotation, row.velocity, row.spin)]
+    surface = [row.friction, row.restitution, row.thickness, row.group, row.mask]
+    plain = None if len(row.shape.samples) else plain_of(row.shape)
+    digest = digest_of(row.shape)
+    return [serial_of(collider), row.is_alive, digest, plain, row.offset, surface, motion, target]
+
+
+def read_row(entry: list[Any], shapes: dict[str, Shape], room: int) -> ColliderRow:
+    """The row of an entry, with `shapes` by digest and room for so many samples.
+
+    Raises: ValueError, SnapshotError or OptionError for what is no collider.
+    """
+    _, is_alive, digest, plain, offset, surface, motion, target = entry
+    shape = shapes.get(digest)
+    if shape is None:
+        shape = from_plain(plain)
+    if not isinstance(shape, Shape):
+        raise SnapshotError(
+            "this snapshot has a collider with a grid that this world never had: add one of each "
+            "MeshShape and HeightFieldShape (and remove it again) before restoring"
+        )
+    friction, restitution, thickness, group, mask = surface
+    position, rotation, velocity, spin = (
+        vector_of(each, n) for each, n in zip(motion, (3, 4, 3, 3), strict=True)
+    )
+    if abs(np.linalg.norm(rotation) - 1.0) > 1e-3:
+        raise ValueError("a rotation is none")
+    row = ColliderRow(
+        shape,
+        as_number(friction, "friction", 0.0, 1e6),
+        -1.0 if restitution == -1.0 else as_number(restitution, "restitution", 0.0, 1.0),
+        as_number(thickness, "thickness", 0.0, 1e3),
+        as_count(group, "group", 0, ALL_GROUPS),
+        as_count(mask, "mask", 0, ALL_GROUPS),
+        position,
+        rotation,
+        velocity,
+        spin,
+        as_count(offset, "offset", 0),
+        None if target is None else (vector_of(target[0], 3), vector_of(target[1], 4)),
+        as_flag(is_alive, "is_alive"),
+    )
+    if not row.offset <= room - len(shape.samples):
+        raise ValueError("a collider's grid lies outside the room for grids")
+    return row

@@ -1,0 +1,110 @@
+"""Candidates: the triangles that each vertex is near, until bodies have moved too far."""
+
+from taichi_soft.contact.fields import FOUND, NO_CONTACT, SLOTS
+from taichi_soft.core.runtime import ti
+
+SHORTEST, LONGEST = 0.1, 0.3
+"""Mean edges: for which way of a body's fastest vertex a search holds, at least and at most."""
+
+
+@ti.func
+def forget_candidates(state: ti.template(), body):
+    """Drop the candidates of a body's vertices, but for what its search needs to go on with their contacts.
+
+    A search that began without the impulses of the last substep would let all sag a little, once a step, and
+    a heap would never cease to tremble.
+    """
+    outer = state.body_outer[body]
+    for k in range(outer[0], outer[1]):
+        p = state.outer_particle[k]
+        state.soft.kept_normal_impulse[p] = 0.0
+    first_slot = outer[0] * SLOTS
+    for k in range(first_slot, first_slot + state.soft.contact_count[body]):
+        slot = state.soft.contact_slot[k]
+        p = state.soft.slot_vertices[slot].x
+        if state.soft.slot_normal_impulse[slot] > state.soft.kept_normal_impulse[p]:
+            state.soft.kept_triangle[p] = state.soft.slot_triangle[slot]
+            state.soft.kept_normal_impulse[p] = state.soft.slot_normal_impulse[slot]
+            state.soft.kept_friction_impulse[p] = state.soft.slot_friction_impulse[slot]
+    state.soft.slot_count[body] = 0
+    state.soft.contact_count[body] = 0
+
+
+@ti.func
+def _farthest_found(soft: ti.template(), k):
+    """Row of what is farthest of all that was found for a vertex."""
+    farthest = k * FOUND
+    for row in range(k * FOUND + 1, k * FOUND + soft.found_count[k]):
+        if soft.found_distance[row] > soft.found_distance[farthest]:
+            farthest = row
+    return farthest
+
+
+@ti.func
+def keep(soft: ti.template(), k, triangle, distance):
+    """Put a triangle among the nearest of a vertex.
+
+    Returns: the distance of the one that found no place [m].
+    """
+    row, lost = k * FOUND + soft.found_count[k], ti.cast(NO_CONTACT, ti.f32)
+    if soft.found_count[k] == FOUND:
+        row = _farthest_found(soft, k)
+        lost = ti.max(soft.found_distance[row], distance)
+    else:
+        soft.found_count[k] = soft.found_count[k] + 1
+    if distance < lost:
+        soft.found_triangle[row] = triangle
+        soft.found_distance[row] = distance
+    return lost
+
+
+@ti.func
+def note_lost(state: ti.template(), body, distance, thickness):
+    """Note that something `distance` [m] from a vertex of a body found no room.
+
+    What touches at `thickness` [m] need not be looked for again before that is used up.
+    """
+    way = ti.max(distance - thickness, 2.0 * SHORTEST * state.soft.body_surface[body].z)
+    state.soft.body_lost[body] = ti.min(state.soft.body_lost[body], way)
+
+
+@ti.func
+def list_candidates(state: ti.template(), body, thickness):
+    """Make candidates of what was found for the vertices of a body, which go on with their contacts.
+
+    Where that is more than there is room for, those that found most give up what is farthest.
+    Args:
+        thickness: the greatest at which it touches another body [m].
+    """
+    outer = state.body_outer[body]
+    total = 0
+    for k in range(outer[0], outer[1]):
+        total += state.soft.found_count[k]
+    is_too_much = total > (outer[1] - outer[0]) * SLOTS
+    slot, contacts = outer[0] * SLOTS, 0
+    for k in range(outer[0], outer[1]):
+        while is_too_much and state.soft.found_count[k] > SLOTS:
+            row, last = _farthest_found(state.soft, k), k * FOUND + state.soft.found_count[k] - 1
+            note_lost(state, body, state.soft.found_distance[row], thickness)
+            state.soft.found_triangle[row] = state.soft.found_triangle[last]
+            state.soft.found_distance[row] = state.soft.found_distance[last]
+            state.soft.found_count[k] = state.soft.found_count[k] - 1
+        p = state.outer_particle[k]
+        for row in range(k * FOUND, k * FOUND + state.soft.found_count[k]):
+            triangle = state.soft.found_triangle[row]
+            corners = state.triangle_vertices[triangle]
+            other = state.particle_body[corners[0]]
+            mutual = 0.5 * (state.soft.body_surface[body].y + state.soft.body_surface[other].y)
+            state.soft.slot_vertices[slot] = ti.Vector([p, corners[0], corners[1], corners[2]])
+            state.soft.slot_triangle[slot] = triangle
+            state.soft.slot_spare[slot] = state.soft.found_distance[row] - mutual
+            state.soft.slot_normal_impulse[slot] = 0.0
+            state.soft.slot_friction_impulse[slot] = ti.Vector.zero(ti.f32, 3)
+            if state.soft.kept_triangle[p] == triangle and state.soft.kept_normal_impulse[p] > 0.0:
+                state.soft.slot_normal_impulse[slot] = state.soft.kept_normal_impulse[p]
+                state.soft.slot_friction_impulse[slot] = state.soft.kept_friction_impulse[p]
+                state.soft.contact_slot[outer[0] * SLOTS + contacts] = slot
+                contacts += 1
+            slot += 1
+    state.soft.slot_count[body] = slot - outer[0] * SLOTS
+    state.soft.contact_count[body] = contacts
