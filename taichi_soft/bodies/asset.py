@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies.contact import DEFAULT_CONTACT, THIN, Contact
+from taichi_soft.bodies.description import BodyDescription, require_size
 from taichi_soft.bodies.first_mode import first_frequency
-from taichi_soft.bodies.layout import BodyArrays, BodyDescription, arrange, require_size
+from taichi_soft.bodies.layout import BodyArrays, arrange
 from taichi_soft.bodies.plasticity import Plasticity
 from taichi_soft.bodies.stability import StableStep, stable_step
 from taichi_soft.bodies.tearing import Tearing

@@ -5,13 +5,13 @@ a game runs stalls it. A closed world therefore gives its fields back, and the n
 them takes them over with its kernels compiled.
 """
 
-from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from taichi_soft.bodies.capacity import BodyCapacity
 from taichi_soft.bodies.layout import BodyArrays, Ranges, Scene, blocks_of
 from taichi_soft.bodies.program import Program
 from taichi_soft.bodies.status import ABSENT
@@ -19,78 +19,6 @@ from taichi_soft.core.constants import LANES
 from taichi_soft.core.loading import Loader
 from taichi_soft.core.runtime import holds_fields, make_fields, ti
 from taichi_soft.core.turns import in_turn
-
-ROOMS = "particles", "edges", "blocks", "triangles", "outer", "rings", "bodies"
-"""The numbers of a `Capacity` that a world does not notice if they are larger than it needs."""
-
-MOST_GRABS, PATCH_ROWS = 16, 128
-"""Grabs of one world at a time, and particles that one of them holds."""
-
-
-Room = TypeVar("Room", bound="BodyCapacity")
-
-
-@dataclass(frozen=True)
-class BodyCapacity:
-    """Room in a state. Rounded up to powers of two, so that similar worlds share compiled kernels."""
-
-    particles: int
-    edges: int
-    blocks: int
-    bodies: int
-    triangles: int
-    outer: int
-    parallel: bool  # room for the force of every corner and edge at once, as the flat schedule needs
-    rings: int = 0  # rows of what lies round edges, and whether edges carry force at all
-    implicit: bool = False  # room for the linear system of implicit integration
-    anisotropic: bool = False  # room for 21 elastic constants per tetrahedron
-    plastic: bool = False  # room for the first rest shapes of bodies that can be bent for good
-    double: bool = False  # float64 instead of float32: to evaluate forces, not to move
-
-    @classmethod
-    def of(
-        cls: type[Room],
-        scene: Scene,
-        *,
-        parallel: bool = False,
-        implicit: bool = False,
-        plastic: bool = False,
-        double: bool = False,
-        **others: Any,
-    ) -> Room:
-        """Room for `scene`. Lanes of its last body read on behind its particles and triangles.
-
-        Args: others: by name, of what a subclass adds.
-        """
-        return cls(
-            _power_of_two(scene.particle_count + LANES, 512),
-            _power_of_two(scene.edge_count, 2048),
-            _power_of_two(scene.block_count, 128),
-            _power_of_two(len(scene.bodies), 8),
-            _power_of_two(scene.triangle_count + LANES, 512),
-            _power_of_two(scene.outer_count, 512),
-            parallel,
-            _power_of_two(scene.ring_count, 512) if scene.has_bonds else 0,
-            implicit,
-            any(body.stiffness.any() for body in scene.bodies),
-            plastic,
-            double,
-            **others,
-        )
-
-    @property
-    def rooms(self) -> list[int]:
-        """How much room there is, in the order of `ROOMS`."""
-        return [getattr(self, name) for name in ROOMS]
-
-    def has_room_for(self, other: "BodyCapacity") -> bool:
-        """Whether a state of this capacity has the fields of one of `other`, and none of them shorter."""
-        widened = {name: max(getattr(self, name), getattr(other, name)) for name in ROOMS}
-        return replace(other, **widened) == self and (self.rings > 0) == (other.rings > 0)
-
-
-def _power_of_two(count: int, least: int) -> int:
-    return max(least, 1 << max(count - 1, 0).bit_length())
 
 
 @holds_fields
@@ -205,31 +133,9 @@ class BodyFields:
         )  # how often a step that fails is made again, twice as fine each time
         self.block_model = ti.field(ti.i32, b)
 
-        self.grab_body = ti.field(ti.i32, MOST_GRABS)  # its number plus 1, 0 where nothing is held
-        self.grab_corners = ti.Vector.field(3, ti.i32, MOST_GRABS)
-        self.grab_weights = ti.Vector.field(3, real, MOST_GRABS)  # of the corners
-        self.grab_target = ti.Vector.field(3, real, MOST_GRABS)  # [m]
-        self.grab_spring = ti.Vector.field(3, real, MOST_GRABS)  # see `write_grab`
-        self.grab_limits = ti.Vector.field(3, real, MOST_GRABS)
-        self.grab_force = ti.Vector.field(3, real, MOST_GRABS)  # [N], in the last substep
-        self.grab_count = ti.field(ti.i32, MOST_GRABS)  # rows of the patch
-        self.patch_particle = ti.field(ti.i32, MOST_GRABS * PATCH_ROWS)
-        self.patch_share = ti.field(real, MOST_GRABS * PATCH_ROWS)
-
         self.gravity = ti.Vector.field(3, real, ())  # [m/s^2]
         self.wind = ti.Vector.field(4, real, ())  # [m/s], density times drag coefficient [kg/m^3]
         self.floor = ti.Vector.field(3, real, ())  # height [m], restitution, friction
-
-    def carried_grabs(self) -> list[list[Any]]:
-        """What the next step depends on: of each grab, of each in use, of each row of its patch."""
-        return [
-            [self.grab_body],
-            [
-                *(self.grab_corners, self.grab_weights, self.grab_target, self.grab_spring),
-                *(self.grab_limits, self.grab_force, self.grab_count),
-            ],
-            [self.patch_particle, self.patch_share],
-        ]
 
     def load(self, scene: Scene, models: list[int], kinds: NDArray[np.float64] | None = None) -> None:
         """Fill every field from `scene`, and those that `loader` has rows for already.
@@ -294,14 +200,6 @@ class BodyFields:
         fill(self.body_status, np.full(len(bodies), ABSENT))
         fill(self.body_velocity_lag, np.zeros(0))
         fill(self.body_drives, np.zeros(0))
-        fill(self.grab_body, np.zeros(0))
-        # A world that was here before may have held particles that there are not any more.
-        for numbers in (self.grab_count, self.patch_particle, self.patch_share):
-            fill(numbers, np.zeros(0))
-        for rows in (self.grab_corners, self.grab_weights, self.grab_target, self.grab_spring):
-            fill(rows, np.zeros((0, 3)))
-        for rows in (self.grab_limits, self.grab_force):
-            fill(rows, np.zeros((0, 3)))
         fill(self.body_damping, np.zeros(0))
         fill(self.body_is_braked, np.zeros(0))
         fill(self.body_jolted, np.zeros(0))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.bodies.layout import BodyDescription
+from taichi_soft.bodies.description import BodyDescription
 from taichi_soft.bodies.vibration import Vibration, vibration_of
 
 Floats = NDArray[np.float64]

@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from taichi_soft.bodies.fields import BodyCapacity, BodyFields, acquire, release
+from taichi_soft.bodies.capacity import BodyCapacity
+from taichi_soft.bodies.description import BodyDescription
+from taichi_soft.bodies.fields import BodyFields, acquire, release
 from taichi_soft.bodies.kernels.evaluate import compute_body_forces
 from taichi_soft.bodies.kernels.readout import write_motion
-from taichi_soft.bodies.layout import BodyDescription, Scene, arrange
+from taichi_soft.bodies.layout import Scene, arrange
 from taichi_soft.bodies.program import Program
 from taichi_soft.core.constants import POSITION_LIMIT
 from taichi_soft.core.errors import MeshError, OptionError

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.bodies.layout import BodyArrays, BodyDescription, arrange_part
+from taichi_soft.bodies.description import BodyDescription
+from taichi_soft.bodies.layout import BodyArrays, arrange_part
 from taichi_soft.meshing import TetMesh
 
 if TYPE_CHECKING:

@@ -1,6 +1,7 @@
 """A body, and the part of its world that it shares with all that a game does to it.
 
-Slices see a `Context` and `SoftBody`, never the world that stands above them.
+Slices see a `Context` and `SoftBody`, never the world that stands above them. These classes name each other,
+so they stand in one file.
 """
 
 from __future__ import annotations
@@ -14,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.bodies.asset import SoftBodyAsset
+from taichi_soft.bodies.description import BodyDescription
 from taichi_soft.bodies.failure import FailedStep, Failure
-from taichi_soft.bodies.layout import BodyArrays, BodyDescription, Ranges, Scene
+from taichi_soft.bodies.layout import BodyArrays, Ranges, Scene
 from taichi_soft.bodies.part import Part
 from taichi_soft.bodies.slots import Pools
 from taichi_soft.core.clock import Clock

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.bodies.layout import BodyDescription
+from taichi_soft.bodies.description import BodyDescription
 from taichi_soft.bodies.vibration import TetVibration, Vibration, vibration_of
 from taichi_soft.core.errors import OptionError
 from taichi_soft.elements.laws import ElementModel, fit_model

@@ -7,8 +7,8 @@ from abc import ABC, abstractmethod
 import numpy as np
 from numpy.typing import NDArray
 
+from taichi_soft.bodies.description import BodyDescription
 from taichi_soft.bodies.forces import StillBody
-from taichi_soft.bodies.layout import BodyDescription
 from taichi_soft.core.types import DampingModel
 from taichi_soft.elements.materials import AnisotropicMaterial, Material
 from taichi_soft.meshing import BodyMesh, TetMesh

@@ -9,10 +9,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.bodies.fields import MOST_GRABS, PATCH_ROWS
 from taichi_soft.bodies.soft_body import Context, RowsOf, Slice, SoftBody, context_of, record_of
 from taichi_soft.control.access import change, numbers, require_substeps, rows_of
-from taichi_soft.control.kernels.grabs import end_grab, read_grab_force, write_grab, write_grab_target
+from taichi_soft.control.kernels.grabs import (
+    MOST_GRABS,
+    PATCH_ROWS,
+    end_grab,
+    read_grab_force,
+    write_grab,
+    write_grab_target,
+)
 from taichi_soft.control.patches import patch_round
 from taichi_soft.core.checks import as_array, as_count, as_number, as_vector
 from taichi_soft.core.constants import GRAVITY_EARTH
@@ -137,12 +143,12 @@ class Grabs(Slice):
 
     def require(self, read: Any, rows_of: RowsOf) -> None:
         """Raises: ValueError where the fields name what there is not, or are not finite."""
-        fields, particles = self.context.built.state, self.context.layout.particle_count
-        require_below(rows_of(fields.grab_body), len(self.context.slots.slots) + 1)
-        require_below(rows_of(fields.grab_corners), particles)
-        require_below(rows_of(fields.grab_count), PATCH_ROWS + 1)
-        require_below(rows_of(fields.patch_particle), particles)
-        for field in (fields.grab_weights, fields.grab_target, fields.grab_spring, fields.patch_share):
+        fields, particles = self.context.built.state.grabs, self.context.layout.particle_count
+        require_below(rows_of(fields.body), len(self.context.slots.slots) + 1)
+        require_below(rows_of(fields.corners), particles)
+        require_below(rows_of(fields.count), PATCH_ROWS + 1)
+        require_below(rows_of(fields.particle), particles)
+        for field in (fields.weights, fields.target, fields.spring, fields.share):
             require_finite(rows_of(field))
 
     def restore(self, read: Any) -> None:

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.bodies.fields import PATCH_ROWS
-from taichi_soft.bodies.layout import BodyDescription
+from taichi_soft.bodies.description import BodyDescription
+from taichi_soft.control.kernels.grabs import PATCH_ROWS
 from taichi_soft.elements.materials import SpringMaterial
 
 PATCH_SIZE = 0.25

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from taichi_soft.bodies.layout import outer_vertices
+from taichi_soft.bodies.description import outer_vertices
 from taichi_soft.bodies.soft_body import SoftBody, context_of
 from taichi_soft.control.access import attempt, numbers, rouse, some_particles
 from taichi_soft.control.attachments import require_unattached

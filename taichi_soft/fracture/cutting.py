@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from taichi_soft.bodies.description import BodyDescription
 from taichi_soft.bodies.fields import BodyFields, with_spare_rows
 from taichi_soft.bodies.kernels.plasticity import read_rest_inverses
-from taichi_soft.bodies.layout import BodyArrays, BodyDescription, arrange_part, blocks_of
+from taichi_soft.bodies.layout import BodyArrays, arrange_part, blocks_of
 from taichi_soft.bodies.part import Part
 from taichi_soft.bodies.soft_body import Context, SoftBody, bars_to_cut, context_of, record_of, redescribe
 from taichi_soft.bodies.status import ABSENT, ACTIVE

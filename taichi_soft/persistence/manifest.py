@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from taichi_soft.bodies.description import BodyDescription
 from taichi_soft.bodies.failure import FailedStep
-from taichi_soft.bodies.layout import BodyArrays, BodyDescription
+from taichi_soft.bodies.layout import BodyArrays
 from taichi_soft.bodies.part import Part, name_of
 from taichi_soft.bodies.soft_body import SoftBody, record_of
 from taichi_soft.core.checks import as_count, as_number

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from taichi_soft.bodies.layout import BodyDescription
+from taichi_soft.bodies.description import BodyDescription
 from taichi_soft.bodies.part import name_of
 from taichi_soft.bodies.soft_body import SoftBody, record_of
 from taichi_soft.control.materials import write_constants

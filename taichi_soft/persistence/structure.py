@@ -8,7 +8,7 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from taichi_soft.bodies.asset import SoftBodyAsset
-from taichi_soft.bodies.fields import ROOMS
+from taichi_soft.bodies.capacity import ROOMS
 from taichi_soft.core.errors import SnapshotError
 from taichi_soft.core.serialisation import as_plain, digest_of, from_json, to_json
 from taichi_soft.solver.context import WorldContext

@@ -6,10 +6,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.bodies.fields import BodyCapacity, BodyFields
+from taichi_soft.bodies.capacity import BodyCapacity
+from taichi_soft.bodies.fields import BodyFields
 from taichi_soft.bodies.layout import Scene
 from taichi_soft.contact.fields import ContactCapacity, ContactFields, SoftContactFields
 from taichi_soft.control.joint_fields import JointFields
+from taichi_soft.control.kernels.grabs import GrabFields
 from taichi_soft.control.kernels.motors import MotorFields
 from taichi_soft.core.runtime import holds_fields, ti
 from taichi_soft.solver.step_fields import JobFields, Progress
@@ -31,7 +33,7 @@ class Capacity(BodyCapacity):
 
 @holds_fields
 class State(BodyFields):
-    """The fields of bodies, and slice by slice those of motors, contact and joints, where there are any."""
+    """The fields of bodies, and those of each slice that a world has."""
 
     capacity: Capacity
 
@@ -39,7 +41,7 @@ class State(BodyFields):
         """Allocate `capacity`; contents are zero until `load`."""
         super().__init__(capacity)
         n, bodies = capacity.particles, capacity.bodies
-        self.motors = MotorFields(bodies)
+        self.grabs, self.motors = GrabFields(self.real), MotorFields(bodies)
         if capacity.has_contact:
             self.contact = ContactFields(capacity.contact, n, bodies)
             self.joints = JointFields(n)
@@ -55,7 +57,7 @@ class State(BodyFields):
     @property
     def carried(self) -> dict[str, list[list[Any]]]:
         """Fields of slices that the next step depends on, in groups: see `Slice.row_counts`."""
-        groups = {"grabs": self.carried_grabs(), "motors": self.motors.carried()}
+        groups = {"grabs": self.grabs.carried(), "motors": self.motors.carried()}
         if self.capacity.has_contact:
             groups["joints"], groups["colliders"] = self.joints.carried(), self.contact.carried()
         if self.capacity.contact.soft:
@@ -64,6 +66,7 @@ class State(BodyFields):
 
     def load(self, scene: Scene, models: list[int], kinds: NDArray[np.float64] | None = None) -> None:
         """As `BodyFields.load`."""
+        self.grabs.clear(self.loader)
         self.motors.clear(self.loader)
         if self.capacity.has_contact:
             self._load_contact(scene)

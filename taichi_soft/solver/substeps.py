@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from taichi_soft.bodies.layout import BodyDescription
+from taichi_soft.bodies.description import BodyDescription
 from taichi_soft.bodies.slots import Pools
 from taichi_soft.bodies.soft_body import SoftBody, record_of
 from taichi_soft.bodies.stability import StableStep, stable_step

@@ -10,8 +10,8 @@ from mode_oracle import assembled_stiffness, first_mode, lumped_masses
 from random_meshes import scattered
 
 from taichi_soft import Material, World, beam, box, internal_forces, sphere
+from taichi_soft.bodies.description import BodyDescription
 from taichi_soft.bodies.first_mode import first_frequency
-from taichi_soft.bodies.layout import BodyDescription
 from taichi_soft.core.errors import MaterialError
 from taichi_soft.elements.laws import element_model, fit_model
 from taichi_soft.lab.drop_test.robustness.foreign_meshes import FOREIGN_MESHES

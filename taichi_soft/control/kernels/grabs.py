@@ -1,4 +1,4 @@
-"""Springs that pull a patch of a body's surface to a point: a hand, or a mouse.
+"""Grabs: their fields, and springs that pull a patch of a body's surface to a point: a hand, or a mouse.
 
 Each is a soft constraint in the sense of Catto, Soft Constraints (GDC 2011): the velocity after the pull
 enters the spring and its damper, so that it takes nothing beyond its aim, however stiff it is. A particle of
@@ -6,22 +6,63 @@ the patch has its share of both; the shares add up to 1. What is more than the p
 whole body, by mass, which deforms nothing.
 """
 
-from taichi_soft.bodies.fields import MOST_GRABS, PATCH_ROWS
+from typing import Any
+
+import numpy as np
+
 from taichi_soft.bodies.kernels.motion import gravity_on
 from taichi_soft.bodies.status import GRABBED
+from taichi_soft.core.loading import Loader
 from taichi_soft.core.math.tensors import widened
-from taichi_soft.core.runtime import ti
+from taichi_soft.core.runtime import holds_fields, ti
+
+MOST_GRABS, PATCH_ROWS = 16, 128
+"""Grabs of one world at a time, and particles that one of them holds."""
+
+
+@holds_fields
+class GrabFields:
+    """All grabs of a world, each with the rows of its patch."""
+
+    def __init__(self, real: Any) -> None:
+        """Allocate; contents are zero."""
+        self.body = ti.field(ti.i32, MOST_GRABS)  # its number plus 1, 0 where nothing is held
+        self.corners = ti.Vector.field(3, ti.i32, MOST_GRABS)
+        self.weights = ti.Vector.field(3, real, MOST_GRABS)  # of the corners
+        self.target = ti.Vector.field(3, real, MOST_GRABS)  # [m]
+        self.spring = ti.Vector.field(3, real, MOST_GRABS)  # see `write_grab`
+        self.limits = ti.Vector.field(3, real, MOST_GRABS)
+        self.force = ti.Vector.field(3, real, MOST_GRABS)  # [N], in the last substep
+        self.count = ti.field(ti.i32, MOST_GRABS)  # rows of the patch
+        self.particle = ti.field(ti.i32, MOST_GRABS * PATCH_ROWS)
+        self.share = ti.field(real, MOST_GRABS * PATCH_ROWS)
+
+    def clear(self, loader: Loader) -> None:
+        """Let there be no grab. A world that was here before may have held particles that there are not any
+        more."""
+        for numbers in (self.body, self.count, self.particle, self.share):
+            loader.fill(numbers, np.zeros(0))
+        for rows in (self.corners, self.weights, self.target, self.spring, self.limits, self.force):
+            loader.fill(rows, np.zeros((0, 3)))
+
+    def carried(self) -> list[list[Any]]:
+        """What the next step depends on: of each grab, of each in use, of each row of its patch."""
+        return [
+            [self.body],
+            [self.corners, self.weights, self.target, self.spring, self.limits, self.force, self.count],
+            [self.particle, self.share],
+        ]
 
 
 @ti.func
 def _stretch(state: ti.template(), g):
     """From where a grab wants its point to where that is [m], no longer than the longest."""
-    corners, weights = state.grab_corners[g], state.grab_weights[g]
+    corners, weights = state.grabs.corners[g], state.grabs.weights[g]
     point = ti.Vector.zero(state.real, 3)
     for i in ti.static(range(3)):
         point += weights[i] * state.particle_position[corners[i]]
-    stretch = point - state.grab_target[g]
-    return stretch * ti.min(1.0, state.grab_spring[g].z / ti.max(stretch.norm(), 1e-12))
+    stretch = point - state.grabs.target[g]
+    return stretch * ti.min(1.0, state.grabs.spring[g].z / ti.max(stretch.norm(), 1e-12))
 
 
 @ti.func
@@ -32,7 +73,7 @@ def _rest_of_pull(state: ti.template(), g, wanted, h, drag):
         wanted: force of the spring and its damper, at the velocity that the body is going to have [N].
         drag: by how much it falls with that velocity [N s/m].
     """
-    on_patch, on_all, inv_mass = state.grab_limits[g].x, state.grab_limits[g].y, state.grab_limits[g].z
+    on_patch, on_all, inv_mass = state.grabs.limits[g].x, state.grabs.limits[g].y, state.grabs.limits[g].z
     force = wanted / (1.0 + h * drag * inv_mass)
     size = ti.max(force.norm(), 1e-30)
     return ti.max(ti.min(size, on_all) - on_patch, 0.0) / size * h * inv_mass * force
@@ -48,16 +89,16 @@ def pull_grabs(state: ti.template(), body, h, kick):
         gravity = gravity_on(state, body)
         particles = state.body_particles[body]
         for g in range(MOST_GRABS):
-            if state.grab_body[g] == body + 1:
-                spring = state.grab_spring[g]
+            if state.grabs.body[g] == body + 1:
+                spring = state.grabs.spring[g]
                 pull = spring.x * _stretch(state, g)
                 drag = spring.y + h * spring.x
                 part = ti.cast(0.0, state.real)
                 wanted, total = -pull, ti.Vector.zero(state.real, 3)
                 for turn in range(2):  # the first time to see how strong it is, the second to do it
                     total = ti.Vector.zero(state.real, 3)
-                    for row in range(g * PATCH_ROWS, g * PATCH_ROWS + state.grab_count[g]):
-                        p, share = state.patch_particle[row], state.patch_share[row]
+                    for row in range(g * PATCH_ROWS, g * PATCH_ROWS + state.grabs.count[g]):
+                        p, share = state.grabs.particle[row], state.grabs.share[row]
                         inv_mass = state.particle_inv_mass[p]
                         if inv_mass > 0.0:
                             v = state.particle_velocity[p]
@@ -67,13 +108,13 @@ def pull_grabs(state: ti.template(), body, h, kick):
                             total += impulse
                             wanted -= ti.select(turn == 0, share * drag, 0.0) * (v + kick * gravity)
                     if turn == 0:
-                        part = ti.min(1.0, h * state.grab_limits[g].x / ti.max(total.norm(), 1e-30))
+                        part = ti.min(1.0, h * state.grabs.limits[g].x / ti.max(total.norm(), 1e-30))
                 change = _rest_of_pull(state, g, wanted, h, drag)
                 if change.norm_sqr() > 0.0:
                     for p in range(particles[0], particles[1]):
                         if state.particle_inv_mass[p] > 0.0:
                             state.particle_velocity[p] = state.particle_velocity[p] + change
-                state.grab_force[g] = (part * total + change / state.grab_limits[g].z) / h
+                state.grabs.force[g] = (part * total + change / state.grabs.limits[g].z) / h
 
 
 @ti.func
@@ -83,15 +124,15 @@ def add_grabs(state: ti.template(), body, h):
         gravity = gravity_on(state, body)
         particles = state.body_particles[body]
         for g in range(MOST_GRABS):
-            if state.grab_body[g] == body + 1:
-                spring = state.grab_spring[g]
+            if state.grabs.body[g] == body + 1:
+                spring = state.grabs.spring[g]
                 pull = spring.x * _stretch(state, g)
                 drag = spring.y + h * spring.x
                 part = ti.cast(1.0, state.real)
                 wanted = ti.Vector.zero(state.real, 3)
                 for turn in range(2):
-                    for row in range(g * PATCH_ROWS, g * PATCH_ROWS + state.grab_count[g]):
-                        p, share = state.patch_particle[row], state.patch_share[row]
+                    for row in range(g * PATCH_ROWS, g * PATCH_ROWS + state.grabs.count[g]):
+                        p, share = state.grabs.particle[row], state.grabs.share[row]
                         if state.particle_inv_mass[p] > 0.0:
                             force = -share * (pull + drag * state.particle_velocity[p])
                             if turn == 0:
@@ -103,13 +144,13 @@ def add_grabs(state: ti.template(), body, h):
                                         state.particle_block[p][i, i] + part * share * h * drag
                                     )
                     if turn == 0:
-                        part = ti.min(1.0, state.grab_limits[g].x / ti.max(wanted.norm(), 1e-30))
+                        part = ti.min(1.0, state.grabs.limits[g].x / ti.max(wanted.norm(), 1e-30))
                 change = _rest_of_pull(state, g, wanted - h * drag * gravity, h, drag)
                 if change.norm_sqr() > 0.0:
                     for p in range(particles[0], particles[1]):
                         if state.particle_inv_mass[p] > 0.0:
                             _add_force(state, p, state.particle_mass[p] * change)
-                state.grab_force[g] = part * wanted + change / (h * state.grab_limits[g].z)
+                state.grabs.force[g] = part * wanted + change / (h * state.grabs.limits[g].z)
 
 
 @ti.func
@@ -140,34 +181,34 @@ def write_grab(
     """
     ti.loop_config(serialize=True)
     for _ in range(1):
-        state.grab_body[g] = body + 1
-        state.grab_corners[g] = ti.Vector([corners[0], corners[1], corners[2]])
-        state.grab_weights[g] = ti.Vector([numbers[0], numbers[1], numbers[2]])
-        state.grab_target[g] = ti.Vector([numbers[3], numbers[4], numbers[5]])
-        state.grab_spring[g] = ti.Vector([numbers[6], numbers[7], numbers[8]])
-        state.grab_limits[g] = ti.Vector([numbers[9], numbers[10], numbers[11]])
-        state.grab_force[g] = ti.Vector.zero(state.real, 3)
-        state.grab_count[g] = patch.shape[0]
+        state.grabs.body[g] = body + 1
+        state.grabs.corners[g] = ti.Vector([corners[0], corners[1], corners[2]])
+        state.grabs.weights[g] = ti.Vector([numbers[0], numbers[1], numbers[2]])
+        state.grabs.target[g] = ti.Vector([numbers[3], numbers[4], numbers[5]])
+        state.grabs.spring[g] = ti.Vector([numbers[6], numbers[7], numbers[8]])
+        state.grabs.limits[g] = ti.Vector([numbers[9], numbers[10], numbers[11]])
+        state.grabs.force[g] = ti.Vector.zero(state.real, 3)
+        state.grabs.count[g] = patch.shape[0]
         for i in range(patch.shape[0]):
-            state.patch_particle[g * PATCH_ROWS + i] = patch[i]
-            state.patch_share[g * PATCH_ROWS + i] = shares[i]
+            state.grabs.particle[g * PATCH_ROWS + i] = patch[i]
+            state.grabs.share[g * PATCH_ROWS + i] = shares[i]
         state.body_drives[body] = state.body_drives[body] | GRABBED
 
 
 @ti.kernel
 def write_grab_target(state: ti.template(), g: ti.i32, target: ti.types.ndarray(dtype=ti.f32, ndim=1)):
     """Where a grab pulls to from now on, (3,) [m]."""
-    state.grab_target[g] = ti.Vector([target[0], target[1], target[2]])
+    state.grabs.target[g] = ti.Vector([target[0], target[1], target[2]])
 
 
 @ti.kernel
 def end_grab(state: ti.template(), g: ti.i32, body: ti.i32):
     """Let go."""
     others = 0
-    state.grab_body[g] = 0
+    state.grabs.body[g] = 0
     ti.loop_config(serialize=True)
     for each in range(MOST_GRABS):
-        others += int(state.grab_body[each] == body + 1)
+        others += int(state.grabs.body[each] == body + 1)
     if others == 0:
         state.body_drives[body] = state.body_drives[body] & ~GRABBED
 
@@ -176,4 +217,4 @@ def end_grab(state: ti.template(), g: ti.i32, body: ti.i32):
 def read_grab_force(state: ti.template(), g: ti.i32, force: ti.types.ndarray(dtype=ti.f32, ndim=1)):
     """With what a grab pulled in the last substep, (3,) [N]."""
     for k in ti.static(range(3)):
-        force[k] = state.grab_force[g][k]
+        force[k] = state.grabs.force[g][k]

@@ -1,7 +1,7 @@
 """What frames, hands and other bodies feel of a body."""
 
-from taichi_soft.bodies.fields import MOST_GRABS
 from taichi_soft.control.joint_fields import ENDS, MOST_JOINTS
+from taichi_soft.control.kernels.grabs import MOST_GRABS
 from taichi_soft.core.runtime import ti
 
 
@@ -13,8 +13,8 @@ def forget_loads(state: ti.template(), body):
     for p in range(particles[0], particles[1]):
         state.particle_reaction[p] = zero
     for g in range(MOST_GRABS):
-        if state.grab_body[g] == body + 1:
-            state.grab_force[g] = zero
+        if state.grabs.body[g] == body + 1:
+            state.grabs.force[g] = zero
     if ti.static(state.capacity.has_contact):
         for j in range(MOST_JOINTS):
             ends, rows = state.joints.bodies[j], state.joints.rows[j]

@@ -8,9 +8,9 @@ vibrations sharply; momentum and spin stay.
 
 from taichi_soft.bodies.kernels.motion import particle_is_sound, remember_particle, restore_particle
 from taichi_soft.bodies.status import ABSENT, ACTIVE, FEELS_REACTION, FROZEN
+from taichi_soft.contact.kernels.candidates import forget_candidates
 from taichi_soft.contact.kernels.collide import forget_contacts
 from taichi_soft.contact.kernels.rebound import begin_rebounds, take_back_rebounds
-from taichi_soft.contact.kernels.soft_search import forget_candidates
 from taichi_soft.contact.kernels.touches import forget_touches
 from taichi_soft.core.runtime import ti
 from taichi_soft.core.types import Integrator

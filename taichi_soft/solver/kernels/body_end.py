@@ -3,8 +3,8 @@
 from taichi_soft.bodies.kernels.motion import restore_particle
 from taichi_soft.bodies.kernels.plasticity import flow_body
 from taichi_soft.bodies.status import ACTIVE, FROZEN, PUSHED
+from taichi_soft.contact.kernels.candidates import forget_candidates
 from taichi_soft.contact.kernels.collide import forget_contacts
-from taichi_soft.contact.kernels.soft_search import forget_candidates
 from taichi_soft.control.kernels.drives import push_particles
 from taichi_soft.control.kernels.loads import forget_loads
 from taichi_soft.core.runtime import ti

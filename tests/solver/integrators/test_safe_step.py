@@ -12,7 +12,7 @@ from scipy.sparse.linalg import eigsh
 from step_oracle import differences
 
 from taichi_soft import Material, beam, box, cylinder, delaunay_mesh, sphere, stable_step, torus
-from taichi_soft.bodies.layout import BodyDescription
+from taichi_soft.bodies.description import BodyDescription
 from taichi_soft.elements.laws import element_model, fit_model
 
 MESHES = {

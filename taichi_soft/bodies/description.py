@@ -1,0 +1,147 @@
+"""What a body is made of, in the order of its vertices: masses, constants, rest shape."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.core.errors import MeshError
+from taichi_soft.core.types import DampingModel
+from taichi_soft.elements.laws import BondLaw, ElementModel
+from taichi_soft.elements.laws.bonds import Bonds
+from taichi_soft.elements.materials import AnisotropicMaterial, AnyMaterial, Material, SpringMaterial
+from taichi_soft.meshing import (
+    BodyMesh,
+    ParticleMesh,
+    TetMesh,
+)
+from taichi_soft.meshing.arrays import read_only
+from taichi_soft.meshing.splitting import InnerFaces, inner_faces
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
+SHORTEST_EDGE = 1e-6
+"""[m]; volumes of smaller tetrahedra run out of float32's range."""
+
+
+@dataclass(frozen=True, eq=False)
+class BodyDescription:
+    """One kind of body, wherever it is."""
+
+    mesh: BodyMesh
+    material: AnyMaterial
+    model: ElementModel
+    pinned: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int32))  # vertices that stay in place
+
+    @cached_property
+    def bonds(self) -> Bonds | None:
+        """What a pairwise law knows of the edges; None for other laws."""
+        law = self.model.law
+        return law.bonds(self.mesh, self.material) if isinstance(law, BondLaw) else None
+
+    @cached_property
+    def masses(self) -> Floats:
+        """Mass of each vertex, (n,) [kg], in the caller's order, read-only."""
+        if isinstance(self.mesh, ParticleMesh):
+            return self.mesh.masses
+        if self.bonds is not None and self.bonds.masses is not None:
+            return read_only(self.bonds.masses)
+        return read_only(vertex_masses(self.mesh, self.per_tet("density")))  # type: ignore[arg-type]
+
+    def per_tet(self, name: str) -> Floats:
+        """A constant of the material for each tetrahedron, (m,)."""
+        if isinstance(self.material, SpringMaterial):
+            return np.zeros(0)
+        return self.material.per_tet(name, len(self.mesh.tets))
+
+    @cached_property
+    def rest_inverses(self) -> Floats:
+        """A^-1 of each tetrahedron, (m, 3, 3) [1/m], in the caller's order, read-only."""
+        return read_only(rest_inverses(self.mesh))
+
+    @cached_property
+    def sound_speed(self) -> float:
+        """Of the fastest waves in it at rest [m/s]: sqrt((lambda + 2 mu) / density), the largest of its
+        tetrahedra; in given springs a sqrt(k / m), the largest of its edges."""
+        mesh, material = self.mesh, self.material
+        if isinstance(material, SpringMaterial):
+            assert self.bonds is not None
+            ends = mesh.vertices[mesh.edges]
+            lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+            lightest = self.masses[mesh.edges].min(axis=1)
+            return float((lengths * np.sqrt(self.bonds.constants[:, 1] / lightest)).max())
+        if isinstance(material, Material):
+            modulus = self.lame @ np.array([1.0, 2.0])
+        else:
+            modulus = material.stiffness_matrices(len(mesh.tets))[:, range(3), range(3)].max(axis=1)
+        return float(np.sqrt((modulus / self.per_tet("density")).max()))
+
+    @cached_property
+    def inner_faces(self) -> InnerFaces:
+        """Where it can be cut."""
+        return inner_faces(self.mesh.tets)
+
+    @property
+    def lame(self) -> Floats:
+        """Lame's lambda and mu of each tetrahedron, (m, 2) [Pa]; zero for an anisotropic material."""
+        if not isinstance(self.material, Material):
+            return np.zeros((len(self.mesh.tets), 2))
+        return np.stack([self.per_tet("lame_lambda"), self.per_tet("lame_mu")], axis=1)
+
+    @property
+    def stiffness(self) -> Floats:
+        """The 21 constants of each tetrahedron of an anisotropic material, (m, 21) [Pa]; zero for others."""
+        count = len(self.mesh.tets)
+        if not isinstance(self.material, AnisotropicMaterial):
+            return np.zeros((count, 21))
+        rows, columns = np.triu_indices(6)
+        return self.material.stiffness_matrices(count)[:, rows, columns]
+
+    @cached_property
+    def edge_damping(self) -> Floats:
+        """Damping of each edge by the law, (k,) [N s/m]."""
+        if isinstance(self.material, SpringMaterial):
+            return self.material.per_edge("damping", len(self.mesh.edges))
+        if self.model.damping_model is not DampingModel.EDGE:
+            return np.zeros(len(self.mesh.edges))
+        damping = edge_damping(self.mesh, self.per_tet("damping"))  # type: ignore[arg-type]
+        return damping if self.bonds is None else damping * self.bonds.is_bond
+
+
+def outer_vertices(mesh: BodyMesh) -> Ints:
+    """Vertices of the surface; of a `ParticleMesh`, which has no inside, all."""
+    if isinstance(mesh, TetMesh):
+        return mesh.surface_vertices
+    return np.arange(len(mesh.vertices), dtype=np.int32)
+
+
+def edge_damping(mesh: TetMesh, tet_damping: Floats) -> Floats:
+    """Damping of each edge: the mean over the tetrahedra that share it, (k,) [N s/m]."""
+    total = np.bincount(mesh.tet_edges.ravel(), np.repeat(tet_damping, 6), minlength=len(mesh.edges))
+    return total / mesh.edge_valence
+
+
+def vertex_masses(mesh: TetMesh, density: Floats) -> Floats:
+    """A quarter of the mass of each neighbouring tetrahedron, (n,) [kg] (thesis chapter 6)."""
+    quarter = np.repeat(mesh.volumes * density / 4.0, 4)
+    return np.bincount(mesh.tets.ravel(), quarter, minlength=len(mesh.vertices)).astype(np.float64)
+
+
+def rest_inverses(mesh: BodyMesh) -> Floats:
+    """A^-1 of thesis eq. 6.1 for every tetrahedron, (m, 3, 3) [1/m]."""
+    corners = mesh.vertices[mesh.tets]
+    shapes = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
+    return np.asarray(np.linalg.inv(shapes))
+
+
+def require_size(mesh: BodyMesh) -> None:
+    """Raises: MeshError for edges below `SHORTEST_EDGE`."""
+    shortest = float(mesh.edge_lengths.min())
+    if shortest < SHORTEST_EDGE:
+        raise MeshError(
+            f"the shortest edge is {shortest:.3g} m: scale the mesh (in metres) to {SHORTEST_EDGE:g} or more"
+        )
