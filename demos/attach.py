@@ -9,7 +9,7 @@ from taichi_soft.cli import main
 from taichi_soft.core.constants import GRAVITY_EARTH
 from taichi_soft.render import Camera, colormap
 from taichi_soft.render.film import Actor, Stage
-from taichi_soft.render.scenery import Prop
+from taichi_soft.render.props import Prop
 
 MATERIAL = Material(young=4.0e5, poisson=0.3, density=1000.0, damping_ratio=0.2)
 SIZE = (0.5, 0.5, 1.4)  # of the bar [m]

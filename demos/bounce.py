@@ -4,8 +4,8 @@ from engine_adapter import FixedStep
 from taichi_soft import World, load_mesh, preset
 from taichi_soft.cli import main
 from taichi_soft.render import Camera
+from taichi_soft.render.demos import ASSETS
 from taichi_soft.render.film import Actor, Stage
-from taichi_soft.render.stages import ASSETS
 
 HEIGHT = 7.0  # of the lowest point [m]
 

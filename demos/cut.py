@@ -7,7 +7,7 @@ from taichi_soft import Body, BoxShape, Frame, Material, SoftBodyAsset, World, b
 from taichi_soft.cli import main
 from taichi_soft.render import PALETTE, Camera
 from taichi_soft.render.film import Actor, Stage
-from taichi_soft.render.scenery import Prop
+from taichi_soft.render.props import Prop
 
 MATERIAL = Material(young=2.5e5, poisson=0.3, density=1000.0, damping_ratio=0.3)
 SIZE = (0.6, 0.6, 2.0)  # of the bar [m]

@@ -21,7 +21,7 @@ from taichi_soft.cli import main
 from taichi_soft.core.constants import GRAVITY_EARTH
 from taichi_soft.render import PALETTE, Camera
 from taichi_soft.render.film import Actor, Stage
-from taichi_soft.render.scenery import Prop
+from taichi_soft.render.props import Prop
 
 MATERIAL = Material(young=2.5e5, poisson=0.3, density=400.0, damping_ratio=0.4)
 CRATE = np.array([2.4, 0.0, 0.0])  # middle of its bottom [m]

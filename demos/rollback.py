@@ -10,7 +10,7 @@ from taichi_soft.cli import main
 from taichi_soft.core.constants import GRAVITY_EARTH
 from taichi_soft.render import PALETTE, Camera
 from taichi_soft.render.film import Actor, Stage
-from taichi_soft.render.scenery import Prop
+from taichi_soft.render.props import Prop
 
 MATERIAL = Material(young=1.0e5, poisson=0.3, density=300.0, damping_ratio=0.1)
 CONTACT = Contact(friction=0.3)

@@ -6,8 +6,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from taichi_soft.render.demos import load_demo
 from taichi_soft.render.film import film
-from taichi_soft.render.stages import load_demo
 
 FOLDER = Path(__file__).parent / "pictures"
 # That show what each demo is about [s].

@@ -13,7 +13,7 @@ from engine_adapter.rollback import Rollback
 from taichi_soft import Body, Event, OptionError, StateError, World
 from taichi_soft.core.checks import as_count, as_number
 from taichi_soft.core.handles import handles_of
-from taichi_soft.core.turns import one_thread
+from taichi_soft.core.threads import one_thread
 
 
 class EngineAdapter:

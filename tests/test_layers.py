@@ -35,7 +35,7 @@ LEVEL = {name: level for level, name in enumerate(LAYERS.split())}
 
 OURS = ("taichi_soft", "engine_adapter", "demos")
 
-PICTURES = ("film", "scenery", "stages", "replay")
+PICTURES = ("film", "props", "demos", "replay")
 """Files of render that know worlds; the others draw triangles."""
 
 NO_TAICHI = (
@@ -132,7 +132,7 @@ def found_in(modules, rule):
 def test_there_is_something_to_check():
     assert {"taichi_soft.world.world", "taichi_soft.elements.laws", "engine_adapter.adapter"} <= set(FILES)
     assert "taichi_soft.elements.laws.model" in IMPORTS["taichi_soft.elements.kernels.elastic"]
-    assert "taichi_soft.bodies.program" in IMPORTS["taichi_soft.solver.program"]
+    assert "taichi_soft.bodies.law_program" in IMPORTS["taichi_soft.solver.program"]
 
 
 def test_every_file_has_a_layer():
@@ -193,7 +193,7 @@ def test_the_engine_adapter_knows_only_the_public_names():
     """And the checks of arguments and of callers."""
     inner = {n for m in FILES if m.startswith("engine_adapter") for n in IMPORTS[m]}
     known = {name for name in inner if name.startswith("taichi_soft")}
-    assert known <= {"taichi_soft", *(f"taichi_soft.core.{name}" for name in ("checks", "handles", "turns"))}
+    assert known <= {"taichi_soft", *(f"taichi_soft.core.{name}" for name in ("checks", "handles", "threads"))}
 
 
 def test_pictures_know_meshes_but_no_physics():
@@ -245,7 +245,7 @@ def test_a_downward_import_is_not(module, source):
 
 
 @pytest.mark.parametrize(
-    "source", ["def f(body):\n    return body._part", "from taichi_soft.core.turns import _taichi"]
+    "source", ["def f(body):\n    return body._part", "from taichi_soft.core.threads import _taichi"]
 )
 def test_reading_what_is_anothers_own_is_found(source):
     assert list(others_names(source)) != []

@@ -11,7 +11,7 @@ import trimesh
 
 from taichi_soft import LAWS, PRESETS
 from taichi_soft.core.types import DampingModel, Flips, Integrator, Strain
-from taichi_soft.render.stages import demo_names
+from taichi_soft.render.demos import demo_names
 
 ROOT = Path(__file__).resolve().parents[1]
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")

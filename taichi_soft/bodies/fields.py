@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.bodies.capacity import BodyCapacity
+from taichi_soft.bodies.law_program import Program
 from taichi_soft.bodies.layout import BodyArrays, Ranges, Scene, blocks_of
-from taichi_soft.bodies.program import Program
 from taichi_soft.bodies.status import ABSENT
 from taichi_soft.core.constants import LANES
-from taichi_soft.core.loading import Loader
+from taichi_soft.core.field_loader import Loader
 from taichi_soft.core.runtime import holds_fields, make_fields, ti
-from taichi_soft.core.turns import in_turn
+from taichi_soft.core.threads import in_turn
 
 
 @holds_fields

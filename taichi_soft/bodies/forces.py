@@ -13,12 +13,12 @@ from taichi_soft.bodies.description import BodyDescription
 from taichi_soft.bodies.fields import BodyFields, acquire, release
 from taichi_soft.bodies.kernels.evaluate import compute_body_forces
 from taichi_soft.bodies.kernels.readout import write_motion
+from taichi_soft.bodies.law_program import Program
 from taichi_soft.bodies.layout import Scene, arrange
-from taichi_soft.bodies.program import Program
 from taichi_soft.core.constants import POSITION_LIMIT
 from taichi_soft.core.errors import MeshError, OptionError
 from taichi_soft.core.runtime import init
-from taichi_soft.core.turns import in_turn
+from taichi_soft.core.threads import in_turn
 from taichi_soft.core.types import DampingModel, Flips, Integrator, Strain
 from taichi_soft.elements.kernels.gradients import (
     compute_bond_stiffness,

@@ -15,16 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.bodies.asset import SoftBodyAsset
+from taichi_soft.bodies.cut_mesh import CutMesh
 from taichi_soft.bodies.description import BodyDescription
 from taichi_soft.bodies.failure import FailedStep, Failure
 from taichi_soft.bodies.layout import BodyArrays, Ranges, Scene
-from taichi_soft.bodies.part import Part
 from taichi_soft.bodies.slots import Pools
 from taichi_soft.core.clock import Clock
 from taichi_soft.core.errors import StateError
 from taichi_soft.core.handles import Handle, Handles
 from taichi_soft.core.settings import Settings
-from taichi_soft.core.turns import one_thread
+from taichi_soft.core.threads import one_thread
 from taichi_soft.elements.materials import AnyMaterial
 from taichi_soft.meshing import BodyMesh
 
@@ -196,10 +196,10 @@ class BodyRecord:
     removed_in: int | None = None  # step
     frozen_in: FailedStep | None = None
     failure: Failure | None = None  # once it was asked for
-    part: Part | None = None  # of the asset's mesh, once it was cut
+    part: CutMesh | None = None  # of the asset's mesh, once it was cut
     topology_version: int = 0
 
-    def become(self, part: Part | None) -> None:
+    def become(self, part: CutMesh | None) -> None:
         """Take note of what cuts have left of the asset's mesh, None for all of it."""
         self.part = part
         self.topology_version += 1

@@ -28,7 +28,7 @@ def demo(
     threads: Threads = None,
 ) -> None:
     """Run a demo without a display, film it, and say how much faster than real time it ran."""
-    from taichi_soft.render.stages import demo_names, load_demo
+    from taichi_soft.render.demos import demo_names, load_demo
 
     if name is None:
         for each in demo_names():

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from taichi_soft.core.constants import LANES
-from taichi_soft.core.loading import Loader
+from taichi_soft.core.field_loader import Loader
 from taichi_soft.core.runtime import holds_fields, ti
 
 NO_COLLIDER = -1

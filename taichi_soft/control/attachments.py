@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies.soft_body import Slice, SoftBody, context_of
-from taichi_soft.control.access import change, named_particles, require_substeps, rows_of
+from taichi_soft.control.change import change, named_particles, require_substeps, rows_of
 from taichi_soft.control.frames import Frame, Frames
 from taichi_soft.control.kernels.pins import attach_particles, free_particles, read_reaction, write_feeling
 from taichi_soft.core.checks import as_flag

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies.soft_body import Context, SoftBody, context_of
-from taichi_soft.control.access import change, numbers, require_substeps, rows_of, some_particles
+from taichi_soft.control.change import change, numbers, require_substeps, rows_of, some_particles
 from taichi_soft.control.impulses import LARGEST_IMPULSE
 from taichi_soft.control.kernels.drives import (
     add_push,

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies.fields import BodyFields
 from taichi_soft.bodies.soft_body import Context, RowsOf, Slice, SoftBody
-from taichi_soft.control.jumps import carry
 from taichi_soft.control.kernels.pins import WITH_FRAME, aim_pinned
+from taichi_soft.control.rigid_transform import carry
 from taichi_soft.core.checks import as_flag, as_rotation, as_vector
 from taichi_soft.core.constants import POSITION_LIMIT
 from taichi_soft.core.errors import OptionError, StateError

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies.soft_body import Context, RowsOf, Slice, SoftBody, context_of, record_of
-from taichi_soft.control.access import change, numbers, require_substeps, rows_of
+from taichi_soft.control.change import change, numbers, require_substeps, rows_of
+from taichi_soft.control.grab_patch import patch_round
 from taichi_soft.control.kernels.grabs import (
     MOST_GRABS,
     PATCH_ROWS,
@@ -19,7 +20,6 @@ from taichi_soft.control.kernels.grabs import (
     write_grab,
     write_grab_target,
 )
-from taichi_soft.control.patches import patch_round
 from taichi_soft.core.checks import as_array, as_count, as_number, as_vector
 from taichi_soft.core.constants import GRAVITY_EARTH
 from taichi_soft.core.errors import MeshError, OptionError, StateError

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from taichi_soft.bodies.soft_body import Context, SoftBody
-from taichi_soft.control.access import attempt, change, numbers, rouse, rows_of, some_particles
+from taichi_soft.control.change import attempt, change, numbers, rouse, rows_of, some_particles
 from taichi_soft.control.kernels.impulses import add_impulse_near, add_radial_impulse, add_velocity
 from taichi_soft.core.checks import as_number, as_vector
 from taichi_soft.core.constants import VELOCITY_LIMIT

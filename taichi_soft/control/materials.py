@@ -12,7 +12,7 @@ from taichi_soft.bodies.fields import BodyFields
 from taichi_soft.bodies.kernels.constants import write_fours, write_masses, write_numbers
 from taichi_soft.bodies.layout import BodyArrays, Ranges, blocks_of, rearrange
 from taichi_soft.bodies.soft_body import SoftBody, context_of, record_of, redescribe
-from taichi_soft.control.access import change
+from taichi_soft.control.change import change
 from taichi_soft.core.constants import LANES
 from taichi_soft.core.errors import MaterialError
 from taichi_soft.elements.laws import fit_model

@@ -20,7 +20,7 @@ from taichi_soft.bodies.soft_body import (
     lives_in,
     require_alive,
 )
-from taichi_soft.control.access import change, named_particles, numbers, require_substeps, rows_of
+from taichi_soft.control.change import change, named_particles, numbers, require_substeps, rows_of
 from taichi_soft.control.kernels.motors import (
     MOST_MOTORS,
     MOTOR_ROWS,

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies.soft_body import SoftBody, context_of
-from taichi_soft.control.access import attempt, change, named_particles, rouse, rows_of, some_particles
 from taichi_soft.control.attachments import attached_vertices, require_unattached
+from taichi_soft.control.change import attempt, change, named_particles, rouse, rows_of, some_particles
 from taichi_soft.control.frames import Frames
 from taichi_soft.control.kernels.pins import free_particles, pin_particles, read_pinned, write_targets
 from taichi_soft.core.checks import as_array

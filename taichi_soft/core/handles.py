@@ -8,7 +8,7 @@ from functools import wraps
 from typing import Any, Protocol, TypeVar, cast
 from weakref import WeakValueDictionary
 
-from taichi_soft.core.turns import Turn, one_thread
+from taichi_soft.core.threads import Turn, one_thread
 
 Kind = TypeVar("Kind", bound="Handle")
 Method = TypeVar("Method", bound=Callable[..., Any])

@@ -38,7 +38,7 @@ from taichi_soft.core.taichi_patches import (
     remember_sources,
     ti,
 )
-from taichi_soft.core.turns import in_turn, leave_behind
+from taichi_soft.core.threads import in_turn, leave_behind
 
 __all__ = ["Device", "device", "holds_fields", "init", "is_initialized", "make_fields", "ti"]
 

@@ -18,7 +18,7 @@ os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
 import taichi as ti
 
 from taichi_soft.core.subnormals import without_subnormals
-from taichi_soft.core.turns import in_turn
+from taichi_soft.core.threads import in_turn
 
 __all__ = [
     "check_real_functions",

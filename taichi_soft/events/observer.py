@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from taichi_soft.bodies.law_program import Program
 from taichi_soft.bodies.layout import Scene
-from taichi_soft.bodies.program import Program
 from taichi_soft.bodies.soft_body import SoftBody, record_of
 from taichi_soft.bodies.status import ACTIVE, ASLEEP
 from taichi_soft.contact.collider import Collider

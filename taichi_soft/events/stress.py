@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.bodies.fields import BodyFields
+from taichi_soft.bodies.law_program import Program
 from taichi_soft.bodies.layout import Scene
-from taichi_soft.bodies.program import Program
 from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.core.constants import LANES
 from taichi_soft.core.handles import serial_of

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from taichi_soft.bodies.cut_mesh import CutMesh
 from taichi_soft.bodies.description import BodyDescription
 from taichi_soft.bodies.fields import BodyFields, with_spare_rows
 from taichi_soft.bodies.kernels.plasticity import read_rest_inverses
 from taichi_soft.bodies.layout import BodyArrays, arrange_part, blocks_of
-from taichi_soft.bodies.part import Part
 from taichi_soft.bodies.soft_body import Context, SoftBody, bars_to_cut, context_of, record_of, redescribe
 from taichi_soft.bodies.status import ABSENT, ACTIVE
 from taichi_soft.control.attachments import share_attachments
@@ -199,7 +199,7 @@ def _settle(context: Context, body: SoftBody, pieces: list[_Piece], slots: list[
     for each, piece in zip((body, *fallen), pieces, strict=True):
         redescribe(each, piece.description, piece.arrays)
         corners, order = piece.description.mesh.tets, piece.arrays.order
-        record_of(each).become(Part(vertices[piece.vertices], order, tets[piece.tets], corners))
+        record_of(each).become(CutMesh(vertices[piece.vertices], order, tets[piece.tets], corners))
     share_attachments(
         body, [(each, piece.vertices) for each, piece in zip((body, *fallen), pieces, strict=True)]
     )

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.bodies.fields import BodyFields
+from taichi_soft.bodies.law_program import Program
 from taichi_soft.bodies.measures import positions_of, tet_stresses
-from taichi_soft.bodies.program import Program
 from taichi_soft.bodies.soft_body import Context, Slice, SoftBody, bars_to_cut, record_of
 from taichi_soft.core.errors import StateError
 from taichi_soft.core.serialisation import below

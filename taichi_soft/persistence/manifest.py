@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from taichi_soft.bodies.cut_mesh import CutMesh, name_of
 from taichi_soft.bodies.description import BodyDescription
 from taichi_soft.bodies.failure import FailedStep
 from taichi_soft.bodies.layout import BodyArrays
-from taichi_soft.bodies.part import Part, name_of
 from taichi_soft.bodies.soft_body import SoftBody, record_of
 from taichi_soft.core.checks import as_count, as_number
 from taichi_soft.core.errors import SnapshotError, TaichiSoftError
@@ -57,7 +57,7 @@ class BodyEntry:
     serial: int
     first_step: int
     failed: FailedStep | None
-    part: Part | None
+    part: CutMesh | None
     description: BodyDescription
     arrays: BodyArrays | None  # of a part
 
@@ -74,17 +74,17 @@ class Manifest:
     slices: dict[str, Any]  # what each has read
 
 
-def read_parts(context: WorldContext, bodies: list[Any], rows: NDArray[np.int32]) -> dict[int, Part]:
+def read_parts(context: WorldContext, bodies: list[Any], rows: NDArray[np.int32]) -> dict[int, CutMesh]:
     """What cuts have left of bodies, by slot, from the entries of these and the rows of all parts one by one.
 
     Raises: as `read_manifest`.
     """
-    parts: dict[int, Part] = {}
+    parts: dict[int, CutMesh] = {}
     for slot, entry in enumerate(bodies):
         if entry is not None and entry[4] is not None:
             n, m = (below(count, len(rows) + 1) for count in entry[4][:2])
             size = 2 * n + 5 * m
-            parts[slot] = Part.of_rows(rows[:size], n, m)
+            parts[slot] = CutMesh.of_rows(rows[:size], n, m)
             parts[slot].require_of(context.slots.assets[slot])
             if parts[slot].digest != entry[4][2]:
                 raise ValueError(f"what was cut off body {slot} has another name")
@@ -94,7 +94,7 @@ def read_parts(context: WorldContext, bodies: list[Any], rows: NDArray[np.int32]
     return parts
 
 
-def read_manifest(context: WorldContext, plain: dict[str, Any], parts: dict[int, Part]) -> Manifest:
+def read_manifest(context: WorldContext, plain: dict[str, Any], parts: dict[int, CutMesh]) -> Manifest:
     """What `write_manifest` wrote.
 
     Raises: SnapshotError, or what Python raises where it is not in order.
@@ -127,7 +127,7 @@ def _require_serials(context: WorldContext, plain: dict[str, Any]) -> None:
         raise ValueError("two handles have the same number")
 
 
-def _read_body(context: WorldContext, slot: int, entry: Any, part: Part | None) -> BodyEntry | None:
+def _read_body(context: WorldContext, slot: int, entry: Any, part: CutMesh | None) -> BodyEntry | None:
     if entry is None:
         return None
     serial, first_step, failed, material, _ = entry

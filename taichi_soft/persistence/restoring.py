@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from taichi_soft.bodies.cut_mesh import name_of
 from taichi_soft.bodies.description import BodyDescription
-from taichi_soft.bodies.part import name_of
 from taichi_soft.bodies.soft_body import SoftBody, record_of
 from taichi_soft.control.materials import write_constants
 from taichi_soft.core.handles import serial_of

@@ -15,7 +15,7 @@ from engine_adapter import EngineAdapter, FixedStep
 from taichi_soft.core.checks import LARGEST_COUNT, as_positive
 from taichi_soft.core.errors import OptionError
 from taichi_soft.render import PALETTE, Camera, Renderer, Surface, VideoWriter, draw_labels, draw_text
-from taichi_soft.render.scenery import Prop, Scenery
+from taichi_soft.render.props import Prop, Scenery
 from taichi_soft.world.body import Body
 from taichi_soft.world.world import World
 

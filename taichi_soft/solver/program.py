@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-from taichi_soft.bodies.program import Program
+from taichi_soft.bodies.law_program import Program
 from taichi_soft.core.types import Integrator
 from taichi_soft.solver.integrators import ADVANCE
 

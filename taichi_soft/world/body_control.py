@@ -20,7 +20,7 @@ from taichi_soft.control.impulses import apply_impulse, apply_impulse_at_point
 from taichi_soft.control.joints import Joint, Joints
 from taichi_soft.control.materials import set_damping, set_material
 from taichi_soft.control.pins import pin, set_targets, unpin
-from taichi_soft.control.placement import set_velocity, teleport
+from taichi_soft.control.rigid_motion import set_velocity, teleport
 from taichi_soft.core.handles import recorded
 from taichi_soft.elements.materials import AnyMaterial
 

@@ -15,7 +15,7 @@ import numpy as np
 from taichi_soft.bodies.failure import FailedStep
 from taichi_soft.control.drives import push_bodies, set_wind
 from taichi_soft.control.impulses import apply_radial_impulse
-from taichi_soft.control.jumps import carry
+from taichi_soft.control.rigid_transform import carry
 from taichi_soft.persistence.snapshot import restore_snapshot, state_hash, take_snapshot
 from taichi_soft.queries import cast_ray, cast_rays, find_closest_point, find_in_box, find_in_sphere
 from taichi_soft.solver.context import WorldContext

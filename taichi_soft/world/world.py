@@ -11,7 +11,7 @@ from taichi_soft.bodies.layout import Scene
 from taichi_soft.bodies.slots import Pools
 from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.contact.colliders import MOST_SAMPLES
-from taichi_soft.control.access import require_substeps
+from taichi_soft.control.change import require_substeps
 from taichi_soft.control.drives import ForceField, push_by_field, require_field
 from taichi_soft.core.checks import as_count, as_flag, as_number, as_path, as_vector
 from taichi_soft.core.clock import Clock

@@ -7,8 +7,8 @@ from scipy.special import ellipe, ellipk
 
 from engine_adapter import EngineAdapter
 from taichi_soft import LAWS, OptionError
+from taichi_soft.render.demos import demo_names, load_demo
 from taichi_soft.render.film import film
-from taichi_soft.render.stages import demo_names, load_demo
 
 
 def run(name: str, seconds: float):

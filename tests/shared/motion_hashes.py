@@ -28,8 +28,8 @@ from taichi_soft import Material, World, box, delaunay_mesh, init
 from taichi_soft.core.errors import TaichiSoftError
 from taichi_soft.core.types import Integrator
 from taichi_soft.elements.laws import LAWS
+from taichi_soft.render.demos import demo_names, load_demo
 from taichi_soft.render.film import film
-from taichi_soft.render.stages import demo_names, load_demo
 
 TICKS = 300
 DEMO_SECONDS = 2.0

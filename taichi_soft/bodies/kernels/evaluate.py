@@ -1,6 +1,6 @@
 """Evaluation without motion: forces on a body where it is, or would be."""
 
-from taichi_soft.bodies.kernels.motion import particle_is_sound
+from taichi_soft.bodies.kernels.particles import particle_is_sound
 from taichi_soft.core.constants import LANES
 from taichi_soft.core.math.finite import is_finite
 from taichi_soft.core.math.tensors import widened

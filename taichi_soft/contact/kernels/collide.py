@@ -1,9 +1,9 @@
 """Particles of one body against the colliders, in one thread."""
 
-from taichi_soft.contact.distances.response import resolved_velocity
 from taichi_soft.contact.distances.sweep import NEVER, TOUCHING, distance_from, first_touch, rests_at
 from taichi_soft.contact.fields import NO_COLLIDER
 from taichi_soft.contact.kernels.rebound import add_normal_impulse
+from taichi_soft.contact.kernels.restitution import resolved_velocity
 from taichi_soft.core.math.quaternion import spun, turned, turned_back
 from taichi_soft.core.runtime import ti
 

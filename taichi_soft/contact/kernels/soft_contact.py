@@ -5,7 +5,7 @@ with it of its sliding: projected Gauss-Seidel over velocities, begun with the i
 Impulses are equal and opposite. What is too near already is moved apart without giving it a velocity.
 """
 
-from taichi_soft.bodies.kernels.motion import inv_mass_of, moves
+from taichi_soft.bodies.kernels.particles import inv_mass_of, moves
 from taichi_soft.contact.fields import SLOTS
 from taichi_soft.core.math.finite import is_finite
 from taichi_soft.core.runtime import ti

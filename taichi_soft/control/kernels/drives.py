@@ -5,7 +5,7 @@ leapfrog half a substep's worth comes before the first kick and the other half a
 are between.
 """
 
-from taichi_soft.bodies.kernels.motion import gravity_on
+from taichi_soft.bodies.kernels.particles import gravity_on
 from taichi_soft.bodies.status import DAMPED, FEELS_REACTION, PUSHED, SHELTERED
 from taichi_soft.core.runtime import ti
 

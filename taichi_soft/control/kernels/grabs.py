@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from taichi_soft.bodies.kernels.motion import gravity_on
+from taichi_soft.bodies.kernels.particles import gravity_on
 from taichi_soft.bodies.status import GRABBED
-from taichi_soft.core.loading import Loader
+from taichi_soft.core.field_loader import Loader
 from taichi_soft.core.math.tensors import widened
 from taichi_soft.core.runtime import holds_fields, ti
 

@@ -11,7 +11,7 @@ The impulse on the place is shared out so that it acts where the particle is. So
 momentum stay, also where there is a gap.
 """
 
-from taichi_soft.bodies.kernels.motion import inv_mass_of, velocity
+from taichi_soft.bodies.kernels.particles import inv_mass_of, velocity
 from taichi_soft.bodies.status import FEELS_REACTION, JOINED
 from taichi_soft.control.joint_fields import ENDS, MOST_JOINTS
 from taichi_soft.core.math.finite import is_finite

@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from taichi_soft.bodies.kernels.motion import gravity_on
-from taichi_soft.core.loading import Loader
+from taichi_soft.bodies.kernels.particles import gravity_on
+from taichi_soft.core.field_loader import Loader
 from taichi_soft.core.math.svd import signed_svd
 from taichi_soft.core.runtime import holds_fields, ti
 from taichi_soft.core.types import Integrator

@@ -11,7 +11,7 @@ from engine_adapter import EngineAdapter, FixedStep
 from taichi_soft.elements.materials import Material
 from taichi_soft.lab.profiling.spread import Spread, time_calls
 from taichi_soft.meshing import TetMesh, sphere
-from taichi_soft.solver.kernels.phases import PHASES, repeat_phase
+from taichi_soft.solver.kernels.phase_timing import PHASES, repeat_phase
 from taichi_soft.world.world import World, context_of_world
 
 MATERIAL = Material(young=1.0e6, poisson=0.1, density=1000.0, damping=100.0, damping_ratio=0.0)

@@ -6,7 +6,7 @@ island is put back. It makes the step again with twice as many substeps, and so 
 vibrations sharply; momentum and spin stay.
 """
 
-from taichi_soft.bodies.kernels.motion import particle_is_sound, remember_particle, restore_particle
+from taichi_soft.bodies.kernels.particles import particle_is_sound, remember_particle, restore_particle
 from taichi_soft.bodies.status import ABSENT, ACTIVE, FEELS_REACTION, FROZEN
 from taichi_soft.contact.kernels.candidates import forget_candidates
 from taichi_soft.contact.kernels.collide import forget_contacts

@@ -1,12 +1,12 @@
 """What comes after the last substep of a step, body by body."""
 
-from taichi_soft.bodies.kernels.motion import restore_particle
+from taichi_soft.bodies.kernels.particles import restore_particle
 from taichi_soft.bodies.kernels.plasticity import flow_body
 from taichi_soft.bodies.status import ACTIVE, FROZEN, PUSHED
 from taichi_soft.contact.kernels.candidates import forget_candidates
 from taichi_soft.contact.kernels.collide import forget_contacts
 from taichi_soft.control.kernels.drives import push_particles
-from taichi_soft.control.kernels.loads import forget_loads
+from taichi_soft.control.kernels.reactions import forget_loads
 from taichi_soft.core.runtime import ti
 from taichi_soft.core.types import Integrator
 from taichi_soft.elements.kernels.internal_forces import clear_forces

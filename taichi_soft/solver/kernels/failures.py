@@ -1,8 +1,8 @@
 """What broke a frozen body: its last step made again, element by element."""
 
 from taichi_soft.bodies.kernels.evaluate import accumulate_forces_one_by_one
-from taichi_soft.bodies.kernels.motion import restore_particle
-from taichi_soft.control.kernels.loads import forget_loads
+from taichi_soft.bodies.kernels.particles import restore_particle
+from taichi_soft.control.kernels.reactions import forget_loads
 from taichi_soft.core.runtime import ti
 from taichi_soft.elements.kernels.internal_forces import clear_forces
 from taichi_soft.solver.kernels.substep import advance_body

@@ -10,7 +10,7 @@ every barrier may wait for the operating system, which is why only very large bo
 A GPU has no such barrier: there each substep is a launch of its own.
 """
 
-from taichi_soft.bodies.kernels.motion import (
+from taichi_soft.bodies.kernels.particles import (
     gravity_on,
     particle_is_sound,
     remember_particle,

@@ -6,7 +6,7 @@ colliders, a particle that a collider stopped has the velocity of its surface al
 to come, until it would have to be pulled. Friction acts after the solve, and takes no more than the sliding.
 """
 
-from taichi_soft.bodies.kernels.motion import gravity_on
+from taichi_soft.bodies.kernels.particles import gravity_on
 from taichi_soft.contact.distances.distance import signed_distance
 from taichi_soft.contact.distances.sweep import TOUCHING
 from taichi_soft.contact.fields import NO_COLLIDER

@@ -5,7 +5,7 @@ that is too far a way for them to change evenly, the step is made in pieces. Par
 are held at its height within the solve, until it would have to pull them down.
 """
 
-from taichi_soft.bodies.kernels.motion import gravity_on
+from taichi_soft.bodies.kernels.particles import gravity_on
 from taichi_soft.bodies.status import FEELS_REACTION
 from taichi_soft.contact.distances.floor import resolve_floor
 from taichi_soft.control.kernels.grabs import add_grabs

@@ -4,7 +4,7 @@ One thread owns an island, so that what passes between its bodies has one order 
 that stays clear of all others is an island of its own.
 """
 
-from taichi_soft.bodies.kernels.motion import gravity_on
+from taichi_soft.bodies.kernels.particles import gravity_on
 from taichi_soft.bodies.status import ABSENT, ASLEEP
 from taichi_soft.contact.kernels.filters import may_touch
 from taichi_soft.control.joint_fields import MOST_JOINTS

@@ -3,7 +3,7 @@
 Between the two the island takes velocities away, in joints and in contact of bodies with each other.
 """
 
-from taichi_soft.bodies.kernels.motion import gravity_on
+from taichi_soft.bodies.kernels.particles import gravity_on
 from taichi_soft.core.constants import LANES, ROW_BITS
 from taichi_soft.core.math.tensors import widened
 from taichi_soft.core.runtime import ti

@@ -1,6 +1,6 @@
 """Motion of particles: from force to velocity to position, with the floor in the way."""
 
-from taichi_soft.bodies.kernels.motion import gravity_on
+from taichi_soft.bodies.kernels.particles import gravity_on
 from taichi_soft.contact.distances.floor import resolve_floor
 from taichi_soft.core.constants import LANES, ROW_BITS
 from taichi_soft.core.runtime import ti

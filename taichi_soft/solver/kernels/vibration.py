@@ -10,7 +10,7 @@ and before they move anything, leapfrog stays stable for each step for which it 
 which is leapfrog with the mass D^-1 >= 1 but for a damper that only takes energy.
 """
 
-from taichi_soft.bodies.kernels.motion import gravity_on
+from taichi_soft.bodies.kernels.particles import gravity_on
 from taichi_soft.bodies.status import FEELS_REACTION
 from taichi_soft.contact.distances.floor import resolve_floor
 from taichi_soft.core.constants import LANES, ROW_BITS

@@ -9,10 +9,10 @@ from numpy.typing import ArrayLike
 
 from taichi_soft.bodies.description import outer_vertices
 from taichi_soft.bodies.soft_body import SoftBody, context_of
-from taichi_soft.control.access import attempt, numbers, rouse, some_particles
 from taichi_soft.control.attachments import require_unattached
-from taichi_soft.control.jumps import jump_to
-from taichi_soft.control.kernels.placement import write_rigid_velocity
+from taichi_soft.control.change import attempt, numbers, rouse, some_particles
+from taichi_soft.control.kernels.rigid_motion import write_rigid_velocity
+from taichi_soft.control.rigid_transform import jump_to
 from taichi_soft.core.checks import as_flag, as_rotation, as_vector
 from taichi_soft.core.constants import POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.core.errors import OptionError

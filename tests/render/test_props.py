@@ -18,7 +18,7 @@ from taichi_soft import (
 )
 from taichi_soft.render import Camera, Renderer
 from taichi_soft.render.film import Actor, Stage, film
-from taichi_soft.render.scenery import Prop, Scenery
+from taichi_soft.render.props import Prop, Scenery
 
 
 def about_y(angle):

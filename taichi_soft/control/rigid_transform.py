@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.bodies.soft_body import SoftBody, context_of
-from taichi_soft.control.access import attempt, rouse
-from taichi_soft.control.kernels.placement import jump
+from taichi_soft.control.change import attempt, rouse
+from taichi_soft.control.kernels.rigid_motion import jump
 from taichi_soft.core.constants import POSITION_LIMIT
 from taichi_soft.core.errors import OptionError
 

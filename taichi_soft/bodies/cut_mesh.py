@@ -21,7 +21,7 @@ Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class CutMesh:
     """Some of the tetrahedra of an asset's mesh, and copies of its vertices."""
 
     vertices: Ints  # of the asset's mesh, that each vertex is or is a copy of, (n,)
@@ -46,7 +46,7 @@ class Part:
         return [len(self.vertices), len(self.tets), self.digest]
 
     @classmethod
-    def of_rows(cls, rows: NDArray[np.int32], n: int, m: int) -> Part:
+    def of_rows(cls, rows: NDArray[np.int32], n: int, m: int) -> CutMesh:
         """What has these `rows`."""
         vertices, order, tets, corners = np.split(rows, [n, 2 * n, 2 * n + m])
         return cls(vertices.astype(np.int64), order, tets.astype(np.int64), corners.reshape(m, 4))
@@ -83,6 +83,6 @@ class Part:
         return arrange_part(description, asset.arrays, self.vertices, self.tets, self.order)
 
 
-def name_of(part: Part | None) -> str:
+def name_of(part: CutMesh | None) -> str:
     """Its digest; "" for a whole mesh."""
     return "" if part is None else part.digest
