@@ -167,10 +167,9 @@ class BodyFields:
         fill(self.tet_rest_inverse, inverses)
         if self.capacity.plastic:
             fill(self.tet_original_inverse, inverses)
-        fill(self.tet_lame, _blocks(bodies, lambda b: b.lame, 2))
-        if self.capacity.anisotropic:
-            fill(self.tet_stiffness, _blocks(bodies, lambda b: b.stiffness, 21))
-        fill(self.tet_damping, _blocks(bodies, lambda b: b.tet_damping, 1))
+        constants = [self.tet_constants(body) for body in bodies]
+        for number, (field, rows) in enumerate(constants[0]):
+            fill(field, np.concatenate([blocks_of(each[number][1], rows.shape[1], 0) for each in constants]))
 
         edges = _laid_out(scene, "edges", lambda b: with_spare_rows(b.edge_vertices), "particles")
         fill(self.edge_vertices, edges)
@@ -215,6 +214,18 @@ class BodyFields:
         fill(self.block_model, np.repeat(models, [r.blocks[1] - r.blocks[0] for r in ranges]))
         self.loader.write()
 
+    def tet_constants(self, body: BodyArrays) -> list[tuple[Any, NDArray[np.float64]]]:
+        """Fields with constants of tetrahedra, and what one body has in each, (m, k).
+
+        Whatever a material is made of has its line here: to load a world, after `set_material`, after a cut.
+        """
+        found = [(self.tet_lame, body.lame), (self.tet_damping, body.tet_damping[:, None])]
+        if self.capacity.anisotropic:
+            found.append((self.tet_stiffness, body.stiffness))
+        if self.capacity.rings:
+            found.append((self.tet_expansion_modulus, body.expansion_modulus[:, None]))
+        return found
+
     def _load_bonds(self, scene: Scene) -> None:
         """What the pairwise laws know of their edges; zeros for the edges of other bodies."""
         fill, bodies = self.loader.fill, scene.bodies
@@ -236,7 +247,6 @@ class BodyFields:
         fill(self.ring_members, np.concatenate(members))
         fill(self.ring_weights, np.concatenate(weights))
         fill(self.tet_inverse_volume6, _blocks(bodies, lambda b: np.linalg.det(b.rest_inverse), 1))
-        fill(self.tet_expansion_modulus, _blocks(bodies, lambda b: b.expansion_modulus, 1))
         fill(self.edge_pressure, np.zeros(0))
 
     def _load_gather_lists(self, corners: NDArray[np.int64], edges: NDArray[np.int64], count: int) -> None:

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from taichi_soft.bodies.constants import write_tet_constants
 from taichi_soft.bodies.description import BodyDescription
 from taichi_soft.bodies.fields import BodyFields
 from taichi_soft.bodies.kernels.constants import write_fours, write_masses, write_numbers
-from taichi_soft.bodies.layout import BodyArrays, Ranges, blocks_of, rearrange
+from taichi_soft.bodies.layout import BodyArrays, Ranges, rearrange
 from taichi_soft.bodies.soft_body import SoftBody, context_of, record_of, redescribe
 from taichi_soft.control.change import change
-from taichi_soft.core.constants import LANES
 from taichi_soft.core.errors import MaterialError
 from taichi_soft.elements.laws import fit_model
 
@@ -47,23 +47,9 @@ def write_constants(state: BodyFields, body: SoftBody, description: BodyDescript
     write_numbers(state.body_sound_speed, body.index, speed)
     write_numbers(state.body_fading, body.index, fading)
     write_numbers(state.body_fading_interval, body.index, interval)
-    for field, rows in _tet_constants(state, arrays):
-        numbers = blocks_of(rows, rows.shape[1], 0).astype(np.float32)
-        write_numbers(field, place.blocks[0] * LANES * rows.shape[1], numbers)
+    write_tet_constants(state, place.blocks[0], arrays)
     if arrays.bonds is not None:
         _write_bonds(state, arrays, place)
-
-
-def _tet_constants(state: BodyFields, arrays: BodyArrays) -> list[tuple[Any, Any]]:
-    """Fields of blocks of tetrahedra, with the rows of one body, (m, k)."""
-    if len(arrays.tet_vertices) == 0:
-        return []
-    found = [(state.tet_lame, arrays.lame), (state.tet_damping, arrays.tet_damping[:, None])]
-    if state.capacity.anisotropic:
-        found.append((state.tet_stiffness, arrays.stiffness))
-    if arrays.bonds is not None:
-        found.append((state.tet_expansion_modulus, arrays.expansion_modulus[:, None]))
-    return found
 
 
 def _write_bonds(state: BodyFields, arrays: BodyArrays, place: Ranges) -> None:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from taichi_soft.bodies.constants import write_tet_constants
 from taichi_soft.bodies.cut_mesh import CutMesh
 from taichi_soft.bodies.description import BodyDescription
 from taichi_soft.bodies.fields import BodyFields, with_spare_rows
@@ -192,7 +193,7 @@ def _settle(context: Context, body: SoftBody, pieces: list[_Piece], slots: list[
         rows[:, 20:26] *= (masses / rows[:, 15])[:, None]  # pushes and reactions are shared like the mass
         rows[:, 15] = masses
         present = None if inverses is None else inverses[piece.tets][piece.arrays.tet_order]
-        _write(state, slot, piece.arrays, rows, ACTIVE, body.index, present)
+        _write(context, state, slot, piece.arrays, rows, ACTIVE, body.index, present)
     built.has_changed()
     fallen = tuple(context.take_in(context, body.asset) for _ in pieces[1:])
     vertices, tets = body.vertex_origins, body.tet_origins
@@ -219,11 +220,12 @@ def refill_slot(context: Context, state: BodyFields, slot: int, part: BodyArrays
     """Write the whole body of its asset, or a part of it, into a slot where another part was, at rest."""
     arrays = context.slots.assets[slot].arrays if part is None else part
     rows = np.zeros((len(arrays.mass), MOTION_WIDTH), dtype=np.float32)
-    _write(state, slot, arrays, rows, ABSENT, slot, None)
+    _write(context, state, slot, arrays, rows, ABSENT, slot, None)
     context.layout.bodies[slot] = arrays
 
 
 def _write(
+    context: Context,
     state: BodyFields,
     slot: int,
     arrays: BodyArrays,
@@ -246,15 +248,13 @@ def _write(
         blocks_of(arrays.tet_vertices, 4, 0),
         blocks_of(arrays.tet_edges, 6, 0),
         np.stack([present, first]),
-        _real_blocks(arrays.lame, 2),
-        _real_blocks(arrays.stiffness, 21) if state.capacity.anisotropic else np.zeros(1, dtype=np.float32),
-        _real_blocks(arrays.tet_damping, 1),
         with_spare_rows(arrays.edge_vertices),
         with_spare_rows(arrays.edge_damping).astype(np.float32),
         arrays.edge_blocks,
         arrays.triangles,
         arrays.outer,
     )
+    write_tet_constants(state, context.layout.ranges[slot].blocks[0], arrays)
 
 
 def _real_blocks(rows: NDArray[Any], width: int) -> NDArray[np.float32]:

@@ -51,9 +51,6 @@ def write_body(
     tet_vertices: ti.types.ndarray(dtype=ti.i32, ndim=1),
     tet_edges: ti.types.ndarray(dtype=ti.i32, ndim=1),
     rest_inverses: ti.types.ndarray(dtype=ti.f32, ndim=2),
-    lame: ti.types.ndarray(dtype=ti.f32, ndim=1),
-    stiffness: ti.types.ndarray(dtype=ti.f32, ndim=1),
-    tet_damping: ti.types.ndarray(dtype=ti.f32, ndim=1),
     edges: ti.types.ndarray(dtype=ti.i32, ndim=2),
     edge_damping: ti.types.ndarray(dtype=ti.f32, ndim=1),
     edge_blocks: ti.types.ndarray(dtype=ti.i32, ndim=2),
@@ -67,7 +64,7 @@ def write_body(
         motion: as `read_motion`, of each vertex in the caller's order.
         rest: positions of the particles at rest, in kernel order.
         particles: of each vertex.
-        tet_vertices, tet_edges, lame, stiffness, tet_damping: in blocks.
+        tet_vertices, tet_edges: in blocks.
         rest_inverses: in blocks; as they are, and as they first were.
         edges, edge_damping: with the spare rows.
     """
@@ -102,13 +99,6 @@ def write_body(
             state.tet_rest_inverse[b0 * 9 * LANES + i] = rest_inverses[0, i]
             if ti.static(state.capacity.plastic):
                 state.tet_original_inverse[b0 * 9 * LANES + i] = rest_inverses[1, i]
-        for i in range(lame.shape[0]):
-            state.tet_lame[b0 * 2 * LANES + i] = lame[i]
-        if ti.static(state.capacity.anisotropic):
-            for i in range(stiffness.shape[0]):
-                state.tet_stiffness[b0 * 21 * LANES + i] = stiffness[i]
-        for i in range(tet_damping.shape[0]):
-            state.tet_damping[b0 * LANES + i] = tet_damping[i]
         if ti.static(state.capacity.implicit):
             for i in range(tet_edges.shape[0]):
                 state.tet_edges[b0 * 6 * LANES + i] = e0 + tet_edges[i]
@@ -123,7 +113,7 @@ def write_body(
         for i in range(outer.shape[0]):
             state.outer_particle[o0 + i] = p0 + outer[i]
         state.body_particles[body] = ti.Vector([p0, p0 + particles.shape[0]])
-        state.body_blocks[body] = ti.Vector([b0, b0 + tet_damping.shape[0] // LANES])
+        state.body_blocks[body] = ti.Vector([b0, b0 + tet_vertices.shape[0] // (4 * LANES)])
         state.body_edges[body] = ti.Vector([e0, e0 + edges.shape[0] - LANES])
         state.body_edge_blocks[body] = ti.Vector([c0, c0 + edge_blocks.shape[0]])
         state.body_triangles[body] = ti.Vector([t0, t0 + triangles.shape[0]])
