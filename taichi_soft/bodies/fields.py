@@ -168,8 +168,8 @@ class BodyFields:
         if self.capacity.plastic:
             fill(self.tet_original_inverse, inverses)
         constants = [self.tet_constants(body) for body in bodies]
-        for number, (field, rows) in enumerate(constants[0]):
-            fill(field, np.concatenate([blocks_of(each[number][1], rows.shape[1], 0) for each in constants]))
+        for number, (field, own) in enumerate(constants[0]):
+            fill(field, np.concatenate([blocks_of(each[number][1], own.shape[1], 0) for each in constants]))
 
         edges = _laid_out(scene, "edges", lambda b: with_spare_rows(b.edge_vertices), "particles")
         fill(self.edge_vertices, edges)

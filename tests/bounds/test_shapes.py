@@ -53,8 +53,10 @@ def test_the_grid_of_a_mesh(name):
     ask(MeshShape(MESHES[name], cache=False))
 
 
-@pytest.mark.parametrize("make", [sliver_at_a_junction, random_tetrahedra, random_blocks])
-def test_grids_of_surfaces_with_slivers(make):
+@pytest.mark.parametrize(
+    ("make", "fit"), [(sliver_at_a_junction, 40), (random_tetrahedra, 6), (random_blocks, 40)]
+)
+def test_grids_of_surfaces_with_slivers(make, fit):
     """Also of thousands of times the size or none, with vertices on nodes; too thin ones may be refused."""
     init()
     taken = 0
@@ -70,7 +72,7 @@ def test_grids_of_surfaces_with_slivers(make):
             taken += 1
             if taken < 3:
                 ask(shape)
-    assert taken > 2
+    assert taken >= fit
 
 
 @pytest.mark.parametrize("size", [(2, 2), (2, 9), (31, 7)])

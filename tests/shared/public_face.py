@@ -160,6 +160,16 @@ def print_nothing(_):
     pass
 
 
+class NothingThereError(Exception):
+    """The game has none of what an argument names."""
+
+
+def one_of(values, rng):
+    if not len(values):
+        raise NothingThereError
+    return values[rng.integers(len(values))]
+
+
 class Kind(NamedTuple):
     """What one argument may be."""
 
@@ -266,7 +276,7 @@ NOT_BODIES = {
     "none": None, "number": 0, "text": "body", "class": World, "removed": Of(lambda g: g.dead_body),
     "of another world": Of(lambda g: g.foreign_body), "collider": Of(lambda g: g.collider),
 }  # fmt: skip
-BODY = Kind(lambda game, rng: game.world.bodies[rng.integers(len(game.world.bodies))], NOT_BODIES)
+BODY = Kind(lambda game, rng: one_of(game.world.bodies, rng), NOT_BODIES)
 BODIES = or_none(Kind(
     lambda game, rng: list(game.world.bodies)[: rng.integers(0, 3)],
     {"number": 1, "numbers": [0, 1], "one body": Of(lambda g: g.free), "removed": Of(lambda g: [g.dead_body]),
@@ -297,7 +307,7 @@ ASSET = Kind(
      "body": Of(lambda g: g.free)},
 )  # fmt: skip
 FRAME = Kind(
-    lambda game, rng: game.frames[rng.integers(len(game.frames))],
+    lambda game, rng: one_of(game.frames, rng),
     {"none": None, "number": 0, "text": "hand", "removed": Of(lambda g: g.dead_frame),
      "of another world": Of(lambda g: g.foreign_frame), "body": Of(lambda g: g.free)},
 )  # fmt: skip
@@ -556,7 +566,7 @@ CALLS: dict[str, dict[str, Call]] = {
     },
     "Rollback": {
         "save": NOTHING,
-        "rewind_to": Call({"step": Kind(lambda g, rng: g.rollback.steps[-1], NOT_COUNTS | {"never": 10**6})}, _is_not_kept),
+        "rewind_to": Call({"step": Kind(lambda g, rng: one_of(g.rollback.steps[-1:], rng), NOT_COUNTS | {"never": 10**6})}, _is_not_kept),
     },
 }  # fmt: skip
 

@@ -8,7 +8,18 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
-from public_face import CALLS, DEAD, DT, MAKERS, READABLE_WHEN_DEAD, READERS, SUBSTEPS, Game, Of
+from public_face import (
+    CALLS,
+    DEAD,
+    DT,
+    MAKERS,
+    READABLE_WHEN_DEAD,
+    READERS,
+    SUBSTEPS,
+    Game,
+    NothingThereError,
+    Of,
+)
 from reading import burst, leave, not_finite
 
 import engine_adapter
@@ -208,7 +219,7 @@ def perform(game, act):
     handle = handles[rng.integers(len(handles))]
     try:
         given_ = draw(game, handle, call, rng)
-    except (ValueError, IndexError):  # there is nothing of the kind that an argument names
+    except NothingThereError:
         return
     is_wrong_time = call.refused(game, handle, given_)
     before = None if is_wrong_time is False else world_as_it_is(game)
@@ -236,7 +247,7 @@ def misuse(game, act):
     name, label = bad[act.bad % len(bad)]
     try:
         given_ = draw(game, handle, call, rng)
-    except (ValueError, IndexError):
+    except NothingThereError:
         return
     given_[name] = found_in(call.takes[name].bad[label], game)
     told = refused(game, getattr(handle, method), **given_)
