@@ -22,8 +22,15 @@ from taichi_soft.bodies.soft_body import (
 from taichi_soft.control.change import change, named_particles, rows_of
 from taichi_soft.control.embedding import Places, places_at, places_on
 from taichi_soft.control.grab_patch import wave_speed
-from taichi_soft.control.joint_fields import ENDS, JOINT_ROWS, MOST_JOINTS
-from taichi_soft.control.kernels.joints import end_joint, forget_held, read_joint_impulse, write_joint
+from taichi_soft.control.kernels.joints import (
+    ENDS,
+    JOINT_ROWS,
+    MOST_JOINTS,
+    end_joint,
+    forget_held,
+    read_joint_impulse,
+    write_joint,
+)
 from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.core.handles import Handle, handles_of, recorded, serial_of
 from taichi_soft.core.serialisation import below, indices_below, require_below

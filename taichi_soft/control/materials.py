@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from taichi_soft.bodies.constants import write_tet_constants
 from taichi_soft.bodies.description import BodyDescription
 from taichi_soft.bodies.fields import BodyFields
 from taichi_soft.bodies.kernels.constants import write_fours, write_masses, write_numbers
 from taichi_soft.bodies.layout import BodyArrays, Ranges, rearrange
 from taichi_soft.bodies.soft_body import SoftBody, context_of, record_of, redescribe
+from taichi_soft.bodies.tet_constants import write_tet_constants
 from taichi_soft.control.change import change
 from taichi_soft.core.errors import MaterialError
 from taichi_soft.elements.laws import fit_model

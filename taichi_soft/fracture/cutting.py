@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.bodies.constants import write_tet_constants
 from taichi_soft.bodies.cut_mesh import CutMesh
 from taichi_soft.bodies.description import BodyDescription
 from taichi_soft.bodies.fields import BodyFields, with_spare_rows
@@ -21,6 +20,7 @@ from taichi_soft.bodies.kernels.plasticity import read_rest_inverses
 from taichi_soft.bodies.layout import BodyArrays, arrange_part, blocks_of
 from taichi_soft.bodies.soft_body import Context, SoftBody, bars_to_cut, context_of, record_of, redescribe
 from taichi_soft.bodies.status import ABSENT, ACTIVE
+from taichi_soft.bodies.tet_constants import write_tet_constants
 from taichi_soft.control.attachments import share_attachments
 from taichi_soft.core.checks import as_array, as_vector
 from taichi_soft.core.errors import OptionError, StateError

@@ -10,8 +10,8 @@ from taichi_soft.bodies.capacity import BodyCapacity
 from taichi_soft.bodies.fields import BodyFields
 from taichi_soft.bodies.layout import Scene
 from taichi_soft.contact.fields import ContactCapacity, ContactFields, SoftContactFields
-from taichi_soft.control.joint_fields import JointFields
 from taichi_soft.control.kernels.grabs import GrabFields
+from taichi_soft.control.kernels.joints import JointFields
 from taichi_soft.control.kernels.motors import MotorFields
 from taichi_soft.core.runtime import holds_fields, ti
 from taichi_soft.solver.step_fields import JobFields, Progress

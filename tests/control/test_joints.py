@@ -15,7 +15,7 @@ from taichi_soft import (
     box,
     rope,
 )
-from taichi_soft.control.joint_fields import JOINT_ROWS, MOST_JOINTS
+from taichi_soft.control.kernels.joints import JOINT_ROWS, MOST_JOINTS
 from taichi_soft.render.replay import replay
 
 G, DT = 9.81, 1 / 60

@@ -1,7 +1,7 @@
 """Fields as kernels take them."""
 
 from taichi_soft.contact.fields import ContactFields, SoftContactFields
-from taichi_soft.control.joint_fields import JointFields
+from taichi_soft.control.kernels.joints import JointFields
 from taichi_soft.solver.state import State
 from taichi_soft.solver.step_fields import JobFields
 

@@ -18,8 +18,8 @@ from taichi_soft import (
     World,
     box,
 )
-from taichi_soft.control.joint_fields import MOST_JOINTS
 from taichi_soft.control.kernels.grabs import MOST_GRABS
+from taichi_soft.control.kernels.joints import MOST_JOINTS
 from taichi_soft.control.kernels.motors import MOST_MOTORS
 
 

@@ -1,4 +1,6 @@
-"""Joints: particles of one body held at places in another, which go with a tetrahedron of that.
+"""Joints: their fields, and how they act.
+
+A joint holds particles of one body at places in another, which go with a tetrahedron of that.
 
 In every substep impulses make the velocity of each particle that of its place, row by row, some times over
 (Gauss-Seidel). That takes energy out and puts none in, whatever the masses; it has no stiffness that could be
@@ -11,11 +13,19 @@ The impulse on the place is shared out so that it acts where the particle is. So
 momentum stay, also where there is a gap.
 """
 
+from typing import Any
+
 from taichi_soft.bodies.kernels.particles import inv_mass_of, velocity
 from taichi_soft.bodies.status import FEELS_REACTION, JOINED
-from taichi_soft.control.joint_fields import ENDS, MOST_JOINTS
 from taichi_soft.core.math.finite import is_finite
-from taichi_soft.core.runtime import ti
+from taichi_soft.core.runtime import holds_fields, ti
+
+MOST_JOINTS, JOINT_ROWS = 64, 2048
+"""Joints of one world at a time, and particles that all of them hold together."""
+
+ENDS = 5
+"""Particles that a row names: the one that is held, and four of the other body that hold it. Their positions
+times their weights, 1 and four that add up to -1, add up to the gap between the particle and its place."""
 
 SWEEPS = 6
 """Times all rows of an island are gone through in a substep, an even number. Rows that share no particle need
@@ -28,6 +38,35 @@ by a coarse one, would shake what is light."""
 MOST_SHIFT = 0.5
 """Change of the weights, at most, that makes an impulse act where the particle is: what is farther off its
 place, over the size of the tetrahedron, is turned a little by the joint."""
+
+
+@holds_fields
+class JointFields:
+    """Joints, and the rows that they are made of, packed to the front in the order of joining.
+
+    End k of row r is at r ENDS + k.
+    """
+
+    def __init__(self, particles: int) -> None:
+        """Allocate; contents are zero."""
+        self.bodies = ti.Vector.field(2, ti.i32, MOST_JOINTS)  # numbers plus 1, 0 where there is no joint
+        self.rows = ti.Vector.field(2, ti.i32, MOST_JOINTS)  # range
+        self.draw_speed = ti.field(ti.f32, MOST_JOINTS)  # [m/s] at which a gap closes, at most
+        self.impulse = ti.Vector.field(3, ti.f32, MOST_JOINTS)  # on the first body in the last step [N s]
+        self.particle = ti.field(ti.i32, JOINT_ROWS * ENDS)
+        self.weight = ti.field(ti.f32, JOINT_ROWS * ENDS)
+        self.share = ti.field(ti.f32, JOINT_ROWS * ENDS)  # of an impulse, in the last substep
+        self.row_impulse = ti.Vector.field(3, ti.f32, JOINT_ROWS)  # on the first end, in the last substep
+        self.approach = ti.Vector.field(3, ti.f32, JOINT_ROWS)  # at which the gap is to change [m/s]
+        self.is_held = ti.field(ti.i32, particles)  # 1 where it is the first end of a row
+
+    def carried(self) -> list[list[Any]]:
+        """What the next step depends on: of each joint, of each row in use, of each of its ends."""
+        return [
+            [self.bodies, self.rows, self.draw_speed, self.impulse],
+            [self.row_impulse],
+            [self.particle, self.weight, self.share],
+        ]
 
 
 @ti.func

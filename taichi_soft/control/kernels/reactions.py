@@ -1,7 +1,7 @@
 """What frames, hands and other bodies feel of a body."""
 
-from taichi_soft.control.joint_fields import ENDS, MOST_JOINTS
 from taichi_soft.control.kernels.grabs import MOST_GRABS
+from taichi_soft.control.kernels.joints import ENDS, MOST_JOINTS
 from taichi_soft.core.runtime import ti
 
 
