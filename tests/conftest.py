@@ -12,6 +12,7 @@ from hypothesis import settings
 from xdist.scheduler import LoadFileScheduling
 
 from taichi_soft import Material, World, box, init, load_mesh
+from taichi_soft.bodies.capacity import LEAST
 
 settings.register_profile("same every time", derandomize=True, deadline=None)
 settings.load_profile("same every time")
@@ -106,6 +107,13 @@ def settle_imports():
     """What the imports made stays: the collector need not walk it after every test."""
     gc.collect()
     gc.freeze()
+
+
+@pytest.fixture(autouse=True, scope="session")
+def share_the_kernels():
+    """Worlds of all tests have room for as much: those of the same structure then take over each other's
+    fields, with the kernels that are compiled for them."""
+    LEAST.update(particles=2048, edges=8192, blocks=1024, triangles=4096, outer=2048, rings=2048, bodies=16)
 
 
 @pytest.fixture(autouse=True, scope="session")

@@ -10,6 +10,9 @@ ROOMS = "particles", "edges", "blocks", "triangles", "outer", "rings", "bodies"
 """The numbers of a `Capacity` that a world does not notice if they are larger than it needs."""
 
 
+LEAST = dict.fromkeys(ROOMS, 512) | {"edges": 2048, "blocks": 128, "bodies": 8}
+"""Room that the smallest world has."""
+
 Room = TypeVar("Room", bound="BodyCapacity")
 
 
@@ -46,14 +49,14 @@ class BodyCapacity:
         Args: others: by name, of what a subclass adds.
         """
         return cls(
-            _power_of_two(scene.particle_count + LANES, 512),
-            _power_of_two(scene.edge_count, 2048),
-            _power_of_two(scene.block_count, 128),
-            _power_of_two(len(scene.bodies), 8),
-            _power_of_two(scene.triangle_count + LANES, 512),
-            _power_of_two(scene.outer_count, 512),
+            _room(scene.particle_count + LANES, "particles"),
+            _room(scene.edge_count, "edges"),
+            _room(scene.block_count, "blocks"),
+            _room(len(scene.bodies), "bodies"),
+            _room(scene.triangle_count + LANES, "triangles"),
+            _room(scene.outer_count, "outer"),
             parallel,
-            _power_of_two(scene.ring_count, 512) if scene.has_bonds else 0,
+            _room(scene.ring_count, "rings") if scene.has_bonds else 0,
             implicit,
             any(body.stiffness.any() for body in scene.bodies),
             plastic,
@@ -72,5 +75,6 @@ class BodyCapacity:
         return replace(other, **widened) == self and (self.rings > 0) == (other.rings > 0)
 
 
-def _power_of_two(count: int, least: int) -> int:
-    return max(least, 1 << max(count - 1, 0).bit_length())
+def _room(count: int, name: str) -> int:
+    """A power of two."""
+    return max(LEAST[name], 1 << max(count - 1, 0).bit_length())

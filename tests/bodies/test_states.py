@@ -29,14 +29,14 @@ def room(world):
 def test_a_world_moves_the_same_in_the_fields_of_a_larger_one(monkeypatch):
     gc.collect()  # worlds of earlier tests give back their fields before, not into the empty list
     monkeypatch.setattr(fields, "_free", [])
-    large = fallen(10)
-    assert room(large) == 16
+    large = fallen(20)
+    assert room(large) == 32
     del large
     gc.collect()
     guest = fallen(2)
-    assert room(guest) == 16
+    assert room(guest) == 32
     host = fallen(2)
-    assert room(host) == 8
+    assert room(host) == 16
     assert guest.snapshot() == host.snapshot()
     name, data = host.state_hash(), host.snapshot()
     host.step(1 / 60, 4)
