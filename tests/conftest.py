@@ -51,6 +51,7 @@ LONGEST = (
 
 NUMPY = ("meshing/", "elements/materials/", "test_layers")
 KERNEL = ("elements/", "contact/distances/", "contact/shapes/", "core/math/")
+WORLD = ("elements/laws/test_energy_laws",)
 SOAK = (
     *("lab/", "demos/", "cli/"),
     *(
@@ -63,15 +64,26 @@ SOAK = (
     *("elements/laws/test_anisotropy", "control/test_materials", "bodies/test_particle_bodies"),
     *("bodies/test_stress", "bodies/test_states"),
     *("fracture/test_cutting", "fracture/test_cut_snapshots"),
+    # What starts processes, or compiles a world of its own, to look after something else than physics.
+    *("world/test_warm_up", "persistence/test_recorder", "solver/test_kernel_cache"),
+    *(f"core/test_threads.py::test_{name}" for name in ("a_", "worlds_that_compile")),
+    *(f"core/test_runtime.py::test_{name}" for name in ("starting_again", "the_threads_that_work")),
+    *(f"world/test_public_face.py::test_{name}" for name in ("every", "a_", "all_that", "nothing")),
+    *(f"persistence/test_snapshot.py::test_{name}" for name in ("rest_shapes", "other_integrators")),
+    *("control/test_joints.py::test_a_recording", "test_readme.py::test_the_level"),
+    # The same for laws that no game gets by default.
+    "solver/test_recovery.py::test_a_wrecked_body_finds_its_shape_again",
+    "solver/test_coarse_steps.py::test_what_one_may_ask_of_implicit_euler",
 )
-"""Tiers, by the beginnings of files. SOAK compiles or runs for more than some 40 s with an empty cache and is
-left to `make test-all`; NUMPY runs no kernel, KERNEL some by themselves; the rest are whole worlds."""
+"""Tiers, by the beginnings of files or tests. SOAK compiles or runs for more than some 40 s with an empty
+cache and is left to `make test-all`; NUMPY runs no kernel, KERNEL some by themselves; the rest, and
+what is named in WORLD, are whole worlds."""
 
 
 def tier_of(item):
     """The marker of a test."""
     file = item.nodeid.removeprefix("tests/")
-    tiers = {"soak": SOAK, "numpy": NUMPY, "kernel": KERNEL}
+    tiers = {"soak": SOAK, "numpy": NUMPY, "world": WORLD, "kernel": KERNEL}
     return next((name for name, starts in tiers.items() if file.startswith(starts)), "world")
 
 

@@ -150,7 +150,8 @@ def test_what_is_removed_drives_no_longer_and_the_others_go_on():
 @pytest.mark.parametrize("integrator", ["leapfrog", "implicit_euler"])
 @pytest.mark.parametrize("limit", [{"max_torque": 1e12}, {"max_force": 1e12}], ids=str)
 def test_no_torque_and_no_speed_breaks_a_body(integrator, limit):
-    world, body = made(WHEEL, JELLY, integrator=integrator, gravity=(0, 0, -9.81), floor=-0.7)
+    floor = None if integrator == "implicit_euler" else -0.7
+    world, body = made(WHEEL, JELLY, integrator=integrator, gravity=(0, 0, -9.81), floor=floor)
     motor = world.add_motor(body, HUB, (1, 0, 0), speed=2e4, **limit)
     run(world, 60)
     assert not body.is_frozen
