@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.bodies.soft_body import Context, RowsOf, Slice, SoftBody, context_of, record_of
+from taichi_soft.bodies.soft_body import RowsOf, SoftBody, context_of, record_of
 from taichi_soft.control.change import change, numbers, require_substeps, rows_of
 from taichi_soft.control.grab_patch import patch_round
 from taichi_soft.control.kernels.grabs import (
@@ -20,6 +20,7 @@ from taichi_soft.control.kernels.grabs import (
     write_grab,
     write_grab_target,
 )
+from taichi_soft.control.numbered import Numbered
 from taichi_soft.core.checks import as_array, as_count, as_number, as_vector
 from taichi_soft.core.constants import GRAVITY_EARTH
 from taichi_soft.core.errors import MeshError, OptionError, StateError
@@ -86,20 +87,11 @@ class Grab(Handle):
             raise StateError(f"this grab of body {self.body.index} was released: grab again")
 
 
-class Grabs(Slice):
+class Grabs(Numbered[Grab]):
     """All grabs of one world, by number."""
 
     name = "grabs"
-
-    def __init__(self, context: Context) -> None:
-        """None yet."""
-        super().__init__(context)
-        self.by_number: dict[int, Grab] = {}
-
-    @property
-    def handles(self) -> list[Grab]:
-        """Of all grabs there are, by number."""
-        return [grab for _, grab in sorted(self.by_number.items())]
+    most, way_out = MOST_GRABS, "release"
 
     def holds(self, body: SoftBody) -> bool:
         """Whether it is grabbed."""
@@ -196,9 +188,7 @@ def grab_at(
     if point is not None:
         target = as_vector(point, "point", "m")
     grabs = context_of(body).of(Grabs).by_number
-    free = next((slot for slot in range(MOST_GRABS) if slot not in grabs), None)
-    if free is None:
-        raise StateError(f"all {MOST_GRABS} grabs of this world are in use: release one first")
+    free = context_of(body).of(Grabs).free_number()
     patch = patch_round(record_of(body).description, corners, weights)
     spring = (mass * omega**2, 2 * mass * omega, 2 * HIGHEST_SPEED / omega)
     row = numbers(weights, target, *spring, min(strongest, patch.strength), strongest, 1 / mass)

@@ -10,9 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies.soft_body import (
-    Context,
     RowsOf,
-    Slice,
     SoftBody,
     context_of,
     lives_in,
@@ -31,6 +29,7 @@ from taichi_soft.control.kernels.joints import (
     read_joint_impulse,
     write_joint,
 )
+from taichi_soft.control.numbered import Numbered
 from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.core.handles import Handle, handles_of, recorded, serial_of
 from taichi_soft.core.serialisation import below, indices_below, require_below
@@ -96,20 +95,11 @@ class Joint(Handle):
             )
 
 
-class Joints(Slice):
+class Joints(Numbered[Joint]):
     """All joints of one world, by number."""
 
     name = "joints"
-
-    def __init__(self, context: Context) -> None:
-        """None yet."""
-        super().__init__(context)
-        self.by_number: dict[int, Joint] = {}
-
-    @property
-    def handles(self) -> list[Joint]:
-        """Of all joints there are, by number."""
-        return [joint for _, joint in sorted(self.by_number.items())]
+    most, way_out = MOST_JOINTS, "release"
 
     @property
     def rows_in_use(self) -> int:
@@ -215,9 +205,7 @@ class Joints(Slice):
                 "joints need bodies that are stepped together: make the world with soft_contact=True, or "
                 "with collider_room=1 where bodies shall not touch each other"
             )
-        free = next((number for number in range(MOST_JOINTS) if number not in self.by_number), None)
-        if free is None:
-            raise StateError(f"all {MOST_JOINTS} joints of this world are in use: release one first")
+        free = self.free_number()
         used = self.rows_in_use
         if used + len(vertices) > JOINT_ROWS:
             raise StateError(

@@ -12,9 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies.pose import best_fitting_pose
 from taichi_soft.bodies.soft_body import (
-    Context,
     RowsOf,
-    Slice,
     SoftBody,
     context_of,
     lives_in,
@@ -29,6 +27,7 @@ from taichi_soft.control.kernels.motors import (
     write_drive,
     write_motors,
 )
+from taichi_soft.control.numbered import Numbered
 from taichi_soft.core.checks import as_flag, as_number, as_vector
 from taichi_soft.core.constants import VELOCITY_LIMIT
 from taichi_soft.core.errors import OptionError, StateError
@@ -153,20 +152,11 @@ class Motor(Handle):
             raise StateError(f"this motor of body {self.body.index} was removed: add another")
 
 
-class Motors(Slice):
+class Motors(Numbered[Motor]):
     """All motors of one world, by number."""
 
     name = "motors"
-
-    def __init__(self, context: Context) -> None:
-        """None yet."""
-        super().__init__(context)
-        self.by_number: dict[int, Motor] = {}
-
-    @property
-    def handles(self) -> list[Motor]:
-        """Of all motors there are, by number."""
-        return [motor for _, motor in sorted(self.by_number.items())]
+    most, way_out = MOST_MOTORS, "remove"
 
     @property
     def rows_in_use(self) -> int:
@@ -307,9 +297,7 @@ class Motors(Slice):
             rest = body.mesh.vertices[vertices]
             _require_width(rest, masses)
             drive.axis = best_fitting_pose(rest, positions, masses).rotation.T @ drive.axis
-        free = next((number for number in range(MOST_MOTORS) if number not in self.by_number), None)
-        if free is None:
-            raise StateError(f"all {MOST_MOTORS} motors of this world are in use: remove one first")
+        free = self.free_number()
         used = self.rows_in_use
         if used + len(vertices) > MOTOR_ROWS:
             raise StateError(
