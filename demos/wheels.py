@@ -7,7 +7,7 @@ from engine_adapter import FixedStep
 from taichi_soft import Body, BoxShape, Contact, Material, Motor, World, cylinder
 from taichi_soft.cli import main
 from taichi_soft.render import PALETTE, Camera
-from taichi_soft.render.film import Actor, Stage
+from taichi_soft.render.film import Actor, Color, Paint, Stage
 
 STIFFNESSES = (6e4, 1.5e5, 5e5)  # Young's moduli, from the softest wheel to the firmest [Pa]
 RADIUS, WIDTH, HUB = 0.5, 0.7, 0.2  # of the wheels; radius of what the motor drives [m]
@@ -68,17 +68,17 @@ def stage() -> Stage:
     motors = [
         world.add_motor(body, hub, (0.0, 1.0, 0.0), speed=0.0, max_torque=TORQUE) for body in world.bodies
     ]
-    camera = Camera.framing((-0.4, -1.9, 0.0), (5.4, 1.9, 1.2), aspect=16 / 9, azimuth=-122, elevation=24)
     for body in world.bodies:  # or the tetrahedra, which all lean to one side, would steer
         world.add_motor(body, hub, (0.0, 0.0, 1.0), speed=0.0, max_torque=TORQUE, is_fixed=True)
     drivers = Drivers(motors)
+    camera = Camera.framing((-0.4, -1.9, 0.0), (5.4, 1.9, 1.2), aspect=16 / 9, azimuth=-122, elevation=24)
     title = "soft wheels with motors at their hubs"
     found = Stage(title, world, actors, camera, STEP, 7.0, act=drivers)
     found.caption = drivers.caption
     return found
 
 
-def _sectors(color):  # type: ignore[no-untyped-def]
+def _sectors(color: Color) -> Paint:
     """Every other twelfth of a wheel is paler, so that one sees it turn."""
 
     def paint(body: Body) -> NDArray[np.float32]:

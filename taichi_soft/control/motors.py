@@ -11,13 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies.pose import best_fitting_pose
-from taichi_soft.bodies.soft_body import (
-    RowsOf,
-    SoftBody,
-    context_of,
-    lives_in,
-    require_alive,
-)
+from taichi_soft.bodies.soft_body import RowsOf, SoftBody, context_of
 from taichi_soft.control.change import change, named_particles, numbers, require_substeps, rows_of
 from taichi_soft.control.kernels.motors import (
     MOST_MOTORS,
@@ -257,7 +251,7 @@ class Motors(Numbered[Motor]):
 
     def add(
         self,
-        body: Any,
+        body: SoftBody,
         particles: ArrayLike,
         axis: ArrayLike,
         speed: float,
@@ -266,11 +260,8 @@ class Motors(Numbered[Motor]):
         is_fixed: bool,
         point: ArrayLike | None,
     ) -> Motor:
-        """As `World.add_motor`."""
+        """As `World.add_motor`, of a body of this world."""
         context = self.context
-        if not isinstance(body, SoftBody) or not lives_in(body, context):
-            raise OptionError(f"body must be one that this world made, got {body!r}")
-        require_alive(body)
         vertices = named_particles(body, particles)
         if (max_torque is None) == (max_force is None):
             raise OptionError(

@@ -25,6 +25,7 @@ from taichi_soft.core.handles import recorded
 from taichi_soft.fracture.tearing import Tears
 from taichi_soft.queries import cast_ray
 from taichi_soft.world.body import Body
+from taichi_soft.world.spawning import require_own
 from taichi_soft.world.world_parts import WorldParts
 
 SLICES: tuple[type[Slice], ...] = (Colliders, Frames, Attachments, Grabs, Joints, Motors, Tears)
@@ -192,6 +193,7 @@ class WorldControl(WorldParts):
             without `is_fixed` for particles on a line; StateError before `build`, under schedule "flat", and
             where the world's 64 motors, or the 16,384 particles that they may drive, are all in use.
         """
+        require_own(self._context, body)
         motors = self._context.of(Motors)
         return motors.add(body, particles, axis, speed, max_torque, max_force, is_fixed, point)
 

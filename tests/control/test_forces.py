@@ -231,6 +231,7 @@ def test_what_acts_within_substeps_is_refused_under_the_flat_schedule(cube, jell
         lambda: body.set_linear_damping(1.0),
         lambda: world.set_wind((1, 0, 0)),
         lambda: world.set_force_field(lambda x, t: x),
+        lambda: world.add_motor(body, [0], (0, 0, 1), speed=1.0, max_force=1.0, is_fixed=True),
     ):
         with pytest.raises(StateError, match="schedule='per_body'"):
             call()
@@ -249,6 +250,7 @@ def test_nothing_acts_before_build(cube, jelly):
         lambda: body.set_linear_damping(1.0),
         lambda: world.set_wind((1, 0, 0)),
         lambda: world.set_force_field(lambda x, t: x),
+        lambda: world.add_motor(body, [0], (0, 0, 1), speed=1.0, max_force=1.0, is_fixed=True),
     ):
         with pytest.raises(StateError, match="not built"):
             call()

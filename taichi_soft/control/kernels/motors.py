@@ -19,7 +19,7 @@ import numpy as np
 
 from taichi_soft.bodies.kernels.particles import gravity_on
 from taichi_soft.core.field_loader import Loader
-from taichi_soft.core.math.svd import signed_svd
+from taichi_soft.core.math.svd import nearest_rotation
 from taichi_soft.core.runtime import holds_fields, ti
 from taichi_soft.core.types import Integrator
 
@@ -73,8 +73,8 @@ class MotorFields:
 def _axis_now(state: ti.template(), motor):
     """A point on the axis of a motor [m], and its direction.
 
-    One that turns with the particles does so by the rotation R that comes nearest to them: R = U V^T of
-    sum m x r^T = U S V^T, x now and r at rest from their centres.
+    One that turns with the particles does so by the rotation that is nearest to sum m x r^T, x now and r at
+    rest from their centres.
     """
     first = state.motors.particle[motor.first]
     x0, r0 = state.particle_position[first], state.rest_position[first]
@@ -93,8 +93,8 @@ def _axis_now(state: ti.template(), motor):
     if motor.is_fixed == 0:
         size = ti.max(size, 1e-30)
         a, b, c = a - rest.x / mass * now, b - rest.y / mass * now, c - rest.z / mass * now
-        U, _, V = signed_svd((a / size, b / size, c / size))
-        axis = U[0] * V[0].dot(motor.axis) + U[1] * V[1].dot(motor.axis) + U[2] * V[2].dot(motor.axis)
+        rows = nearest_rotation((a / size, b / size, c / size))
+        axis = ti.Vector([rows[0].dot(motor.axis), rows[1].dot(motor.axis), rows[2].dot(motor.axis)])
     return point, axis
 
 
@@ -153,7 +153,7 @@ def run_motors(state: ti.template(), program: ti.template(), body, h, kick, is_f
                 before = ti.select(is_first == 1, 0.0, state.motors.impulse[number])
                 state.motors.impulse[number] = before + _run_motor(state, program, motor, h, kick)
                 if ti.static(program.has_contact):
-                    if motor.speed != 0.0 and motor.limit > 0.0:
+                    if motor.speed != 0.0 and motor.limit > 0.0 and state.contact.calm[body] != 0.0:
                         state.contact.calm[body] = 0.0  # however slowly it begins to move
 
 

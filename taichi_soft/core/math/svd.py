@@ -1,4 +1,4 @@
-"""Singular values of a 3x3 matrix with the sign of its determinant."""
+"""Singular values of a 3x3 matrix with the sign of its determinant, and the rotation nearest to it."""
 
 from taichi_soft.core.math.eigen import symmetric_eigen
 from taichi_soft.core.math.tensors import inner_square, times
@@ -29,3 +29,18 @@ def signed_svd(F):
         u1 = u1 / ti.sqrt(u1.dot(u1))
     u2 = u0.cross(u1)
     return (u0, u1, u2), ti.Vector([s0, s1, u2.dot(times(F, V[2]))]), V
+
+
+@ti.func
+def nearest_rotation(F):
+    """U V^T of F = U S V^T: the rotation nearest to F, as rows.
+
+    Args:
+        F: as columns.
+    """
+    U, _, V = signed_svd(F)
+    return (
+        U[0].x * V[0] + U[1].x * V[1] + U[2].x * V[2],
+        U[0].y * V[0] + U[1].y * V[1] + U[2].y * V[2],
+        U[0].z * V[0] + U[1].z * V[1] + U[2].z * V[2],
+    )

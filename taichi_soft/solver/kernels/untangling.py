@@ -10,7 +10,7 @@ altogether all of it goes there, within a second.
 
 from taichi_soft.bodies.status import PLACED
 from taichi_soft.core.constants import LANES
-from taichi_soft.core.math.svd import signed_svd
+from taichi_soft.core.math.svd import nearest_rotation
 from taichi_soft.core.math.tensors import determinant
 from taichi_soft.core.math.tetrahedron import shape
 from taichi_soft.core.runtime import ti
@@ -86,13 +86,7 @@ def _best_fit(state: ti.template(), body):
         x, r = state.particle_position[p] - now, state.rest_position[p] - rest
         a, b, c = a + share * r.x * x, b + share * r.y * x, c + share * r.z * x
         size += share * r.dot(r)
-    U, _, V = signed_svd((a / size, b / size, c / size))
-    rows = (
-        U[0].x * V[0] + U[1].x * V[1] + U[2].x * V[2],
-        U[0].y * V[0] + U[1].y * V[1] + U[2].y * V[2],
-        U[0].z * V[0] + U[1].z * V[1] + U[2].z * V[2],
-    )
-    return rest, now, rows
+    return rest, now, nearest_rotation((a / size, b / size, c / size))
 
 
 @ti.func
