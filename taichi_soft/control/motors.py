@@ -214,7 +214,7 @@ class Motors(Numbered[Motor]):
         found = []
         for serial, number, slot, particles, turns, is_fixed, axis, point, speed, limit in entries:
             count = vertex_counts[below(slot, len(vertex_counts))]
-            if not count:
+            if not (count and self.context.built.program.has_contact):
                 raise ValueError("a motor drives no body")
             drive = Drive(
                 as_flag(turns, "turns"),
@@ -282,6 +282,11 @@ class Motors(Numbered[Motor]):
             )
         place = None if point is None else as_vector(point, "point", "m")
         require_substeps(context, "motors")
+        if not context.built.program.has_contact:
+            raise StateError(
+                "motors need a world that is made for contact: give it a collider, soft_contact=True, or "
+                "collider_room=1 where there is nothing to touch but the floor"
+            )
         positions, masses = body.positions()[vertices].astype(np.float64), body.masses[vertices]
         drive = Drive(turns, stays, direction / length, place, wanted, limit)
         if not stays:

@@ -15,7 +15,7 @@ EXPLICIT = ("leapfrog", "lazy_leapfrog")
 
 
 def made(mesh, material=RUBBER, *, pinned=(), position=(0.0, 0.0, 0.0), **options):
-    world = World(**{"floor": None, "gravity": (0.0, 0.0, 0.0), **options})
+    world = World(**{"floor": None, "gravity": (0.0, 0.0, 0.0), "collider_room": 1, **options})
     body = world.add_body(mesh, material, pinned=pinned, position=position)
     world.build()
     return world, body
@@ -108,7 +108,7 @@ def test_an_axis_goes_with_the_particles_or_stays_in_space():
 def test_a_driven_wheel_rolls():
     """Without slipping: as fast as its rim turns, from the axle to the floor."""
     stands = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-    world = World(friction=1.0)
+    world = World(friction=1.0, collider_room=1)
     body = world.add_body(WHEEL, RUBBER, position=(0, 0, 0.5), rotation=stands)
     world.build()
     motor = world.add_motor(body, HUB, (0, 1, 0), speed=4.0, max_torque=400.0)
@@ -188,7 +188,7 @@ def test_a_body_stays_awake_while_a_motor_starts_slowly():
 
 
 def test_a_motor_leaves_with_its_body_and_comes_back_with_a_snapshot():
-    world = World(floor=None, gravity=(0, 0, 0))
+    world = World(floor=None, gravity=(0, 0, 0), collider_room=1)
     asset = SoftBodyAsset(WHEEL, RUBBER)
     world.reserve(asset, 2)
     body = world.spawn(asset)
@@ -209,3 +209,10 @@ def test_a_motor_leaves_with_its_body_and_comes_back_with_a_snapshot():
     assert world.motors == [motor]
     run(world, 30)
     assert (world.state_hash(), motor.effort, motor.measured_speed) == told
+
+
+def test_a_world_without_contact_refuses_a_motor_and_names_the_way_out():
+    world, body = made(WHEEL, collider_room=0)
+    with pytest.raises(StateError, match="collider_room=1"):
+        world.add_motor(body, HUB, (0, 0, 1), speed=1.0, max_torque=1.0)
+    assert list(world.motors) == []

@@ -139,7 +139,7 @@ def _run_motor(state: ti.template(), program: ti.template(), motor, h, kick):
 
 @ti.func
 def run_motors(state: ti.template(), program: ti.template(), body, h, kick, is_first):
-    """Let the motors of one body act for a substep of `h` [s].
+    """Let the motors of one body act for a substep of `h` [s], in a world with contact.
 
     They look at the velocities after a kick of the forces [s]: so they feel what holds against them.
 
@@ -152,9 +152,8 @@ def run_motors(state: ti.template(), program: ti.template(), body, h, kick, is_f
                 motor = state.motors.motor[number]
                 before = ti.select(is_first == 1, 0.0, state.motors.impulse[number])
                 state.motors.impulse[number] = before + _run_motor(state, program, motor, h, kick)
-                if ti.static(program.has_contact):
-                    if motor.speed != 0.0 and motor.limit > 0.0 and state.contact.calm[body] != 0.0:
-                        state.contact.calm[body] = 0.0  # however slowly it begins to move
+                if motor.speed != 0.0 and motor.limit > 0.0 and state.contact.calm[body] != 0.0:
+                    state.contact.calm[body] = 0.0  # however slowly it begins to move
 
 
 @ti.kernel
