@@ -29,6 +29,7 @@ from taichi_soft.core.cores import (
     thread_ids,
 )
 from taichi_soft.core.errors import DeviceError, OptionError
+from taichi_soft.core.kernel_cache import await_lock
 from taichi_soft.core.subnormals import learn
 from taichi_soft.core.taichi_patches import (
     check_real_functions,
@@ -163,6 +164,7 @@ def _start(arch: str, reason: str, threads: int, cores: tuple[int, ...], is_left
     global _device, _process
     is_checked = os.environ.get(DEBUG) == "1"
     before, since = (thread_ids(), number_now()) if cores else (set(), 0)
+    await_lock(ti.lang.impl.default_cfg().offline_cache_file_path)
     with contextlib.redirect_stdout(io.StringIO()):  # Taichi announces itself
         ti.init(
             arch=getattr(ti, arch),
@@ -194,6 +196,7 @@ def _start(arch: str, reason: str, threads: int, cores: tuple[int, ...], is_left
 def _end() -> None:
     """Let Taichi keep the kernels that it compiled: its own parts may go in any order."""
     if os.getpid() == _process:
+        await_lock(ti.lang.impl.current_cfg().offline_cache_file_path)
         ti.reset()
 
 

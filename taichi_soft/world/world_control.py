@@ -190,9 +190,9 @@ class WorldControl(WorldParts):
                 axis pass through the centre of mass of the particles, wherever that goes.
         Returns: a handle to change the speed and the limit with, to read the effort, and to remove it.
         Raises: OptionError for bad numbers, vertices or a body of another world, for both limits or none, and
-            without `is_fixed` for particles on a line; StateError before `build`, in a world without a collider,
-            `collider_room` and `soft_contact`, and where the world's 64 motors, or the 16,384 particles that
-            they may drive, are all in use.
+            without `is_fixed` for particles on a line; StateError before `build`, in a world without a
+            collider, `collider_room` and `soft_contact`, and where the world's 64 motors, or the 16,384
+            particles that they may drive, are all in use.
         """
         require_own(self._context, body)
         motors = self._context.of(Motors)

@@ -16,7 +16,9 @@ from taichi_soft.lab.report import run
 def report(monkeypatch, capfd, measured, here, tmp_path):
     """Runs the command: exit code, output, errors."""
     monkeypatch.setattr(run, "EXPERIMENTS", {"squares": SQUARES, "nothing": NOTHING})
-    monkeypatch.setattr(import_module("taichi_soft.cli.report"), "init", lambda arch: Device("cpu", 1, "a test"))
+    monkeypatch.setattr(
+        import_module("taichi_soft.cli.report"), "init", lambda arch: Device("cpu", 1, "a test")
+    )
     monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "200")

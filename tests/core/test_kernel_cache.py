@@ -1,0 +1,60 @@
+"""Kernels that one process compiled are there for the next, whatever became of others meanwhile."""
+
+import os
+import subprocess
+import sys
+import time
+
+import pytest
+
+PROGRAM = """
+from taichi_soft import init
+from taichi_soft.core.runtime import ti
+
+init("cpu", threads=1)
+
+
+@ti.kernel
+def add(a: ti.i32, b: ti.i32) -> ti.i32:
+    return a + b
+
+
+assert add(2, 3) == 5
+"""
+
+
+@pytest.fixture
+def run(tmp_path):
+    """Runs a program with a kernel. Returns the files of kernels that are kept then."""
+    program = tmp_path / "program.py"
+    program.write_text(PROGRAM)
+    folder = tmp_path / "kernels"
+
+    def run_program():
+        environment = {**os.environ, "TI_OFFLINE_CACHE_FILE_PATH": str(folder)}
+        subprocess.run([sys.executable, str(program)], check=True, env=environment, timeout=120)
+        return {path.name: path.stat().st_mtime_ns for path in folder.glob("*.tic")}
+
+    return run_program, folder
+
+
+def test_a_lock_left_by_a_killed_process_does_not_keep_kernels_from_being_kept(run):
+    run_program, folder = run
+    folder.mkdir()
+    lock = folder / "ticache.lock"
+    lock.touch()
+    hour_ago = time.time() - 3600
+    os.utime(lock, (hour_ago, hour_ago))
+    kept = run_program()
+    assert len(kept) > 0
+    assert not lock.exists()
+
+
+def test_a_lock_that_another_process_holds_is_waited_for(run):
+    run_program, folder = run
+    folder.mkdir()
+    lock = folder / "ticache.lock"
+    lock.touch()
+    code = f"import pathlib, time; time.sleep(6); pathlib.Path({str(lock)!r}).unlink()"
+    with subprocess.Popen([sys.executable, "-c", code]):  # for longer than a program runs that does not wait
+        assert len(run_program()) > 0
