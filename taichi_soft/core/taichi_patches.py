@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import os
+import sys
 import textwrap
 import threading
 import types
@@ -35,6 +36,18 @@ __all__ = [
 ti.lang.kernel_impl.Kernel.ast_builder = lambda _: ti.lang.impl.get_runtime().compiling_callable.ast_builder()
 
 
+def _is_in_class(level_of_class_stackframe: int) -> bool:
+    """Whether a function is defined in a class. Taichi 1.7 reads the source around each for that: two thirds
+    of the time of our import."""
+    try:
+        return "__qualname__" in sys._getframe(level_of_class_stackframe).f_locals
+    except ValueError:  # there is nothing around a script
+        return False
+
+
+ti.lang.kernel_impl._inside_class = _is_in_class
+
+
 def _remember(look_up: Callable[[Any], Any]) -> Callable[[Any], Any]:
     """`look_up`, which asks once about each object, for as long as the object lives."""
     known: weakref.WeakKeyDictionary[Any, Any] = weakref.WeakKeyDictionary()
@@ -48,17 +61,25 @@ def _remember(look_up: Callable[[Any], Any]) -> Callable[[Any], Any]:
 
 
 def remember_sources() -> None:
-    """Wherever a `ti.func` is called, Taichi 1.7 reads its source again, and wraps the line of every name and
-    operator in it for messages of errors: a third of a first step whose kernels are in the cache. The answers
-    are always the same, so they are kept."""
-    kernels, nodes = ti.lang.kernel_impl, ti.lang.ast.ast_transformer_utils
+    """Wherever a `ti.func` is called, Taichi 1.7 reads its source again. For messages of errors it writes
+    down where each name and operator in it stands, and wraps the lines. Here sources are read once, and
+    messages have the first line as it is."""
+    kernels = ti.lang.kernel_impl
     kernels.getsourcefile = _remember(kernels.getsourcefile)
     kernels.getsourcelines = _remember(kernels.getsourcelines)
     kernels.textwrap = types.SimpleNamespace(
         fill=functools.cache(textwrap.fill), dedent=functools.cache(textwrap.dedent)
     )
-    wrapper = types.SimpleNamespace(wrap=functools.cache(nodes.TextWrapper(width=80).wrap))
-    nodes.TextWrapper = lambda width: wrapper
+    ti.lang.ast.ast_transformer_utils.ASTTransformerContext.get_pos_info = _place_of
+
+
+def _place_of(context: Any, node: Any) -> str:
+    """Where something stands in a source: file, function, its first line, and a mark below that."""
+    number, line = node.lineno + context.lineno_offset, context.src[node.lineno - 1].rstrip()
+    start = context.indent + node.col_offset
+    end = context.indent + node.end_col_offset if node.end_lineno == node.lineno else len(line)
+    mark = " " * start + "^" * (end - start)
+    return f'File "{context.file}", line {number}, in {context.func.func.__name__}:\n{line}\n{mark}\n'
 
 
 def let_threads_in(lay_out_now: Callable[[Callable[[bool], None], bool], None]) -> None:
