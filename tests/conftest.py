@@ -4,12 +4,13 @@ import gc
 import os
 import signal
 import sys
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import settings
-from xdist.scheduler import LoadFileScheduling
+from xdist.scheduler import LoadScopeScheduling
 
 from taichi_soft import Material, World, box, init, load_mesh
 from taichi_soft.bodies.capacity import LEAST
@@ -24,31 +25,15 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     # A shell that runs the tests behind `&` has them ignore Ctrl-C, and the processes that they start too.
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
-TOGETHER = (
-    *("tests/lab/experiments/", "tests/solver/integrators/", "tests/elements/laws/", "tests/demos/"),
-    *("tests/fracture/test_cut", "tests/control/"),
-)
-"""Files that begin alike share most of their kernels, which one worker compiles for all of them; experiments
-share what they measure, too."""
-
-RANDOM_GAMES = (
-    *("solver/test_threads", "persistence/test_snapshot"),
-    *("persistence/test_recorder", "persistence/test_rollback"),
-)
-"""Files with the same game: the same again."""
-
-LONGEST = (
-    *("solver/test_threads", "cli/test_cli", "contact/test_implicit_contact", "control/test_joints"),
-    *("solver/test_plasticity", "world/test_bodies", "contact/test_colliders", "bodies/test_states"),
-    *(
-        "bodies/test_particle_bodies",
-        "lab/profiling/test_profiling",
-        "lab/drop_test/test_drops",
-        "test_readme",
-    ),
-)
-"""Files that take longest where nothing is compiled yet. They begin first, so that no worker ends alone."""
-
+SECONDS = {
+    **{"contact/": (290, 100), "control/": (440, 50), "events/": (75, 0), "persistence/": (95, 40)},
+    **{"core/": (100, 30), "world/": (150, 250), "bodies/": (5, 130), "lab/": (0, 660), "cli/": (0, 160)},
+    **{"demos/": (0, 270), "solver/": (330, 900), "elements/": (130, 60), "fracture/": (85, 80)},
+    **{"engine_adapter/": (87, 0), "render/": (85, 0), "test_readme": (30, 15), "": (30, 0)},
+}
+"""What tests take whose files begin so, those of `make test` and the soaks, with an empty kernel cache and
+two workers: to give both as much. Neighbours have worlds of the same kinds, which are compiled once in each
+worker."""
 
 NUMPY = ("meshing/", "elements/materials/", "test_layers")
 KERNEL = ("elements/", "contact/distances/", "contact/shapes/", "core/math/")
@@ -78,6 +63,11 @@ cache and is left to `make test-all`; NUMPY runs no kernel, KERNEL some by thems
 what is named in WORLD, are whole worlds."""
 
 
+def is_soak(nodeid):
+    """Whether a test is left to `make test-all`."""
+    return nodeid.removeprefix("tests/").startswith(SOAK)
+
+
 def tier_of(item):
     """The marker of a test."""
     file = item.nodeid.removeprefix("tests/")
@@ -85,31 +75,52 @@ def tier_of(item):
     return next((name for name, starts in tiers.items() if file.startswith(starts)), "world")
 
 
-class ByKernels(LoadFileScheduling):
-    """Whole files to one worker, and those that share their kernels to the same one."""
-
-    def _split_scope(self, nodeid):
-        file = super()._split_scope(nodeid)
-        if file in {f"tests/{name}.py" for name in RANDOM_GAMES}:
-            return "random games"
-        return next((start for start in TOGETHER if file.startswith(start)), file)
-
-
-@pytest.hookimpl(optionalhook=True)
-def pytest_xdist_make_scheduler(config, log):
-    return ByKernels(config, log) if config.getvalue("dist") == "loadfile" else None
+def folder_of(nodeid):
+    """The entry of `SECONDS` that a test belongs to."""
+    return next(start for start in SECONDS if nodeid.removeprefix("tests/").startswith(start))
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
+    order = list(SECONDS)
+    items.sort(key=lambda item: order.index(folder_of(item.nodeid)))
     for item in items:
         item.add_marker(tier_of(item))
-    first = [*TOGETHER, *(f"tests/{name}.py" for name in LONGEST)]
 
-    def place(item):
-        return next((n for n, start in enumerate(first) if item.nodeid.startswith(start)), len(first))
 
-    items.sort(key=place)
+class Shares(LoadScopeScheduling):
+    """The tests in their order, cut into one share for each worker, between files.
+
+    Taichi's cache on disk finds a kernel only where as many fields were made before it as when it was kept.
+    So a worker has to run the same files in the same order every time.
+    """
+
+    share_of_file = None
+
+    def _split_scope(self, nodeid):
+        if self.share_of_file is None:
+            self.share_of_file = self._cut()
+        return self.share_of_file[nodeid.split("::")[0]]
+
+    def _cut(self):
+        seconds = self._seconds_of_files()
+        share, before, most = {}, 0.0, sum(seconds.values()) / self.numnodes
+        for file, its in seconds.items():
+            share[file] = f"share {min(int((before + its / 2) / most), self.numnodes - 1)}"
+            before += its
+        return share
+
+    def _seconds_of_files(self):
+        tiers = [(folder_of(nodeid), is_soak(nodeid)) for nodeid in self.collection]
+        counts, seconds = Counter(tiers), Counter()
+        for nodeid, (folder, is_long) in zip(self.collection, tiers, strict=True):
+            seconds[nodeid.split("::")[0]] += SECONDS[folder][is_long] / counts[folder, is_long] + 0.01
+        return seconds
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    return Shares(config, log) if config.getvalue("dist") == "loadscope" else None
 
 
 @pytest.fixture(autouse=True, scope="session")
@@ -127,6 +138,7 @@ def share_the_kernels():
     if os.environ.get(DEBUG) == "1":
         return
     LEAST.update(particles=2048, edges=8192, blocks=1024, triangles=4096, outer=2048, rings=2048, bodies=16)
+    LEAST.update(colliders=32, samples=32768)
 
 
 @pytest.fixture(autouse=True, scope="session")

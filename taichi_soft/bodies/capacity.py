@@ -10,8 +10,8 @@ ROOMS = "particles", "edges", "blocks", "triangles", "outer", "rings", "bodies"
 """The numbers of a `Capacity` that a world does not notice if they are larger than it needs."""
 
 
-LEAST = dict.fromkeys(ROOMS, 512) | {"edges": 2048, "blocks": 128, "bodies": 8}
-"""Room that the smallest world has."""
+LEAST = dict.fromkeys(ROOMS, 512) | {"edges": 2048, "blocks": 128, "bodies": 8, "colliders": 8, "samples": 0}
+"""Room that the smallest world has; the last two where there is contact."""
 
 Room = TypeVar("Room", bound="BodyCapacity")
 

@@ -499,7 +499,7 @@ def test_a_body_comes_to_rest_on_every_kind_of_collider(bowl):
         (HeightFieldShape(slope, 1.0), {"position": (0, 0, -0.8)}, BLOCK, 0.4),
         (bowl, {}, sphere(0.4, 2), -0.4),
     ]
-    world = room(collider_room=20)  # and so the capacity of the world with a fence of capsules
+    world = room(collider_room=20)
     damped = Material(5e5, 0.3, 1000.0, 600.0)
     for number, (shape, options, mesh, height) in enumerate(grounds):
         world.add_collider(shape, **options, **alone(number))
@@ -543,14 +543,14 @@ REFUSED = {
 
 def test_grounds_come_and_go_while_the_world_runs():
     """What lies on one stays there, whatever comes and goes beside it, as long as `sample_room` lasts."""
-    world = room(collider_room=5, sample_room=1024)
+    world = room(collider_room=5, sample_room=4 * 64 * 128)
     bodies = [world.add_body(BLOCK, FIRM, position=(x, 0, 0.27)) for x in (0.0, 20.0)]
     world.build()
-    grounds = [HeightFieldShape(np.full((16, 16), 0.1 * i), 0.5) for i in range(3)]
+    grounds = [HeightFieldShape(np.full((64, 128), 0.1 * i), 0.1) for i in range(3)]
     first = world.add_collider(grounds[0])
     second = world.add_collider(grounds[1], position=(20, 0, -0.1))
     others = [world.add_collider(grounds[2], position=(0, 0, -9)) for _ in range(2)]
-    with pytest.raises(StateError, match=r"256 samples.* room for 0: .*sample_room") as refusal:
+    with pytest.raises(StateError, match=r"8,192 samples.* room for 0: .*sample_room") as refusal:
         world.add_collider(grounds[2])
     assert len(str(refusal.value)) < 300
     run(world, 0.5)
@@ -574,19 +574,23 @@ def test_grounds_come_and_go_while_the_world_runs():
     lows = [body.positions()[:, 2].min() for body in bodies]
     np.testing.assert_allclose(lows, [0.0, 0.0], atol=2e-3)
     assert first.impulse[2] < 0
-    assert repr(grounds[1]) == "HeightFieldShape(16 x 16 nodes, spacing=0.5, heights from 0.1 to 0.1 m)"
+    assert repr(grounds[1]) == "HeightFieldShape(64 x 128 nodes, spacing=0.1, heights from 0.1 to 0.1 m)"
+
+
+MOST = 32
+"""Colliders of a world, which makes room for a power of two."""
 
 
 def full_world():
-    """A body that slides on a moving box; eight colliders, for which there is room, and one removed."""
-    world = room(collider_room=7)
+    """A body that slides on a moving box; as many colliders as there is room for, and one removed."""
+    world = room(collider_room=MOST - 1)
     moving = world.add_collider(BoxShape((9, 9, 1)), position=(0, 0, -0.5))
     world.add_body(BLOCK, FIRM, position=(0, 0, 0.26))
     world.build()
     moving.set_velocity((0.5, 0.2, 0.1), (0, 0, 0.3))
     world.removed = world.add_collider(PlaneShape(), mask=0)
     world.removed.remove()
-    for _ in range(7):
+    for _ in range(MOST - 1):
         world.add_collider(PlaneShape(), mask=0)
     return world, moving
 
@@ -604,7 +608,7 @@ def test_a_refused_call_changes_nothing():
         ends.append(
             (world.bodies[0].positions(), world.bodies[0].velocities(), moving.position, moving.rotation)
         )
-        assert len(world.colliders) == 8
+        assert len(world.colliders) == MOST
         del world, moving
     for one, other in zip(*ends, strict=True):
         np.testing.assert_array_equal(one, other)
