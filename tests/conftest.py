@@ -26,16 +26,30 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 SECONDS = {
-    **{"contact/": (160, 100), "solver/test_sleep": (15, 0), "solver/test_islands": (15, 0)},
-    **{"solver/test_repeated_steps": (5, 0), "render/test_props": (5, 0), "control/": (200, 50)},
-    **{"events/": (32, 0), "persistence/": (60, 40), "core/": (70, 30), "world/": (90, 250)},
-    **{"bodies/": (3, 130), "lab/": (0, 660), "cli/": (0, 160), "demos/": (0, 270), "solver/": (130, 900)},
-    **{"elements/": (100, 60), "fracture/": (40, 80), "engine_adapter/": (6, 0), "render/": (20, 0)},
-    **{"test_readme": (10, 15), "": (25, 0)},
+    "contact/": (160, 100),
+    "solver/test_sleep": (15, 0),
+    "solver/test_islands": (15, 0),
+    "solver/test_repeated_steps": (5, 0),
+    "render/test_props": (5, 0),
+    "control/": (200, 50),
+    "events/": (32, 0),
+    "persistence/": (60, 40),
+    "core/": (70, 30),
+    "world/": (90, 250),
+    "bodies/": (3, 130),
+    "lab/": (0, 660),
+    "cli/": (0, 160),
+    "demos/": (0, 270),
+    "solver/": (130, 900),
+    "elements/": (100, 60),
+    "fracture/": (40, 80),
+    "engine_adapter/": (6, 0),
+    "render/": (20, 0),
+    "test_readme": (10, 15),
+    "": (25, 0),
 }
-"""What tests take whose files begin so, those of `make test` and the soaks, with an empty kernel cache and
-two workers: to give both as much. Neighbours have worlds of the same kinds, which are compiled once in each
-worker."""
+"""What the tests of files that begin so take, those of `make test` and the soaks, with an empty kernel cache.
+Neighbours have worlds of the same kinds, which each worker compiles once."""
 
 NUMPY = ("meshing/", "elements/materials/", "test_layers")
 KERNEL = ("elements/", "contact/distances/", "contact/shapes/", "core/math/")
