@@ -49,14 +49,14 @@ class BodyCapacity:
         Args: others: by name, of what a subclass adds.
         """
         return cls(
-            _room(scene.particle_count + LANES, "particles"),
-            _room(scene.edge_count, "edges"),
-            _room(scene.block_count, "blocks"),
-            _room(len(scene.bodies), "bodies"),
-            _room(scene.triangle_count + LANES, "triangles"),
-            _room(scene.outer_count, "outer"),
+            room_for(scene.particle_count + LANES, "particles"),
+            room_for(scene.edge_count, "edges"),
+            room_for(scene.block_count, "blocks"),
+            room_for(len(scene.bodies), "bodies"),
+            room_for(scene.triangle_count + LANES, "triangles"),
+            room_for(scene.outer_count, "outer"),
             parallel,
-            _room(scene.ring_count, "rings") if scene.has_bonds else 0,
+            room_for(scene.ring_count, "rings") if scene.has_bonds else 0,
             implicit,
             any(body.stiffness.any() for body in scene.bodies),
             plastic,
@@ -75,6 +75,6 @@ class BodyCapacity:
         return replace(other, **widened) == self and (self.rings > 0) == (other.rings > 0)
 
 
-def _room(count: int, name: str) -> int:
+def room_for(count: int, name: str) -> int:
     """A power of two."""
     return max(LEAST[name], 1 << max(count - 1, 0).bit_length())

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taichi_soft.bodies.capacity import LEAST
+from taichi_soft.bodies.capacity import LEAST, room_for
 from taichi_soft.bodies.soft_body import Context, RowsOf, Slice, SoftBody
 from taichi_soft.contact.collider import Collider, ColliderRow, rebind, row_of
 from taichi_soft.contact.collider_entries import entry_of, read_row
@@ -150,8 +150,8 @@ class Colliders(Slice):
         count = len(self._rows) + room
         samples = sum(len(row.shape.samples) for row in self._rows) + sample_room
         return ContactCapacity(
-            max(LEAST["colliders"], 1 << max(count - 1, 0).bit_length()),
-            max(LEAST["samples"], max(1024, 1 << (samples - 1).bit_length()) if samples else 0),
+            room_for(count, "colliders"),
+            room_for(max(samples, 1024), "samples") if samples else LEAST["samples"],
             soft,
         )
 

@@ -11,7 +11,7 @@ import time
 from pathlib import Path
 
 LONGEST_HELD = 30.0
-"""Of a lock that somebody still holds [s]: writing hundreds of kernels takes a second or two."""
+"""Of a lock that somebody still holds [s], also where clocks differ."""
 
 LOCK = "ticache.lock"
 
@@ -24,6 +24,6 @@ def await_lock(default: str) -> None:
     """
     lock = Path(os.environ.get("TI_OFFLINE_CACHE_FILE_PATH") or default) / LOCK
     with contextlib.suppress(OSError):  # it is gone, or not ours to remove
-        while time.time() - lock.stat().st_mtime < LONGEST_HELD:
+        while abs(time.time() - lock.stat().st_mtime) < LONGEST_HELD:
             time.sleep(0.02)
         lock.unlink()

@@ -37,8 +37,8 @@ ti.lang.kernel_impl.Kernel.ast_builder = lambda _: ti.lang.impl.get_runtime().co
 
 
 def _is_in_class(level_of_class_stackframe: int) -> bool:
-    """Whether a function is defined in a class. Taichi 1.7 reads the source around each for that: two thirds
-    of the time of our import."""
+    """Whether a function is defined in a class. Taichi 1.7 reads the source around each for that: 0.4 s of
+    0.7 s of our import."""
     try:
         return "__qualname__" in sys._getframe(level_of_class_stackframe).f_locals
     except ValueError:  # there is nothing around a script

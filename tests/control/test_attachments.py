@@ -25,7 +25,7 @@ def about_z(angle):
 def made():
     worlds = {}
     for kind in KINDS:
-        world = World(integrator=kind, floor=-1e3)  # far away, but with the kernels of tests beside this
+        world = World(integrator=kind, floor=-1e3)  # far below: other tests here have its kernels
         body = world.add_body(box(cells=(2, 2, 2)), Material(1e5, 0.2, 1000.0, 200.0), law="virial")
         world.build()
         worlds[kind] = world, body

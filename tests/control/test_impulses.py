@@ -13,11 +13,8 @@ def make(schedule, **options):
     """A soft cube that is deformed and turning, a ball beside it, no gravity."""
     integrator = "implicit_euler" if schedule == "implicit" else "leapfrog"
     world = World(
-        **{
-            "gravity": (0, 0, 0),
-            "floor": -1e3,
-            **options,
-        },  # far away, but with the kernels of tests beside this
+        # The floor is far below: other tests here have its kernels.
+        **{"gravity": (0, 0, 0), "floor": -1e3, **options},
         integrator=integrator,
         schedule="per_body" if schedule == "implicit" else schedule,
     )

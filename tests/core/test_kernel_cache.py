@@ -33,7 +33,7 @@ def run(tmp_path):
     def run_program():
         environment = {**os.environ, "TI_OFFLINE_CACHE_FILE_PATH": str(folder)}
         subprocess.run([sys.executable, str(program)], check=True, env=environment, timeout=120)
-        return {path.name: path.stat().st_mtime_ns for path in folder.glob("*.tic")}
+        return list(folder.glob("*.tic"))
 
     return run_program, folder
 
@@ -45,8 +45,7 @@ def test_a_lock_left_by_a_killed_process_does_not_keep_kernels_from_being_kept(r
     lock.touch()
     hour_ago = time.time() - 3600
     os.utime(lock, (hour_ago, hour_ago))
-    kept = run_program()
-    assert len(kept) > 0
+    assert len(run_program()) > 0
     assert not lock.exists()
 
 
