@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from taichi_soft.bodies.fields import BodyFields
-from taichi_soft.bodies.kernels.constants import write_numbers
+from taichi_soft.bodies.kernels.constant_rows import write_numbers
 from taichi_soft.bodies.layout import BodyArrays, blocks_of
 from taichi_soft.core.constants import LANES
 

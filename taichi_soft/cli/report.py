@@ -48,8 +48,8 @@ def report(
     and points that failed are computed again; without that folder everything is.
     """
     from taichi_soft.lab.experiments import Effort
-    from taichi_soft.lab.report.extra import require_extra
     from taichi_soft.lab.report.machine import machine_facts
+    from taichi_soft.lab.report.required_packages import require_extra
     from taichi_soft.lab.report.run import choose_experiments, require_writable, run_experiments
 
     chosen = choose_experiments(names or [])

@@ -9,7 +9,7 @@ import numpy as np
 
 from taichi_soft.bodies.description import BodyDescription
 from taichi_soft.bodies.fields import BodyFields
-from taichi_soft.bodies.kernels.constants import write_fours, write_masses, write_numbers
+from taichi_soft.bodies.kernels.constant_rows import write_fours, write_masses, write_numbers
 from taichi_soft.bodies.layout import BodyArrays, Ranges, rearrange
 from taichi_soft.bodies.soft_body import SoftBody, context_of, record_of, redescribe
 from taichi_soft.bodies.tet_constants import write_tet_constants

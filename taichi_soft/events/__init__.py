@@ -1,5 +1,6 @@
 """What has happened in the steps since it was last asked."""
 
+from taichi_soft.events.event_state import Known, Memory
 from taichi_soft.events.kinds import (
     ContactBegan,
     ContactEnded,
@@ -12,7 +13,6 @@ from taichi_soft.events.kinds import (
     Woke,
 )
 from taichi_soft.events.log import EventLog, Listener
-from taichi_soft.events.memory import Known, Memory
 from taichi_soft.events.observer import Observer
 
 __all__ = [

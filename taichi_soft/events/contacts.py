@@ -12,8 +12,8 @@ from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.contact.collider import Collider
 from taichi_soft.contact.kernels.touches import OF_BODY
 from taichi_soft.core.handles import serial_of
+from taichi_soft.events.event_state import CONTACT_WIDTH, Known
 from taichi_soft.events.kinds import ContactBegan, ContactEnded
-from taichi_soft.events.memory import CONTACT_WIDTH, Known
 
 CONTACT_PAUSE = 0.05
 """Time without an impulse [s] after which a contact has ended. Single vertices of what rests, rolls or slides

@@ -8,8 +8,8 @@ from typing import Any
 
 from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.core.errors import OptionError, StateError
+from taichi_soft.events.event_state import Known, Memory
 from taichi_soft.events.kinds import CONTACT_KINDS, KINDS, Event, Torn
-from taichi_soft.events.memory import Known, Memory
 from taichi_soft.events.observer import Observer
 
 MOST_EVENTS = 10_000

@@ -16,6 +16,7 @@ from taichi_soft.contact.colliders import Colliders
 from taichi_soft.contact.fields import PAIR_ROWS
 from taichi_soft.contact.kernels.touches import OF_BODY, read_touches
 from taichi_soft.events.contacts import Contacts, Key
+from taichi_soft.events.event_state import Known, Memory
 from taichi_soft.events.kinds import (
     CONTACT_KINDS,
     SLEEP_KINDS,
@@ -27,7 +28,6 @@ from taichi_soft.events.kinds import (
     TearCandidates,
     Woke,
 )
-from taichi_soft.events.memory import Known, Memory
 from taichi_soft.events.stress import StressWatches
 
 

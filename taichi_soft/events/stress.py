@@ -15,8 +15,8 @@ from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.core.constants import LANES
 from taichi_soft.core.handles import serial_of
 from taichi_soft.elements.kernels.stress import NO_LIMIT, read_stress
+from taichi_soft.events.event_state import Known, WatchNote
 from taichi_soft.events.kinds import Event, StressExceeded, TearCandidates
-from taichi_soft.events.memory import Known, WatchNote
 
 BACK_BELOW = 0.9
 """Part of a threshold below which a tetrahedron has to come before it can come over it again: or one that

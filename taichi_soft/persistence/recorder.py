@@ -24,7 +24,7 @@ from taichi_soft.core.errors import SnapshotError
 from taichi_soft.core.handles import Handle, serial_of
 from taichi_soft.core.serialisation import as_plain, digest_of, from_json, plain_of, to_json
 from taichi_soft.persistence.snapshot import state_hash, take_snapshot
-from taichi_soft.persistence.structure import asset_digest
+from taichi_soft.persistence.world_structure import asset_digest
 from taichi_soft.solver.context import WorldContext
 
 MARK, VERSION = b"TSOFTREC", 1

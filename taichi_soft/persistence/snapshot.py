@@ -25,7 +25,7 @@ from taichi_soft.core.errors import SnapshotError, StateError
 from taichi_soft.core.runtime import ti
 from taichi_soft.core.serialisation import from_json, to_json
 from taichi_soft.events import Known, Memory
-from taichi_soft.persistence.kernels.words import (
+from taichi_soft.persistence.kernels.packing import (
     BODY,
     PARTICLE,
     SHAPE,
@@ -38,7 +38,7 @@ from taichi_soft.persistence.kernels.words import (
 )
 from taichi_soft.persistence.manifest import Manifest, read_manifest, read_parts, write_manifest
 from taichi_soft.persistence.restoring import put_back
-from taichi_soft.persistence.structure import require_structure, structure_of
+from taichi_soft.persistence.world_structure import require_structure, structure_of
 from taichi_soft.solver.context import WorldContext
 from taichi_soft.solver.state import State
 

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from taichi_soft.bodies.fields import BodyFields
 from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.core.checks import as_vector
-from taichi_soft.queries.asking import as_chosen, as_reach, just_beyond, read_answer
 from taichi_soft.queries.kernels import find_closest
+from taichi_soft.queries.query import as_chosen, as_reach, just_beyond, read_answer
 
 Floats = NDArray[np.float64]
 

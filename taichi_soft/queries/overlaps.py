@@ -14,8 +14,8 @@ from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.core.checks import as_number, as_rotation, as_vector
 from taichi_soft.core.constants import POSITION_LIMIT
 from taichi_soft.core.errors import OptionError
-from taichi_soft.queries.asking import as_chosen
 from taichi_soft.queries.kernels import find_overlaps
+from taichi_soft.queries.query import as_chosen
 
 
 @dataclass(frozen=True, eq=False)

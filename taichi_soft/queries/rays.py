@@ -13,8 +13,8 @@ from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.core.checks import as_array, as_vector
 from taichi_soft.core.constants import POSITION_LIMIT
 from taichi_soft.core.errors import OptionError
-from taichi_soft.queries.asking import as_chosen, as_reach, just_beyond, read_answer
 from taichi_soft.queries.kernels import find_hits
+from taichi_soft.queries.query import as_chosen, as_reach, just_beyond, read_answer
 
 Floats = NDArray[np.float64]
 

@@ -3,7 +3,7 @@
 """Sky and floor, painted once per camera, and how light becomes a pixel."""
 
 from taichi_soft.core.runtime import ti
-from taichi_soft.render import look
+from taichi_soft.render import lighting
 from taichi_soft.render.kernel_types import image, picture, reals, rows, vec3
 
 
@@ -66,7 +66,9 @@ def paint_backdrop(
         ray = pixel_ray(rays, x + 0.5, y + 0.5)
         up = ray.z / ray.norm()
         # Brightest at the horizon, deeper upwards; below it, where the floor has faded, it stays bright.
-        color = look.HORIZON + (look.ZENITH - look.HORIZON) * smoothstep(-0.05, 0.9, ti.sqrt(ti.max(up, 0.0)))
+        color = lighting.HORIZON + (lighting.ZENITH - lighting.HORIZON) * smoothstep(
+            -0.05, 0.9, ti.sqrt(ti.max(up, 0.0))
+        )
         share = 0.0
         depth = (floor - eye.z) / ti.select(ti.abs(ray.z) > 1e-9, ray.z, 1e-9)
         if has_floor != 0 and depth > 0.0 and eye.z > floor:
@@ -80,7 +82,7 @@ def paint_backdrop(
             wide_x = (ti.abs(at_right.x - at.x) + ti.abs(at_below.x - at.x)) / check + 1e-4
             wide_y = (ti.abs(at_right.y - at.y) + ti.abs(at_below.y - at.y)) / check + 1e-4
             wave = check_average(at.x / check, wide_x) * check_average(at.y / check, wide_y)
-            tiles = look.FLOOR_DARK + (look.FLOOR_BRIGHT - look.FLOOR_DARK) * (0.5 + 0.5 * wave)
+            tiles = lighting.FLOOR_DARK + (lighting.FLOOR_BRIGHT - lighting.FLOOR_DARK) * (0.5 + 0.5 * wave)
             far = ti.sqrt((at.x - target.x) ** 2 + (at.y - target.y) ** 2) / fade
             share = ti.exp(-2.5 * far * far) * smoothstep(0.0, 0.06, -steep / ray.norm())
             color = color + (tiles - color) * share

@@ -3,7 +3,7 @@
 """Light on a point: shadows from their maps, and what a body sends to the eye."""
 
 from taichi_soft.core.runtime import ti
-from taichi_soft.render import look
+from taichi_soft.render import lighting
 
 COARSE = 4.0
 """Texels of the sun's map along one of the maps of far shadows."""
@@ -100,9 +100,9 @@ def floor_shadow(
         # The higher what casts the shadow, the softer its edge.
         height = bilinear(far_height, far_shadow.shape[0], u, v) / far
         near = bilinear(near_shadow, near_shadow.shape[0], place.x, place.y)
-        lack = (near + (far - near) * ti.min(height, 1.0)) * (1.0 - look.SHADED)
+        lack = (near + (far - near) * ti.min(height, 1.0)) * (1.0 - lighting.SHADED)
     spot = light_place(contact_place, at)
-    dark = bilinear(contact, contact.shape[0], spot.x, spot.y) * (1.0 - look.CONTACT)
+    dark = bilinear(contact, contact.shape[0], spot.x, spot.y) * (1.0 - lighting.CONTACT)
     return 1.0 - (1.0 - lack) * (1.0 - dark)
 
 
@@ -117,8 +117,8 @@ def glow(color, normal, view, sun, lit, above):
         above: 0 on the floor to 1 well above it, where its underside sees light.
     """
     upward = 0.5 + 0.5 * normal.z
-    below = look.FLOOR_LIGHT * (0.35 + 0.65 * above)
-    over = look.SKY_LIGHT * (0.7 + 0.3 * above)
+    below = lighting.FLOOR_LIGHT * (0.35 + 0.65 * above)
+    over = lighting.SKY_LIGHT * (0.7 + 0.3 * above)
     around = below + (over - below) * upward
     facing = ti.max(normal.dot(sun), 0.0) * lit
     half = sun + view
@@ -127,7 +127,9 @@ def glow(color, normal, view, sun, lit, above):
         shine *= shine
     grazing = 1.0 - ti.max(normal.dot(view), 0.0)
     grazing = grazing * grazing
-    rim = look.RIM * grazing * grazing * upward
+    rim = lighting.RIM * grazing * grazing * upward
     return (
-        color * (look.SUN * facing + around) + look.HORIZON * rim + look.SUN * (look.HIGHLIGHT * shine * lit)
+        color * (lighting.SUN * facing + around)
+        + lighting.HORIZON * rim
+        + lighting.SUN * (lighting.HIGHLIGHT * shine * lit)
     )

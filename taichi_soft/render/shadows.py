@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from taichi_soft.render.camera import Camera
 from taichi_soft.render.light_funcs import COARSE as COARSE_TEXELS
 from taichi_soft.render.light_funcs import FAINTEST
-from taichi_soft.render.look import SUN_AZIMUTH, SUN_ELEVATION
+from taichi_soft.render.lighting import SUN_AZIMUTH, SUN_ELEVATION
 from taichi_soft.render.raster import CENTER, Raster
 from taichi_soft.render.scene import SceneArrays
 

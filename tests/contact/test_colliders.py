@@ -617,9 +617,7 @@ def test_a_refused_call_changes_nothing():
 def test_a_body_that_breaks_among_colliders_tells_where():
     world = World(collider_room=1, retries=0)
     world.add_collider(BoxShape((1.0, 1.0, 1.0)), position=(0.9, 0.0, 0.5))
-    body = world.add_body(
-        box(cells=(2, 2, 2)), Material(1e5, 0.2, 1000.0, 20.0), position=(0, 0, 1.6), law="virial"
-    )
+    body = world.add_body(box(cells=(2, 2, 2)), Material(1e5, 0.2, 1000.0, 20.0), position=(0, 0, 1.6))
     world.build()
     fast = 9e3 * np.where(np.arange(body.vertex_count) % 2, 1, -1)
     body.set_motion(body.positions(), fast[:, None] * np.ones(3))

@@ -18,7 +18,6 @@ def cushion():
         box((1, 1, 0.5), (4, 4, 2)),
         Material(3e5, 0.3, 1000.0, 60.0, damping_ratio=0.0),
         position=(0, 0, 0.26),
-        law="virial",
     )
     world.build()
     for _ in range(60):

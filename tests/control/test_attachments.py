@@ -26,7 +26,7 @@ def made():
     worlds = {}
     for kind in KINDS:
         world = World(integrator=kind, floor=-1e3)  # far below: other tests here have its kernels
-        body = world.add_body(box(cells=(2, 2, 2)), Material(1e5, 0.2, 1000.0, 200.0), law="virial")
+        body = world.add_body(box(cells=(2, 2, 2)), Material(1e5, 0.2, 1000.0, 200.0))
         world.build()
         worlds[kind] = world, body
     return worlds
@@ -82,7 +82,7 @@ def test_two_attachments_share_the_load(plain):
     np.testing.assert_allclose(first.force + second.force, [0, 0, -WEIGHT], atol=1e-3 * WEIGHT)
     assert first.force[2] == pytest.approx(second.force[2], rel=0.02)
     assert first.force[0] == pytest.approx(-second.force[0], abs=2)
-    assert abs(first.force[0]) > 20  # it sags between them
+    assert abs(first.force[0]) > 8  # it sags between them
 
 
 def test_what_the_frame_gives_is_what_the_body_gets(loose):
@@ -225,8 +225,8 @@ def test_a_jump_leaves_no_trace_on_how_a_hanging_body_swings(plain):
 
 
 def test_what_is_dragged_too_far_in_a_step_without_retries_is_told_the_way_out():
-    world = World(floor=None, retries=0)
-    body = world.add_body(box(cells=(2, 2, 2)), Material(1e5, 0.2, 1000.0, 200.0), law="virial")
+    world = World(floor=-1e3, retries=0)
+    body = world.add_body(box(cells=(2, 2, 2)), Material(1e5, 0.2, 1000.0, 200.0))
     world.build()
     frame = world.add_frame()
     body.attach(SIDE, frame)

@@ -5,7 +5,17 @@ import warnings
 import numpy as np
 import pytest
 
-from taichi_soft import Material, OptionError, SlowStepWarning, TetMesh, World, box, sphere
+from taichi_soft import (
+    Material,
+    OptionError,
+    SlowStepWarning,
+    SpringMaterial,
+    TetMesh,
+    World,
+    box,
+    rope,
+    sphere,
+)
 
 BALL = sphere(0.5, 3)
 JELLY = Material(1e5, 0.3, 1000.0)
@@ -114,7 +124,7 @@ def test_a_world_that_may_not_take_so_many_refuses_and_stays_as_it_was():
 
 def test_what_one_may_ask_of_implicit_euler_is_bounded_too():
     world = World(max_substeps=2, integrator="implicit_euler")
-    world.add_body(sphere(0.5, 2), Material(1e9, 0.3, 1000.0), position=(0, 0, 3))
+    world.add_body(rope(1.0, 8, 1.0), SpringMaterial(1e9), law="springs", position=(0, 0, 3))
     world.build()
     world.step(1 / 60)
     with pytest.raises(OptionError, match="substeps is 3; the world takes max_substeps=2"):

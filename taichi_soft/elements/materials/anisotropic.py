@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from taichi_soft.core.checks import as_array, as_rotation, as_rotations, to_array
 from taichi_soft.core.errors import MaterialError
 from taichi_soft.core.serialisation import serialised
-from taichi_soft.elements.materials.constants import (
+from taichi_soft.elements.materials.element_values import (
     LARGEST,
     POSITIVE,
     Array,

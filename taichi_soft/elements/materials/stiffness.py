@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from taichi_soft.core.checks import as_array, as_number, as_positive, as_rotation
 from taichi_soft.core.errors import MaterialError
 from taichi_soft.core.serialisation import serialised
-from taichi_soft.elements.materials.constants import LARGEST, SMALLEST
+from taichi_soft.elements.materials.element_values import LARGEST, SMALLEST
 
 Floats = NDArray[np.float64]
 

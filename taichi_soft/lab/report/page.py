@@ -11,10 +11,10 @@ from typing import Any
 from taichi_soft.core.errors import OptionError
 from taichi_soft.lab.experiments import CLAIMS, Effort
 from taichi_soft.lab.report.exhibits import Exhibit, Sheet, exhibit_of, file_name, require_distinct, sheet_of
-from taichi_soft.lab.report.extra import require_extra
 from taichi_soft.lab.report.judgements import OF_MANY, Concluded, Judgement, counts, judge
 from taichi_soft.lab.report.law_checks import law_table
 from taichi_soft.lab.report.markdown import Literal, escaped
+from taichi_soft.lab.report.required_packages import require_extra
 from taichi_soft.lab.report.spreadsheets import csv_of_judgements
 from taichi_soft.lab.report.wording import duration, point_line
 

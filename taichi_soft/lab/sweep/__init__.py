@@ -5,8 +5,8 @@ A point is plain data, and so is what a function measures there. Nothing here kn
 
 from taichi_soft.lab.sweep.cluster import cluster_workers
 from taichi_soft.lab.sweep.progress import show_progress
+from taichi_soft.lab.sweep.provenance import origin
 from taichi_soft.lab.sweep.schedule import TIME_LIMIT, compute_all
-from taichi_soft.lab.sweep.sources import origin
 from taichi_soft.lab.sweep.store import Store
 from taichi_soft.lab.sweep.task import Outcome, Task, Worker
 from taichi_soft.lab.sweep.workers import local_workers

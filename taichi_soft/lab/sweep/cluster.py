@@ -12,7 +12,7 @@ from contextlib import contextmanager, suppress
 from typing import Any
 
 from taichi_soft.core.errors import SweepError
-from taichi_soft.lab.sweep.sources import origin
+from taichi_soft.lab.sweep.provenance import origin
 from taichi_soft.lab.sweep.task import Outcome, Task, Worker, compute
 
 TIMEOUTS = TimeoutError, futures.TimeoutError, asyncio.TimeoutError

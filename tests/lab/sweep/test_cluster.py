@@ -40,7 +40,7 @@ def test_the_same_numbers_come_from_a_cluster_and_from_this_machine(cluster):
 
 
 def test_workers_with_other_code_are_refused(cluster, monkeypatch):
-    monkeypatch.setattr("taichi_soft.lab.sweep.sources._digest", lambda: "another")
+    monkeypatch.setattr("taichi_soft.lab.sweep.provenance._digest", lambda: "another")
     with (
         pytest.raises(SweepError, match="install the same versions"),
         cluster_workers(cluster.scheduler_address),
