@@ -226,7 +226,7 @@ def test_a_jump_leaves_no_trace_on_how_a_hanging_body_swings(plain):
 
 def test_what_is_dragged_too_far_in_a_step_without_retries_is_told_the_way_out():
     world = World(floor=-1e3, retries=0)
-    body = world.add_body(box(cells=(2, 2, 2)), Material(1e5, 0.2, 1000.0, 200.0))
+    body = world.add_body(box(cells=(2, 2, 2)), Material(1e5, 0.2, 1000.0, 200.0), law="virial")
     world.build()
     frame = world.add_frame()
     body.attach(SIDE, frame)
