@@ -20,7 +20,9 @@ def kernels_after_a_run(folder):
     return {path.name for path in folder.rglob("*.tic")}
 
 
-def test_a_second_process_compiles_nothing_again(tmp_path):
+def test_later_processes_compile_nothing_again(tmp_path):
+    """Three of them: a key may depend on addresses, and be the same by chance."""
     first = kernels_after_a_run(tmp_path)
     assert len(first) > 5
-    assert kernels_after_a_run(tmp_path) == first
+    for _ in range(3):
+        assert kernels_after_a_run(tmp_path) == first
