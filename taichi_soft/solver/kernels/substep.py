@@ -118,11 +118,7 @@ def _do_contact_phase(state: ti.template(), island: ti.i32, body: ti.i32, job: J
 
 @ti.real_func
 def _do_other_phase(state: ti.template(), program: ti.template(), island: ti.i32, body: ti.i32, job: Job):
-    """All but the kick; by itself, because Taichi takes more than twice as long for twice the code.
-
-    A real function calls one other at most. Where it calls two, the key of Taichi's cache holds them in the
-    order of their addresses, and most processes compile the kernel anew.
-    """
+    """All but the kick; by itself, because Taichi takes more than twice as long for twice the code."""
     if job.phase == BEGIN:
         begin_body(state, program, body)
     if job.phase == END:
