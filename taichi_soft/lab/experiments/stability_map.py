@@ -58,14 +58,8 @@ def points(effort: Effort) -> list[Point]:
 
 
 def _drop(mesh: str, nu: float, flips: str, moduli: int, seconds: float) -> Point:
-    return {
-        "part": "drop",
-        "mesh": mesh,
-        "poisson": nu,
-        "flips": flips,
-        "moduli": moduli,
-        "seconds": seconds,
-    }
+    drop = {"part": "drop", "mesh": mesh, "poisson": nu}
+    return {**drop, "flips": flips, "moduli": moduli, "seconds": seconds}
 
 
 def sphere_mesh(name: str) -> TetMesh:
