@@ -3,8 +3,8 @@
 A snapshot has four parts. The *structure* is what the world was built of; a world of another structure
 refuses it. The *manifest* is what Python knows: time, who lives in which slot, and what each slice enters
 (colliders, frames, joints ...). The *words* are what the fields hold, bit by bit (see
-`persistence.kernels.words`), and what cuts have left of meshes (see `bodies.cut_mesh`). The last part is what
-events go on with (see `events.memory`).
+`persistence.kernels.packing`), and what cuts have left of meshes (see `bodies.cut_mesh`). The last part is
+what events go on with (see `events.event_state`).
 """
 
 from __future__ import annotations

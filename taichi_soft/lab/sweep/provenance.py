@@ -8,7 +8,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 _PACKAGE = Path(__file__).parents[2]
-_ABOVE = {"report", "cli.py", "__main__.py"}
+_ABOVE = {"report", "cli", "__main__.py"}
 """What lies above the experiments: it shows results, and cannot change them."""
 
 
@@ -17,11 +17,15 @@ def origin(arch: str) -> dict[str, str]:
     return {"sources": _digest(), "taichi": version("taichi"), "numpy": version("numpy"), "arch": arch}
 
 
+def sources() -> list[str]:
+    """Files of the package that results depend on, as paths within it."""
+    names = [path.relative_to(_PACKAGE) for path in sorted(_PACKAGE.rglob("*.py"))]
+    return [name.as_posix() for name in names if _ABOVE.isdisjoint(name.parts[:2])]
+
+
 @cache
 def _digest() -> str:
     found = hashlib.sha256()
-    for path in sorted(_PACKAGE.rglob("*.py")):
-        name = path.relative_to(_PACKAGE)
-        if _ABOVE.isdisjoint(name.parts[:2]):
-            found.update(name.as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
+    for name in sources():
+        found.update(name.encode() + b"\0" + (_PACKAGE / name).read_bytes() + b"\0")
     return found.hexdigest()

@@ -1,1 +1,1 @@
-"""State as words: all that passes from one step to the next, copied and hashed."""
+"""All that passes from one step to the next, packed into one array, and hashed."""

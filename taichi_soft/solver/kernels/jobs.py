@@ -7,7 +7,7 @@
     kick a, kick b                        kick e                         kick c, kick d
     waits for c and d
     solves joints of a b c d              joints, contact, drift of e    looks for bodies
-    calls for GAPS
+    calls for NARROW_PHASE
     gaps of a, b                          next substep                   gaps of c, d
     solves contacts of a b c d            ...                            looks for bodies
     calls for DRIFT

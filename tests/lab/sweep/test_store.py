@@ -7,6 +7,7 @@ import pytest
 
 from taichi_soft.core.errors import SweepError
 from taichi_soft.lab.sweep import Outcome, Store, origin
+from taichi_soft.lab.sweep.provenance import sources
 
 MINE = {"sources": "0123456789abcdef", "arch": "cpu"}
 OTHER = {"sources": "fedcba9876543210", "arch": "cpu"}
@@ -118,6 +119,12 @@ def test_what_cannot_be_written_is_refused_in_one_line(tmp_path):
     (tmp_path / "data").write_text("a file")
     with pytest.raises(SweepError, match="choose another folder"):
         Store(tmp_path / "data" / "bars.jsonl", MINE)
+
+
+def test_results_depend_on_all_but_what_shows_them():
+    folders = {name.split("/")[0] for name in sources()}
+    assert folders >= {"bodies", "contact", "lab", "solver", "world"}
+    assert not any(name.startswith(("cli/", "lab/report/")) for name in sources())
 
 
 def test_the_origin_is_of_the_sources_and_of_the_device(tmp_path):

@@ -5,7 +5,7 @@ by side, as the forces of tetrahedra in `elastic`. What then becomes of them goe
 """
 
 from taichi_soft.contact.fields import NO_CONTACT, SLOTS
-from taichi_soft.contact.kernels.soft_contact import note_levers
+from taichi_soft.contact.kernels.contact_solver import note_levers
 from taichi_soft.core.constants import LANES, ROW_BITS
 from taichi_soft.core.math.finite import is_finite
 from taichi_soft.core.math.triangle import closest_point_on_triangle

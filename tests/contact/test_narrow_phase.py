@@ -5,7 +5,7 @@ import pytest
 
 from taichi_soft import Contact, Material, TetMesh, World, box
 from taichi_soft.contact.fields import SLOTS
-from taichi_soft.contact.kernels.soft_gaps import find_gaps
+from taichi_soft.contact.kernels.narrow_phase import find_gaps
 from taichi_soft.core.runtime import ti
 from taichi_soft.solver.state import State
 
