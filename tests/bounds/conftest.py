@@ -7,7 +7,8 @@ import os
 
 import pytest
 
-from taichi_soft.bodies import fields as state
+from taichi_soft.bodies import capacity
+from taichi_soft.contact import colliders
 from taichi_soft.core.runtime import DEBUG
 
 if os.environ.get(DEBUG) != "1":
@@ -17,4 +18,5 @@ if os.environ.get(DEBUG) != "1":
 @pytest.fixture(autouse=True)
 def no_spare_rows(monkeypatch):
     """Fields are otherwise as long as the next power of two, and hide what is read behind a body's end."""
-    monkeypatch.setattr(state, "_power_of_two", lambda count, least: max(count, 1))
+    for module in (capacity, colliders):
+        monkeypatch.setattr(module, "room_for", lambda count, name: max(count, 1))
