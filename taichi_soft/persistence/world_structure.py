@@ -21,6 +21,7 @@ def structure_of(context: WorldContext) -> bytes:
     return to_json(
         {
             "package": _package_version(),
+            "slices": [each.name for each in context.slices],
             # The rooms may be another world's, and follow from the bodies.
             "capacity": {name: value for name, value in capacity.items() if name not in ROOMS},
             "soft_contact": context.contact.soft,

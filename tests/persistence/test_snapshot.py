@@ -337,6 +337,14 @@ def test_the_snapshot_of_another_world_is_refused_with_what_differs(small, bodie
     refused(small, world.snapshot(), what)
 
 
+def test_a_snapshot_of_a_time_when_worlds_had_fewer_slices_is_refused(small):
+    structure, *others = unseal(small.snapshot(), MARK, VERSION, "snapshot")
+    built_of = json.loads(bytes(structure))
+    built_of["slices"].remove("motors")
+    older = [json.dumps(built_of).encode(), *(bytes(each) for each in others)]
+    refused(small, seal(MARK, VERSION, older), "slices")
+
+
 def forged(data, change):
     """A snapshot with a right checksum of what somebody made up."""
     structure, notes, words, memory = unseal(data, MARK, VERSION, "snapshot")
