@@ -6,44 +6,45 @@
 
 VENV := .venv
 BIN := $(VENV)/bin
-READY := $(VENV)/.ready
 
 help:
 	@echo "make demo     set up, drop a soft sphere, write out/bounce.mp4"
 	@echo "make test     set up, run the tests, but those that take long"
 	@echo "make test-fast  set up, run tests without worlds: for the inner loop"
-	@echo "make test-all set up, run every test: half an hour"
+	@echo "make test-all set up with every extra, run every test: half an hour"
 	@echo "make test-bounds  set up, run kernels with every index checked: takes minutes"
 	@echo "make profile  set up, measure what a frame costs here"
-	@echo "make lint     set up, check style and types"
+	@echo "make lint     set up with every extra, check style and types"
+	@echo "make setup    set up with every extra"
 	@echo "make clean    delete the environment and what was written"
 
-setup: $(READY)
-
-$(READY): pyproject.toml setup.sh
-	@sh setup.sh "$(VENV)"
+# One environment for all of them; each adds to it what it needs.
+$(VENV)/.%: pyproject.toml setup.sh
+	@sh setup.sh "$(VENV)" $*
 	@touch $@
 
-demo: $(READY)
+setup: $(VENV)/.dev
+
+demo: $(VENV)/.demo
 	@$(BIN)/taichi-soft demo bounce --out out/bounce.mp4
 
-test: $(READY)
+test: $(VENV)/.test
 	@$(BIN)/python -m pytest -m "not soak"
 
-test-fast: $(READY)
+test-fast: $(VENV)/.test
 	@$(BIN)/python -m pytest -m "numpy or kernel"
 
-test-all: $(READY)
+test-all: $(VENV)/.dev
 	@$(BIN)/python -m pytest
 
-test-bounds: $(READY)
+test-bounds: $(VENV)/.test
 	@TAICHI_SOFT_DEBUG=1 $(BIN)/python -m pytest tests/bounds
 
-profile: $(READY)
+profile: $(VENV)/.demo
 	@$(BIN)/taichi-soft profile
 
-lint: $(READY)
+lint: $(VENV)/.dev
 	@$(BIN)/ruff check . && $(BIN)/ruff format --check . && $(BIN)/mypy
 
 clean:
-	rm -rf $(VENV) out build *.egg-info
+	rm -rf $(VENV) out build dist *.egg-info

@@ -1,41 +1,50 @@
 #!/bin/sh
-# Makes the environment in $1 and installs taichi-soft with its test tools. Uses uv if it is there, else venv + pip.
-# PYTHON=/path/to/python names the interpreter to use.
+# Makes the environment in $1, unless it is there, and installs taichi-soft with the extra $2 (demo, test, dev).
+# Uses uv if it is there, else venv + pip. PYTHON=/path/to/python names the interpreter to use.
 set -eu
 
 venv=$1
+extra=$2
 fail() {
     echo "taichi-soft: $1" >&2
     exit 1
 }
 no_install="the packages could not be installed, for the reason above (without a network: give pip an index or a cache)"
 supported='import sys; sys.exit(not (3, 10) <= sys.version_info[:2] <= (3, 13))'
+installing="installing taichi-soft[$extra] and what it needs (once; some minutes where nothing is in the package cache)"
 
 if [ -z "${PYTHON:-}" ] && command -v uv >/dev/null 2>&1; then
-    rm -rf "$venv"
-    uv venv --quiet --python ">=3.10,<3.14" "$venv" || fail "uv found no Python 3.10 to 3.13"
-    uv pip install --quiet --python "$venv/bin/python" -e ".[dev]" || fail "$no_install"
+    if [ ! -x "$venv/bin/python" ]; then
+        echo "1/2 making the environment $venv"
+        uv venv --quiet --python ">=3.10,<3.14" "$venv" || fail "uv found no Python 3.10 to 3.13"
+    fi
+    echo "2/2 $installing"
+    uv pip install --python "$venv/bin/python" -e ".[$extra]" || fail "$no_install"
     exit 0
 fi
 
-for candidate in ${PYTHON:-python3 python3.13 python3.12 python3.11 python3.10 python}; do
-    if command -v "$candidate" >/dev/null 2>&1; then
-        found=$candidate
-        if "$candidate" -c "$supported" >/dev/null 2>&1; then
-            python=$candidate
-            break
+if [ ! -x "$venv/bin/pip" ]; then
+    for candidate in ${PYTHON:-python3 python3.13 python3.12 python3.11 python3.10 python}; do
+        if command -v "$candidate" >/dev/null 2>&1; then
+            found=$candidate
+            if "$candidate" -c "$supported" >/dev/null 2>&1; then
+                python=$candidate
+                break
+            fi
         fi
+    done
+    if [ -z "${python:-}" ]; then
+        [ -n "${found:-}" ] || fail "no Python found: install Python 3.10, 3.11, 3.12 or 3.13"
+        version=$("$found" -c 'import platform; print(platform.python_version())' 2>/dev/null || echo "a broken one")
+        fail "$found is Python $version: install 3.10 to 3.13 (Taichi has wheels for no other), or name one: make PYTHON=python3.12 test"
     fi
-done
-if [ -z "${python:-}" ]; then
-    [ -n "${found:-}" ] || fail "no Python found: install Python 3.10, 3.11, 3.12 or 3.13"
-    version=$("$found" -c 'import platform; print(platform.python_version())' 2>/dev/null || echo "a broken one")
-    fail "$found is Python $version: install 3.10 to 3.13 (Taichi has wheels for no other), or name one: make PYTHON=python3.12 test"
-fi
-"$python" -c 'import venv, ensurepip' >/dev/null 2>&1 ||
-    fail "$python has no venv module: install it (Debian and Ubuntu: apt install python3-venv)"
+    "$python" -c 'import venv, ensurepip' >/dev/null 2>&1 ||
+        fail "$python has no venv module: install it (Debian and Ubuntu: apt install python3-venv)"
 
-echo "setting up $venv with $("$python" --version)"
-rm -rf "$venv"
-"$python" -m venv "$venv" || fail "$python could not make $venv, for the reason above"
-"$venv/bin/python" -m pip install --quiet --disable-pip-version-check -e ".[dev]" || fail "$no_install"
+    echo "1/2 making the environment $venv with $("$python" --version)"
+    rm -rf "$venv"
+    "$python" -m venv "$venv" || fail "$python could not make $venv, for the reason above"
+fi
+
+echo "2/2 $installing"
+"$venv/bin/python" -m pip install --disable-pip-version-check -e ".[$extra]" || fail "$no_install"

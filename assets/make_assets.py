@@ -1,6 +1,6 @@
 """Make the mesh files in this folder. The same command makes the same files: every random choice is seeded.
 
-Needs `pip install "taichi-soft[assets]"`. Prints a row of the table in README.md for each file.
+Needs `pip install "taichi-soft[voronoi]"`. Prints a row of the table in README.md for each file.
 """
 
 from __future__ import annotations

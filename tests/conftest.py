@@ -14,6 +14,7 @@ from xdist.scheduler import LoadScopeScheduling
 
 from taichi_soft import Material, World, box, init, load_mesh
 from taichi_soft.bodies.capacity import LEAST
+from taichi_soft.core.extras import missing_packages
 from taichi_soft.core.runtime import DEBUG
 
 settings.register_profile("same every time", derandomize=True, deadline=None)
@@ -50,6 +51,7 @@ SECONDS = {
     "engine_adapter/": (7, 0),
     "render/": (20, 0),
     "test_readme": (1, 10),
+    "test_package": (5, 60),
     "": (21, 0),
 }
 """What the tests of files that begin so take, those of `make test` and the soaks, with an empty kernel cache.
@@ -77,11 +79,20 @@ SOAK = (
     *(f"world/test_public_face.py::test_{name}" for name in ("every", "a_", "all_that", "nothing")),
     "solver/test_recovery.py::test_a_wrecked_body_finds_its_shape_again[exact",
     *(f"persistence/test_snapshot.py::test_{name}" for name in ("rest_shapes", "other_integrators")),
+    *(f"test_package.py::test_a_{name}" for name in ("source", "wheel")),
     *("control/test_joints.py::test_a_recording", "test_readme.py::test_the_level"),
 )
 """Tiers, by the beginnings of files or tests. SOAK compiles or runs for more than some 40 s with an empty
 cache and is left to `make test-all`; NUMPY runs no kernel, KERNEL some by themselves; the rest, and
 what is named in WORLD, are whole worlds."""
+
+
+NEEDS = {
+    "lab/experiments/": "report",
+    "lab/report/": "report",
+    "lab/sweep/test_cluster": "cluster",
+}
+"""Extras that tests need beyond those of the extra `test`, by the beginnings of files."""
 
 
 def is_soak(nodeid):
@@ -107,6 +118,30 @@ def pytest_collection_modifyitems(items):
     items.sort(key=lambda item: order.index(folder_of(item.nodeid)))
     for item in items:
         item.add_marker(tier_of(item))
+        for start, extra in NEEDS.items():
+            if item.nodeid.removeprefix("tests/").startswith(start):
+                missing = missing_packages(extra)
+                reason = f"needs {', '.join(missing)}: pip install 'taichi-soft[{extra}]'"
+                item.add_marker(pytest.mark.skipif(bool(missing), reason=reason))
+
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_runtest_makereport():
+    outcome = yield
+    fail_if_skipped(outcome.get_result())
+
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_make_collect_report():
+    outcome = yield
+    fail_if_skipped(outcome.get_result())
+
+
+def fail_if_skipped(report):
+    """Where every extra is installed, as `.ci/run` has it, a test that is skipped tests nothing."""
+    if os.environ.get("TAICHI_SOFT_ALL_TESTS") == "1" and report.skipped and not hasattr(report, "wasxfail"):
+        report.outcome = "failed"
+        report.longrepr = f"skipped: {report.longrepr[-1]}"
 
 
 class Shares(LoadScopeScheduling):

@@ -11,6 +11,7 @@ from rich.markup import escape
 
 from taichi_soft.cli.console import Arch, console, errors, say
 from taichi_soft.core.errors import OptionError
+from taichi_soft.core.extras import require_extra
 from taichi_soft.core.runtime import init
 
 
@@ -49,7 +50,6 @@ def report(
     """
     from taichi_soft.lab.experiments import Effort
     from taichi_soft.lab.report.machine import machine_facts
-    from taichi_soft.lab.report.required_packages import require_extra
     from taichi_soft.lab.report.run import choose_experiments, require_writable, run_experiments
 
     chosen = choose_experiments(names or [])
@@ -61,7 +61,7 @@ def report(
         raise OptionError(
             f"--workers {workers} are of this machine, and --cluster {cluster} has its own: leave out one"
         )
-    require_extra()
+    require_extra("report", "a report needs")
     folder = out or Path("out") / "report"
     require_writable(folder)
     device = init(arch)

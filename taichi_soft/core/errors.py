@@ -20,6 +20,10 @@ class OptionError(TaichiSoftError, ValueError):
     """An argument has a value that this call does not take."""
 
 
+class MissingExtraError(OptionError, ImportError):
+    """What was asked for needs packages of an extra that are not installed."""
+
+
 class StateError(TaichiSoftError, RuntimeError):
     """The call is right but comes at the wrong time (for example `step` before `build`)."""
 

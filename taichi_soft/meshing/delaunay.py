@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from taichi_soft.core.errors import MeshError, OptionError
+from taichi_soft.core.errors import MeshError
+from taichi_soft.core.extras import require_extra
 from taichi_soft.meshing.arrays import FloatArray
 from taichi_soft.meshing.quality import FLATTEST
 from taichi_soft.meshing.tet_mesh import TetMesh
@@ -17,11 +18,10 @@ corners lie on one sphere but for rounding."""
 
 
 def scipy_spatial(purpose: str = "Voronoi graphs") -> Any:
-    """scipy.spatial. Raises: OptionError where it is not installed, with the purpose."""
-    try:
-        from scipy import spatial
-    except ImportError:
-        raise OptionError(f"{purpose} need scipy: pip install 'taichi-soft[voronoi]'") from None
+    """scipy.spatial. Raises: MissingExtraError with the purpose."""
+    require_extra("voronoi", f"{purpose} need")
+    from scipy import spatial
+
     return spatial
 
 

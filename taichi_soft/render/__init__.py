@@ -1,5 +1,10 @@
 """Pictures and films of soft bodies without a display."""
 
+from taichi_soft.core.extras import require_extra
+
+require_extra("film", "pictures and films need")
+
+# isort: split
 from taichi_soft.render.camera import Camera
 from taichi_soft.render.colors import FLIPPED, PALETTE, colormap, highlight
 from taichi_soft.render.overlay import Corner, draw_labels, draw_text

@@ -1,28 +1,22 @@
-"""The demos that come with the source: each file in `demos/` sets one stage."""
+"""The demos: each file in `demos/` sets one stage."""
 
 from __future__ import annotations
 
 import importlib.util
-from pathlib import Path
 from types import ModuleType
 
 from taichi_soft.core.errors import OptionError
-
-ROOT = Path(__file__).resolve().parents[2]
-DEMOS = ROOT / "demos"
-ASSETS = ROOT / "assets"
+from taichi_soft.core.package_data import DEMOS
 
 
 def demo_names() -> list[str]:
-    """Names of the demos there are; none where the package is installed without its source."""
+    """Names of the demos there are."""
     return sorted(path.stem for path in DEMOS.glob("[a-z]*.py"))
 
 
 def load_demo(name: str) -> ModuleType:
     """The demo of that name, a module with `stage()` and `proof(stage)`. Raises: OptionError."""
     names = demo_names()
-    if not names:
-        raise OptionError(f"no demos in {DEMOS}: they come with the source, clone it and run them there")
     if name not in names:
         raise OptionError(f"unknown demo {name!r}: choose one of {', '.join(names)}")
     spec = importlib.util.spec_from_file_location(f"taichi_soft_demo_{name}", DEMOS / f"{name}.py")

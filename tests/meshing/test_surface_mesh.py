@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from taichi_soft import MeshError, ParticleMesh, beam, box, cylinder, load_mesh, sphere, surface_mesh, torus
-from taichi_soft.render.demos import ASSETS
+from taichi_soft.core.package_data import ASSETS
 
 SHAPES = {"box": box(), "beam": beam(), "sphere": sphere(), "cylinder": cylinder(), "torus": torus()}
 SHAPES |= {path.stem: load_mesh(path) for path in sorted(ASSETS.glob("*.npz"))}

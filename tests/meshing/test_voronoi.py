@@ -19,7 +19,7 @@ from taichi_soft import (
 )
 from taichi_soft.meshing import delaunay
 from taichi_soft.meshing.delaunay import circumspheres, require_delaunay
-from taichi_soft.render.demos import ASSETS
+from taichi_soft.core.package_data import ASSETS
 
 CORNER = TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]], [[0, 1, 2, 3]])
 

@@ -21,7 +21,7 @@ from taichi_soft.lab.experiments.experiment import (
     Table,
     Verdict,
 )
-from taichi_soft.render.demos import ASSETS
+from taichi_soft.core.package_data import ASSETS
 
 MATERIAL = Material(1e6, 0.25, 1000.0, damping_ratio=0.0)
 RIGHT = float(MATERIAL.lame_lambda + 2 * MATERIAL.lame_mu)

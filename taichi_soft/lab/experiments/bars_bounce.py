@@ -25,7 +25,7 @@ from taichi_soft.lab.experiments.experiment import (
     Table,
     Verdict,
 )
-from taichi_soft.render.demos import ASSETS
+from taichi_soft.core.package_data import ASSETS
 
 Floats = NDArray[np.float64]
 

@@ -24,7 +24,7 @@ from taichi_soft.lab.experiments.experiment import (
     Table,
     Verdict,
 )
-from taichi_soft.render.demos import ASSETS
+from taichi_soft.core.package_data import ASSETS
 
 YOUNG, POISSON, DENSITY, SPIN = 1e6, 0.1, 1000.0, 2.0  # rad/s, so slow that nothing stretches
 DT, SUBSTEPS = 1 / 60, 12

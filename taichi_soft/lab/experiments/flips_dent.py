@@ -26,7 +26,7 @@ from taichi_soft.lab.experiments.experiment import (
     Table,
     Verdict,
 )
-from taichi_soft.render.demos import ASSETS
+from taichi_soft.core.package_data import ASSETS
 
 MATERIAL = Material(young=1e6, poisson=0.1, density=1000.0, damping=100.0, damping_ratio=0.0)
 SPEED, HEIGHT = 20.0, 1.05  # of the sphere that is thrown down, of radius 1 m

@@ -24,7 +24,7 @@ from taichi_soft.lab.experiments.experiment import (
     Table,
     Verdict,
 )
-from taichi_soft.render.demos import ASSETS
+from taichi_soft.core.package_data import ASSETS
 
 DT, SUBSTEPS = 1 / 50, 14
 THESIS_FACTOR, THESIS_TETS = 0.45, 955

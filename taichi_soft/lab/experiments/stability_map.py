@@ -28,7 +28,7 @@ from taichi_soft.lab.experiments.experiment import (
     Table,
     Verdict,
 )
-from taichi_soft.render.demos import ASSETS
+from taichi_soft.core.package_data import ASSETS
 
 DENSITY, DAMPING, HEIGHT, VOLUME = 1000.0, 100.0, 7.0, 4.0
 DT, SUBSTEPS = 1 / 50, 14  # 700 substeps a second

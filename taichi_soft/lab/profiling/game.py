@@ -18,7 +18,7 @@ from taichi_soft.elements.materials.material import DAMPING_RATIO
 from taichi_soft.lab.profiling.spread import Spread, compare, time_calls
 from taichi_soft.lab.profiling.stolen import processor_ticks, stolen_since
 from taichi_soft.meshing import TetMesh, box, load_mesh, sphere
-from taichi_soft.render.demos import ASSETS
+from taichi_soft.core.package_data import ASSETS
 from taichi_soft.world.body import Body
 from taichi_soft.world.world import World
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from taichi_soft.bodies.description import edge_damping, rest_inverses, vertex_masses
 from taichi_soft.core.constants import GRAVITY_EARTH
-from taichi_soft.core.errors import OptionError
+from taichi_soft.core.extras import require_extra
 from taichi_soft.elements.materials import Material
 from taichi_soft.meshing import TetMesh
 
@@ -21,11 +21,10 @@ Floats = NDArray[np.float64]
 
 
 def require_scipy() -> Any:
-    """scipy.sparse. Raises: OptionError where it is not installed."""
-    try:
-        import scipy.sparse.linalg
-    except ImportError:
-        raise OptionError("this comparison needs scipy: pip install 'taichi-soft[voronoi]'") from None
+    """scipy.sparse. Raises: MissingExtraError."""
+    require_extra("voronoi", "this comparison needs")
+    import scipy.sparse.linalg
+
     return scipy.sparse
 
 

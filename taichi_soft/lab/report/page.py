@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from taichi_soft.core.errors import OptionError
+from taichi_soft.core.extras import require_extra
 from taichi_soft.lab.experiments import CLAIMS, Effort
 from taichi_soft.lab.report.exhibits import Exhibit, Sheet, exhibit_of, file_name, require_distinct, sheet_of
 from taichi_soft.lab.report.judgements import OF_MANY, Concluded, Judgement, counts, judge
 from taichi_soft.lab.report.law_checks import law_table
 from taichi_soft.lab.report.markdown import Literal, escaped
-from taichi_soft.lab.report.required_packages import require_extra
 from taichi_soft.lab.report.spreadsheets import csv_of_judgements
 from taichi_soft.lab.report.wording import duration, point_line
 
@@ -36,7 +36,7 @@ def write_report(
         pictures of a wrong shape, and a directory that takes no files. What was there before is then still
         whole.
     """
-    require_extra()
+    require_extra("report", "a report needs")
     require_distinct((experiment.name for experiment, _, _ in sections), "the report")
     judgements = judge(sections)
     exhibits = [exhibit_of(*section) for section in sections]

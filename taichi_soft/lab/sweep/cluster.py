@@ -12,6 +12,7 @@ from contextlib import contextmanager, suppress
 from typing import Any
 
 from taichi_soft.core.errors import SweepError
+from taichi_soft.core.extras import require_extra
 from taichi_soft.lab.sweep.provenance import origin
 from taichi_soft.lab.sweep.task import Outcome, Task, Worker, compute
 
@@ -41,14 +42,12 @@ def cluster_workers(address: str, arch: str = "cpu") -> Iterator[list[Worker]]:
     Each computes one point at a time, whatever threads it has.
     Args:
         address: of its scheduler, host:port.
-    Raises: SweepError where it cannot be reached, has no workers, or they have other versions than we.
+    Raises: MissingExtraError; SweepError where it cannot be reached, has no workers, or they have other versions
+        than we.
     """
-    try:
-        from distributed import Client
-    except ImportError:
-        raise SweepError(
-            "a cluster needs Dask distributed: run pip install 'taichi-soft[cluster]', or leave out --cluster"
-        ) from None
+    require_extra("cluster", "a cluster needs Dask's")
+    from distributed import Client
+
     try:
         try:
             client = Client(address, timeout=CONNECT_LIMIT, set_as_default=False)

@@ -8,7 +8,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 _PACKAGE = Path(__file__).parents[2]
-_ABOVE = {"report", "cli", "__main__.py"}
+_ABOVE = {"report", "cli", "demos", "__main__.py"}
 """What lies above the experiments: it shows results, and cannot change them."""
 
 

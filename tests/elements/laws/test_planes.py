@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from taichi_soft import MeshError, OptionError, box, load_mesh, plane_angles, sphere
-from taichi_soft.render.demos import ASSETS
+from taichi_soft.core.package_data import ASSETS
 
 BALL = sphere(0.7, 1)
 

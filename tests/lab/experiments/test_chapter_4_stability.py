@@ -8,7 +8,7 @@ from taichi_soft import Material, box, load_mesh
 from taichi_soft.lab.experiments import Verdict
 from taichi_soft.lab.experiments.anisotropy import mesh_of
 from taichi_soft.lab.experiments.law_stability import ShakenBody, vibration
-from taichi_soft.render.demos import ASSETS
+from taichi_soft.core.package_data import ASSETS
 
 
 def ring_and_fit(mesh, e):

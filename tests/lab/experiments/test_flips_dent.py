@@ -9,7 +9,7 @@ from quick import quick_results
 
 from taichi_soft import load_mesh
 from taichi_soft.lab.experiments import EXPERIMENTS, Results, Verdict, section_of
-from taichi_soft.render.demos import ASSETS
+from taichi_soft.core.package_data import ASSETS
 
 EXPERIMENT = EXPERIMENTS["flips-dent"]
 

@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from skfem import Basis, ElementTetP1, ElementVector, MeshTet
-from skfem.models.elasticity import linear_elasticity
 
 from taichi_soft import Material, edges_as_particles, force_gradient
 from taichi_soft.elements.laws.springs import spring_bonds
@@ -26,6 +24,9 @@ def test_the_block_fills_its_box_in_many_directions():
 
 
 def test_at_rest_the_stiffness_is_that_of_linear_finite_elements():
+    from skfem import Basis, ElementTetP1, ElementVector, MeshTet
+    from skfem.models.elasticity import linear_elasticity
+
     ours = StaticBody(BLOCK, MATERIAL, "virial").stiffness().toarray()
     form = linear_elasticity(MATERIAL.lame_lambda, MATERIAL.lame_mu)
     basis = Basis(MeshTet(BLOCK.vertices.T, BLOCK.tets.T.astype(np.int64)), ElementVector(ElementTetP1()))

@@ -9,7 +9,7 @@ from rich.console import Console
 
 from taichi_soft.core.errors import OptionError, SweepError
 from taichi_soft.lab.experiments import EXPERIMENTS, Effort, Verdict
-from taichi_soft.lab.report import required_packages, run
+from taichi_soft.lab.report import run
 from taichi_soft.lab.sweep import Store
 
 
@@ -109,15 +109,6 @@ def test_an_unknown_experiment_is_refused_with_the_names_there_are():
     with pytest.raises(OptionError, match="'nope'") as caught:
         run.choose_experiments(["leapfrog-reversal", "nope"])
     assert "leapfrog-reversal" in str(caught.value)
-
-
-def test_missing_packages_are_named_with_the_way_to_get_them(monkeypatch):
-    required_packages.require_extra()
-    monkeypatch.setattr(
-        required_packages, "find_spec", lambda name: None if name in ("jinja2", "skfem") else name
-    )
-    with pytest.raises(OptionError, match=r"jinja2, scikit-fem.*pip install 'taichi-soft\[report\]'"):
-        required_packages.require_extra()
 
 
 def test_a_folder_that_takes_no_files_is_refused(tmp_path):

@@ -1,0 +1,41 @@
+"""Extras: packages that a game need not install, and how to get them where one is missing."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+
+from taichi_soft.core.errors import MissingExtraError
+
+EXTRAS = {
+    "cli": {"typer": "typer", "rich": "rich"},
+    "film": {"cv2": "opencv-python-headless"},
+    "io": {"meshio": "meshio"},
+    "voronoi": {"scipy": "scipy"},
+    "report": {
+        "cv2": "opencv-python-headless",
+        "jinja2": "jinja2",
+        "matplotlib": "matplotlib",
+        "rich": "rich",
+        "scipy": "scipy",
+        "skfem": "scikit-fem",
+    },
+    "cluster": {"distributed": "distributed"},
+}
+"""By extra: its modules, and the packages that have them, as in pyproject.toml."""
+
+
+def missing_packages(extra: str) -> list[str]:
+    """Packages of the extra that are not installed."""
+    return [package for module, package in EXTRAS[extra].items() if find_spec(module) is None]
+
+
+def require_extra(extra: str, what: str) -> None:
+    """Raises: MissingExtraError in one line where a package of the extra is missing.
+
+    Args:
+        what: what needs it, and a verb: "a film needs".
+    """
+    missing = missing_packages(extra)
+    if missing:
+        names = ", ".join(missing)
+        raise MissingExtraError(f"{what} {names}, not installed here: run pip install 'taichi-soft[{extra}]'")
