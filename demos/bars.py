@@ -6,8 +6,8 @@ from numpy.typing import NDArray
 from engine_adapter import FixedStep
 from taichi_soft import Body, Material, World, load_mesh
 from taichi_soft.cli import main
-from taichi_soft.render import Camera, colormap
 from taichi_soft.core.package_data import ASSETS
+from taichi_soft.render import Camera, colormap
 from taichi_soft.render.film import Actor, Stage
 
 MATERIAL = Material(young=2.0e6, poisson=0.2, density=1000.0, damping=20.0, damping_ratio=0.0)

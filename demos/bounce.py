@@ -3,8 +3,8 @@
 from engine_adapter import FixedStep
 from taichi_soft import World, load_mesh, preset
 from taichi_soft.cli import main
-from taichi_soft.render import Camera
 from taichi_soft.core.package_data import ASSETS
+from taichi_soft.render import Camera
 from taichi_soft.render.film import Actor, Stage
 
 HEIGHT = 7.0  # of the lowest point [m]

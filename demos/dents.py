@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from engine_adapter import FixedStep
 from taichi_soft import Body, Material, World, load_mesh
 from taichi_soft.cli import main
-from taichi_soft.render import PALETTE, Camera, highlight
 from taichi_soft.core.package_data import ASSETS
+from taichi_soft.render import PALETTE, Camera, highlight
 from taichi_soft.render.film import Actor, Stage
 
 SOFT = Material(young=2.0e5, poisson=0.1, density=1000.0, damping=100.0, damping_ratio=0.0)

@@ -123,7 +123,8 @@ def test_a_wheel_works_without_the_checkout(built, tmp_path):
     )  # on a package index they would lead nowhere
 
     def run(*arguments):
-        code = f"import sys; sys.path.insert(0, {str(tmp_path / 'site')!r}); from taichi_soft.cli import main; main()"
+        code = f"import sys; sys.path.insert(0, {str(tmp_path / 'site')!r})\n"
+        code += "from taichi_soft.cli import main\nmain()"
         command = [sys.executable, "-c", code, *arguments]
         done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300)
         assert done.returncode == 0, done.stderr

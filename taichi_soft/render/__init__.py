@@ -1,5 +1,7 @@
 """Pictures and films of soft bodies without a display."""
 
+# ruff: noqa: E402 (says first which package is missing)
+
 from taichi_soft.core.extras import require_extra
 
 require_extra("film", "pictures and films need")

@@ -17,9 +17,9 @@ from taichi_soft import (
     torus,
     voronoi_graph,
 )
+from taichi_soft.core.package_data import ASSETS
 from taichi_soft.meshing import delaunay
 from taichi_soft.meshing.delaunay import circumspheres, require_delaunay
-from taichi_soft.core.package_data import ASSETS
 
 CORNER = TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]], [[0, 1, 2, 3]])
 

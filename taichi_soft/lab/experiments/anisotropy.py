@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft import LAWS, Material, TetMesh, box, cylinder, delaunay_mesh, load_mesh, sphere
+from taichi_soft.core.package_data import ASSETS
 from taichi_soft.lab.experiments.directional_stiffness import directions, spread, stretch_modulus
 from taichi_soft.lab.experiments.experiment import (
     Effort,
@@ -21,7 +22,6 @@ from taichi_soft.lab.experiments.experiment import (
     Table,
     Verdict,
 )
-from taichi_soft.core.package_data import ASSETS
 
 MATERIAL = Material(1e6, 0.25, 1000.0, damping_ratio=0.0)
 RIGHT = float(MATERIAL.lame_lambda + 2 * MATERIAL.lame_mu)

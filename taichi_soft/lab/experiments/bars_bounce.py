@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft import Body, Material, TetMesh, World, load_mesh
+from taichi_soft.core.package_data import ASSETS
 from taichi_soft.lab.experiments.experiment import (
     Effort,
     Experiment,
@@ -25,7 +26,6 @@ from taichi_soft.lab.experiments.experiment import (
     Table,
     Verdict,
 )
-from taichi_soft.core.package_data import ASSETS
 
 Floats = NDArray[np.float64]
 

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from taichi_soft import Material, TetMesh, World, box, load_mesh
+from taichi_soft.core.package_data import ASSETS
 from taichi_soft.lab.experiments.experiment import (
     Effort,
     Experiment,
@@ -24,7 +25,6 @@ from taichi_soft.lab.experiments.experiment import (
     Table,
     Verdict,
 )
-from taichi_soft.core.package_data import ASSETS
 
 YOUNG, POISSON, DENSITY, SPIN = 1e6, 0.1, 1000.0, 2.0  # rad/s, so slow that nothing stretches
 DT, SUBSTEPS = 1 / 60, 12

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft import FrozenBodyWarning, Material, World, load_mesh
+from taichi_soft.core.package_data import ASSETS
 from taichi_soft.lab.experiments.experiment import (
     Effort,
     Experiment,
@@ -26,7 +27,6 @@ from taichi_soft.lab.experiments.experiment import (
     Table,
     Verdict,
 )
-from taichi_soft.core.package_data import ASSETS
 
 MATERIAL = Material(young=1e6, poisson=0.1, density=1000.0, damping=100.0, damping_ratio=0.0)
 SPEED, HEIGHT = 20.0, 1.05  # of the sphere that is thrown down, of radius 1 m

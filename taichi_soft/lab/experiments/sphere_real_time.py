@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from taichi_soft import World, device, load_mesh, preset
+from taichi_soft.core.package_data import ASSETS
 from taichi_soft.lab.experiments.experiment import (
     Effort,
     Experiment,
@@ -24,7 +25,6 @@ from taichi_soft.lab.experiments.experiment import (
     Table,
     Verdict,
 )
-from taichi_soft.core.package_data import ASSETS
 
 DT, SUBSTEPS = 1 / 50, 14
 THESIS_FACTOR, THESIS_TETS = 0.45, 955

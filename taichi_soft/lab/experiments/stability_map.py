@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from taichi_soft import FrozenBodyWarning, Material, TetMesh, UnstableStepWarning, World, load_mesh, sphere
 from taichi_soft.bodies.stability import stable_step
+from taichi_soft.core.package_data import ASSETS
 from taichi_soft.elements.laws import element_model
 from taichi_soft.lab.experiments.experiment import (
     Effort,
@@ -28,7 +29,6 @@ from taichi_soft.lab.experiments.experiment import (
     Table,
     Verdict,
 )
-from taichi_soft.core.package_data import ASSETS
 
 DENSITY, DAMPING, HEIGHT, VOLUME = 1000.0, 100.0, 7.0, 4.0
 DT, SUBSTEPS = 1 / 50, 14  # 700 substeps a second

@@ -42,8 +42,8 @@ def cluster_workers(address: str, arch: str = "cpu") -> Iterator[list[Worker]]:
     Each computes one point at a time, whatever threads it has.
     Args:
         address: of its scheduler, host:port.
-    Raises: MissingExtraError; SweepError where it cannot be reached, has no workers, or they have other versions
-        than we.
+    Raises: MissingExtraError; SweepError where it cannot be reached, has no workers, or they have other
+            versions than we.
     """
     require_extra("cluster", "a cluster needs Dask's")
     from distributed import Client

@@ -5,10 +5,10 @@ import pytest
 from quick import altered, findings, quick_results, verdicts
 
 from taichi_soft import Material, box, load_mesh
+from taichi_soft.core.package_data import ASSETS
 from taichi_soft.lab.experiments import Verdict
 from taichi_soft.lab.experiments.anisotropy import mesh_of
 from taichi_soft.lab.experiments.law_stability import ShakenBody, vibration
-from taichi_soft.core.package_data import ASSETS
 
 
 def ring_and_fit(mesh, e):
