@@ -1,5 +1,7 @@
 """Real-time soft bodies from real material parameters."""
 
+import logging
+
 from taichi_soft.core import signals  # noqa: F401 - first: it watches while the rest is imported
 
 # isort: split
@@ -184,3 +186,5 @@ __all__ = [
     "voronoi_graph",
     "voxels",
 ]
+
+logging.getLogger(__name__).addHandler(logging.NullHandler())  # silent, unless a game asks for it

@@ -18,7 +18,7 @@ from taichi_soft.bodies.tearing import Tearing
 from taichi_soft.core.checks import as_count, as_indices, as_rotation, as_vector
 from taichi_soft.core.constants import POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.core.errors import MaterialError, OptionError
-from taichi_soft.core.types import DampingModel, Flips, Strain
+from taichi_soft.core.types import DampingModel, DampingModelName, FlipsName, LawName, StrainName
 from taichi_soft.elements.laws import ElementModel, default_law, element_model, fit_model
 from taichi_soft.elements.materials import AnisotropicMaterial, AnyMaterial, Material, SpringMaterial
 from taichi_soft.meshing import BodyMesh, ParticleMesh, TetMesh
@@ -62,10 +62,10 @@ class SoftBodyAsset:
     mesh: BodyMesh
     material: AnyMaterial
     _: KW_ONLY
-    law: str | None = None
-    strain: str | Strain | None = None
-    flips: str | Flips | None = None
-    damping_model: str | DampingModel = DampingModel.EDGE
+    law: LawName | None = None
+    strain: StrainName | None = None
+    flips: FlipsName | None = None
+    damping_model: DampingModelName = DampingModel.EDGE
     pinned: ArrayLike = ()
     contact: Contact = DEFAULT_CONTACT
     plasticity: Plasticity | None = None

@@ -19,7 +19,7 @@ from taichi_soft.core.constants import POSITION_LIMIT
 from taichi_soft.core.errors import MeshError, OptionError
 from taichi_soft.core.runtime import init
 from taichi_soft.core.threads import in_turn
-from taichi_soft.core.types import DampingModel, Flips, Integrator, Strain
+from taichi_soft.core.types import DampingModel, DampingModelName, FlipsName, Integrator, LawName, StrainName
 from taichi_soft.elements.kernels.gradients import (
     compute_bond_stiffness,
     compute_system_stiffness,
@@ -40,10 +40,10 @@ def internal_forces(
     positions: ArrayLike,
     velocities: ArrayLike | None = None,
     *,
-    law: str = "virial",
-    strain: str | Strain | None = None,
-    flips: str | Flips | None = None,
-    damping_model: str | DampingModel = DampingModel.EDGE,
+    law: LawName = "virial",
+    strain: StrainName | None = None,
+    flips: FlipsName | None = None,
+    damping_model: DampingModelName = DampingModel.EDGE,
     dtype: DTypeLike = np.float64,
 ) -> NDArray[Any]:
     """Elastic and damping forces on every vertex of a deformed mesh [N].
@@ -71,9 +71,9 @@ def force_gradient(
     material: AnyMaterial,
     positions: ArrayLike,
     *,
-    law: str = "virial",
-    strain: str | Strain | None = None,
-    flips: str | Flips | None = None,
+    law: LawName = "virial",
+    strain: StrainName | None = None,
+    flips: FlipsName | None = None,
     projected: bool = False,
 ) -> NDArray[np.float64]:
     """How the elastic forces on a deformed mesh change as its vertices move, in float64.

@@ -9,11 +9,12 @@ import typer
 from rich.console import Console
 
 from taichi_soft.core.runtime import Device
+from taichi_soft.core.types import ArchName
 
 console = Console()
 errors = Console(stderr=True)
 
-Arch = Annotated[str, typer.Option(help="Device: auto (the CPU), cpu; untried: cuda, vulkan, metal.")]
+Arch = Annotated[ArchName, typer.Option(help="Device: auto is the CPU; cuda, vulkan and metal are untried.")]
 Threads = Annotated[
     int | None, typer.Option(help="CPU threads; by default one per core, bound to it on Linux.")
 ]

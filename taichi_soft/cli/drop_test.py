@@ -6,7 +6,7 @@ import json
 import shlex
 import sys
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
 import typer
 from rich.markup import escape
@@ -15,6 +15,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from taichi_soft.cli.console import Arch, AsJson, Threads, console, errors, say
 from taichi_soft.core.errors import OptionError
 from taichi_soft.core.runtime import init
+from taichi_soft.core.types import ArchName, FlipsName, LawName
 
 
 def drop_test(
@@ -73,7 +74,10 @@ def drop_test(
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
     with Progress(*columns, console=errors, disable=not errors.is_terminal) as progress:
         numbers = range(first, first + cases)
-        chosen = [make_case(seed, n, law, flips) for n in progress.track(numbers, description="making")]
+        chosen = [
+            make_case(seed, n, cast(LawName, law), cast(FlipsName, flips))
+            for n in progress.track(numbers, description="making")
+        ]
         outcomes = []
         for outcome in progress.track(run_cases(chosen), total=cases, description="dropping"):
             outcomes.append(outcome)
@@ -95,7 +99,7 @@ def _sweep(
     out: Path,
     worst: int,
     workers: int | None,
-    arch: str,
+    arch: ArchName,
     *,
     as_json: bool,
 ) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import platform
-from typing import Annotated
+from typing import Annotated, cast
 
 import typer
 from rich.console import Console
@@ -13,6 +13,7 @@ from rich.table import Table
 
 from taichi_soft.cli.console import Arch, AsJson, Threads, console, device_facts, errors, say, version_of
 from taichi_soft.core.runtime import init
+from taichi_soft.core.types import LawName
 from taichi_soft.elements.materials import Material
 
 
@@ -57,7 +58,7 @@ def __say_laws(names: list[str], as_json: bool) -> None:
     from taichi_soft.lab.profiling.report import law_rows, law_table
 
     with errors.status("compiling and measuring laws"):
-        costs = measure_laws(names)
+        costs = measure_laws(cast(list[LawName], names))  # which checks them
     if as_json:
         print(json.dumps(law_rows(costs), indent=2))
         return

@@ -11,6 +11,7 @@ import contextlib
 import ctypes
 import functools
 import io
+import logging
 import os
 import threading
 from _thread import start_new_thread
@@ -20,6 +21,7 @@ from dataclasses import dataclass, replace
 from queue import SimpleQueue
 from typing import TypeVar
 
+from taichi_soft.core.compilation import BURST
 from taichi_soft.core.cores import (
     available_cores,
     bind_youngest,
@@ -36,10 +38,12 @@ from taichi_soft.core.taichi_patches import (
     has_pending_fields,
     let_threads_in,
     let_whole_numbers_overflow,
+    note_compilation,
     remember_sources,
     ti,
 )
 from taichi_soft.core.threads import in_turn, leave_behind
+from taichi_soft.core.types import ArchName
 
 __all__ = ["Device", "device", "holds_fields", "init", "is_initialized", "make_fields", "ti"]
 
@@ -67,7 +71,7 @@ def holds_fields(cls: Class) -> Class:
 class Device:
     """What `init` chose."""
 
-    arch: str  # "cpu", "cuda", "vulkan" or "metal"
+    arch: ArchName  # "cpu", "cuda", "vulkan" or "metal"
     threads: int  # CPU worker threads (1 on a GPU: the host side is serial)
     reason: str  # one line for people
     cores: tuple[int, ...] = ()  # to which the worker threads are bound, one each; none where they are free
@@ -78,6 +82,8 @@ class Device:
         return self.arch != "cpu"
 
 
+_log = logging.getLogger(__name__)
+
 _device: Device | None = None
 _process = 0  # that started Taichi
 _jobs: SimpleQueue[Callable[[], object]] = SimpleQueue()  # of the thread that started it
@@ -86,7 +92,7 @@ _home = 0  # identity of that thread
 
 
 @in_turn
-def init(arch: str = "auto", threads: int | None = None, cores: Sequence[int] | None = None) -> Device:
+def init(arch: ArchName = "auto", threads: int | None = None, cores: Sequence[int] | None = None) -> Device:
     """Start Taichi for this process and say what was chosen.
 
     Entry points call this; a library that embeds taichi-soft may call it first with its own choice. Any
@@ -141,7 +147,8 @@ def init(arch: str = "auto", threads: int | None = None, cores: Sequence[int] | 
             raise OptionError(f"Taichi already runs {where}: call init(cores={list(bound)}) first")
         return _device
 
-    chosen, reason = ("cpu", "the default") if arch == "auto" else (arch, "asked for by name")
+    chosen: ArchName = "cpu" if arch == "auto" else arch
+    reason = "the default" if arch == "auto" else "asked for by name"
     if ti.lang.impl.get_runtime().prog is not None:
         raise DeviceError(
             "Taichi was started by ti.init, and starting it again would destroy the fields made since: call "
@@ -156,10 +163,13 @@ def init(arch: str = "auto", threads: int | None = None, cores: Sequence[int] | 
         if isinstance(error, DeviceError):
             raise
         raise DeviceError(f"cannot start Taichi on {chosen!r}: {error}. Use init('cpu')") from error
-    return device()
+    found = device()
+    where = f", bound to cores {list(found.cores)}" if found.cores else ""
+    _log.info("Taichi runs on %s with %d threads%s (%s)", found.arch, found.threads, where, found.reason)
+    return found
 
 
-def _start(arch: str, reason: str, threads: int, cores: tuple[int, ...], is_left_to_us: bool) -> None:
+def _start(arch: ArchName, reason: str, threads: int, cores: tuple[int, ...], is_left_to_us: bool) -> None:
     """Start Taichi, with its workers on these cores if there are any, and note the device."""
     global _device, _process
     is_checked = os.environ.get(DEBUG) == "1"
@@ -267,6 +277,7 @@ def _lay_out(lay_out: Callable[[bool], None], is_first_call: bool) -> None:
 if ti.__version__[:2] == (1, 7):
     remember_sources()
     let_threads_in(_lay_out)
+    note_compilation(BURST.begin, BURST.end)
 
 
 def _serve() -> None:

@@ -1,10 +1,13 @@
-"""Choices that the public face takes by name. Each enum also accepts its string."""
+"""Choices that the public face takes by name. Each enum also accepts its string.
+
+The `...Name` types let an editor complete the strings and mypy refuse a misspelt one.
+"""
 
 from __future__ import annotations
 
 import re
 from enum import Enum
-from typing import TypeVar
+from typing import Literal, TypeAlias, TypeVar
 
 from taichi_soft.core.errors import OptionError
 
@@ -63,3 +66,26 @@ class Schedule(Choice):
     AUTO = "auto"
     PER_BODY = "per_body"  # one thread per body, all substeps of a body in a row
     FLAT = "flat"  # all tetrahedra of all bodies in parallel, substep by substep
+
+
+StrainName: TypeAlias = Strain | Literal["linear", "exact"]
+FlipsName: TypeAlias = Flips | Literal["tolerant", "recover", "off"]
+DampingModelName: TypeAlias = DampingModel | Literal["edge", "tet_mean"]
+IntegratorName: TypeAlias = (
+    Integrator | Literal["explicit_euler", "leapfrog", "lazy_leapfrog", "implicit_euler"]
+)
+ScheduleName: TypeAlias = Schedule | Literal["auto", "per_body", "flat"]
+ArchName: TypeAlias = Literal["auto", "cpu", "cuda", "vulkan", "metal"]
+LawName: TypeAlias = Literal[
+    "virial",
+    "face",
+    "st_venant_kirchhoff",
+    "neo_hookean",
+    "springs",
+    "volume_springs",
+    "cmpm",
+    "cmpm2",
+    "best_fitting_plane",
+    "tilted_plane",
+    "tilted_plane_printed",
+]

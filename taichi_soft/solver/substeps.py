@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import warnings
 from typing import Any
@@ -14,6 +15,8 @@ from taichi_soft.bodies.soft_body import SoftBody, record_of
 from taichi_soft.bodies.stability import StableStep, stable_step
 from taichi_soft.core.checks import as_count, as_step
 from taichi_soft.core.errors import OptionError, SlowStepWarning, StateError, UnstableStepWarning
+
+_log = logging.getLogger(__name__)
 
 _PLAIN = {float, int, np.float64, type(None)}
 """Types whose values can be compared with those of the last step."""
@@ -123,6 +126,7 @@ class Substeps:
         elif self._most is not None and count > self._most:
             raise OptionError(f"substeps is {count:,}; the world takes max_substeps={self._most:,}")
         h = seconds / count
+        _log.info("a step of %g s is made in %d substeps", seconds, count)
         if self._is_implicit:
             return seconds, count, h
         # Of bodies that were cut or are of something else nothing is estimated here: the caller knows better.

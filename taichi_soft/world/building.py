@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import warnings
 import weakref
 from dataclasses import replace
@@ -32,6 +33,9 @@ from taichi_soft.solver.program import StepProgram
 from taichi_soft.solver.schedules import choose_schedule, make_launch, most_substeps
 from taichi_soft.solver.simulation import Simulation
 from taichi_soft.solver.state import Capacity, State
+from taichi_soft.solver.substeps import FRAME
+
+_log = logging.getLogger(__name__)
 
 
 def build(context: WorldContext) -> Simulation:
@@ -92,6 +96,15 @@ def build(context: WorldContext) -> Simulation:
         colliders.load(state.contact, len(pools.slots))
         woken = weakref.WeakMethod(simulation.wake_near)  # or the two would keep each other
         colliders.on_jump = lambda lower, upper: (woken() or ignore)(lower, upper)
+    _log.info(
+        "built a world of %d slots for bodies and %d tetrahedra: schedule %s, %s, %s; %d substeps in 1/60 s",
+        len(pools.slots),
+        sum(len(body.tet_vertices) for body in scene.bodies),
+        settings.schedule.value,
+        settings.integrator.value,
+        "with contact" if has_contact else "without contact",
+        context.substeps.stable_count(FRAME),
+    )
     return simulation
 
 

@@ -6,7 +6,6 @@ Taichi compiles a kernel where it is called first: a tenth of a second to one wi
 from __future__ import annotations
 
 import math
-import sys
 from functools import partial
 from typing import cast
 
@@ -29,21 +28,11 @@ SHORTEST = 1e-6
 UP = np.array([0.0, 0.0, 1.0])
 
 
-def _say(what: str = "") -> None:
-    """What is being compiled, on a line of a terminal that each call writes anew; nothing elsewhere."""
-    if sys.stderr is not None and sys.stderr.isatty():
-        told = f"compiling {what} (once; later starts find it in a cache)" if what else ""
-        print(f"\r{told:<79}\r", end="", file=sys.stderr, flush=True)
-
-
 def warm_up(context: WorldContext) -> None:
     """As `World.warm_up`."""
-    _say("snapshots")
     before = take_snapshot(context)
     try:
-        _say("the step")
         context.built.trial_step(SHORTEST)
-        _say("what a game does to bodies")
         _fill_pools(context)
         living = cast("tuple[Body, ...]", context.slots.living)
         bodies = [body for body in living if not body.is_frozen]
@@ -53,13 +42,11 @@ def warm_up(context: WorldContext) -> None:
         for body in {body.asset: body for body in bodies}.values():
             _control(context, body, next((each for each in bodies if each is not body), None))
             _measure(context, body)
-        _say("queries")
         _ask(context)
         context.built.trial_step(SHORTEST)
         context.built.events.warm_up()
     finally:
         restore_snapshot(context, before)
-        _say()
     state_hash(context)
     if context.slots.living and not context.settings.is_implicit:
         context.substeps.stable_count(FRAME)

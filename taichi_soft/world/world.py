@@ -20,7 +20,7 @@ from taichi_soft.core.errors import FrozenBodyWarning, OptionError, StateError
 from taichi_soft.core.handles import Handles, recorded, serial_of
 from taichi_soft.core.settings import ContactSettings, Settings
 from taichi_soft.core.signals import Whole
-from taichi_soft.core.types import Integrator, Schedule
+from taichi_soft.core.types import Integrator, IntegratorName, Schedule, ScheduleName
 from taichi_soft.persistence.recorder import Recorder
 from taichi_soft.persistence.snapshot import restore_snapshot, take_snapshot
 from taichi_soft.solver.context import WorldContext
@@ -85,10 +85,10 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
         floor: float | None = 0.0,
         restitution: float | None = None,
         friction: float = 0.5,
-        integrator: str | Integrator = Integrator.LEAPFROG,
+        integrator: IntegratorName = Integrator.LEAPFROG,
         tolerance: float = 1e-3,
         most_iterations: int = 200,
-        schedule: str | Schedule = Schedule.AUTO,
+        schedule: ScheduleName = Schedule.AUTO,
         soft_contact: bool = False,
         sleep_speed: float = 0.0,
         collider_room: int = 0,
@@ -148,6 +148,14 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
         self._force_field: ForceField | None = None
         self._recorder: Recorder | None = None
         self._restore_count = 0
+
+    def __repr__(self) -> str:
+        kinds = [
+            f"{len(self.bodies)} bodies",
+            f"{len(self.colliders)} colliders",
+            f"t = {self.time:g} s" if self.is_built else "not built",
+        ]
+        return f"World({', '.join(kinds)})"
 
     @property
     def settings(self) -> Settings:

@@ -15,7 +15,7 @@ from taichi_soft.bodies.tearing import Tearing
 from taichi_soft.core.checks import as_number
 from taichi_soft.core.errors import OptionError
 from taichi_soft.core.handles import recorded
-from taichi_soft.core.types import DampingModel, Flips, Strain
+from taichi_soft.core.types import DampingModel, DampingModelName, FlipsName, LawName, StrainName
 from taichi_soft.elements.materials import AnyMaterial
 from taichi_soft.meshing import BodyMesh
 from taichi_soft.world.body import Body
@@ -41,10 +41,10 @@ class WorldBodies(WorldParts):
         mesh: BodyMesh,
         material: AnyMaterial,
         *,
-        law: str | None = None,
-        strain: str | Strain | None = None,
-        flips: str | Flips | None = None,
-        damping_model: str | DampingModel = DampingModel.EDGE,
+        law: LawName | None = None,
+        strain: StrainName | None = None,
+        flips: FlipsName | None = None,
+        damping_model: DampingModelName = DampingModel.EDGE,
         position: ArrayLike = (0.0, 0.0, 0.0),
         rotation: ArrayLike | None = None,
         velocity: ArrayLike = (0.0, 0.0, 0.0),

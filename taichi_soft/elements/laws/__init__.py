@@ -4,7 +4,16 @@ from dataclasses import replace
 from functools import partial
 
 from taichi_soft.core.errors import MaterialError, MeshError, OptionError
-from taichi_soft.core.types import ChoiceT, DampingModel, Flips, Strain
+from taichi_soft.core.types import (
+    ChoiceT,
+    DampingModel,
+    DampingModelName,
+    Flips,
+    FlipsName,
+    LawName,
+    Strain,
+    StrainName,
+)
 from taichi_soft.elements.laws.best_fitting_plane import best_fitting_plane_bonds
 from taichi_soft.elements.laws.bonds import Ring
 from taichi_soft.elements.laws.cmpm import cmpm_bonds
@@ -38,7 +47,7 @@ __all__ = [
     "fit_model",
 ]
 
-LAWS: dict[str, Law] = {
+LAWS: dict[LawName, Law] = {
     law.name: law
     for law in (
         StressLaw("virial", "thesis 6.3", "Hooke's stress to forces by the virial theorem", virial_forces),
@@ -121,10 +130,10 @@ LAWS: dict[str, Law] = {
 
 
 def element_model(
-    law: str,
-    strain: str | Strain | None = None,
-    flips: str | Flips | None = None,
-    damping_model: str | DampingModel = DampingModel.EDGE,
+    law: LawName,
+    strain: StrainName | None = None,
+    flips: FlipsName | None = None,
+    damping_model: DampingModelName = DampingModel.EDGE,
 ) -> ElementModel:
     """The model that these names choose; None takes the law's own.
 
@@ -144,7 +153,7 @@ def element_model(
     )
 
 
-def default_law(material: AnyMaterial, strain: str | Strain | None, flips: str | Flips | None) -> str:
+def default_law(material: AnyMaterial, strain: StrainName | None, flips: FlipsName | None) -> LawName:
     """Name of the law that a body has where none is named.
 
     Neo-Hookean: no body froze by it, and every wreck came back (`taichi-soft drop-test --sweep`). The virial

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from taichi_soft.core.types import Flips, Integrator, Strain
+from taichi_soft.core.types import Flips, Integrator, LawName, Strain
 from taichi_soft.elements.laws.bonds import Bonds, Ring
 
 SOLID = ("young", "poisson", "density", "damping")
@@ -15,7 +15,7 @@ ANISOTROPIC = ("stiffness", "frame", "density", "damping")
 class StressLaw:
     """Hooke's stress of a tetrahedron, turned into forces on its vertices (thesis chapter 6)."""
 
-    name: str
+    name: LawName
     source: str
     summary: str
     forces: Any  # ti.func (shape columns, Cauchy stress columns) -> four vec3 [N]
@@ -31,7 +31,7 @@ class StressLaw:
 class EnergyLaw:
     """An elastic energy and its derivative: what a body gives back is what was put in."""
 
-    name: str
+    name: LawName
     source: str
     summary: str
     piola: Any  # ti.func (F columns, lambda, mu) -> d energy / d F, columns [Pa]
@@ -49,7 +49,7 @@ class EnergyLaw:
 class BondLaw:
     """Forces between the two ends of each edge: the pairwise models of thesis chapters 3 to 5."""
 
-    name: str
+    name: LawName
     source: str
     summary: str
     ring: Ring  # what is looked at besides the two ends

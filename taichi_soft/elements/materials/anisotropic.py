@@ -17,6 +17,7 @@ from taichi_soft.elements.materials.element_values import (
     Array,
     as_constant,
     as_ratio,
+    described,
     is_damping,
     is_positive,
     require_one_length,
@@ -47,6 +48,9 @@ class AnisotropicMaterial:
     damping: float | Array = 0.0
     frame: Any = None
     damping_ratio: float = DAMPING_RATIO
+
+    def __repr__(self) -> str:
+        return described(self)
 
     def __post_init__(self) -> None:
         if not isinstance(self.stiffness, Stiffness):

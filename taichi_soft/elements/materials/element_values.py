@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -71,6 +72,21 @@ def spread(given: float | Array, name: str, elements: str, count: int) -> Array:
             f"{name} has {values.shape[0]} values for a mesh of {count} {elements}: give one each"
         )
     return np.ascontiguousarray(np.broadcast_to(values, (count,)))
+
+
+def described(material: Any) -> str:
+    """What `repr` says of a material: numbers as they are, arrays by their length and range."""
+    given = {each.name: getattr(material, each.name) for each in fields(material)}
+    texts = [f"{name}={_text(value)}" for name, value in given.items() if value is not None]
+    return f"{type(material).__name__}({', '.join(texts)})"
+
+
+def _text(value: Any) -> str:
+    if not isinstance(value, np.ndarray):
+        return f"{value:g}" if isinstance(value, float) else repr(value)
+    if value.ndim == 1:
+        return f"<{len(value)} values, {value.min():g} to {value.max():g}>"
+    return f"<array {' x '.join(map(str, value.shape))}>"
 
 
 def require_one_length(given: dict[str, Any], element: str) -> None:

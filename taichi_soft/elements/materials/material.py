@@ -17,6 +17,7 @@ from taichi_soft.elements.materials.element_values import (
     Array,
     as_constant,
     as_ratio,
+    described,
     is_damping,
     is_positive,
     require_one_length,
@@ -56,6 +57,9 @@ class Material:
     shear_modulus: float | Array | None = None
     shear_damping: float | Array | None = None
     damping_ratio: float = DAMPING_RATIO
+
+    def __repr__(self) -> str:
+        return described(self)
 
     def __post_init__(self) -> None:
         self._check("young", is_positive, f"above 0 Pa, {POSITIVE}")

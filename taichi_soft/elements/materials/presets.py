@@ -8,10 +8,14 @@ of metres dents it for good); damping ratios are half of usual loss factors at a
 
 from __future__ import annotations
 
+from typing import Literal, TypeAlias
+
 from taichi_soft.core.errors import OptionError
 from taichi_soft.elements.materials.material import Material
 
-PRESETS = {
+PresetName: TypeAlias = Literal["thesis_sphere", "gelatine", "soft_rubber", "foam", "cork", "auxetic_foam"]
+
+PRESETS: dict[PresetName, Material] = {
     "thesis_sphere": Material(young=1.0e6, poisson=0.1, density=1000.0, damping=100.0, damping_ratio=0.0),
     "gelatine": Material(young=1.0e5, poisson=0.45, density=1050.0, damping_ratio=0.08),
     "soft_rubber": Material(young=2.0e6, poisson=0.47, density=1100.0, damping_ratio=0.05),
@@ -21,7 +25,7 @@ PRESETS = {
 }
 
 
-def preset(name: str) -> Material:
+def preset(name: PresetName) -> Material:
     """The material of that name. Raises: OptionError with the names there are."""
     if not isinstance(name, str) or name not in PRESETS:
         raise OptionError(f"unknown material {name!r}: choose one of {', '.join(map(repr, PRESETS))}")

@@ -15,6 +15,7 @@ from taichi_soft.elements.materials.element_values import (
     POSITIVE,
     Array,
     as_constant,
+    described,
     is_damping,
     is_positive,
     require_one_length,
@@ -37,6 +38,9 @@ class SpringMaterial:
     stiffness: float | Array
     damping: float | Array = 0.0
     rest_length: float | Array | None = None
+
+    def __repr__(self) -> str:
+        return described(self)
 
     def __post_init__(self) -> None:
         self._check("stiffness", is_positive, f"above 0 N/m, {POSITIVE}")

@@ -94,6 +94,9 @@ class Stiffness:
         matrix.flags.writeable = False
         object.__setattr__(self, "matrix", matrix)
 
+    def __repr__(self) -> str:
+        return f"Stiffness({self.symmetry()}, up to {np.abs(self.matrix).max():g} Pa)"
+
     @classmethod
     def isotropic(cls, young: float, poisson: float) -> Stiffness:
         """The same in all directions: 2 constants (thesis eq. 2.35). young [Pa], poisson from -1 to 0.5."""

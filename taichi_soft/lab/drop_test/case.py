@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from taichi_soft import Material, TetMesh, box, cylinder, element_model, sphere, stable_step, torus
 from taichi_soft.core.constants import GRAVITY_EARTH
-from taichi_soft.core.types import Flips
+from taichi_soft.core.types import Flips, FlipsName, LawName
 from taichi_soft.elements.laws import LAWS
 from taichi_soft.lab.drop_test.course import HALF, Solid, make_course, random_rotation
 
@@ -50,8 +50,8 @@ class Case:
     velocity: Floats
     angular_velocity: Floats
     course: tuple[Solid, ...]
-    law: str
-    flips: str | None
+    law: LawName
+    flips: FlipsName | None
     substeps: int  # of a step of 1/60 s
 
     @property
@@ -78,7 +78,7 @@ class Case:
         )
 
 
-def make_case(seed: int, number: int, law: str = "virial", flips: str | None = None) -> Case:
+def make_case(seed: int, number: int, law: LawName = "virial", flips: FlipsName | None = None) -> Case:
     """Case `number` of `seed`, by a law and its treatment of flips: "recover" where none is given and the law
     lets one choose.
 

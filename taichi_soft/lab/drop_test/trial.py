@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft import Contact, FrozenBodyWarning, HeightFieldShape, Material, SoftBodyAsset, World
+from taichi_soft.core.types import FlipsName, LawName
 from taichi_soft.lab.drop_test.case import LARGEST, SHAPES, STEPS_PER_SECOND, Case, shape_mesh
 from taichi_soft.lab.drop_test.outcome import Outcome
 from taichi_soft.world.body import Body
@@ -159,7 +160,7 @@ def _world_of(batch: list[Case]) -> tuple[World, list[_Run]]:
 
 
 @cache
-def _filler(shape: str, law: str, flips: str | None) -> SoftBodyAsset:
+def _filler(shape: str, law: LawName, flips: FlipsName | None) -> SoftBodyAsset:
     """Of slots that stay empty: soft and pinned, so that nothing warns of its step or its weight."""
     mesh = shape_mesh(shape, LARGEST, np.full(2, 0.5))
     pinned = range(len(mesh.vertices))

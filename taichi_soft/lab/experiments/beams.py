@@ -108,13 +108,13 @@ def conclude(results: Results) -> Section:
             why,
         )
 
-    def held(claim: str, load: str, law: str) -> Finding:
+    def held(claim: str, load: str, theory: str) -> Finding:
         away = max(abs(numbers[load] - 1) for numbers in solid)
         others = [numbers[load] for point, numbers in laws if not is_tetrahedral(point["law"])]
         return Finding(
             claim,
-            f"tetrahedral laws resist with {law} to {away:.1g}; laws along edges with {min(others):.2f} to "
-            f"{max(others):.2f} of it",
+            f"tetrahedral laws resist with {theory} to {away:.1g}; laws along edges with {min(others):.2f} "
+            f"to {max(others):.2f} of it",
             Verdict.AGREES if away < EXACT else Verdict.DIFFERS,
             "" if away < EXACT else f"model: linear finite elements reach {linear[load]:.5f} on this mesh",
         )

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from taichi_soft import Material, TetMesh, World
+from taichi_soft.core.types import LawName
 from taichi_soft.lab.experiments.anisotropy import mesh_of
 from taichi_soft.lab.experiments.experiment import (
     Effort,
@@ -25,7 +26,7 @@ from taichi_soft.lab.experiments.law_stability import vibration
 from taichi_soft.lab.experiments.timing import in_turns
 
 MATERIAL = Material(1e6, 0.25, 1000.0, damping_ratio=0.0)
-LAWS = ("cmpm", "best_fitting_plane")
+LAWS: tuple[LawName, ...] = ("cmpm", "best_fitting_plane")
 MESHES = ("another uneven block", "uneven block", "ball")
 STEP, SUBSTEPS = 1e-4, 200
 """Of what is timed: so short that bodies at rest stay there."""
@@ -52,7 +53,7 @@ def measure(point: Point) -> Numbers:
     }
 
 
-def _world(mesh: TetMesh, law: str) -> World:
+def _world(mesh: TetMesh, law: LawName) -> World:
     world = World(gravity=(0, 0, 0), floor=None, retries=0)
     world.add_body(mesh, MATERIAL, law=law)
     world.build()

@@ -6,6 +6,7 @@ import warnings
 from functools import cache
 
 from taichi_soft import Body, FrozenBodyWarning, Material, TetMesh, UnstableStepWarning, World, sphere
+from taichi_soft.core.types import IntegratorName
 from taichi_soft.lab.experiments.experiment import Numbers
 
 MATERIAL = Material(young=7.0e9, poisson=0.3, density=1000.0, damping=4000.0, damping_ratio=0.0)
@@ -32,7 +33,7 @@ def _mesh(resolution: int) -> TetMesh:
 class Drop:
     """A sphere above the floor."""
 
-    def __init__(self, integrator: str, factor: float, resolution: int) -> None:
+    def __init__(self, integrator: IntegratorName, factor: float, resolution: int) -> None:
         self.world = World(integrator=integrator, retries=0)
         mesh = _mesh(resolution)
         self.rest_volume = mesh.volume

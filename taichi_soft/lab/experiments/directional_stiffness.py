@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft import Material, TetMesh, internal_forces
+from taichi_soft.core.types import LawName
 
 Floats = NDArray[np.float64]
 
@@ -21,7 +22,7 @@ def directions(count: int) -> Floats:
     return np.stack([ring * np.cos(turn), ring * np.sin(turn), z], axis=1)
 
 
-def stretch_modulus(mesh: TetMesh, material: Material, law: str, direction: Floats) -> float:
+def stretch_modulus(mesh: TetMesh, material: Material, law: LawName, direction: Floats) -> float:
     """Twice the work per volume and squared strain [Pa]: lambda + 2 mu of an isotropic material.
 
     Nothing moves across the direction. The work is that of the forces half way.

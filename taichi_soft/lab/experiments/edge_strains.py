@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft import Material, TetMesh, force_gradient
+from taichi_soft.core.types import LawName
 
 Floats = NDArray[np.float64]
 
@@ -25,7 +26,7 @@ class EdgeReading:
     shear_stiffness: float  # a G / l [N/m]
 
 
-def read_edge(mesh: TetMesh, material: Material, positions: Floats, law: str) -> EdgeReading:
+def read_edge(mesh: TetMesh, material: Material, positions: Floats, law: LawName) -> EdgeReading:
     """Reading of the edge between vertices 0 and 1."""
     block = force_gradient(mesh, material, positions, law=law)[0, :, 1, :]
     values, vectors = np.linalg.eigh((block + block.T) / 2)

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from taichi_soft import ParticleMesh, SpringMaterial, UnstableStepWarning, World
+from taichi_soft.core.types import IntegratorName
 from taichi_soft.lab.experiments.experiment import (
     Effort,
     Experiment,
@@ -25,7 +26,7 @@ from taichi_soft.lab.experiments.experiment import (
     Verdict,
 )
 
-INTEGRATORS = ("explicit_euler", "implicit_euler", "leapfrog")
+INTEGRATORS: tuple[IntegratorName, ...] = ("explicit_euler", "implicit_euler", "leapfrog")
 MOVING = 5
 """Particles between the fixed ones. With more, explicit Euler blows up round-off in higher modes first."""
 
@@ -79,7 +80,7 @@ def measure(point: Point) -> Numbers:
     return {"displacement": u.round(7).tolist(), "amplitude": np.hypot(u, v).round(7).tolist()}
 
 
-def per_step(integrator: str, angle: float) -> float:
+def per_step(integrator: IntegratorName, angle: float) -> float:
     """What one step makes of the amplitude, in closed form."""
     growth = float(np.hypot(1.0, angle))
     return {"explicit_euler": growth, "implicit_euler": 1 / growth}.get(integrator, 1.0)

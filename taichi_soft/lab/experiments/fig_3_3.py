@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from taichi_soft.core.types import IntegratorName
 from taichi_soft.lab.experiments.experiment import (
     Effort,
     Experiment,
@@ -25,7 +26,7 @@ from taichi_soft.lab.experiments.experiment import (
 )
 from taichi_soft.lab.experiments.oscillators import step_factors
 
-INTEGRATORS = ("explicit_euler", "implicit_euler")
+INTEGRATORS: tuple[IntegratorName, ...] = ("explicit_euler", "implicit_euler")
 LEFT, TOP = -3.0, 2.4
 """Of the plane of h lambda; the lower half mirrors the upper."""
 
@@ -55,7 +56,7 @@ def measure(point: Point) -> Numbers:
     return {"factor": factors.reshape(len(y), len(x)).round(6).tolist()}
 
 
-def closed_form(integrator: str, z: NDArray[np.complex128]) -> NDArray[np.float64]:
+def closed_form(integrator: IntegratorName, z: NDArray[np.complex128]) -> NDArray[np.float64]:
     """Factor of a step, eq. 3.5 and 3.6."""
     return np.asarray(np.abs(1 + z) if integrator == "explicit_euler" else np.abs(1 / (1 - z)))
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from taichi_soft import FrozenBodyWarning, Material, TetMesh, UnstableStepWarning, World, internal_forces
+from taichi_soft.core.types import LawName
 
 STEPS = 200
 GROWTH = 3.0
@@ -25,7 +26,7 @@ class Vibration:
     growth_rate: float  # largest [1/s]: forces without an energy may feed a vibration, whatever the step
 
 
-def vibration(mesh: TetMesh, material: Material, law: str) -> Vibration:
+def vibration(mesh: TetMesh, material: Material, law: LawName) -> Vibration:
     """From all eigenvalues of M^-1 K, with K from differences of the forces."""
     count = mesh.vertices.size
     nudge = 1e-6 * float(mesh.edge_lengths.min())
@@ -48,7 +49,7 @@ def vibration(mesh: TetMesh, material: Material, law: str) -> Vibration:
 class ShakenBody:
     """A body that is shaken a little, again and again."""
 
-    def __init__(self, mesh: TetMesh, material: Material, law: str) -> None:
+    def __init__(self, mesh: TetMesh, material: Material, law: LawName) -> None:
         """Float in no gravity."""
         self.world = World(gravity=(0, 0, 0), floor=None, retries=0)
         self.body = self.world.add_body(mesh, material, law=law)

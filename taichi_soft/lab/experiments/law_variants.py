@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from taichi_soft import LAWS
-from taichi_soft.core.types import Strain
+from taichi_soft.core.types import LawName, Strain
 from taichi_soft.elements.laws import BondLaw
 from taichi_soft.lab.experiments.experiment import Effort, Point
 
@@ -21,7 +21,7 @@ def variants(effort: Effort) -> list[Point]:
     return every
 
 
-def is_tetrahedral(law: str) -> bool:
+def is_tetrahedral(law: LawName) -> bool:
     """Whether it turns the stress of tetrahedra into forces; others act along edges."""
     return not isinstance(LAWS[law], BondLaw)
 

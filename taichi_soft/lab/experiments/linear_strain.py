@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from taichi_soft import Material, TetMesh, internal_forces
+from taichi_soft.core.types import StrainName
 from taichi_soft.lab.experiments.experiment import (
     Effort,
     Experiment,
@@ -51,7 +52,7 @@ def measure(point: Point) -> Numbers:
     }
 
 
-def _told(kind: str, amount: float, strain: str) -> float:
+def _told(kind: str, amount: float, strain: StrainName) -> float:
     """From the forces of the code."""
     x = TET.vertices @ _deformation(kind, amount).T
     forces = internal_forces(TET, Material(YOUNG, 0.0, 1000.0, damping_ratio=0.0), x, strain=strain)

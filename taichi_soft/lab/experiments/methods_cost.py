@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from taichi_soft import Material, World, box, internal_forces, voronoi_graph
+from taichi_soft.core.types import LawName
 from taichi_soft.lab.experiments.experiment import (
     Effort,
     Experiment,
@@ -21,7 +22,7 @@ from taichi_soft.lab.experiments.experiment import (
 from taichi_soft.lab.experiments.irregular import cube
 from taichi_soft.lab.experiments.judgement import judged
 
-LAWS = ("virial", "face", "springs", "cmpm")
+LAWS: tuple[LawName, ...] = ("virial", "face", "springs", "cmpm")
 MATERIAL = Material(young=1e5, poisson=0.3, density=1000.0, damping=0.1, damping_ratio=0.0)
 SUBSTEPS, SUBSTEP = 20, 1e-5  # [s], far below every limit: the bodies just fall
 SAME = 1e-9

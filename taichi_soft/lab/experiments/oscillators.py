@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft import ParticleMesh, SpringMaterial, UnstableStepWarning, World
+from taichi_soft.core.types import IntegratorName
 
 Floats = NDArray[np.float64]
 
@@ -23,7 +24,11 @@ SLACK = 1e-9
 
 
 def run_oscillators(
-    integrator: str, stiffness: ArrayLike, damping: ArrayLike, start: tuple[ArrayLike, ArrayLike], steps: int
+    integrator: IntegratorName,
+    stiffness: ArrayLike,
+    damping: ArrayLike,
+    start: tuple[ArrayLike, ArrayLike],
+    steps: int,
 ) -> tuple[Floats, Floats]:
     """Displacements [m] and velocities [m/s] at the start and after each step of 1 s, (steps + 1, m) each.
 
@@ -54,7 +59,7 @@ def run_oscillators(
     return np.array([row[0] for row in found]), np.array([row[1] for row in found])
 
 
-def step_factors(integrator: str, stiffness: ArrayLike, damping: ArrayLike) -> Floats:
+def step_factors(integrator: IntegratorName, stiffness: ArrayLike, damping: ArrayLike) -> Floats:
     """Largest modulus of the eigenvalues of a step of each oscillator, (m,): above 1 it grows.
 
     From what is left of two different starts after two steps and after three. For methods whose state is

@@ -7,7 +7,7 @@ modulus whose largest stable step is the thesis's, tells how much of the upper e
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from taichi_soft import FrozenBodyWarning, Material, TetMesh, UnstableStepWarning, World, load_mesh, sphere
 from taichi_soft.bodies.stability import stable_step
 from taichi_soft.core.package_data import ASSETS
+from taichi_soft.core.types import FlipsName
 from taichi_soft.elements.laws import element_model
 from taichi_soft.lab.experiments.experiment import (
     Effort,
@@ -38,7 +39,7 @@ LEAST, MOST = 1e5, 1e7
 """Range of the moduli tried [Pa]."""
 ROUNDING = 1.5
 """By what an edge of the window may miss the thesis's, which has one digit: 1e6 may stand for 1.5e6."""
-FLIPS = ("tolerant", "recover", "off")
+FLIPS: tuple[FlipsName, ...] = ("tolerant", "recover", "off")
 MESHES = ("thesis", "coarse", "fine")
 OUTCOMES = ("collapses", "dented", "whole", "explodes")
 
@@ -57,7 +58,7 @@ def points(effort: Effort) -> list[Point]:
     return drops + [_drop(mesh, nu, "tolerant", 21, 6.0) for mesh in MESHES[1:] for nu in WINDOWS] + limits
 
 
-def _drop(mesh: str, nu: float, flips: str, moduli: int, seconds: float) -> Point:
+def _drop(mesh: str, nu: float, flips: FlipsName, moduli: int, seconds: float) -> Point:
     drop = {"part": "drop", "mesh": mesh, "poisson": nu}
     return {**drop, "flips": flips, "moduli": moduli, "seconds": seconds}
 
@@ -310,7 +311,7 @@ def _collapse_finding(results: Results) -> Finding:
     return Finding("sphere-collapse", measured, Verdict.AGREES if agrees else Verdict.DIFFERS, why)
 
 
-def _draw(figure: Any, results: Results, names: list[str]) -> None:
+def _draw(figure: Any, results: Results, names: Sequence[str]) -> None:
     colors = {"collapses": "tab:blue", "dented": "tab:cyan", "whole": "tab:green", "explodes": "tab:red"}
     panels: NDArray[Any] = figure.subplots(1, len(names), sharey=True, squeeze=False)[0]
     for axes, flips in zip(panels, names, strict=True):

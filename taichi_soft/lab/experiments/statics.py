@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from taichi_soft import LAWS, Material, TetMesh, internal_forces
 from taichi_soft.core.errors import TaichiSoftError
+from taichi_soft.core.types import LawName, StrainName
 from taichi_soft.elements.laws import BondLaw
 from taichi_soft.elements.laws.bonds import Ring
 from taichi_soft.lab.experiments.sparse_gradient import Floats, SparseGradient
@@ -65,7 +66,9 @@ class Equilibrium:
 class StaticBody:
     """One mesh, material and law. What was factorised for one loading serves others of the same `driven`."""
 
-    def __init__(self, mesh: TetMesh, material: Material, law: str, strain: str | None = None) -> None:
+    def __init__(
+        self, mesh: TetMesh, material: Material, law: LawName, strain: StrainName | None = None
+    ) -> None:
         """At rest, where the mesh is."""
         self.mesh, self.material = mesh, material
         self._law, self._strain = law, strain
@@ -148,7 +151,7 @@ def factorised(matrix: Any) -> Any:
     return factors.solve
 
 
-def _dependence(mesh: TetMesh, material: Material, law: str) -> Any:
+def _dependence(mesh: TetMesh, material: Material, law: LawName) -> Any:
     """Which vertices' forces depend on where which vertices are: sparse, symmetric (n, n)."""
     from scipy.sparse import coo_matrix
 

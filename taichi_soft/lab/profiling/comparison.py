@@ -10,6 +10,7 @@ import numpy as np
 
 from taichi_soft.bodies.description import BodyDescription
 from taichi_soft.bodies.layout import arrange
+from taichi_soft.core.types import LawName
 from taichi_soft.elements.laws import element_model
 from taichi_soft.elements.materials import Material
 from taichi_soft.lab.profiling.baseline import Baseline
@@ -25,7 +26,7 @@ SUBSTEP = 1.0e-5  # [s], far below every limit: the bodies just fall
 PUSHED_APART = 0.02  # initial stretch, so that elastic forces act
 
 
-NATIVE_LAWS = ("virial", "springs", "volume_springs")
+NATIVE_LAWS: tuple[LawName, ...] = ("virial", "springs", "volume_springs")
 """What `baseline.cpp` has."""
 
 
@@ -33,7 +34,7 @@ NATIVE_LAWS = ("virial", "springs", "volume_springs")
 class Comparison:
     """One body on one thread, with Taichi and in C++."""
 
-    law: str
+    law: LawName
     element: str  # "tetrahedron" or "edge"
     tets: int
     taichi: Spread  # [ns per element and substep], Python included
@@ -46,13 +47,13 @@ def compare_with_baseline(
     library: ctypes.CDLL,
     repeats: int = 31,
     sizes: dict[int, tuple[int, int, int]] = SIZES,
-    laws: tuple[str, ...] = NATIVE_LAWS,
+    laws: tuple[LawName, ...] = NATIVE_LAWS,
 ) -> list[Comparison]:
     """Measure every law and size against the library that `compile_baseline` made."""
     return [_compare(library, repeats, cells, law) for law in laws for cells in sizes.values()]
 
 
-def _compare(library: ctypes.CDLL, repeats: int, cells: tuple[int, int, int], law: str) -> Comparison:
+def _compare(library: ctypes.CDLL, repeats: int, cells: tuple[int, int, int], law: LawName) -> Comparison:
     mesh = box((1.0, 1.0, 1.0), cells)
     world = World(floor=None, schedule="per_body")
     body = world.add_body(mesh, MATERIAL, law=law, position=(0.0, 0.0, 1.0))

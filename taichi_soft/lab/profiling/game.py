@@ -14,6 +14,7 @@ from taichi_soft.bodies.asset import SoftBodyAsset
 from taichi_soft.bodies.contact import DEFAULT_CONTACT, Contact
 from taichi_soft.contact.shapes import BoxShape
 from taichi_soft.core.package_data import ASSETS
+from taichi_soft.core.types import LawName
 from taichi_soft.elements.materials import preset
 from taichi_soft.elements.materials.material import DAMPING_RATIO
 from taichi_soft.lab.profiling.spread import Spread, compare, time_calls
@@ -70,7 +71,7 @@ def _mesh() -> TetMesh:
 def _spheres(
     height: float,
     contact: Contact = DEFAULT_CONTACT,
-    law: str | None = "virial",
+    law: LawName | None = "virial",
     damping_ratio: float = 0.0,
     **options: Any,
 ) -> World:

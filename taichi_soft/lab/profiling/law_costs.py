@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
+from taichi_soft.core.types import LawName, StrainName
 from taichi_soft.elements.laws import LAWS, BondLaw, Law, element_model
 from taichi_soft.elements.materials import AnisotropicMaterial, Material, Stiffness
 from taichi_soft.lab.profiling.spread import Spread, compare
@@ -24,25 +25,25 @@ SUBSTEP = 1.0e-5  # [s], far below every limit: the bodies just fall
 class LawCost:
     """A law with one of the strains it takes, None where it has none to choose, and one kind of material."""
 
-    law: str
-    strain: str | None
+    law: LawName
+    strain: StrainName | None
     is_anisotropic: bool
     element: str  # that it works on: "tetrahedron" or "edge"
     cost: Spread  # of a whole substep, edge damping included [ns per element]
     ratio: Spread  # over that of "virial" with the linear strain, pair by pair
 
 
-def kinds_of(laws: Iterable[Law]) -> list[tuple[Law, str | None, bool]]:
+def kinds_of(laws: Iterable[Law]) -> list[tuple[Law, StrainName | None, bool]]:
     """Each law with every strain, None where it has none to choose, and once with anisotropic material."""
-    found: list[tuple[Law, str | None, bool]] = []
+    found: list[tuple[Law, StrainName | None, bool]] = []
     for law in laws:
-        strains: list[str | None] = [strain.value for strain in law.strains] or [None]
+        strains: list[StrainName | None] = [strain.value for strain in law.strains] or [None]
         found += [(law, strain, False) for strain in strains]
         found += [(law, strains[0], True)] * law.takes_anisotropy
     return found
 
 
-def measure_laws(names: Sequence[str] = tuple(LAWS), repeats: int = 11) -> list[LawCost]:
+def measure_laws(names: Sequence[LawName] = tuple(LAWS), repeats: int = 11) -> list[LawCost]:
     """Measure every kind of these laws, on one body and so on one thread. Raises: OptionError for no law."""
     laws = [element_model(name).law for name in names]
     usual = _falling("virial", None, MATERIAL)
@@ -55,7 +56,9 @@ def measure_laws(names: Sequence[str] = tuple(LAWS), repeats: int = 11) -> list[
     return found
 
 
-def _falling(law: str, strain: str | None, material: Material | AnisotropicMaterial) -> partial[None]:
+def _falling(
+    law: LawName, strain: StrainName | None, material: Material | AnisotropicMaterial
+) -> partial[None]:
     world = World(floor=None, schedule="per_body")
     world.add_body(MESH, material, law=law, strain=strain)
     world.build()

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from engine_adapter import EngineAdapter, FixedStep
+from taichi_soft.core.types import ScheduleName
 from taichi_soft.elements.materials import Material
 from taichi_soft.lab.profiling.spread import Spread, time_calls
 from taichi_soft.meshing import TetMesh, sphere
@@ -32,7 +33,7 @@ class Phases:
     python: Spread  # advance and read a single tetrahedron: what a frame costs before any physics [ms]
 
 
-def spheres(count: int, schedule: str = "auto", mesh: TetMesh | None = None) -> World:
+def spheres(count: int, schedule: ScheduleName = "auto", mesh: TetMesh | None = None) -> World:
     """A built world of equal bodies in free fall, spheres of 1,280 tetrahedra unless `mesh` is given."""
     mesh = mesh or sphere(radius=1.0, resolution=4)
     world = World(schedule=schedule)

@@ -10,6 +10,7 @@ import time
 from dataclasses import dataclass
 
 from taichi_soft.core.errors import DeviceError
+from taichi_soft.core.types import ArchName
 
 _PROGRAM = """
 import numpy as np
@@ -33,7 +34,7 @@ class Startup:
     warm: float  # kernels in Taichi's offline cache
 
 
-def measure_startup(arch: str, threads: int, cores: tuple[int, ...]) -> Startup:
+def measure_startup(arch: ArchName, threads: int, cores: tuple[int, ...]) -> Startup:
     """Run a small game twice in processes of their own, with a cache of their own.
 
     Args:

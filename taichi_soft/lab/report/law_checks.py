@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from taichi_soft import LAWS
+from taichi_soft.core.types import LawName
 from taichi_soft.lab.experiments import Results, Table
 from taichi_soft.lab.experiments.bar_stiffness import LINEAR
 from taichi_soft.lab.experiments.beams import LOADS
@@ -98,5 +99,5 @@ def _spread(results: Results) -> Values:
     return {point["law"]: spread(numbers["around"]) for point, numbers in results.where(mesh="block")}
 
 
-def _name(law: str) -> str:
+def _name(law: LawName) -> str:
     return LINEAR if law == ELEMENTS else law

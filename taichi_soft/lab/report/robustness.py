@@ -11,6 +11,7 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
+from taichi_soft.core.types import ArchName
 from taichi_soft.lab.drop_test.robustness import GROUPS, Verdict, run_cell
 from taichi_soft.lab.drop_test.robustness.cells import Cell
 from taichi_soft.lab.drop_test.robustness.trial import CALM_TIME, DROP, DROP_TIME, MOST_WORK, RECOVERY_TIME
@@ -54,7 +55,7 @@ CRITERION = (
 
 
 def run_sweep(
-    cells: Sequence[Cell], folder: Path, console: Console, *, workers: int | None, arch: str
+    cells: Sequence[Cell], folder: Path, console: Console, *, workers: int | None, arch: ArchName
 ) -> list[Result]:
     """Compute cells that are not in `folder` yet, and keep each there as soon as it is done; group by group.
 
@@ -155,13 +156,13 @@ def line_of(row: Result) -> str:
     return f"{line} [{', '.join(soft)}]" if soft else line
 
 
-def write_page(rows: Sequence[Result], path: Path, command: str, arch: str) -> None:
+def write_page(rows: Sequence[Result], path: Path, command: str, arch: ArchName) -> None:
     """The table, what is not well, and the meshes, as Markdown. Raises: OSError."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text("\n".join(_page(rows, command, arch)) + "\n", encoding="utf-8")
 
 
-def _page(rows: Sequence[Result], command: str, arch: str) -> Iterator[str]:
+def _page(rows: Sequence[Result], command: str, arch: ArchName) -> Iterator[str]:
     facts = machine_facts(arch, "processes of this machine")
     yield "# Which bodies hold"
     yield ""

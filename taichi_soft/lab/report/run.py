@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from taichi_soft.core.errors import OptionError
+from taichi_soft.core.types import ArchName
 from taichi_soft.lab.experiments import (
     EXPERIMENTS,
     Effort,
@@ -68,7 +69,7 @@ def run_experiments(
     *,
     workers: int | None = None,
     cluster: str | None = None,
-    arch: str = "cpu",
+    arch: ArchName = "cpu",
     time_limit: float = TIME_LIMIT,
 ) -> list[Concluded]:
     """Measure all points that are not in `folder` yet, and conclude.
@@ -108,7 +109,7 @@ def run_experiments(
 
 
 @contextmanager
-def _workers(cluster: str | None, workers: int | None, arch: str) -> Iterator[list[Worker]]:
+def _workers(cluster: str | None, workers: int | None, arch: ArchName) -> Iterator[list[Worker]]:
     with cluster_workers(cluster, arch) if cluster else local_workers(workers, arch) as crew:
         yield crew
 

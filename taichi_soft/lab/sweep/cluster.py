@@ -13,6 +13,7 @@ from typing import Any
 
 from taichi_soft.core.errors import SweepError
 from taichi_soft.core.extras import require_extra
+from taichi_soft.core.types import ArchName
 from taichi_soft.lab.sweep.provenance import origin
 from taichi_soft.lab.sweep.task import Outcome, Task, Worker, compute
 
@@ -36,7 +37,7 @@ LOOK = 1.0
 
 
 @contextmanager
-def cluster_workers(address: str, arch: str = "cpu") -> Iterator[list[Worker]]:
+def cluster_workers(address: str, arch: ArchName = "cpu") -> Iterator[list[Worker]]:
     """The workers that a cluster has now. Workers started later take the place of lost ones.
 
     Each computes one point at a time, whatever threads it has.
@@ -71,7 +72,7 @@ def cluster_workers(address: str, arch: str = "cpu") -> Iterator[list[Worker]]:
         yield [ClusterWorker(client, addresses, arch) for _ in addresses.all()]
 
 
-def _require_same_code(client: Any, arch: str) -> None:
+def _require_same_code(client: Any, arch: ArchName) -> None:
     mine = origin(arch)
     with _losses():
         found = client.run(origin, arch, on_error="return")
@@ -119,7 +120,7 @@ class _Addresses:
 class ClusterWorker:
     """A worker of a cluster; where it was lost, another one."""
 
-    def __init__(self, client: Any, addresses: _Addresses, arch: str) -> None:
+    def __init__(self, client: Any, addresses: _Addresses, arch: ArchName) -> None:
         self._client, self._addresses, self._arch = client, addresses, arch
         self._address: str | None = None
         self._is_started = False

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from taichi_soft.core.runtime import init
+from taichi_soft.core.types import ArchName
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,7 @@ class Worker(Protocol):
 
 
 def compute(
-    arch: str, function: Callable[[dict[str, Any]], dict[str, Any]], point: dict[str, Any]
+    arch: ArchName, function: Callable[[dict[str, Any]], dict[str, Any]], point: dict[str, Any]
 ) -> Outcome:
     """Compute a point in this process, on one thread of the CPU or on `arch`.
 

@@ -12,6 +12,7 @@ from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
 
 from taichi_soft.core.cores import available_cores
+from taichi_soft.core.types import ArchName
 from taichi_soft.lab.sweep.task import Outcome, Task, Worker, compute
 
 CONTEXT = multiprocessing.get_context("spawn")
@@ -24,7 +25,7 @@ END_LIMIT = 10.0
 
 
 @contextmanager
-def local_workers(count: int | None = None, arch: str = "cpu") -> Iterator[list[Worker]]:
+def local_workers(count: int | None = None, arch: ArchName = "cpu") -> Iterator[list[Worker]]:
     """Processes of one thread each, started when they are needed; None: one for each core."""
     workers = [LocalWorker(arch) for _ in range(count or len(available_cores()))]
     try:
@@ -37,7 +38,7 @@ def local_workers(count: int | None = None, arch: str = "cpu") -> Iterator[list[
 class LocalWorker:
     """A process of this machine; where it was lost, the next point starts another one."""
 
-    def __init__(self, arch: str) -> None:
+    def __init__(self, arch: ArchName) -> None:
         self._arch = arch
         self._process: SpawnProcess | None = None
         self._pipe: Connection | None = None
@@ -123,7 +124,7 @@ def _start_unseen(process: SpawnProcess) -> None:
     signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _serve(pipe: Connection, arch: str) -> None:
+def _serve(pipe: Connection, arch: ArchName) -> None:
     """Compute what is sent until None is, or nobody is there any more."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     with suppress(EOFError, BrokenPipeError):

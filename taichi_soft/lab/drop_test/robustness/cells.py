@@ -11,6 +11,7 @@ import numpy as np
 from taichi_soft import TetMesh
 from taichi_soft.core.constants import GRAVITY_EARTH
 from taichi_soft.core.errors import OptionError
+from taichi_soft.core.types import FlipsName, LawName
 from taichi_soft.elements.laws import LAWS, EnergyLaw, StressLaw
 from taichi_soft.lab.drop_test.case import MOST_SAG, edge_damping
 from taichi_soft.lab.drop_test.robustness.foreign_meshes import FOREIGN_MESHES
@@ -69,8 +70,8 @@ def law_variants() -> list[tuple[str | None, str | None]]:
 def choose_cells(
     groups: list[str] | None = None,
     *,
-    law: str | None = None,
-    flips: str | None = None,
+    law: LawName | None = None,
+    flips: FlipsName | None = None,
     damping: str | None = None,
     count: int | None = None,
     wrecks: int = 0,

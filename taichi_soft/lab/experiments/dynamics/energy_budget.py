@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft import Material, TetMesh, World, box
+from taichi_soft.core.types import LawName
 from taichi_soft.lab.experiments.experiment import (
     Effort,
     Experiment,
@@ -85,7 +86,7 @@ def _edges(mesh: TetMesh, positions: Floats) -> Floats:
     return np.asarray(corners[:, 1:] - corners[:, :1])
 
 
-def _energy_density(law: str, F: Floats) -> Floats:
+def _energy_density(law: LawName, F: Floats) -> Floats:
     """Of deformations (m, 3, 3) [J/m^3]. For a law without energy that of Hooke's law, which is the same in
     the strains F F^T and F^T F."""
     mu, lam = YOUNG / (2 * (1 + POISSON)), YOUNG * POISSON / ((1 + POISSON) * (1 - 2 * POISSON))

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from taichi_soft.core.types import LawName
 from taichi_soft.lab.experiments.dynamics.beam_theory import euler_bernoulli_frequency
 from taichi_soft.lab.experiments.dynamics.compared_laws import TETRAHEDRAL, laws_of
 from taichi_soft.lab.experiments.dynamics.swinging_beam import (
@@ -148,7 +149,7 @@ def _excess(results: Results, support: str, cells: int) -> str:
     return f"{results.one(law='virial', cells=cells)[support] / theory(support) - 1:.0%}"
 
 
-def _extrapolated(results: Results, support: str, law: str = "virial") -> float:
+def _extrapolated(results: Results, support: str, law: LawName = "virial") -> float:
     """Frequency for cells without size from the two finest meshes, with an error of second order."""
     rows = sorted((point["cells"], numbers[support]) for point, numbers in results.where(law=law))
     (coarse, low), (fine, high) = rows[-2:]

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft import Material, PlaneShape, TetMesh, World, internal_forces, sphere
+from taichi_soft.core.types import LawName
 
 Floats = NDArray[np.float64]
 
@@ -41,7 +42,7 @@ def cap(mesh: TetMesh) -> NDArray[np.int64]:
     return np.flatnonzero(mesh.vertices[:, 2] > 0.5 * RADIUS)
 
 
-def press_on_floor(mesh: TetMesh, law: str) -> list[float]:
+def press_on_floor(mesh: TetMesh, law: LawName) -> list[float]:
     """What holds the cap when it was lowered by each depth [N], from the positions in float64."""
     held, ground = cap(mesh), float(mesh.vertices[:, 2].min())
     world = World(gravity=(0, 0, 0), floor=ground, friction=FRICTIONLESS, retries=0)
@@ -59,7 +60,7 @@ def press_on_floor(mesh: TetMesh, law: str) -> list[float]:
     return forces
 
 
-def press_plane(mesh: TetMesh, law: str) -> list[float]:
+def press_plane(mesh: TetMesh, law: LawName) -> list[float]:
     """The same with a plane that rises, from the impulse that it reports."""
     ground = float(mesh.vertices[:, 2].min())
     world = World(gravity=(0, 0, 0), floor=None, retries=0)

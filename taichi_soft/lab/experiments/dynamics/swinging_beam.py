@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft import FrozenBodyWarning, Material, TetMesh, World, box
+from taichi_soft.core.types import LawName
 from taichi_soft.lab.experiments.dynamics.beam_theory import Beam, first_shape, timoshenko_frequency
 from taichi_soft.lab.experiments.dynamics.compared_laws import WITHOUT_ENERGY
 
@@ -41,7 +42,7 @@ def theory(support: str) -> float:
     return timoshenko_frequency(BEAM, is_held=support == "cantilever")
 
 
-def swing(mesh: TetMesh, law: str, support: str) -> tuple[float, float]:
+def swing(mesh: TetMesh, law: LawName, support: str) -> tuple[float, float]:
     """Frequency [Hz], and a swing over the one a period before. 0 where it breaks."""
     shape, held = mode_shape(mesh, support)
     world = World(gravity=(0, 0, 0), floor=None, retries=0)
