@@ -39,7 +39,7 @@ SECONDS = {
     "persistence/": (15, 163),
     "engine_adapter/test_rollback": (30, 0),
     "core/math/": (2, 0),
-    "core/": (66, 37),
+    "core/": (66, 90),
     "world/": (84, 397),
     "bodies/": (3, 296),
     "lab/": (0, 355),

@@ -45,14 +45,14 @@ class _Burst:
             self.show(f"compiling {name} ({so_far}; a later start finds them in a cache)")
         return now
 
-    def end(self, name: str, start: float) -> None:
-        """It has run for the first time."""
+    def end(self, name: str, start: float, is_found: bool) -> None:
+        """It has run for the first time, `is_found` among those known or made from its source."""
         self._last = time.perf_counter()
         took = self._last - start
         if self._seconds > PATIENCE:
             self.show("")
         self._count, self._seconds = self._count + 1, self._seconds + took
-        _log.debug("kernel %s took %.3f s to compile, or to load, and to run once", name, took)
+        _log.debug("kernel %s took %.3f s, %s", name, took, "known" if is_found else "made from its source")
 
 
 BURST = _Burst()

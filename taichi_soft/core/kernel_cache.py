@@ -16,13 +16,18 @@ LONGEST_HELD = 30.0
 LOCK = "ticache.lock"
 
 
+def folder_of(default: str) -> Path:
+    """Where Taichi keeps kernels: `default`, or what the environment names."""
+    return Path(os.environ.get("TI_OFFLINE_CACHE_FILE_PATH") or default)
+
+
 def await_lock(default: str) -> None:
     """Wait until nobody else reads or writes the kernels kept. What a killed process left is removed.
 
     Args:
         default: the folder where the environment names no other.
     """
-    lock = Path(os.environ.get("TI_OFFLINE_CACHE_FILE_PATH") or default) / LOCK
+    lock = folder_of(default) / LOCK
     with contextlib.suppress(OSError):  # it is gone, or not ours to remove
         while abs(time.time() - lock.stat().st_mtime) < LONGEST_HELD:
             time.sleep(0.02)

@@ -21,7 +21,6 @@ from dataclasses import dataclass, replace
 from queue import SimpleQueue
 from typing import TypeVar
 
-from taichi_soft.core.compilation import BURST
 from taichi_soft.core.cores import (
     available_cores,
     bind_youngest,
@@ -31,14 +30,15 @@ from taichi_soft.core.cores import (
     thread_ids,
 )
 from taichi_soft.core.errors import DeviceError, OptionError
-from taichi_soft.core.kernel_cache import await_lock
+from taichi_soft.core.first_launch import FIRST_LAUNCHES
+from taichi_soft.core.kernel_cache import await_lock, folder_of
+from taichi_soft.core.known_kernels import KnownKernels
 from taichi_soft.core.subnormals import learn
 from taichi_soft.core.taichi_patches import (
     check_real_functions,
     has_pending_fields,
     let_threads_in,
     let_whole_numbers_overflow,
-    note_compilation,
     remember_sources,
     ti,
 )
@@ -195,6 +195,8 @@ def _start(arch: ArchName, reason: str, threads: int, cores: tuple[int, ...], is
     if is_checked:
         check_real_functions()
         let_whole_numbers_overflow()
+    elif arch == "cpu":
+        FIRST_LAUNCHES.open(KnownKernels(folder_of(ti.lang.impl.current_cfg().offline_cache_file_path)))
     ti.lang.impl.get_runtime().materialize()  # once, by the first kernel otherwise, in whichever thread
     _process = os.getpid()
     atexit.register(_end)
@@ -206,8 +208,10 @@ def _start(arch: ArchName, reason: str, threads: int, cores: tuple[int, ...], is
 def _end() -> None:
     """Let Taichi keep the kernels that it compiled: its own parts may go in any order."""
     if os.getpid() == _process:
+        FIRST_LAUNCHES.close()
         await_lock(ti.lang.impl.current_cfg().offline_cache_file_path)
         ti.reset()
+        FIRST_LAUNCHES.keep()
 
 
 def _bound(
@@ -277,7 +281,7 @@ def _lay_out(lay_out: Callable[[bool], None], is_first_call: bool) -> None:
 if ti.__version__[:2] == (1, 7):
     remember_sources()
     let_threads_in(_lay_out)
-    note_compilation(BURST.begin, BURST.end)
+    FIRST_LAUNCHES.install()
 
 
 def _serve() -> None:

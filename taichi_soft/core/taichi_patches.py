@@ -26,7 +26,6 @@ __all__ = [
     "has_pending_fields",
     "let_threads_in",
     "let_whole_numbers_overflow",
-    "note_compilation",
     "remember_sources",
     "ti",
 ]
@@ -105,35 +104,6 @@ def let_threads_in(lay_out_now: Callable[[Callable[[bool], None], bool], None]) 
     accessor.__init__ = make_in_turn
     lay_out = ti.lang.impl.PyTaichi.materialize_root_fb
     ti.lang.impl.PyTaichi.materialize_root_fb = staticmethod(functools.partial(lay_out_now, lay_out))
-
-
-def note_compilation(begin: Callable[[str], float], end: Callable[[str, float], None]) -> None:
-    """Tell when a kernel is compiled, until it has run once: Taichi 1.7 finishes it in the first launch.
-
-    Args:
-        begin: is told the kernel's name, and returns the time.
-        end: is told both.
-    """
-    kernel = ti.lang.kernel_impl.Kernel
-    materialize = kernel.materialize
-
-    def noted(self: Any, key: Any = None, args: Any = None, arg_features: Any = None) -> None:
-        if key in self.compiled_kernels:
-            return
-        name = self.func.__name__
-        start = begin(name)
-
-        def launch_first(*given: Any) -> Any:
-            del self.launch_kernel  # from now on that of the class
-            try:
-                return self.launch_kernel(*given)
-            finally:
-                end(name, start)
-
-        materialize(self, key, args, arg_features)
-        self.launch_kernel = launch_first
-
-    kernel.materialize = noted
 
 
 def has_pending_fields() -> bool:

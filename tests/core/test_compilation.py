@@ -16,7 +16,7 @@ def told(monkeypatch):
     def compile_in(seconds, name="step"):
         start = burst.begin(name)
         clock[0] += seconds
-        burst.end(name, start)
+        burst.end(name, start, False)
 
     return compile_in, told, clock
 

@@ -1,0 +1,161 @@
+"""What is done when a kernel is first called: it is looked for among those known, or made from its source."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable
+from typing import Any
+
+from taichi_soft.core.compilation import BURST
+from taichi_soft.core.known_kernels import (
+    FLAG,
+    KnownKernels,
+    UnknownPartError,
+    digest_of,
+    name_of,
+    short_body,
+    short_name_of,
+)
+from taichi_soft.core.taichi_patches import ti
+
+kernels = ti.lang.kernel_impl
+Make = Callable[..., None]
+
+
+class FirstLaunches:
+    """Of all kernels of a process."""
+
+    def __init__(self) -> None:
+        self._known: KnownKernels | None = None
+        self._flag: Any = None
+        self._made: list[tuple[Any, Any, str]] = []  # kernel, what Taichi tells its arrays apart by, digest
+
+    def open(self, known: KnownKernels) -> None:
+        """From now on look for kernels among those known. Makes a field: called as Taichi starts."""
+        self._flag, self._known = ti.field(ti.i32, ()), known
+
+    def install(self) -> None:
+        """Have Taichi ask here."""
+        plain = kernels.Kernel.materialize
+
+        def materialize(kernel: Any, key: Any = None, args: Any = None, arg_features: Any = None) -> None:
+            if key not in kernel.compiled_kernels:
+                self._prepare(kernel, plain, key, args, arg_features)
+
+        kernels.Kernel.materialize = materialize
+
+    def close(self) -> None:
+        """Have Taichi keep a file with a short body for each kernel that was made from its source."""
+        for kernel, features, digest in self._made:
+            program = ti.lang.impl.get_runtime().prog
+            short = self._create_short(kernel, features, digest)
+            program.compile_kernel(program.config(), program.get_device_caps(), short)
+
+    def keep(self) -> None:
+        """Once Taichi has ended: put the code of these kernels into the files of the short bodies."""
+        if self._known is not None:
+            self._known.keep({digest: name_of(kernel, digest) for kernel, _, digest in self._made})
+
+    def _prepare(self, kernel: Any, plain: Make, key: Any, args: Any, features: Any) -> None:
+        """Make a kernel, and have its first launch looked at."""
+        name = kernel.func.__name__
+        start = BURST.begin(name)
+        digest = self._digest_of(kernel, args, features)
+        is_short = self._known is not None and digest in self._known
+        if digest is None:
+            plain(kernel, key, args, features)
+        elif is_short:
+            kernel.runtime.materialize()
+            kernel.compiled_kernels[key] = self._create_short(kernel, features, digest)
+        else:
+            self._make(kernel, key, args, features, digest)
+        is_found = is_short
+
+        def launch_first(compiled: Any, *given: Any) -> Any:
+            nonlocal is_found
+            del kernel.launch_kernel  # from now on that of the class
+            try:
+                found = kernel.launch_kernel(compiled, *given)
+                if is_short and digest is not None and self._flag[None] != 0:  # nothing else has happened
+                    self._flag[None], is_found = 0, False
+                    self._make(kernel, key, args, features, digest)
+                    found = kernel.launch_kernel(kernel.compiled_kernels[key], *given)
+                return found
+            finally:
+                BURST.end(name, start, is_found)
+
+        kernel.launch_kernel = launch_first
+
+    def _digest_of(self, kernel: Any, args: Any, features: Any) -> str | None:
+        """None where the kernel cannot be known."""
+        is_ours = kernel.func.__module__.startswith("taichi_soft.")
+        if self._known is None or not is_ours or kernel.autodiff_mode != kernels.AutodiffMode.NONE:
+            return None
+        slots = kernel.template_slot_locations
+        given = [(args[i] if i in slots else features[i], i in slots) for i in range(len(args))]
+        try:
+            return digest_of(kernel.func, given)
+        except UnknownPartError:
+            return None
+
+    def _make(self, kernel: Any, key: Any, args: Any, features: Any, digest: str) -> None:
+        """Make a kernel from its source, under a name by which its file is found again."""
+        kernel.runtime.materialize()
+        slots = kernel.template_slot_locations
+        tree, context = kernels._get_tree_and_ctx(
+            kernel, args=args, excluded_parameters=slots, arg_features=features
+        )
+        kernel.compiled_kernels[key] = _create(kernel, tree, context, name_of(kernel, digest))
+        self._made.append((kernel, features, digest))
+
+    def _create_short(self, kernel: Any, features: Any, digest: str) -> Any:
+        """One with the same arguments whose body is short."""
+        names = [argument.name for argument in kernel.arguments]
+        lines = [""] * 32
+        function = ast.FunctionDef(
+            name=kernel.func.__name__,
+            args=ast.arguments(
+                posonlyargs=[],
+                args=[ast.arg(arg=name) for name in names],
+                kwonlyargs=[],
+                kw_defaults=[],
+                defaults=[],
+            ),
+            body=short_body(digest),
+            decorator_list=[],
+            returns=ast.Constant(value=None) if kernel.return_type else None,
+        )
+        tree = ast.fix_missing_locations(ast.Module(body=[function], type_ignores=[]))
+        context = kernels.ASTTransformerContext(
+            excluded_parameters=kernel.template_slot_locations,
+            is_kernel=True,
+            func=kernel,
+            arg_features=features,
+            global_vars={FLAG: self._flag, **dict.fromkeys(names)},
+            argument_data=None,
+            src=lines,
+            start_lineno=1,
+            file=__file__,
+        )
+        return _create(kernel, tree, context, short_name_of(digest))
+
+
+def _create(kernel: Any, tree: Any, context: Any, name: str) -> Any:
+    """Taichi's own kernel from the tree of a function, as `Kernel.materialize` of Taichi 1.7 makes it."""
+    runtime = kernel.runtime
+
+    def taichi_ast_generator(made: Any) -> None:  # Taichi looks for this name
+        kernel.kernel_cpp = made
+        runtime.inside_kernel, runtime.current_kernel = True, kernel
+        assert runtime.compiling_callable is None
+        runtime.compiling_callable = made
+        try:
+            context.ast_builder = made.ast_builder()
+            kernels.transform_tree(tree, context)
+        finally:
+            runtime.inside_kernel, runtime.current_kernel, runtime.compiling_callable = False, None, None
+
+    return runtime.prog.create_kernel(taichi_ast_generator, name, kernel.autodiff_mode)
+
+
+FIRST_LAUNCHES = FirstLaunches()

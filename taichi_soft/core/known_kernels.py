@@ -1,0 +1,197 @@
+"""Kernels that an earlier process compiled, found without walking through their source.
+
+Taichi 1.7 keeps compiled kernels on disk under a hash of what it makes of their source. To get at that hash
+it walks through the source of each kernel at every start, which takes most of a start with a full cache.
+
+Here a kernel that is known from earlier is made with a short body instead. That body holds a digest of all
+that the kernel's source depends on. When the process ends that compiled the kernel, its code is put into the
+file of the short body. There Taichi finds it, by the hash of the short body, which costs next to nothing.
+
+The short body sets a flag. If Taichi does not find the file, it compiles that body, and the flag tells so
+after the launch. Nothing else has happened then: the kernel is made from its source and launched.
+"""
+
+from __future__ import annotations
+
+import ast
+import enum
+import functools
+import hashlib
+import json
+import os
+import re
+import sys
+from dataclasses import is_dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+PACKAGE = Path(__file__).resolve().parents[1]
+
+INDEX = "taichi_soft.json"
+"""File beside Taichi's own, with the digests of kernels that can be found."""
+
+FLAG = "__flag"
+"""Name in the short body of the field that it sets."""
+
+HEADER = 1 << 17
+"""Bytes at the front of Taichi's file of a kernel, among which the names of its functions stand."""
+
+
+class UnknownPartError(Exception):
+    """A kernel depends on something of which no digest can be made."""
+
+
+@functools.cache
+def digest_of_sources() -> str:
+    """Of the package's own files, the interpreter and NumPy: what decides how a kernel's source is read."""
+    found = hashlib.sha256(f"{sys.version} {np.__version__}".encode())
+    for path in sorted(PACKAGE.rglob("*.py")):
+        text = path.read_bytes()
+        if b"ti." in text:  # a file that no kernel is in may change
+            found.update(path.relative_to(PACKAGE).as_posix().encode() + b"\0" + text + b"\0")
+    return found.hexdigest()
+
+
+def digest_of(function: Any, arguments: list[tuple[Any, bool]]) -> str:
+    """Of a kernel and what it is compiled for.
+
+    Args:
+        function: the Python function.
+        arguments: of each its value, and whether it is a template argument; of others what Taichi tells them
+            apart by.
+    Raises: UnknownPartError.
+    """
+    parts: list[str] = [digest_of_sources(), function.__module__, function.__qualname__]
+    if function.__closure__:
+        raise UnknownPartError(function.__qualname__)
+    seen: dict[int, int] = {}
+    for value, is_template in arguments:
+        _describe(value, parts, seen) if is_template else parts.append(_feature(value))
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()
+
+
+def _feature(value: Any) -> str:
+    """Type and dimensions of an array, as Taichi tells arrays apart."""
+    if isinstance(value, tuple):
+        return f"({', '.join(map(_feature, value))})"
+    text = value.to_string() if hasattr(value, "to_string") else str(value)
+    if " at 0x" in text:
+        raise UnknownPartError(text)
+    return text
+
+
+def _describe(value: Any, parts: list[str], seen: dict[int, int]) -> None:
+    """Add to `parts` all of a template argument that code can be made of."""
+    kind = type(value)
+    if value is None or kind in (bool, int, float, str, bytes):
+        parts.append(repr(value))
+        return
+    if isinstance(value, (enum.Enum, np.generic)):
+        parts.append(f"{kind.__qualname__} {value!r}")
+        return
+    if id(value) in seen:
+        parts.append(f"again {seen[id(value)]}")
+        return
+    seen[id(value)] = len(seen)
+    if hasattr(value, "snode") and hasattr(value, "vars"):  # a field
+        trees = [(each.ptr.snode().get_snode_tree_id(), each.ptr.snode().id) for each in value.vars]
+        parts.append(
+            f"{kind.__name__} {trees} {value.shape} {value.dtype.to_string()} {getattr(value, 'n', 0)}"
+        )
+    elif hasattr(value, "field_dict"):  # a field of structures
+        _describe(value.field_dict, parts, seen)
+    elif hasattr(value, "to_string"):  # a type of Taichi's
+        parts.append(value.to_string())
+    elif isinstance(value, np.ndarray) and value.dtype != object:
+        parts.append(f"array {value.dtype} {value.shape} {hashlib.sha256(value.tobytes()).hexdigest()}")
+    elif isinstance(value, dict):
+        _describe_all(value, [each for item in value.items() for each in item], parts, seen)
+    elif isinstance(value, (tuple, list)):
+        _describe_all(value, value, parts, seen)
+    elif isinstance(value, (set, frozenset)):
+        _describe_all(value, sorted(value, key=repr), parts, seen)
+    elif isinstance(value, functools.partial):
+        _describe_all(value, (value.func, value.args, value.keywords), parts, seen)
+    elif isinstance(value, type) or (callable(value) and hasattr(value, "__qualname__")):
+        if "<" in value.__qualname__ or not value.__module__.startswith("taichi_soft."):
+            raise UnknownPartError(value.__qualname__)
+        parts.append(f"{value.__module__} {value.__qualname__}")
+    elif hasattr(value, "_data_oriented") or is_dataclass(value):
+        parts.append(f"{kind.__module__} {kind.__qualname__}")
+        _describe(vars(value), parts, seen)
+    else:
+        raise UnknownPartError(kind.__qualname__)
+
+
+def _describe_all(value: Any, items: Any, parts: list[str], seen: dict[int, int]) -> None:
+    parts.append(f"{type(value).__name__} {len(items)}")
+    for each in items:
+        _describe(each, parts, seen)
+
+
+def short_body(digest: str) -> list[ast.stmt]:
+    """Statements that set the flag, once with each part of the digest."""
+    words = np.frombuffer(bytes.fromhex(digest), np.int32)
+    return ast.parse("\n".join(f"{FLAG}[None] = {word}" for word in (*words.tolist(), 1))).body
+
+
+def name_of(kernel: Any, digest: str) -> str:
+    """Of a kernel that is made from its source, in Taichi's file of it."""
+    return f"{kernel.func.__name__}_{digest[:32]}"
+
+
+def short_name_of(digest: str) -> str:
+    """Of one with the short body."""
+    return f"known_{digest[:32]}"
+
+
+class KnownKernels:
+    """Those in one folder of Taichi's."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._known = self._read()
+
+    def __contains__(self, digest: object) -> bool:
+        return digest in self._known
+
+    def _read(self) -> set[str]:
+        try:
+            return set(json.loads((self.folder / INDEX).read_text()))
+        except (OSError, ValueError, TypeError):
+            return set()
+
+    def keep(self, names: dict[str, str]) -> None:
+        """Put kernels where the short bodies are found.
+
+        Args:
+            names: by digest, of the kernels that were made from their source. Taichi has written all files.
+        """
+        files = self._files_of({*names.values(), *map(short_name_of, names)})
+        kept = []
+        for digest, name in names.items():
+            code, place = files.get(name), files.get(short_name_of(digest))
+            if code and place:
+                _write(place, code.read_bytes())
+                kept.append(digest)
+        if kept:
+            _write(self.folder / INDEX, json.dumps(sorted({*self._read(), *kept})).encode())
+
+    def _files_of(self, names: set[str]) -> dict[str, Path]:
+        """Files in which these kernels are, by name."""
+        found = {}
+        for path in self.folder.glob("*.tic"):
+            with path.open("rb") as file:
+                match = re.search(rb'"name":"(\w+?)_kernel_\d+_', file.read(HEADER))
+            if match and match.group(1).decode() in names:
+                found[match.group(1).decode()] = path
+        return found
+
+
+def _write(path: Path, contents: bytes) -> None:
+    """All of a file at once: others may read it meanwhile."""
+    part = path.with_name(f"{path.name}.{os.getpid()}.part")
+    part.write_bytes(contents)
+    part.replace(path)

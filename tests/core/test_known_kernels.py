@@ -1,0 +1,132 @@
+"""Kernels of an earlier process are found again, do the same to the bit, and are never taken for others."""
+
+import json
+import os
+import subprocess
+import sys
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from taichi_soft.core import known_kernels
+from taichi_soft.core.known_kernels import INDEX, UnknownPartError, digest_of
+from taichi_soft.core.runtime import holds_fields, init, ti
+from taichi_soft.core.types import Integrator
+from taichi_soft.elements.laws import LAWS, element_model
+
+PROGRAM = """
+import logging, sys
+logging.basicConfig(level=logging.DEBUG)
+from taichi_soft import Material, World, box, init
+init("cpu", threads=1)
+world = World(integrator=sys.argv[1])
+world.add_body(box(cells=(int(sys.argv[2]),) * 3), Material(2e5, 0.3, 1000), position=(0, 0, 0.6), law="virial")
+world.build()
+for _ in range(20):
+    world.step(1 / 60, 12)
+print(world.state_hash())
+"""
+
+
+def play(folder, integrator="leapfrog", cells=2):
+    """State at the end, and the kernels that were made from their source and those that were known."""
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM, integrator, str(cells)],
+        env={**os.environ, "TI_OFFLINE_CACHE_FILE_PATH": str(folder)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    lines = [
+        line for line in done.stderr.splitlines() if "first_launch" in line or "compilation:kernel" in line
+    ]
+    made = [line.split()[1] for line in lines if line.endswith("made from its source")]
+    known = [line.split()[1] for line in lines if line.endswith("known")]
+    return done.stdout.strip(), made, known
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A cache that one process has filled, and what it found at the end."""
+    folder = tmp_path_factory.mktemp("kernels")
+    state, made, known = play(folder)
+    assert "step_in_turn" in made
+    assert known == []
+    return folder, state, made
+
+
+def test_a_later_process_makes_no_kernel_from_its_source_and_moves_bodies_alike(folder):
+    folder, state, made = folder
+    again, made_again, known = play(folder)
+    assert made_again == []
+    assert known == made
+    assert again == state
+
+
+def test_a_world_of_another_integrator_or_size_takes_no_kernel_for_its_own(folder, tmp_path):
+    folder, _, _ = folder
+    for other in ("lazy_leapfrog", 2), ("leapfrog", 5):
+        assert play(folder, *other)[0] == play(tmp_path / str(other[1]), *other)[0]
+
+
+def test_what_is_missing_from_the_cache_is_made_from_its_source_again(folder):
+    folder, state, made = folder
+    index = json.loads((folder / INDEX).read_text())
+    for path in folder.glob("T*.tic"):
+        if any(f"known_{each[:32]}".encode() in path.read_bytes() for each in index):
+            path.unlink()  # none: their files hold the code of kernels
+    for path in folder.glob("T*.tic"):
+        path.unlink()
+    again, made_again, known = play(folder)
+    assert again == state
+    assert sorted(made_again) == sorted(made)
+    assert known == []
+
+
+@holds_fields
+class Fields:
+    def __init__(self, size, dtype=ti.f32, option="a"):
+        self.x = ti.field(dtype, size)
+        self.option = option
+
+
+@dataclass(frozen=True)
+class Choice:
+    integrator: Integrator
+    model: object
+
+
+def kernel_like():
+    """Stands for the function of a kernel."""
+
+
+def digest(*values):
+    return digest_of(kernel_like, [(value, True) for value in values])
+
+
+def test_a_digest_tells_apart_all_that_code_is_made_of():
+    init("cpu")
+    models = [element_model(name, strain) for name in ("virial", "face") for strain in ("linear", "exact")]
+    models += [element_model("virial", flips=each) for each in LAWS["virial"].flips[1:]]
+    found = [digest(Choice(integrator, model)) for integrator in Integrator for model in models]
+    found += [digest(Fields(4)), digest(Fields(4)), digest(Fields(5)), digest(Fields(4, ti.f64))]
+    fields = Fields(4)
+    found.append(digest(fields))
+    fields.option = "b"
+    found += [digest(fields), digest(1), digest(1.0), digest(True), digest("1"), digest(None), digest((1, 2))]
+    found += [digest(np.arange(3)), digest(np.arange(4)), digest(1, 2), digest({1: 2}), digest([1, 2])]
+    assert len(set(found)) == len(found)
+    assert digest(fields) == digest(fields)
+
+
+def test_other_sources_give_another_digest(monkeypatch):
+    before = digest(1)
+    monkeypatch.setattr(known_kernels, "digest_of_sources", lambda: "others")
+    assert digest(1) != before
+
+
+def test_what_nothing_is_known_of_gives_none():
+    for value in (object(), lambda: 1, open):
+        with pytest.raises(UnknownPartError):
+            digest(value)
