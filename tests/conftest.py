@@ -76,6 +76,8 @@ SOAK = (
     *("world/test_warm_up", "persistence/test_recorder", "solver/test_kernel_cache"),
     *(f"core/test_threads.py::test_{name}" for name in ("a_", "worlds_that_compile")),
     *(f"core/test_runtime.py::test_{name}" for name in ("starting_again", "the_threads_that_work")),
+    *(f"core/test_known_kernels.py::test_{name}" for name in ("a_later", "a_world", "what_is_missing")),
+    "core/test_logging",
     *(f"world/test_public_face.py::test_{name}" for name in ("every", "a_", "all_that", "nothing")),
     "solver/test_recovery.py::test_a_wrecked_body_finds_its_shape_again[exact",
     *(f"persistence/test_snapshot.py::test_{name}" for name in ("rest_shapes", "other_integrators")),

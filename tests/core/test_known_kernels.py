@@ -21,7 +21,8 @@ logging.basicConfig(level=logging.DEBUG)
 from taichi_soft import Material, World, box, init
 init("cpu", threads=1)
 world = World(integrator=sys.argv[1])
-world.add_body(box(cells=(int(sys.argv[2]),) * 3), Material(2e5, 0.3, 1000), position=(0, 0, 0.6), law="virial")
+cube = box(cells=(int(sys.argv[2]),) * 3)
+world.add_body(cube, Material(2e5, 0.3, 1000), position=(0, 0, 0.6), law="virial")
 world.build()
 for _ in range(20):
     world.step(1 / 60, 12)
@@ -38,9 +39,7 @@ def play(folder, integrator="leapfrog", cells=2):
         text=True,
         check=True,
     )
-    lines = [
-        line for line in done.stderr.splitlines() if "first_launch" in line or "compilation:kernel" in line
-    ]
+    lines = [line for line in done.stderr.splitlines() if "compilation:kernel" in line]
     made = [line.split()[1] for line in lines if line.endswith("made from its source")]
     known = [line.split()[1] for line in lines if line.endswith("known")]
     return done.stdout.strip(), made, known
@@ -72,10 +71,7 @@ def test_a_world_of_another_integrator_or_size_takes_no_kernel_for_its_own(folde
 
 def test_what_is_missing_from_the_cache_is_made_from_its_source_again(folder):
     folder, state, made = folder
-    index = json.loads((folder / INDEX).read_text())
-    for path in folder.glob("T*.tic"):
-        if any(f"known_{each[:32]}".encode() in path.read_bytes() for each in index):
-            path.unlink()  # none: their files hold the code of kernels
+    assert len(json.loads((folder / INDEX).read_text())) >= len(made)
     for path in folder.glob("T*.tic"):
         path.unlink()
     again, made_again, known = play(folder)

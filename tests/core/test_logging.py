@@ -36,4 +36,4 @@ def test_device_schedule_substeps_and_compile_times_are_logged():
     assert any("a step of 0.0166667 s is made in" in text for text in said["INFO"])
     assert any(text.startswith("kernel step_in_turn took ") for text in said["DEBUG"])
     names = [text.split()[1] for text in said["DEBUG"]]
-    assert len(names) > 5
+    assert {"spawn_body", "step_in_turn"} <= set(names)
