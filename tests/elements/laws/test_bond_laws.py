@@ -186,7 +186,9 @@ class TestGivenSprings:
     @pytest.mark.parametrize(
         ("arguments", "text"),
         [
-            ({"stiffness": 0.0}, "stiffness is 0: it must be above 0 N/m"),
+            ({"stiffness": 0.0}, "stiffness is 0 N/m for every edge"),
+            ({"stiffness": [0.0, 0.0]}, "stiffness is 0 N/m for every edge"),
+            ({"stiffness": [1.0, 1e-12]}, "stiffness of edge 1 is 1e-12: it must be 0 N/m, or from 1e-09"),
             ({"stiffness": [1.0, -2.0]}, "stiffness of edge 1 is -2"),
             ({"stiffness": 1.0, "damping": -1}, "damping is -1"),
             ({"stiffness": 1.0, "rest_length": 0}, "rest_length is 0"),
