@@ -110,8 +110,8 @@ def _reading(results: Results) -> Finding:
         return judged("strain-misread-triangle", measured, all(holds), why)
     why = (
         "the text tells neither the triangle nor how far it is stretched, and both count. What is read are "
-        "the components that the strain has in the frame of the subfaces' normal (see fig-4.3): little tension "
-        "and much shear where that lies at an angle to the pull"
+        "the components that the strain has in the frame of the subfaces' normal (see fig-4.3): little "
+        "tension and much shear where that lies at an angle to the pull"
     )
     return Finding("strain-misread-triangle", measured, Verdict.UNKNOWN, why)
 

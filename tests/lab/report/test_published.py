@@ -18,6 +18,7 @@ ROOT = Path(__file__).resolve().parents[3]
 REPORT = ROOT / "docs" / "report"
 MANY = {
     Verdict.AGREES: "agree",
+    Verdict.PARTLY: "agree in part",
     Verdict.DIFFERS: "differ",
     Verdict.UNKNOWN: "cannot be told",
 }
