@@ -2,7 +2,8 @@
 
 Least squares for more than three particles; the same formula gives the cross product for three. Where there
 are two, the centre of the edge is the third. Such planes are rarely perpendicular to their edge, so, as in
-CMPM2, their normal is compared with where the tetrahedra have carried it from rest.
+CMPM2, their normal is compared with where the tetrahedra have carried it from rest. Implicit Euler holds the
+normal, and takes the edge itself for what is compared (`bond_stiffness`).
 """
 
 from __future__ import annotations

@@ -33,8 +33,8 @@ class SpringMaterial:
     """Springs of a `ParticleMesh`. Each constant is a number, or an array with one per row of `mesh.edges`.
 
     Args:
-        stiffness: k of thesis eq. 3.8 [N/m], 0 or more, and above 0 for at least one edge. An edge of 0 has its
-            damping only.
+        stiffness: k of thesis eq. 3.8 [N/m], 0 or more, and above 0 for at least one edge. An edge of 0 has
+            its damping only.
         damping: b of eq. 3.9 [N s/m], 0 or more.
         rest_length: l of eq. 3.8 [m], above 0; None takes the lengths in the mesh.
     Raises: MaterialError with the first value out of range, or where no edge has any stiffness.
