@@ -158,6 +158,41 @@ def test_the_class_of_symmetry_is_recognised(name):
     assert CLASSES[name].symmetry() == name
 
 
+def changed(matrix, *entries):
+    """With 5e4 Pa more in each entry (row, column, times), and in the one across the diagonal."""
+    c = matrix.copy()
+    for row, column, times in entries:
+        c[row, column] += 5e4 * times
+        c[column, row] = c[row, column]
+    return Stiffness(c)
+
+
+FLAT = Stiffness.orthotropic((3e6, 2e6, 2.5e6), (0.3, 0.2, 0.25), (8e5, 1e6, 9e5)).matrix
+ROUND = Stiffness.one_axis(3e6, 2e6, 0.3, 0.2, 1e6).matrix
+EVEN = Stiffness.isotropic(2e6, 0.3).matrix
+
+
+@pytest.mark.parametrize(
+    ("matrix", "entries", "name"),
+    [
+        *((FLAT, [(row, column, 1)], "none") for row in range(3) for column in (3, 4)),
+        *((FLAT, [entry], "none") for entry in ((3, 5, 1), (4, 5, 1))),
+        *((FLAT, [entry], "one plane") for entry in ((0, 5, 1), (1, 5, 1), (2, 5, 1), (3, 4, 1))),
+        (ROUND, [(1, 1, 2), (3, 3, 1)], "orthotropic"),  # c22 and c33 apart, c44 = (c22 - c23) / 2 kept
+        (ROUND, [(0, 1, 1)], "orthotropic"),
+        (ROUND, [(4, 4, 1)], "orthotropic"),
+        (ROUND, [(3, 3, 1)], "orthotropic"),
+        (EVEN, [(3, 3, 1)], "orthotropic"),
+        (EVEN, [(0, 0, 1)], "one axis"),
+        (EVEN, [(0, 1, 1), (0, 2, 1)], "one axis"),
+        (EVEN, [(4, 4, 1), (5, 5, 1)], "one axis"),
+        (EVEN, [(0, 0, 1e-9)], "isotropic"),
+    ],
+)
+def test_each_condition_of_a_symmetry_counts_by_itself(matrix, entries, name):
+    assert changed(matrix, *entries).symmetry() == name
+
+
 @pytest.mark.parametrize("name", CLASSES)
 def test_a_class_has_as_many_constants_as_the_book_says(name):
     """The rank of all stiffnesses that keep the class's symmetry: averaged over its rotations."""
