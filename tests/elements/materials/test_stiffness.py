@@ -110,6 +110,20 @@ def test_the_tensor_says_the_same_as_the_matrix(seed):
 
 
 @given(seed=seeds)
+def test_compliance_turns_stress_back_into_strain(seed):
+    """Eq. 2.23: of a bar of wood pulled or sheared it shows 1 / E, -nu / E and 1 / G."""
+    rng = np.random.default_rng(seed)
+    stiffness, strain = any_stiffness(rng), symmetric(rng)
+    stress = stress_of(stiffness, strain)
+    rows = stiffness.compliance @ [stress[0, 0], stress[1, 1], stress[2, 2], *(stress[pair] for pair in AXES)]
+    expected = [strain[0, 0], strain[1, 1], strain[2, 2], *(2 * strain[pair] for pair in AXES)]
+    np.testing.assert_allclose(rows, expected, atol=1e-9 * np.abs(expected).max())
+    wood = Stiffness.orthotropic(**WOOD).compliance
+    np.testing.assert_allclose(np.diag(wood), 1 / np.array([*WOOD["young"], *WOOD["shear"]]))
+    assert wood[0, 2] == pytest.approx(-WOOD["poisson"][1] / WOOD["young"][0])
+
+
+@given(seed=seeds)
 def test_youngs_modulus_along_any_direction_is_that_of_a_pulled_bar(seed):
     rng = np.random.default_rng(seed)
     stiffness, n = any_stiffness(rng), rng.normal(size=3)
