@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies.pose import Pose, best_fitting_pose
 from taichi_soft.bodies.soft_body import SoftBody, context_of, record_of, require_alive, rest_inverses_of
-from taichi_soft.core.errors import MeshError
+from taichi_soft.core.checks import as_vector
+from taichi_soft.core.errors import MeshError, OptionError
 from taichi_soft.elements.kernels.stress import compute_stress
 from taichi_soft.elements.laws.law import EnergyLaw
 from taichi_soft.elements.materials import AnisotropicMaterial, Material, SpringMaterial, voigt_stress
 from taichi_soft.meshing import TetMesh
+from taichi_soft.meshing.sections import section_areas
 
 Floats = NDArray[np.float64]
 
@@ -103,11 +105,24 @@ def green_strain_and_stress(body: SoftBody) -> tuple[Floats, Floats]:
 
 
 def tet_stresses(body: SoftBody) -> Floats:
-    """Cauchy stress of each tetrahedron by the body's own law, in the axes of the world, (m, 3, 3) [Pa]."""
+    """As `Body.stresses`."""
     F = deformations(body)
     stress = np.empty_like(F)
     compute_stress(record_of(body).description.model, F, _material(body).stiffness_matrices(len(F)), stress)
     return stress
+
+
+def force_across(body: SoftBody, point: ArrayLike, normal: ArrayLike) -> Floats:
+    """As `Body.force_across`."""
+    place, across = as_vector(point, "point", "m"), as_vector(normal, "normal", "(any length)")
+    length = float(np.linalg.norm(across))
+    if not length > 0.0:
+        raise OptionError("normal is zero: pass a direction across the plane")
+    across = across / length
+    stress = tet_stresses(body)
+    heights = (positions_of(body)[body.tets] - place) @ across
+    areas = section_areas(heights, np.abs(tet_volumes(body)))
+    return np.asarray(np.einsum("mab,b,m->a", stress, across, areas))
 
 
 def deformations(body: SoftBody) -> Floats:

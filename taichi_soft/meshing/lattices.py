@@ -76,7 +76,7 @@ def cloth_constants(mesh: ParticleMesh, cells: tuple[int, int], **values: float)
     Args:
         mesh: made by `cloth`.
         cells: as given to it.
-        values: tensile=, shear= and bend=, each of the kinds that the cloth has.
+        values: tensile=, shear= and bend=, each of the kinds that the cloth has; 0 for none.
     Raises: OptionError for an unknown kind or one that is missing; MeshError for a mesh of other cells.
     """
     unknown = set(values) - set(KINDS)

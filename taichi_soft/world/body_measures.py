@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies import measures
 from taichi_soft.bodies.pose import Pose
@@ -83,13 +83,30 @@ class BodyMeasures(SoftBody):
         """Equivalent (von Mises) logarithmic strain that each tetrahedron has for good, (m,)."""
         return measures.plastic_strains(self)
 
-    def tet_stress(self) -> Floats:
-        """Von Mises stress of each tetrahedron, (m,) [Pa].
+    def stresses(self) -> Floats:
+        """Stress of each tetrahedron, (m, 3, 3) [Pa], in the axes of the world; above 0 is tension.
 
-        Of the Cauchy stress, force by area as it is now, of the body's own law. Laws along edges know none:
-        theirs is by Hooke's law and linear strain. Inside out it is finite: that of the mirror image, by law
-        "neo_hookean" that of a negative volume.
+        The Cauchy stress: force by area as it is now, of the body's own law, without damping. Laws along
+        edges know none: theirs is by Hooke's law and linear strain. Inside out it is finite: that of the
+        mirror image, by law "neo_hookean" that of a negative volume.
         """
+        return measures.tet_stresses(self)
+
+    def force_across(self, point: ArrayLike, normal: ArrayLike) -> Floats:
+        """Elastic force across a plane, (3,) [N].
+
+        The part beyond it, where `normal` points, pulls the other part with this: `stresses` times the areas
+        in which the plane cuts the tetrahedra, as they lie now. In a body at rest it carries what hangs on
+        it, as exactly as the mesh resolves the stress.
+        Args:
+            point: of the plane, (3,) [m].
+            normal: of the plane, (3,), of any length but zero.
+        Raises: OptionError for a point or normal that is none; MeshError for a body without tetrahedra.
+        """
+        return measures.force_across(self, point, normal)
+
+    def tet_stress(self) -> Floats:
+        """Von Mises stress of each tetrahedron, (m,) [Pa], of `stresses`."""
         return measures.tet_stress(self)
 
     def tet_strain(self) -> Floats:

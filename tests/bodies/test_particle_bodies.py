@@ -12,6 +12,8 @@ from taichi_soft import (
     SpringMaterial,
     World,
     box,
+    cloth,
+    cloth_constants,
     rope,
     sphere,
 )
@@ -42,6 +44,40 @@ def test_an_undamped_lattice_keeps_its_energy_in_flight():
     for _ in range(50):
         world.step(0.02, 40)
         assert body.kinetic_energy() + body.elastic_energy() == pytest.approx(start, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("integrator", "dt", "steps"), [("leapfrog", 1 / 60, 1200), ("implicit_euler", 1 / 30, 600)]
+)
+def test_a_cloth_without_bending_springs_hangs_by_its_threads_and_meshes_alone(integrator, dt, steps):
+    """At rest its springs of the other kinds, computed here, carry the weight of every free particle."""
+    cells, k = (6, 6), {"tensile": 200.0, "shear": 100.0, "bend": 0.0}
+    mesh = cloth((1.0, 1.0), cells, 0.3)
+    stiffness = cloth_constants(mesh, cells, **k)
+    world = World(floor=None, integrator=integrator)
+    down = [[0, 0, 1], [0, 1, 0], [-1, 0, 0]]
+    body = world.add_body(
+        mesh, SpringMaterial(stiffness, 0.5), pinned=[0, 6], position=(0, 0, 2), rotation=down
+    )
+    world.build()
+    threads = cloth((1.0, 1.0), cells, 0.3, springs=("tensile", "shear"))
+    of_threads = cloth_constants(threads, cells, tensile=k["tensile"], shear=k["shear"])
+    alike = World(floor=None, integrator=integrator)
+    alike.add_body(threads, SpringMaterial(of_threads), position=(0, 0, 2))
+    assert body.stable_step.undamped == pytest.approx(alike.bodies[0].stable_step.undamped, rel=0.02)
+    for _ in range(steps):
+        world.step(dt)
+    x = body.positions().astype(np.float64)
+    p, q = threads.edges.T
+    r = x[q] - x[p]
+    length = np.linalg.norm(r, axis=1)
+    pull = (of_threads * (length - threads.edge_lengths) / length)[:, None] * r
+    force = threads.masses[:, None] * np.array([0, 0, -9.81])
+    np.add.at(force, p, pull)
+    np.add.at(force, q, -pull)
+    force[[0, 6]] = 0
+    assert np.abs(force).max() < 0.02 * 0.3 * 9.81 / 49
+    assert x[:, 2].min() < 1.1
 
 
 KINDS = ("virial", "neo_hookean", "volume_springs", "cmpm", "best_fitting_plane")

@@ -8,6 +8,7 @@ import pytest
 from taichi_soft import (
     AnisotropicMaterial,
     Material,
+    OptionError,
     Stiffness,
     StressExceeded,
     TearCandidates,
@@ -15,7 +16,6 @@ from taichi_soft import (
     box,
     internal_forces,
 )
-from taichi_soft.bodies.measures import tet_stresses
 
 DT = 1 / 60
 MESH = box((1, 1, 1), cells=(1, 1, 1))
@@ -121,7 +121,7 @@ def test_stress_of_a_stretch_along_one_axis_is_that_of_the_law(name, s, still, t
     np.testing.assert_allclose(body.tet_stress(), np.full(count, von_mises(wanted)), rtol=2e-5)
     np.testing.assert_allclose(body.vertex_stress(), np.full(8, von_mises(wanted)), rtol=2e-5)
     in_world = np.tile(turned @ wanted @ turned.T, (count, 1, 1))
-    np.testing.assert_allclose(tet_stresses(body), in_world, atol=2e-6 * YOUNG)
+    np.testing.assert_allclose(body.stresses(), in_world, atol=2e-6 * YOUNG)
 
 
 @pytest.mark.parametrize("s", STRETCHES)
@@ -144,6 +144,24 @@ def test_a_watch_fires_just_below_the_stress_of_the_law_and_not_above_it(name, s
         np.testing.assert_allclose(np.abs(events[1].normals @ turned[:, 0]), 1.0, atol=1e-5)
 
 
+@pytest.mark.parametrize("name", CASES)
+def test_the_force_across_a_plane_is_the_stress_on_its_section(name, still, turned):
+    """sigma n A of a cube sheared and stretched evenly: a plane through its middle cuts out a square of F."""
+    F = turned @ np.array([[1.2, 0.1, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.9]])
+    body = deform(still, name, F)
+    stress, middle = body.stresses()[0], F @ MESH.vertices.mean(axis=0)
+    for axis in range(3):
+        area = np.linalg.det(F) * np.linalg.inv(F).T @ I3[axis]  # Nanson: of the square of 1 m^2 across it
+        found = body.force_across(middle, 3 * area)
+        np.testing.assert_allclose(found, stress @ area, atol=5e-6 * YOUNG)
+        np.testing.assert_allclose(body.force_across(middle, -area), -found, atol=1e-6 * YOUNG)
+    assert body.force_across(middle + 9, (0, 0, 1)).tolist() == [0, 0, 0]
+    with pytest.raises(OptionError, match="normal is zero"):
+        body.force_across(middle, (0, 0, 0))
+    with pytest.raises(OptionError, match="point"):
+        body.force_across((0, 0), (0, 0, 1))
+
+
 @pytest.mark.parametrize("mirror", [1.0, -1.0])
 @pytest.mark.parametrize("name", [name for name in CASES if name != "volume_springs"])
 def test_stress_is_that_of_the_forces(name, mirror, still, turned):
@@ -157,7 +175,7 @@ def test_stress_is_that_of_the_forces(name, mirror, still, turned):
     forces = internal_forces(MESH, case.material, x, **case.options)
     volume = np.linalg.det(F) if name == "neo_hookean" else abs(np.linalg.det(F))
     expected = np.tile(-forces.T @ x / volume, (len(MESH.tets), 1, 1))
-    np.testing.assert_allclose(tet_stresses(body), expected, atol=2e-6 * 4e5)
+    np.testing.assert_allclose(body.stresses(), expected, atol=2e-6 * 4e5)
 
 
 @pytest.mark.parametrize("name", CASES)

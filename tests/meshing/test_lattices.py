@@ -49,6 +49,12 @@ def test_a_cloth_weighs_by_the_area_round_each_particle():
     assert sorted(set(mesh.masses)) == [0.25, 0.5, 1.0]
 
 
+def test_the_particles_of_a_cloth_stand_in_columns_and_rows_as_far_apart_as_its_sides_say():
+    mesh = cloth((3.0, 1.0), (2, 5), 6.0)
+    expected = [(1.5 * i, 0.2 * j, 0.0) for i in range(3) for j in range(6)]
+    np.testing.assert_allclose(mesh.vertices, expected, atol=1e-15)
+
+
 def test_a_cloth_can_be_seen_from_both_sides():
     mesh = cloth((3.0, 2.0), (3, 2), 6.0)
     a, b, c = (mesh.vertices[mesh.surface[:, i]] for i in range(3))

@@ -112,3 +112,7 @@ def test_owned_edges_come_in_fuller_groups_than_by_the_lower_number(mesh):
         return len(mesh.edges) / (np.ceil(counts / 8) * 8).sum()
 
     assert share(edge_owners(mesh.edges, len(mesh.vertices), 8)) > 1.15 * share(mesh.edges.min(axis=1))
+
+
+def test_points_on_one_spot_keep_their_order():
+    assert spatial_order(np.full((5, 3), 2.5)).tolist() == [0, 1, 2, 3, 4]

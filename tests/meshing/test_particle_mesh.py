@@ -60,6 +60,7 @@ REFUSED = {
     "to itself": (SQUARE, [[0, 1], [2, 2]], 1.0, "edge 1 names a vertex twice"),
     "given twice": (SQUARE, [[0, 1], [1, 2], [1, 0]], 1.0, "edges 0 and 2 join the same vertices"),
     "zero length": (np.zeros((4, 3)), ROUND, 1.0, "edge 0 has zero length"),
+    "two on one spot": ([[1, 2, 3], [2, 2, 3], [2, 2, 3], [0, 2, 3]], ROUND, 1.0, "edge 1 has zero length"),
     "massless": (SQUARE, ROUND, [1, 1, 0, 1], "mass 2 is 0 kg"),
     "negative mass": (SQUARE, ROUND, -1.0, "mass 0 is -1 kg"),
     "mass nan": (SQUARE, ROUND, [1, np.nan, 1, 1], "mass 1"),

@@ -199,6 +199,11 @@ REFUSED = {
     "same tetrahedron": (CORNER, [[0, 1, 2, 3], [3, 1, 0, 2]], "tetrahedra 0 and 1 have the same"),
     "flat": (np.vstack([CORNER[:3], [[1, 1, 0]]]), [[0, 1, 2, 3]], "tetrahedron 0 has no volume"),
     "nearly flat": (CORNER * [1, 1, 1e-8], [[0, 1, 2, 3]], "tetrahedron 0 has no volume"),
+    "one of two flat": (
+        np.vstack([CORNER, [[1, 1, 0]]]),
+        [[0, 1, 2, 3], [0, 1, 2, 4]],
+        "tetrahedron 1 has no volume",
+    ),
     "all in one point": (np.ones((4, 3)), [[0, 1, 2, 3]], "tetrahedron 0 has no volume"),
     "inverted": (TWO, [[0, 1, 2, 3], [4, 1, 2, 3]], r"tetrahedron 1 has volume -.*fix_orientation=True"),
     "unused vertex": (TWO, [[0, 1, 2, 3]], "vertex 4 belongs to no tetrahedron"),

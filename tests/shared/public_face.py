@@ -531,6 +531,7 @@ CALLS: dict[str, dict[str, Call]] = {
             ).but("none"),
             "triangle": choice(None, text="blade", line=np.zeros((3, 3)), both=np.eye(3), two=np.eye(3)[:2]),
         }, perhaps),
+        "force_across": Call({"point": POINT, "normal": WAY}),
         "watch_stress": Call({"threshold": THRESHOLD}),
         "watch_tearing": Call({"tear_stress": THRESHOLD}),
     },
@@ -575,7 +576,7 @@ READERS: dict[str, str] = {
         time""",
     "Body": """aabb angular_momentum asset attachments center_of_mass deformations elastic_energy failure flipped_count flipped_tets
         gravitational_energy gravity_scale index is_alive is_asleep is_cut is_frozen is_held is_sheltered
-        kinetic_energy linear_damping masses material mesh momentum pinned plastic_strains pose solve_residual stable_step strains surface
+        kinetic_energy linear_damping masses material mesh momentum pinned plastic_strains pose solve_residual stable_step strains stresses surface
         tet_origins tet_strain tet_stress tets topology_version velocities vertex_count vertex_origins vertex_strain
         vertex_stress volume volumes""",
     "Collider": """angular_impulse angular_velocity friction group impulse index is_alive mask position restitution

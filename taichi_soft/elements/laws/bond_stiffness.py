@@ -1,8 +1,10 @@
 """How the force between two particles changes as they move (thesis 3.5.3 and 4.2), with the corrections.
 
 Eq. 3.21 to 3.23 and 4.6, 4.7 print diagonal matrices of a unit vector's components; right is the outer
-product. A stretched spring resists turning as well: (1 - l/r)(I - n n^T), which is negative where it is
-pressed.
+product. Laws of chapter 4 hold the normals of their planes, as eq. 4.6 does: how these turn as particles move
+is left out, and the matrices are 0.1 to 0.6 off the true ones, by the sum of squares. Implicit Euler comes to
+rest in the same shapes by them; on its way it is less exact. A stretched spring resists turning as well:
+(1 - l/r)(I - n n^T), which is negative where it is pressed.
 """
 
 from taichi_soft.core.runtime import ti

@@ -2,6 +2,7 @@
 
 Between two particles lies a face of the Voronoi graph. Its corners move with the tetrahedra that hold them,
 and the normal of the deformed face tells what part of the edge is tension and what is shear.
+Implicit Euler holds that normal (`bond_stiffness`), as thesis 4.2 does.
 """
 
 from __future__ import annotations

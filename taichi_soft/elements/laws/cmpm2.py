@@ -2,7 +2,8 @@
 
 The normal n of the subfaces of an edge is compared with r, the direction that it had at rest and that has
 been carried along by the tetrahedra: eq. 4.9 (with r - n^, of unit length) and 4.10. On an edge that several
-tetrahedra share, r is their mean, weighed by the areas of their subfaces.
+tetrahedra share, r is their mean, weighed by the areas of their subfaces. Implicit Euler holds n, and takes
+the edge itself for r (`bond_stiffness`).
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ The plane is perpendicular to its edge at rest. Where a particle round the edge 
 the plane by c times that angle about the axis through the edge at right angles to the particle's arm. Eq.
 4.11 and 4.12 as printed, b = 1/4 and c = b beta / (2 pi), tilt it by an eighth of an even shear only; c =
 beta / pi tilts it by all of it wherever the particles stand evenly. beta is the angle that a particle
-represents.
+represents. Implicit Euler holds the plane's normal (`bond_stiffness`).
 """
 
 from __future__ import annotations

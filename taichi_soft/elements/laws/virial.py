@@ -2,7 +2,8 @@
 
 sigma = 1/V sum x f^T (eq. 6.16 without its factor 2, which cancels against the kinetic energy) is
 solved for the forces that deform: [f1 f2 f3] = V sigma B^-T. V B^-T is the cofactor matrix of B over 6,
-so nothing is divided and a flat tetrahedron is no special case. The material answers with -f.
+so nothing is divided and a flat tetrahedron is no special case. The material answers with -f. With the factor
+2, as printed, forces are twice as strong: a `Material` of twice Young's modulus has them.
 """
 
 from taichi_soft.core.math.tensors import cofactor, times

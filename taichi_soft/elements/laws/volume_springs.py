@@ -2,7 +2,8 @@
 
 Each tetrahedron that has grown by dV pulls the ends of its six edges together with the pressure E nu dV / V0
 times the area a of the whole edge, besides the springs (eq. 5.5 with its sign turned: as printed a grown one
-pushes them apart, and its volume runs away).
+pushes them apart, and its volume runs away). A `Material` whose Poisson's ratio is -nu has the forces as they
+are printed, because the springs know no ratio.
 """
 
 from __future__ import annotations

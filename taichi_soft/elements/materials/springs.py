@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.core.errors import MaterialError
 from taichi_soft.core.serialisation import serialised
@@ -23,16 +23,22 @@ from taichi_soft.elements.materials.element_values import (
 )
 
 
+def _is_stiffness(x: Array) -> NDArray[np.bool_]:
+    """Which values are 0, or above it and can be computed with."""
+    return np.asarray((x == 0) | is_positive(x))
+
+
 @serialised("stiffness", "damping", "rest_length")
 @dataclass(frozen=True, eq=False)
 class SpringMaterial:
     """Springs of a `ParticleMesh`. Each constant is a number, or an array with one per row of `mesh.edges`.
 
     Args:
-        stiffness: k of thesis eq. 3.8 [N/m], above 0.
+        stiffness: k of thesis eq. 3.8 [N/m], 0 or more, and above 0 for at least one edge. An edge of 0 has
+            its damping only.
         damping: b of eq. 3.9 [N s/m], 0 or more.
         rest_length: l of eq. 3.8 [m], above 0; None takes the lengths in the mesh.
-    Raises: MaterialError with the first value out of range.
+    Raises: MaterialError with the first value out of range, or where no edge has any stiffness.
     """
 
     stiffness: float | Array
@@ -43,7 +49,9 @@ class SpringMaterial:
         return described(self)
 
     def __post_init__(self) -> None:
-        self._check("stiffness", is_positive, f"above 0 N/m, {POSITIVE}")
+        self._check("stiffness", _is_stiffness, f"0 N/m, or {POSITIVE}")
+        if not np.any(self.stiffness):
+            raise MaterialError("stiffness is 0 N/m for every edge: give at least one edge more than that")
         self._check("damping", is_damping, f"0 N s/m or more and below {LARGEST:g}")
         if self.rest_length is not None:
             self._check("rest_length", is_positive, f"above 0 m, {POSITIVE}")

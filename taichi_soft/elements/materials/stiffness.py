@@ -190,6 +190,14 @@ class Stiffness:
             index[a, b] = index[b, a] = number
         return np.asarray(self.matrix[index[:, :, None, None], index])
 
+    @property
+    def compliance(self) -> Floats:
+        """The other way round, strain from stress (thesis eq. 2.23): the inverse of `matrix`, (6, 6) [1/Pa].
+
+        In the same order, with engineering shear: on its diagonal stand 1 / E and 1 / G.
+        """
+        return np.asarray(np.linalg.inv(self.matrix))
+
     def rotated(self, rotation: ArrayLike) -> Stiffness:
         """The stiffness of the material turned by a matrix (3, 3) or a quaternion (x, y, z, w)."""
         return Stiffness(turned(self.matrix, as_rotation(rotation)[None])[0])

@@ -42,9 +42,13 @@ CLAIMS: dict[str, Claim] = {
         "section 4.3, figure 4.3",
         "One edge stretched at 30 degrees reads a tensile and a shear strain that are wrong.",
     ),
+    "cmpm-anisotropic": Claim(
+        "section 4.3", "Stretched along another axis it answers with another force: CMPM is anisotropic."
+    ),
     "strain-misread-triangle": Claim(
-        "section 4.3, figure 4.5",
-        "A triangle stretched along another axis answers with another force: CMPM is anisotropic.",
+        "section 4.4.1, figure 4.5",
+        "Where a triangle is stretched at a particle, an edge of it reads a small tensile and a much larger "
+        "shear strain.",
     ),
     "cmpm2-step": Claim(
         "section 4.4.1", "CMPM2, with barycentric subfaces, runs with somewhat larger steps than CMPM."

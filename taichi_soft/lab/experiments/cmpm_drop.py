@@ -20,8 +20,11 @@ TOUCHES = 0.25
 """Time [s] at which the sphere is still in the air; it falls 0.5 m in 0.32 s."""
 
 OFF, SHRUNK = 0.05, 0.9
-"""Of what is sound: the fall deviates by less than this [m], and the volume stays above this part of "
-"its own."""
+"""Of what is whole: the fall deviates by less than this [m], and the volume stays above this part of its
+own."""
+
+BOUNCE = 0.5
+"""Part of the bounce of a fall with short steps that one has to keep to be sound."""
 
 
 @cache
@@ -68,7 +71,17 @@ def fall(drop: Drop) -> Numbers:
     }
 
 
-def is_sound(numbers: Numbers, reference: list[float]) -> bool:
+def rebound(height: list[float]) -> float:
+    """How far the sphere bounces off the floor, from its heights frame by frame [m]."""
+    return max(0.0, max(height[round(TOUCHES / FRAME) + 1 :]) - RADIUS)
+
+
+def bounces(numbers: Numbers, reference: list[float]) -> bool:
+    """Whether it bounces about as high as it should."""
+    return rebound(numbers["height"]) >= BOUNCE * rebound(reference)
+
+
+def is_whole(numbers: Numbers, reference: list[float]) -> bool:
     """Whether the sphere fell as it should, stayed whole, and lies or bounces on the floor at the end."""
     air = [i for i in range(FRAMES) if (i + 1) * FRAME < TOUCHES]
     off = max(abs(numbers["height"][i] - reference[i]) for i in air)

@@ -38,6 +38,7 @@ class Verdict(Choice):
     """What a measurement says about a claim."""
 
     AGREES = "agrees"
+    PARTLY = "agrees in part"
     DIFFERS = "differs"
     UNKNOWN = "cannot be told"
 
@@ -50,7 +51,7 @@ class Finding:
         claim: its key in `CLAIMS`.
         measured: a sentence with the figures and their units.
         verdict: whether they agree with the claim.
-        why: where they differ, or nothing can be told: whether model, mesh or reading of the text is the
+        why: where they do not agree, or not for all laws: whether model, mesh or reading of the text is the
             likely cause, and the evidence.
     """
 

@@ -27,6 +27,17 @@ def judged(claim: str, measured: str, agrees: bool, why: str) -> Finding:
     return Finding(claim, measured, Verdict.DIFFERS, why)
 
 
+def judged_but_for(
+    claim: str, measured: str, agrees: bool, why: str, exceptions: Collection[str], because: str
+) -> Finding:
+    """Agrees, agrees but for `exceptions`, such as some of the laws, or differs for the reason `why`."""
+    if not agrees or not exceptions:
+        return judged(claim, measured, agrees, why)
+    return Finding(
+        claim, measured, Verdict.PARTLY, f"it does not hold for {', '.join(exceptions)}: {because}"
+    )
+
+
 def judged_on_meshes(claim: str, measured: str, agrees: Collection[bool], why: str) -> Finding:
     """Agrees on every mesh, differs on every mesh, or depends on the mesh, which the thesis leaves open."""
     if all(agrees) or not any(agrees):

@@ -7,7 +7,7 @@ modulus whose largest stable step is the thesis's, tells how much of the upper e
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -30,6 +30,7 @@ from taichi_soft.lab.experiments.experiment import (
     Table,
     Verdict,
 )
+from taichi_soft.lab.experiments.sphere_outcomes import COLLAPSED, OUTCOMES, outcomes, window
 
 DENSITY, DAMPING, HEIGHT, VOLUME = 1000.0, 100.0, 7.0, 4.0
 DT, SUBSTEPS = 1 / 50, 14  # 700 substeps a second
@@ -39,11 +40,12 @@ LEAST, MOST = 1e5, 1e7
 """Range of the moduli tried [Pa]."""
 ROUNDING = 1.5
 """By what an edge of the window may miss the thesis's, which has one digit: 1e6 may stand for 1.5e6."""
+EQUAL = 1.1
+"""By what edges may differ that are called the same: less than from one modulus that is tried to the next."""
 FLIPS: tuple[FlipsName, ...] = ("tolerant", "recover", "off")
 MESHES = ("thesis", "coarse", "fine")
-OUTCOMES = ("collapses", "dented", "whole", "explodes")
-
-Window = tuple[float, float, float, float]
+LINES = tuple(k / 20 for k in range(6, 17))
+"""Parts of the volume at which a sphere might be called collapsed instead, to see what hangs on it."""
 
 
 def points(effort: Effort) -> list[Point]:
@@ -118,51 +120,6 @@ def _linear_limit(mesh: TetMesh, nu: float) -> float:
     return young
 
 
-def outcomes(numbers: Numbers) -> list[str]:
-    """What became of each sphere.
-
-    One explodes if it goes non-finite or doubles in extent, and is dented if more than a hundredth of its
-    tetrahedra stay inside out; where these leave it half of its volume or less it has collapsed.
-    """
-    ends = []
-    for volume, flipped, frozen, extent in zip(
-        numbers["volume"], numbers["flipped"], numbers["frozen"], numbers["extent"], strict=True
-    ):
-        if frozen or extent > 2.0:
-            ends.append("explodes")
-        elif flipped > 0.01:
-            ends.append("collapses" if volume <= 0.5 else "dented")
-        else:
-            ends.append("whole")
-    return ends
-
-
-def window(numbers: Numbers) -> Window:
-    """Edges, each as a bracket [Pa], of the longest unbroken row of whole spheres: the lower from the last
-    one that is neither whole nor dented to the first of the row, the upper from its last to the next that
-    explodes."""
-    young, ends = numbers["young"], outcomes(numbers)
-    first, last = _longest_row(end == "whole" for end in ends)
-    if first > last:
-        return np.inf, np.inf, 0.0, 0.0
-    gone = [i for i in range(first) if ends[i] not in ("dented", "whole")]
-    exploded = [i for i in range(last, len(ends)) if ends[i] == "explodes"]
-    low = young[gone[-1]] if gone else 0.0
-    high = young[exploded[0]] if exploded else np.inf
-    return low, young[first], young[last], high
-
-
-def _longest_row(values: Iterable[bool]) -> tuple[int, int]:
-    """Where the longest row of true values begins and ends; the end lies before the beginning if none is."""
-    best, start, at = (0, -1), 0, -1
-    for at, value in enumerate(values):
-        if not value:
-            start = at + 1
-        elif at - start > best[1] - best[0]:
-            best = start, at
-    return best
-
-
 def conclude(results: Results) -> Section:
     """The windows beside the thesis's."""
     drops = results.where(part="drop")
@@ -218,18 +175,64 @@ def conclude(results: Results) -> Section:
     )
 
 
+def _edges_agree(numbers: Numbers, nu: float, collapsed: float = COLLAPSED) -> tuple[bool, bool]:
+    """Whether the lower and the upper edge of a window are the thesis's."""
+    low, first, last, high = window(numbers, collapsed)
+    thesis_low, thesis_high = WINDOWS[nu]
+    return (
+        low / ROUNDING <= thesis_low <= first * ROUNDING,
+        last / ROUNDING <= thesis_high <= high * ROUNDING,
+    )
+
+
+def _is_calm(numbers: Numbers, nu: float, collapsed: float = COLLAPSED) -> bool:
+    """Whether none collapses or explodes between the thesis's edges."""
+    ends = zip(numbers["young"], outcomes(numbers, collapsed), strict=True)
+    return all(end in ("whole", "dented") for E, end in ends if WINDOWS[nu][0] <= E <= WINDOWS[nu][1])
+
+
+def _other_lines(numbers: Numbers, nu: float) -> str:
+    """For which lines between dented and collapsed the verdict is the same."""
+
+    def verdict(line: float) -> Verdict:
+        agrees = all(_edges_agree(numbers, nu, line)) and _is_calm(numbers, nu, line)
+        return Verdict.AGREES if agrees else Verdict.DIFFERS
+
+    same = [line for line in LINES if verdict(line) is verdict(COLLAPSED)]
+    others = [line for line in LINES if line not in same]
+    told = f"; collapsed is called what keeps {COLLAPSED:g} of its volume or less: "
+    if not others:
+        return told + f"the verdict is the same with any line from {LINES[0]:g} to {LINES[-1]:g} instead"
+    return told + (
+        f"with {', '.join(f'{line:g}' for line in same)} instead the verdict is the same, with "
+        f"{', '.join(f'{line:g}' for line in others)} it is '{verdict(others[0]).value}'"
+    )
+
+
+def _unhandled(results: Results, nu: float) -> str:
+    """The window of spheres whose flips nobody handles."""
+    for _, numbers in results.where(part="drop", mesh="thesis", flips="off", poisson=nu):
+        _, first, last, _ = window(numbers)
+        gaps = (thesis / edge for thesis, edge in zip(WINDOWS[nu], (first, last), strict=True))
+        is_the_same = all(1 / EQUAL < gap < EQUAL for gap in gaps)
+        return (
+            f"; with flips off, so that nothing is done about them, whole from {first:.2g} to {last:.2g} Pa"
+            + (", which is the thesis's very window" if is_the_same else "")
+        )
+    return ""
+
+
 def _window_finding(results: Results, nu: float) -> Finding:
     numbers = results.one(part="drop", mesh="thesis", flips="tolerant", poisson=nu)
     low, first, last, high = window(numbers)
     thesis_low, thesis_high = WINDOWS[nu]
-    lower_agrees = low / ROUNDING <= thesis_low <= first * ROUNDING
-    upper_agrees = last / ROUNDING <= thesis_high <= high * ROUNDING
+    lower_agrees, upper_agrees = _edges_agree(numbers, nu)
+    calm = _is_calm(numbers, nu)
     inside = [
         end
         for E, end in zip(numbers["young"], outcomes(numbers), strict=True)
         if thesis_low <= E <= thesis_high
     ]
-    calm = all(end in ("whole", "dented") for end in inside)
     left = [
         f"{volume:.2f}"
         for E, end, volume in zip(numbers["young"], outcomes(numbers), numbers["volume"], strict=True)
@@ -239,7 +242,7 @@ def _window_finding(results: Results, nu: float) -> Finding:
         f"whole for E from {first:.2g} to {last:.2g} Pa, collapsed at {low:.2g} Pa and below, exploded at "
         f"{high:.2g} Pa and above; within the thesis's interval {inside.count('whole')} of {len(inside)} "
         f"whole, {len(left)} dented" + (f", which keep {', '.join(left)} of their volume" if left else "")
-    )
+    ) + (_other_lines(numbers, nu) + _unhandled(results, nu))
     if lower_agrees and upper_agrees and calm:
         return Finding(f"sphere-window-{nu}", measured, Verdict.AGREES)
     reasons = []

@@ -16,7 +16,11 @@ NOT_MEASURED = "not measured"
 OUTCOMES = (*(verdict.value for verdict in Verdict), NOT_MEASURED)
 """What can be said of a claim, in words."""
 
-OF_MANY = {"agrees": "agree", "differs": "differ"} | {name: name for name in OUTCOMES[2:]}
+OF_MANY = {name: name for name in OUTCOMES} | {
+    "agrees": "agree",
+    "agrees in part": "agree in part",
+    "differs": "differ",
+}
 """The same of several claims."""
 
 CHAPTERS = {
@@ -40,7 +44,7 @@ class Judgement:
     def outcome(self) -> str:
         """One of `OUTCOMES`; of several findings the least favourable one decides."""
         verdicts = [finding.verdict for _, finding in self.findings]
-        for verdict in (Verdict.DIFFERS, Verdict.UNKNOWN, Verdict.AGREES):
+        for verdict in (Verdict.DIFFERS, Verdict.UNKNOWN, Verdict.PARTLY, Verdict.AGREES):
             if verdict in verdicts:
                 return str(verdict.value)
         return NOT_MEASURED

@@ -14,7 +14,13 @@ from taichi_soft.lab.experiments import CLAIMS, Experiment, Results, Section, Ta
 from taichi_soft.lab.report.judgements import NOT_MEASURED, OF_MANY, Judgement, counts
 from taichi_soft.lab.report.wording import duration, numeric_columns, point_line, readable
 
-COLOURS = {"agrees": "green", "differs": "dark_orange", "cannot be told": "magenta", "not measured": "dim"}
+COLOURS = {
+    "agrees": "green",
+    "agrees in part": "yellow",
+    "differs": "dark_orange",
+    "cannot be told": "magenta",
+    "not measured": "dim",
+}
 MOST_ROWS = 20
 """Of a table; all of them are in the report."""
 

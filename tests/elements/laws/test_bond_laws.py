@@ -140,6 +140,26 @@ def test_a_grown_tetrahedron_is_pulled_together_by_its_volume():
     assert (np.einsum("na,na->n", firm - plain, inward) > 0).all()
 
 
+def test_eq_5_5_as_printed_is_the_law_with_poissons_ratio_turned_round():
+    """f_p = -E a nu dV / V0 n beside the springs of eq. 5.2, written out."""
+    mesh, nu = MESHES["ring"], 0.3
+    x = mesh.vertices + 0.1 * np.random.default_rng(4).normal(size=mesh.vertices.shape)
+    E, none = np.full(len(mesh.tets), 1e6), np.zeros(len(mesh.tets))
+
+    def printed(p, q):
+        pull = oracle.spring(mesh, p, q, x, E, none)
+        for t, _, _ in oracle.tets_round(mesh, p, q):
+            before, now = (abs(oracle.signed_volume(y[mesh.tets[t]])) for y in (mesh.vertices, x))
+            pull = pull - E[t] * oracle.edge_area(mesh, p, q) * nu * (now / before - 1) * oracle.unit(
+                x[q] - x[p]
+            )
+        return pull
+
+    expected = oracle.summed(mesh, printed)
+    found = internal_forces(mesh, Material(1e6, -nu, 1000.0), x, law="volume_springs")
+    np.testing.assert_allclose(found, expected, atol=1e-9 * np.abs(expected).max())
+
+
 def test_constants_per_edge_belong_to_the_edges_as_they_were_given():
     """Against each edge alone, for edges in no order at all."""
     rng = np.random.default_rng(9)
@@ -186,7 +206,9 @@ class TestGivenSprings:
     @pytest.mark.parametrize(
         ("arguments", "text"),
         [
-            ({"stiffness": 0.0}, "stiffness is 0: it must be above 0 N/m"),
+            ({"stiffness": 0.0}, "stiffness is 0 N/m for every edge"),
+            ({"stiffness": [0.0, 0.0]}, "stiffness is 0 N/m for every edge"),
+            ({"stiffness": [1.0, 1e-12]}, "stiffness of edge 1 is 1e-12: it must be 0 N/m, or from 1e-09"),
             ({"stiffness": [1.0, -2.0]}, "stiffness of edge 1 is -2"),
             ({"stiffness": 1.0, "damping": -1}, "damping is -1"),
             ({"stiffness": 1.0, "rest_length": 0}, "rest_length is 0"),

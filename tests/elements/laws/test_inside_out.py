@@ -359,3 +359,14 @@ def test_one_tetrahedron_inside_out_leaves_the_rest_of_the_body_alone(law, strai
     assert np.abs(forces[outside]).max() < 1e-8 < 1 < np.abs(forces[touched]).max()
     if flips != "recover":  # the axis that a mirrored rest shape recovers along is any
         np.testing.assert_allclose(forces, expected, atol=1e-9 * np.abs(expected).max())
+
+
+@FLIPPED
+def test_volume_springs_are_at_rest_in_their_mirror_image(mirror):
+    """A volume counts without its sign, or the tetrahedron would push its edges apart and run away."""
+    forces = internal_forces(oracle.ONE_TET, MATERIAL, mirror(REST), law="volume_springs")
+    assert np.abs(forces).max() < 1e-8
+    stretched = REST * (1, 1, 1.1)
+    expected = internal_forces(oracle.ONE_TET, MATERIAL, stretched, law="volume_springs")
+    mirrored = internal_forces(oracle.ONE_TET, MATERIAL, stretched * (1, 1, -1), law="volume_springs")
+    np.testing.assert_allclose(mirrored, expected * (1, 1, -1), atol=1e-9 * np.abs(expected).max())

@@ -27,6 +27,26 @@ def test_forces_equal_those_of_the_equations_in_numpy(law, strain, flips, seed, 
     np.testing.assert_allclose(forces, expected, rtol=0, atol=1e-10 * np.abs(expected).max())
 
 
+@UPRIGHT
+def test_eq_6_16_as_printed_is_the_law_with_twice_youngs_modulus(strain):
+    """sigma = 1/(2V) sum q f^T solved for f (eq. 6.18); the material answers with -f."""
+    mesh, E, nu = oracle.ONE_TET, 1e6, 0.3
+    x = mesh.vertices @ (np.eye(3) + 0.2 * np.random.default_rng(7).normal(size=(3, 3))).T
+    q = (x[1:] - x[0]).T
+    F = q @ np.linalg.inv((mesh.vertices[1:] - mesh.vertices[0]).T)
+    assert np.linalg.det(F) > 0
+    if strain == "linear":
+        eps = (F @ F.T - np.eye(3)) / 2
+    else:
+        squares, axes = np.linalg.eigh(F @ F.T)
+        eps = axes * np.sqrt(squares) @ axes.T - np.eye(3)
+    sigma = E / (1 + nu) * (eps + nu / (1 - 2 * nu) * np.trace(eps) * np.eye(3))
+    f = np.linalg.solve(q / (2 * np.linalg.det(q) / 6), sigma)  # rows f1, f2, f3
+    found = internal_forces(mesh, Material(2 * E, nu, 1000.0), x, law="virial", strain=strain)
+    np.testing.assert_allclose(found[1:], -f, atol=1e-9 * np.abs(f).max())
+    np.testing.assert_allclose(found[0], f.sum(axis=0), atol=1e-9 * np.abs(f).max())
+
+
 @pytest.mark.parametrize("flips", oracle.FLIPS)
 @UPRIGHT
 @settings(max_examples=15)

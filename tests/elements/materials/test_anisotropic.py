@@ -138,3 +138,23 @@ def test_particles_have_no_frames():
     rope = ParticleMesh([[0, 0, 0], [1, 0, 0]], [[0, 1]], 1.0)
     with pytest.raises(MeshError, match="needs tetrahedra"):
         internal_forces(rope, AnisotropicMaterial(WOOD, 500.0), rope.vertices, law="springs")
+
+
+def test_the_material_of_some_tetrahedra_has_their_values_and_those_given_for_all():
+    frames = frames_along(np.random.default_rng(2).normal(size=(4, 3)))
+    rows = np.array([2, 0, 2])
+    each = AnisotropicMaterial(WOOD, np.arange(1.0, 5.0), damping=np.arange(4.0), frame=frames)
+    some = each.of_tets(rows)
+    assert some.density.tolist() == [3.0, 1.0, 3.0]
+    assert some.damping.tolist() == [2.0, 0.0, 2.0]
+    assert np.array_equal(some.frame, frames[rows])
+    one = AnisotropicMaterial(WOOD, 500.0, damping=2.0, frame=frames[1])
+    same = one.of_tets(rows)
+    assert (same.density, same.damping) == (500.0, 2.0)
+    assert np.array_equal(same.frame, frames[1])
+
+
+@pytest.mark.parametrize("ratio", [-0.001, 1000.1, np.nan])
+def test_a_damping_ratio_out_of_range_is_refused(ratio):
+    with pytest.raises(MaterialError, match=r"damping_ratio is .*: it must be from 0 to 1000"):
+        AnisotropicMaterial(WOOD, 500.0, damping_ratio=ratio)

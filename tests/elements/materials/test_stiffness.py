@@ -110,6 +110,20 @@ def test_the_tensor_says_the_same_as_the_matrix(seed):
 
 
 @given(seed=seeds)
+def test_compliance_turns_stress_back_into_strain(seed):
+    """Eq. 2.23: of a bar of wood pulled or sheared it shows 1 / E, -nu / E and 1 / G."""
+    rng = np.random.default_rng(seed)
+    stiffness, strain = any_stiffness(rng), symmetric(rng)
+    stress = stress_of(stiffness, strain)
+    rows = stiffness.compliance @ [stress[0, 0], stress[1, 1], stress[2, 2], *(stress[pair] for pair in AXES)]
+    expected = [strain[0, 0], strain[1, 1], strain[2, 2], *(2 * strain[pair] for pair in AXES)]
+    np.testing.assert_allclose(rows, expected, atol=1e-9 * np.abs(expected).max())
+    wood = Stiffness.orthotropic(**WOOD).compliance
+    np.testing.assert_allclose(np.diag(wood), 1 / np.array([*WOOD["young"], *WOOD["shear"]]))
+    assert wood[0, 2] == pytest.approx(-WOOD["poisson"][1] / WOOD["young"][0])
+
+
+@given(seed=seeds)
 def test_youngs_modulus_along_any_direction_is_that_of_a_pulled_bar(seed):
     rng = np.random.default_rng(seed)
     stiffness, n = any_stiffness(rng), rng.normal(size=3)
@@ -156,6 +170,41 @@ CONSTANTS = {"isotropic": 2, "one axis": 5, "orthotropic": 9, "one plane": 13, "
 @pytest.mark.parametrize("name", CLASSES)
 def test_the_class_of_symmetry_is_recognised(name):
     assert CLASSES[name].symmetry() == name
+
+
+def changed(matrix, *entries):
+    """With 5e4 Pa more in each entry (row, column, times), and in the one across the diagonal."""
+    c = matrix.copy()
+    for row, column, times in entries:
+        c[row, column] += 5e4 * times
+        c[column, row] = c[row, column]
+    return Stiffness(c)
+
+
+FLAT = Stiffness.orthotropic((3e6, 2e6, 2.5e6), (0.3, 0.2, 0.25), (8e5, 1e6, 9e5)).matrix
+ROUND = Stiffness.one_axis(3e6, 2e6, 0.3, 0.2, 1e6).matrix
+EVEN = Stiffness.isotropic(2e6, 0.3).matrix
+
+
+@pytest.mark.parametrize(
+    ("matrix", "entries", "name"),
+    [
+        *((FLAT, [(row, column, 1)], "none") for row in range(3) for column in (3, 4)),
+        *((FLAT, [entry], "none") for entry in ((3, 5, 1), (4, 5, 1))),
+        *((FLAT, [entry], "one plane") for entry in ((0, 5, 1), (1, 5, 1), (2, 5, 1), (3, 4, 1))),
+        (ROUND, [(1, 1, 2), (3, 3, 1)], "orthotropic"),  # c22 and c33 apart, c44 = (c22 - c23) / 2 kept
+        (ROUND, [(0, 1, 1)], "orthotropic"),
+        (ROUND, [(4, 4, 1)], "orthotropic"),
+        (ROUND, [(3, 3, 1)], "orthotropic"),
+        (EVEN, [(3, 3, 1)], "orthotropic"),
+        (EVEN, [(0, 0, 1)], "one axis"),
+        (EVEN, [(0, 1, 1), (0, 2, 1)], "one axis"),
+        (EVEN, [(4, 4, 1), (5, 5, 1)], "one axis"),
+        (EVEN, [(0, 0, 1e-9)], "isotropic"),
+    ],
+)
+def test_each_condition_of_a_symmetry_counts_by_itself(matrix, entries, name):
+    assert changed(matrix, *entries).symmetry() == name
 
 
 @pytest.mark.parametrize("name", CLASSES)

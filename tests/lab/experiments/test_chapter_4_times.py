@@ -40,16 +40,20 @@ def test_implicit_steps_follow_a_fall_that_leapfrog_cannot_make():
     assert implicit["step"] == pytest.approx(1e-2, rel=0.05)
     assert results.one(integrator="leapfrog", factor=1.3)["frozen"]
     assert len(results.one(run="rates")["explicit"]) == FRAMES
-    assert verdicts("implicit-step", results)["implicit-step"] is Verdict.AGREES
+    assert verdicts("implicit-step", results)["implicit-step"] is Verdict.PARTLY  # it does not bounce
+    rises = results.one(integrator="leapfrog", factor=0.9)["height"]
 
-    def judged(gain, frozen):
+    def judged(gain, frozen, height):
         def change(point, numbers):
             if point["run"] == "rates":
                 return {"explicit": [gain] * FRAMES, "implicit": [1.0] * FRAMES}
-            return {**numbers, "frozen": frozen if point["factor"] == 100.0 else numbers["frozen"]}
+            if point["factor"] == 100.0:
+                return {**numbers, "frozen": frozen, "height": [*numbers["height"][:5], *height]}
+            return numbers
 
         return list(verdicts("implicit-step", altered(results, change)).values())
 
-    assert judged(25.0, False) == [Verdict.AGREES, Verdict.AGREES]
-    assert judged(5.0, True) == [Verdict.DIFFERS, Verdict.DIFFERS]
+    assert judged(25.0, False, rises[5:]) == [Verdict.AGREES, Verdict.AGREES]
+    assert judged(25.0, False, [1.0] * 7) == [Verdict.PARTLY, Verdict.AGREES]
+    assert judged(5.0, True, rises[5:]) == [Verdict.DIFFERS, Verdict.DIFFERS]
     assert {point["resolution"] for point in points(Effort.FULL)} == {5}

@@ -23,6 +23,12 @@ def test_errors_of_tetrahedra_fall_with_second_order_and_those_of_springs_stay()
         assert abs(by_law["springs"][6][load]) > 0.2
     assert max(abs(numbers["tension"]) for numbers in by_law["virial"].values()) < 5e-4
     (finding,) = section_of(EXPERIMENT, Results(tuple(rows))).findings
+    assert finding.verdict is Verdict.PARTLY  # springs go elsewhere
+    alike = deepcopy(rows)
+    for row in alike:
+        if row.point["law"] == "springs":
+            row.numbers.update(by_law["virial"][row.point["cells"]])
+    (finding,) = section_of(EXPERIMENT, Results(tuple(alike))).findings
     assert finding.verdict is Verdict.AGREES
 
     stuck = deepcopy(rows)

@@ -31,6 +31,8 @@ def test_times_decide():
     assert set(verdicts(forces, COST).values()) == {Verdict.AGREES}
     slow = copy.deepcopy(COST)
     slow["seconds"]["cmpm"] = [2e-4] * 3
+    assert verdicts(forces, slow)["springs-faster"] is Verdict.PARTLY
+    slow["seconds"]["springs"] = [4e-5] * 3
     slow["seconds"]["face"] = [9e-5] * 3
     assert set(verdicts(forces, slow).values()) == {Verdict.DIFFERS}
 

@@ -7,8 +7,9 @@ import pytest
 from linear_motion import quadratic_form
 from quick import quick_results
 
-from taichi_soft.lab.experiments import EXPERIMENTS, Results, Verdict, section_of
-from taichi_soft.lab.experiments.stability_map import outcomes, sphere_mesh, window
+from taichi_soft.lab.experiments import EXPERIMENTS, Result, Results, Verdict, section_of
+from taichi_soft.lab.experiments.sphere_outcomes import outcomes, window
+from taichi_soft.lab.experiments.stability_map import sphere_mesh
 
 EXPERIMENT = EXPERIMENTS["stability-map"]
 
@@ -79,3 +80,30 @@ def test_outcomes():
         "extent": [1.5, 1.0, 1.0, 1.0, 3.0],
     }
     assert outcomes(numbers) == ["collapses", "dented", "whole", "explodes", "explodes"]
+
+
+def test_the_verdict_tells_for_which_line_between_dented_and_collapsed_it_holds():
+    def told(kept):
+        drop = {
+            "young": [1e5, 2e5, 4e5, 1e6, 3e6, 5e6],
+            "volume": [0.1, kept, 1.0, 1.0, 1.0, 1.0],
+            "flipped": [0.4, 0.1, 0.0, 0.0, 0.0, 0.0],
+            "frozen": [False] * 5 + [True],
+            "extent": [1.0] * 6,
+        }
+        whole = {**drop, "flipped": [0.4, *[0.0] * 5]}
+        rows = [
+            Result({"part": "drop", "mesh": "thesis", "poisson": nu, "flips": flips}, numbers)
+            for nu in (0.1, 0.4)
+            for flips, numbers in (("tolerant", drop), ("off", whole))
+        ]
+        return section_of(EXPERIMENT, Results(tuple(rows))).findings[:2]
+
+    low, high = told(0.58)
+    assert low.verdict is Verdict.AGREES
+    assert "with 0.3, 0.35, 0.4, 0.45, 0.5, 0.55 instead the verdict is the same" in low.measured
+    assert "with 0.6, 0.65, 0.7, 0.75, 0.8 it is 'differs'" in low.measured
+    assert "whole from 2e+05 to 3e+06 Pa, which is the thesis's very window" in low.measured
+    assert "the verdict is the same with any line from 0.3 to 0.8" in high.measured
+    assert high.measured.endswith("whole from 2e+05 to 3e+06 Pa")
+    assert "the verdict is the same with any line from 0.3 to 0.8" in told(0.9)[0].measured

@@ -22,12 +22,14 @@ def test_a_pulse_runs_at_the_root_of_modulus_over_density():
     expected = 4e-3 * np.exp(-0.5 * ((places - SPEED * time) / 0.8) ** 2)
     assert np.abs(last - expected).max() < 2e-4
 
-    assert _verdict(measured) is Verdict.AGREES
+    assert _verdict(measured) is Verdict.PARTLY
+    alike = [(p, {**n, "speed": SPEED}) for p, n in measured]
+    assert _verdict(alike) is Verdict.AGREES
     slower = [(p, {**n, "speed": 0.97 * n["speed"]}) if p["law"] == "face" else (p, n) for p, n in measured]
     assert _verdict(slower) is Verdict.DIFFERS
 
 
 def _verdict(measured):
     (finding,) = section_of(WAVE_SPEED, Results(tuple(Result(p, n) for p, n in measured))).findings
-    assert finding.verdict is Verdict.AGREES or finding.why.startswith("the model")
+    assert finding.verdict is not Verdict.DIFFERS or finding.why.startswith("the model")
     return finding.verdict

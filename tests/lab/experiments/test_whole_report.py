@@ -16,7 +16,13 @@ DIFFERING = {
     *("strain-misread-edge", "cmpm2-step", "tilted-plane", "sphere-window-0.4"),
     "volume-springs-drop",  # on the one irregular mesh that is quick; on others it holds
 }
-UNTOLD = {"volume-springs-limit", "shear-modulus-volume"}
+UNTOLD = {"volume-springs-limit", "shear-modulus-volume", "strain-misread-triangle"}
+PARTLY = {
+    *("patch-test", "beam-tension", "beam-shear", "beam-torsion", "beam-bending", "block-shear", "hertz"),
+    *("mesh-convergence", "cantilever-frequency", "free-beam-frequency", "wave-speed", "momentum-budget"),
+    "energy-budget",
+}
+"""Theory that laws along edges, or the virial law, do not meet."""
 
 
 @pytest.fixture(scope="module")
@@ -36,6 +42,7 @@ def test_every_claim_has_a_measured_number_and_the_verdict_that_is_known(report)
         assert (row["why"] == "") <= (row["verdict"] == "agrees"), claim
     judged = {claim: row["verdict"] for claim, row in rows.items() if claim not in TIMED}
     assert {claim for claim, verdict in judged.items() if verdict == "differs"} == DIFFERING
+    assert {claim for claim, verdict in judged.items() if verdict == "agrees in part"} == PARTLY
     assert {claim for claim, verdict in judged.items() if verdict == "cannot be told"} == UNTOLD
 
 

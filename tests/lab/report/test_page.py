@@ -160,8 +160,10 @@ def test_the_summary_counts_all_claims(written):
         if words[0].isdigit()
     }
     rest = len(CLAIMS) - 4
-    assert tiles == {"agree": 0, "differ": 2, "cannot be told": 2, "not measured": rest}
-    line = f"Of {len(CLAIMS)} claims: 0 agree, 2 differ, 2 cannot be told, {rest} not measured."
+    assert tiles == {"agree": 0, "agree in part": 0, "differ": 2, "cannot be told": 2, "not measured": rest}
+    line = (
+        f"Of {len(CLAIMS)} claims: 0 agree, 0 agree in part, 2 differ, 2 cannot be told, {rest} not measured."
+    )
     assert line in markdown
 
 

@@ -72,7 +72,8 @@ def test_verdicts_list_what_was_found_and_count_all():
     missing = [key for key in CLAIMS if key not in invented.EXPECTED]
     assert f"not measured: {', '.join(missing)}" in words
     assert words.endswith(
-        f"{len(CLAIMS)} claims: 0 agree, 2 differ, 2 cannot be told, {len(missing)} not measured"
+        f"{len(CLAIMS)} claims: 0 agree, 0 agree in part, 2 differ, 2 cannot be told, "
+        f"{len(missing)} not measured"
     )
 
 

@@ -1,0 +1,121 @@
+"""The report in docs/report, and what the README tells of it, against what the code says of the same numbers.
+
+Nothing is measured anew: the published points are concluded again.
+"""
+
+import csv
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from taichi_soft.lab.experiments import CLAIMS, EXPERIMENTS, Effort, Result, Results, Verdict, section_of
+from taichi_soft.lab.report.markdown import escaped
+from taichi_soft.lab.report.wording import legible
+
+ROOT = Path(__file__).resolve().parents[3]
+REPORT = ROOT / "docs" / "report"
+MANY = {
+    Verdict.AGREES: "agree",
+    Verdict.PARTLY: "agree in part",
+    Verdict.DIFFERS: "differ",
+    Verdict.UNKNOWN: "cannot be told",
+}
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def cell(value) -> str:
+    """A value as the files have it."""
+    if value is None:
+        return ""
+    return value if isinstance(value, str) else json.dumps(value)
+
+
+def value(text: str):
+    try:
+        return json.loads(text)
+    except ValueError:
+        return text
+
+
+def published(experiment) -> Results:
+    """The published points, which are those that the code asks for today, with what was measured there."""
+    csv.field_size_limit(2**30)
+    rows = rows_of(REPORT / "points" / f"{experiment.name}.csv")
+    points = experiment.points(Effort.FULL)
+    assert len(rows) == len(points)
+    results = []
+    for row, point in zip(rows, points, strict=True):
+        told = {name.removeprefix("point."): text for name, text in row.items() if name.startswith("point.")}
+        assert {name: cell(point.get(name)) for name in told} == told
+        assert set(point) <= set(told)
+        numbers = {
+            name.removeprefix("measured."): value(text)
+            for name, text in row.items()
+            if name.startswith("measured.") and text
+        }
+        assert row["error"] == ""
+        results.append(Result(point, numbers, seconds=float(row["seconds"])))
+    return Results(tuple(results))
+
+
+VERDICTS = rows_of(REPORT / "verdicts.csv")
+
+
+def test_the_published_claims_are_those_of_the_code_in_their_order_and_words():
+    told = [(row["claim"], row["source"], row["text"]) for row in VERDICTS]
+    assert told == [(key, claim.source, claim.text) for key, claim in CLAIMS.items()]
+    assert {path.stem for path in (REPORT / "points").iterdir()} == set(EXPERIMENTS)
+
+
+@pytest.mark.parametrize("name", EXPERIMENTS)
+def test_published_verdicts_and_reasons_follow_from_the_published_points(name):
+    experiment = EXPERIMENTS[name]
+    found = {
+        (finding.claim, finding.verdict.value, legible(finding.measured), legible(finding.why))
+        for finding in section_of(experiment, published(experiment)).findings
+    }
+    told = {
+        (row["claim"], row["verdict"], row["measured"], row["why"])
+        for row in VERDICTS
+        if row["experiment"] == name
+    }
+    assert found == told
+    assert {claim for claim, *_ in told} == set(experiment.claims)
+
+
+def test_report_and_readme_count_the_verdicts_of_the_table():
+    counts = {verdict: sum(row["verdict"] == verdict.value for row in VERDICTS) for verdict in Verdict}
+    assert sum(counts.values()) == len(VERDICTS)
+    report = (REPORT / "report.md").read_text(encoding="utf-8")
+    of_report = ", ".join(f"{count} {MANY[verdict]}" for verdict, count in counts.items())
+    assert f"\nOf {len(CLAIMS)} claims: {of_report}, 0 not measured.\n" in report
+    readme = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
+    sentence = re.search(r"of (\d+) claims ([^.]*)\.", readme)
+    assert sentence
+    assert int(sentence[1]) == len(CLAIMS)
+    told = re.findall(r"(\d+) ([a-z ]+?)(?=,| and|$)", sentence[2])
+    assert {words: int(number) for number, words in told} == {MANY[v]: n for v, n in counts.items()}
+
+
+def test_the_report_tells_every_verdict_of_the_table():
+    report = (REPORT / "report.md").read_text(encoding="utf-8")
+    for row in VERDICTS:
+        told = f"| **{row['verdict']}** | {escaped(row['text'])} | {escaped(row['source'])} | "
+        assert f"{told}{escaped(row['measured'])}" in report, row["claim"]
+
+
+def test_the_readme_has_the_windows_of_the_published_table():
+    readme = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
+    windows = {
+        float(row["nu [1]"]): [f"{float(row[f'whole {end} [Pa]']) / 1e6:.2g}" for end in ("from", "to")]
+        for row in rows_of(REPORT / "tables" / "stability-map-windows.csv")
+        if (row["mesh"], row["flips"]) == ("thesis", "tolerant")
+    }
+    assert "whole for E from {} to {} MPa with nu = 0.1".format(*windows[0.1]) in readme
+    assert "from {} to {} MPa with 0.4".format(*windows[0.4]) in readme
