@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.bodies.kernels.render_mesh import write_render_mesh
+from taichi_soft.bodies.kernels.render_mesh import RING, write_render_mesh
 from taichi_soft.bodies.soft_body import SoftBody, require_alive
 from taichi_soft.core.checks import as_number
+from taichi_soft.core.constants import LANES
 from taichi_soft.core.errors import MeshError, StateError
 from taichi_soft.meshing.arrays import read_only
 from taichi_soft.meshing.creases import split_at_creases
@@ -44,15 +45,11 @@ class RenderMesh:
         vertices: of the body, that each render vertex is or is a copy of, (k,).
         triangles: render vertices, (m, 3).
         """
-        count, corners = len(vertices), triangles.ravel()
         self._body = body
         self._body_vertices: Ints32 = read_only(vertices.astype(np.int32))
         self._triangles: Ints32 = read_only(triangles)
         self._topology_version = body.topology_version
-        begins = np.r_[0, np.cumsum(np.bincount(corners, minlength=count))] + 2 * count + 1 + len(corners)
-        around = np.argsort(corners, kind="stable") // 3
-        self._table = np.concatenate([vertices, corners, begins, around]).astype(np.int32)
-        self._areas = np.empty(len(corners), dtype=np.float32)
+        self._table = _table(vertices, triangles)
 
     def __repr__(self) -> str:
         state = ", outdated" if self.is_outdated else ""
@@ -117,15 +114,15 @@ def read_render_mesh(
 ) -> None:
     """Fill two buffers, (k, 3) each, from the fields of a world. See `World.read_render_mesh`."""
     is_serial = mesh.vertex_count < FEWEST_SHARED
-    _write(state, is_serial, mesh.body.index, alpha, mesh._table, mesh._areas, positions, normals)
+    _write(state, is_serial, mesh.body.index, alpha, mesh._table, positions, normals)
 
 
 def warm_up(state: Any) -> None:
     """Compile what `read_render_mesh` calls, for few vertices and for many."""
-    table = np.array([0, 0, 0, 0, 6, 7, 0], dtype=np.int32)  # a triangle, of one vertex of the first body
-    rows = np.empty((3, 3), dtype=np.float32)
+    table = _table(np.zeros(3, dtype=np.int64), np.arange(3).reshape(1, 3))  # of a vertex of the first body
+    positions, normals = np.empty((2, 3, 3), dtype=np.float32)
     for is_serial in (True, False):
-        _write(state, is_serial, 0, 1.0, table, rows[0], rows[1], rows[2])
+        _write(state, is_serial, 0, 1.0, table, positions, normals)
 
 
 def _write(
@@ -134,8 +131,54 @@ def _write(
     body: int,
     alpha: float,
     table: Ints32,
-    areas: Floats32,
     positions: Floats32,
     normals: Floats32,
 ) -> None:
-    write_render_mesh(state, is_serial, body, alpha, table, areas, positions.reshape(-1), normals.reshape(-1))
+    write_render_mesh(state, is_serial, body, alpha, table, positions.reshape(-1), normals.reshape(-1))
+
+
+def _table(vertices: NDArray[np.int64], triangles: NDArray[Any]) -> Ints32:
+    """What the kernel walks, in one array, because each argument of a kernel costs as much as some hundred
+    vertices: blocks, the body's vertex of each render vertex, where the further triangles of each block begin
+    in the table and behind the last one end, and these triangles.
+
+    A block has `LANES` render vertices, then `RING` rows with the rings round them: triangles (v, a, b) and
+    (v, b, c) make the ring a, b, c, and v itself fills it up. A further triangle is the lane of its vertex,
+    and its two others. The last block repeats the last vertex.
+    """
+    count = len(vertices)
+    rings, further = _rings(count, triangles)
+    lanes = np.minimum(np.arange(-(-count // LANES) * LANES), count - 1)
+    blocks = np.concatenate([lanes[:, None], rings[lanes]], axis=1).reshape(-1, LANES, 1 + RING)
+    begins = 3 * np.r_[0, np.cumsum(np.bincount(further[:, 0] // LANES, minlength=len(blocks)))]
+    further[:, 0] %= LANES
+    begins += blocks.size + count + len(begins)
+    parts = (blocks.swapaxes(1, 2).ravel(), vertices, begins, further.ravel())
+    return np.concatenate(parts).astype(np.int32)
+
+
+def _rings(count: int, triangles: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The ring round each render vertex, (k, RING), and triangles that none has, (f, 3), each beginning with
+    the vertex whose ring lacks it, in ascending order.
+
+    A ring begins at a border of the surface where there is one, and ends where it is full or nothing goes on.
+    """
+    turned = triangles[:, [[0, 1, 2], [1, 2, 0], [2, 0, 1]]].reshape(-1, 3).astype(np.int64)
+    own, one, other = turned[np.argsort(triangles.ravel(), kind="stable")].T
+    key = own * count + one
+    order = np.argsort(key, kind="stable")
+    place = np.minimum(np.searchsorted(key[order], own * count + other), len(key) - 1)
+    following = np.where(key[order][place] == own * count + other, order[place], -1)
+    is_inner = np.zeros(len(key), dtype=np.bool_)
+    is_inner[following[following >= 0]] = True
+    by_vertex = np.lexsort((is_inner, own))
+    at = by_vertex[np.searchsorted(own, np.arange(count))]
+    rings = np.tile(np.arange(count)[:, None], (1, RING))
+    rings[:, 0] = one[at]
+    is_left, goes_on = np.ones(len(key), dtype=np.bool_), np.ones(count, dtype=np.bool_)
+    for slot in range(1, RING):
+        rings[goes_on, slot] = other[at[goes_on]]
+        is_left[at[goes_on]] = False
+        at = np.where(goes_on, following[at], -1)
+        goes_on = (at >= 0) & is_left[at]
+    return rings, np.stack([own, one, other], axis=1)[is_left]

@@ -11,6 +11,7 @@ from taichi_soft import (
     SoftBodyAsset,
     SpringMaterial,
     StateError,
+    TetMesh,
     World,
     box,
     cloth,
@@ -20,6 +21,14 @@ from taichi_soft import (
 from taichi_soft.bodies import render_mesh
 
 CUBE, BALL, BLOCK = box((1, 1, 1), (1, 1, 1)), sphere(0.5, 5), box((1, 1, 1), (3, 3, 3))
+_TURN = np.linspace(0.0, 2 * np.pi, 13)[:-1]
+SPINDLE = TetMesh(  # at the ends of which twelve triangles meet, and of its shaft four
+    np.concatenate(
+        [[[0, 0, 0.6], [0, 0, -0.6]], np.stack([np.cos(_TURN), np.sin(_TURN), 0 * _TURN], axis=1) / 3]
+    ),
+    [[0, 1, 2 + (i + 1) % 12, 2 + i] for i in range(12)],
+    fix_orientation=True,
+)
 JELLY, THREAD = Material(1e5, 0.3, 1000.0), SpringMaterial(500.0, 0.2)
 
 
@@ -33,6 +42,7 @@ class Zoo:
         self.cube = world.add_body(CUBE, JELLY, position=(0, 0, 1))
         self.ball = world.add_body(BALL, JELLY, position=(3, 0, 1))
         self.block = world.spawn(block, position=(6, 0, 1))
+        self.spindle = world.add_body(SPINDLE, JELLY, position=(0, 3, 1))
         self.sheet = world.add_body(cloth((1, 1), (4, 4), 0.2), THREAD, position=(9, 0, 1))
         self.rope = world.add_body(rope(1.0, 4, mass=0.1), THREAD, position=(12, 0, 1))
         world.build()
@@ -82,7 +92,7 @@ def enclosed(positions, triangles):
 
 
 @pytest.mark.parametrize("crease", [None, 30.0, 60.0])
-@pytest.mark.parametrize("name", ["cube", "ball", "block", "sheet"])
+@pytest.mark.parametrize("name", ["cube", "ball", "block", "spindle", "sheet"])
 def test_render_vertices_lie_where_the_bodys_vertices_are(zoo, name, crease):
     body = getattr(zoo, name)
     shaken(body)
@@ -95,7 +105,7 @@ def test_render_vertices_lie_where_the_bodys_vertices_are(zoo, name, crease):
 
 
 @pytest.mark.parametrize("crease", [None, 30.0])
-@pytest.mark.parametrize("name", ["cube", "ball", "block", "sheet"])
+@pytest.mark.parametrize("name", ["cube", "ball", "block", "spindle", "sheet"])
 @pytest.mark.parametrize("fewest_shared", [0, 10**9], ids=["by all threads", "by one"])
 def test_normals_are_the_means_of_the_triangles_weighted_by_area(
     zoo, name, crease, fewest_shared, monkeypatch
@@ -142,7 +152,7 @@ def test_a_cube_has_six_normals_or_one_for_each_vertex(zoo):
 
 
 def test_triangles_face_outwards(zoo):
-    for body in (zoo.cube, zoo.ball, zoo.block):
+    for body in (zoo.cube, zoo.ball, zoo.block, zoo.spindle):
         shaken(body, by=0.02)
         mesh = body.render_mesh()
         assert enclosed(zoo.draw(mesh)[0], mesh.triangles) == pytest.approx(body.volume(), rel=1e-4)
