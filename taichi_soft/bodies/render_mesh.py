@@ -40,10 +40,12 @@ class RenderMesh:
     """
 
     def __init__(self, body: SoftBody, vertices: NDArray[np.int64], triangles: Ints32) -> None:
-        """Args:
-        body: which it draws.
-        vertices: of the body, that each render vertex is or is a copy of, (k,).
-        triangles: render vertices, (m, 3).
+        """Made by `Body.render_mesh`.
+
+        Args:
+            body: which it draws.
+            vertices: of the body, that each render vertex is or is a copy of, (k,).
+            triangles: render vertices, (m, 3).
         """
         self._body = body
         self._body_vertices: Ints32 = read_only(vertices.astype(np.int32))
