@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from engine_adapter.fixed_step import Accumulator, FixedStep
 from engine_adapter.rollback import Rollback
-from taichi_soft import Body, Event, OptionError, StateError, World
+from taichi_soft import Body, Event, OptionError, RenderMesh, StateError, World
 from taichi_soft.core.checks import as_count, as_number
 from taichi_soft.core.handles import handles_of
 from taichi_soft.core.threads import one_thread
@@ -184,3 +184,18 @@ class EngineAdapter:
             removed.
         """
         return self._world.read_positions(body, self._accumulator.alpha, out)
+
+    def render_mesh(
+        self,
+        mesh: RenderMesh,
+        positions: NDArray[np.float32] | None = None,
+        normals: NDArray[np.float32] | None = None,
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Positions [m] and normals to draw, between the previous step and the last one, float32 (k, 3) each.
+
+        Args:
+            mesh: of a body of this adapter's world, see `Body.render_mesh`.
+            positions, normals: C-contiguous float32 arrays to fill and return; None makes a new one.
+        Raises: as `World.read_render_mesh`.
+        """
+        return self._world.read_render_mesh(mesh, self._accumulator.alpha, positions, normals)

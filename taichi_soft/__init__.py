@@ -11,6 +11,7 @@ from taichi_soft.bodies.failure import Failure
 from taichi_soft.bodies.forces import force_gradient, internal_forces
 from taichi_soft.bodies.plasticity import Plasticity
 from taichi_soft.bodies.pose import Pose
+from taichi_soft.bodies.render_mesh import RenderMesh
 from taichi_soft.bodies.stability import StableStep, stable_step
 from taichi_soft.bodies.tearing import Tearing
 from taichi_soft.contact.collider import Collider
@@ -137,6 +138,7 @@ __all__ = [
     "Pose",
     "RayHit",
     "RayHits",
+    "RenderMesh",
     "Settings",
     "Shape",
     "SkippedCellsWarning",

@@ -132,6 +132,15 @@ CALLS = {
     "stable_substeps": lambda v, game: game.world.stable_substeps(v),
     "read_positions body": lambda v, game: game.world.read_positions(v, 1.0),
     "read_positions alpha": lambda v, game: game.world.read_positions(game.world.bodies[0], v),
+    "render_mesh crease": lambda v, game: game.world.bodies[0].render_mesh(crease=v),
+    "read_render_mesh mesh": lambda v, game: game.world.read_render_mesh(v, 1.0),
+    "read_render_mesh alpha": lambda v, game: game.world.read_render_mesh(
+        game.world.bodies[0].render_mesh(), v
+    ),
+    "read_render_mesh positions": lambda v, game: game.world.read_render_mesh(
+        game.world.bodies[0].render_mesh(), 1.0, v
+    ),
+    "adapter mesh": lambda v, game: game.render_mesh(v),
     "raycast origin": lambda v, game: game.world.raycast(v, (0, 0, 1)),
     "raycast direction": lambda v, game: game.world.raycast((0, 0, 0), v),
     "raycast max_distance": lambda v, game: game.world.raycast((0, 0, 0), (0, 0, 1), max_distance=v),

@@ -13,6 +13,7 @@ from taichi_soft.core.constants import POSITION_LIMIT
 from taichi_soft.core.errors import OptionError
 
 Floats = NDArray[np.float64]
+Floats32 = NDArray[np.float32]
 
 LARGEST_COUNT = 1_000_000
 """Substeps, bodies or pixels: more would not end within minutes, or not fit 32 bits."""
@@ -117,6 +118,26 @@ def as_indices(values: ArrayLike, name: str, count: int) -> NDArray[np.int32]:
         worst = int(array.min() if array.min() < 0 else array.max())
         raise OptionError(f"{name} names vertex {worst}: there are {count}, from 0 to {count - 1}")
     return np.unique(array).astype(np.int32)
+
+
+def as_buffer(out: Any, name: str, count: int) -> Floats32:
+    """`out` if (count, 3) positions or normals can be written to it, or a new array for None.
+
+    Raises: OptionError.
+    """
+    if out is None:
+        return np.empty((count, 3), dtype=np.float32)
+    if not isinstance(out, np.ndarray):
+        raise OptionError(f"{name} must be a numpy array, got {type(out).__name__}")
+    if out.shape != (count, 3) or out.dtype != np.float32:
+        raise OptionError(
+            f"{name} must be float32 of shape ({count}, 3), got {out.dtype} of shape {out.shape}"
+        )
+    if not (out.flags.c_contiguous and out.flags.writeable):
+        raise OptionError(
+            f"{name} must be C-contiguous and writeable: make it with numpy.empty((n, 3), numpy.float32)"
+        )
+    return out
 
 
 def as_path(value: Any) -> Path:

@@ -8,8 +8,8 @@ from numpy.typing import ArrayLike, NDArray
 from taichi_soft.core.checks import as_array, to_array
 from taichi_soft.core.errors import MeshError, OptionError
 from taichi_soft.meshing import BodyMesh, ParticleMesh, TetMesh
+from taichi_soft.meshing.creases import ROUND, split_at_creases
 from taichi_soft.render.colors import PALETTE, to_linear
-from taichi_soft.render.creases import split_at_creases
 
 # Coordinates beyond this [m] come from an explosion; their products would overflow in float32.
 FARTHEST = 1e7
@@ -39,7 +39,7 @@ class Surface:
                 f"triangles name vertices {corners.min()} to {corners.max()}, there are {self.vertex_count}"
             )
         # Only vertices on the surface are projected and lit, those on sharp edges once per side.
-        self._used, self.triangles = split_at_creases(first, corners)
+        self._used, self.triangles = split_at_creases(first, corners, ROUND)
         self.positions = first
         self.color = color
 

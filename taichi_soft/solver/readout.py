@@ -9,9 +9,11 @@ from taichi_soft.bodies.kernels.evaluate import compute_body_forces
 from taichi_soft.bodies.kernels.plasticity import read_rest_inverses
 from taichi_soft.bodies.kernels.readout import read_positions, read_velocities
 from taichi_soft.bodies.layout import Scene
+from taichi_soft.bodies.render_mesh import RenderMesh, read_render_mesh
 from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.control.joints import Joints
 from taichi_soft.control.kernels.joints import add_joint_forces
+from taichi_soft.core.checks import as_buffer
 from taichi_soft.core.errors import OptionError
 from taichi_soft.core.settings import Settings
 from taichi_soft.core.types import Integrator
@@ -23,7 +25,7 @@ Floats32 = NDArray[np.float32]
 
 
 class Readout:
-    """Positions, velocities and rest shapes of one world's bodies."""
+    """Positions, velocities, render meshes and rest shapes of one world's bodies."""
 
     def __init__(
         self, settings: Settings, state: State, program: StepProgram, scene: Scene, joints: Joints
@@ -39,13 +41,24 @@ class Readout:
 
     def positions(self, body: SoftBody, alpha: float, out: Floats32 | None) -> Floats32:
         """As `World.read_positions`. Raises: OptionError for an `out` that does not fit."""
-        rows = _as_buffer(out, body.vertex_count)
+        rows = as_buffer(out, "out", body.vertex_count)
         if self._alpha != alpha:
             read_positions(self._state, alpha, self._rows)
             self._alpha = alpha
         begin = self._scene.ranges[body.index].particles[0]
         rows[:] = self._rows[begin : begin + body.vertex_count]
         return rows
+
+    def render_mesh(
+        self, mesh: RenderMesh, alpha: float, positions: Floats32 | None, normals: Floats32 | None
+    ) -> tuple[Floats32, Floats32]:
+        """As `World.read_render_mesh`. Raises: OptionError for a buffer that does not fit."""
+        x = as_buffer(positions, "positions", mesh.vertex_count)
+        n = as_buffer(normals, "normals", mesh.vertex_count)
+        if np.may_share_memory(x, n):  # of contiguous arrays it is certain
+            raise OptionError("positions and normals share memory: give each a buffer of its own")
+        read_render_mesh(self._state, mesh, alpha, x, n)
+        return x, n
 
     def velocities(self, body: SoftBody) -> Floats32:
         """Velocities at the time of the positions, (n, 3) [m/s]."""
@@ -83,18 +96,3 @@ class Readout:
         inverses = np.empty(rows.shape)
         inverses[self._scene.bodies[body.index].tet_order] = rows
         return inverses
-
-
-def _as_buffer(out: Floats32 | None, count: int) -> Floats32:
-    """`out` if it can take (count, 3) positions, or a new array. Raises: OptionError."""
-    if out is None:
-        return np.empty((count, 3), dtype=np.float32)
-    if not isinstance(out, np.ndarray):
-        raise OptionError(f"out must be a numpy array, got {type(out).__name__}")
-    if out.shape != (count, 3) or out.dtype != np.float32:
-        raise OptionError(f"out must be float32 of shape ({count}, 3), got {out.dtype} of shape {out.shape}")
-    if not (out.flags.c_contiguous and out.flags.writeable):
-        raise OptionError(
-            "out must be C-contiguous and writeable: make it with numpy.empty((n, 3), numpy.float32)"
-        )
-    return out

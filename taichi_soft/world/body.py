@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies import measures
+from taichi_soft.bodies.render_mesh import RenderMesh, surface_render_mesh
 from taichi_soft.bodies.stability import StableStep
 from taichi_soft.control.attachments import Attachment
 from taichi_soft.control.frames import Frames
@@ -15,6 +16,7 @@ from taichi_soft.core.checks import as_array, as_positive
 from taichi_soft.core.handles import recorded
 from taichi_soft.events import Event, StressExceeded, TearCandidates
 from taichi_soft.fracture.cutting import cut
+from taichi_soft.meshing.creases import ROUND
 from taichi_soft.solver.context import WorldContext
 from taichi_soft.world.body_control import BodyControl
 from taichi_soft.world.body_measures import BodyMeasures
@@ -60,6 +62,19 @@ class Body(BodyControl, BodyMeasures):
             Nothing is changed then.
         """
         return cast("tuple[Body, ...]", cut(self, plane, triangle))
+
+    def render_mesh(self, *, crease: float | None = ROUND) -> RenderMesh:
+        """What a renderer draws of the body: its surface, with a copy of a vertex per side of a sharp edge.
+
+        `EngineAdapter.render_mesh` or `World.read_render_mesh` fills its buffers once a frame. A cut or a
+        tear makes it outdated: see `RenderMesh.is_outdated`.
+        Args:
+            crease: angle between neighbouring triangles at rest beyond which their edge is sharp, 0 to 180
+                [degrees]; None: all is shaded as round.
+        Raises: OptionError for an angle out of range; MeshError for a body without triangles, such as a rope;
+            StateError for one that was removed.
+        """
+        return surface_render_mesh(self, crease)
 
     @property
     def stable_step(self) -> StableStep:

@@ -12,6 +12,7 @@ from typing import cast
 import numpy as np
 
 from taichi_soft.bodies.failure import FailedStep
+from taichi_soft.bodies.render_mesh import warm_up as warm_up_render_meshes
 from taichi_soft.control.drives import push_bodies, set_wind
 from taichi_soft.control.impulses import apply_radial_impulse
 from taichi_soft.control.rigid_transform import carry
@@ -42,6 +43,7 @@ def warm_up(context: WorldContext) -> None:
         for body in {body.asset: body for body in bodies}.values():
             _control(context, body, next((each for each in bodies if each is not body), None))
             _measure(context, body)
+        warm_up_render_meshes(context.built.state)
         _ask(context)
         context.built.trial_step(SHORTEST)
         context.built.events.warm_up()

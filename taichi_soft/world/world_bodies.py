@@ -10,6 +10,8 @@ from numpy.typing import ArrayLike
 from taichi_soft.bodies.asset import Floats32, SoftBodyAsset
 from taichi_soft.bodies.contact import DEFAULT_CONTACT, Contact
 from taichi_soft.bodies.plasticity import Plasticity
+from taichi_soft.bodies.render_mesh import RenderMesh, require_current
+from taichi_soft.bodies.soft_body import lives_in
 from taichi_soft.bodies.stability import StableStep
 from taichi_soft.bodies.tearing import Tearing
 from taichi_soft.core.checks import as_number
@@ -143,3 +145,32 @@ class WorldBodies(WorldParts):
         if type(alpha) is not float or not 0.0 <= alpha <= 1.0:
             alpha = as_number(alpha, "alpha", 0.0, 1.0, "a number from 0 to 1")
         return simulation.readout.positions(body, alpha, out)
+
+    def read_render_mesh(
+        self,
+        mesh: RenderMesh,
+        alpha: float,
+        positions: Floats32 | None = None,
+        normals: Floats32 | None = None,
+    ) -> tuple[Floats32, Floats32]:
+        """What a renderer draws, between the previous step (alpha 0) and the last one (alpha 1).
+
+        A normal is the mean of those of the triangles round its vertex, as they are now, each weighted by its
+        area. So a triangle that is crushed to a line counts for nothing, and films are shaded the same way.
+        Where all of them have no area it is (0, 0, 1). One call is one kernel.
+        Args:
+            mesh: of a body of this world, see `Body.render_mesh`.
+            positions, normals: C-contiguous float32 arrays (k, 3) to fill; None makes a new one.
+        Returns: both: positions of the render vertices [m], and their normals of unit length, outward.
+        Raises: OptionError for a body of another world, an alpha out of range or a buffer that does not
+            fit; StateError for a body that was removed, or cut since the mesh was made, and before `build`.
+        """
+        simulation = self._built
+        if not isinstance(mesh, RenderMesh):
+            raise OptionError(f"mesh must be a RenderMesh, made by body.render_mesh(), got {mesh!r}")
+        if not lives_in(mesh.body, self._context):
+            raise OptionError(f"mesh must be of a body of this world, got one of {mesh.body!r} of another")
+        require_current(mesh)
+        if type(alpha) is not float or not 0.0 <= alpha <= 1.0:
+            alpha = as_number(alpha, "alpha", 0.0, 1.0, "a number from 0 to 1")
+        return simulation.readout.render_mesh(mesh, alpha, positions, normals)

@@ -20,6 +20,7 @@ from taichi_soft import (
     MeshShape,
     PlaneShape,
     Plasticity,
+    RenderMesh,
     SoftBodyAsset,
     SphereShape,
     SpringMaterial,
@@ -78,6 +79,7 @@ class Game:
         self.dead_grab, self.dead_hold = body.grab(0), body.attach([0], world.add_frame(), two_way=True)
         neighbour = world.spawn(self.cube, position=(0.5, 0.0, 2.0))
         self.dead_joint = body.attach_to(neighbour, [0], onto=[0])
+        self.dead_mesh = body.render_mesh()
         self.dead_motor = world.add_motor(body, [0], (0, 0, 1), speed=1.0, max_force=1.0, is_fixed=True)
         self.dead_motor.remove()
         self.dead_grab.release()
@@ -109,6 +111,7 @@ class Game:
         self.other = World(retries=0)
         self.foreign_body = self.other.add_body(BLOCK, SOFT, position=(0.0, 0.0, 2.0))
         self.foreign_frame = self.other.add_frame()
+        self.foreign_mesh = self.foreign_body.render_mesh()
         self.foreign_asset = SoftBodyAsset(BLOCK, SOFT)
 
     def begin(self):
@@ -288,6 +291,12 @@ BUFFER = Kind(
     {"list": [[0.0] * 3] * N, "double": np.zeros((N, 3)), "short": np.zeros((N - 1, 3), np.float32),
      "flat": np.zeros(3 * N, np.float32), "number": 0, "text": "out"},
 )  # fmt: skip
+DRAWN = Kind(
+    lambda game, rng: one_of(game.world.bodies, rng).render_mesh(),
+    {"none": None, "number": 0, "text": "skin", "body": Of(lambda g: g.free), "of a removed body": Of(lambda g: g.dead_mesh),
+     "of another world": Of(lambda g: g.foreign_mesh), "class": RenderMesh},
+)  # fmt: skip
+DRAWN_BUFFER = BUFFER.but("short", "double", short=np.zeros((1, 3), np.float32), double=np.zeros((1, 3)))
 GROUP = choice(1, 2, 3, **NOT_COUNTS, **{"too many bits": 2**40})
 SHAPE = choice(
     SphereShape(0.2), BoxShape((0.3, 0.3, 0.2)), CapsuleShape(0.1, 0.3), PlaneShape(),
@@ -474,6 +483,9 @@ CALLS: dict[str, dict[str, Call]] = {
         "set_wind": Call({"velocity": or_none(SPEED), "density": number(0.5, 2.0, below=-1.0), "drag": number(0.1, 2.0, below=-1.0)}),
         "set_force_field": Call({"function": FIELD}),
         "read_positions": Call({"body": BODY, "alpha": number(0.0, 1.0, below=-0.1, above=1.1), "out": BUFFER}),
+        "read_render_mesh": Call({
+            "mesh": DRAWN, "alpha": number(0.0, 1.0, below=-0.1, above=1.1), "positions": DRAWN_BUFFER, "normals": DRAWN_BUFFER,
+        }),
         "record_events": Call({"kinds": EVENTS}),
         "on": Call({"kind": EVENT, "function": FUNCTION}),
         "drain_events": NOTHING,
@@ -534,6 +546,7 @@ CALLS: dict[str, dict[str, Call]] = {
         "force_across": Call({"point": POINT, "normal": WAY}),
         "watch_stress": Call({"threshold": THRESHOLD}),
         "watch_tearing": Call({"tear_stress": THRESHOLD}),
+        "render_mesh": Call({"crease": or_none(number(0.0, 180.0, below=-1.0, above=181.0))}),
     },
     "Collider": {
         "move_to": Call({"position": POINT, "rotation": ROTATION}),
@@ -564,6 +577,7 @@ CALLS: dict[str, dict[str, Call]] = {
         "state_hash": NOTHING,
         "drain_events": NOTHING,
         "positions": Call({"body": BODY, "out": BUFFER}),
+        "render_mesh": Call({"mesh": DRAWN, "positions": DRAWN_BUFFER, "normals": DRAWN_BUFFER}),
     },
     "Rollback": {
         "save": NOTHING,

@@ -47,6 +47,9 @@ def readings(world, adapter):
                     yield f"{kind} {number}.{name}", found() if callable(found) else found
     for body in world.bodies:
         yield "positions", (body.positions(), world.read_positions(body, 0.5), adapter.positions(body))
+        with contextlib.suppress(MeshError):  # a rope has no surface
+            skin = body.render_mesh()
+            yield "render_mesh", (world.read_render_mesh(skin, 0.5), adapter.render_mesh(skin))
         middle = body.center_of_mass()
         yield "raycast", world.raycast(middle + UP, -UP)
         yield "closest_point", world.closest_point(middle + UP, max_distance=10.0)

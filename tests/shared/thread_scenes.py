@@ -19,7 +19,8 @@ if __name__ == "__main__":
 # ruff: noqa: E402
 import random_play
 
-from taichi_soft import Contact, Material, World, box, init, sphere
+from taichi_soft import Contact, Material, SpringMaterial, World, box, cloth, init, sphere
+from taichi_soft.bodies.render_mesh import FEWEST_SHARED
 
 CUBE = box(cells=(2, 2, 2))
 TOP = np.flatnonzero(CUBE.vertices[:, 2] > 0.49)
@@ -127,6 +128,19 @@ def torn():
     return motion(world)
 
 
+def drawn():
+    """Vertices and normals of a large surface, which threads share."""
+    mesh = cloth((1, 1), (50, 50), 0.1)
+    world = World(gravity=(0, 0, 0), floor=None)
+    body = world.add_body(mesh, SpringMaterial(100.0, 0.1))
+    world.build()
+    shift = np.random.default_rng(2).normal(scale=0.1, size=mesh.vertices.shape)
+    body.set_motion(mesh.vertices + shift, 0.0 * shift)
+    skin = body.render_mesh()
+    assert skin.vertex_count > FEWEST_SHARED
+    return [rows.tobytes().hex() for rows in world.read_render_mesh(skin, 0.3)]
+
+
 def played():
     """300 ticks of anything: hashes of each, after wrong inputs were taken back every 20 ticks."""
     hashes, different = random_play.check(300, seed=11)
@@ -143,6 +157,7 @@ SCENES = {
     "fallen, per body": lambda: fallen("per_body"),
     "fallen, flat": lambda: fallen("flat"),
     "torn": torn,
+    "drawn": drawn,
     "played": played,
 }
 

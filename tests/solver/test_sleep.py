@@ -48,6 +48,19 @@ def piles(asleep):
     world.set_force_field(None)
 
 
+def test_who_sleeps_is_drawn_where_it_lies_at_any_time(piles):
+    world, _ = piles
+    step(world, 0.1)
+    for body in world.bodies:
+        assert body.is_asleep
+        skin = body.render_mesh()
+        expected = body.positions()[skin.body_vertices]
+        for alpha in (0.0, 0.4, 1.0):
+            positions, normals = world.read_render_mesh(skin, alpha)
+            np.testing.assert_allclose(positions, expected, atol=1e-5)
+            np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1.0, atol=1e-5)
+
+
 def who_sleeps(world):
     return [body.is_asleep for body in world.bodies]
 

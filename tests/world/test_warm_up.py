@@ -20,6 +20,7 @@ from taichi_soft import (
     World,
     box,
 )
+from taichi_soft.bodies import render_mesh
 from taichi_soft.control.kernels.grabs import MOST_GRABS
 from taichi_soft.control.kernels.joints import MOST_JOINTS
 from taichi_soft.control.kernels.motors import MOST_MOTORS
@@ -133,6 +134,17 @@ def test_nothing_is_compiled_where_the_game_looks(game, compiled, kind):
         found = getattr(game.handles(kind)[0], name)
         if inspect.ismethod(found):
             found()
+    assert compiled == []
+
+
+@pytest.mark.parametrize("fewest_shared", [0, 10**9], ids=["by all threads", "by one"])
+def test_nothing_is_compiled_where_a_mesh_of_any_size_is_drawn(game, compiled, monkeypatch, fewest_shared):
+    monkeypatch.setattr(render_mesh, "FEWEST_SHARED", fewest_shared)
+    game.begin()
+    compiled.clear()
+    for crease in (None, 30.0):
+        _, normals = game.adapter.render_mesh(game.free.render_mesh(crease=crease))
+        assert np.isfinite(normals).all()
     assert compiled == []
 
 

@@ -1,0 +1,96 @@
+"""Vertices and normals of one body, as a renderer draws them.
+
+Render vertices lie in blocks of `LANES`. What one thread does with a block is the same wherever the block
+comes, so the bits are the same for any number of threads.
+"""
+
+from taichi_soft.core.constants import LANES
+from taichi_soft.core.runtime import ti
+
+RING = 9
+"""Vertices in the ring round a render vertex: eight triangles, which is more than most have."""
+
+STRIDE = (1 + RING) * LANES
+"""Numbers of a block in the table."""
+
+BLOCK_BITS = (1 << 24) - 1
+"""Mask that leaves every block number unchanged, so that index arithmetic is seen not to overflow."""
+
+NO_LENGTH = 1e-37
+"""Square [m^4] of the sum of a vertex's triangles below which they have no direction: float32 ends there."""
+
+
+@ti.func
+def _row(rows: ti.template(), i):
+    return ti.Vector([rows[3 * i], rows[3 * i + 1], rows[3 * i + 2]])
+
+
+@ti.func
+def _block_count(positions: ti.template()):
+    return (positions.shape[0] // 3 + LANES - 1) // LANES
+
+
+@ti.kernel
+def write_render_mesh(
+    state: ti.template(),
+    is_serial: ti.template(),
+    body: ti.i32,
+    alpha: ti.f32,
+    table: ti.types.ndarray(dtype=ti.i32, ndim=1),
+    positions: ti.types.ndarray(dtype=ti.f32, ndim=1),
+    normals: ti.types.ndarray(dtype=ti.f32, ndim=1),
+):
+    """Positions [m] and unit normals of render vertices, `alpha` of the way from the previous step (0) to the
+    last one (1).
+
+    Args:
+        table: see `RenderMesh`.
+        positions, normals: (3 k,).
+    """
+    ti.loop_config(serialize=is_serial)
+    for block in range(_block_count(positions)):
+        first = state.body_particles[body][0]
+        for lane in range(LANES):
+            i = table[block * STRIDE + lane]
+            p = state.particle_of_vertex[first + table[_block_count(positions) * STRIDE + i]]
+            before, after = state.prev_position[p], state.particle_position[p]
+            x = before + alpha * (after - before)
+            if alpha == 1.0:
+                x = after
+            for k in ti.static(range(3)):
+                positions[3 * i + k] = x[k]
+    ti.loop_config(serialize=is_serial)
+    for block in range(_block_count(positions)):
+        nx, ny = ti.Vector.zero(ti.f32, LANES), ti.Vector.zero(ti.f32, LANES)
+        nz = ti.Vector.zero(ti.f32, LANES)
+        # Reads arrays and writes local ones only, so that LLVM makes one pass over vector registers of it.
+        for lane in range(LANES):
+            j = lane & (LANES - 1)
+            place = (block & BLOCK_BITS) * STRIDE + j
+            a = _row(positions, table[place])
+            one = _row(positions, table[place + LANES]) - a
+            n = ti.Vector.zero(ti.f32, 3)
+            for slot in ti.static(range(2, RING + 1)):
+                other = _row(positions, table[place + slot * LANES]) - a
+                n += one.cross(other)
+                one = other
+            nx[j], ny[j], nz[j] = n.x, n.y, n.z
+        # The few triangles that no ring has.
+        row = _block_count(positions) * STRIDE + positions.shape[0] // 3 + block
+        for number in range((table[row + 1] - table[row]) // 3):
+            place = table[row] + 3 * number
+            j = table[place]
+            a = _row(positions, table[block * STRIDE + j])
+            n = (_row(positions, table[place + 1]) - a).cross(_row(positions, table[place + 2]) - a)
+            nx[j], ny[j], nz[j] = nx[j] + n.x, ny[j] + n.y, nz[j] + n.z
+        for lane in range(LANES):
+            j = lane & (LANES - 1)
+            square = nx[j] * nx[j] + ny[j] * ny[j] + nz[j] * nz[j]
+            scale = ti.rsqrt(ti.max(square, NO_LENGTH))
+            is_sound = square > NO_LENGTH
+            nx[j] = ti.select(is_sound, nx[j] * scale, 0.0)
+            ny[j] = ti.select(is_sound, ny[j] * scale, 0.0)
+            nz[j] = ti.select(is_sound, nz[j] * scale, 1.0)
+        for j in ti.static(range(LANES)):
+            i = table[block * STRIDE + j]
+            normals[3 * i], normals[3 * i + 1], normals[3 * i + 2] = nx[j], ny[j], nz[j]

@@ -1,0 +1,186 @@
+"""What a renderer draws of a body: triangles, and the vertices and normals of each frame."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.bodies.kernels.render_mesh import RING, write_render_mesh
+from taichi_soft.bodies.soft_body import SoftBody, require_alive
+from taichi_soft.core.checks import as_number
+from taichi_soft.core.constants import LANES
+from taichi_soft.core.errors import MeshError, StateError
+from taichi_soft.meshing.arrays import read_only
+from taichi_soft.meshing.creases import split_at_creases
+
+Floats32 = NDArray[np.float32]
+Ints32 = NDArray[np.int32]
+
+FEWEST_SHARED = 4000
+"""Render vertices from which on threads share them: waking them costs as much as some thousand of them."""
+
+
+class RenderMesh:
+    """The surface of one body as a renderer takes it. Made by `Body.render_mesh`, and read-only.
+
+        skin = duck.render_mesh(crease=40.0)
+        vertices = np.empty((skin.vertex_count, 3), np.float32)
+        normals = np.empty_like(vertices)
+        index_buffer = skin.triangles
+        while running:
+            game.advance(seconds_since_last_frame)
+            if skin.is_outdated:
+                ...  # the body was cut: make mesh and buffers anew
+            game.render_mesh(skin, vertices, normals)
+
+    It has the vertices on the surface only, one copy for each side of a sharp edge. It stays as it is: a cut
+    body has other vertices, so its mesh is outdated, and is made anew.
+    """
+
+    def __init__(self, body: SoftBody, vertices: NDArray[np.int64], triangles: Ints32) -> None:
+        """Made by `Body.render_mesh`.
+
+        Args:
+            body: which it draws.
+            vertices: of the body, that each render vertex is or is a copy of, (k,).
+            triangles: render vertices, (m, 3).
+        """
+        self._body = body
+        self._body_vertices: Ints32 = read_only(vertices.astype(np.int32))
+        self._triangles: Ints32 = read_only(triangles)
+        self._topology_version = body.topology_version
+        self._table = _table(vertices, triangles)
+
+    def __repr__(self) -> str:
+        state = ", outdated" if self.is_outdated else ""
+        return f"RenderMesh({self.vertex_count} vertices, {len(self._triangles)} triangles{state})"
+
+    @property
+    def body(self) -> SoftBody:
+        """Which it draws."""
+        return self._body
+
+    @property
+    def vertex_count(self) -> int:
+        """Number of render vertices, k."""
+        return len(self._body_vertices)
+
+    @property
+    def triangles(self) -> Ints32:
+        """The index buffer: render vertices, int32 (m, 3), counterclockwise seen from outside."""
+        return self._triangles
+
+    @property
+    def body_vertices(self) -> Ints32:
+        """The body's vertex that each render vertex is a copy of, int32 (k,): what is known of the body's
+        vertices becomes an attribute by it, as `body.vertex_stress()[mesh.body_vertices]`."""
+        return self._body_vertices
+
+    @property
+    def topology_version(self) -> int:
+        """That of the body when this was made."""
+        return self._topology_version
+
+    @property
+    def is_outdated(self) -> bool:
+        """Whether the body was cut, torn or restored to another cut since: then make a new one."""
+        return self._topology_version != self._body.topology_version
+
+
+def surface_render_mesh(body: SoftBody, crease: float | None) -> RenderMesh:
+    """As `Body.render_mesh`."""
+    require_alive(body)
+    if crease is not None:
+        crease = as_number(crease, "crease", 0.0, 180.0, "an angle from 0 to 180 degrees, or None")
+    if len(body.surface) == 0:
+        raise MeshError(f"{body!r} has no triangles to draw: give its ParticleMesh some with surface=")
+    return RenderMesh(body, *split_at_creases(body.mesh.vertices, body.surface, crease))
+
+
+def require_current(mesh: RenderMesh) -> None:
+    """Raises: StateError for a mesh whose body was removed or has other vertices by now."""
+    body = mesh.body
+    require_alive(body)
+    if mesh.is_outdated:
+        raise StateError(
+            f"body {body.index} was cut, torn or restored since this render mesh was made (topology_version "
+            f"{mesh.topology_version}, now {body.topology_version}): make it anew by body.render_mesh(), and "
+            "buffers for its vertex_count"
+        )
+
+
+def read_render_mesh(
+    state: Any, mesh: RenderMesh, alpha: float, positions: Floats32, normals: Floats32
+) -> None:
+    """Fill two buffers, (k, 3) each, from the fields of a world. See `World.read_render_mesh`."""
+    is_serial = mesh.vertex_count < FEWEST_SHARED
+    _write(state, is_serial, mesh.body.index, alpha, mesh._table, positions, normals)
+
+
+def warm_up(state: Any) -> None:
+    """Compile what `read_render_mesh` calls, for few vertices and for many."""
+    table = _table(np.zeros(3, dtype=np.int64), np.arange(3).reshape(1, 3))  # of a vertex of the first body
+    positions, normals = np.empty((2, 3, 3), dtype=np.float32)
+    for is_serial in (True, False):
+        _write(state, is_serial, 0, 1.0, table, positions, normals)
+
+
+def _write(
+    state: Any,
+    is_serial: bool,
+    body: int,
+    alpha: float,
+    table: Ints32,
+    positions: Floats32,
+    normals: Floats32,
+) -> None:
+    write_render_mesh(state, is_serial, body, alpha, table, positions.reshape(-1), normals.reshape(-1))
+
+
+def _table(vertices: NDArray[np.int64], triangles: NDArray[Any]) -> Ints32:
+    """What the kernel walks, in one array, because each argument of a kernel costs as much as some hundred
+    vertices: blocks, the body's vertex of each render vertex, where the further triangles of each block begin
+    in the table and behind the last one end, and these triangles.
+
+    A block has `LANES` render vertices, then `RING` rows with the rings round them: triangles (v, a, b) and
+    (v, b, c) make the ring a, b, c, and v itself fills it up. A further triangle is the lane of its vertex,
+    and its two others. The last block repeats the last vertex.
+    """
+    count = len(vertices)
+    rings, further = _rings(count, triangles)
+    lanes = np.minimum(np.arange(-(-count // LANES) * LANES), count - 1)
+    blocks = np.concatenate([lanes[:, None], rings[lanes]], axis=1).reshape(-1, LANES, 1 + RING)
+    begins = 3 * np.r_[0, np.cumsum(np.bincount(further[:, 0] // LANES, minlength=len(blocks)))]
+    further[:, 0] %= LANES
+    begins += blocks.size + count + len(begins)
+    parts = (blocks.swapaxes(1, 2).ravel(), vertices, begins, further.ravel())
+    return np.concatenate(parts).astype(np.int32)
+
+
+def _rings(count: int, triangles: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The ring round each render vertex, (k, RING), and triangles that none has, (f, 3), each beginning with
+    the vertex whose ring lacks it, in ascending order.
+
+    A ring begins at a border of the surface where there is one, and ends where it is full or nothing goes on.
+    """
+    turned = triangles[:, [[0, 1, 2], [1, 2, 0], [2, 0, 1]]].reshape(-1, 3).astype(np.int64)
+    own, one, other = turned[np.argsort(triangles.ravel(), kind="stable")].T
+    key = own * count + one
+    order = np.argsort(key, kind="stable")
+    place = np.minimum(np.searchsorted(key[order], own * count + other), len(key) - 1)
+    following = np.where(key[order][place] == own * count + other, order[place], -1)
+    is_inner = np.zeros(len(key), dtype=np.bool_)
+    is_inner[following[following >= 0]] = True
+    by_vertex = np.lexsort((is_inner, own))
+    at = by_vertex[np.searchsorted(own, np.arange(count))]
+    rings = np.tile(np.arange(count)[:, None], (1, RING))
+    rings[:, 0] = one[at]
+    is_left, goes_on = np.ones(len(key), dtype=np.bool_), np.ones(count, dtype=np.bool_)
+    for slot in range(1, RING):
+        rings[goes_on, slot] = other[at[goes_on]]
+        is_left[at[goes_on]] = False
+        at = np.where(goes_on, following[at], -1)
+        goes_on = (at >= 0) & is_left[at]
+    return rings, np.stack([own, one, other], axis=1)[is_left]
