@@ -16,7 +16,7 @@ from taichi_soft.core.known_kernels import (
     short_body,
     short_name_of,
 )
-from taichi_soft.core.taichi_patches import ti
+from taichi_soft.core.taichi_patches import ti, tree_of
 
 kernels = ti.lang.kernel_impl
 Make = Callable[..., None]
@@ -101,10 +101,7 @@ class FirstLaunches:
     def _make(self, kernel: Any, key: Any, args: Any, features: Any, digest: str) -> None:
         """Make a kernel from its source, under a name by which its file is found again."""
         kernel.runtime.materialize()
-        slots = kernel.template_slot_locations
-        tree, context = kernels._get_tree_and_ctx(
-            kernel, args=args, excluded_parameters=slots, arg_features=features
-        )
+        tree, context = tree_of(kernel, args, features)
         kernel.compiled_kernels[key] = _create(kernel, tree, context, name_of(kernel, digest))
         self._made.append((kernel, features, digest))
 

@@ -28,6 +28,7 @@ __all__ = [
     "let_whole_numbers_overflow",
     "remember_sources",
     "ti",
+    "tree_of",
 ]
 
 # A `ti.real_func` is compiled once and by itself, where a `ti.func` is copied to wherever it is called. But
@@ -104,6 +105,16 @@ def let_threads_in(lay_out_now: Callable[[Callable[[bool], None], bool], None]) 
     accessor.__init__ = make_in_turn
     lay_out = ti.lang.impl.PyTaichi.materialize_root_fb
     ti.lang.impl.PyTaichi.materialize_root_fb = staticmethod(functools.partial(lay_out_now, lay_out))
+
+
+def tree_of(kernel: Any, arguments: Any, features: Any) -> tuple[Any, Any]:
+    """Syntax tree of a kernel's source, and what Taichi walks through it with."""
+    return ti.lang.kernel_impl._get_tree_and_ctx(
+        kernel,
+        args=arguments,
+        excluded_parameters=kernel.template_slot_locations,
+        arg_features=features,
+    )
 
 
 def has_pending_fields() -> bool:
