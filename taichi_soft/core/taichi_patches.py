@@ -109,12 +109,11 @@ def let_threads_in(lay_out_now: Callable[[Callable[[bool], None], bool], None]) 
 
 def tree_of(kernel: Any, arguments: Any, features: Any) -> tuple[Any, Any]:
     """Syntax tree of a kernel's source, and what Taichi walks through it with."""
-    return ti.lang.kernel_impl._get_tree_and_ctx(
-        kernel,
-        args=arguments,
-        excluded_parameters=kernel.template_slot_locations,
-        arg_features=features,
+    slots = kernel.template_slot_locations
+    tree, context = ti.lang.kernel_impl._get_tree_and_ctx(
+        kernel, args=arguments, excluded_parameters=slots, arg_features=features
     )
+    return tree, context
 
 
 def has_pending_fields() -> bool:
