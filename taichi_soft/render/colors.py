@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.core.checks import as_array, as_number, to_array
 from taichi_soft.core.errors import OptionError
 from taichi_soft.render.arguments import as_color
+from taichi_soft.render.opencv import cv2
 
 Color = tuple[float, float, float]
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.core.checks import to_array
 from taichi_soft.core.errors import OptionError
 from taichi_soft.core.types import Choice
+from taichi_soft.render.opencv import cv2
 
 Picture = NDArray[np.uint8]
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from importlib.util import find_spec
-
-from taichi_soft.core.errors import OptionError
+from taichi_soft.core.required_packages import require_packages
 
 EXTRA = {"jinja2": "jinja2", "matplotlib": "matplotlib", "scipy": "scipy", "skfem": "scikit-fem"}
 """Modules of the extra `report`, and the packages that have them."""
@@ -12,8 +10,4 @@ EXTRA = {"jinja2": "jinja2", "matplotlib": "matplotlib", "scipy": "scipy", "skfe
 
 def require_extra() -> None:
     """Raises: OptionError where one is missing."""
-    missing = [package for module, package in EXTRA.items() if find_spec(module) is None]
-    if missing:
-        raise OptionError(
-            f"a report needs {', '.join(missing)}, not installed here: run pip install 'taichi-soft[report]'"
-        )
+    require_packages("a report", "report", EXTRA)

@@ -114,7 +114,8 @@ def test_an_unknown_experiment_is_refused_with_the_names_there_are():
 def test_missing_packages_are_named_with_the_way_to_get_them(monkeypatch):
     required_packages.require_extra()
     monkeypatch.setattr(
-        required_packages, "find_spec", lambda name: None if name in ("jinja2", "skfem") else name
+        "taichi_soft.core.required_packages.find_spec",
+        lambda name: None if name in ("jinja2", "skfem") else name,
     )
     with pytest.raises(OptionError, match=r"jinja2, scikit-fem.*pip install 'taichi-soft\[report\]'"):
         required_packages.require_extra()
