@@ -36,6 +36,16 @@ def _say(what: str = "") -> None:
         print(f"\r{told:<79}\r", end="", file=sys.stderr, flush=True)
 
 
+def warm_up_step(context: WorldContext) -> None:
+    """Compile what a step needs, and no more. The world stays as it is, to the bit."""
+    before = take_snapshot(context)
+    try:
+        context.built.trial_step(SHORTEST)
+    finally:
+        restore_snapshot(context, before)
+    _find_stable_step(context)
+
+
 def warm_up(context: WorldContext) -> None:
     """As `World.warm_up`."""
     _say("snapshots")
@@ -61,6 +71,11 @@ def warm_up(context: WorldContext) -> None:
         restore_snapshot(context, before)
         _say()
     state_hash(context)
+    _find_stable_step(context)
+
+
+def _find_stable_step(context: WorldContext) -> None:
+    """Which the first step would find, if nobody had."""
     if context.slots.living and not context.settings.is_implicit:
         context.substeps.stable_count(FRAME)
 
