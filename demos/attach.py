@@ -11,7 +11,7 @@ from taichi_soft.render import Camera, ColorScale
 from taichi_soft.render.film import Actor, Stage
 from taichi_soft.render.props import Prop
 
-MATERIAL = Material(young=1.2e5, poisson=0.3, density=1000.0, damping_ratio=0.2)
+MATERIAL = Material(young=2.0e5, poisson=0.3, density=1000.0, damping_ratio=0.2)
 SIZE = (0.5, 0.5, 1.4)  # of the bar [m]
 PIVOT = np.array([0.0, 0.0, 3.8])  # [m]
 ROD = 1.8  # from there to the plate [m]

@@ -12,7 +12,7 @@ from taichi_soft.render.props import Prop
 MATERIAL = Material(young=1.2e5, poisson=0.3, density=1000.0, damping_ratio=0.3)
 SIZE = (0.6, 0.6, 2.0)  # of the bar [m]
 HEIGHT = 2.4  # of its middle [m]
-CUT = np.array([0.0, 0.0, 2.25])  # where the blade crosses the middle [m]
+CUT = np.array([0.0, 0.0, 2.05])  # where the blade crosses the middle [m]
 ALONG = np.array([1.0, 0.0, 0.1]) / np.hypot(1.0, 0.1)  # its way
 ASIDE = np.array([0.0, 1.0, 0.0])  # its edge
 WAY, WIDTH = 2.6, 0.3  # how far it goes, and from its edge to its back [m]

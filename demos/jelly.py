@@ -51,9 +51,8 @@ def stage() -> Stage:
     world.build()
     colors = [PALETTE[5], PALETTE[2], PALETTE[4], PALETTE[1]]
     actors = [Actor(body, color) for body, color in zip(world.bodies, colors, strict=True)]
-    camera = Camera.framing(
-        (-1.0, -1.0, 0.1), (1.0, 1.0, 3.2), aspect=16 / 9, azimuth=-62, elevation=9, margin=1.02
-    )
+    seen = (-1.0, -1.0, 0.1), (1.0, 1.0, 3.2)
+    camera = Camera.framing(*seen, aspect=16 / 9, azimuth=-62, elevation=9, margin=1.02)
     title = f"jelly, E = {JELLY.young / 1e3:g} kPa"
     return Stage(title, world, actors, camera, STEP, 5.0, act=Scale())
 

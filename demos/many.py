@@ -24,9 +24,8 @@ def stage() -> Stage:
         actors.append(Actor(body, PALETTE[(row + column) % len(PALETTE)]))
     world.build()
     edge = PITCH * ROWS / 2
-    camera = Camera.framing(
-        (-edge, -edge, 0.0), (edge, edge, 3.0), aspect=16 / 9, azimuth=-80.0, elevation=25.0, margin=1.0
-    )
+    seen = (-edge, -edge, 0.0), (edge, edge, 3.0)
+    camera = Camera.framing(*seen, aspect=16 / 9, azimuth=-80.0, elevation=25.0, margin=1.0)
     title = f"{len(actors)} spheres, {len(actors) * len(mesh.tets):,} tetrahedra"
     return Stage(title, world, actors, camera, FixedStep(dt=1 / 50, substeps=14), seconds=6.0)
 
