@@ -7,17 +7,17 @@ from engine_adapter import FixedStep
 from taichi_soft import Attachment, Body, BoxShape, CapsuleShape, Frame, Material, World, box
 from taichi_soft.cli import main
 from taichi_soft.core.constants import GRAVITY_EARTH
-from taichi_soft.render import Camera, colormap
+from taichi_soft.render import Camera, ColorScale
 from taichi_soft.render.film import Actor, Stage
 from taichi_soft.render.props import Prop
 
-MATERIAL = Material(young=4.0e5, poisson=0.3, density=1000.0, damping_ratio=0.2)
+MATERIAL = Material(young=2.0e5, poisson=0.3, density=1000.0, damping_ratio=0.2)
 SIZE = (0.5, 0.5, 1.4)  # of the bar [m]
 PIVOT = np.array([0.0, 0.0, 3.8])  # [m]
 ROD = 1.8  # from there to the plate [m]
 LENGTH = ROD + SIZE[2] / 2  # from there to the middle of the bar [m]
 WIDEST = np.radians(50.0)
-SCALE = 4.0e4  # of the colours [Pa]
+STRESS = ColorScale("von Mises stress", 0.0, 3.0e4, "Pa")
 STEP = FixedStep(dt=1 / 50)
 
 
@@ -65,10 +65,11 @@ def stage() -> Stage:
         Prop((plate[0] + (0, 0, 0.04), plate[1]), frame),
         Prop((rod[0] + (0, 0, ROD / 2), rod[1]), frame),
     ]
-    camera = Camera.framing((-2.6, -0.3, 0.0), (2.6, 0.3, 4.8), aspect=16 / 9, azimuth=-80, elevation=8)
-    title = f"hung from a frame; colour: von Mises stress to {SCALE / 1e3:g} kPa"
+    camera = Camera.framing((-2.3, -0.3, 0.2), (2.3, 0.3, 3.9), aspect=16 / 9, azimuth=-80, elevation=5)
     actors = [Actor(body, paint=_stress)]
-    return Stage(title, world, actors, camera, STEP, 8.0, act=swing, props=props, caption=swing.caption)
+    found = Stage("hung from a frame", world, actors, camera, STEP, 8.0, act=swing, props=props)
+    found.caption, found.scale = swing.caption, STRESS
+    return found
 
 
 def _turn(angle: float) -> NDArray[np.float64]:
@@ -78,7 +79,7 @@ def _turn(angle: float) -> NDArray[np.float64]:
 
 
 def _stress(body: Body) -> NDArray[np.float32]:
-    return colormap(body.vertex_stress(), 0.0, SCALE)
+    return STRESS.colors(body.vertex_stress())
 
 
 def proof(stage: Stage) -> float:

@@ -7,11 +7,11 @@ from engine_adapter import FixedStep
 from taichi_soft import Body, Material, World, load_mesh
 from taichi_soft.cli import main
 from taichi_soft.core.package_data import ASSETS
-from taichi_soft.render import Camera, colormap
+from taichi_soft.render import Camera, ColorScale
 from taichi_soft.render.film import Actor, Stage
 
-MATERIAL = Material(young=2.0e6, poisson=0.2, density=1000.0, damping=20.0, damping_ratio=0.0)
-SCALE = 2.0e5  # of the colours [Pa]
+MATERIAL = Material(young=6.0e5, poisson=0.2, density=1000.0, damping=20.0, damping_ratio=0.0)
+STRESS = ColorScale("von Mises stress", 0.0, 1.0e5, "Pa")
 
 
 def stage() -> Stage:
@@ -20,13 +20,14 @@ def stage() -> Stage:
     mesh = mesh.translated(-np.mean(mesh.bounds, axis=0))
     reach = float(np.linalg.norm(mesh.vertices, axis=1).max())
     world = World()
-    body = world.add_body(mesh, MATERIAL, rotation=_tilt(0.5), position=(0.0, 0.0, reach + 2.0), law="virial")
+    body = world.add_body(mesh, MATERIAL, rotation=_tilt(0.5), position=(0.0, 0.0, reach + 0.6), law="virial")
     world.build()
-    box = (-1.1 * reach, -1.1 * reach, 0.0), (1.1 * reach, 1.1 * reach, 2.0 * reach + 2.0)
-    camera = Camera.framing(*box, aspect=16 / 9, elevation=12.0)
-    title = f"bars, {len(mesh.tets)} tetrahedra; colour: von Mises stress to {SCALE / 1e6:g} MPa"
+    camera = Camera.framing(
+        (-reach, -reach, 0.0), (reach, reach, 2.0 * reach + 0.4), aspect=16 / 9, elevation=12.0, margin=1.0
+    )
     actor = Actor(body, paint=_stress)
-    return Stage(title, world, [actor], camera, FixedStep(dt=1 / 50), seconds=6.0)
+    title = f"bars, {len(mesh.tets)} tetrahedra"
+    return Stage(title, world, [actor], camera, FixedStep(dt=1 / 50), seconds=6.0, scale=STRESS)
 
 
 def _tilt(angle: float) -> NDArray[np.float64]:
@@ -37,7 +38,7 @@ def _tilt(angle: float) -> NDArray[np.float64]:
 
 
 def _stress(body: Body) -> NDArray[np.float32]:
-    return colormap(body.vertex_stress(), 0.0, SCALE)
+    return STRESS.colors(body.vertex_stress())
 
 
 def proof(stage: Stage) -> float:

@@ -10,7 +10,7 @@ from taichi_soft.cli import main
 from taichi_soft.render import PALETTE, Camera
 from taichi_soft.render.film import Actor, Stage
 
-MATERIAL = Material(young=3.0e5, poisson=0.3, density=500.0)
+MATERIAL = Material(young=6.0e4, poisson=0.3, density=500.0)
 THICKNESS = 0.02  # of the skins of the bodies [m]
 RADIUS, WALL = 2.0, 0.2  # of the inside of the bowl, and how thick it is [m]
 BODIES = 20
@@ -41,8 +41,8 @@ def stage() -> Stage:
     world.build()
     for body in world.bodies:
         body.set_linear_damping(DRAG)
-    camera = Camera.framing((-2.2, -2.2, 0.0), (2.2, 2.2, 3.2), aspect=16 / 9, elevation=36)
-    return Stage(f"{BODIES} bodies in a bowl of triangles", world, actors, camera, STEP, 10.0)
+    camera = Camera.framing((-1.9, -1.9, 0.3), (1.9, 1.9, 3.1), aspect=16 / 9, elevation=40, margin=1.0)
+    return Stage(f"{BODIES} bodies in a bowl", world, actors, camera, STEP, 10.0)
 
 
 def _bowl() -> trimesh.Trimesh:

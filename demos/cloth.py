@@ -5,7 +5,7 @@ import numpy as np
 from engine_adapter import FixedStep
 from taichi_soft import SpringMaterial, World, cloth, cloth_constants
 from taichi_soft.cli import main
-from taichi_soft.render import Camera
+from taichi_soft.render import PALETTE, Camera
 from taichi_soft.render.film import Actor, Stage
 
 CELLS = (24, 24)
@@ -21,11 +21,13 @@ def stage() -> Stage:
     material = SpringMaterial(stiffness, damping=0.05)
     body = world.add_body(mesh, material, law="springs", pinned=corners, position=(0, -SIDE / 2, 2.4))
     world.build()
-    camera = Camera.framing((-2, -1.2, 0), (2, 1.2, 2.6), aspect=16 / 9, azimuth=-50, elevation=15)
+    camera = Camera.framing(
+        (-0.9, -1.0, 0.4), (1.5, 1.0, 2.5), aspect=16 / 9, azimuth=-50, elevation=8, margin=1.05
+    )
     return Stage(
-        "cloth: implicit Euler, one step a frame",
+        "cloth, one implicit step a frame",
         world,
-        [Actor(body)],
+        [Actor(body, PALETTE[2])],
         camera,
         FixedStep(dt=1 / 60, substeps=1),
         seconds=5.0,

@@ -14,11 +14,11 @@ from taichi_soft.lab.profiling.spread import time_calls
 from taichi_soft.render import PALETTE, Camera
 from taichi_soft.render.film import Actor, Stage
 
-SOFT = Material(young=6.0e5, poisson=0.2, density=1000.0, damping=30.0, damping_ratio=0.0)
+SOFT = Material(young=2.5e5, poisson=0.2, density=1000.0, damping=30.0, damping_ratio=0.0)
 HEIGHT = 2.2  # of the centres [m]
 STEP = FixedStep(dt=1 / 50, substeps=10)
 PER_ROW = 4
-PITCH, DEPTH = 6.0, 5.6  # between spheres, across and away from the eye [m]
+PITCH, DEPTH = 3.4, 4.4  # between spheres, across and away from the eye [m]
 
 
 def stage() -> Stage:
@@ -31,14 +31,27 @@ def stage() -> Stage:
         in_row = min(PER_ROW, len(LAWS) - row * PER_ROW)
         place = PITCH * (column - (in_row - 1) / 2), -DEPTH * row, HEIGHT
         body = world.add_body(mesh, SOFT, law=law, position=place)
-        actors.append(Actor(body, PALETTE[i % len(PALETTE)], label=f"{law}\n{_cost(mesh, law):.2f} ms"))
+        actors.append(
+            Actor(body, PALETTE[i % len(PALETTE)], label=f"{_in_lines(law)}\n{_cost(mesh, law):.2f} ms")
+        )
     world.build()
     rows = -(-len(LAWS) // PER_ROW)
-    edge = PITCH * PER_ROW / 2
+    edge = PITCH * (PER_ROW - 1) / 2 + 1.3
     camera = Camera.framing(
-        (-edge, -DEPTH * (rows - 1), 0), (edge, 0, 2), aspect=16 / 9, azimuth=-90, elevation=42, margin=1.02
+        (-edge, -DEPTH * (rows - 1) - 2.0, 0),
+        (edge, 1, 2.0),
+        aspect=16 / 9,
+        azimuth=-90,
+        elevation=34,
+        margin=1.0,
     )
-    return Stage("one sphere, every law", world, actors, camera, STEP, seconds=6.0)
+    return Stage("one sphere, every law, time of a step", world, actors, camera, STEP, seconds=6.0)
+
+
+def _in_lines(law: str) -> str:
+    """A long name in two lines, broken after an underscore."""
+    head, _, tail = law.rpartition("_")
+    return f"{head}_\n{tail}" if len(law) > 14 else law
 
 
 def _cost(mesh: TetMesh, law: str) -> float:

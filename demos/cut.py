@@ -9,14 +9,14 @@ from taichi_soft.render import PALETTE, Camera
 from taichi_soft.render.film import Actor, Stage
 from taichi_soft.render.props import Prop
 
-MATERIAL = Material(young=2.5e5, poisson=0.3, density=1000.0, damping_ratio=0.3)
+MATERIAL = Material(young=1.2e5, poisson=0.3, density=1000.0, damping_ratio=0.3)
 SIZE = (0.6, 0.6, 2.0)  # of the bar [m]
 HEIGHT = 2.4  # of its middle [m]
-CUT = np.array([0.0, 0.0, 2.25])  # where the blade crosses the middle [m]
+CUT = np.array([0.0, 0.0, 2.05])  # where the blade crosses the middle [m]
 ALONG = np.array([1.0, 0.0, 0.1]) / np.hypot(1.0, 0.1)  # its way
 ASIDE = np.array([0.0, 1.0, 0.0])  # its edge
 WAY, WIDTH = 2.6, 0.3  # how far it goes, and from its edge to its back [m]
-BEGIN, PASSING = 1.6, 0.5  # when it sets out, and how long it takes [s]
+BEGIN, PASSING = 0.9, 0.5  # when it sets out, and how long it takes [s]
 STEP = FixedStep(dt=1 / 50, substeps=16)
 
 
@@ -67,10 +67,8 @@ def stage() -> Stage:
         Prop((plate[0] + (0, 0, 0.06), plate[1]), ceiling),
         Prop(steel, blade, color=(0.95, 0.93, 0.88)),
     ]
-    camera = Camera.framing((-1.9, -0.6, 0.0), (1.9, 0.6, 3.6), aspect=16 / 9, azimuth=-66, elevation=17)
-    found = Stage(
-        "cut along the faces of its tetrahedra", world, [Actor(bar)], camera, STEP, 7.0, props=props
-    )
+    camera = Camera.framing((-1.4, -0.6, 0.0), (1.4, 0.6, 3.5), aspect=16 / 9, azimuth=-66, elevation=8)
+    found = Stage("cut in two", world, [Actor(bar)], camera, STEP, 7.0, props=props)
     found.act = knife = Knife(blade, found)
     found.caption = knife.caption
     return found

@@ -5,7 +5,7 @@ import numpy as np
 from engine_adapter import FixedStep
 from taichi_soft import Material, World, box
 from taichi_soft.cli import main
-from taichi_soft.render import Camera, colormap
+from taichi_soft.render import Camera, ColorScale
 from taichi_soft.render.film import Actor, Stage
 
 LIGHT, HEAVY = 200.0, 2000.0  # [kg/m^3]
@@ -17,16 +17,16 @@ def stage() -> Stage:
     mesh = mesh.translated(-np.mean(mesh.bounds, axis=0))
     right = (mesh.vertices[mesh.tets].mean(axis=1)[:, 0] + 1.5) / 3.0
     material = Material(
-        young=4.0e5, poisson=0.2, density=LIGHT + (HEAVY - LIGHT) * right, damping=20.0, damping_ratio=0.0
+        young=3.0e5, poisson=0.2, density=LIGHT + (HEAVY - LIGHT) * right, damping=20.0, damping_ratio=0.0
     )
     world = World()
-    body = world.add_body(mesh, material, position=(0.0, 0.0, 3.75), law="virial")
+    body = world.add_body(mesh, material, position=(0.0, 0.0, 2.75), law="virial", flips="recover")
     world.build()
-    colors = colormap(mesh.vertices[:, 0], -1.9, 1.9)
-    camera = Camera.framing((-2.2, -1.2, 0.0), (2.2, 1.2, 4.9), aspect=16 / 9, azimuth=-75.0, elevation=10.0)
-    title = f"density from {LIGHT:g} (left) to {HEAVY:g} kg/m^3 (right)"
+    scale = ColorScale("density", LIGHT, HEAVY, "kg/m^3")
+    colors = scale.colors(LIGHT + (HEAVY - LIGHT) * (mesh.vertices[:, 0] + 1.5) / 3.0)
+    camera = Camera.framing((-2.0, -0.8, 0.0), (2.8, 0.8, 3.9), aspect=16 / 9, azimuth=-75.0, elevation=8.0)
     actor = Actor(body, paint=lambda body: colors)
-    return Stage(title, world, [actor], camera, FixedStep(dt=1 / 50), seconds=5.0)
+    return Stage("heavier to the right", world, [actor], camera, FixedStep(dt=1 / 50), 5.0, scale=scale)
 
 
 def proof(stage: Stage) -> float:

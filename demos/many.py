@@ -1,29 +1,31 @@
-"""Sixty-four of the thesis's spheres rain down: bodies run side by side, one per processor core at a time."""
+"""Sixty-four soft spheres rain down: bodies run side by side, one per processor core at a time."""
 
 from engine_adapter import FixedStep
-from taichi_soft import World, load_mesh, preset
+from taichi_soft import Material, World, load_mesh
 from taichi_soft.cli import main
 from taichi_soft.core.package_data import ASSETS
 from taichi_soft.render import PALETTE, Camera
 from taichi_soft.render.film import Actor, Stage
 
 ROWS = 8
-PITCH = 3.0  # between spheres [m]
+PITCH = 2.8  # between spheres [m]
+SOFT = Material(young=2.5e5, poisson=0.3, density=1000.0)
 
 
 def stage() -> Stage:
     """A square of spheres, each a little higher than the last."""
-    mesh, material = load_mesh(ASSETS / "sphere.npz"), preset("thesis_sphere")
+    mesh = load_mesh(ASSETS / "sphere.npz")
     world = World()
     actors = []
     for i in range(ROWS * ROWS):
         row, column = divmod(i, ROWS)
-        place = (PITCH * (column - 3.5), PITCH * (row - 3.5), 2.0 + 0.35 * (row + column))
-        body = world.add_body(mesh, material, position=place, law="virial")
+        place = (PITCH * (column - 3.5), PITCH * (row - 3.5), 1.6 + 0.16 * (row + column))
+        body = world.add_body(mesh, SOFT, position=place)
         actors.append(Actor(body, PALETTE[(row + column) % len(PALETTE)]))
     world.build()
     edge = PITCH * ROWS / 2
-    camera = Camera.framing((-edge, -edge, 0.0), (edge, edge, 6.0), aspect=16 / 9, elevation=24.0)
+    seen = (-edge, -edge, 0.0), (edge, edge, 3.0)
+    camera = Camera.framing(*seen, aspect=16 / 9, azimuth=-80.0, elevation=25.0, margin=1.0)
     title = f"{len(actors)} spheres, {len(actors) * len(mesh.tets):,} tetrahedra"
     return Stage(title, world, actors, camera, FixedStep(dt=1 / 50, substeps=14), seconds=6.0)
 

@@ -22,7 +22,7 @@ from taichi_soft.cli import main
 from taichi_soft.render import PALETTE, Camera
 from taichi_soft.render.film import Actor, Stage
 
-MATERIAL = Material(young=2.5e5, poisson=0.3, density=400.0, damping_ratio=0.3)
+MATERIAL = Material(young=8.0e4, poisson=0.3, density=400.0, damping_ratio=0.3)
 LAYERS, ROWS, COLUMNS = 2, 2, 4  # of bodies over the ramp
 SLOPE = 0.32  # of the ramp [rad]
 HUB = np.array([1.85, 0.0, 3.6])  # of the wheel [m]
@@ -102,7 +102,9 @@ def stage() -> Stage:
         body = world.add_body(mesh, MATERIAL, law="neo_hookean", position=place)
         actors.append(Actor(body, PALETTE[i % len(PALETTE)]))
     world.build()
-    camera = Camera.framing((-3.0, -3.2, 0.0), (5.1, 2.4, 6.7), aspect=16 / 9, azimuth=-74, elevation=24)
+    camera = Camera.framing(
+        (-2.8, -2.6, 0.0), (4.6, 2.0, 6.2), aspect=16 / 9, azimuth=-74, elevation=20, margin=1.0
+    )
     return Stage("a course of colliders", world, actors, camera, STEP, 15.0, act=course)
 
 

@@ -12,7 +12,7 @@ from taichi_soft.render import PALETTE, Camera
 from taichi_soft.render.film import Actor, Stage
 from taichi_soft.render.props import Prop
 
-MATERIAL = Material(young=1.0e5, poisson=0.3, density=300.0, damping_ratio=0.1)
+MATERIAL = Material(young=2.5e4, poisson=0.3, density=300.0, damping_ratio=0.1)
 CONTACT = Contact(friction=0.3)
 ROOM, WALL, HEIGHT = 4.0, 0.12, 0.5  # width of the arena, thickness and height of its walls [m]
 BESIDE = np.array([ROOM + 0.9, 0.0, 0.0])  # where the second machine's picture is drawn [m]
@@ -136,10 +136,8 @@ class Match:
     def caption(self) -> str:
         """For the picture."""
         rewinds = sum(machine.rewinds for machine in self.machines)
-        return (
-            f"inputs arrive {LATE} ticks late: {rewinds} rollbacks; {self.agreed()} of {len(self.settled())} "
-            "hashes agree"
-        )
+        agreed = f"{self.agreed()} of {len(self.settled())} hashes agree"
+        return f"inputs {LATE} ticks late, {rewinds} rollbacks, {agreed}"
 
 
 def stage() -> Stage:
@@ -155,9 +153,9 @@ def stage() -> Stage:
     walls = [each for each in second.colliders if each is not second.floor_collider]
     props = [Prop((wall.shape.surface()[0] + BESIDE, wall.shape.surface()[1]), wall) for wall in walls]
     camera = Camera.framing(
-        (-2.2, -2.2, 0.0), (BESIDE[0] + 2.2, 2.2, 1.0), aspect=16 / 9, azimuth=-90, elevation=50
+        (-2.1, -2.1, 0.0), (BESIDE[0] + 2.1, 2.1, 0.8), aspect=16 / 9, azimuth=-90, elevation=48, margin=1.0
     )
-    title = "one game on two machines: the red player's, and the green one's"
+    title = "one game on two machines"
     return Stage(title, first, actors, camera, STEP, 10.0, act=match, props=props, caption=match.caption)
 
 

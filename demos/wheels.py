@@ -9,14 +9,14 @@ from taichi_soft.cli import main
 from taichi_soft.render import PALETTE, Camera
 from taichi_soft.render.film import Actor, Color, Paint, Stage
 
-STIFFNESSES = (6e4, 1.5e5, 5e5)  # Young's moduli, from the softest wheel to the firmest [Pa]
+STIFFNESSES = (4e4, 1e5, 4e5)  # Young's moduli, from the softest wheel to the firmest [Pa]
 RADIUS, WIDTH, HUB = 0.5, 0.7, 0.2  # of the wheels; radius of what the motor drives [m]
 SPEED, TORQUE = 3.0, 1500.0  # [rad/s] and [N m]
 LANE, ASIDE = 1.4, 0.3  # from wheel to wheel, and how much wider than these the steps are on each side [m]
 RISE, TREAD, STEPS = 0.14, 0.9, 3  # of the steps [m], and how many there are
 FOOT, TOP = 1.4, 2.8  # where the first step begins, and how long the last one is [m]
 GOAL = FOOT + (STEPS - 1) * TREAD + TOP / 2 - 0.2  # where the motors brake [m]
-BEGIN = 0.8  # when they set out [s]
+BEGIN = 0.4  # when they set out [s]
 DRAG = 2.0  # [1/s] of a wheel that brakes, or it would rock to and fro about its hub
 STEP = FixedStep(dt=1 / 50)
 
@@ -62,7 +62,7 @@ def stage() -> Stage:
             rotation=upright,
             contact=Contact(friction=0.9),
         )
-        actors.append(Actor(body, paint=_sectors(PALETTE[i]), label=f"{young / 1e3:.0f} kPa"))
+        actors.append(Actor(body, paint=_sectors(PALETTE[i])))
     world.build()
     hub = np.flatnonzero(np.hypot(*mesh.vertices[:, :2].T) < HUB)
     motors = [
@@ -71,10 +71,12 @@ def stage() -> Stage:
     for body in world.bodies:  # or the tetrahedra, which all lean to one side, would steer
         world.add_motor(body, hub, (0.0, 0.0, 1.0), speed=0.0, max_torque=TORQUE, is_fixed=True)
     drivers = Drivers(motors)
-    camera = Camera.framing((-0.4, -1.9, 0.0), (5.4, 1.9, 1.2), aspect=16 / 9, azimuth=-122, elevation=24)
-    title = "soft wheels with motors at their hubs"
-    found = Stage(title, world, actors, camera, STEP, 7.0, act=drivers)
-    found.caption = drivers.caption
+    camera = Camera.framing(
+        (-0.3, -1.9, 0.0), (5.4, 1.9, 1.2), aspect=16 / 9, azimuth=-112, elevation=26, margin=1.0
+    )
+    legend = [(PALETTE[i], f"E = {young / 1e3:.0f} kPa") for i, young in enumerate(STIFFNESSES)]
+    found = Stage("wheels driven at their hubs", world, actors, camera, STEP, 7.0, act=drivers)
+    found.caption, found.legend = drivers.caption, legend
     return found
 
 

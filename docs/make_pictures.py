@@ -1,4 +1,4 @@
-"""Makes the pictures of the README: `python docs/make_pictures.py`, in about two minutes."""
+"""Makes the pictures of the README: `python docs/make_pictures.py`, in some minutes."""
 
 import tempfile
 from pathlib import Path
@@ -10,8 +10,11 @@ from taichi_soft.render.demos import load_demo
 from taichi_soft.render.film import film
 
 FOLDER = Path(__file__).parent / "pictures"
-# That show what each demo is about [s].
-MOMENTS = {"bounce": 1.26, "dents": 2.0, "bars": 1.36, "density": 1.0, "many": 0.8, "cloth": 1.2}
+FILMS = {"jelly": 2.6, "bounce": 3.8}
+"""How much of them is shown [s]."""
+
+MOMENTS = {"dents": 0.44, "bars": 1.06, "tower": 0.6, "drape": 2.6, "bridge": 1.6, "bowl": 3.0}
+"""That show what each demo is about [s]."""
 
 
 def still(name: str, moment: float, size: tuple[int, int] = (520, 292)) -> np.ndarray:
@@ -23,7 +26,8 @@ def still(name: str, moment: float, size: tuple[int, int] = (520, 292)) -> np.nd
 
 def main() -> None:
     """Write all pictures."""
-    film(load_demo("bounce").stage(), FOLDER / "bounce.gif", fps=50 / 3, size=(400, 224), seconds=3.8)
+    for name, seconds in FILMS.items():
+        film(load_demo(name).stage(), FOLDER / f"{name}.gif", fps=50 / 3, size=(560, 316), seconds=seconds)
     stills = [still(name, moment) for name, moment in MOMENTS.items()]
     rows = [np.hstack(stills[i : i + 2]) for i in range(0, len(stills), 2)]
     cv2.imwrite(str(FOLDER / "demos.png"), np.vstack(rows))

@@ -8,7 +8,7 @@ from taichi_soft.core.errors import MissingExtraError
 
 EXTRAS = {
     "cli": {"typer": "typer", "rich": "rich"},
-    "film": {"cv2": "opencv-python-headless"},
+    "film": {"cv2": "opencv-python-headless", "imageio_ffmpeg": "imageio-ffmpeg"},
     "io": {"meshio": "meshio"},
     "voronoi": {"scipy": "scipy"},
     "report": {
@@ -24,18 +24,27 @@ EXTRAS = {
 """By extra: its modules, and the packages that have them, as in pyproject.toml."""
 
 
-def missing_packages(extra: str) -> list[str]:
-    """Packages of the extra that are not installed."""
-    return [package for module, package in EXTRAS[extra].items() if find_spec(module) is None]
+def missing_packages(extra: str, *modules: str) -> list[str]:
+    """Packages of the extra, or those of these modules, that are not installed."""
+    named = EXTRAS[extra]
+    return [named[module] for module in modules or named if not _is_there(module)]
 
 
-def require_extra(extra: str, what: str) -> None:
+def _is_there(module: str) -> bool:
+    try:
+        return find_spec(module) is not None
+    except ImportError:
+        return False
+
+
+def require_extra(extra: str, what: str, *modules: str) -> None:
     """Raises: MissingExtraError in one line where a package of the extra is missing.
 
     Args:
         what: what needs it, and a verb: "a film needs".
+        modules: of the extra, where it needs these only.
     """
-    missing = missing_packages(extra)
+    missing = missing_packages(extra, *modules)
     if missing:
         names = ", ".join(missing)
         raise MissingExtraError(f"{what} {names}, not installed here: run pip install 'taichi-soft[{extra}]'")

@@ -1,15 +1,8 @@
 """Pictures and films of soft bodies without a display."""
 
-# ruff: noqa: E402 (says first which package is missing)
-
-from taichi_soft.core.extras import require_extra
-
-require_extra("film", "pictures and films need")
-
-# isort: split
 from taichi_soft.render.camera import Camera
-from taichi_soft.render.colors import FLIPPED, PALETTE, colormap, highlight
-from taichi_soft.render.overlay import Corner, draw_labels, draw_text
+from taichi_soft.render.colors import FLIPPED, PALETTE, ColorScale, colormap, highlight
+from taichi_soft.render.overlay import Corner, draw_color_scale, draw_labels, draw_legend, draw_text
 from taichi_soft.render.renderer import Renderer
 from taichi_soft.render.surface import Surface
 from taichi_soft.render.video import VideoWriter
@@ -18,12 +11,15 @@ __all__ = [
     "FLIPPED",
     "PALETTE",
     "Camera",
+    "ColorScale",
     "Corner",
     "Renderer",
     "Surface",
     "VideoWriter",
     "colormap",
+    "draw_color_scale",
     "draw_labels",
+    "draw_legend",
     "draw_text",
     "highlight",
 ]

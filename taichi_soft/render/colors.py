@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-import cv2
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.core.checks import as_array, as_number, to_array
 from taichi_soft.core.errors import OptionError
 from taichi_soft.render.arguments import as_color
+from taichi_soft.render.opencv import cv2
 
 Color = tuple[float, float, float]
 
@@ -24,6 +26,18 @@ PALETTE: tuple[Color, ...] = (
 )
 """Body colours, sRGB from 0 to 1, told apart by hue at about the same lightness; cycle through them."""
 
+RAMP: tuple[Color, ...] = (
+    (0.30, 0.52, 0.80),
+    (0.42, 0.75, 0.76),
+    (0.95, 0.88, 0.52),
+    (0.95, 0.57, 0.28),
+    (0.80, 0.18, 0.22),
+)
+"""Colours of a `ColorScale` at equal steps, sRGB from 0 to 1."""
+
+PREFIXES = (("G", 1e9), ("M", 1e6), ("k", 1e3), ("", 1.0))
+"""Of units, the largest first; taken from ten of it on."""
+
 FLIPPED: Color = (0.93, 0.10, 0.42)
 """Colour of what is turned inside out, found in no body of `PALETTE`, sRGB from 0 to 1."""
 
@@ -37,16 +51,63 @@ def colormap(values: ArrayLike, low: float, high: float) -> NDArray[np.float32]:
     Returns: sRGB from 0 to 1, float32 (n, 3).
     Raises: OptionError for values that are not finite or an empty range.
     """
+    place = _places(values, low, high) * 255.0
+    # The library has 256 colours; between two of them is interpolated.
+    table = cv2.applyColorMap(np.arange(256, dtype=np.uint8).reshape(-1, 1), cv2.COLORMAP_VIRIDIS)
+    rgb = table[:, 0, ::-1].astype(np.float32) / 255.0
+    channels = [np.interp(place, np.arange(256), rgb[:, k]) for k in range(3)]
+    return np.stack(channels, axis=1).astype(np.float32)
+
+
+def _places(values: ArrayLike, low: float, high: float) -> NDArray[np.float64]:
+    """Where numbers lie from `low` (0) to `high` (1). Raises: as `colormap`."""
     numbers = as_array(values, "values", (None,))
     start, end = as_number(low, "low", -1e300, 1e300), as_number(high, "high", -1e300, 1e300)
     if not start < end:
         raise OptionError(f"low must be below high, got {start:g} and {end:g}")
-    # The library has 256 colours; between two of them is interpolated.
-    table = cv2.applyColorMap(np.arange(256, dtype=np.uint8).reshape(-1, 1), cv2.COLORMAP_VIRIDIS)
-    rgb = table[:, 0, ::-1].astype(np.float32) / 255.0
-    place = np.clip((numbers - start) / (end - start), 0.0, 1.0) * 255.0
-    channels = [np.interp(place, np.arange(256), rgb[:, k]) for k in range(3)]
-    return np.stack(channels, axis=1).astype(np.float32)
+    return np.asarray(np.clip((numbers - start) / (end - start), 0.0, 1.0))
+
+
+@dataclass(frozen=True)
+class ColorScale:
+    """Numbers as colours, and what a bar beside the picture says of them.
+
+    Args:
+        quantity: its name, plain ASCII.
+        low, high: the range, low < high, in `unit`.
+        unit: SI, without a prefix: "Pa". The bar finds one that suits.
+    Raises: OptionError for an empty range or other text.
+    """
+
+    quantity: str
+    low: float
+    high: float
+    unit: str
+
+    def __post_init__(self) -> None:
+        for name in ("quantity", "unit"):
+            text = getattr(self, name)
+            if not (isinstance(text, str) and text.isascii() and text.isprintable()):
+                raise OptionError(f"{name} must be a line of plain ASCII, got {text!r}")
+        self.colors([self.low])
+
+    def colors(self, values: ArrayLike) -> NDArray[np.float32]:
+        """Colours from blue (`low`) over yellow to red (`high`), bright enough to show light and shadow.
+
+        Args:
+            values: (n,), one per vertex; those out of range take the colour of the end they passed.
+        Returns: sRGB from 0 to 1, float32 (n, 3).
+        Raises: OptionError for values that are not finite.
+        """
+        place = _places(values, self.low, self.high) * (len(RAMP) - 1)
+        channels = [np.interp(place, np.arange(len(RAMP)), column) for column in np.transpose(RAMP)]
+        return np.stack(channels, axis=1).astype(np.float32)
+
+    def ticks(self) -> tuple[str, str]:
+        """Both ends in words, the upper one with the unit: ("0", "200 kPa")."""
+        largest = max(abs(self.low), abs(self.high))
+        prefix, factor = next(each for each in PREFIXES if largest >= 10 * each[1] or each is PREFIXES[-1])
+        return f"{self.low / factor:.4g}", f"{self.high / factor:.4g} {prefix}{self.unit}"
 
 
 def highlight(flagged: ArrayLike, color: ArrayLike, marked: ArrayLike = FLIPPED) -> NDArray[np.float32]:

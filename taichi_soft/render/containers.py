@@ -1,26 +1,41 @@
-"""Kinds of film file: how OpenCV writes each, and how to count what is in it."""
+"""Kinds of film file: how each is written, and how to count what is in it."""
 
 from __future__ import annotations
 
 import contextlib
-import os
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
+from fractions import Fraction
 from pathlib import Path
 
-# Read when OpenCV first opens a film: keeps its codecs from writing to the console (errors are raised here).
-os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
-
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.core.errors import VideoError
+from taichi_soft.render.ffmpeg import Ffmpeg, count_frames, run_ffmpeg
+from taichi_soft.render.opencv import cv2
 
 Frame = NDArray[np.uint8]
-CODECS = {".mp4": ("mp4v",), ".webm": ("VP90", "VP80")}  # in the order in which they are tried
-# Of the ways that OpenCV 5.0 writes GIFs, this pair alone comes near the colours, at a third of the size.
-GIF_OPTIONS = (cv2.IMWRITE_GIF_QUALITY, 8, cv2.IMWRITE_GIF_DITHER, cv2.IMWRITE_GIF_FAST_FLOYD_DITHER + 2)
+Found = tuple[int, set[tuple[int, int]]]
+"""Number of frames, and their sizes (width, height)."""
+
+# Players take these numbers as the meaning of a film's colours; the first filter makes them true.
+COLORS = (
+    *("-vf", "scale=out_color_matrix=bt709:out_range=tv,format=yuv420p"),
+    *("-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709", "-color_range", "tv"),
+)
+CODECS = {
+    # With the index at its start, so that browsers begin before they have the whole file.
+    ".mp4": ("-c:v", "libx264", "-preset", "veryfast", "-crf", "18", "-movflags", "+faststart"),
+    ".webm": (
+        *("-c:v", "libvpx-vp9", "-crf", "24", "-b:v", "0"),
+        *("-deadline", "realtime", "-cpu-used", "5", "-row-mt", "1"),
+    ),
+}
+LOSSLESS = ("-c:v", "libx264rgb", "-preset", "ultrafast", "-qp", "0")
+# One palette for a whole film: what stands still then keeps its pixels, and takes no room in later frames. An
+# ordered pattern between its colours does not crawl either.
+DITHER = "paletteuse=dither=bayer:bayer_scale=4:diff_mode=rectangle"
 GIF_FASTEST = 50.0  # frames per second; shows are timed in 1/100 s, and viewers slow down what lasts only one
 
 
@@ -35,34 +50,29 @@ def quiet() -> Iterator[None]:
         cv2.utils.logging.setLogLevel(before)
 
 
-@contextlib.contextmanager
-def deaf_console() -> Iterator[None]:
-    """Lose what goes to the console's error stream: OpenCV prints there past every setting of its own."""
-    console = os.dup(2)
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(nowhere, 2)
-        yield
-    finally:
-        os.dup2(console, 2)
-        os.close(console)
-        os.close(nowhere)
-
-
 class Container(ABC):
-    """A film that is being written, in blue, green, red order, to a path of its own."""
+    """A film that is being written to a folder of its own."""
 
     @abstractmethod
-    def __init__(self, path: Path, fps: float, size: tuple[int, int]) -> None:
-        """Open a file of frames of `size` (width, height). Raises: VideoError if it cannot be written."""
+    def __init__(self, folder: Path, suffix: str, fps: float, size: tuple[int, int]) -> None:
+        """Begin, with frames of `size` (width, height). Raises: VideoError or OptionError."""
+
+    @property
+    @abstractmethod
+    def files(self) -> list[Path]:
+        """What is to be moved to the film's place in the end: one file, or a picture for each frame."""
 
     @abstractmethod
     def write(self, frame: Frame) -> None:
-        """Add a frame."""
+        """Add a frame, sRGB (height, width, 3). Raises: VideoError."""
 
     @abstractmethod
     def finish(self) -> None:
-        """Complete the file. Raises: VideoError or cv2.error if that is impossible."""
+        """Complete the file. Raises: VideoError if that is impossible."""
+
+    @abstractmethod
+    def measure(self) -> Found:
+        """What is in it, read back. Raises: VideoError for what cannot be read."""
 
     @abstractmethod
     def abandon(self) -> None:
@@ -70,89 +80,99 @@ class Container(ABC):
 
 
 class Stream(Container):
-    """.mp4 and .webm."""
+    """.mp4 of H.264 and .webm of VP9."""
 
-    def __init__(self, path: Path, fps: float, size: tuple[int, int]) -> None:
-        for codec in CODECS[path.suffix]:
-            with deaf_console():
-                self._writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*codec), fps, size)
-            if self._writer.isOpened():
-                return
-        raise VideoError(
-            f"this OpenCV cannot write {' or '.join(CODECS[path.suffix])} films: use .gif or .png"
-        )
+    def __init__(self, folder: Path, suffix: str, fps: float, size: tuple[int, int]) -> None:
+        self._path, self._list = folder / f"film{suffix}", folder / "list"
+        self._ffmpeg = Ffmpeg([*_frames_of(fps, size), *COLORS, *CODECS[suffix], self._path])
+
+    @property
+    def files(self) -> list[Path]:
+        return [self._path]
 
     def write(self, frame: Frame) -> None:
-        self._writer.write(frame)
+        self._ffmpeg.write(frame)
 
     def finish(self) -> None:
-        self._writer.release()
+        self._ffmpeg.finish()
+
+    def measure(self) -> Found:
+        return count_frames(self._path, self._list)
 
     def abandon(self) -> None:
-        self._writer.release()
+        self._ffmpeg.kill()
 
 
 class Gif(Container):
-    """.gif; the frames stay in memory until the end, because OpenCV writes them all at once."""
+    """.gif. Frames wait on the disk, without loss, until their colours are all known."""
 
-    def __init__(self, path: Path, fps: float, size: tuple[int, int]) -> None:
+    def __init__(self, folder: Path, suffix: str, fps: float, size: tuple[int, int]) -> None:
         if fps > GIF_FASTEST:
             raise VideoError(
                 f"a .gif shows at most {GIF_FASTEST:g} frames per second, got {fps:g}: use .webm or .mp4"
             )
-        self._path, self._fps = path, fps
-        self._frames: list[Frame] = []
+        self._frames, self._palette = folder / "frames.mp4", folder / "palette.png"
+        self._path, self._list = folder / f"film{suffix}", folder / "list"
+        self._ffmpeg = Ffmpeg([*_frames_of(fps, size), *LOSSLESS, self._frames])
+
+    @property
+    def files(self) -> list[Path]:
+        return [self._path]
 
     def write(self, frame: Frame) -> None:
-        self._frames.append(frame)
+        self._ffmpeg.write(frame)
 
     def finish(self) -> None:
-        animation = cv2.Animation()
-        animation.frames = self._frames
-        # Frames end at the nearest 1/100 s, so that rounding does not add up.
-        ends = 10 * np.round(np.arange(len(self._frames) + 1) * 100.0 / self._fps).astype(np.int64)
-        animation.durations = np.diff(ends).tolist()
-        if not cv2.imwriteanimation(str(self._path), animation, GIF_OPTIONS):
-            raise VideoError("OpenCV could not encode the .gif")
+        self._ffmpeg.finish()
+        look = ["-vf", "palettegen=reserve_transparent=0", "-update", "1"]
+        run_ffmpeg(["-i", self._frames, *look, self._palette])
+        draw = ["-lavfi", DITHER, "-fps_mode", "passthrough", "-loop", "0"]
+        run_ffmpeg(["-i", self._frames, "-i", self._palette, *draw, self._path])
+
+    def measure(self) -> Found:
+        return count_frames(self._path, self._list)
 
     def abandon(self) -> None:
-        self._frames = []
+        self._ffmpeg.kill()
 
 
 class Pictures(Container):
-    """.png: one file per frame in a folder."""
+    """.png: one file per frame."""
 
-    def __init__(self, path: Path, fps: float, size: tuple[int, int]) -> None:
-        path.mkdir()
-        self._path, self._count = path, 0
+    def __init__(self, folder: Path, suffix: str, fps: float, size: tuple[int, int]) -> None:
+        self._folder = folder
+        self._files: list[Path] = []
+
+    @property
+    def files(self) -> list[Path]:
+        return self._files
 
     def write(self, frame: Frame) -> None:
-        name = self._path / f"{self._count:04d}.png"
-        if not cv2.imwrite(str(name), frame):
-            raise VideoError(f"OpenCV could not write {name}")
-        self._count += 1
+        name = self._folder / f"{len(self._files):04d}.png"
+        with quiet():
+            is_written = cv2.imwrite(str(name), cv2.cvtColor(frame, cv2.COLOR_RGB2BGR))
+        if not is_written:
+            raise VideoError(f"OpenCV could not write {name.name}: is the disk full?")
+        self._files.append(name)
 
     def finish(self) -> None:
         """Nothing is left to do: every frame was complete once written."""
+
+    def measure(self) -> Found:
+        sizes = []
+        with quiet():
+            for name in self._files:
+                picture = cv2.imread(str(name))
+                if picture is not None:
+                    sizes.append((picture.shape[1], picture.shape[0]))
+        return len(sizes), set(sizes)
 
     def abandon(self) -> None:
         """Nothing is open."""
 
 
-def measure(path: Path) -> tuple[int, set[tuple[int, int]]]:
-    """How many frames a finished container holds, and their sizes (width, height)."""
-    sizes: list[tuple[int, int]] = []
-    if path.is_dir():
-        for name in sorted(path.iterdir()):
-            picture = cv2.imread(str(name))
-            if picture is not None:
-                sizes.append((picture.shape[1], picture.shape[0]))
-        return len(sizes), set(sizes)
-    film = cv2.VideoCapture(str(path))
-    while True:
-        found, picture = film.read()
-        if not found:
-            break
-        sizes.append((picture.shape[1], picture.shape[0]))
-    film.release()
-    return len(sizes), set(sizes)
+def _frames_of(fps: float, size: tuple[int, int]) -> list[str]:
+    """What ffmpeg has to know of the frames in its pipe."""
+    rate = Fraction(fps).limit_denominator(100_000)
+    raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}"]
+    return [*raw, "-r", f"{rate.numerator}/{rate.denominator}", "-i", "pipe:0"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,19 +12,35 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from engine_adapter import EngineAdapter, FixedStep
+from taichi_soft.contact.collider import Collider
 from taichi_soft.core.checks import LARGEST_COUNT, as_positive
 from taichi_soft.core.errors import OptionError
-from taichi_soft.render import PALETTE, Camera, Renderer, Surface, VideoWriter, draw_labels, draw_text
+from taichi_soft.render import (
+    PALETTE,
+    Camera,
+    ColorScale,
+    Renderer,
+    Surface,
+    VideoWriter,
+    draw_color_scale,
+    draw_labels,
+    draw_legend,
+    draw_text,
+)
+from taichi_soft.render.colors import Color
 from taichi_soft.render.props import Prop, Scenery
 from taichi_soft.world.body import Body
-from taichi_soft.world.world import World
+from taichi_soft.world.warm_up import warm_up_step
+from taichi_soft.world.world import World, context_of_world
 
-Color = tuple[float, float, float]
 Paint = Callable[[Body], NDArray[np.float32]]
 Progress = Callable[[int, int], None]
 
-_COMPILING = 2
-"""Frames at the start that are left out of the times: the first draws, the second makes the first step."""
+_RECENT = 25
+"""Frames of whose times the picture tells the median."""
+
+LABEL_ROOM = 1.2
+"""How far in front of the middle of a body its label stands, in half widths of the body at rest."""
 
 
 @dataclass
@@ -34,14 +50,17 @@ class Actor:
     body: Body
     color: Color = PALETTE[0]
     paint: Paint | None = None  # vertex colours (n, 3) after the last step, instead of `color`
-    label: str = ""  # below the body
+    label: str = ""  # on the floor in front of the body
     world: World | None = None  # that it lives in, where that is not the stage's
     shift: ArrayLike = (0.0, 0.0, 0.0)  # from where it is to where it is drawn, (3,) [m]
 
 
 @dataclass
 class Stage:
-    """A built world, how it is stepped and how it is seen. Its colliders are drawn by themselves."""
+    """A built world, how it is stepped and how it is seen. Its colliders are drawn without being named.
+
+    Words stand in the corners, and are short: they have to be legible in a film of 480 pixels.
+    """
 
     title: str
     world: World
@@ -52,18 +71,24 @@ class Stage:
     act: Callable[[World], object] | None = None  # before every fixed step: moves colliders, grabs, throws
     props: list[Prop] = field(default_factory=list)
     caption: Callable[[], str] | None = None  # a further line in the corner, after the last step
+    scale: ColorScale | None = None  # what the colours of bodies mean, shown as a bar
+    legend: list[tuple[Color, str]] = field(default_factory=list)  # colours of bodies and what these are
+    collider_colors: dict[Collider, Color] = field(default_factory=dict)  # of those that are to stand out
 
 
 @dataclass(frozen=True)
 class FilmReport:
-    """What a film took. Drawing and writing are not part of the step times."""
+    """What a film took. Drawing, writing and compiling are not part of the step times.
+
+    What `Stage.act` alone calls compiles where it calls it first, in a film as in a game.
+    """
 
     path: Path | None
     frames: int
     fps: float
     simulated: float  # time that passed in the world [s]
-    step_times: NDArray[np.float64]  # of stepping and reading each frame [s], without those that compile
-    draw_times: NDArray[np.float64]  # of drawing each frame [s], likewise; empty where nothing is drawn
+    step_times: NDArray[np.float64]  # of stepping and reading each frame but the first [s]
+    draw_times: NDArray[np.float64]  # of drawing each frame [s]; empty where nothing is drawn
 
     @property
     def real_time_factor(self) -> float:
@@ -108,10 +133,11 @@ def film(
             f"{1.0 / (stage.step.dt * stage.step.max_steps):g} or more"
         )
     start = stage.world.time
-    scenery = Scenery(stage.world, stage.props)
+    scenery = Scenery(stage.world, stage.props, stage.collider_colors)
     take = _Take(stage, scenery, fps)
     with nullcontext() if path is None else VideoWriter(path, fps=fps, size=size) as writer:
         artist = _Artist(stage, scenery, writer.size, fps) if writer else None
+        _warm_up(stage, take, artist)
         for number in range(count):
             positions = take.play(number)
             if artist and writer:
@@ -123,9 +149,34 @@ def film(
         count,
         fps,
         stage.world.time - start,
-        np.array(take.times[_COMPILING:]),
-        np.array(artist.times[_COMPILING:] if artist else []),
+        np.array(take.times[1:]),
+        np.array(artist.times if artist else []),
     )
+
+
+def _warm_up(stage: Stage, take: _Take, artist: _Artist | None) -> None:
+    """Compile what steps and pictures need. Nothing moves."""
+    worlds = {id(world): world for world in [stage.world, *(a.world or stage.world for a in stage.actors)]}
+    for world in worlds.values():
+        warm_up_step(context_of_world(world))
+    positions = take.play(0)
+    take.times.clear()
+    if artist:
+        artist.draw(positions, take.adapter, take.times)
+        artist.times.clear()
+
+
+def speed_of(times: Sequence[float], fps: float) -> str:
+    """How fast the last frames were, at the median: one of them may have been disturbed.
+
+    Args:
+        times: of stepping each frame [s]. The first shows the stage as it stands, and does not count.
+    """
+    recent = times[1:][-_RECENT:]
+    if not recent:
+        return ""
+    factor = 1.0 / fps / float(np.median(recent))
+    return f"{factor:.{0 if factor >= 10 else 1 if factor >= 0.1 else 2}f} x real time"
 
 
 class _Take:
@@ -181,15 +232,14 @@ class _Artist:
                 surface.color = actor.paint(actor.body)
         picture = self.renderer.render([*self.scenery.at(now.alpha), *surfaces])
         self._draw_labels(picture, positions)
-        lines = [self.stage.title, f"t = {now.time:.2f} s"]
+        lines = [self.stage.title, f"t = {now.time:.2f} s   {speed_of(step_times, self.fps)}".rstrip()]
         if self.stage.caption:
             lines.append(self.stage.caption())
-        recent = step_times[_COMPILING:][-25:]
-        if recent:
-            mean = float(np.mean(recent))
-            factor = 1.0 / self.fps / mean
-            lines.append(f"step {mean * 1e3:.2f} ms, {factor:.{0 if factor >= 10 else 1}f} x real time")
         draw_text(picture, lines)
+        if self.stage.scale:
+            draw_color_scale(picture, self.stage.scale, corner="top right")
+        if self.stage.legend:
+            draw_legend(picture, self.stage.legend, corner="top right")
         self.times.append(time.perf_counter() - start)
         return picture
 
@@ -201,11 +251,17 @@ class _Artist:
         return self.surfaces[key]
 
     def _draw_labels(self, picture: NDArray[np.uint8], positions: list[NDArray[np.float32]]) -> None:
-        """A caption on the floor in front of each body that has one."""
-        named = [(a.label, rows) for a, rows in zip(self.stage.actors, positions, strict=True) if a.label]
+        """A caption on the floor in front of each body that has one, clear of it."""
+        named = [(a, rows) for a, rows in zip(self.stage.actors, positions, strict=True) if a.label]
         if not named:
             return
-        feet = np.array([rows.mean(axis=0) for _, rows in named])
-        feet[:, 2] = [rows[:, 2].min() for _, rows in named]
+        floor = self.stage.world.settings.floor
+        forward = np.subtract(self.stage.camera.eye, self.stage.camera.target)[:2]
+        forward = forward / max(float(np.linalg.norm(forward)), 1e-9)
+        feet = np.array([rows.mean(axis=0) for _, rows in named], dtype=np.float64)
+        for foot, (actor, rows) in zip(feet, named, strict=True):
+            half = float(np.ptp(actor.body.mesh.vertices, axis=0)[:2].max()) / 2
+            foot[:2] += LABEL_ROOM * half * forward
+            foot[2] = rows[:, 2].min() if floor is None else floor
         places = self.stage.camera.project(feet, self.renderer.width, self.renderer.height)
-        draw_labels(picture, [label for label, _ in named], places)
+        draw_labels(picture, [actor.label for actor, _ in named], places)

@@ -1,25 +1,29 @@
-"""Words on a picture: a panel in a corner, and captions under bodies."""
+"""Words on a picture: panels in corners, what colours mean, and captions under bodies."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.core.checks import to_array
 from taichi_soft.core.errors import OptionError
 from taichi_soft.core.types import Choice
+from taichi_soft.render.arguments import as_color
+from taichi_soft.render.colors import Color, ColorScale
+from taichi_soft.render.opencv import cv2
 
 Picture = NDArray[np.uint8]
 
 FONT = cv2.FONT_HERSHEY_SIMPLEX
-LINE = 1 / 32  # height of a line of text [shorter side of the picture]
+LINE = 1 / 26  # height of a line of text [shorter side of the picture]
 CAPTION = 0.8  # of that, for captions: there may be many
-SMALLEST_LINE = 11.0  # pixels; below it letters cannot be read
+SMALLEST_LINE = 13.0  # pixels; below it letters cannot be read
 LETTER = 22.0  # height of a line of this font at scale 1 [pixels]
 GAP = 0.45  # between lines, and round the words [line heights]
+INDENT = " " * 5  # room for a swatch before a line
+BAR = 12  # blanks between the ends of a colour bar
 PANEL, OPACITY, INK = (22, 26, 34), 0.62, (245, 247, 250)
 
 
@@ -42,16 +46,58 @@ def draw_text(picture: Picture, lines: Sequence[str], *, corner: Corner | str = 
     Raises: OptionError for another picture, text or corner.
     """
     _check(picture, lines)
-    place = Corner.parse(corner).value
-    if not lines:
-        return picture
-    height, width = picture.shape[:2]
-    margin = round(0.02 * min(height, width))
-    line = _line_height(lines, width - 2 * margin, height - 2 * margin, min(height, width))
-    pad, wide, high = _panel_size(lines, line)
-    left = margin if "left" in place else width - margin - wide
-    top = margin if "top" in place else height - margin - high
-    _draw_panel(picture, lines, left, top, line, pad, wide, high)
+    place = Corner.parse(corner)
+    if lines:
+        _draw_in_corner(picture, lines, place)
+    return picture
+
+
+def draw_legend(
+    picture: Picture, entries: Sequence[tuple[Color, str]], *, corner: Corner | str = Corner.TOP_RIGHT
+) -> Picture:
+    """The picture with lines of text as `draw_text`, each behind a swatch of its colour.
+
+    Args:
+        picture: uint8 (height, width, 3), changed in place.
+        entries: sRGB from 0 to 1, and plain ASCII text.
+    Raises: OptionError for another picture, colour, text or corner.
+    """
+    colors = [as_color(color, "color of the legend") for color, _ in entries]
+    lines = [INDENT + text for _, text in entries]
+    _check(picture, lines)
+    place = Corner.parse(corner)
+    if lines:
+        left, top, line, pad = _draw_in_corner(picture, lines, place)
+        side = round(0.85 * line)
+        for row, color in enumerate(colors):
+            begin = round(top + pad + row * line * (1.0 + GAP) + 0.12 * line)
+            swatch = picture[begin : begin + side, left + pad : left + pad + side]
+            swatch[:] = np.round(255.0 * np.array(color)).astype(np.uint8)
+    return picture
+
+
+def draw_color_scale(
+    picture: Picture, scale: ColorScale, *, corner: Corner | str = Corner.TOP_RIGHT
+) -> Picture:
+    """The picture with a bar of the colours of a scale, what they show, and from where to where.
+
+    Args:
+        picture: uint8 (height, width, 3), changed in place.
+    Raises: OptionError for another picture, scale or corner.
+    """
+    if not isinstance(scale, ColorScale):
+        raise OptionError(f"scale must be a ColorScale, got {type(scale).__name__}")
+    low, high = scale.ticks()
+    _check(picture, [scale.quantity])
+    place = Corner.parse(corner)
+    ends = low + " " * BAR + high
+    left, top, line, pad = _draw_in_corner(picture, [scale.quantity, "", low], place, ends)
+    wide = max(_width(text, line) for text in (scale.quantity, ends))
+    _put(picture, high, left + pad + wide - _width(high, line), _baseline(top + pad, 2, line), line)
+    begin = round(top + pad + line * (1.0 + GAP))
+    bar = picture[begin : begin + round(0.9 * line), left + pad : left + pad + wide]
+    values = np.linspace(scale.low, scale.high, bar.shape[1])
+    bar[:] = np.round(255.0 * scale.colors(values)).astype(np.uint8)
     return picture
 
 
@@ -98,6 +144,24 @@ def _check(picture: Picture, lines: Sequence[str]) -> None:
             raise OptionError(f"text must be a list of lines of plain ASCII, got {line!r}")
 
 
+def _draw_in_corner(
+    picture: Picture, lines: Sequence[str], corner: Corner, widest: str = ""
+) -> tuple[int, int, float, int]:
+    """A panel there, with room for `widest` in a line.
+
+    Returns: its left and top, the height of its lines, and its padding [pixels].
+    """
+    height, width = picture.shape[:2]
+    margin = round(0.02 * min(height, width))
+    sized = [*lines[:-1], max(lines[-1], widest, key=len)]
+    line = _line_height(sized, width - 2 * margin, height - 2 * margin, min(height, width))
+    pad, wide, high = _panel_size(sized, line)
+    left = margin if "left" in corner.value else width - margin - wide
+    top = margin if "top" in corner.value else height - margin - high
+    _draw_panel(picture, lines, left, top, line, pad, wide, high)
+    return left, top, line, pad
+
+
 def _width(text: str, line: float) -> int:
     (width, _), _ = cv2.getTextSize(text, FONT, line / LETTER, _stroke(line))
     return int(width)
@@ -132,6 +196,14 @@ def _draw_panel(
     part[:] = np.round(part * (1.0 - OPACITY) + np.array(PANEL) * OPACITY).astype(np.uint8)
     canvas = np.ascontiguousarray(part)
     for row, text in enumerate(lines):
-        base = round(pad + row * line * (1.0 + GAP) + 0.86 * line)
-        cv2.putText(canvas, text, (pad, base), FONT, line / LETTER, INK, _stroke(line), cv2.LINE_AA)
+        _put(canvas, text, pad, _baseline(pad, row, line), line)
     part[:] = canvas
+
+
+def _baseline(top: int, row: int, line: float) -> int:
+    """Of a line of text below `top` [pixels]."""
+    return round(top + row * line * (1.0 + GAP) + 0.86 * line)
+
+
+def _put(canvas: Picture, text: str, left: int, base: int, line: float) -> None:
+    cv2.putText(canvas, text, (left, base), FONT, line / LETTER, INK, _stroke(line), cv2.LINE_AA)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,8 +18,8 @@ from taichi_soft.render import Surface
 from taichi_soft.render.colors import Color
 from taichi_soft.world.world import World
 
-STONE: Color = (0.60, 0.62, 0.66)
-"""Colour of colliders, duller than every body, sRGB from 0 to 1."""
+SLATE: Color = (0.33, 0.39, 0.50)
+"""Colour of colliders, sRGB from 0 to 1: darker than the floor, and duller than every body."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Prop:
 
     surface: Triangles
     place: Collider | Frame
-    color: Color = STONE
+    color: Color = SLATE
 
 
 class Scenery:
@@ -43,8 +43,12 @@ class Scenery:
     As bodies are, they are drawn between the last two steps: tell it before each step.
     """
 
-    def __init__(self, world: World, props: Sequence[Prop] = ()) -> None:
-        seen = [Prop(_drawn(c.shape), c) for c in world.colliders if not _is_level(c)]
+    def __init__(
+        self, world: World, props: Sequence[Prop] = (), colors: Mapping[Collider, Color] | None = None
+    ) -> None:
+        """`colors`: sRGB from 0 to 1 of colliders that are to stand out from the others."""
+        given = colors or {}
+        seen = [Prop(_drawn(c.shape), c, given.get(c, SLATE)) for c in world.colliders if not _is_level(c)]
         self._props = [*seen, *props]
         self._surfaces = [Surface(*prop.surface, color=prop.color) for prop in self._props]
         self._before: list[Any] = []

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 
 from taichi_soft.bodies.asset import SoftBodyAsset
@@ -19,6 +18,7 @@ from taichi_soft.core.handles import Handle, handles_of, is_recorded
 from taichi_soft.core.serialisation import from_plain
 from taichi_soft.persistence.recorder import read_recording
 from taichi_soft.render import FLIPPED, PALETTE, Camera, Renderer, Surface, draw_text, highlight
+from taichi_soft.render.opencv import cv2
 from taichi_soft.render.props import Scenery
 from taichi_soft.world.body import Body
 from taichi_soft.world.world import World, context_of_world

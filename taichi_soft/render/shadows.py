@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,6 +11,7 @@ from taichi_soft.render.camera import Camera
 from taichi_soft.render.light_funcs import COARSE as COARSE_TEXELS
 from taichi_soft.render.light_funcs import FAINTEST
 from taichi_soft.render.lighting import SUN_AZIMUTH, SUN_ELEVATION
+from taichi_soft.render.opencv import cv2
 from taichi_soft.render.raster import CENTER, Raster
 from taichi_soft.render.scene import SceneArrays
 

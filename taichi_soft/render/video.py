@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import re
-import shutil
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.core.checks import as_count, as_number, as_path
 from taichi_soft.core.errors import StateError, VideoError
-from taichi_soft.render.containers import Container, Gif, Pictures, Stream, measure, quiet
+from taichi_soft.render.containers import Container, Gif, Pictures, Stream
+from taichi_soft.render.part_folder import PartFolder
 
 CONTAINERS: dict[str, type[Container]] = {".mp4": Stream, ".webm": Stream, ".gif": Gif, ".png": Pictures}
 
@@ -23,16 +22,17 @@ class VideoWriter:
     """Writes frames to a film, as a context manager; the suffix says of which kind.
 
     Args:
-        path: .webm (plays in browsers), .mp4 (MPEG-4, plays in players but not in browsers), .gif, or .png
-            for numbered pictures: `out/bounce.png` gives `out/bounce_0000.png` and so on. Its folder is made
-            if it is missing.
+        path: .mp4 (H.264), .webm (VP9), .gif, or .png for numbered pictures: `out/bounce.png` gives
+            `out/bounce_0000.png` and so on. Browsers play all of them. Its folder is made if it is missing.
         fps: frames per second, above 0 to 240; at most 50 for .gif.
         size: (width, height) of the frames [pixels], both even for .webm and .mp4.
-    Raises: VideoError for a suffix, size or place that cannot be written; OptionError for other arguments.
+    Raises: VideoError for a suffix, size or place that cannot be written; OptionError for other arguments,
+        and where the package that brings ffmpeg is missing (.png does without).
 
-    The film is built beside its place, read back, and moved there only when it holds every frame: after an
-    exception inside the `with`, what was there before is still there. Pictures left over from a longer
-    sequence of the same name are removed.
+    The film is made in a hidden folder beside its place, read back, and moved there only when it holds every
+    frame: after an exception inside the `with`, what was there before is still there. Where the process is
+    killed, the next film in the same place removes that folder. Pictures left over from a longer sequence of
+    the same name are removed.
     """
 
     def __init__(self, path: str | Path, *, fps: float, size: tuple[int, int]) -> None:
@@ -47,22 +47,19 @@ class VideoWriter:
         if CONTAINERS[suffix] is Stream and (self.size[0] % 2 or self.size[1] % 2):
             raise VideoError(f"a {suffix} film needs an even width and height, got {size[0]} x {size[1]}")
         self.count = 0  # frames written
-        self._part = self.path.with_name(f".{self.path.stem}.part{suffix}")
         self._closed = False
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._remove_part()
             if self.path.is_dir():
                 raise IsADirectoryError(21, "it is a folder")
-            if CONTAINERS[suffix] is not Pictures:
-                self._part.touch()  # says why not, where OpenCV would only say no
-            with quiet():
-                self._container = CONTAINERS[suffix](self._part, self.fps, self.size)
-        except (VideoError, KeyboardInterrupt, SystemExit):
-            self._remove_part()
-            raise
+            self._part = PartFolder(self.path.parent)
         except OSError as error:
             raise VideoError(f"cannot write {self.path}: {error.strerror or error}") from error
+        try:
+            self._container = CONTAINERS[suffix](self._part.path, suffix, self.fps, self.size)
+        except BaseException:
+            self._part.remove()
+            raise
 
     def write(self, frame: NDArray[np.uint8]) -> None:
         """Add a frame, sRGB, uint8 (height, width, 3). Raises: VideoError for any other."""
@@ -77,8 +74,11 @@ class VideoWriter:
                 else type(given).__name__
             )
             raise VideoError(f"frame {self.count} must be uint8 of shape {wanted}, got {what}")
-        with quiet():
-            self._container.write(cv2.cvtColor(frame, cv2.COLOR_RGB2BGR))
+        try:
+            self._container.write(frame)
+        except BaseException:  # it may hold half of the frame
+            self._give_up()
+            raise
         self.count += 1
 
     def close(self) -> None:
@@ -88,26 +88,23 @@ class VideoWriter:
         """
         if self._closed:
             return
-        self._closed = True
         try:
             if self.count == 0:
-                self._container.abandon()
                 raise VideoError(f"no frame was written to {self.path}: nothing was saved")
-            with quiet():
-                self._container.finish()
-                found, sizes = measure(self._part)
+            self._container.finish()
+            found, sizes = self._container.measure()
             if found != self.count or sizes != {self.size}:
                 raise VideoError(
                     f"{self.path} would hold {found} frames of size {sorted(sizes)} instead of "
                     f"{self.count} of {self.size}: is the disk full?"
                 )
             self._move()
-        except (OSError, cv2.error) as error:
+        except OSError as error:
             if isinstance(error, VideoError):
                 raise
-            raise VideoError(f"cannot write {self.path}: {error}".splitlines()[0]) from error
+            raise VideoError(f"cannot write {self.path}: {error.strerror or error}") from error
         finally:
-            self._remove_part()
+            self._give_up()
 
     def __enter__(self) -> VideoWriter:
         return self
@@ -117,27 +114,26 @@ class VideoWriter:
     ) -> None:
         if kind is None:
             self.close()
-        elif not self._closed:
+        else:
+            self._give_up()
+
+    def _give_up(self) -> None:
+        """Let go of what is not in its place by now; once closed, does nothing."""
+        if not self._closed:
             self._closed = True
-            with quiet():
-                self._container.abandon()
-            self._remove_part()
+            self._container.abandon()
+            self._part.remove()
 
     def _move(self) -> None:
-        """Put the finished part in its place."""
-        if not self._part.is_dir():
-            self._part.replace(self.path)
+        """Put the finished film in its place."""
+        files = self._container.files
+        if self.path.suffix.lower() != ".png":
+            files[0].replace(self.path)
             return
-        for picture in sorted(self._part.iterdir()):
+        for picture in files:
             picture.replace(self.path.with_name(f"{self.path.stem}_{picture.name}"))
         numbered = re.compile(re.escape(self.path.stem) + r"_(\d{4,})\.png")
         for name in self.path.parent.iterdir():
             match = numbered.fullmatch(name.name)
             if match and int(match.group(1)) >= self.count:
                 name.unlink()
-
-    def _remove_part(self) -> None:
-        if self._part.is_dir():
-            shutil.rmtree(self._part)
-        else:
-            self._part.unlink(missing_ok=True)

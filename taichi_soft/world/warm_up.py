@@ -29,6 +29,16 @@ SHORTEST = 1e-6
 UP = np.array([0.0, 0.0, 1.0])
 
 
+def warm_up_step(context: WorldContext) -> None:
+    """Compile what a step needs, and no more. The world stays as it is, to the bit."""
+    before = take_snapshot(context)
+    try:
+        context.built.trial_step(SHORTEST)
+    finally:
+        restore_snapshot(context, before)
+    _find_stable_step(context)
+
+
 def warm_up(context: WorldContext) -> None:
     """As `World.warm_up`."""
     before = take_snapshot(context)
@@ -50,6 +60,11 @@ def warm_up(context: WorldContext) -> None:
     finally:
         restore_snapshot(context, before)
     state_hash(context)
+    _find_stable_step(context)
+
+
+def _find_stable_step(context: WorldContext) -> None:
+    """Which the first step would find, if nobody had."""
     if context.slots.living and not context.settings.is_implicit:
         context.substeps.stable_count(FRAME)
 

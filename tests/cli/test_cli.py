@@ -39,8 +39,8 @@ def test_demo_without_a_name_lists_the_demos_with_a_summary_each():
     assert done.returncode == 0
     lines = done.stdout.splitlines()
     assert [line.split()[0] for line in lines] == [
-        *("attach", "bars", "bounce", "bowl", "cloth", "compare", "cut", "density", "dents", "grab"),
-        *("many", "playground", "rollback", "wheels"),
+        *("attach", "bars", "bounce", "bowl", "bridge", "cloth", "compare", "cut", "density", "dents"),
+        *("drape", "grab", "jelly", "many", "playground", "rollback", "tower", "wheels"),
     ]
 
 

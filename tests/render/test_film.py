@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 
 from engine_adapter import FixedStep
-from taichi_soft import Material, OptionError, VideoError, World, box
-from taichi_soft.render import Camera, Renderer
-from taichi_soft.render.film import Actor, Stage, film
+from taichi_soft import BoxShape, Material, OptionError, VideoError, World, box
+from taichi_soft.render import Camera, ColorScale, Renderer, VideoWriter
+from taichi_soft.render.film import Actor, Stage, film, speed_of
+from taichi_soft.render.props import SLATE, Scenery
 
 
 def falling_box(dt: float = 1 / 50) -> Stage:
@@ -23,7 +24,7 @@ def test_frames_show_every_fixed_step_where_both_rates_agree(tmp_path):
     seen = []
     report = film(stage, tmp_path / "b.mp4", size=(160, 120), on_frame=lambda *now: seen.append(now))
     assert report.frames == 50
-    assert len(report.draw_times) == 48
+    assert len(report.draw_times) == 50
     assert seen == [(i + 1, 50) for i in range(50)]
     assert stage.world.step_count == 49
     assert report.simulated == pytest.approx(0.98)
@@ -47,9 +48,60 @@ def test_the_time_in_the_picture_is_that_of_the_body_in_it(tmp_path, monkeypatch
     np.testing.assert_allclose(drawn, 3.5 - 0.5 * 9.81 * times**2, atol=1e-5)
 
 
+def test_what_is_compiled_before_the_first_frame_moves_nothing(tmp_path):
+    """The film ends in the state of a world that was only stepped, to the bit."""
+    stage, alone = falling_box(), falling_box()
+    report = film(stage, tmp_path / "b.png", seconds=0.5, size=(160, 120))
+    for _ in range(stage.world.step_count):
+        alone.world.step(stage.step.dt)
+    np.testing.assert_array_equal(stage.actors[0].body.positions(), alone.actors[0].body.positions())
+    assert stage.world.step_count == 24
+    assert report.simulated == pytest.approx(24 * stage.step.dt)
+
+
+def test_everything_is_drawn_and_stepped_once_before_the_first_frame(monkeypatch, tmp_path):
+    """In the worlds of all actors, and before any frame is written."""
+    done = []
+    original = Renderer.render
+    monkeypatch.setattr(Renderer, "render", lambda *given: done.append("draw") or original(*given))
+    monkeypatch.setattr("taichi_soft.render.film.warm_up_step", lambda context: done.append("step"))
+    write = VideoWriter.write
+    monkeypatch.setattr(VideoWriter, "write", lambda *given: done.append("write") or write(*given))
+    stage, other = falling_box(), falling_box()
+    stage.actors.append(Actor(other.actors[0].body, world=other.world))
+    film(stage, tmp_path / "b.png", seconds=0.04, size=(160, 120))
+    assert done == ["step", "step", "draw", "draw", "write", "draw", "write"]
+
+
+def test_the_picture_says_how_fast_the_last_frames_were_whatever_one_of_them_took():
+    for times, told in (
+        ([9.0], ""),
+        ([9.0, 0.002], "10 x real time"),
+        ([9.0, *[0.04] * 12, 30.0, *[0.04] * 12], "0.5 x real time"),
+        ([9.0, *[5.0] * 30, *[0.0016] * 25], "12 x real time"),
+        ([9.0, 1.0], "0.02 x real time"),
+    ):
+        assert speed_of(times, 50.0) == told
+
+
+def test_a_label_stands_on_the_floor_in_front_of_the_body(monkeypatch, tmp_path):
+    """Wherever the body is above it: below all of its pixels, and as far as the floor goes."""
+    places = []
+    monkeypatch.setattr(
+        "taichi_soft.render.film.draw_labels", lambda picture, labels, rows: places.append(rows)
+    )
+    stage = falling_box()
+    film(stage, tmp_path / "b.png", seconds=0.4, size=(160, 120))
+    camera = stage.camera
+    way = np.subtract(camera.eye, camera.target)[:2]
+    foot = [*(0.6 * way / np.linalg.norm(way)), 0.0]
+    for rows in places:
+        np.testing.assert_allclose(rows[0], camera.project([foot], 160, 120)[0], atol=0.05)
+
+
 def test_the_real_time_factor_is_simulated_time_over_time_taken():
     report = film(falling_box(), None, seconds=0.4)
-    assert len(report.step_times) == report.frames - 2
+    assert len(report.step_times) == report.frames - 1
     expected = len(report.step_times) * 0.02 / report.step_times.sum()
     assert report.real_time_factor == pytest.approx(expected)
     assert report.path is None
@@ -92,3 +144,36 @@ def test_simulated_time_is_that_of_the_world():
     stage = falling_box(dt=1 / 60)
     report = film(stage, None, seconds=0.5)
     assert report.simulated == stage.world.time > 0.4
+
+
+def test_colors_of_bodies_and_colliders_are_explained_and_told_apart(tmp_path):
+    """The bar and the legend stand in the upper right corner; a collider may have a colour of its own."""
+    world = World()
+    colliders = [world.add_collider(BoxShape((1, 1, 1)), position=(x, 0, 0.5)) for x in (-1.5, 1.5)]
+    body = world.add_body(box((1, 1, 1), (2, 2, 2)), Material(1e5, 0.2, 1000, 10), position=(0, 0, 4))
+    world.build()
+    drawn = Scenery(world, [], {colliders[1]: (1.0, 0.0, 0.0)}).at(1.0)
+    assert drawn[0].color.max() < 0.3
+    np.testing.assert_allclose(drawn[1].color, [(1.0, 0.0, 0.0)] * len(drawn[1].color), atol=1e-6)
+    camera = Camera.framing((-1, -1, 0), (1, 1, 5))
+    pictures = {}
+    for name, options in (
+        ("plain", {}),
+        ("bar", {"scale": ColorScale("stress", 0.0, 1e5, "Pa")}),
+        ("legend", {"legend": [((0.0, 1.0, 0.0), "green")]}),
+    ):
+        stage = Stage("box", world, [Actor(body)], camera, FixedStep(dt=0.02), 1.0, **options)
+        film(stage, tmp_path / f"{name}.png", seconds=0.02, size=(320, 240))
+        pictures[name] = cv2.imread(str(tmp_path / f"{name}_0000.png")).astype(int)
+    for name in ("bar", "legend"):
+        rows, columns = np.nonzero(np.abs(pictures[name] - pictures["plain"]).max(axis=2) > 3)
+        assert rows.max() < 120
+        assert columns.min() > 160
+    assert (pictures["legend"] == (0, 255, 0)).all(axis=2).sum() > 30
+
+
+def test_colliders_have_another_colour_than_the_floor():
+    """Their lightest and darkest tiles are far from it, in sRGB."""
+    picture = Renderer(160, 120, camera=Camera.framing((-1, -1, 0), (1, 1, 1))).render([])
+    floor = picture[-10:].reshape(-1, 3) / 255.0
+    assert np.abs(floor - np.array(SLATE)).max(axis=1).min() > 0.15

@@ -7,7 +7,6 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
 from taichi_soft.core.errors import OptionError
@@ -24,6 +23,7 @@ from taichi_soft.lab.experiments import (
 from taichi_soft.lab.report.plots import png_of
 from taichi_soft.lab.report.spreadsheets import csv_of_points, csv_of_table
 from taichi_soft.lab.report.wording import numeric_columns, readable
+from taichi_soft.render.opencv import cv2
 
 LONG = 12
 """Rows; a longer table is folded."""

@@ -1,0 +1,77 @@
+"""A cloth falls over a ball that moves to and fro, and is carried along by friction."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine_adapter import FixedStep
+from taichi_soft import Collider, Contact, SphereShape, SpringMaterial, World, cloth, cloth_constants
+from taichi_soft.cli import main
+from taichi_soft.render import PALETTE, Camera
+from taichi_soft.render.film import Actor, Stage
+
+CELLS = (32, 32)
+SIDE, MASS, SKIN = 2.4, 0.6, 0.02  # of the cloth [m], [kg], [m]
+RADIUS, HEIGHT = 0.55, 1.15  # of the ball, and of its middle [m]
+REACH, PERIOD, BEGIN = (
+    0.5,
+    3.0,
+    1.2,
+)  # how far it moves to each side [m], how long there and back, from when [s]
+FALL = 0.35  # from the cloth to the ball [m]
+STEP = FixedStep(dt=1 / 60, substeps=2)
+
+
+class Mover:
+    """Moves the ball before every step."""
+
+    def __init__(self, ball: Collider) -> None:
+        """In the middle."""
+        self.ball = ball
+
+    def __call__(self, world: World) -> None:
+        """To where it is at the end of the coming step."""
+        self.ball.move_to(_place(world.time + STEP.dt))
+
+
+def _place(time: float) -> NDArray[np.float64]:
+    """Of the middle of the ball [m]: it sets out slowly."""
+    since = max(time - BEGIN, 0.0)
+    sway = REACH * min(since / PERIOD, 1.0) * np.sin(2.0 * np.pi * since / PERIOD)
+    return np.array([sway, 0.0, HEIGHT])
+
+
+def stage() -> Stage:
+    """The cloth flat above the ball."""
+    world = World(integrator="implicit_euler")
+    ball = world.add_collider(SphereShape(RADIUS), position=_place(0.0), friction=0.6)
+    mesh = cloth((SIDE, SIDE), CELLS, MASS)
+    material = SpringMaterial(
+        cloth_constants(mesh, CELLS, tensile=400.0, shear=100.0, bend=1.0), damping=0.05
+    )
+    place = (-SIDE / 2 + 0.1, -SIDE / 2, HEIGHT + RADIUS + FALL)  # a little aside, as thrown
+    contact = Contact(thickness=SKIN)
+    body = world.add_body(mesh, material, law="springs", position=place, contact=contact)
+    world.build()
+    camera = Camera.framing((-1.4, -1.0, 0.0), (1.4, 1.0, 2.1), aspect=16 / 9, azimuth=-70, elevation=12)
+    return Stage(
+        "cloth over a moving ball",
+        world,
+        [Actor(body, PALETTE[2])],
+        camera,
+        STEP,
+        8.0,
+        act=Mover(ball),
+        collider_colors={ball: PALETTE[1]},
+    )
+
+
+def proof(stage: Stage) -> float:
+    """How near the nearest vertex of the cloth is to the ball [m]; below 0 where one is inside."""
+    mover = stage.act
+    assert isinstance(mover, Mover)
+    away = stage.actors[0].body.positions() - mover.ball.position
+    return float(np.linalg.norm(away, axis=1).min()) - RADIUS
+
+
+if __name__ == "__main__":
+    main("demo", "drape")
