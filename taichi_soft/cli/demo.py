@@ -11,6 +11,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from taichi_soft.cli.console import Arch, Threads, errors, say
+from taichi_soft.core.compilation import shown_by
 from taichi_soft.core.errors import OptionError
 from taichi_soft.core.runtime import init
 
@@ -27,7 +28,7 @@ def demo(
     arch: Arch = "auto",
     threads: Threads = None,
 ) -> None:
-    """Run a demo without a display, film it, and say how much faster than real time it ran."""
+    """Run a demo without a display, film it, and say how fast it ran, as a multiple of real time."""
     from taichi_soft.render.demos import demo_names, load_demo
 
     if name is None:
@@ -41,17 +42,18 @@ def demo(
     init(arch, threads)
     from taichi_soft.render.film import film
 
-    stage = module.stage()
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
-    with Progress(*columns, console=errors, disable=not errors.is_terminal) as progress:
-        task = progress.add_task(name)
+    bar = Progress(*columns, console=errors, disable=not errors.is_terminal)
+    task = bar.add_task(name, total=None)
+    with bar as progress, shown_by(lambda text: progress.update(task, description=escape(text) or name)):
+        stage = module.stage()
         report = film(
             stage,
             path,
             fps=fps,
             size=pixels,
             seconds=seconds,
-            on_frame=lambda done, total: progress.update(task, completed=done, total=total),
+            on_frame=lambda done, total: progress.update(task, description=name, completed=done, total=total),
         )
     if report.path is not None:
         say(f"wrote {escape(str(report.path))}: {report.frames} frames, {report.frames / fps:.1f} s")
@@ -59,7 +61,7 @@ def demo(
         frame = f"median {median(report.step_times) * 1e3:.2f} ms per frame of {1e3 / fps:.1f} ms"
         say(
             f"{name}: {report.simulated:.2f} s simulated, {frame}: "
-            f"{report.real_time_factor:.1f} x faster than real time"
+            f"{report.real_time_factor:.1f} x real time"
         )
     if len(report.draw_times):
         say(f"a picture of {size} took {median(report.draw_times) * 1e3:.1f} ms to draw, at the median")
