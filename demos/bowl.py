@@ -41,8 +41,8 @@ def stage() -> Stage:
     world.build()
     for body in world.bodies:
         body.set_linear_damping(DRAG)
-    camera = Camera.framing((-1.9, -1.9, 0.3), (1.9, 1.9, 3.1), aspect=16 / 9, elevation=40, margin=1.0)
-    return Stage(f"{BODIES} bodies in a bowl", world, actors, camera, STEP, 10.0)
+    camera = Camera.framing((-1.7, -1.7, 0.2), (1.7, 1.7, 2.6), aspect=16 / 9, elevation=52, margin=1.0)
+    return Stage(f"{BODIES} bodies in a bowl", world, actors, camera, STEP, 5.0)
 
 
 def _bowl() -> trimesh.Trimesh:

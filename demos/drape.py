@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine_adapter import FixedStep
-from taichi_soft import Collider, Contact, SphereShape, SpringMaterial, World, cloth, cloth_constants
+from taichi_soft import Collider, SphereShape, SpringMaterial, World, cloth, cloth_constants
 from taichi_soft.cli import main
 from taichi_soft.render import PALETTE, Camera
 from taichi_soft.render.film import Actor, Stage
@@ -43,16 +43,17 @@ def _place(time: float) -> NDArray[np.float64]:
 def stage() -> Stage:
     """The cloth flat above the ball."""
     world = World(integrator="implicit_euler")
-    ball = world.add_collider(SphereShape(RADIUS), position=_place(0.0), friction=0.6)
+    ball = world.add_collider(SphereShape(RADIUS), position=_place(0.0), friction=0.6, thickness=SKIN)
     mesh = cloth((SIDE, SIDE), CELLS, MASS)
     material = SpringMaterial(
         cloth_constants(mesh, CELLS, tensile=400.0, shear=100.0, bend=1.0), damping=0.05
     )
     place = (-SIDE / 2 + 0.1, -SIDE / 2, HEIGHT + RADIUS + FALL)  # a little aside, as thrown
-    contact = Contact(thickness=SKIN)
-    body = world.add_body(mesh, material, law="springs", position=place, contact=contact)
+    body = world.add_body(mesh, material, law="springs", position=place)
     world.build()
-    camera = Camera.framing((-1.4, -1.0, 0.0), (1.4, 1.0, 2.1), aspect=16 / 9, azimuth=-70, elevation=12)
+    camera = Camera.framing(
+        (-1.2, -0.8, 0.2), (1.2, 0.8, 2.0), aspect=16 / 9, azimuth=-70, elevation=12, margin=1.0
+    )
     return Stage(
         "cloth over a moving ball",
         world,
