@@ -59,10 +59,7 @@ def demo(
         say(f"wrote {escape(str(report.path))}: {report.frames} frames, {report.frames / fps:.1f} s")
     if len(report.step_times):
         frame = f"median {median(report.step_times) * 1e3:.2f} ms per frame of {1e3 / fps:.1f} ms"
-        say(
-            f"{name}: {report.simulated:.2f} s simulated, {frame}: "
-            f"{report.real_time_factor:.1f} x real time"
-        )
+        say(f"{name}: {report.simulated:.2f} s simulated, {frame}: {report.real_time_factor:.1f} x real time")
     if len(report.draw_times):
         say(f"a picture of {size} took {median(report.draw_times) * 1e3:.1f} ms to draw, at the median")
 
