@@ -1,7 +1,7 @@
 """Docstrings of this code base as mkdocstrings understands them: a Griffe extension.
 
-Ours write `Args:` without an empty line before it, `Returns:` and `Raises:` as one sentence each, and what a field
-of a dataclass is as a comment beside it.
+Ours write `Args:` without an empty line before it, and `Returns:` and `Raises:` as one sentence each. What a
+field of a dataclass is, they say in a comment beside it.
 """
 
 from __future__ import annotations
@@ -19,18 +19,17 @@ COMMENT = re.compile(r"\s#\s(?!noqa|type:)(.*)$")
 def sectioned(text: str) -> str:
     """The docstring with its sections set apart."""
     lines: list[str] = []
-    is_list = is_code = False
+    section = ""  # that the present line belongs to
     for line in text.splitlines():
-        if LIST.match(line):
-            lines, is_list = [*lines, ""], True
-        elif found := SENTENCE.match(line):
-            line = f"**{found[1]}:** {found[2]}"
-            lines, is_list = [*lines, ""], False
-        elif is_list and line and not line.startswith(" "):
-            lines, is_list = [*lines, ""], False
-        elif not is_list and line.startswith("    ") and not is_code and lines and lines[-1]:
-            lines = [*lines, ""] if not lines[-1].startswith(("**Ra", "**Re", "**Wa", "    ")) else lines
-            line = line.strip() if lines[-1].startswith(("**Ra", "**Re", "**Wa")) else line
+        if found := LIST.match(line) or SENTENCE.match(line):
+            section = found[1]
+            lines.append("")
+            line = line if LIST.match(line) else f"**{section}:** {found[2]}"
+        elif line and not line.startswith(" ") and section in ("Args", "Attributes"):
+            section = ""
+            lines.append("")
+        elif section in ("Returns", "Raises", "Warns"):
+            line = line.strip()
         lines.append(line)
     return "\n".join(lines)
 
@@ -46,5 +45,7 @@ class DocstringSections(griffe.Extension):
     def on_attribute(self, *, attr: griffe.Attribute, **_: Any) -> None:
         """Take the comment beside a field for its docstring."""
         if attr.docstring is None and attr.lineno is not None and attr.parent is not None:
-            if attr.parent.is_class and (found := COMMENT.search(attr.lines_collection[attr.filepath][attr.lineno - 1])):
+            if attr.parent.is_class and (
+                found := COMMENT.search(attr.lines_collection[attr.filepath][attr.lineno - 1])
+            ):
                 attr.docstring = griffe.Docstring(found[1], parent=attr)
