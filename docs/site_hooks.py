@@ -27,7 +27,11 @@ PAGE = """<!DOCTYPE html>
 <title>taichi-soft: the thesis's experiments, measured</title>
 <style>
 {style}
-main table {{ display: block; overflow-x: auto; }}
+main > table {{ display: block; overflow-x: auto; width: fit-content; max-width: 100%; }}
+main > table {{ background: var(--card); }}
+main > table th, main > table td {{ padding: 5px 10px; vertical-align: top; min-width: 4.5rem; }}
+main > table td {{ border-top: 1px solid var(--line); }}
+main > h2 {{ margin-top: 1.6em; }}
 main img {{ max-width: 100%; height: auto; background: #fff; }}
 </style>
 </head>
