@@ -34,6 +34,18 @@ def sectioned(text: str) -> str:
     return "\n".join(lines)
 
 
+def fields(cls: griffe.Class) -> list[str]:
+    """What a dataclass says of its fields in comments beside them; where it says nothing, their types."""
+    lines = []
+    for name, member in cls.members.items():
+        if not (member.is_attribute and "instance-attribute" in member.labels and member.annotation):
+            continue
+        beside = member.lines_collection[member.filepath][(member.endlineno or member.lineno) - 1]
+        found = COMMENT.search(beside)
+        lines.append(f"    {name}: {found[1] if found else f'`{member.annotation}`'}")
+    return lines
+
+
 class DocstringSections(griffe.Extension):
     """Griffe calls it for every object that it has read."""
 
@@ -42,10 +54,12 @@ class DocstringSections(griffe.Extension):
         if obj.docstring is not None:
             obj.docstring.value = sectioned(obj.docstring.value)
 
-    def on_attribute(self, *, attr: griffe.Attribute, **_: Any) -> None:
-        """Take the comment beside a field for its docstring."""
-        if attr.docstring is None and attr.lineno is not None and attr.parent is not None:
-            if attr.parent.is_class and (
-                found := COMMENT.search(attr.lines_collection[attr.filepath][attr.lineno - 1])
-            ):
-                attr.docstring = griffe.Docstring(found[1], parent=attr)
+    def on_class(self, *, cls: griffe.Class, **_: Any) -> None:
+        """List the fields of a dataclass that does not do so in its docstring."""
+        doc = cls.docstring
+        if (
+            doc is not None
+            and "dataclass" in cls.labels
+            and not re.search(r"^(Args|Attributes):", doc.value, re.M)
+        ):
+            doc.value = "\n".join([*doc.value.splitlines(), "", "Attributes:", *fields(cls)])
