@@ -2,7 +2,7 @@
 # make test: set everything up, run the tests that take minutes; make test-all: those that take half an hour, too
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-fast test-all test-bounds lint profile clean
+.PHONY: help setup demo test test-fast test-all test-bounds lint profile docs clean
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -14,6 +14,7 @@ help:
 	@echo "make test-all set up with every extra, run every test: half an hour"
 	@echo "make test-bounds  set up, run kernels with every index checked: takes minutes"
 	@echo "make profile  set up, measure what a frame costs here"
+	@echo "make docs     set up, build the documentation into out/docs"
 	@echo "make lint     set up with every extra, check style and types"
 	@echo "make setup    set up with every extra"
 	@echo "make clean    delete the environment and what was written"
@@ -42,6 +43,9 @@ test-bounds: $(VENV)/.test
 
 profile: $(VENV)/.demo
 	@$(BIN)/taichi-soft profile
+
+docs: $(VENV)/.docs
+	@$(BIN)/mkdocs build --strict
 
 lint: $(VENV)/.dev
 	@$(BIN)/ruff check . && $(BIN)/ruff format --check . && $(BIN)/mypy

@@ -1,0 +1,88 @@
+"""What the documentation site takes from elsewhere: files above this folder, and the kept report.
+
+MkDocs calls these functions by their names (mkdocs.yml, `hooks`).
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from pathlib import Path
+from typing import Any
+
+import markdown
+from mkdocs.structure.files import File, Files
+
+ROOT = Path(__file__).parents[1]
+REPORT = ROOT / "docs" / "report"
+ABOVE = {"CONTRIBUTING.md": "contributing.md", "CHANGELOG.md": "changelog.md"}
+"""Files at the top of the repository, and the pages that they become."""
+
+PAGE = """<!DOCTYPE html>
+<html lang="en-GB">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="color-scheme" content="light dark">
+<title>taichi-soft: the thesis's experiments, measured</title>
+<style>
+{style}
+main > table {{ display: block; overflow-x: auto; width: fit-content; max-width: 100%; }}
+main > table {{ background: var(--card); }}
+main > table th, main > table td {{ padding: 5px 10px; vertical-align: top; min-width: 4.5rem; }}
+main > table td {{ border-top: 1px solid var(--line); }}
+main > h2 {{ margin-top: 1.6em; }}
+main img {{ max-width: 100%; height: auto; background: #fff; }}
+</style>
+</head>
+<body>
+<main>
+<p class="source"><a href="index.html">Back to the documentation</a></p>
+{body}
+</main>
+</body>
+</html>
+"""
+
+
+def on_files(files: Files, config: Any) -> Files:
+    """Add the pages from above, and the report as one page that stands by itself."""
+    for name, page in ABOVE.items():
+        files.append(File.generated(config, page, abs_src_path=str(ROOT / name)))
+    files.append(File.generated(config, "report/full.html", content=_report()))
+    return files
+
+
+def on_page_markdown(text: str, page: Any, **_: Any) -> str:
+    """Let links between files of the repository lead to their pages."""
+    name = page.file.src_uri
+    if name == "report/index.md":
+        return text.replace("<!-- verdicts -->", _verdicts())
+    for above, its_page in ABOVE.items():
+        text = text.replace(f"](../{above})", f"]({its_page})").replace(f"]({above})", f"]({its_page})")
+    return text.replace("](docs/", "](") if name in ABOVE.values() else text
+
+
+def _verdicts() -> str:
+    """The table of all claims with their verdicts."""
+    lines, chapter = [], ""
+    with (REPORT / "verdicts.csv").open(encoding="utf-8", newline="") as file:
+        for row in csv.DictReader(file):
+            if row["chapter"] != chapter:
+                chapter = row["chapter"]
+                lines += ["", f"### {chapter}", "", "| verdict | claim | measured |", "|---|---|---|"]
+            anchor = f"experiment-{row['experiment']}"
+            claim = f"{row['text']} ({row['source']}; [experiment](full.html#{anchor}))"
+            measured = row["measured"] + (f". **Why:** {row['why']}" if row["why"] else "")
+            cells = (f"**{row['verdict']}**", claim, measured)
+            lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
+    return "\n".join(lines)
+
+
+def _report() -> str:
+    """`report.md` as a page with the style of those that `taichi-soft report` writes."""
+    text = (REPORT / "report.md").read_text(encoding="utf-8")
+    text = re.sub(r"^  - ", "    - ", text, flags=re.MULTILINE)  # a list in a list, four columns in
+    body = markdown.markdown(text, extensions=["tables", "sane_lists"])
+    style = (ROOT / "taichi_soft/lab/report/templates/report.css").read_text(encoding="utf-8")
+    return PAGE.format(style=style, body=body)

@@ -1,0 +1,155 @@
+"""What the pages of the documentation print has to run, and where they point to there has to be something."""
+
+import ast
+import functools
+import re
+import subprocess
+import sys
+import warnings
+from pathlib import Path
+
+import pytest
+
+import engine_adapter
+import taichi_soft
+from taichi_soft import LAWS, PRESETS
+from taichi_soft.core.extras import EXTRAS
+from taichi_soft.core.types import DampingModel, Flips, Integrator, Strain
+from taichi_soft.render.demos import demo_names
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCS = ROOT / "docs"
+MADE = {
+    "contributing.md": "CONTRIBUTING.md",
+    "changelog.md": "CHANGELOG.md",
+    "report/full.html": "docs/report/report.md",
+}
+"""Pages that docs/site_hooks.py makes, and of what."""
+PAGES = {
+    path.relative_to(DOCS).as_posix(): path.read_text(encoding="utf-8") for path in sorted(DOCS.rglob("*.md"))
+}
+CODE = {
+    name: re.findall(r"^```python\n(.*?)^```", text, re.DOTALL | re.MULTILINE) for name, text in PAGES.items()
+}
+LINK = re.compile(r"\]\(([^)\s]+)\)")
+
+
+def prose(name):
+    """A page without its code."""
+    return re.sub(r"^```.*?^```", "", PAGES[name], flags=re.DOTALL | re.MULTILINE)
+
+
+def slug(heading):
+    """The anchor that MkDocs gives a heading."""
+    kept = re.sub(r"[^\w\s-]", "", heading.replace("`", "")).strip().lower()
+    return re.sub(r"[-\s]+", "-", kept)
+
+
+@pytest.mark.parametrize("name", [name for name, blocks in CODE.items() if blocks])
+def test_the_code_of_a_page_runs_from_top_to_bottom(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names: dict = {"__name__": "page"}
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", taichi_soft.FrozenBodyWarning)
+        warnings.simplefilter("error", taichi_soft.UnstableStepWarning)
+        for number, block in enumerate(CODE[name]):
+            exec(compile(block, f"docs/{name}, block {number}", "exec"), names)
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_every_link_within_the_site_leads_somewhere(name):
+    for target in LINK.findall(prose(name)):
+        if re.match(r"https?:", target):
+            continue
+        path, _, anchor = target.partition("#")
+        found = (DOCS / name).parent / path if path else DOCS / name
+        made = (
+            MADE.get(found.resolve().relative_to(DOCS).as_posix())
+            if DOCS in found.resolve().parents
+            else None
+        )
+        found = ROOT / made if made else found
+        assert found.exists(), f"{name}: {target}"
+        if anchor and found.suffix == ".md":
+            text = re.sub(
+                r"^```.*?^```", "", found.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE
+            )
+            slugs = {slug(heading) for heading in re.findall(r"^#+ (.*)$", text, re.MULTILINE)}
+            assert anchor in slugs | set(re.findall(r'<a id="([^"]+)"', text)), f"{name}: {target}"
+
+
+def test_every_page_is_in_the_navigation():
+    navigation = (ROOT / "mkdocs.yml").read_text(encoding="utf-8").split("\nnav:\n")[1].split("\n\n")[0]
+    listed = set(re.findall(r"[\w/-]+\.md", navigation))
+    assert listed == (set(PAGES) - {"report/report.md"}) | {name for name in MADE if name.endswith(".md")}
+
+
+@functools.cache
+def help_of(*command):
+    done = subprocess.run(
+        [sys.executable, "-m", "taichi_soft", *command, "--help"], capture_output=True, text=True
+    )
+    return done.stdout
+
+
+@pytest.mark.parametrize("name", sorted(set(PAGES) - {"report/report.md"}))
+def test_every_command_and_option_of_a_page_exists(name):
+    text = PAGES[name]
+    for command, rest in re.findall(
+        r"taichi-soft (demo|info|profile|drop-test|report|replay)\b([^`\n|]*)", text
+    ):
+        for option in re.findall(r"(?<!\S)--[a-z-]+", rest):
+            assert option in help_of(command), f"{name}: taichi-soft {command} {option}"
+    for command in re.findall(r"^ +taichi-soft ([\w-]+)|`taichi-soft ([\w-]+)", text, re.MULTILINE):
+        assert "".join(command) in help_of(), name
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    for target in re.findall(r"^ +make ([\w-]+)|`make ([\w-]+)`", text, re.MULTILINE):
+        assert f"\n{''.join(target)}:" in makefile, name
+
+
+@pytest.mark.parametrize("package", [taichi_soft, engine_adapter])
+def test_every_public_name_is_on_a_page_of_the_reference_once(package):
+    text = "\n".join(text for name, text in PAGES.items() if name.startswith("reference/"))
+    listed = re.findall(rf"^::: {package.__name__}\.(\w+)$", text, re.MULTILINE)
+    assert sorted(listed) == sorted(package.__all__)
+
+
+@pytest.mark.parametrize(
+    ("page", "names"),
+    [
+        ("materials.md", LAWS),
+        ("materials.md", PRESETS),
+        ("command-line.md", demo_names()),
+        ("first-steps.md", EXTRAS),
+        *(("materials.md", [each.value for each in kind]) for kind in (Strain, Flips, DampingModel)),
+        ("game-loop.md", [each.value for each in Integrator]),
+    ],
+)
+def test_every_choice_stands_in_its_table(page, names):
+    for name in names:
+        assert re.search(rf"^\|.*`\"?{name}\"?`", PAGES[page], re.MULTILINE), name
+
+
+def test_presets_have_the_numbers_of_the_table():
+    rows = dict(
+        re.findall(
+            r'^\| `"(\w+)"` \| ([\d.]+ MPa \| -?[\d.]+ \| \d+ kg/m\^3 \| [\d.]+)',
+            PAGES["materials.md"],
+            re.MULTILINE,
+        )
+    )
+    said = {
+        name: f"{m.young / 1e6:g} MPa | {m.poisson:g} | {m.density:g} kg/m^3 | {m.damping_ratio:g}"
+        for name, m in PRESETS.items()
+    }
+    assert rows == said
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_code_of_a_page_imports_public_names_only(name):
+    for block in CODE[name]:
+        for node in ast.walk(ast.parse(block)):
+            if isinstance(node, ast.ImportFrom) and node.module in ("taichi_soft", "engine_adapter"):
+                assert {each.name for each in node.names} <= set(sys.modules[node.module].__all__)
+            elif isinstance(node, ast.ImportFrom):
+                assert not (node.module or "").startswith(("taichi_soft", "engine_adapter"))
