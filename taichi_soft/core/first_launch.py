@@ -60,12 +60,12 @@ class FirstLaunches:
         """Make a kernel, and have its first launch looked at."""
         name = kernel.func.__name__
         start = BURST.begin(name)
+        kernel.runtime.materialize()  # lays out fields, of whose places digests are made
         digest = self._digest_of(kernel, args, features)
         is_short = self._known is not None and digest in self._known
         if digest is None:
             plain(kernel, key, args, features)
         elif is_short:
-            kernel.runtime.materialize()
             kernel.compiled_kernels[key] = self._create_short(kernel, features, digest)
         else:
             self._make(kernel, key, args, features, digest)
@@ -100,7 +100,6 @@ class FirstLaunches:
 
     def _make(self, kernel: Any, key: Any, args: Any, features: Any, digest: str) -> None:
         """Make a kernel from its source, under a name by which its file is found again."""
-        kernel.runtime.materialize()
         tree, context = tree_of(kernel, args, features)
         kernel.compiled_kernels[key] = _create(kernel, tree, context, name_of(kernel, digest))
         self._made.append((kernel, features, digest))

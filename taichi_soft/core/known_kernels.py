@@ -48,9 +48,7 @@ def digest_of_sources() -> str:
     """Of the package's own files, the interpreter and NumPy: what decides how a kernel's source is read."""
     found = hashlib.sha256(f"{sys.version} {np.__version__}".encode())
     for path in sorted(PACKAGE.rglob("*.py")):
-        text = path.read_bytes()
-        if b"ti." in text:  # a file that no kernel is in may change
-            found.update(path.relative_to(PACKAGE).as_posix().encode() + b"\0" + text + b"\0")
+        found.update(path.relative_to(PACKAGE).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
     return found.hexdigest()
 
 
@@ -96,10 +94,9 @@ def _describe(value: Any, parts: list[str], seen: dict[int, int]) -> None:
         return
     seen[id(value)] = len(seen)
     if hasattr(value, "snode") and hasattr(value, "vars"):  # a field
-        trees = [(each.ptr.snode().get_snode_tree_id(), each.ptr.snode().id) for each in value.vars]
-        parts.append(
-            f"{kind.__name__} {trees} {value.shape} {value.dtype.to_string()} {getattr(value, 'n', 0)}"
-        )
+        parts += [_place_of(each.ptr.snode()) for each in value.vars]
+        parts.append(f"{kind.__name__} {value.shape} {value.dtype.to_string()}")
+        parts.append(f"{getattr(value, 'n', 1)} x {getattr(value, 'm', 1)}")
     elif hasattr(value, "field_dict"):  # a field of structures
         _describe(value.field_dict, parts, seen)
     elif hasattr(value, "to_string"):  # a type of Taichi's
@@ -123,6 +120,22 @@ def _describe(value: Any, parts: list[str], seen: dict[int, int]) -> None:
         _describe(vars(value), parts, seen)
     else:
         raise UnknownPartError(kind.__qualname__)
+
+
+_places: dict[tuple[int, int], str] = {}
+
+
+def _place_of(node: Any) -> str:
+    """Where a number of a field lies in memory: its own place, and those of all that it lies in. It depends
+    on the sizes of other fields too."""
+    tree, first = node.get_snode_tree_id(), node.id
+    if (tree, first) not in _places:
+        path = []
+        while node is not None:
+            path.append((node.id, node.offset_bytes_in_parent_cell, node.cell_size_bytes))
+            node = node.parent
+        _places[tree, first] = f"{tree} {path}"
+    return _places[tree, first]
 
 
 def _describe_all(value: Any, items: Any, parts: list[str], seen: dict[int, int]) -> None:

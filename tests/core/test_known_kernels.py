@@ -20,7 +20,7 @@ import logging, sys
 logging.basicConfig(level=logging.DEBUG)
 from taichi_soft import Material, World, box, init
 init("cpu", threads=1)
-world = World(integrator=sys.argv[1])
+world = World(integrator=sys.argv[1], collider_room=len(sys.argv[3]))
 cube = box(cells=(int(sys.argv[2]),) * 3)
 world.add_body(cube, Material(2e5, 0.3, 1000), position=(0, 0, 0.6), law="virial")
 world.build()
@@ -30,10 +30,10 @@ print(world.state_hash())
 """
 
 
-def play(folder, integrator="leapfrog", cells=2):
+def play(folder, integrator="leapfrog", cells=2, has_collider=False):
     """State at the end, and the kernels that were made from their source and those that were known."""
     done = subprocess.run(
-        [sys.executable, "-c", PROGRAM, integrator, str(cells)],
+        [sys.executable, "-c", PROGRAM, integrator, str(cells), "1" * has_collider],
         env={**os.environ, "TI_OFFLINE_CACHE_FILE_PATH": str(folder)},
         capture_output=True,
         text=True,
@@ -65,8 +65,16 @@ def test_a_later_process_makes_no_kernel_from_its_source_and_moves_bodies_alike(
 
 def test_a_world_of_another_integrator_or_size_takes_no_kernel_for_its_own(folder, tmp_path):
     folder, _, _ = folder
-    for other in ("lazy_leapfrog", 2), ("leapfrog", 5):
-        assert play(folder, *other)[0] == play(tmp_path / str(other[1]), *other)[0]
+    others = [
+        ("lazy_leapfrog", 2, False),
+        ("leapfrog", 5, False),
+        ("leapfrog", 5, True),
+        ("leapfrog", 7, True),
+    ]
+    alone = [play(tmp_path / str(number), *other)[0] for number, other in enumerate(others)]
+    for _ in range(2):  # made first, and known then
+        assert [play(folder, *other)[0] for other in others] == alone
+    assert len(set(alone)) == len(alone)
 
 
 def test_what_is_missing_from_the_cache_is_made_from_its_source_again(folder):

@@ -1,0 +1,78 @@
+"""A game in Panda3D: rigid crates of Bullet fall onto a soft block. A file name asks for a picture only."""
+
+import sys
+
+import numpy as np
+from direct.showbase.ShowBase import ShowBase
+from panda3d import bullet, core
+
+from engine_adapter import EngineAdapter, FixedStep
+from taichi_soft import BoxShape, Material, World, box
+
+DT, EDGE, PICTURE = 1 / 60, 0.4, sys.argv[1:]
+core.load_prc_file_data("", "audio-library-name null\nbackground-color 0.8 0.85 0.9")
+core.load_prc_file_data("", "window-type offscreen\nload-display p3tinydisplay" if PICTURE else "")
+game, rigid, soft, crates = ShowBase(), bullet.BulletWorld(), World(collider_room=3), []
+rigid.set_gravity(core.LVector3(0, 0, -9.81))
+jelly = Material(young=6e4, poisson=0.4, density=1000, damping_ratio=0.1)
+block = soft.add_body(box((1.6, 1.6, 0.7), (8, 8, 4)), jelly, position=(0, 0, 0.36))
+soft.build()
+for number in range(3):
+    crate = game.render.attach_new_node(bullet.BulletRigidBodyNode("crate"))
+    crate.set_pos(0.5 * number - 0.5, 0, 1.3 + 0.5 * number)
+    crate.node().set_mass(40.0)
+    crate.node().add_shape(bullet.BulletBoxShape(core.LVector3(EDGE / 2)))
+    rigid.attach(crate.node())
+    model = game.loader.load_model("models/box")
+    model.set_pos_hpr_scale(*(-EDGE / 2,) * 3, 0, 0, 0, EDGE, EDGE, EDGE)
+    model.reparent_to(crate)
+    crates.append((crate, soft.add_collider(BoxShape((EDGE,) * 3), position=tuple(crate.get_pos()))))
+last = np.zeros((3, 2, 3))
+
+
+def step_bullet(soft):
+    """What the last soft step gave pushes the crates, and colliders follow them: see docs/coupling.md."""
+    now = np.array([(collider.impulse, collider.angular_impulse) for _, collider in crates])
+    for (crate, _), (impulse, angular) in zip(crates, 1.5 * now - 0.5 * last, strict=True):
+        crate.node().set_active(True)
+        crate.node().apply_central_impulse(core.LVector3(*impulse))
+        crate.node().apply_torque_impulse(core.LVector3(*angular))
+    last[:] = now
+    rigid.do_physics(DT, 1, DT)
+    for crate, collider in crates:
+        w, *xyz = crate.get_quat()
+        collider.move_to(tuple(crate.get_pos()), (*xyz, w))
+
+
+adapter, skin = EngineAdapter(soft, FixedStep(dt=DT), before_step=step_bullet), block.render_mesh(crease=50.0)
+vertices, normals = np.empty((2, skin.vertex_count, 3), np.float32)
+data = core.GeomVertexData("soft", core.GeomVertexFormat.get_v3n3(), core.Geom.UH_dynamic)
+data.set_num_rows(skin.vertex_count)
+triangles, geom, node = core.GeomTriangles(core.Geom.UH_static), core.Geom(data), core.GeomNode("soft")
+for corners in skin.triangles.tolist():
+    triangles.add_vertices(*corners)
+geom.add_primitive(triangles)
+node.add_geom(geom)
+game.render.attach_new_node(node).set_color(0.95, 0.45, 0.35, 1)
+for light in (core.DirectionalLight("sun"), core.AmbientLight("sky")):
+    light.color = (0.7, 0.7, 0.7, 1) if light.name == "sun" else (0.35, 0.35, 0.4, 1)
+    lamp = game.render.attach_new_node(light)
+    lamp.set_hpr(-35, -55, 0)
+    game.render.set_light(lamp)
+game.disable_mouse()
+game.camera.set_pos(1.6, -3.9, 2.4)
+game.camera.look_at(0, 0, 0.6)
+
+
+def draw(task):
+    """One frame: time goes on, and positions and normals go into Panda3D's own buffer."""
+    adapter.advance(DT if PICTURE else game.clock.dt)
+    adapter.render_mesh(skin, vertices, normals)
+    memoryview(data.modify_array(0)).cast("B")[:] = np.hstack((vertices, normals)).tobytes()
+    return task.cont
+
+
+game.task_mgr.add(draw, "soft")
+for _ in range(40 if PICTURE else 0):
+    game.task_mgr.step()
+game.win.save_screenshot(*PICTURE) if PICTURE else game.run()
