@@ -57,10 +57,19 @@ def on_page_markdown(text: str, page: Any, **_: Any) -> str:
     """Let links between files of the repository lead to their pages."""
     name = page.file.src_uri
     if name == "report/index.md":
-        return text.replace("<!-- verdicts -->", _verdicts())
+        return text.replace("<!-- head -->", _head()).replace("<!-- verdicts -->", _verdicts())
     for above, its_page in ABOVE.items():
         text = text.replace(f"](../{above})", f"]({its_page})").replace(f"]({above})", f"]({its_page})")
     return text.replace("](docs/", "](") if name in ABOVE.values() else text
+
+
+def _head() -> str:
+    """When and how the report was made, and how many claims hold."""
+    text = (REPORT / "report.md").read_text(encoding="utf-8")
+    facts = dict(re.findall(r"^- (\w+): (.*)$", text, re.MULTILINE))
+    counts = re.search(r"^Of \d+ claims: .*$", text, re.MULTILINE)
+    assert counts is not None
+    return f"It was made on {facts['Made']} by `{facts['Command']}`, on {facts['processor']}. {counts[0]}"
 
 
 def _verdicts() -> str:
