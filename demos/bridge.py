@@ -10,7 +10,8 @@ from taichi_soft.render import PALETTE, Camera
 from taichi_soft.render.film import Actor, Stage
 
 PLANKS, PLANK, GAP = 13, 0.3, 0.12  # how many, how long along the bridge, and how far apart [m]
-WIDTH, ROPE, THICKNESS = 1.5, 0.1, 0.12  # of the bridge, of the ropes at its sides, of both [m]
+WIDTH, ROPE, THICKNESS = 1.7, 0.12, 0.12  # of the bridge, of the ropes at its sides, of both [m]
+EDGE = 0.16  # by which the ropes rise outwards, so that nothing rolls off [m]
 HEIGHT = 1.2  # of the bridge when it hangs straight [m]
 WOOD, HEMP = 1.5e6, 1.0e6  # Young's moduli of planks and ropes [Pa]
 SOFT = Material(young=3.0e4, poisson=0.3, density=400.0, damping_ratio=0.1)
@@ -39,11 +40,11 @@ def stage() -> Stage:
     material = Material(np.where(columns < PLANK, WOOD, HEMP), 0.2, 300.0, damping_ratio=0.1)
     world = World(soft_contact=True)
     pillar = BoxShape((1.2, WIDTH + 0.2, HEIGHT))
-    for x in (-0.6, LENGTH + 0.6):
+    for x in (-0.65, LENGTH + 0.65):
         world.add_collider(pillar, position=(x, 0.0, HEIGHT / 2))
     contact, cube = Contact(friction=0.6, thickness=0.02), box((0.6, 0.6, 0.6), (4, 4, 4))
     bridge = world.add_body(mesh, material, position=(0.0, 0.0, HEIGHT), contact=contact)
-    for i, (shape, x) in enumerate(((torus(0.36, 0.15), 1.4), (sphere(0.4, 3), 2.5), (cube, 3.7))):
+    for i, (shape, x) in enumerate(((torus(0.36, 0.15), 1.2), (sphere(0.4, 3), 2.7), (cube, 4.1))):
         world.add_body(shape, SOFT, position=(x, 0.0, HEIGHT + 0.7 + 0.3 * i), contact=contact)
     world.build()
     holds = []
@@ -55,7 +56,7 @@ def stage() -> Stage:
     colors = np.where((is_wood & inner)[:, None], PALETTE[7], (0.90, 0.82, 0.66)).astype(np.float32)
     actors = [Actor(bridge, paint=lambda body: colors)]
     actors += [Actor(body, PALETTE[i]) for i, body in enumerate(world.bodies[1:])]
-    box_seen = (-0.7, -0.8, 0.2), (LENGTH + 0.7, 0.8, HEIGHT + 1.1)
+    box_seen = (-0.8, -0.8, 0.2), (LENGTH + 1.1, 0.8, HEIGHT + 1.2)
     camera = Camera.framing(*box_seen, aspect=16 / 9, azimuth=-76, elevation=14, margin=1.0)
     return Stage("a rope bridge", world, actors, camera, STEP, 7.0, act=Carriers(holds))
 
@@ -74,7 +75,8 @@ def _bridge() -> TetMesh:
         [[-WIDTH / 2], np.linspace(ROPE - WIDTH / 2, WIDTH / 2 - ROPE, across - 1), [WIDTH / 2]]
     )
     places = [np.interp(x, np.arange(along + 1), lengths), np.interp(y, np.arange(across + 1), widths)]
-    return TetMesh(np.stack([*places, THICKNESS * (z - 0.5)], axis=1), tets.reshape(kept.shape))
+    rise = np.where((y < 0.5) | (y > across - 0.5), EDGE, 0.0)
+    return TetMesh(np.stack([*places, THICKNESS * (z - 0.5) + rise], axis=1), tets.reshape(kept.shape))
 
 
 def proof(stage: Stage) -> float:

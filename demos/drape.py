@@ -52,7 +52,7 @@ def stage() -> Stage:
     body = world.add_body(mesh, material, law="springs", position=place)
     world.build()
     camera = Camera.framing(
-        (-1.2, -0.8, 0.2), (1.2, 0.8, 2.0), aspect=16 / 9, azimuth=-70, elevation=12, margin=1.0
+        (-1.2, -0.8, 0.2), (1.2, 0.8, 2.2), aspect=16 / 9, azimuth=-70, elevation=12, margin=1.0
     )
     return Stage(
         "cloth over a moving ball",

@@ -9,8 +9,8 @@ from taichi_soft.core.constants import GRAVITY_EARTH
 from taichi_soft.render import PALETTE, Camera
 from taichi_soft.render.film import Actor, Stage
 
-JELLY = Material(young=3.0e4, poisson=0.4, density=500.0, damping_ratio=0.08)
-RUBBER = Material(young=4.0e5, poisson=0.3, density=700.0, damping_ratio=0.3)
+JELLY = Material(young=2.5e4, poisson=0.4, density=500.0, damping_ratio=0.08)
+RUBBER = Material(young=4.0e5, poisson=0.3, density=1300.0, damping_ratio=0.3)
 SIZE, LAYERS = (1.8, 1.8, 0.5), 3  # of a block [m], and how many there are
 SKIN = 0.02  # between them [m]
 RADIUS, DROP = 0.5, 0.9  # of the ball, and how high above the stack it begins [m]
@@ -51,7 +51,7 @@ def stage() -> Stage:
     world.build()
     colors = [PALETTE[5], PALETTE[2], PALETTE[4], PALETTE[1]]
     actors = [Actor(body, color) for body, color in zip(world.bodies, colors, strict=True)]
-    seen = (-1.0, -1.0, 0.1), (1.0, 1.0, 3.2)
+    seen = (-1.15, -1.15, 0.0), (1.15, 1.15, 3.2)
     camera = Camera.framing(*seen, aspect=16 / 9, azimuth=-62, elevation=9, margin=1.02)
     title = f"jelly, E = {JELLY.young / 1e3:g} kPa"
     return Stage(title, world, actors, camera, STEP, 5.0, act=Scale())

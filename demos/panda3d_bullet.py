@@ -25,6 +25,7 @@ for number in range(3):
     rigid.attach(crate.node())
     model = game.loader.load_model("models/box")
     model.set_pos_hpr_scale(*(-EDGE / 2,) * 3, 0, 0, 0, EDGE, EDGE, EDGE)
+    model.set_texture_off(1)
     model.reparent_to(crate)
     crates.append((crate, soft.add_collider(BoxShape((EDGE,) * 3), position=tuple(crate.get_pos()))))
 last = np.zeros((3, 2, 3))

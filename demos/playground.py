@@ -29,6 +29,7 @@ HUB = np.array([1.85, 0.0, 3.6])  # of the wheel [m]
 HOLLOW = np.array([1.7, 0.0, 0.0])  # its middle [m]
 UP = np.array([0.0, 0.0, 1.0])
 RIM = 2.4  # radius of its rim [m]
+GROUND, MOVING = (0.52, 0.52, 0.40), (0.92, 0.90, 0.85)  # colours of colliders
 STEP = FixedStep(dt=1 / 50)
 
 
@@ -47,7 +48,8 @@ class Course:
         lying = _turn(0.0, about_x=np.pi / 2)
         self.bars = [world.add_collider(CapsuleShape(0.13, 2.4), rotation=lying) for _ in range(2)]
         world.add_collider(SphereShape(0.45), position=HOLLOW + 0.25 * UP)
-        world.add_collider(HeightFieldShape(_ground(), spacing=0.2), position=HOLLOW)
+        ground = world.add_collider(HeightFieldShape(_ground(), spacing=0.2), position=HOLLOW)
+        self.colors = {ground: GROUND, **dict.fromkeys([*self.paddles, *self.bars], MOVING)}
         for i, bar in enumerate(self.bars):
             bar.teleport(self._bar(i, 0.0))
 
@@ -103,9 +105,11 @@ def stage() -> Stage:
         actors.append(Actor(body, PALETTE[i % len(PALETTE)]))
     world.build()
     camera = Camera.framing(
-        (-2.8, -2.6, 0.0), (4.6, 2.0, 6.2), aspect=16 / 9, azimuth=-74, elevation=20, margin=1.0
+        (-2.9, -2.4, 0.0), (3.9, 2.0, 6.8), aspect=16 / 9, azimuth=-74, elevation=20, margin=1.0
     )
-    return Stage("a course of colliders", world, actors, camera, STEP, 15.0, act=course)
+    return Stage(
+        "a course of colliders", world, actors, camera, STEP, 8.0, act=course, collider_colors=course.colors
+    )
 
 
 def proof(stage: Stage) -> float:

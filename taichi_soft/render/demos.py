@@ -10,8 +10,9 @@ from taichi_soft.core.package_data import DEMOS
 
 
 def demo_names() -> list[str]:
-    """Names of the demos there are."""
-    return sorted(path.stem for path in DEMOS.glob("[a-z]*.py"))
+    """Names of the demos there are. What sets no stage is a program of its own."""
+    stages = (path for path in DEMOS.glob("[a-z]*.py") if "\ndef stage(" in path.read_text(encoding="utf-8"))
+    return sorted(path.stem for path in stages)
 
 
 def load_demo(name: str) -> ModuleType:

@@ -65,6 +65,8 @@ class Ffmpeg:
             raise VideoError(f"cannot start {command[0]}: {error.strerror or error}") from error
         with contextlib.suppress(OSError, AttributeError):  # AttributeError: on Windows
             os.setpriority(os.PRIO_PROCESS, self._process.pid, LOWEST_PRIORITY)
+        with contextlib.suppress(OSError):  # Linux weighs sessions first, and then what is in one
+            Path(f"/proc/{self._process.pid}/autogroup").write_text(str(LOWEST_PRIORITY))
 
     def write(self, frame: NDArray[np.uint8]) -> None:
         """Give it a frame. Raises: VideoError where it has ended."""
