@@ -44,7 +44,8 @@ SECONDS = {
     "bodies/": (15, 296),
     "lab/": (0, 355),
     "cli/": (0, 135),
-    "demos/": (0, 381),
+    "demos/": (0, 500),
+    "docs/": (10, 400),
     "solver/": (75, 950),
     "elements/": (107, 98),
     "fracture/": (19, 90),
@@ -82,6 +83,7 @@ SOAK = (
     "solver/test_recovery.py::test_a_wrecked_body_finds_its_shape_again[exact",
     *(f"persistence/test_snapshot.py::test_{name}" for name in ("rest_shapes", "other_integrators")),
     *(f"test_package.py::test_a_{name}" for name in ("source", "wheel")),
+    "docs/test_pages.py::test_the_code",
     *("control/test_joints.py::test_a_recording", "test_readme.py::test_the_level"),
 )
 """Tiers, by the beginnings of files or tests. SOAK compiles or runs for more than some 40 s with an empty

@@ -208,10 +208,12 @@ def _start(arch: ArchName, reason: str, threads: int, cores: tuple[int, ...], is
 def _end() -> None:
     """Let Taichi keep the kernels that it compiled: its own parts may go in any order."""
     if os.getpid() == _process:
-        FIRST_LAUNCHES.close()
+        with contextlib.suppress(Exception):  # it only makes later starts shorter
+            FIRST_LAUNCHES.close()
         await_lock(ti.lang.impl.current_cfg().offline_cache_file_path)
         ti.reset()
-        FIRST_LAUNCHES.keep()
+        with contextlib.suppress(OSError):  # the folder takes no files
+            FIRST_LAUNCHES.keep()
 
 
 def _bound(
