@@ -8,6 +8,7 @@ import sys
 import textwrap
 import threading
 import types
+import warnings
 import weakref
 from collections.abc import Callable
 from importlib import import_module
@@ -16,7 +17,9 @@ from typing import Any
 os.environ.setdefault("TI_SKIP_VERSION_CHECK", "ON")
 os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
 
-import taichi as ti
+with warnings.catch_warnings():
+    warnings.simplefilter("ignore", SyntaxWarning)  # Python 3.12 and later, of a docstring of Taichi's
+    import taichi as ti
 
 from taichi_soft.core.subnormals import without_subnormals
 from taichi_soft.core.threads import in_turn
