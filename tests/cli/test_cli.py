@@ -34,6 +34,13 @@ def test_every_command_explains_itself(command):
     assert done.stderr == ""
 
 
+def test_an_unknown_device_is_refused_with_those_there_are():
+    done = run("info", "--arch", "abacus")
+    assert done.returncode == 2
+    assert all(name in done.stderr for name in ("'abacus'", "auto", "cpu", "cuda", "vulkan", "metal"))
+    assert "Traceback" not in done.stderr
+
+
 def test_demo_without_a_name_lists_the_demos_with_a_summary_each():
     done = run("demo")
     assert done.returncode == 0
@@ -64,7 +71,6 @@ def test_demo_writes_a_film_and_says_how_fast_it_ran(tmp_path):
         (("demo", "bounce", "--out", "/proc/nowhere/x.mp4"), "/proc/nowhere"),
         (("demo", "bounce", "--seconds", "-1"), "-1"),
         (("demo", "bounce", "--fps", "nan"), "nan"),
-        (("info", "--arch", "abacus"), "'abacus'"),
         (("info", "--threads", "0"), "0"),
         (("info", "--law", "none"), "'none'"),
         (("profile", "--cores", "first"), "'first'"),
