@@ -41,7 +41,7 @@ def stage() -> Stage:
     world.build()
     for body in world.bodies:
         body.set_linear_damping(DRAG)
-    camera = Camera.framing((-1.7, -1.7, 0.2), (1.7, 1.7, 2.6), aspect=16 / 9, elevation=52, margin=1.0)
+    camera = Camera.framing((-1.8, -1.8, 0.2), (1.8, 1.8, 3.2), aspect=16 / 9, elevation=52, margin=1.0)
     return Stage(f"{BODIES} bodies in a bowl", world, actors, camera, STEP, 5.0)
 
 
