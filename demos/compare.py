@@ -14,7 +14,7 @@ from taichi_soft.lab.profiling.spread import time_calls
 from taichi_soft.render import PALETTE, Camera
 from taichi_soft.render.film import Actor, Stage
 
-SOFT = Material(young=2.5e5, poisson=0.2, density=1000.0, damping=30.0, damping_ratio=0.0)
+SOFT = Material(young=6.0e5, poisson=0.2, density=1000.0, damping=30.0, damping_ratio=0.0)
 HEIGHT = 2.2  # of the centres [m]
 STEP = FixedStep(dt=1 / 50, substeps=10)
 PER_ROW = 4

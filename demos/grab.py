@@ -23,10 +23,10 @@ from taichi_soft.render import PALETTE, Camera
 from taichi_soft.render.film import Actor, Stage
 from taichi_soft.render.props import Prop
 
-MATERIAL = Material(young=1.2e5, poisson=0.3, density=400.0, damping_ratio=0.4)
+MATERIAL = Material(young=2.5e5, poisson=0.3, density=400.0, damping_ratio=0.4)
 CRATE = np.array([2.4, 0.0, 0.0])  # middle of its bottom [m]
-INSIDE, WALL, HEIGHT = 2.4, 0.14, 0.8  # of the crate: width, thickness and height of its walls [m]
-FIRST, EVERY = 0.6, 1.7  # when the hand takes the first body, and another [s]
+INSIDE, WALL, HEIGHT = 2.4, 0.14, 1.2  # of the crate: width, thickness and height of its walls [m]
+FIRST, EVERY = 0.8, 1.7  # when the hand takes the first body, and another [s]
 LIFT, STEEP = np.array([-0.1, 0.0, 1.3]), 0.8  # way up [m]; how steeply it throws
 LIFTING, PULL = 0.7, 10.0  # how long it lifts [s], and speeds up the throw [m/s^2]
 UP = np.array([0.0, 0.0, 1.0])
@@ -108,7 +108,7 @@ def stage() -> Stage:
     frame = world.add_frame((-0.6, 0.0, 2.2))
     props = [Prop(SphereShape(0.09).surface(), frame, color=(0.95, 0.93, 0.88))]
     camera = Camera.framing(
-        (-1.5, -1.4, 0.0), (3.7, 1.2, 2.5), aspect=16 / 9, azimuth=-72, elevation=34, margin=1.0
+        (-1.5, -1.4, 0.0), (3.7, 1.2, 2.6), aspect=16 / 9, azimuth=-72, elevation=34, margin=1.0
     )
     return Stage("picked up and thrown", world, actors, camera, STEP, 10.0, act=Hand(frame), props=props)
 
