@@ -10,7 +10,7 @@ from taichi_soft.cli import main
 from taichi_soft.render import PALETTE, Camera
 from taichi_soft.render.film import Actor, Stage
 
-MATERIAL = Material(young=6.0e4, poisson=0.3, density=500.0)
+MATERIAL = Material(young=3.0e5, poisson=0.3, density=500.0)
 THICKNESS = 0.02  # of the skins of the bodies [m]
 RADIUS, WALL = 2.0, 0.2  # of the inside of the bowl, and how thick it is [m]
 BODIES = 20
