@@ -47,4 +47,4 @@ if [ ! -x "$venv/bin/pip" ]; then
 fi
 
 echo "2/2 $installing"
-"$venv/bin/python" -m pip install --disable-pip-version-check -e ".[$extra]" || fail "$no_install"
+"$venv/bin/python" -m pip install --no-compile --disable-pip-version-check -e ".[$extra]" || fail "$no_install"

@@ -29,7 +29,7 @@ def profile(
         bool, typer.Option("--implicit", help="Compare implicit Euler with leapfrog and with scipy.")
     ] = False,
     startup: Annotated[
-        bool, typer.Option("--startup", help="Time a new process to its first frame, cold and warm.")
+        bool, typer.Option("--startup", help="Time new processes until their worlds are warm: minutes.")
     ] = False,
     game: Annotated[
         bool, typer.Option("--game", help="What contact, sleep, spawning and unused features cost.")
@@ -65,7 +65,7 @@ def profile(
             found["implicit"] = profiling.measure_implicit(max(3, repeats // 12))
         if startup:
             status.update("starting new processes")
-            found["startup"] = [profiling.measure_startup(device.arch, device.threads, device.cores)]
+            found["startup"] = profiling.measure_startup(device.arch, device.threads, device.cores)
         if game:
             status.update("measuring what a game does")
             found["features"] = profiling.measure_features(max(3, repeats // 3))

@@ -28,7 +28,7 @@ def _show_on_terminal(text: str) -> None:
         print(f"\r{text:<79}\r", end="", file=sys.stderr, flush=True)
 
 
-class _Burst:
+class Burst:
     """Kernels that follow each other."""
 
     def __init__(self) -> None:
@@ -55,7 +55,7 @@ class _Burst:
         _log.debug("kernel %s took %.3f s, %s", name, took, "known" if is_found else "made from its source")
 
 
-BURST = _Burst()
+BURST = Burst()
 
 
 @contextlib.contextmanager

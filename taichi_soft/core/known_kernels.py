@@ -64,7 +64,7 @@ def digest_of(function: Any, arguments: list[tuple[Any, bool]]) -> str:
     parts: list[str] = [digest_of_sources(), function.__module__, function.__qualname__]
     if function.__closure__:
         raise UnknownPartError(function.__qualname__)
-    seen: dict[int, int] = {}
+    seen: dict[int, tuple[int, Any]] = {}
     for value, is_template in arguments:
         _describe(value, parts, seen) if is_template else parts.append(_feature(value))
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()
@@ -80,7 +80,7 @@ def _feature(value: Any) -> str:
     return text
 
 
-def _describe(value: Any, parts: list[str], seen: dict[int, int]) -> None:
+def _describe(value: Any, parts: list[str], seen: dict[int, tuple[int, Any]]) -> None:
     """Add to `parts` all of a template argument that code can be made of."""
     kind = type(value)
     if value is None or kind in (bool, int, float, str, bytes):
@@ -90,9 +90,9 @@ def _describe(value: Any, parts: list[str], seen: dict[int, int]) -> None:
         parts.append(f"{kind.__qualname__} {value!r}")
         return
     if id(value) in seen:
-        parts.append(f"again {seen[id(value)]}")
+        parts.append(f"again {seen[id(value)][0]}")
         return
-    seen[id(value)] = len(seen)
+    seen[id(value)] = len(seen), value  # kept, or another could get its identity
     if hasattr(value, "snode") and hasattr(value, "vars"):  # a field
         parts += [_place_of(each.ptr.snode()) for each in value.vars]
         parts.append(f"{kind.__name__} {value.shape} {value.dtype.to_string()}")
@@ -138,7 +138,7 @@ def _place_of(node: Any) -> str:
     return _places[tree, first]
 
 
-def _describe_all(value: Any, items: Any, parts: list[str], seen: dict[int, int]) -> None:
+def _describe_all(value: Any, items: Any, parts: list[str], seen: dict[int, tuple[int, Any]]) -> None:
     parts.append(f"{type(value).__name__} {len(items)}")
     for each in items:
         _describe(each, parts, seen)

@@ -8,7 +8,7 @@ from taichi_soft.core.runtime import init, ti
 
 @pytest.fixture
 def told(monkeypatch):
-    burst = compilation._Burst()
+    burst = compilation.Burst()
     monkeypatch.setattr(burst, "show", lambda text: told.append(text))
     monkeypatch.setattr(compilation.time, "perf_counter", lambda: clock[0])
     clock, told = [100.0], []

@@ -53,10 +53,10 @@ def tables(found: dict[str, Any]) -> Iterator[tuple[str, Table]]:
             table.add_row(row.name, *steps, *times, *gains)
         yield "Implicit Euler, time to simulate one second", table
     if "startup" in found:
-        table = _table("kernel cache", "time")
-        table.add_row("empty", f"{found['startup'][0].cold:.2f}")
-        table.add_row("full", f"{found['startup'][0].warm:.2f}")
-        yield "A new process to its first frame [s]", table
+        table = _table("world", "kernel cache", "first frame", "all warm")
+        for row in found["startup"]:
+            table.add_row(row.world, row.cache, f"{row.first_frame:.2f}", f"{row.warm:.2f}")
+        yield "A new process until its first frame, and until nothing compiles any more [s]", table
     if "features" in found:
         table = _table("a step with", "used", "least", "median", "most")
         for row in found["features"]:

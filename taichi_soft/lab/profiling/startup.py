@@ -1,4 +1,4 @@
-"""How long a new process takes to its first frame, with an empty kernel cache and with a full one."""
+"""How long a new process takes until a game can begin, with an empty kernel cache and with a full one."""
 
 from __future__ import annotations
 
@@ -12,46 +12,78 @@ from dataclasses import dataclass
 from taichi_soft.core.errors import DeviceError
 from taichi_soft.core.types import ArchName
 
-_PROGRAM = """
+PROGRAM = """
+import time
 import numpy as np
 from engine_adapter import EngineAdapter, FixedStep
-from taichi_soft import World, init, preset, sphere
+from taichi_soft import BoxShape, Material, SoftBodyAsset, World, box, init, sphere
 init({arch!r}, {threads!r}, {cores!r})
-world = World()
-body = world.add_body(sphere(radius=1.0), preset("thesis_sphere"), position=(0, 0, 3), law="virial")
+rubber = Material(young=3e5, poisson=0.3, density=1000)
+{world}
 world.build()
 game = EngineAdapter(world, FixedStep(dt=1 / 60))
 game.step()
 game.positions(body, np.empty((body.vertex_count, 3), np.float32))
+print(time.time())
+world.warm_up()
+print(time.time())
 """
+
+WORLDS = {
+    "plain": """
+world = World()
+body = world.add_body(sphere(radius=0.5), rubber, position=(0, 0, 3))
+""",
+    "contact": """
+world = World(soft_contact=True)
+body = world.add_body(box((1, 1, 1), (3, 3, 3)), rubber, position=(0, 0, 0.52))
+world.reserve(SoftBodyAsset(sphere(radius=0.3), rubber), 4)
+world.add_collider(BoxShape((2, 2, 0.2)), position=(3, 0, 0.1))
+""",
+    "cutting": """
+world = World()
+body = world.add_body(box((1, 1, 1), (3, 3, 3)), rubber, position=(0, 0, 3), spare_vertices=200)
+""",
+}
+"""By name: a body and a floor; bodies that touch each other, a pool, a collider; a body that can be cut."""
 
 
 @dataclass(frozen=True)
 class Startup:
-    """From starting Python to the first positions [s]."""
+    """From starting Python until a world has drawn its first frame, and until nothing compiles any more."""
 
-    cold: float  # nothing compiled before
-    warm: float  # kernels in Taichi's offline cache
+    world: str  # one of `WORLDS`
+    cache: str  # "empty", or "full" of what the same program compiled
+    first_frame: float  # [s]
+    warm: float  # [s], after `World.warm_up`
 
 
-def measure_startup(arch: ArchName, threads: int, cores: tuple[int, ...]) -> Startup:
-    """Run a small game twice in processes of their own, with a cache of their own.
+def measure_startup(
+    arch: ArchName, threads: int, cores: tuple[int, ...], worlds: tuple[str, ...] = tuple(WORLDS)
+) -> list[Startup]:
+    """Run a small game of each world twice in processes of their own, with a cache of their own.
 
     Args:
         cores: to which the threads are bound, or none.
+        worlds: names of `WORLDS`.
     Raises: DeviceError if such a process fails.
     """
-    program = _PROGRAM.format(arch=arch, threads=threads, cores=cores or None)
-    with tempfile.TemporaryDirectory(prefix="taichi-soft-") as folder:
-        environment = {**os.environ, "TI_OFFLINE_CACHE_FILE_PATH": folder}
-        return Startup(_time_process(program, environment), _time_process(program, environment))
+    found = []
+    for name in worlds:
+        program = PROGRAM.format(arch=arch, threads=threads, cores=cores or None, world=WORLDS[name])
+        with tempfile.TemporaryDirectory(prefix="taichi-soft-") as folder:
+            environment = {**os.environ, "TI_OFFLINE_CACHE_FILE_PATH": folder}
+            found += [Startup(name, cache, *_times_of(program, environment)) for cache in ("empty", "full")]
+    return found
 
 
-def _time_process(program: str, environment: dict[str, str]) -> float:
-    start = time.perf_counter()
+def _times_of(program: str, environment: dict[str, str]) -> tuple[float, float]:
+    """When it says so, in seconds from its start on."""
+    start = time.time()
     done = subprocess.run(
         [sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=False
     )
     if done.returncode != 0:
         raise DeviceError(f"a new process failed: {(done.stderr.strip().splitlines() or ['no message'])[-1]}")
-    return time.perf_counter() - start
+    first_frame, warm = (float(line) - start for line in done.stdout.split())
+    return first_frame, warm
