@@ -50,6 +50,8 @@ class FirstLaunches:
             program = ti.lang.impl.get_runtime().prog
             short = self._create_short(kernel, features, digest)
             program.compile_kernel(program.config(), program.get_device_caps(), short)
+        if self._made:
+            _ = self._flag[None]  # reading it is a kernel too, that the next process asks for
 
     def keep(self) -> None:
         """Once Taichi has ended: put the code of these kernels into the files of the short bodies."""

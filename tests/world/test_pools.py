@@ -153,6 +153,7 @@ ARGUMENTS |= {
 }
 ARGUMENTS |= {"grab": (0, (1.0, 0.0, 0.0)), "pin": ([0],), "set_targets": ([0], [(9.0, 0.0, 0.0)])}
 ARGUMENTS |= {name: (1.0,) for name in ("set_damping", "set_gravity_scale", "set_linear_damping")}
+ARGUMENTS |= {"force_across": ((9.0, 0.0, 0.0), UP)}
 ARGUMENTS |= {"set_material": (JELLY,), "set_sheltered": (True,)}
 
 
