@@ -21,6 +21,10 @@ _WINDOW, _CHANGE = 10, 5e-3
 """Iterations, and change of the frequency's square in all of these, at which it ends. Of long bodies and of
 letters a single one changes little long before the end."""
 
+_ROUND_OFF = 1e-9
+"""Length of a direction, as a part of the longest, below which it is round-off: made longer it would be rigid
+motion as well. Bodies of few tetrahedra have no other directions left."""
+
 
 def first_frequency(body: BodyDescription) -> float:
     """Angular frequency of the slowest vibration of a body that nothing holds [rad/s]; 0 where it has none.
@@ -64,8 +68,9 @@ def _ritz(directions: Floats, images: Floats) -> tuple[Floats, Floats, Floats]:
 
     Returns: these, their images and the squares of their frequencies.
     """
-    lengths = np.linalg.norm(directions, axis=0) + 1e-300
-    directions, images = directions / lengths, images / lengths
+    lengths = np.linalg.norm(directions, axis=0)
+    real = lengths > _ROUND_OFF * lengths.max()
+    directions, images = directions[:, real] / lengths[real], images[:, real] / lengths[real]
     sizes, mixed = np.linalg.eigh(directions.T @ directions)
     mixed = mixed[:, sizes > 1e-10] / np.sqrt(sizes[sizes > 1e-10])
     small = mixed.T @ (directions.T @ images) @ mixed

@@ -72,6 +72,23 @@ def test_other_laws_and_implicit_euler_fade_by_it_too(options):
     assert with_it - without == pytest.approx(0.05, rel=0.2)
 
 
+@pytest.mark.parametrize("cells", [(1, 1, 1), (2, 1, 1), (2, 2, 1), (2, 2, 2), (3, 1, 1)])
+def test_a_box_of_few_tetrahedra_has_the_frequency_of_its_stiffness_matrix(cells):
+    mesh = box((1.0, 0.8, 0.6), cells)
+    require_first_frequency(mesh)
+
+
+def test_a_ball_of_twenty_tetrahedra_has_the_frequency_of_its_stiffness_matrix():
+    require_first_frequency(sphere(0.5, 1))
+
+
+def require_first_frequency(mesh):
+    material = Material(YOUNG, POISSON, DENSITY)
+    body = BodyDescription(mesh, material, fit_model(element_model("neo_hookean"), mesh, material))
+    omega, _ = first_mode(assembled_stiffness(mesh, YOUNG, POISSON), lumped_masses(mesh, DENSITY))
+    assert first_frequency(body) == pytest.approx(omega, rel=3e-3)
+
+
 def differences(mesh, law):
     """Stiffness at rest by differences of the forces, (3n, 3n)."""
     material, count = Material(YOUNG, POISSON, DENSITY), mesh.vertices.size
