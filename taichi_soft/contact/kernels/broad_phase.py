@@ -179,8 +179,10 @@ def is_outdated(state: ti.template(), island, given, h):
     return outdated | int(nearest_lost < farthest)
 
 
-@ti.func
-def begin_search(state: ti.template(), body, given, h, left, forgets):
+@ti.real_func
+def begin_search(
+    state: ti.template(), body: ti.i32, given: ti.f32, h: ti.f32, left: ti.f32, forgets: ti.i32
+):
     """Forget (1) the candidates of a body, and find the boxes that `search_body` looks at.
 
     Args:
@@ -198,8 +200,8 @@ def begin_search(state: ti.template(), body, given, h, left, forgets):
     state.soft.body_lost[body] = NO_CONTACT
 
 
-@ti.func
-def note_way(state: ti.template(), body, shared):
+@ti.real_func
+def note_way(state: ti.template(), body: ti.i32, shared: ti.math.vec3):
     """Note how far a body is from where it was searched, beside the way [m] that its island `shared`.
 
     The length of its path would be much more: a pile of soft bodies is never quite still.

@@ -26,8 +26,10 @@ def _in_frame(contact: ti.template(), c, x, time):
     return turned_back(spun(contact.collider_rotation[c], contact.collider_spin[c] * time), x - position)
 
 
-@ti.func
-def _clearance(state: ti.template(), p, row, count, reach, since, left):
+@ti.real_func
+def _clearance(
+    state: ti.template(), p: ti.i32, row: ti.i32, count: ti.i32, reach: ti.f32, since: ti.f32, left: ti.f32
+) -> ti.f32:
     """How far a particle is from all colliders that are near, less what these may come nearer [m]."""
     x, clearance = state.particle_position[p], ti.cast(reach, ti.f32)
     for i in range(count):
@@ -37,8 +39,10 @@ def _clearance(state: ti.template(), p, row, count, reach, since, left):
     return clearance
 
 
-@ti.func
-def find_near_colliders(state: ti.template(), body, reach, since, left):
+@ti.real_func
+def find_near_colliders(
+    state: ti.template(), body: ti.i32, reach: ti.f32, since: ti.f32, left: ti.f32
+):
     """List the colliders that come within `reach` [m] of a body's particles, and how clear of them each is.
 
     Args:

@@ -150,8 +150,8 @@ def _solve_slot(state: ti.template(), slot, h, sweep):
         _push_apart(state, p, corners, slot, depth)
 
 
-@ti.func
-def solve_island(state: ti.template(), island, h):
+@ti.real_func
+def solve_island(state: ti.template(), island: ti.i32, h: ti.f32):
     """Take from the velocities of an island what would bring its bodies too near within `h` [s]."""
     first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
     for sweep in range(SWEEPS + 1):

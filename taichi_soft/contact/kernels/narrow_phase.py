@@ -214,8 +214,8 @@ def _find_near_gaps(state: ti.template(), body, count, given, h):
                     shallowest, behind = distance, slot
 
 
-@ti.func
-def find_gaps(state: ti.template(), body, given, h):
+@ti.real_func
+def find_gaps(state: ti.template(), body: ti.i32, given: ti.f32, h: ti.f32):
     """List the contacts of a body's vertices; `given` and `h` as in `_list_near`."""
     first_slot, before = state.body_outer[body][0] * SLOTS, state.soft.contact_count[body]
     near = _list_near(state, body, given, h)

@@ -10,8 +10,8 @@ from taichi_soft.bodies.status import DAMPED, FEELS_REACTION, PUSHED, SHELTERED
 from taichi_soft.core.runtime import ti
 
 
-@ti.func
-def push_particles(state: ti.template(), body, seconds):
+@ti.real_func
+def push_particles(state: ti.template(), body: ti.i32, seconds: ti.f32):
     """Change the velocities of one body by what pushes and linear damping do in `seconds`."""
     drives = state.body_drives[body]
     if drives & (PUSHED | DAMPED) != 0:
@@ -27,8 +27,8 @@ def push_particles(state: ti.template(), body, seconds):
                 state.particle_reaction[p] = state.particle_reaction[p] + impulse
 
 
-@ti.func
-def blow_on(state: ti.template(), body, h):
+@ti.real_func
+def blow_on(state: ti.template(), body: ti.i32, h: ti.f32):
     """Change the velocities of one body by what the wind does in `h` [s], triangle by triangle.
 
     A vertex takes up its third of 1/4 rho c_d A |v_n| v_n implicitly: it is never taken beyond the wind's own
@@ -58,8 +58,8 @@ def blow_on(state: ti.template(), body, h):
                     state.particle_reaction[p] = state.particle_reaction[p] + impulse
 
 
-@ti.func
-def add_reactions(state: ti.template(), body, seconds):
+@ti.real_func
+def add_reactions(state: ti.template(), body: ti.i32, seconds: ti.f32):
     """Add up what internal forces and gravity on pinned particles do in `seconds` [N s]."""
     if state.body_drives[body] & FEELS_REACTION != 0:
         gravity = gravity_on(state, body)

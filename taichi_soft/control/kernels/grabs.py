@@ -79,8 +79,8 @@ def _rest_of_pull(state: ti.template(), g, wanted, h, drag):
     return ti.max(ti.min(size, on_all) - on_patch, 0.0) / size * h * inv_mass * force
 
 
-@ti.func
-def pull_grabs(state: ti.template(), body, h, kick):
+@ti.real_func
+def pull_grabs(state: ti.template(), body: ti.i32, h: ti.f32, kick: ti.f32):
     """Change the velocities of one body by the pull of its grabs in `h` [s].
 
     It looks at the velocities after the forces of this substep, or it would not feel what holds against it.

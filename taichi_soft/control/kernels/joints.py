@@ -125,8 +125,10 @@ def _turned(i, first, last, back):
     return ti.select(back == 1, first + last - 1 - i, i)
 
 
-@ti.func
-def solve_joints(state: ti.template(), island, h, is_first, common):
+@ti.real_func
+def solve_joints(
+    state: ti.template(), island: ti.i32, h: ti.f32, is_first: ti.i32, common: ti.math.vec3
+) -> ti.math.vec2:
     """Let the joints of an island act for a substep of `h` [s], after all its bodies have been kicked.
 
     Args:
@@ -166,7 +168,7 @@ def solve_joints(state: ti.template(), island, h, is_first, common):
                                 v = state.particle_velocity[state.joints.particle[k]]
                                 highest = ti.max(highest, v.dot(v))
                                 highest_beside = ti.max(highest_beside, (v - common).dot(v - common))
-    return ti.sqrt(highest), ti.sqrt(highest_beside)
+    return ti.math.vec2(ti.sqrt(highest), ti.sqrt(highest_beside))
 
 
 @ti.func

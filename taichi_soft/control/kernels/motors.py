@@ -137,8 +137,10 @@ def _run_motor(state: ti.template(), program: ti.template(), motor, h, kick):
     return impulse
 
 
-@ti.func
-def run_motors(state: ti.template(), program: ti.template(), body, h, kick, is_first):
+@ti.real_func
+def run_motors(
+    state: ti.template(), program: ti.template(), body: ti.i32, h: ti.f32, kick: ti.f32, is_first: ti.i32
+):
     """Let the motors of one body act for a substep of `h` [s], in a world with contact.
 
     They look at the velocities after a kick of the forces [s]: so they feel what holds against them.

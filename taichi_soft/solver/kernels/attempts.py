@@ -49,8 +49,8 @@ def attempts_of(state: ti.template(), program: ti.template()):
     return halvings, last
 
 
-@ti.func
-def begin_body(state: ti.template(), program: ti.template(), body):
+@ti.real_func
+def begin_body(state: ti.template(), program: ti.template(), body: ti.i32):
     """Remember how a body is before the step: to interpolate from, and to put it back there. Forget what it
     touched in the last one."""
     if state.body_status[body] != ABSENT:
@@ -102,8 +102,8 @@ def _put_back_body(state: ti.template(), program: ti.template(), body):
             forget_candidates(state, body)  # for good, as the island looks for others before it goes on
 
 
-@ti.func
-def put_back_island(state: ti.template(), program: ti.template(), island):
+@ti.real_func
+def put_back_island(state: ti.template(), program: ti.template(), island: ti.i32):
     """Put an island back to where it was before the step."""
     first, end = rows_of(state, program, island)
     for row in range(first, end):

@@ -5,6 +5,7 @@ from taichi_soft.contact.kernels.rebound import limit_rebounds
 from taichi_soft.core.constants import LANES, ROW_BITS
 from taichi_soft.core.runtime import ti
 from taichi_soft.solver.kernels.sleep import note_motion
+from taichi_soft.solver.step_fields import Job
 
 
 @ti.func
@@ -65,8 +66,8 @@ def _drift_block(state: ti.template(), body, first, count, h, since, gone):
     return way2
 
 
-@ti.func
-def drift_body(state: ti.template(), body, job):
+@ti.real_func
+def drift_body(state: ti.template(), body: ti.i32, job: Job):
     """New positions of one body, and what colliders in the way make of velocities."""
     h, since = job.h, job.since
     gone = state.contact.gone[body] + job.fastest * h

@@ -134,8 +134,8 @@ def _list_islands(state: ti.template(), body_count, end):
     contact.island_count[None] = islands
 
 
-@ti.func
-def find_islands(state: ti.template(), body_count, dt):
+@ti.real_func
+def find_islands(state: ti.template(), body_count: ti.i32, dt: ti.f32):
     """Find which bodies may touch within a step of `dt` [s], and list them."""
     for body in range(body_count):
         state.contact.parent[body] = body

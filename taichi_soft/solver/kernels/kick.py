@@ -10,6 +10,7 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.core.types import Integrator
 from taichi_soft.solver.kernels.implicit_contact import kick_implicitly
 from taichi_soft.solver.kernels.motion import JOLT
+from taichi_soft.solver.step_fields import Job
 
 EXPLODING = 20.0
 """Way of a particle within one substep, over the mean edge of its body's surface, from which the body is
@@ -122,8 +123,10 @@ def _note_speeds(
             state.contact.is_exploding[body] = is_exploding
 
 
-@ti.func
-def kick_among_colliders(state: ti.template(), program: ti.template(), body, job, kick):
+@ti.real_func
+def kick_among_colliders(
+    state: ti.template(), program: ti.template(), body: ti.i32, job: Job, kick: ti.f32
+) -> ti.i32:
     """New velocities of one body after `kick` [s] of its forces, and positions after the job's `drift_time`.
 
     Notes the highest speed [m/s], the highest and the mean beside the job's `velocity`, and what it returns.

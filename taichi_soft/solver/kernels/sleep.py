@@ -32,8 +32,8 @@ def wake_by_colliders(state: ti.template(), body_count):
             _wake_in_box(state, body_count, state.contact.collider_lower[c], state.contact.collider_upper[c])
 
 
-@ti.func
-def wake_island(state: ti.template(), island):
+@ti.real_func
+def wake_island(state: ti.template(), island: ti.i32) -> ti.i32:
     """Wake all bodies of an island of which one is awake. Returns whether any is."""
     first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
     is_awake = 0
@@ -72,8 +72,8 @@ def _put_to_sleep(state: ti.template(), body):
     state.body_status[body] = ASLEEP
 
 
-@ti.func
-def settle_island(state: ti.template(), island, dt):
+@ti.real_func
+def settle_island(state: ti.template(), island: ti.i32, dt: ti.f32) -> ti.i32:
     """Count the calm of an island after a step of `dt` [s], and let it fall asleep together.
 
     Returns: whether it is still awake (1).

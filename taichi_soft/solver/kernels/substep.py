@@ -39,7 +39,7 @@ from taichi_soft.solver.kernels.implicit_euler import implicit_substep, keeps_sh
 from taichi_soft.solver.kernels.jobs import OWNER, run_job
 from taichi_soft.solver.kernels.kick import kick_among_colliders
 from taichi_soft.solver.kernels.motion import move_body
-from taichi_soft.solver.kernels.vibration import damp_vibration
+from taichi_soft.solver.kernels.vibration import damp_body
 from taichi_soft.solver.step_fields import Job
 
 BEGIN, KICK, BOXES, BROAD_PHASE, NARROW_PHASE, DRIFT, END = range(7)
@@ -92,7 +92,7 @@ def advance_body(state: ti.template(), program: ti.template(), body, now, drifts
         pull_grabs(state, body, now.h, felt)
     if ti.static(program.has_contact):  # its code, even unused, takes others 5 % of their time
         run_motors(state, program, body, now.h, felt, int(now.s == 0))
-    damp_vibration(state, program, body, felt, now.h, now.s, now.substeps)
+    damp_body(state, program, body, felt, now.h, now.s, now.substeps)
     return _kick(state, program, body, now, kick, drifts)
 
 
@@ -248,7 +248,8 @@ def _solve_joints(state: ti.template(), program: ti.template(), island, now, run
     """Returns: the highest speed of what joints hold [m/s], and the highest beside what the island shares."""
     speed, beside = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32)
     if ti.static(program.integrator != Integrator.IMPLICIT_EULER):
-        speed, beside = solve_joints(state, island, now.h, int(now.since == 0.0), run.velocity)
+        found = solve_joints(state, island, now.h, int(now.since == 0.0), run.velocity)
+        speed, beside = found.x, found.y
     return speed, beside
 
 

@@ -16,7 +16,7 @@ from taichi_soft.core.math.tetrahedron import shape
 from taichi_soft.core.runtime import ti
 from taichi_soft.core.types import Flips
 from taichi_soft.elements.kernels.elastic import particles_of, rest_inverse_of
-from taichi_soft.solver.kernels.vibration import fade_vibration
+from taichi_soft.solver.kernels.vibration import fade_body
 
 PATIENCE = 15
 """Fixed steps between two looks: a quarter of a second."""
@@ -127,8 +127,8 @@ def _raise(state: ti.template(), program: ti.template(), body, steps_left, secon
         _pull(state, program, p, fit, 1.0 / steps_left, seconds)
 
 
-@ti.func
-def untangle_body(state: ti.template(), program: ti.template(), body, seconds):
+@ti.real_func
+def untangle_body(state: ti.template(), program: ti.template(), body: ti.i32, seconds: ti.f32):
     """At the end of a step, of so many seconds: look after what is caught, where the law brings it back."""
     for m, model in ti.static(enumerate(program.models)):
         if ti.static(model.flips == Flips.RECOVER):
@@ -150,7 +150,7 @@ def untangle_body(state: ti.template(), program: ti.template(), body, seconds):
                 elif age >= PATIENCE:
                     keep = ti.exp(-FADING * seconds)
                 if keep < 1.0:
-                    fade_vibration(state, program, body, 0.0, 0.0, keep)
+                    fade_body(state, program, body, 0.0, 0.0, keep)
                 if age < 0:
                     _raise(state, program, body, -age, seconds)
                 elif is_look and age >= 2 * PATIENCE:

@@ -169,23 +169,30 @@ def _limit_vibration(state: ti.template(), program: ti.template(), body, kick, f
     """
     particles, gravity = state.body_particles[body], gravity_on(state, body)
     x0, v0 = state.particle_position[particles[0]], state.particle_velocity[particles[0]]
-    center, velocity, spin = _rigid_motion(state, program, body, kick, 0.0, 0, x0, v0)
-    for p in range(particles[0], particles[1]):
-        if state.particle_inv_mass[p] > 0.0:
-            kicked = _kicked_velocity(state, p, gravity, kick)
-            rigid = v0 + velocity + spin.cross(state.particle_position[p] - x0 - center)
-            beside = kicked - rigid
-            speed = beside.norm()
-            slower = ti.select(speed < farthest, beside, beside * (farthest / ti.max(speed, 1e-30)))
-            if not speed < 1e18:  # whose square overflows: its direction is not known
-                slower = beside * 0.0
-            state.particle_velocity[p] = state.particle_velocity[p] + (rigid + slower - kicked)
-    _, velocity_now, spin_now = _rigid_motion(state, program, body, kick, 0.0, 0, x0, v0)
-    for p in range(particles[0], particles[1]):
-        if state.particle_inv_mass[p] > 0.0:
-            arm = state.particle_position[p] - x0 - center
-            back = velocity - velocity_now + (spin - spin_now).cross(arm)
-            state.particle_velocity[p] = state.particle_velocity[p] + back
+    center, velocity, spin = x0 * 0.0, v0 * 0.0, v0 * 0.0
+    for turn in range(2):  # first all are made slower, then they get back what that took of the rigid motion
+        center_now, velocity_now, spin_now = _rigid_motion(state, program, body, kick, 0.0, 0, x0, v0)
+        if turn == 0:
+            center, velocity, spin = center_now, velocity_now, spin_now
+        for p in range(particles[0], particles[1]):
+            if state.particle_inv_mass[p] > 0.0:
+                arm = state.particle_position[p] - x0 - center
+                change = velocity - velocity_now + (spin - spin_now).cross(arm)
+                if turn == 0:
+                    kicked = _kicked_velocity(state, p, gravity, kick)
+                    rigid = v0 + velocity + spin.cross(arm)
+                    change = rigid + _slower(kicked - rigid, farthest) - kicked
+                state.particle_velocity[p] = state.particle_velocity[p] + change
+
+
+@ti.func
+def _slower(beside, most):
+    """A velocity beside the rigid motion, no faster than `most` [m/s]."""
+    speed = beside.norm()
+    slower = ti.select(speed < most, beside, beside * (most / ti.max(speed, 1e-30)))
+    if not speed < 1e18:  # whose square overflows: its direction is not known
+        slower = beside * 0.0
+    return slower
 
 
 @ti.func
@@ -218,3 +225,28 @@ def damp_vibration(state: ti.template(), program: ti.template(), body, kick, h, 
         fade_vibration(state, program, body, kick, h, keep)
     if state.body_is_braked[body] == 1:
         _limit_vibration(state, program, body, kick, FARTHEST * state.body_edge[body] / h)
+
+
+@ti.real_func
+def fade_body(
+    state: ti.template(), program: ti.template(), body: ti.i32, kick: ti.f32, h: ti.f32, keep: ti.f32
+):
+    """As `fade_vibration`, where only CPUs run it."""
+    fade_vibration(state, program, body, kick, h, keep)
+
+
+@ti.real_func
+def _limit_body(
+    state: ti.template(), program: ti.template(), body: ti.i32, kick: ti.f32, farthest: ti.f32
+):
+    _limit_vibration(state, program, body, kick, farthest)
+
+
+@ti.func
+def damp_body(state: ti.template(), program: ti.template(), body, kick, h, s, substeps):
+    """As `damp_vibration`, where only CPUs run it."""
+    keep = kept_vibration(state, body, h, s, substeps)
+    if keep < 1.0:
+        fade_body(state, program, body, kick, h, keep)
+    if state.body_is_braked[body] == 1:
+        _limit_body(state, program, body, kick, FARTHEST * state.body_edge[body] / h)
