@@ -16,6 +16,7 @@ from taichi_soft.cli.info import info
 from taichi_soft.cli.profile import profile
 from taichi_soft.cli.replay import replay
 from taichi_soft.cli.report import report
+from taichi_soft.cli.warm import warm
 from taichi_soft.core.errors import TaichiSoftError
 from taichi_soft.core.signals import INTERRUPTED, ended_by_signals
 
@@ -26,7 +27,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for _command in (demo, info, replay, profile, drop_test, report):
+for _command in (demo, info, replay, profile, drop_test, report, warm):
     app.command()(_command)
 
 

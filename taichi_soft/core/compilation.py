@@ -33,6 +33,7 @@ class Burst:
 
     def __init__(self) -> None:
         self.show: Show = _show_on_terminal
+        self.made, self.found = 0, 0  # since the start of the process
         self._count, self._seconds, self._last = 0, 0.0, 0.0
 
     def begin(self, name: str) -> float:
@@ -52,6 +53,7 @@ class Burst:
         if self._seconds > PATIENCE:
             self.show("")
         self._count, self._seconds = self._count + 1, self._seconds + took
+        self.made, self.found = self.made + (not is_found), self.found + is_found
         _log.debug("kernel %s took %.3f s, %s", name, took, "known" if is_found else "made from its source")
 
 

@@ -18,6 +18,7 @@ from _thread import start_new_thread
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
+from pathlib import Path
 from queue import SimpleQueue
 from typing import TypeVar
 
@@ -45,7 +46,7 @@ from taichi_soft.core.taichi_patches import (
 from taichi_soft.core.threads import in_turn, leave_behind
 from taichi_soft.core.types import ArchName
 
-__all__ = ["Device", "device", "holds_fields", "init", "is_initialized", "make_fields", "ti"]
+__all__ = ["Device", "device", "holds_fields", "init", "is_initialized", "kernel_folder", "make_fields", "ti"]
 
 Result = TypeVar("Result")
 Class = TypeVar("Class", bound=type)
@@ -196,13 +197,18 @@ def _start(arch: ArchName, reason: str, threads: int, cores: tuple[int, ...], is
         check_real_functions()
         let_whole_numbers_overflow()
     elif arch == "cpu":
-        FIRST_LAUNCHES.open(KnownKernels(folder_of(ti.lang.impl.current_cfg().offline_cache_file_path)))
+        FIRST_LAUNCHES.open(KnownKernels(kernel_folder()))
     ti.lang.impl.get_runtime().materialize()  # once, by the first kernel otherwise, in whichever thread
     _process = os.getpid()
     atexit.register(_end)
     _device = Device(arch=arch, threads=threads if arch == "cpu" else 1, reason=reason)
     if cores:
         _device = _bound(_device, thread_ids() - before, since, cores, is_left_to_us)
+
+
+def kernel_folder() -> Path:
+    """Where compiled kernels are kept for later processes, as this one ends."""
+    return folder_of(ti.lang.impl.current_cfg().offline_cache_file_path)
 
 
 def _end() -> None:

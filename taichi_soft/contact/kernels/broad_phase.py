@@ -180,9 +180,7 @@ def is_outdated(state: ti.template(), island, given, h):
 
 
 @ti.real_func
-def begin_search(
-    state: ti.template(), body: ti.i32, given: ti.f32, h: ti.f32, left: ti.f32, forgets: ti.i32
-):
+def begin_search(state: ti.template(), body: ti.i32, given: ti.f32, h: ti.f32, left: ti.f32, forgets: ti.i32):
     """Forget (1) the candidates of a body, and find the boxes that `search_body` looks at.
 
     Args:

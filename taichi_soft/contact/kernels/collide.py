@@ -40,9 +40,7 @@ def _clearance(
 
 
 @ti.real_func
-def find_near_colliders(
-    state: ti.template(), body: ti.i32, reach: ti.f32, since: ti.f32, left: ti.f32
-):
+def find_near_colliders(state: ti.template(), body: ti.i32, reach: ti.f32, since: ti.f32, left: ti.f32):
     """List the colliders that come within `reach` [m] of a body's particles, and how clear of them each is.
 
     Args:

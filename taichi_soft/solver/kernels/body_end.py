@@ -48,7 +48,9 @@ def _end_active_body(state: ti.template(), program: ti.template(), body, substep
 
 
 @ti.real_func
-def end_body(state: ti.template(), program: ti.template(), body: ti.i32, substeps: ti.i32, h: ti.f32) -> ti.i32:
+def end_body(
+    state: ti.template(), program: ti.template(), body: ti.i32, substeps: ti.i32, h: ti.f32
+) -> ti.i32:
     """After the last of so many substeps of `h` [s]: drives end, plasticity flows, what is caught is freed.
 
     Returns: whether the body failed, or was not solved as exactly as asked (1).

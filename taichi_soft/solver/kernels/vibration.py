@@ -236,9 +236,7 @@ def fade_body(
 
 
 @ti.real_func
-def _limit_body(
-    state: ti.template(), program: ti.template(), body: ti.i32, kick: ti.f32, farthest: ti.f32
-):
+def _limit_body(state: ti.template(), program: ti.template(), body: ti.i32, kick: ti.f32, farthest: ti.f32):
     _limit_vibration(state, program, body, kick, farthest)
 
 

@@ -1,0 +1,90 @@
+"""Kernels compiled before a game needs them."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import os
+import sys
+import time
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.markup import escape
+
+from taichi_soft.cli.console import Arch, Threads, errors, say
+from taichi_soft.core.compilation import BURST, shown_by
+from taichi_soft.core.errors import OptionError
+from taichi_soft.core.runtime import init, kernel_folder
+
+
+def warm(
+    worlds: Annotated[
+        str,
+        typer.Argument(help="Function of a file or module that returns built worlds: game.py:make_world."),
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder for the kernels, to ship with a game; by default that of all programs."),
+    ] = None,
+    arch: Arch = "auto",
+    threads: Threads = None,
+) -> None:
+    """Compile all that the worlds of a game need, so that its next start finds it."""
+    make = _function_of(worlds)
+    if out is not None:
+        os.environ["TI_OFFLINE_CACHE_FILE_PATH"] = str(out.resolve())
+    if threads is not None or arch != "auto":  # or a game may start Taichi as it likes
+        init(arch, threads)
+    start = time.perf_counter()
+    with (
+        errors.status("building") as status,
+        shown_by(lambda text: status.update(escape(text) or "building")),
+    ):
+        count = 0
+        for world in _worlds_of(make(), worlds):
+            world.warm_up()
+            count += 1
+    took = time.perf_counter() - start
+    say(
+        f"{count} {'world' if count == 1 else 'worlds'} in {took:.1f} s: {BURST.made} kernels compiled, "
+        f"{BURST.found} found from earlier"
+    )
+    say(f"a start that builds the same worlds in the same order finds them in {escape(str(kernel_folder()))}")
+    if out is not None:
+        say("where TI_OFFLINE_CACHE_FILE_PATH names that folder")
+
+
+def _function_of(text: str) -> Callable[[], Any]:
+    """What `place:name` means: a function of a file or a module."""
+    place, _, name = text.rpartition(":")
+    if not place or not name.isidentifier():
+        raise OptionError(f"which worlds, must be like game.py:make_world, got {text!r}")
+    sys.path.insert(0, os.getcwd())
+    try:
+        module = _module_of(place)
+    except (ImportError, OSError) as error:
+        raise OptionError(f"cannot import {place!r}: {error}") from error
+    function = getattr(module, name, None)
+    if not callable(function):
+        raise OptionError(f"{place!r} has no function {name!r}")
+    return function  # type: ignore[no-any-return]
+
+
+def _module_of(place: str) -> Any:
+    if not place.endswith(".py"):
+        return importlib.import_module(place)
+    path = Path(place)
+    sys.path.insert(0, str(path.parent.resolve()))
+    return importlib.import_module(path.stem)
+
+
+def _worlds_of(found: Any, text: str) -> Iterable[Any]:
+    from taichi_soft import World
+
+    each = list(found) if isinstance(found, Iterable) else [found]
+    if not each or not all(isinstance(world, World) for world in each):
+        raise OptionError(f"{text} must return a built World, or several, got {found!r}")
+    return each
