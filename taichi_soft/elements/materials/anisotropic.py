@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -33,7 +34,7 @@ class AnisotropicMaterial:
     """A linearly elastic, damped material whose stiffness depends on the direction.
 
     Args:
-        stiffness: in the material's own axes.
+        stiffness: in the material's own axes: a `Stiffness`, or a sequence of one per tetrahedron.
         density: mass per volume [kg/m^3], above 0: a number, or one per tetrahedron.
         damping: b of thesis eq. 3.9 [N s/m], 0 or more: a number, or one per tetrahedron.
         frame: the material's axes in the mesh, as columns: a rotation matrix (3, 3) or a quaternion
@@ -43,7 +44,7 @@ class AnisotropicMaterial:
     Raises: MaterialError or OptionError with the first value out of range.
     """
 
-    stiffness: Stiffness
+    stiffness: Stiffness | Sequence[Stiffness]
     density: float | Array
     damping: float | Array = 0.0
     frame: Any = None
@@ -54,10 +55,7 @@ class AnisotropicMaterial:
 
     def __post_init__(self) -> None:
         if not isinstance(self.stiffness, Stiffness):
-            raise MaterialError(
-                f"stiffness must be a taichi_soft.Stiffness, got {type(self.stiffness).__name__}: "
-                "make it with Stiffness.orthotropic(...), or Stiffness(matrix)"
-            )
+            object.__setattr__(self, "stiffness", _one_per_tet(self.stiffness))
         density = as_constant(
             self.density, "density", "tetrahedron", is_positive, f"above 0 kg/m^3, {POSITIVE}"
         )
@@ -69,7 +67,10 @@ class AnisotropicMaterial:
         object.__setattr__(self, "damping_ratio", as_ratio(self.damping_ratio))
         object.__setattr__(self, "frame", _frame(self.frame))
         frames = self.frame if np.ndim(self.frame) == 3 else None
-        require_one_length({"density": density, "damping": damping, "frame": frames}, "tetrahedron")
+        given = {"density": density, "damping": damping, "frame": frames}
+        if not isinstance(self.stiffness, Stiffness):
+            given["stiffness"] = np.zeros(len(self.stiffness))
+        require_one_length(given, "tetrahedron")
 
     def per_tet(self, name: str, tet_count: int) -> Array:
         """`density` or `damping` of each of `tet_count` tetrahedra.
@@ -79,12 +80,16 @@ class AnisotropicMaterial:
         return spread(getattr(self, name), name, "tetrahedra", tet_count)
 
     def require_count(self, tet_count: int) -> None:
-        """Raises: MaterialError if density, damping or frame are given for another number of tetrahedra."""
+        """Raises: MaterialError if a constant or the frame is given for another number of tetrahedra."""
         self.per_tet("density", tet_count)
         self.per_tet("damping", tet_count)
         if np.ndim(self.frame) == 3 and len(self.frame) != tet_count:
             raise MaterialError(
                 f"frame has {len(self.frame)} rotations for a mesh of {tet_count} tetrahedra: give one each"
+            )
+        if not isinstance(self.stiffness, Stiffness) and len(self.stiffness) != tet_count:
+            raise MaterialError(
+                f"stiffness has {len(self.stiffness)} entries for a mesh of {tet_count} tetrahedra: give one each"
             )
 
     def of_tets(self, rows: NDArray[np.int64]) -> AnisotropicMaterial:
@@ -93,7 +98,10 @@ class AnisotropicMaterial:
         given = {
             name: getattr(self, name) for name, ndim in lists.items() if np.ndim(getattr(self, name)) == ndim
         }
-        return replace(self, **{name: value[rows] for name, value in given.items()})
+        lists_of_rows = {name: value[rows] for name, value in given.items()}
+        if not isinstance(self.stiffness, Stiffness):
+            lists_of_rows["stiffness"] = [self.stiffness[row] for row in rows]
+        return replace(self, **lists_of_rows)
 
     def stiffness_matrices(self, tet_count: int) -> Array:
         """Stiffness of each tetrahedron in the axes of the mesh, (m, 6, 6) [Pa], as `Stiffness.matrix`.
@@ -101,7 +109,9 @@ class AnisotropicMaterial:
         Raises: MaterialError if there are frames for another number of tetrahedra.
         """
         self.require_count(tet_count)
-        matrices = turned(self.stiffness.matrix, np.atleast_3d(self.frame).reshape(-1, 3, 3))
+        each = [self.stiffness] if isinstance(self.stiffness, Stiffness) else self.stiffness
+        own = np.stack([stiffness.matrix for stiffness in each])
+        matrices = turned(own, np.atleast_3d(self.frame).reshape(-1, 3, 3))
         return np.ascontiguousarray(np.broadcast_to(matrices, (tet_count, 6, 6)))
 
 
@@ -129,6 +139,18 @@ def frames_along(directions: ArrayLike) -> NDArray[np.float64]:
         frames[:, :, column] = cosine[:, None] * unit + turn + (axis @ unit * factor)[:, None] * axis
     frames[cosine < -1 + 1e-9] = np.diag([-1.0, -1.0, 1.0])
     return frames
+
+
+def _one_per_tet(values: Any) -> tuple[Stiffness, ...]:
+    found = tuple(values) if isinstance(values, Sequence) else (values,)
+    wrong = next((each for each in found if not isinstance(each, Stiffness)), None)
+    if wrong is not None or not found:
+        what = type(values if wrong is None or len(found) == 1 else wrong).__name__
+        raise MaterialError(
+            f"stiffness must be a taichi_soft.Stiffness, or one per tetrahedron, got {what}: "
+            "make it with Stiffness.orthotropic(...), or Stiffness(matrix)"
+        )
+    return found
 
 
 def _frame(value: Any) -> Array:

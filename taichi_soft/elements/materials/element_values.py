@@ -82,6 +82,8 @@ def described(material: Any) -> str:
 
 
 def _text(value: Any) -> str:
+    if isinstance(value, tuple):
+        return f"<{len(value)} values>"
     if not isinstance(value, np.ndarray):
         return f"{value:g}" if isinstance(value, float) else repr(value)
     if value.ndim == 1:

@@ -12,11 +12,13 @@ from taichi_soft import (
     OptionError,
     ParticleMesh,
     Stiffness,
+    TetMesh,
     World,
     box,
     frames_along,
     internal_forces,
 )
+from taichi_soft.core.serialisation import as_plain, from_plain
 
 WOOD = Stiffness.orthotropic((10e9, 1e9, 0.6e9), (0.4, 0.35, 0.3), (0.1e9, 0.6e9, 0.7e9))
 CUBE = box((1, 1, 1), (1, 1, 1))
@@ -71,10 +73,33 @@ def test_a_frame_is_a_matrix_or_a_quaternion_for_all_or_one_per_tetrahedron(fram
         np.testing.assert_allclose(turned.matrix, WOOD.rotated([0, 0, HALF, HALF]).matrix, atol=1e-2)
 
 
+def test_each_tetrahedron_may_have_a_stiffness_and_a_frame_of_its_own():
+    """A quarter turn about z takes x to y; forces are those of the tetrahedra alone, each with its own."""
+    kinds = [WOOD, WOOD.rotated([0, 0, HALF, HALF]), Stiffness.isotropic(2e9, 0.3)]
+    own = [kinds[t % 3] for t in range(COUNT)]
+    frames = np.stack([np.eye(3), [[0, -1, 0], [1, 0, 0], [0, 0, 1]]])[np.arange(COUNT) % 2]
+    mixed = AnisotropicMaterial(own, 500.0, frame=frames)
+    turn = {0: [0, 0, 0, 1], 1: [0, 0, HALF, HALF]}
+    for t, matrix in enumerate(mixed.stiffness_matrices(COUNT)):
+        np.testing.assert_allclose(matrix, own[t].rotated(turn[t % 2]).matrix, atol=1e-2)
+    moved = CUBE.vertices + 0.05 * np.random.default_rng(1).normal(size=CUBE.vertices.shape)
+    alone = np.zeros_like(moved)
+    for t, tet in enumerate(CUBE.tets):
+        one = TetMesh(CUBE.vertices[tet], [[0, 1, 2, 3]])
+        alone[tet] += internal_forces(one, mixed.of_tets(np.array([t])), moved[tet])
+    np.testing.assert_allclose(internal_forces(CUBE, mixed, moved), alone, rtol=1e-6, atol=1e-2)
+    again = from_plain(as_plain(mixed))
+    np.testing.assert_array_equal(again.stiffness_matrices(COUNT), mixed.stiffness_matrices(COUNT))
+    assert repr(mixed).startswith("AnisotropicMaterial(stiffness=<5 values>, density=500")
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ((1e6, 500.0), r"stiffness must be a taichi_soft\.Stiffness, got float"),
+        (([], 500.0), "got list"),
+        (([WOOD, 3.0], 500.0), "or one per tetrahedron, got float"),
+        (([WOOD] * 3, [500.0, 500.0]), "arrays of different lengths"),
+        ((1e6, 500.0), r"stiffness must be a taichi_soft\.Stiffness, or one per tetrahedron, got float"),
         ((np.eye(6), 500.0), r"got ndarray: make it with Stiffness\.orthotropic"),
         ((WOOD, 0.0), "density is 0"),
         ((WOOD, [500.0, -1.0]), "density of tetrahedron 1 is -1"),
@@ -116,6 +141,7 @@ def test_directions_that_are_none_are_refused(directions, message):
             AnisotropicMaterial(WOOD, 500.0, frame=np.stack([np.eye(3)] * 3)),
             "frame has 3 rotations for a mesh of 5",
         ),
+        (AnisotropicMaterial([WOOD] * 4, 500.0), "stiffness has 4 entries for a mesh of 5"),
         (AnisotropicMaterial(WOOD, [500.0] * 4), "density has 4 values for a mesh of 5"),
         (AnisotropicMaterial(WOOD, 500.0, [1.0] * 7), "damping has 7 values for a mesh of 5"),
     ],
