@@ -10,8 +10,8 @@ from taichi_soft.bodies.status import DAMPED, FEELS_REACTION, PUSHED, SHELTERED
 from taichi_soft.core.runtime import ti
 
 
-@ti.real_func
-def push_particles(state: ti.template(), body: ti.i32, seconds: ti.f32):
+@ti.func
+def push_particles(state: ti.template(), body, seconds):
     """Change the velocities of one body by what pushes and linear damping do in `seconds`."""
     drives = state.body_drives[body]
     if drives & (PUSHED | DAMPED) != 0:

@@ -16,7 +16,7 @@ from taichi_soft.core.math.tetrahedron import shape
 from taichi_soft.core.runtime import ti
 from taichi_soft.core.types import Flips
 from taichi_soft.elements.kernels.elastic import particles_of, rest_inverse_of
-from taichi_soft.solver.kernels.vibration import fade_body
+from taichi_soft.solver.kernels.vibration import fade_vibration
 
 PATIENCE = 15
 """Fixed steps between two looks: a quarter of a second."""
@@ -127,34 +127,42 @@ def _raise(state: ti.template(), program: ti.template(), body, steps_left, secon
         _pull(state, program, p, fit, 1.0 / steps_left, seconds)
 
 
+@ti.func
+def _recovers(state: ti.template(), program: ti.template(), body):
+    """Whether the law of a body brings back what is inside out (1)."""
+    recovers = 0
+    for m, model in ti.static(enumerate(program.models)):
+        if ti.static(model.flips == Flips.RECOVER):
+            recovers = recovers | int(state.body_model[body] == m)
+    return recovers
+
+
 @ti.real_func
 def untangle_body(state: ti.template(), program: ti.template(), body: ti.i32, seconds: ti.f32):
     """At the end of a step, of so many seconds: look after what is caught, where the law brings it back."""
-    for m, model in ti.static(enumerate(program.models)):
-        if ti.static(model.flips == Flips.RECOVER):
-            if state.body_model[body] == m:
-                before = state.body_patience[body]
-                age = ti.max(before, -RAISING_STEPS - 1) + 1
-                if before >= 0 or before == PLACED:  # what has begun to be raised is, to the end
-                    if _is_wrecked(state, body):
-                        age = -RAISING_STEPS
-                    elif before == PLACED:
-                        age = 0
-                is_look = age >= 0 and age % PATIENCE == 0
-                if is_look:
-                    if _caught_count(state, state.particle_position, body) == 0:
-                        age = 0
-                keep = 1.0
-                if age < 0:
-                    keep = CALMING
-                elif age >= PATIENCE:
-                    keep = ti.exp(-FADING * seconds)
-                if keep < 1.0:
-                    fade_body(state, program, body, 0.0, 0.0, keep)
-                if age < 0:
-                    _raise(state, program, body, -age, seconds)
-                elif is_look and age >= 2 * PATIENCE:
-                    if ti.static(not program.has_contact):
-                        _free(state, program, body)
-                state.body_patience[body] = age
-                state.body_jolted[body] = 0
+    if _recovers(state, program, body) == 1:
+        before = state.body_patience[body]
+        age = ti.max(before, -RAISING_STEPS - 1) + 1
+        if before >= 0 or before == PLACED:  # what has begun to be raised is, to the end
+            if _is_wrecked(state, body):
+                age = -RAISING_STEPS
+            elif before == PLACED:
+                age = 0
+        is_look = age >= 0 and age % PATIENCE == 0
+        if is_look:
+            if _caught_count(state, state.particle_position, body) == 0:
+                age = 0
+        keep = 1.0
+        if age < 0:
+            keep = CALMING
+        elif age >= PATIENCE:
+            keep = ti.exp(-FADING * seconds)
+        if keep < 1.0:
+            fade_vibration(state, program, body, 0.0, 0.0, keep)
+        if age < 0:
+            _raise(state, program, body, -age, seconds)
+        elif is_look and age >= 2 * PATIENCE:
+            if ti.static(not program.has_contact):
+                _free(state, program, body)
+        state.body_patience[body] = age
+        state.body_jolted[body] = 0

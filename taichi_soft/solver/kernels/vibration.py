@@ -228,10 +228,9 @@ def damp_vibration(state: ti.template(), program: ti.template(), body, kick, h, 
 
 
 @ti.real_func
-def fade_body(
+def _fade_body(
     state: ti.template(), program: ti.template(), body: ti.i32, kick: ti.f32, h: ti.f32, keep: ti.f32
 ):
-    """As `fade_vibration`, where only CPUs run it."""
     fade_vibration(state, program, body, kick, h, keep)
 
 
@@ -245,6 +244,6 @@ def damp_body(state: ti.template(), program: ti.template(), body, kick, h, s, su
     """As `damp_vibration`, where only CPUs run it."""
     keep = kept_vibration(state, body, h, s, substeps)
     if keep < 1.0:
-        fade_body(state, program, body, kick, h, keep)
+        _fade_body(state, program, body, kick, h, keep)
     if state.body_is_braked[body] == 1:
         _limit_body(state, program, body, kick, FARTHEST * state.body_edge[body] / h)
