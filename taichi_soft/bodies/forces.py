@@ -19,7 +19,7 @@ from taichi_soft.core.constants import POSITION_LIMIT
 from taichi_soft.core.errors import MeshError, OptionError
 from taichi_soft.core.runtime import init
 from taichi_soft.core.threads import in_turn
-from taichi_soft.core.types import DampingModel, DampingModelName, FlipsName, Integrator, LawName, StrainName
+from taichi_soft.core.types import DampingModel, DampingModelName, FlipsName, LawName, StrainName
 from taichi_soft.elements.kernels.gradients import (
     compute_bond_stiffness,
     compute_system_stiffness,
@@ -88,7 +88,6 @@ def force_gradient(
     Raises: as `internal_forces`.
     """
     model = fit_model(element_model(law, strain, flips), mesh, material)
-    model.require_integrator(Integrator.IMPLICIT_EULER)
     x = _rows(positions, mesh, "positions", np.dtype(np.float64))
     if not isinstance(projected, bool):
         raise OptionError(f"projected must be True or False, got {projected!r}")

@@ -44,7 +44,6 @@ def add_body(
     """As `World.add_body`, of an asset made for it; copies share the first one."""
     key = _content(new)
     asset = context.slots.added.get(key, new)
-    asset.description.model.require_integrator(context.settings.integrator)
     rows = asset.placed(position, rotation, velocity, (0.0, 0.0, 0.0), context.settings.floor)
     _add_slot(context, asset)
     context.slots.added[key] = asset
@@ -71,7 +70,6 @@ def reserve(context: WorldContext, asset: SoftBodyAsset, count: int) -> None:
     require_open(context)
     _require_asset(asset)
     number = as_count(count, "count")
-    asset.description.model.require_integrator(context.settings.integrator)
     vertices = context.layout.particle_count + number * (len(asset.mesh.vertices) + asset.spare_vertices)
     if vertices > MOST_VERTICES:
         raise OptionError(

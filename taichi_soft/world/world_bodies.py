@@ -86,7 +86,7 @@ class WorldBodies(WorldParts):
         """Make room for `count` more bodies of an asset, before `build`; `spawn` fills it.
 
         Empty slots take memory, and no time in a step.
-        Raises: OptionError for what is no asset or no count, or an asset that the integrator cannot take;
+        Raises: OptionError for what is no asset or no count;
             StateError after `build`.
         """
         reserve(self._context, asset, count)

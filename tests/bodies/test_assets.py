@@ -4,14 +4,11 @@ import numpy as np
 import pytest
 
 from taichi_soft import (
-    AnisotropicMaterial,
     Material,
     MaterialError,
     MeshError,
     OptionError,
     SoftBodyAsset,
-    StateError,
-    Stiffness,
     World,
     box,
 )
@@ -102,12 +99,3 @@ def test_what_makes_no_body_makes_no_asset(change, error):
     mesh, material = options.pop("mesh"), options.pop("material")
     with pytest.raises(error):
         SoftBodyAsset(mesh, material, **options)
-
-
-def test_an_asset_that_the_integrator_cannot_take_is_refused():
-    grain = AnisotropicMaterial(Stiffness.isotropic(1e6, 0.2), density=500.0)
-    world, kind = World(integrator="implicit_euler"), SoftBodyAsset(MESH, grain, law="virial")
-    with pytest.raises(OptionError, match="has no gradients for an AnisotropicMaterial"):
-        world.reserve(kind, 1)
-    with pytest.raises(StateError, match="has no pool in this world"):
-        world.spawn(kind)

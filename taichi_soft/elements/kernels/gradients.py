@@ -23,7 +23,7 @@ def compute_tet_stiffness(state: ti.template(), model: ti.template(), out: ti.ty
         rows = ti.Matrix.rows([g[0], g[1], g[2], g[3]])
         for i in range(4):
             for j in range(4):
-                columns = corner_stiffness(model, row_of(rows, i), row_of(rows, j), element)
+                columns = corner_stiffness(model, row_of(rows, i), row_of(rows, j), element, False)
                 for a, b in ti.static(ti.ndrange(3, 3)):
                     out[t, 3 * i + a, 3 * j + b] = columns[b][a]
 

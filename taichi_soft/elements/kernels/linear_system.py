@@ -12,7 +12,12 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.core.types import DampingModel
 from taichi_soft.elements.kernels.bonds import bond_frame_of, ring_tension
 from taichi_soft.elements.kernels.elastic import elasticity_of, particles_of, rest_inverse_of
-from taichi_soft.elements.laws.anisotropy import green_stress, pair_stiffness
+from taichi_soft.elements.laws.anisotropic_stiffness import (
+    held_stiffness,
+    pair_stiffness,
+    turned_pair_stiffness,
+)
+from taichi_soft.elements.laws.anisotropy import green_stress
 from taichi_soft.elements.laws.bond_stiffness import along_and_across, spring_stiffness
 from taichi_soft.elements.laws.bonds import Ring
 from taichi_soft.elements.laws.cmpm import direction_of, shear_direction
@@ -70,7 +75,13 @@ def tet_stiffness(state: ti.template(), model: ti.template(), block, lane, proje
     inverse = rest_inverse_of(state, block, lane)
     F = product(shape(x[0], x[1], x[2], x[3]), inverse)
     elasticity = elasticity_of(state, model, block, lane)
-    if ti.static(model.is_anisotropic):
+    if ti.static(model.is_anisotropic and not model.has_energy):
+        if ti.static(projected):
+            M, tension = held_stiffness(model, F, elasticity)
+            return weighed_rows(inverse), (M, tension, elasticity)
+        else:
+            return weighed_rows(inverse), (F, F, elasticity)
+    elif ti.static(model.is_anisotropic):
         a, b, c = green_stress(F, elasticity)
         if ti.static(projected):
             a, b, c = positive_part((a, b, c))
@@ -80,9 +91,11 @@ def tet_stiffness(state: ti.template(), model: ti.template(), block, lane, proje
 
 
 @ti.func
-def corner_stiffness(model: ti.template(), gi, gj, element):
+def corner_stiffness(model: ti.template(), gi, gj, element, projected: ti.template()):
     """- d f_i / d x_j of two corners [N/m], as columns, by their rows and the rest of `tet_stiffness`."""
-    if ti.static(model.is_anisotropic):
+    if ti.static(model.is_anisotropic and not model.has_energy and not projected):
+        return turned_pair_stiffness(model, element[0], gi, gj, element[2])
+    elif ti.static(model.is_anisotropic):
         return pair_stiffness(element[0], gi, gj, element[1], element[2])
     else:
         return stiffness_block(element[0], gi, gj, element[1], element[2], element[3])
@@ -105,7 +118,7 @@ def _add_tet_stiffness(state: ti.template(), model: ti.template(), body, scale):
         for i in range(4):
             p = state.tet_vertices[(block * 4 + i) * LANES + lane]
             for j in range(i, 4):
-                c0, c1, c2 = corner_stiffness(model, row_of(rows, i), row_of(rows, j), element)
+                c0, c1, c2 = corner_stiffness(model, row_of(rows, i), row_of(rows, j), element, True)
                 if i == j:
                     state.particle_block[p] = state.particle_block[p] + ti.Matrix.cols([c0, c1, c2]) * scale
                 else:

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from taichi_soft.core.types import Flips, Integrator, LawName, Strain
+from taichi_soft.core.types import Flips, LawName, Strain
 from taichi_soft.elements.laws.bonds import Bonds, Ring
 
 SOLID = ("young", "poisson", "density", "damping")
@@ -22,7 +22,6 @@ class StressLaw:
     strains: tuple[Strain, ...] = (Strain.LINEAR, Strain.EXACT)  # that it takes, its default first
     flips: tuple[Flips, ...] = (Flips.TOLERANT, Flips.RECOVER, Flips.OFF)
     parameters: tuple[str, ...] = SOLID  # of its material
-    integrators: tuple[Integrator, ...] = tuple(Integrator)
     keeps_energy: bool = False
     takes_anisotropy: bool = True  # also a material with the parameters `ANISOTROPIC`
 
@@ -40,7 +39,6 @@ class EnergyLaw:
     strains: tuple[Strain, ...]
     flips: tuple[Flips, ...]  # one: what it does with them follows from the energy
     parameters: tuple[str, ...] = SOLID
-    integrators: tuple[Integrator, ...] = tuple(Integrator)
     keeps_energy: bool = True
     takes_anisotropy: bool = False
 
@@ -56,7 +54,6 @@ class BondLaw:
     bonds: Callable[..., Bonds]  # numpy: (mesh, material) -> constants of every edge
     parameters: tuple[str, ...] = (*SOLID, "shear_modulus", "shear_damping")
     keeps_energy: bool = False
-    integrators: tuple[Integrator, ...] = tuple(Integrator)
     takes_anisotropy: bool = False
     strains: tuple[Strain, ...] = ()
     flips: tuple[Flips, ...] = ()

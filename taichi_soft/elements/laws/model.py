@@ -5,11 +5,10 @@ A model holds choices, never numbers, so that one compiled kernel serves every m
 
 from dataclasses import dataclass
 
-from taichi_soft.core.errors import OptionError
 from taichi_soft.core.math.tensors import determinant, product, transposed
 from taichi_soft.core.math.tetrahedron import shape
 from taichi_soft.core.runtime import ti
-from taichi_soft.core.types import DampingModel, Flips, Integrator, Strain
+from taichi_soft.core.types import DampingModel, Flips, Strain
 from taichi_soft.elements.laws import strain as strains
 from taichi_soft.elements.laws.anisotropy import green_stress, turned_stress, wave_modulus
 from taichi_soft.elements.laws.bonds import Ring
@@ -31,21 +30,6 @@ class ElementModel:
     flips: Flips | None  # None where the law does not look at tetrahedra
     damping_model: DampingModel
     is_anisotropic: bool = False  # its material has 21 constants instead of 2
-
-    @property
-    def integrators(self) -> tuple[Integrator, ...]:
-        """Those that the law takes with this material."""
-        if self.is_anisotropic and not self.has_energy:  # how R turns with the vertices has not been derived
-            return tuple(each for each in self.law.integrators if each is not Integrator.IMPLICIT_EULER)
-        return self.law.integrators
-
-    def require_integrator(self, integrator: Integrator) -> None:
-        """Raises: OptionError where the integrator needs gradients that this law has not for its material."""
-        if integrator not in self.integrators:
-            raise OptionError(
-                f"law {self.law.name!r} has no gradients for an AnisotropicMaterial, which "
-                f"{integrator.value!r} needs: take law 'st_venant_kirchhoff', or integrator 'leapfrog'"
-            )
 
     @property
     def has_energy(self) -> bool:

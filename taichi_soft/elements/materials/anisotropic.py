@@ -89,7 +89,8 @@ class AnisotropicMaterial:
             )
         if not isinstance(self.stiffness, Stiffness) and len(self.stiffness) != tet_count:
             raise MaterialError(
-                f"stiffness has {len(self.stiffness)} entries for a mesh of {tet_count} tetrahedra: give one each"
+                f"stiffness has {len(self.stiffness)} entries for a mesh of {tet_count} tetrahedra: "
+                "give one each"
             )
 
     def of_tets(self, rows: NDArray[np.int64]) -> AnisotropicMaterial:

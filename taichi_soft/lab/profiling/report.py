@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from typing import Any
 
 from rich.table import Table
 
-from taichi_soft.core.types import Integrator
-from taichi_soft.elements.laws import LAWS, element_model
+from taichi_soft.elements.laws import LAWS
 from taichi_soft.elements.laws.law import ANISOTROPIC
 from taichi_soft.lab.profiling.budget import Budget
 from taichi_soft.lab.profiling.law_costs import LawCost
@@ -86,7 +85,6 @@ def law_rows(costs: list[LawCost]) -> list[dict[str, Any]]:
     rows = []
     for each in costs:
         law = LAWS[each.law]
-        integrators = replace(element_model(each.law), is_anisotropic=each.is_anisotropic).integrators
         rows.append(
             {
                 "law": law.name,
@@ -94,7 +92,6 @@ def law_rows(costs: list[LawCost]) -> list[dict[str, Any]]:
                 "parameters": ANISOTROPIC if each.is_anisotropic else law.parameters,
                 "strain": each.strain,
                 "flips": [choice.value for choice in law.flips],
-                "integrators": [integrator.value for integrator in integrators],
                 "keeps_energy": law.keeps_energy,
                 "element": each.element,
                 "cost": asdict(each.cost),
@@ -107,7 +104,7 @@ def law_rows(costs: list[LawCost]) -> list[dict[str, Any]]:
 def law_table(costs: list[LawCost]) -> Table:
     """`law_rows` for people: the medians of their costs."""
     table = Table()
-    for name in ("law", "source", "parameters", "strain", "flips", "integrators", "energy", "element", "ns"):
+    for name in ("law", "source", "parameters", "strain", "flips", "energy", "element", "ns"):
         table.add_column(name, no_wrap=name == "law")
     table.add_column("of virial", justify="right")
     for row in law_rows(costs):
@@ -117,7 +114,6 @@ def law_table(costs: list[LawCost]) -> Table:
             ", ".join(row["parameters"]),
             row["strain"] or "-",
             ", ".join(row["flips"]) or "-",
-            "all" if len(row["integrators"]) == len(Integrator) else "all but implicit_euler",
             "kept" if row["keeps_energy"] else "drifts",
             row["element"],
             f"{row['cost']['median']:.1f}",

@@ -1,0 +1,173 @@
+"""How the forces of an anisotropic tetrahedron change as its vertices move: what implicit integration needs.
+
+The law of St. Venant-Kirchhoff needs no rotation. Those of thesis chapter 6 have, with F = R U and
+S = C : eps(U), forces -V P g with P = R Q and Q = S cof(U). A change of F turns R as well: with
+U = A diag(s) A^T and G = A^T R^T dF A it is
+
+    dU = A [(s_a G_ab + s_b G_ba) / (s_a + s_b)] A^T,    R^T dR = A [(G_ab - G_ba) / (s_a + s_b)] A^T.
+
+These forces have no energy, so that is not symmetric. What conjugate gradients get is positive semi-definite
+by its form: the stiffness C, turned with R and weighed as the deformed areas weigh it (R held: Mueller and
+Gross 2004, Interactive virtual materials), and what tension adds to it.
+"""
+
+from taichi_soft.core.math.eigen import symmetric_eigen
+from taichi_soft.core.math.polar import orthogonal_factor
+from taichi_soft.core.math.tensors import (
+    cofactor,
+    determinant,
+    outer,
+    plus,
+    product,
+    scaled_plus_identity,
+    symmetric_part,
+    times,
+    transposed,
+)
+from taichi_soft.core.runtime import ti
+from taichi_soft.core.types import Flips, Strain
+from taichi_soft.elements.laws.anisotropy import anisotropic_stress, between, green_stress, wave_modulus
+from taichi_soft.elements.laws.stiffness import element_stiffness, positive_part, stiffness_block
+
+FLATTEST = 0.05
+"""Part of its volume at rest that a flatter tetrahedron is taken to have, where tension is divided by it."""
+
+
+@ti.func
+def _stress_in_rest_axes(model: ti.template(), F, U, stiffness):
+    """S = C : eps of the strain that the model names [Pa], as columns."""
+    if ti.static(model.strain == Strain.EXACT):
+        return anisotropic_stress(scaled_plus_identity(U, 1.0, -1.0), stiffness)
+    else:
+        return green_stress(F, stiffness)
+
+
+@ti.func
+def held_stiffness(model: ti.template(), F, stiffness):
+    """What `pair_stiffness` takes for a law of chapter 6 in place of F and S: positive semi-definite.
+
+    Of what is inside out and comes back, the modulus of its `recovering_piola` alone.
+    """
+    R = orthogonal_factor(F)
+    U = symmetric_part(product(transposed(R), F))
+    others = cofactor(U)
+    values, A = symmetric_eigen(others)
+    weight = ti.sqrt(ti.max(values, 0.0))
+    if ti.static(model.strain != Strain.EXACT):  # d eps = sym(U dU), and U cof(U) = det(U) I
+        weight = weight * 0.0 + ti.sqrt(ti.max(determinant(U), 0.0))
+    W = product((A[0] * weight.x, A[1] * weight.y, A[2] * weight.z), transposed(A))
+    S = _stress_in_rest_axes(model, F, U, stiffness)
+    tension = positive_part(product(S, product(others, others)))
+    a, b, c = plus(tension, 1.0 / ti.max(determinant(U), FLATTEST), tension, 0.0)
+    d, e, f = product(R, W)
+    if ti.static(model.flips == Flips.RECOVER):
+        if determinant(F) < 0.0:
+            a, b, c = scaled_plus_identity(tension, 0.0, wave_modulus(stiffness))
+            d, e, f = F[0] * 0.0, F[1] * 0.0, F[2] * 0.0
+    return (d, e, f), (a, b, c)
+
+
+@ti.func
+def turned_pair_stiffness(model: ti.template(), F, gi, gj, stiffness):
+    """- d f_i / d x_j of two vertices [N/m], as columns, of a law of chapter 6: exact.
+
+    Args:
+        gi, gj: as `pair_stiffness` takes them.
+    """
+    R = orthogonal_factor(F)
+    U = symmetric_part(product(transposed(R), F))
+    s, A = symmetric_eigen(U)
+    S = _stress_in_rest_axes(model, F, U, stiffness)
+    Q = product(S, cofactor(U))
+    RA = product(R, A)
+    side = F[0].x * 0.0 + 1.0
+    if ti.static(model.flips == Flips.OFF):
+        side = ti.select(determinant(F) < 0.0, -1.0, 1.0)
+    block = ti.Matrix.zero(ti.f64, 3, 3)
+    for k in range(3):  # side by side they would take Taichi nine times as long to compile
+        along = ti.Vector([int(k == 0), int(k == 1), int(k == 2)]) + F[0] * 0.0
+        G = product(product(transposed(RA), outer(along, gj)), A)
+        in_axes, turn_in_axes = _parts(G, s)
+        dU, turn = between(A, in_axes), between(A, turn_in_axes)
+        dS = anisotropic_stress(_strain_change(model, U, dU), stiffness)
+        d_area = _mixed_cofactor(U, dU)
+        dQ = plus(product(dS, cofactor(U)), 1.0, product(S, d_area), 1.0)
+        change = times(R, times(plus(product(turn, Q), 1.0, dQ, 1.0), gi)) * side
+        for row in ti.static(range(3)):
+            block[row, k] = change[row]
+    a = ti.Vector([block[0, 0], block[1, 0], block[2, 0]])
+    b = ti.Vector([block[0, 1], block[1, 1], block[2, 1]])
+    c = ti.Vector([block[0, 2], block[1, 2], block[2, 2]])
+    if ti.static(model.flips == Flips.RECOVER):
+        if determinant(F) < 0.0:
+            modulus = wave_modulus(stiffness)
+            g, element = element_stiffness(model, F, (gi, gj, gi, gj), (modulus, modulus * 0.0), False)
+            a, b, c = stiffness_block(element[0], g[0], g[1], element[1], element[2], element[3])
+    return a, b, c
+
+
+@ti.func
+def _strain_change(model: ti.template(), U, dU):
+    if ti.static(model.strain == Strain.EXACT):
+        return dU
+    else:
+        return symmetric_part(product(U, dU))
+
+
+@ti.func
+def _parts(G, s):
+    """Change of U, and R^T dR, in the axes of U, as columns; G as above."""
+    least = 1e-9
+    xy, xz, yz = ti.max(s.x + s.y, least), ti.max(s.x + s.z, least), ti.max(s.y + s.z, least)
+    u_xy = (s.x * G[1].x + s.y * G[0].y) / xy
+    u_xz = (s.x * G[2].x + s.z * G[0].z) / xz
+    u_yz = (s.y * G[2].y + s.z * G[1].z) / yz
+    w_xy, w_xz, w_yz = (G[1].x - G[0].y) / xy, (G[2].x - G[0].z) / xz, (G[2].y - G[1].z) / yz
+    zero = s.x * 0.0
+    dU = ti.Vector([G[0].x, u_xy, u_xz]), ti.Vector([u_xy, G[1].y, u_yz]), ti.Vector([u_xz, u_yz, G[2].z])
+    turn = ti.Vector([zero, -w_xy, -w_xz]), ti.Vector([w_xy, zero, -w_yz]), ti.Vector([w_xz, w_yz, zero])
+    return dU, turn
+
+
+@ti.func
+def _mixed_cofactor(M, N):
+    """How the cofactor of M changes with M along N, as columns."""
+    return (
+        M[1].cross(N[2]) + N[1].cross(M[2]),
+        M[2].cross(N[0]) + N[2].cross(M[0]),
+        M[0].cross(N[1]) + N[0].cross(M[1]),
+    )
+
+
+@ti.func
+def pair_stiffness(F, gi, gj, stress, stiffness):
+    """- d f_i / d x_j of two vertices [N/m], as columns, of forces -V F S g_i with S = `green_stress`.
+
+    F (B_i^T C B_j) F^T + (g_i . S g_j) I, where B_i takes a move of the vertex to strain.
+    Args:
+        gi, gj: rows of A^-1 that belong to the vertices, times the root of the rest volume.
+        stress: S as columns, or the part of it that is let count.
+    """
+    normal, mixed, shear = stiffness[0], stiffness[1], stiffness[2]
+    Ti, Tj = _shear_of(gi), _shear_of(gj)
+    # C B_j: normal and shear stress by a move of the second vertex.
+    a = _scaled_columns(normal, gj), product(mixed, Tj)
+    b = _scaled_columns(transposed(mixed), gj), product(shear, Tj)
+    N = (
+        gi * (a[0][0] + a[1][0]) + times(Ti, b[0][0] + b[1][0]),
+        gi * (a[0][1] + a[1][1]) + times(Ti, b[0][1] + b[1][1]),
+        gi * (a[0][2] + a[1][2]) + times(Ti, b[0][2] + b[1][2]),
+    )
+    return scaled_plus_identity(between(F, N), 1.0, gi.dot(times(stress, gj)))
+
+
+@ti.func
+def _shear_of(g):
+    """Engineering shear yz, xz, xy by a move, as columns."""
+    zero = g.x * 0.0
+    return ti.Vector([zero, g.z, g.y]), ti.Vector([g.z, zero, g.x]), ti.Vector([g.y, g.x, zero])
+
+
+@ti.func
+def _scaled_columns(columns, g):
+    return columns[0] * g.x, columns[1] * g.y, columns[2] * g.z
