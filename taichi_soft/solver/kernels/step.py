@@ -160,8 +160,7 @@ def _step_alone(
 ) -> ti.i32:
     """As `fixed_step`, without contact.
 
-    By itself, so that sums are rounded alike in the kernels for one thread and for several; and there is no
-    other such function in them, because Taichi's cache would not find them again otherwise.
+    By itself, so that sums are rounded alike in the kernels for one thread and for several.
     """
     failed, _ = fixed_step(state, program, body, substeps, h, most, goes_on)
     return failed
@@ -222,8 +221,6 @@ def step_islands(
     goes_on: ti.i32,
 ) -> ti.i32:
     """One fixed step of every active body with contact, or the next `most` substeps of it.
-
-    One kernel, which calls one real function, because Taichi's cache would not find it again otherwise.
 
     Args:
         helpers: threads that may work on islands of others when there is none left for themselves.

@@ -241,7 +241,8 @@ def _limit_body(state: ti.template(), program: ti.template(), body: ti.i32, kick
 
 @ti.func
 def damp_body(state: ti.template(), program: ti.template(), body, kick, h, s, substeps):
-    """As `damp_vibration`, where only CPUs run it."""
+    """As `damp_vibration`, where only CPUs run it. Each part is called here alone: LLVM puts it back, and its
+    rounding does not depend on what else a world has."""
     keep = kept_vibration(state, body, h, s, substeps)
     if keep < 1.0:
         _fade_body(state, program, body, kick, h, keep)
