@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import importlib
-import importlib.util
 import os
+import runpy
 import sys
 import time
 from collections.abc import Callable, Iterable
@@ -64,21 +64,19 @@ def _function_of(text: str) -> Callable[[], Any]:
         raise OptionError(f"which worlds, must be like game.py:make_world, got {text!r}")
     sys.path.insert(0, os.getcwd())
     try:
-        module = _module_of(place)
+        function = _names_in(place).get(name)
     except (ImportError, OSError) as error:
         raise OptionError(f"cannot import {place!r}: {error}") from error
-    function = getattr(module, name, None)
     if not callable(function):
         raise OptionError(f"{place!r} has no function {name!r}")
     return function  # type: ignore[no-any-return]
 
 
-def _module_of(place: str) -> Any:
+def _names_in(place: str) -> dict[str, Any]:
     if not place.endswith(".py"):
-        return importlib.import_module(place)
-    path = Path(place)
-    sys.path.insert(0, str(path.parent.resolve()))
-    return importlib.import_module(path.stem)
+        return vars(importlib.import_module(place))
+    sys.path.insert(0, str(Path(place).parent.resolve()))
+    return runpy.run_path(place)
 
 
 def _worlds_of(found: Any, text: str) -> Iterable[Any]:

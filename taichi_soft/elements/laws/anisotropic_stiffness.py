@@ -84,7 +84,7 @@ def turned_pair_stiffness(model: ti.template(), F, gi, gj, stiffness):
     if ti.static(model.flips == Flips.OFF):
         side = ti.select(determinant(F) < 0.0, -1.0, 1.0)
     block = ti.Matrix.zero(ti.f64, 3, 3)
-    for k in range(3):  # side by side they would take Taichi nine times as long to compile
+    for k in range(3):  # side by side they took Taichi minutes to compile
         along = ti.Vector([int(k == 0), int(k == 1), int(k == 2)]) + F[0] * 0.0
         G = product(product(transposed(RA), outer(along, gj)), A)
         in_axes, turn_in_axes = _parts(G, s)
