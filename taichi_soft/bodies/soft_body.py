@@ -315,7 +315,8 @@ class SoftBody(Handle):
     @property
     @one_thread
     def failure(self) -> Failure | None:
-        """What broke first, None while the body is sound. Found out when first asked, not within a step."""
+        """What broke first, None while the body is sound. Found out when first asked, not within a step: by a
+        kernel that `World.warm_up` leaves out, so it may take a second or two."""
         require_alive(self)
         record = self._record
         if record.frozen_in is not None and record.failure is None:

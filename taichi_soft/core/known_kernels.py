@@ -24,6 +24,7 @@ import sys
 from dataclasses import is_dataclass
 from pathlib import Path
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -67,7 +68,7 @@ def digest_of(function: Any, arguments: list[tuple[Any, bool]]) -> str:
     seen: dict[int, tuple[int, Any]] = {}
     for value, is_template in arguments:
         _describe(value, parts, seen) if is_template else parts.append(_feature(value))
-    return hashlib.sha256("\n".join(parts).encode()).hexdigest()
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:32]
 
 
 def _feature(value: Any) -> str:
@@ -93,10 +94,8 @@ def _describe(value: Any, parts: list[str], seen: dict[int, tuple[int, Any]]) ->
         parts.append(f"again {seen[id(value)][0]}")
         return
     seen[id(value)] = len(seen), value  # kept, or another could get its identity
-    if hasattr(value, "snode") and hasattr(value, "vars"):  # a field
-        parts += [_place_of(each.ptr.snode()) for each in value.vars]
-        parts.append(f"{kind.__name__} {value.shape} {value.dtype.to_string()}")
-        parts.append(f"{getattr(value, 'n', 1)} x {getattr(value, 'm', 1)}")
+    if hasattr(value, "snode") and hasattr(value, "vars"):
+        parts.append(_field_text(value))
     elif hasattr(value, "field_dict"):  # a field of structures
         _describe(value.field_dict, parts, seen)
     elif hasattr(value, "to_string"):  # a type of Taichi's
@@ -122,6 +121,18 @@ def _describe(value: Any, parts: list[str], seen: dict[int, tuple[int, Any]]) ->
         raise UnknownPartError(kind.__qualname__)
 
 
+_field_texts: WeakKeyDictionary[Any, str] = WeakKeyDictionary()
+
+
+def _field_text(field: Any) -> str:
+    """What a field is and where, which does not change once it is laid out."""
+    if field not in _field_texts:
+        places = " ".join(_place_of(each.ptr.snode()) for each in field.vars)
+        size = f"{field.shape} {getattr(field, 'n', 1)} x {getattr(field, 'm', 1)}"
+        _field_texts[field] = f"{type(field).__name__} {size} {field.dtype.to_string()} {places}"
+    return _field_texts[field]
+
+
 _places: dict[tuple[int, int], str] = {}
 
 
@@ -145,19 +156,19 @@ def _describe_all(value: Any, items: Any, parts: list[str], seen: dict[int, tupl
 
 
 def short_body(digest: str) -> list[ast.stmt]:
-    """Statements that set the flag, once with each part of the digest."""
+    """Statements that set the flag, once with each part of the digest: few, as each costs a start time."""
     words = np.frombuffer(bytes.fromhex(digest), np.int32)
     return ast.parse("\n".join(f"{FLAG}[None] = {word}" for word in (*words.tolist(), 1))).body
 
 
 def name_of(kernel: Any, digest: str) -> str:
     """Of a kernel that is made from its source, in Taichi's file of it."""
-    return f"{kernel.func.__name__}_{digest[:32]}"
+    return f"{kernel.func.__name__}_{digest}"
 
 
 def short_name_of(digest: str) -> str:
     """Of one with the short body."""
-    return f"known_{digest[:32]}"
+    return f"known_{digest}"
 
 
 class KnownKernels:

@@ -63,7 +63,7 @@ def measure_startup(
 ) -> list[Startup]:
     """Run a small game of each world twice in processes of their own, with a cache of their own.
 
-    Python's bytecode is there in all of them, as after an installation, whatever the environment says of writing it.
+    Python's bytecode is there in all of them, as after an installation.
 
     Args:
         cores: to which the threads are bound, or none.
