@@ -9,22 +9,24 @@ from taichi_soft.render.film import Actor, Stage
 
 ROWS = 8
 PITCH = 2.8  # between spheres [m]
-SOFT = Material(young=2.5e5, poisson=0.3, density=1000.0)
+LOWEST, SPREAD = 1.3, 4.5  # of the heights they fall from [m]
+SOFT = Material(young=2.0e5, poisson=0.3, density=1000.0, damping_ratio=0.03)
 
 
 def stage() -> Stage:
-    """A square of spheres, each a little higher than the last."""
+    """A square of spheres, at heights without a pattern."""
     mesh = load_mesh(ASSETS / "sphere.npz")
     world = World()
     actors = []
     for i in range(ROWS * ROWS):
         row, column = divmod(i, ROWS)
-        place = (PITCH * (column - 3.5), PITCH * (row - 3.5), 1.6 + 0.16 * (row + column))
+        height = LOWEST + SPREAD * (i * 0.618 % 1.0)
+        place = (PITCH * (column - 3.5), PITCH * (row - 3.5), height)
         body = world.add_body(mesh, SOFT, position=place)
         actors.append(Actor(body, PALETTE[(row + column) % len(PALETTE)]))
     world.build()
     edge = PITCH * ROWS / 2
-    seen = (-edge, -edge, 0.0), (edge, edge, 3.0)
+    seen = (-edge, -edge, 0.0), (edge, edge, 5.0)
     camera = Camera.framing(*seen, aspect=16 / 9, azimuth=-80.0, elevation=25.0, margin=1.0)
     title = f"{len(actors)} spheres, {len(actors) * len(mesh.tets):,} tetrahedra"
     return Stage(title, world, actors, camera, FixedStep(dt=1 / 50, substeps=14), seconds=6.0)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from taichi_soft.core.errors import MeshError, SkippedCellsWarning
-from taichi_soft.meshing import load_mesh, save_mesh, sphere
+from taichi_soft.meshing import TetMesh, load_mesh, save_mesh, sphere
 
 meshio = pytest.importorskip("meshio")
 
@@ -353,3 +353,10 @@ def test_files_of_other_cells_only_say_what_they_lack(tmp_path):
     assert "only 1 hexahedron: divide them into tetrahedra" in refusal(tmp_path / "hex.vtk")
     write(tmp_path / "line.vtk", "vtk", {}, meshio.Mesh(np.array(POINTS), [("line", [[0, 1]])]))
     assert refusal(tmp_path / "line.vtk").endswith("only 1 line: save what fills the body too")
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".node", ".msh", ".vtk", ".vtu", ".mesh"])
+def test_a_mesh_of_a_single_tetrahedron_comes_back(tmp_path, suffix):
+    corner = TetMesh(np.array(POINTS[:4]), np.array(TETS[:1]), fix_orientation=True)
+    save_mesh(corner, tmp_path / f"x{suffix}")
+    assert same(load_mesh(tmp_path / f"x{suffix}"), corner)
