@@ -12,23 +12,21 @@ from taichi_soft import BoxShape, Material, World, box
 DT, EDGE, PICTURE = 1 / 60, 0.4, sys.argv[1:]
 core.load_prc_file_data("", "audio-library-name null\nbackground-color 0.8 0.85 0.9")
 core.load_prc_file_data("", "window-type offscreen\nload-display p3tinydisplay" if PICTURE else "")
-game, rigid, soft, crates = ShowBase(), bullet.BulletWorld(), World(collider_room=3), []
+game, rigid, soft, crates, last = ShowBase(), bullet.BulletWorld(), World(), [], np.zeros((3, 2, 3))
 rigid.set_gravity(core.LVector3(0, 0, -9.81))
 jelly = Material(young=6e4, poisson=0.4, density=1000, damping_ratio=0.1)
 block = soft.add_body(box((1.6, 1.6, 0.7), (8, 8, 4)), jelly, position=(0, 0, 0.36))
-soft.build()
 for number in range(3):
     crate = game.render.attach_new_node(bullet.BulletRigidBodyNode("crate"))
     crate.set_pos(0.5 * number - 0.5, 0, 1.3 + 0.5 * number)
     crate.node().set_mass(40.0)
     crate.node().add_shape(bullet.BulletBoxShape(core.LVector3(EDGE / 2)))
     rigid.attach(crate.node())
-    model = game.loader.load_model("models/box")
-    model.set_pos_hpr_scale(*(-EDGE / 2,) * 3, 0, 0, 0, EDGE, EDGE, EDGE)
-    model.set_texture_off(1)
-    model.reparent_to(crate)
+    look = game.loader.load_model("models/box").copy_to(crate)
+    look.set_texture_off(1)
+    look.set_pos_hpr_scale(*(-EDGE / 2,) * 3, 0, 0, 0, *(EDGE,) * 3)
     crates.append((crate, soft.add_collider(BoxShape((EDGE,) * 3), position=tuple(crate.get_pos()))))
-last = np.zeros((3, 2, 3))
+soft.build()
 
 
 def step_bullet(soft):
@@ -41,8 +39,7 @@ def step_bullet(soft):
     last[:] = now
     rigid.do_physics(DT, 1, DT)
     for crate, collider in crates:
-        w, *xyz = crate.get_quat()
-        collider.move_to(tuple(crate.get_pos()), (*xyz, w))
+        collider.move_to(tuple(crate.get_pos()), tuple(np.roll(crate.get_quat(), -1)))
 
 
 adapter, skin = EngineAdapter(soft, FixedStep(dt=DT), before_step=step_bullet), block.render_mesh(crease=50.0)
@@ -55,14 +52,12 @@ for corners in skin.triangles.tolist():
 geom.add_primitive(triangles)
 node.add_geom(geom)
 game.render.attach_new_node(node).set_color(0.95, 0.45, 0.35, 1)
-for light in (core.DirectionalLight("sun"), core.AmbientLight("sky")):
-    light.color = (0.7, 0.7, 0.7, 1) if light.name == "sun" else (0.35, 0.35, 0.4, 1)
-    lamp = game.render.attach_new_node(light)
-    lamp.set_hpr(-35, -55, 0)
-    game.render.set_light(lamp)
 game.disable_mouse()
-game.camera.set_pos(1.6, -3.9, 2.4)
-game.camera.look_at(0, 0, 0.6)
+game.camera.set_pos_hpr(1.6, -3.9, 2.4, 22, -23, 0)
+sun, sky = core.DirectionalLight("sun"), core.AmbientLight("sky")
+sun.direction, sky.color = core.LVector3(0.5, 0.8, -1.2), (0.15, 0.15, 0.2, 1)
+for light in (sun, sky):
+    game.render.set_light(game.render.attach_new_node(light))
 
 
 def draw(task):
