@@ -229,6 +229,8 @@ def test_a_surface_or_a_scene_in_the_place_of_a_body_is_told_the_way():
             MeshError, match=r'got Scene: read the file by trimesh\.load\(path, force="mesh"\)'
         ) as caught:
             take(trimesh.Scene([CUBE]))
+        with pytest.raises(MeshError, match=r"got int$"):
+            take(7)
         (call,) = re.findall(r"scene\.(.*)$", str(caught.value))
         joined = eval(f"trimesh.Scene([CUBE]).{call}")
         assert MeshShape(joined, cell=COARSE).bounds.tolist() == MeshShape(CUBE, cell=COARSE).bounds.tolist()
