@@ -360,3 +360,13 @@ def test_a_mesh_of_a_single_tetrahedron_comes_back(tmp_path, suffix):
     corner = TetMesh(np.array(POINTS[:4]), np.array(TETS[:1]), fix_orientation=True)
     save_mesh(corner, tmp_path / f"x{suffix}")
     assert same(load_mesh(tmp_path / f"x{suffix}"), corner)
+
+
+def test_a_tetgen_file_that_ends_after_its_head_is_cut_short(tmp_path):
+    save_mesh(BALL, tmp_path / "x.node")
+    lines = (tmp_path / "x.ele").read_text().splitlines()
+    head = next(line for line in lines if not line.startswith("#"))
+    (tmp_path / "x.ele").write_text(f"{head}\n")
+    assert f"{head.split()[0]} tetrahedra announced, 0 found: the file is cut short" in refusal(
+        tmp_path / "x.node"
+    )
