@@ -315,8 +315,10 @@ class SoftBody(Handle):
     @property
     @one_thread
     def failure(self) -> Failure | None:
-        """What broke first, None while the body is sound. Found out when first asked, not within a step: by a
-        kernel that `World.warm_up` leaves out, so it may take a second or two."""
+        """What broke first, None while the body is sound. Found out when first asked, not within a step.
+
+        What finds it out compiles then, for some seconds: `World.warm_up` leaves it out.
+        """
         require_alive(self)
         record = self._record
         if record.frozen_in is not None and record.failure is None:

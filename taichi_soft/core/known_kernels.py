@@ -156,7 +156,7 @@ def _describe_all(value: Any, items: Any, parts: list[str], seen: dict[int, tupl
 
 
 def short_body(digest: str) -> list[ast.stmt]:
-    """Statements that set the flag, once with each part of the digest: few, as each costs a start time."""
+    """Statements that set the flag, once with each part of the digest. Each takes time at every start."""
     words = np.frombuffer(bytes.fromhex(digest), np.int32)
     return ast.parse("\n".join(f"{FLAG}[None] = {word}" for word in (*words.tolist(), 1))).body
 
