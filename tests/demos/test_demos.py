@@ -62,17 +62,18 @@ def test_the_heavy_side_of_the_density_block_bounces_last_and_least():
     assert left[lifts[0] :].max() > right[lifts[1] :].max() + 0.2
 
 
-def test_all_of_many_spheres_land_and_bounce_whole():
+def test_all_of_many_spheres_land_and_bounce_off_the_floor_whole():
     stage = load_demo("many").stage()
     bodies = [actor.body for actor in stage.actors]
-    lowest = np.full(64, np.inf)
+    heights = []
     while stage.world.time < 2.0:
         stage.world.step(stage.step.dt, stage.step.substeps)
-        lowest = np.minimum(lowest, [body.positions()[:, 2].min() for body in bodies])
+        heights.append([body.positions()[:, 2].min() for body in bodies])
     assert load_demo("many").proof(stage) == 64
-    assert lowest == pytest.approx(np.zeros(64), abs=0.01)
-    for body in bodies:
-        assert body.center_of_mass()[2] > 0.5
+    for lowest in np.array(heights).T:
+        landed = np.argmin(lowest)
+        assert lowest[landed] == pytest.approx(0.0, abs=0.01)
+        assert lowest[landed:].max() > 0.1
 
 
 def test_a_sphere_under_every_law_lands_and_stays_whole():
