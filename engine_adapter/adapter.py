@@ -187,14 +187,15 @@ class EngineAdapter:
 
     def render_mesh(
         self,
-        mesh: RenderMesh,
+        mesh: RenderMesh | Body,
         positions: NDArray[np.float32] | None = None,
         normals: NDArray[np.float32] | None = None,
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Positions [m] and normals to draw, between the previous step and the last one, float32 (k, 3) each.
 
         Args:
-            mesh: of a body of this adapter's world, see `Body.render_mesh`.
+            mesh: of a body of this adapter's world, see `Body.render_mesh`; a body stands for the first of
+                its `render_meshes`.
             positions, normals: C-contiguous float32 arrays to fill and return; None makes a new one.
         Raises: as `World.read_render_mesh`.
         """

@@ -12,6 +12,7 @@ from taichi_soft.bodies.forces import force_gradient, internal_forces
 from taichi_soft.bodies.plasticity import Plasticity
 from taichi_soft.bodies.pose import Pose
 from taichi_soft.bodies.render_mesh import RenderMesh
+from taichi_soft.bodies.skin_mesh import SkinMesh
 from taichi_soft.bodies.stability import StableStep, stable_step
 from taichi_soft.bodies.tearing import Tearing
 from taichi_soft.contact.collider import Collider
@@ -93,6 +94,7 @@ from taichi_soft.meshing import (
     voronoi_graph,
     voxels,
 )
+from taichi_soft.meshing.cage_mesh import CageMesh
 from taichi_soft.queries import ClosestPoint, Overlap, RayHit, RayHits
 from taichi_soft.world.body import Body
 from taichi_soft.world.world import World
@@ -104,6 +106,7 @@ __all__ = [
     "Attachment",
     "Body",
     "BoxShape",
+    "CageMesh",
     "CapsuleShape",
     "ClosestPoint",
     "Collider",
@@ -141,6 +144,7 @@ __all__ = [
     "RenderMesh",
     "Settings",
     "Shape",
+    "SkinMesh",
     "SkippedCellsWarning",
     "SlowStepWarning",
     "SnapshotError",

@@ -13,6 +13,7 @@ ROOT = Path(__file__).parents[1]
 LAYERS = """
     core
     meshing
+    cages
     elements
     bodies
     control
@@ -39,7 +40,12 @@ PICTURES = ("film", "props", "demos", "replay")
 """Files of render that know worlds; the others draw triangles."""
 
 NO_TAICHI = (
-    *("taichi_soft.meshing", "taichi_soft.elements.materials", "taichi_soft.core.errors"),
+    *(
+        "taichi_soft.meshing",
+        "taichi_soft.cages",
+        "taichi_soft.elements.materials",
+        "taichi_soft.core.errors",
+    ),
     *("taichi_soft.core.constants", "taichi_soft.core.types", "taichi_soft.core.checks"),
 )
 """Parts that are tested in milliseconds: numpy only."""

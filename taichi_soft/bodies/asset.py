@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import KW_ONLY, dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,16 +14,20 @@ from taichi_soft.bodies.description import BodyDescription, require_size
 from taichi_soft.bodies.first_mode import first_frequency
 from taichi_soft.bodies.layout import BodyArrays, arrange
 from taichi_soft.bodies.plasticity import Plasticity
+from taichi_soft.bodies.skin import Skin, bound
 from taichi_soft.bodies.stability import StableStep, stable_step
 from taichi_soft.bodies.tearing import Tearing
+from taichi_soft.cages import CageMethod, build_cage
 from taichi_soft.core.checks import as_count, as_indices, as_rotation, as_vector
 from taichi_soft.core.constants import POSITION_LIMIT, VELOCITY_LIMIT
-from taichi_soft.core.errors import MaterialError, OptionError
+from taichi_soft.core.errors import MaterialError, MeshError, OptionError
 from taichi_soft.core.types import DampingModel, DampingModelName, FlipsName, LawName, StrainName
 from taichi_soft.elements.laws import ElementModel, default_law, element_model, fit_model
 from taichi_soft.elements.materials import AnisotropicMaterial, AnyMaterial, Material, SpringMaterial
 from taichi_soft.meshing import BodyMesh, ParticleMesh, TetMesh
 from taichi_soft.meshing.arrays import read_only
+from taichi_soft.meshing.cage_mesh import CageMesh
+from taichi_soft.meshing.surfaces import Up, read_surfaces
 
 Floats = NDArray[np.float64]
 Floats32 = NDArray[np.float32]
@@ -56,6 +61,8 @@ class SoftBodyAsset:
         plasticity: how it is bent for good; None for never. Takes laws that look at tetrahedra, and a
             `Material`.
         tearing: where it tears by itself, into its spare vertices; None for nowhere. Takes a `Material`.
+        skin: what is drawn in place of its surface, as `read_surfaces` takes it: a file, a trimesh.Trimesh or
+            Scene. See `Body.render_meshes`.
     Raises: MeshError, MaterialError or OptionError for bad input.
     """
 
@@ -71,6 +78,7 @@ class SoftBodyAsset:
     plasticity: Plasticity | None = None
     spare_vertices: int = 0
     tearing: Tearing | None = None
+    skin: Any = ()
     description: BodyDescription = field(init=False)
 
     def __post_init__(self) -> None:
@@ -88,12 +96,18 @@ class SoftBodyAsset:
             self._require_tears(model)
         if self.plasticity is not None:
             self._require_flow(model)
+        surfaces = () if isinstance(self.skin, tuple) and not self.skin else read_surfaces(self.skin)
+        if surfaces and not isinstance(self.mesh, TetMesh):
+            raise MeshError(f"a skin needs tetrahedra to hang on, and {self.mesh!r} has none")
+        if model.has_bonds and isinstance(self.mesh, CageMesh):
+            raise OptionError(f"law {self.law!r} takes no cage: it looks at edges, 'virial' at tetrahedra")
         pinned = read_only(as_indices(self.pinned, "pinned", len(self.mesh.vertices)))
         require_size(self.mesh)
         description = BodyDescription(self.mesh, self.material, model, pinned)
         _ = description.bonds  # made now, because a pairwise law may refuse the mesh
         object.__setattr__(self, "pinned", pinned)
         object.__setattr__(self, "description", description)
+        object.__setattr__(self, "skin", surfaces)
 
     def _require_tears(self, model: ElementModel) -> None:
         if not isinstance(self.tearing, Tearing):
@@ -115,6 +129,49 @@ class SoftBodyAsset:
 
     def __repr__(self) -> str:
         return f"SoftBodyAsset({self.mesh!r}, {self.law!r})"
+
+    @classmethod
+    def from_surface(
+        cls,
+        surface: Any,
+        material: AnyMaterial,
+        *,
+        cells: int | None = None,
+        cell_size: float | None = None,
+        method: CageMethod = "lattice",
+        up: Up | None = None,
+        **options: Any,
+    ) -> SoftBodyAsset:
+        """A body from an artist's mesh: a cage of tetrahedra that carries the mesh as its skin.
+
+            duck = SoftBodyAsset.from_surface("duck.glb", Material(2e5, 0.4, 900.0), cells=10)
+
+        The surface may have holes, faces turned round, walls within and parts that overlap: see
+        `taichi_soft.cages`. Mass, centre and inertia are those of the solid that it encloses.
+        Args:
+            surface: path of a .glb, .gltf, .obj, .ply, .stl or .off file, a trimesh.Trimesh or Scene, or
+                (vertices (n, 3) [m], triangles (m, 3)).
+            material: of the solid.
+            cells: of the cage along the longest side; 10 if neither this nor cell_size is given.
+            cell_size: edge of a cell [m], instead of `cells`.
+            method: of making the cage; "lattice" needs no other package.
+            up: axis that points up in the file; None takes "y" for .glb and .gltf, as their format has it,
+                and "z" for all else.
+            options: further arguments of `SoftBodyAsset`.
+        Raises: MeshError for a surface that cannot be read or encloses nothing, with the way out; OptionError
+            for cells out of range, with the memory that they would take.
+        """
+        surfaces = read_surfaces(surface, up)
+        cage = build_cage(surfaces, cells=cells, cell_size=cell_size, method=method)
+        return cls(cage.mesh, material, skin=surfaces, **options)
+
+    @cached_property
+    def skins(self) -> tuple[Skin, ...]:
+        """Surfaces that are drawn in place of its own, bound to its tetrahedra."""
+        if not self.skin:
+            return ()
+        assert isinstance(self.mesh, TetMesh)
+        return bound(self.mesh, self.skin)
 
     @cached_property
     def arrays(self) -> BodyArrays:
@@ -222,9 +279,8 @@ def _mean_stiffness(body: BodyDescription) -> float:
     mesh, material = body.mesh, body.material
     assert isinstance(mesh, TetMesh)
     assert isinstance(material, Material | AnisotropicMaterial)
-    count = len(mesh.tets)
     if isinstance(material, Material):
-        stiffness = material.per_tet("young", count)
+        stiffness = body.per_tet("young")
     else:
-        stiffness = np.trace(material.stiffness_matrices(count), axis1=1, axis2=2)
-    return float(mesh.volumes @ stiffness / (mesh.volumes @ material.per_tet("density", count)))
+        stiffness = np.trace(body.stiffness_matrices(), axis1=1, axis2=2)
+    return float(mesh.volumes @ stiffness / (mesh.volumes @ body.per_tet("density")))

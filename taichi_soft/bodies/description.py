@@ -19,6 +19,7 @@ from taichi_soft.meshing import (
     TetMesh,
 )
 from taichi_soft.meshing.arrays import read_only
+from taichi_soft.meshing.cage_mesh import CageMesh, lumped
 from taichi_soft.meshing.splitting import InnerFaces, inner_faces
 
 Floats = NDArray[np.float64]
@@ -53,10 +54,17 @@ class BodyDescription:
         return read_only(vertex_masses(self.mesh, self.per_tet("density")))  # type: ignore[arg-type]
 
     def per_tet(self, name: str) -> Floats:
-        """A constant of the material for each tetrahedron, (m,)."""
+        """A constant of the material for each tetrahedron, as much of it as is solid, (m,)."""
         if isinstance(self.material, SpringMaterial):
             return np.zeros(0)
-        return self.material.per_tet(name, len(self.mesh.tets))
+        assert isinstance(self.mesh, TetMesh)
+        return self.material.per_tet(name, len(self.mesh.tets)) * self.mesh.fill
+
+    def stiffness_matrices(self) -> Floats:
+        """C of Hooke's law of each tetrahedron, as much of it as is solid, (m, 6, 6) [Pa]."""
+        assert isinstance(self.mesh, TetMesh)
+        assert isinstance(self.material, Material | AnisotropicMaterial)
+        return self.material.stiffness_matrices(len(self.mesh.tets)) * self.mesh.fill[:, None, None]
 
     @cached_property
     def rest_inverses(self) -> Floats:
@@ -77,7 +85,7 @@ class BodyDescription:
         if isinstance(material, Material):
             modulus = self.lame @ np.array([1.0, 2.0])
         else:
-            modulus = material.stiffness_matrices(len(mesh.tets))[:, range(3), range(3)].max(axis=1)
+            modulus = self.stiffness_matrices()[:, range(3), range(3)].max(axis=1)
         return float(np.sqrt((modulus / self.per_tet("density")).max()))
 
     @cached_property
@@ -99,7 +107,7 @@ class BodyDescription:
         if not isinstance(self.material, AnisotropicMaterial):
             return np.zeros((count, 21))
         rows, columns = np.triu_indices(6)
-        return self.material.stiffness_matrices(count)[:, rows, columns]
+        return self.stiffness_matrices()[:, rows, columns]
 
     @cached_property
     def edge_damping(self) -> Floats:
@@ -126,9 +134,12 @@ def edge_damping(mesh: TetMesh, tet_damping: Floats) -> Floats:
 
 
 def vertex_masses(mesh: TetMesh, density: Floats) -> Floats:
-    """A quarter of the mass of each neighbouring tetrahedron, (n,) [kg] (thesis chapter 6)."""
-    quarter = np.repeat(mesh.volumes * density / 4.0, 4)
-    return np.bincount(mesh.tets.ravel(), quarter, minlength=len(mesh.vertices)).astype(np.float64)
+    """A quarter of the mass of each neighbouring tetrahedron, (n,) [kg] (thesis chapter 6); in a `CageMesh`
+    that of the solid which the vertex carries."""
+    masses = lumped(mesh.tets, mesh.volumes * density, len(mesh.vertices))
+    if isinstance(mesh, CageMesh):  # by the mean density of the tetrahedra round it
+        masses *= mesh.vertex_volumes / lumped(mesh.tets, mesh.volumes * mesh.fill, len(mesh.vertices))
+    return masses.astype(np.float64)
 
 
 def rest_inverses(mesh: BodyMesh) -> Floats:

@@ -11,8 +11,9 @@ from taichi_soft.core.checks import as_vector
 from taichi_soft.core.errors import MeshError, OptionError
 from taichi_soft.elements.kernels.stress import compute_stress
 from taichi_soft.elements.laws.law import EnergyLaw
-from taichi_soft.elements.materials import AnisotropicMaterial, Material, SpringMaterial, voigt_stress
+from taichi_soft.elements.materials import voigt_stress
 from taichi_soft.meshing import TetMesh
+from taichi_soft.meshing.cage_mesh import lumped
 from taichi_soft.meshing.sections import section_areas
 
 Floats = NDArray[np.float64]
@@ -67,11 +68,6 @@ def gravitational_energy(body: SoftBody) -> float:
     return float(-(body.masses @ positions_of(body)) @ gravity)
 
 
-def _material(body: SoftBody) -> Material | AnisotropicMaterial:
-    assert not isinstance(body.material, SpringMaterial), "laws on tetrahedra take none"
-    return body.material
-
-
 def tet_mesh(body: SoftBody) -> TetMesh:
     """The mesh of a body with tetrahedra."""
     assert isinstance(body.mesh, TetMesh), "meshes without tetrahedra are refused before"
@@ -87,8 +83,7 @@ def elastic_energy(body: SoftBody) -> float:
         growth = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) - bonds.constants[:, 0]
         return float(0.5 * bonds.constants[:, 1] @ growth**2)
     if isinstance(law, EnergyLaw) and not model.is_anisotropic:
-        count = len(body.tets)
-        constants = (_material(body).per_tet(name, count) for name in ("lame_lambda", "lame_mu"))
+        constants = (record_of(body).description.per_tet(name) for name in ("lame_lambda", "lame_mu"))
         return float(law.energy_density(deformations(body), *constants) @ tet_mesh(body).volumes)
     strain, stress = green_strain_and_stress(body)
     return float(0.5 * np.einsum("mab,mab->m", strain, stress) @ tet_mesh(body).volumes)
@@ -101,14 +96,15 @@ def green_strain_and_stress(body: SoftBody) -> tuple[Floats, Floats]:
     """
     F = deformations(body)
     strain = 0.5 * (np.swapaxes(F, 1, 2) @ F - np.eye(3))
-    return strain, voigt_stress(_material(body).stiffness_matrices(len(body.tets)), strain)
+    return strain, voigt_stress(record_of(body).description.stiffness_matrices(), strain)
 
 
 def tet_stresses(body: SoftBody) -> Floats:
     """As `Body.stresses`."""
     F = deformations(body)
     stress = np.empty_like(F)
-    compute_stress(record_of(body).description.model, F, _material(body).stiffness_matrices(len(F)), stress)
+    description = record_of(body).description
+    compute_stress(description.model, F, description.stiffness_matrices(), stress)
     return stress
 
 
@@ -164,5 +160,5 @@ def _deviator_norms(tensors: Floats) -> Floats:
 
 def vertex_means(body: SoftBody, values: Floats) -> Floats:
     """Values (m,) averaged by volume over the tetrahedra round each vertex, (n,)."""
-    flat, shares = body.tets.ravel(), np.repeat(values * tet_mesh(body).volumes / 4.0, 4)
-    return np.asarray(np.bincount(flat, shares, minlength=body.vertex_count) / tet_mesh(body).vertex_volumes)
+    mesh, n = tet_mesh(body), body.vertex_count
+    return np.asarray(lumped(mesh.tets, values * mesh.volumes, n) / lumped(mesh.tets, mesh.volumes, n))

@@ -47,11 +47,23 @@ class RenderMesh:
             vertices: of the body, that each render vertex is or is a copy of, (k,).
             triangles: render vertices, (m, 3).
         """
+        self._describe(body, vertices, triangles)
+        self._table = _table(vertices, triangles)
+
+    def _describe(self, body: SoftBody, vertices: NDArray[np.int64], triangles: Ints32) -> None:
         self._body = body
         self._body_vertices: Ints32 = read_only(vertices.astype(np.int32))
         self._triangles: Ints32 = read_only(triangles)
         self._topology_version = body.topology_version
-        self._table = _table(vertices, triangles)
+
+    @property
+    def _way_out(self) -> str:
+        return "make it anew by body.render_mesh(), and buffers for its vertex_count"
+
+    def _write(self, state: Any, alpha: float, positions: Floats32, normals: Floats32) -> None:
+        """Fill two buffers, (k, 3) each, from the fields of a world."""
+        is_serial = self.vertex_count < FEWEST_SHARED
+        _write(state, is_serial, self._body.index, alpha, self._table, positions, normals)
 
     def __repr__(self) -> str:
         state = ", outdated" if self.is_outdated else ""
@@ -106,8 +118,7 @@ def require_current(mesh: RenderMesh) -> None:
     if mesh.is_outdated:
         raise StateError(
             f"body {body.index} was cut, torn or restored since this render mesh was made (topology_version "
-            f"{mesh.topology_version}, now {body.topology_version}): make it anew by body.render_mesh(), and "
-            "buffers for its vertex_count"
+            f"{mesh.topology_version}, now {body.topology_version}): {mesh._way_out}"
         )
 
 
@@ -115,8 +126,7 @@ def read_render_mesh(
     state: Any, mesh: RenderMesh, alpha: float, positions: Floats32, normals: Floats32
 ) -> None:
     """Fill two buffers, (k, 3) each, from the fields of a world. See `World.read_render_mesh`."""
-    is_serial = mesh.vertex_count < FEWEST_SHARED
-    _write(state, is_serial, mesh.body.index, alpha, mesh._table, positions, normals)
+    mesh._write(state, alpha, positions, normals)
 
 
 def warm_up(state: Any) -> None:

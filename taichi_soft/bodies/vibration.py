@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from taichi_soft.bodies.description import BodyDescription
 from taichi_soft.bodies.forces import StillBody
 from taichi_soft.core.types import DampingModel
-from taichi_soft.elements.materials import AnisotropicMaterial, Material
 from taichi_soft.meshing import BodyMesh, TetMesh
 
 Floats = NDArray[np.float64]
@@ -50,11 +49,10 @@ class TetVibration(Vibration):
 
     def __init__(self, body: BodyDescription) -> None:
         super().__init__(body)
-        mesh, material = body.mesh, body.material
+        mesh = body.mesh
         assert isinstance(mesh, TetMesh)
-        assert isinstance(material, Material | AnisotropicMaterial)
         self.strains = _strains(body.rest_inverses)
-        self.stiffness = material.stiffness_matrices(len(mesh.tets))
+        self.stiffness = body.stiffness_matrices()
         volumes = mesh.volumes[:, None, None]
         self._matrices = np.swapaxes(self.strains, 1, 2) @ (volumes * self.stiffness @ self.strains)
         self._tets = _Owners(mesh.tets, len(mesh.vertices))

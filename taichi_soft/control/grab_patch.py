@@ -68,9 +68,7 @@ def _stiffness(body: BodyDescription, falloff: NDArray[np.float64]) -> float:
 
 def _shear_moduli(body: BodyDescription) -> NDArray[np.float64]:
     """The smallest of each tetrahedron, (m,) [Pa]."""
-    mesh: Any = body.mesh
-    material: Any = body.material
-    moduli = material.stiffness_matrices(len(mesh.tets))
+    moduli = body.stiffness_matrices()
     return np.asarray(moduli[:, range(3, 6), range(3, 6)].min(axis=1))
 
 

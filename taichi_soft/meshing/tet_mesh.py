@@ -36,6 +36,7 @@ class TetMesh(BodyMesh):
             (0,1), (0,2), (0,3), (1,2), (1,3), (2,3).
         surface: int32 (f, 3), boundary triangles, counterclockwise seen from outside.
         volumes: float64 (m,), volume of each tetrahedron, all positive [m^3].
+        fill: float64 (m,), part of each tetrahedron that is solid: 1, but in a `CageMesh`.
 
     Raises: MeshError, naming the element, for wrong shapes or dtypes, numbers that are not finite, indices
         out of range, a vertex twice in a tetrahedron, the same tetrahedron twice, a tetrahedron of zero
@@ -147,6 +148,11 @@ class TetMesh(BodyMesh):
     def volume(self) -> float:
         """Volume of the whole mesh [m^3]."""
         return float(self.volumes.sum())
+
+    @cached_property
+    def fill(self) -> FloatArray:
+        """Part of each tetrahedron that is solid, float64 (m,): 1, but in a `CageMesh`."""
+        return read_only(np.ones(len(self.tets)))
 
     @cached_property
     def vertex_volumes(self) -> FloatArray:

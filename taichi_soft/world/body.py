@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies import measures
 from taichi_soft.bodies.render_mesh import RenderMesh, surface_render_mesh
+from taichi_soft.bodies.skin_mesh import SkinMesh, skin_meshes
 from taichi_soft.bodies.stability import StableStep
 from taichi_soft.control.attachments import Attachment
 from taichi_soft.control.frames import Frames
@@ -75,6 +76,14 @@ class Body(BodyControl, BodyMeasures):
             StateError for one that was removed.
         """
         return surface_render_mesh(self, crease)
+
+    @property
+    def render_meshes(self) -> tuple[SkinMesh, ...]:
+        """The artist's meshes that the body carries, in their own order; none where its asset has no skin.
+
+        They are drawn as a `render_mesh` is, and know trimesh's `visual`: texture coordinates and material.
+        """
+        return skin_meshes(self)
 
     @property
     def stable_step(self) -> StableStep:

@@ -12,6 +12,7 @@ from typing import cast
 import numpy as np
 
 from taichi_soft.bodies.render_mesh import warm_up as warm_up_render_meshes
+from taichi_soft.bodies.skin_mesh import warm_up as warm_up_skins
 from taichi_soft.control.drives import push_bodies, set_wind
 from taichi_soft.control.impulses import apply_radial_impulse
 from taichi_soft.control.rigid_transform import carry
@@ -53,6 +54,8 @@ def warm_up(context: WorldContext) -> None:
             _control(context, body, next((each for each in bodies if each is not body), None))
             _measure(context, body)
         warm_up_render_meshes(context.built.state)
+        if any(asset.skin for asset in context.slots.assets):
+            warm_up_skins(context.built.state)
         _ask(context)
         context.built.trial_step(SHORTEST)
         context.built.events.warm_up()

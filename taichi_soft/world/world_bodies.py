@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import cast
+from dataclasses import fields
+from typing import Any, cast
 
 from numpy.typing import ArrayLike
 
@@ -11,7 +12,8 @@ from taichi_soft.bodies.asset import Floats32, SoftBodyAsset
 from taichi_soft.bodies.contact import DEFAULT_CONTACT, Contact
 from taichi_soft.bodies.plasticity import Plasticity
 from taichi_soft.bodies.render_mesh import RenderMesh, require_current
-from taichi_soft.bodies.soft_body import lives_in
+from taichi_soft.bodies.skin_mesh import first_skin_mesh
+from taichi_soft.bodies.soft_body import SoftBody, lives_in
 from taichi_soft.bodies.stability import StableStep
 from taichi_soft.bodies.tearing import Tearing
 from taichi_soft.core.checks import as_number
@@ -40,8 +42,8 @@ class WorldBodies(WorldParts):
 
     def add_body(
         self,
-        mesh: BodyMesh,
-        material: AnyMaterial,
+        mesh: BodyMesh | SoftBodyAsset,
+        material: AnyMaterial | None = None,
         *,
         law: LawName | None = None,
         strain: StrainName | None = None,
@@ -61,25 +63,30 @@ class WorldBodies(WorldParts):
         Copies, of the same mesh and material with the same options, share the asset.
         Args:
             mesh, material, law, strain, flips, damping_model, pinned, contact, plasticity, spare_vertices,
-                tearing: as `SoftBodyAsset` takes them.
+                tearing: as `SoftBodyAsset` takes them. Or an asset in place of the mesh, which has them all.
             position, rotation, velocity: as `spawn` takes them.
         Returns: a handle.
         Raises: MeshError, MaterialError or OptionError for bad input; StateError after `build`.
         """
         require_open(self._context)
-        asset = SoftBodyAsset(
-            mesh,
-            material,
-            law=law,
-            strain=strain,
-            flips=flips,
-            damping_model=damping_model,
-            pinned=pinned,
-            contact=contact,
-            plasticity=plasticity,
-            spare_vertices=spare_vertices,
-            tearing=tearing,
+        options: dict[str, Any] = {
+            "law": law,
+            "strain": strain,
+            "flips": flips,
+            "damping_model": damping_model,
+            "pinned": pinned,
+            "contact": contact,
+            "plasticity": plasticity,
+            "spare_vertices": spare_vertices,
+            "tearing": tearing,
+        }
+        asset = (
+            mesh
+            if isinstance(mesh, SoftBodyAsset)
+            else SoftBodyAsset(mesh, cast(AnyMaterial, material), **options)
         )
+        if asset is mesh:
+            _require_defaults(material, options)
         return add_body(self._context, asset, position, rotation, velocity)
 
     def reserve(self, asset: SoftBodyAsset, count: int) -> None:
@@ -148,7 +155,7 @@ class WorldBodies(WorldParts):
 
     def read_render_mesh(
         self,
-        mesh: RenderMesh,
+        mesh: RenderMesh | SoftBody,
         alpha: float,
         positions: Floats32 | None = None,
         normals: Floats32 | None = None,
@@ -159,13 +166,16 @@ class WorldBodies(WorldParts):
         area. So a triangle that is crushed to a line counts for nothing, and films are shaded the same way.
         Where all of them have no area it is (0, 0, 1). One call is one kernel.
         Args:
-            mesh: of a body of this world, see `Body.render_mesh`.
+            mesh: of a body of this world, see `Body.render_mesh`; a body stands for the first of its
+                `render_meshes`.
             positions, normals: C-contiguous float32 arrays (k, 3) to fill; None makes a new one.
         Returns: both: positions of the render vertices [m], and their normals of unit length, outward.
         Raises: OptionError for a body of another world, an alpha out of range or a buffer that does not
             fit; StateError for a body that was removed, or cut since the mesh was made, and before `build`.
         """
         simulation = self._built
+        if isinstance(mesh, SoftBody):
+            mesh = first_skin_mesh(mesh)
         if not isinstance(mesh, RenderMesh):
             raise OptionError(f"mesh must be a RenderMesh, made by body.render_mesh(), got {mesh!r}")
         if not lives_in(mesh.body, self._context):
@@ -174,3 +184,12 @@ class WorldBodies(WorldParts):
         if type(alpha) is not float or not 0.0 <= alpha <= 1.0:
             alpha = as_number(alpha, "alpha", 0.0, 1.0, "a number from 0 to 1")
         return simulation.readout.render_mesh(mesh, alpha, positions, normals)
+
+
+def _require_defaults(material: AnyMaterial | None, options: dict[str, Any]) -> None:
+    """Raises: OptionError for what an asset says already."""
+    defaults = {field.name: field.default for field in fields(SoftBodyAsset)}
+    given = [name for name, value in options.items() if value is not defaults[name]]
+    if material is not None or given:
+        name = "material" if material is not None else given[0]
+        raise OptionError(f"{name} was given with an asset, which has its own: give it to SoftBodyAsset")

@@ -1,0 +1,88 @@
+"""An artist's mesh as a renderer takes it, with the vertices and normals of each frame."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.bodies.kernels.skin import FRAME, ROW, write_skin
+from taichi_soft.bodies.render_mesh import RenderMesh
+from taichi_soft.bodies.skin import Skin
+from taichi_soft.bodies.soft_body import SoftBody, require_alive
+from taichi_soft.core.errors import OptionError
+
+Floats32 = NDArray[np.float32]
+
+FEWEST_SHARED = 2000
+"""Vertices from which on threads share them: waking them costs as much as some thousand of them."""
+
+
+class SkinMesh(RenderMesh):
+    """The skin of one body, in its artist's own order. Made by `Body.render_meshes`, and read-only.
+
+    The body's vertices under `body_vertices` are the nearest ones. A skin cannot follow a cut: once its body
+    is cut or torn it is outdated, and there is no new one.
+    """
+
+    def __init__(self, body: SoftBody, skin: Skin) -> None:
+        """Made by `Body.render_meshes`."""
+        corners = body.asset.mesh.tets[skin.tets]
+        nearest = corners[np.arange(len(corners)), skin.shares.argmax(axis=1)]
+        self._describe(body, nearest.astype(np.int64), skin.surface.triangles)
+        self._skin = skin
+        self._frames = np.empty(FRAME * body.vertex_count, dtype=np.float32)
+
+    def __repr__(self) -> str:
+        state = ", outdated" if self.is_outdated else ""
+        name = f"{self.name!r}, " if self.name else ""
+        return f"SkinMesh({name}{self.vertex_count} vertices, {len(self.triangles)} triangles{state})"
+
+    @property
+    def name(self) -> str:
+        """What the mesh is called in its file."""
+        return self._skin.surface.name
+
+    @property
+    def visual(self) -> Any:
+        """trimesh's texture coordinates, material and colours of it; None where there are none."""
+        return self._skin.surface.visual
+
+    @property
+    def is_outdated(self) -> bool:
+        """Whether the body is cut or torn: a skin cannot follow that."""
+        return self._body.is_cut
+
+    @property
+    def _way_out(self) -> str:
+        return "a skin cannot follow a cut: draw body.render_mesh() in its place"
+
+    def _write(self, state: Any, alpha: float, positions: Floats32, normals: Floats32) -> None:
+        skin, n = self._skin, self._body.vertex_count
+        rows = positions.reshape(-1), normals.reshape(-1)
+        is_serial = n + skin.vertex_count < FEWEST_SHARED
+        write_skin(state, is_serial, self._body.index, n, alpha, skin.ints, skin.floats, self._frames, *rows)
+
+
+def skin_meshes(body: SoftBody) -> tuple[SkinMesh, ...]:
+    """Those of its asset; none where it was cut or torn."""
+    if body.is_cut:
+        return ()
+    return tuple(SkinMesh(body, skin) for skin in body.asset.skins)
+
+
+def first_skin_mesh(body: SoftBody) -> SkinMesh:
+    """Raises: OptionError for a body without skin; StateError for one that was removed."""
+    require_alive(body)
+    if not body.asset.skins:
+        raise OptionError(f"{body!r} has no skin: give its asset one by skin=, or draw body.render_mesh()")
+    return SkinMesh(body, body.asset.skins[0])
+
+
+def warm_up(state: Any) -> None:
+    """Compile what a skin's frame calls, for few vertices and for many: of a vertex without neighbours."""
+    ints, floats = np.zeros(2 + 4, dtype=np.int32), np.zeros(3 + ROW, dtype=np.float32)
+    frames, positions, normals = np.empty(FRAME, dtype=np.float32), *np.empty((2, 3), dtype=np.float32)
+    for is_serial in (True, False):
+        write_skin(state, is_serial, 0, 1, 1.0, ints, floats, frames, positions, normals)

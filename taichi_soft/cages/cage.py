@@ -1,0 +1,191 @@
+"""A cage: tetrahedra that carry a solid which only its surface is known of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.cages.connected import parts_of
+from taichi_soft.cages.fitting import caps, fit
+from taichi_soft.cages.lattice import Lattice
+from taichi_soft.cages.marking import mark, split_hinges, without_flat
+from taichi_soft.cages.masses import fitted
+from taichi_soft.cages.solid import Solid, solid_of
+from taichi_soft.core.checks import as_count, as_positive
+from taichi_soft.core.errors import MeshError, OptionError
+from taichi_soft.meshing import TetMesh
+from taichi_soft.meshing.arrays import FloatArray
+from taichi_soft.meshing.cage_mesh import CageMesh, lumped
+from taichi_soft.meshing.locating import Locator
+from taichi_soft.meshing.surfaces import Surface
+
+Ints = NDArray[np.int64]
+
+FINENESS = 8
+"""Voxels along a cube."""
+
+MOST_VOXELS = 1 << 22
+"""Above, voxels are coarser: at least 3 to a cube."""
+
+SMALLEST_PART = 1e-3
+"""Of the volume: smaller parts are dust."""
+
+LEAST_SHARE = 0.05
+"""Of a tetrahedron that is solid, below which it is taken as this much: what is lighter than all round it
+would be thrown about."""
+
+MOST_SHARE = 1.5
+"""Above it what sticks out of the cage stiffens nothing more."""
+
+
+PEELS = 4
+"""Layers of flat tetrahedra that are taken off at most."""
+
+CageMethod = Literal["lattice"]
+METHODS = ("lattice",)
+
+DEFAULT_CELLS = 10
+"""Along the longest side: some thousand tetrahedra, of which a game has many."""
+
+MOST_CUBES = 150_000
+
+BYTES_PER_CUBE = 27 * 250
+"""Of the voxels in it, while the cage is made."""
+
+OPEN = 0.5
+"""Of all lines that meet a surface: more that do not leave it again, and it is a sheet."""
+
+FLATTEST = 1e-6
+"""Volume over that of the box round it, below which nothing is enclosed but rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class Cage:
+    """Tetrahedra, and what of the solid each of them and each vertex carries."""
+
+    mesh: CageMesh
+    solid: Solid
+    part: Ints  # (m,), of the solid that each tetrahedron belongs to
+
+
+def build_cage(
+    surfaces: tuple[Surface, ...],
+    *,
+    cells: int | None = None,
+    cell_size: float | None = None,
+    method: CageMethod = "lattice",
+) -> Cage:
+    """The cage of a solid that surfaces enclose together. Arguments as of `SoftBodyAsset.from_surface`."""
+    if method not in METHODS:
+        raise OptionError(f"unknown method {method!r}: choose one of {', '.join(map(repr, METHODS))}")
+    starts = np.cumsum([0, *(len(surface.vertices) for surface in surfaces)])
+    vertices = np.concatenate([surface.vertices for surface in surfaces])
+    triangles = np.concatenate([surface.triangles + start for surface, start in zip(surfaces, starts)])  # noqa: B905
+    size = np.ptp(vertices[np.unique(triangles)], axis=0)
+    return lattice_cage(vertices, triangles, _cell_size(size, cells, cell_size))
+
+
+def _cell_size(size: FloatArray, cells: int | None, cell_size: float | None) -> float:
+    """Edge of the lattice's cubes [m]. Raises: OptionError for none, or too many of them."""
+    longest = float(size.max())
+    if not longest > 0.0:
+        raise MeshError("the surface is a point: it encloses nothing")
+    if cells is not None and cell_size is not None:
+        raise OptionError(f"cells={cells!r} and cell_size={cell_size!r}: give one of them")
+    if cell_size is None:
+        edge = longest / as_count(DEFAULT_CELLS if cells is None else cells, "cells", 1, 1_000_000)
+    else:
+        edge = as_positive(cell_size, "cell_size", "m")
+        if edge > 2.0 * longest:
+            raise OptionError(f"cell_size is {edge:g} m, and the surface is {longest:g} m long: take less")
+    cubes = float(np.prod(np.ceil(size / edge) + 2.0))
+    if cubes > MOST_CUBES:
+        raise OptionError(
+            f"cells of {edge:.4g} m make a lattice of {cubes:.3g} cubes, which takes about "
+            f"{cubes * BYTES_PER_CUBE / 2**30:,.1f} GiB to fit: stay below {MOST_CUBES:,} cubes"
+        )
+    return edge
+
+
+def lattice_cage(vertices: FloatArray, triangles: Ints, cell_size: float) -> Cage:
+    """A cage of a lattice's tetrahedra.
+
+    Args:
+        vertices: of the surface, (n, 3) [m].
+        triangles: (m, 3).
+        cell_size: edge of the lattice's cubes [m].
+    Raises: MeshError for a surface that encloses nothing, or is open for the most part.
+    """
+    used = vertices[np.unique(triangles)]
+    low, high = used.min(axis=0), used.max(axis=0)
+    fineness = FINENESS
+    while fineness > 3 and np.prod((high - low) / cell_size * fineness + 3) > MOST_VOXELS:
+        fineness -= 1
+    solid = solid_of(vertices, triangles, cell_size / fineness)
+    _require_solid(solid, high - low)
+    points, volumes = solid.quadrature()
+    part_of_point = parts_of(solid.fill)[solid.fill > 0.0]
+    lattice = Lattice.round(low, high, cell_size)
+    places, corners, parts, offset = [], [], [], 0
+    tet_count = 0
+    start = np.full(len(points), -1)
+    large = np.flatnonzero(np.bincount(part_of_point, volumes) >= SMALLEST_PART * volumes.sum())
+    for number, part in enumerate(large):
+        mine = part_of_point == part
+        numbers = mark(lattice, points[mine], volumes[mine])
+        numbers = _peeled(lattice, numbers, solid)
+        tets, lattice_vertices = split_hinges(lattice.corners_of(numbers))
+        at = lattice.points_of(lattice_vertices)
+        places.append(fit(at, tets, solid, cell_size))
+        corners.append(tets + offset)
+        parts.append(np.full(len(tets), number))
+        at_points = lattice.tet_at(points[mine])
+        found = np.minimum(np.searchsorted(numbers, at_points), len(numbers) - 1)
+        start[mine] = np.where(numbers[found] == at_points, found + tet_count, -1)
+        offset, tet_count = offset + len(at), tet_count + len(tets)
+    kept = np.isin(part_of_point, large)
+    mesh = TetMesh(np.concatenate(places), np.concatenate(corners))
+    return _filled(mesh, np.concatenate(parts), solid, points[kept], volumes[kept], start[kept])
+
+
+def _require_solid(solid: Solid, size: FloatArray) -> None:
+    """Raises: MeshError where there is nothing to carry."""
+    if solid.open_share > OPEN:
+        raise MeshError(
+            f"the surface is open: {100 * solid.open_share:.3g} % of the lines through it do not come out "
+            "again. Give a sheet a thickness (Blender: Solidify), or make a cloth of it by ParticleMesh"
+        )
+    if solid.volume <= FLATTEST * float(np.prod(np.maximum(size, solid.spacing))):
+        raise MeshError(f"the surface encloses no volume ({solid.volume:.2g} m^3): give it a thickness")
+
+
+def _peeled(lattice: Lattice, numbers: Ints, solid: Solid) -> Ints:
+    """Without tetrahedra that would lie flat in the surface, as long as what is left hangs together."""
+    for _ in range(PEELS):
+        corners = lattice.corners_of(numbers)
+        used, tets = np.unique(corners, return_inverse=True)
+        tets = tets.reshape(-1, 4)
+        kept = without_flat(corners, caps(lattice.points_of(used), tets, solid, lattice.edge))
+        if kept.all():
+            break
+        numbers = numbers[kept]
+    return numbers
+
+
+def _filled(
+    mesh: TetMesh, parts: Ints, solid: Solid, points: FloatArray, volumes: FloatArray, start: Ints
+) -> Cage:
+    tet, shares = Locator(mesh)(points, start)
+    carried = np.bincount(tet, volumes, len(mesh.tets))
+    fill = np.clip(carried / mesh.volumes, LEAST_SHARE, MOST_SHARE)
+    held = np.bincount(mesh.tets[tet].ravel(), (volumes[:, None] * shares).ravel(), len(mesh.vertices))
+    held = np.maximum(held, lumped(mesh.tets, LEAST_SHARE * mesh.volumes, len(mesh.vertices)))
+    cell = solid.spacing**2 / 12.0  # a full voxel's own second moment over its volume
+    second = np.einsum("k,ki,kj->ij", volumes, points, points) + volumes.sum() * cell * np.eye(3)
+    vertex_volumes = fitted(
+        mesh.vertices, np.asarray(held, dtype=np.float64), float(volumes.sum()), volumes @ points, second
+    )
+    return Cage(CageMesh(mesh.vertices, mesh.tets, fill, vertex_volumes), solid, parts)

@@ -1,0 +1,96 @@
+"""The body-centred cubic lattice: equal tetrahedra without a preferred direction.
+
+Its vertices are corners and centres of cubes. Each tetrahedron has the centres of two neighbouring cubes and
+an edge of the face between them: dihedral angles of 60 and 90 degrees, twelve to a cube. (Labelle and
+Shewchuk, "Isosurface stuffing", 2007, who cut it at the surface; here its vertices are moved.)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.meshing.arrays import FloatArray
+
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Lattice:
+    """Cubes round a solid, with one more on each side. A tetrahedron's number says where it is."""
+
+    origin: FloatArray  # (3,), corner of the first cube [m]
+    edge: float  # of a cube [m]
+    cubes: tuple[int, int, int]
+
+    @classmethod
+    def round(cls, low: FloatArray, high: FloatArray, edge: float) -> Lattice:
+        """About the middle of a box."""
+        inner = np.maximum(np.ceil((high - low) / edge - 1e-9).astype(np.int64), 1)
+        origin = 0.5 * (low + high) - 0.5 * edge * inner - edge
+        nx, ny, nz = (int(n) + 2 for n in inner)
+        return cls(origin, edge, (nx, ny, nz))
+
+    @property
+    def tet_volume(self) -> float:
+        """[m^3]."""
+        return self.edge**3 / 12.0
+
+    @property
+    def tet_count(self) -> int:
+        """Numbers that tetrahedra can have."""
+        return 12 * int(np.prod(self.cubes))
+
+    def tet_at(self, points: FloatArray) -> Ints:
+        """Number of the tetrahedron that holds each point within the inner cubes, (k,)."""
+        places = (points - self.origin) / self.edge
+        cube = places.astype(np.int64)
+        offset = places - cube - 0.5
+        axis = np.argmax(np.abs(offset), axis=1)
+        rows = np.arange(len(points))
+        cube[rows, axis] -= offset[rows, axis] < 0  # the lower of the two that share the face
+        u, v = offset[rows, (axis + 1) % 3], offset[rows, (axis + 2) % 3]
+        side = np.where(np.abs(u) >= np.abs(v), (u < 0).astype(np.int64), 2 + (v < 0))
+        face = axis * int(np.prod(self.cubes)) + np.ravel_multi_index(tuple(cube.T), self.cubes)
+        return np.asarray(face * 4 + side)
+
+    def corners_of(self, numbers: Ints) -> Ints:
+        """Lattice vertices of tetrahedra, (k, 4), of positive volume."""
+        total = int(np.prod(self.cubes))
+        side, rest = numbers % 4, numbers // 4
+        axis, flat = rest // total, rest % total
+        cube = np.stack(np.unravel_index(flat, self.cubes), axis=1)
+        rows = np.arange(len(numbers))
+        u, v = (axis + 1) % 3, (axis + 2) % 3
+        across = cube.copy()
+        across[rows, axis] += 1
+        along = np.where(side < 2, u, v)
+        other = np.where(side < 2, v, u)
+        low = across.copy()
+        low[rows, along] += (side % 2) == 0
+        high = low.copy()
+        high[rows, other] += 1
+        # The edge runs the other way round on the other side of the face, and on its other pair of sides.
+        turn = ((side % 2) == 1) ^ (side >= 2)
+        a, b = self._corner(low), self._corner(high)
+        corners = [self._center(cube), self._center(across), np.where(turn, b, a), np.where(turn, a, b)]
+        return np.stack(corners, axis=1)
+
+    def points_of(self, vertices: Ints) -> FloatArray:
+        """Where lattice vertices are, (k, 3) [m]."""
+        shape = tuple(n + 1 for n in self.cubes)
+        is_center = vertices >= np.prod(shape)
+        corner = np.stack(np.unravel_index(np.where(is_center, 0, vertices), shape), axis=1)
+        center = np.stack(
+            np.unravel_index(np.where(is_center, vertices - np.prod(shape), 0), self.cubes), axis=1
+        )
+        return self.origin + self.edge * np.where(is_center[:, None], center + 0.5, corner)
+
+    def _corner(self, places: Ints) -> Ints:
+        return np.asarray(np.ravel_multi_index(tuple(places.T), tuple(n + 1 for n in self.cubes)))
+
+    def _center(self, cubes: Ints) -> Ints:
+        corners = int(np.prod([n + 1 for n in self.cubes]))
+        return np.asarray(np.ravel_multi_index(tuple(cubes.T), self.cubes) + corners)

@@ -1,0 +1,150 @@
+"""Which tetrahedra of the lattice carry a solid."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.cages.connected import components
+from taichi_soft.cages.lattice import Lattice
+from taichi_soft.meshing.arrays import FloatArray
+from taichi_soft.meshing.topology import LOCAL_FACES
+
+Ints = NDArray[np.int64]
+
+HALF = 0.4
+"""Part of a tetrahedron within the solid from which on it is taken: a little more is taken than is left out,
+as a vertex is more easily moved inwards."""
+
+TRACE = 0.02
+"""The same, where the solid would be lost otherwise: limbs and sheets thinner than a cube."""
+
+LAYER = 2
+"""Tetrahedra, face by face, that a flat layer has at most."""
+
+CRUMB = 2
+"""Tetrahedra that may fall off."""
+
+ROUNDS = 3
+"""In which tetrahedra are added where others hang together at an edge or a vertex only."""
+
+
+def mark(lattice: Lattice, points: FloatArray, volumes: FloatArray) -> Ints:
+    """Numbers of the tetrahedra to take, ascending.
+
+    Args:
+        points: that stand for one connected solid, (k, 3) [m].
+        volumes: of each, (k,) [m^3].
+    """
+    at = lattice.tet_at(points)
+    numbers, place = np.unique(at, return_inverse=True)
+    share = np.bincount(place.reshape(-1), volumes) / lattice.tet_volume
+    trace = min(TRACE, 0.5 * float(share.max()))
+    corners = lattice.corners_of(numbers)
+    taken = share >= HALF
+    while True:
+        lost = ~taken & (share >= trace) & ~np.isin(corners, corners[taken]).any(axis=1)
+        if not lost.any():
+            break
+        # The fullest of those that touch come first; what they cover is lost no longer.
+        taken |= lost & (share >= 0.5 * _most_around(corners, np.where(lost, share, 0.0)))
+    taken = _joined(corners, share, taken, trace)
+    for _ in range(ROUNDS):
+        loose = _hinges(corners[taken])
+        added = ~taken & (share >= trace) & np.isin(corners, loose).any(axis=1)
+        if not added.any():
+            break
+        taken |= added
+    return numbers[taken]
+
+
+def _most_around(corners: Ints, share: FloatArray) -> FloatArray:
+    """The largest share of all tetrahedra that have a corner of each, (m,)."""
+    used, local = np.unique(corners, return_inverse=True)
+    most = np.zeros(len(used))
+    local = local.reshape(-1, 4)
+    np.maximum.at(most, local.ravel(), np.repeat(share, 4))
+    return np.asarray(most[local].max(axis=1))
+
+
+def _joined(corners: Ints, share: FloatArray, taken: NDArray[np.bool_], trace: float) -> NDArray[np.bool_]:
+    """With all those that the solid passes through between parts of what is taken, if that has parts."""
+    parts = components(int(taken.sum()), face_pairs(corners[taken]))
+    if len(parts) == 0 or parts.max() == 0:
+        return taken
+    return taken | (share >= trace)
+
+
+def face_pairs(tets: Ints) -> Ints:
+    """Tetrahedra that share a face, (k, 2)."""
+    faces = np.sort(tets[:, LOCAL_FACES], axis=2).reshape(-1, 3)
+    order = np.lexsort(faces.T)
+    same = (faces[order][1:] == faces[order][:-1]).all(axis=1)
+    return np.stack([order[:-1][same] // 4, order[1:][same] // 4], axis=1)
+
+
+def _fans(tets: Ints) -> Ints:
+    """A number for each corner, (m, 4), alike for corners at the same vertex whose tetrahedra hang together
+    by faces at that vertex."""
+    faces = np.sort(tets[:, LOCAL_FACES], axis=2)
+    flat = faces.reshape(-1, 3)
+    order = np.lexsort(flat.T)
+    same = (flat[order][1:] == flat[order][:-1]).all(axis=1)
+    one, other = order[:-1][same] // 4, order[1:][same] // 4
+    pairs = []
+    for k in range(4):
+        for j in range(4):
+            meets = tets[one, k] == tets[other, j]
+            pairs.append(np.stack([4 * one[meets] + k, 4 * other[meets] + j], axis=1))
+    return components(4 * len(tets), np.concatenate(pairs)).reshape(-1, 4)
+
+
+def _hinges(tets: Ints) -> Ints:
+    """Vertices about which tetrahedra hang together at an edge or at the vertex only."""
+    fans = np.unique(np.stack([tets.ravel(), _fans(tets).ravel()], axis=1), axis=0)
+    vertices, counts = np.unique(fans[:, 0], return_counts=True)
+    return vertices[counts > 1]
+
+
+def split_hinges(tets: Ints) -> tuple[Ints, Ints]:
+    """One vertex for each fan: tetrahedra (m, 4) in new numbers, and the old number of each, (n,)."""
+    fans = _fans(tets)
+    numbers, first = np.unique(fans, return_index=True)
+    return np.searchsorted(numbers, fans), tets.ravel()[first]
+
+
+def without_flat(tets: Ints, flat: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """What is left of tetrahedra when flat ones are taken off in a thin layer, (m,), all in one part.
+
+    A crumb that falls off goes with them; where more would, those round it stay.
+    """
+    taken_off = _in_a_layer(tets, flat)
+    pairs = face_pairs(tets)
+    for _ in range(ROUNDS):
+        kept = ~taken_off
+        parts = components(len(tets), pairs[kept[pairs].all(axis=1)])
+        sizes = np.bincount(parts[kept], minlength=len(tets))
+        is_crumb = kept & (sizes[parts] <= CRUMB)
+        torn = kept & ~is_crumb & (parts != sizes.argmax())
+        if not torn.any():
+            return np.asarray(kept & ~is_crumb)
+        taken_off &= ~np.isin(tets, tets[torn]).any(axis=1)
+    return np.ones(len(tets), dtype=np.bool_)
+
+
+def _in_a_layer(tets: Ints, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Those of the chosen tetrahedra that lie in a thin layer, (m,).
+
+    In each of their groups that hangs together by faces, every one is at most `LAYER` steps from one that was
+    not chosen. A thin limb is no such group.
+    """
+    pairs = face_pairs(tets)
+    groups = components(len(tets), pairs[chosen[pairs].all(axis=1)])
+    has_other = np.zeros(len(tets), dtype=np.bool_)
+    mixed = pairs[chosen[pairs[:, 0]] != chosen[pairs[:, 1]]]
+    has_other[mixed.ravel()] = True
+    for _ in range(LAYER - 1):
+        has_other[pairs[has_other[pairs].any(axis=1)].ravel()] = True
+    deep = np.zeros(len(tets), dtype=np.bool_)
+    deep[groups[chosen & ~has_other]] = True
+    return np.asarray(chosen & ~deep[groups])

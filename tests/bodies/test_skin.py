@@ -1,0 +1,205 @@
+"""An artist's mesh on a body: where it is drawn as the body rests, turns, bends, and is cut."""
+
+import numpy as np
+import pytest
+import trimesh
+from surfaces import ball, joined
+
+from taichi_soft import (
+    Material,
+    MeshError,
+    OptionError,
+    SkinMesh,
+    SoftBodyAsset,
+    SpringMaterial,
+    StateError,
+    World,
+    box,
+    rope,
+    sphere,
+)
+from taichi_soft.bodies import skin_mesh
+
+JELLY = Material(1e5, 0.3, 1000.0)
+BAR = trimesh.creation.box((3.0, 0.6, 0.6)).subdivide().subdivide().subdivide()
+BLOB = joined(ball(0.5, 4), ball(0.35, 4, at=(0.5, 0, 0)))
+
+
+class Zoo:
+    """One world with all kinds of bodies, which each test finds as it was built."""
+
+    def __init__(self):
+        world = self.world = World(floor=None, gravity=(0, 0, 0), retries=0)
+        self.bar = world.add_body(SoftBodyAsset.from_surface(BAR, JELLY, cells=10))
+        self.blob = world.add_body(SoftBodyAsset.from_surface(BLOB, JELLY, cells=8), position=(5, 0, 0))
+        carried = SoftBodyAsset(sphere(0.5, 5), JELLY, skin=(ball(0.6), ball(0.2)), spare_vertices=100)
+        world.reserve(carried, 4)
+        self.carrier = world.spawn(carried, position=(8, 0, 0))
+        self.plain = world.add_body(box((1, 1, 1), (2, 2, 2)), JELLY, position=(11, 0, 0))
+        world.build()
+        self.base = world.snapshot()
+
+    def draw(self, mesh, alpha=1.0):
+        return self.world.read_render_mesh(mesh, alpha)
+
+
+@pytest.fixture(scope="module")
+def built():
+    return Zoo()
+
+
+@pytest.fixture
+def zoo(built):
+    built.world.restore(built.base)
+    return built
+
+
+def put(body, places):
+    body.set_motion(places, np.zeros_like(places))
+
+
+def test_at_rest_a_skin_is_where_the_artist_made_it(zoo):
+    for body, mesh, at in ((zoo.bar, BAR, (0, 0, 0)), (zoo.blob, BLOB, (5, 0, 0))):
+        (skin,) = body.render_meshes
+        positions, normals = zoo.draw(skin)
+        size = np.ptp(mesh.vertices, axis=0).max()
+        np.testing.assert_allclose(positions - at, mesh.vertices, atol=2e-6 * size)
+        np.testing.assert_allclose(normals, body.asset.skins[0].surface.normals, atol=2e-6)
+        np.testing.assert_array_equal(skin.triangles, mesh.faces)
+
+
+def test_a_rigid_motion_moves_positions_and_normals_rigidly(zoo):
+    body = zoo.bar
+    turn = trimesh.transformations.rotation_matrix(1.2, (1, -2, 0.5))[:3, :3]
+    put(body, body.asset.mesh.vertices @ turn.T + [0.3, -0.2, 0.4])
+    positions, normals = zoo.draw(body)
+    np.testing.assert_allclose(positions, BAR.vertices @ turn.T + [0.3, -0.2, 0.4], atol=4e-6)
+    np.testing.assert_allclose(normals, body.asset.skins[0].surface.normals @ turn.T, atol=3e-6)
+
+
+def test_a_uniform_deformation_is_exact_inside_and_out(zoo):
+    """Normals turn by the cofactor of F (Nanson's formula)."""
+    F = np.array([[1.2, 0.3, 0.0], [-0.1, 0.8, 0.2], [0.0, 0.1, 1.1]])
+    body = zoo.carrier  # whose larger skin lies outside of it
+    put(body, body.asset.mesh.vertices @ F.T)
+    for skin, surface in zip(body.render_meshes, (ball(0.6), ball(0.2)), strict=True):
+        positions, normals = zoo.draw(skin)
+        np.testing.assert_allclose(positions, surface.vertices @ F.T, atol=3e-6)
+        wanted = surface.vertices @ np.linalg.inv(F)
+        wanted /= np.linalg.norm(wanted, axis=1, keepdims=True)
+        np.testing.assert_allclose(normals, wanted, atol=0.02)
+
+
+def bent(places):
+    """Along an arc of 90 degrees."""
+    radius = 3.0 / (np.pi / 2)
+    angle, reach = places[:, 0] / radius, radius - places[:, 2]
+    return np.stack([reach * np.sin(angle), places[:, 1], radius - reach * np.cos(angle)], axis=1)
+
+
+def test_a_bent_bar_has_no_creases_at_the_faces_of_its_tetrahedra(zoo):
+    """What is linear in each tetrahedron misses the arc by more than ten times as much."""
+    body = zoo.bar
+    cage, (skin,) = body.asset.mesh, body.asset.skins
+    put(body, bent(cage.vertices))
+    positions, normals = zoo.draw(body)
+    exact = bent(np.asarray(BAR.vertices))
+    linear = np.einsum("kc,kcx->kx", skin.shares, bent(cage.vertices)[cage.tets[skin.tets]])
+    off, off_linear = (np.linalg.norm(found - exact, axis=1) for found in (positions, linear))
+    assert np.sqrt((off**2).mean()) < 0.1 * np.sqrt((off_linear**2).mean())
+    assert off.max() < 0.01
+    across = np.abs(BAR.vertices[:, 0]) < 1.3  # but for the ends
+    up = across & (BAR.vertices[:, 2] > 0.29) & (np.abs(BAR.vertices[:, 1]) < 0.2)
+    angle = BAR.vertices[up, 0] / (3.0 / (np.pi / 2))
+    wanted = np.stack([-np.sin(angle), np.zeros(len(angle)), np.cos(angle)], axis=1)
+    assert np.degrees(np.arccos(np.clip((normals[up] * wanted).sum(axis=1), -1, 1))).max() < 4.0
+
+
+def test_between_two_steps_a_skin_is_drawn_between(zoo):
+    zoo.bar.set_velocity((1.0, 2.0, 3.0))
+    zoo.world.step(0.01)
+    early, late = zoo.draw(zoo.bar, 0.0)[0], zoo.draw(zoo.bar, 1.0)[0]
+    np.testing.assert_allclose(late - early, np.tile([0.01, 0.02, 0.03], (len(late), 1)), atol=2e-6)
+    np.testing.assert_allclose(zoo.draw(zoo.bar, 0.25)[0], 0.75 * early + 0.25 * late, atol=2e-6)
+
+
+def test_one_thread_and_all_draw_the_same_bits(zoo, monkeypatch):
+    put(zoo.blob, bent(zoo.blob.asset.mesh.vertices))
+    found = []
+    for fewest in (0, 10**9):
+        monkeypatch.setattr(skin_mesh, "FEWEST_SHARED", fewest)
+        found.append([rows.tobytes() for rows in zoo.draw(zoo.blob)])
+    assert found[0] == found[1]
+
+
+def test_a_skin_does_not_follow_a_cut_and_says_so(zoo):
+    skin = zoo.carrier.render_meshes[0]
+    assert not skin.is_outdated
+    zoo.carrier.cut(plane=((8.0, 0.0, 0.0), (1.0, 0.0, 0.0)))
+    assert skin.is_outdated
+    with pytest.raises(StateError, match="cannot follow"):
+        zoo.draw(skin)
+    assert zoo.carrier.render_meshes == ()
+    assert zoo.carrier.render_mesh().vertex_count > 0
+
+
+def test_names_textures_and_the_nearest_vertices_are_told(tmp_path):
+    scene = trimesh.Scene()
+    crate = trimesh.creation.box()
+    crate.unmerge_vertices()
+    uv = np.random.default_rng(0).random((len(crate.vertices), 2))
+    crate.visual = trimesh.visual.TextureVisuals(uv=uv)
+    scene.add_geometry(crate, node_name="crate")
+    scene.export(tmp_path / "crate.glb")
+    world = World()
+    body = world.add_body(
+        SoftBodyAsset.from_surface(tmp_path / "crate.glb", JELLY, cells=4), position=(0, 0, 1)
+    )
+    (skin,) = body.render_meshes
+    assert isinstance(skin, SkinMesh)
+    assert "crate" in skin.name
+    assert "crate" in repr(skin)
+    np.testing.assert_allclose(skin.visual.uv, uv, atol=1e-6)
+    near = body.asset.mesh.vertices[skin.body_vertices]
+    assert np.linalg.norm(near - body.asset.skins[0].surface.vertices, axis=1).max() < 0.3
+
+
+def test_bodies_of_one_asset_share_what_binds_their_skin(zoo):
+    assert zoo.bar.asset.skins is zoo.bar.asset.skins
+
+
+def test_where_there_is_no_skin_none_is_drawn(zoo):
+    assert zoo.plain.render_meshes == ()
+    with pytest.raises(OptionError, match="no skin"):
+        zoo.draw(zoo.plain)
+
+
+def test_a_rope_takes_no_skin_and_springs_no_cage():
+    with pytest.raises(MeshError, match="tetrahedra to hang on"):
+        SoftBodyAsset(rope(1.0, 4, mass=0.1), SpringMaterial(500.0, 0.2), skin=ball())
+    with pytest.raises(OptionError, match="takes no cage"):
+        SoftBodyAsset.from_surface(ball(), JELLY, cells=4, law="springs")
+
+
+def test_an_asset_and_options_of_its_own_do_not_go_together():
+    asset = SoftBodyAsset(box((1, 1, 1), (1, 1, 1)), JELLY)
+    world = World()
+    with pytest.raises(OptionError, match="material was given with an asset"):
+        world.add_body(asset, JELLY)
+    with pytest.raises(OptionError, match="law was given with an asset"):
+        world.add_body(asset, law="face")
+    body = world.add_body(asset, position=(0, 0, 1))
+    assert body.asset is asset
+
+
+def test_a_body_from_a_surface_falls_and_rests_on_its_floor():
+    world = World()
+    soft = Material(1e5, 0.3, 1000.0, damping_ratio=0.3)
+    body = world.add_body(SoftBodyAsset.from_surface(BAR, soft, cells=10), position=(0, 0, 0.32))
+    world.build()
+    for _ in range(180):
+        world.step(1 / 60)
+    lowest = world.read_render_mesh(body.render_meshes[0], 1.0)[0][:, 2].min()
+    assert np.abs(body.velocities()).max() < 0.1
+    assert abs(lowest) < 0.02 * 3.0  # of its size
+    assert body.flipped_count() == 0
