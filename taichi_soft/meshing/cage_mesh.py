@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.core.errors import MeshError
 from taichi_soft.core.serialisation import serialised
-from taichi_soft.meshing.arrays import FloatArray, IntArray, as_real, read_only
+from taichi_soft.meshing.arrays import FloatArray, as_real, read_only
 from taichi_soft.meshing.tet_mesh import TetMesh
 
 
@@ -37,14 +37,11 @@ class CageMesh(TetMesh):
     def _carry(self, fill: FloatArray, vertex_volumes: FloatArray) -> None:
         self.__dict__.update(fill=read_only(fill), vertex_volumes=read_only(vertex_volumes))
 
-    def part(self, vertices: NDArray[Any], tets: IntArray, rows: NDArray[Any]) -> CageMesh:
-        """As `TetMesh.part`: copies of a vertex share what it carried by what is round each."""
-        mesh = CageMesh.__new__(CageMesh)
-        mesh._fill(self.vertices[vertices], tets, self.volumes[rows])
-        before = lumped(self.tets, self.fill * self.volumes, len(self.vertices))
-        after = lumped(tets, self.fill[rows] * self.volumes[rows], len(vertices))
-        mesh._carry(self.fill[rows], self.vertex_volumes[vertices] * after / before[vertices])
-        return mesh
+    def _inherit(self, whole: TetMesh, vertices: NDArray[Any], rows: NDArray[Any]) -> None:
+        # Copies of a vertex share what it carried by what is round each.
+        before = lumped(whole.tets, whole.fill * whole.volumes, len(whole.vertices))
+        after = lumped(self.tets, whole.fill[rows] * self.volumes, len(vertices))
+        self._carry(whole.fill[rows], whole.vertex_volumes[vertices] * after / before[vertices])
 
     def __reduce__(self) -> tuple[Any, ...]:
         return (CageMesh, (self.vertices, self.tets, self.fill, self.vertex_volumes))

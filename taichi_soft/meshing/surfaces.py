@@ -113,9 +113,9 @@ def _surface(mesh: trimesh.Trimesh, name: str) -> Surface:
     if len(mesh.faces) == 0:
         raise MeshError("there are no triangles in it")
     surface = _of_arrays(mesh.vertices, mesh.faces, name)
-    given = np.asarray(mesh.vertex_normals, dtype=np.float64) if "vertex_normals" in mesh._cache else None
-    normals = surface.normals if given is None or given.shape != surface.vertices.shape else given
-    return Surface(name, surface.vertices, surface.triangles, read_only(_unit(normals)), mesh.visual)
+    # Those of the file, where it has any: copies of a vertex at a seam of the texture share them.
+    normals = _unit(np.asarray(mesh.vertex_normals, dtype=np.float64))
+    return Surface(name, surface.vertices, surface.triangles, read_only(normals), mesh.visual)
 
 
 def _of_arrays(vertices: Any, triangles: Any, name: str) -> Surface:

@@ -81,9 +81,13 @@ class TetMesh(BodyMesh):
             tets: new vertices of each tetrahedron, (m, 4), every one in use.
             rows: of this mesh, that each tetrahedron is, (m,).
         """
-        mesh = TetMesh.__new__(TetMesh)
+        mesh = type(self).__new__(type(self))
         mesh._fill(self.vertices[vertices], tets, self.volumes[rows])
+        mesh._inherit(self, vertices, rows)
         return mesh
+
+    def _inherit(self, whole: TetMesh, vertices: NDArray[Any], rows: NDArray[Any]) -> None:
+        """Take over what a `part` has of the whole besides its places. Arguments as there."""
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Copying and unpickling rebuild the mesh, so that its arrays are locked again.

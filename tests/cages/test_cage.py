@@ -205,3 +205,16 @@ def test_half_full_tetrahedra_weigh_and_stiffen_by_half():
     assert stable_step(half, RUBBER, element_model("virial")).limit == pytest.approx(
         stable_step(whole, RUBBER, element_model("virial")).limit
     )
+
+
+def test_a_cut_cage_keeps_the_volume_of_its_solid():
+    """Vertices split where a blade passes; copies share by the tetrahedra round each."""
+    found = cage(ball(), cells=5).mesh
+    left = found.vertices[found.tets].mean(axis=1)[:, 0] < 0
+    corners = found.tets.astype(np.int64) + np.where(left, 0, len(found.vertices))[:, None]
+    used, tets = np.unique(corners, return_inverse=True)
+    half = found.part(used % len(found.vertices), tets.reshape(-1, 4).astype(np.int32), np.arange(len(left)))
+    assert isinstance(half, CageMesh)
+    assert len(half.vertices) > len(found.vertices)
+    assert half.vertex_volumes.sum() == pytest.approx(found.vertex_volumes.sum())
+    assert half.fill.tolist() == found.fill.tolist()
