@@ -71,11 +71,13 @@ def as_points(values: ArrayLike, name: str = "vertices", dimension: int = 3) -> 
     return points
 
 
-def as_indices(values: ArrayLike, name: str, width: int, vertex_count: int, what: str) -> IntArray:
+def as_indices(
+    values: ArrayLike, name: str, width: int, vertex_count: int, what: str, *, may_repeat: bool = False
+) -> IntArray:
     """Vertex indices as an int32 copy of shape (m, width), each in 0..vertex_count-1.
 
     Raises: MeshError if the shape or dtype is wrong, or a row (called `what`) has an index out of range
-        or the same vertex twice.
+        or the same vertex twice, unless it `may_repeat`.
     """
     array = _as_array(values, name)
     if array.size == 0:
@@ -93,7 +95,7 @@ def as_indices(values: ArrayLike, name: str, width: int, vertex_count: int, what
         )
     ordered = np.sort(array, axis=1)
     repeated = (ordered[:, 1:] == ordered[:, :-1]).any(axis=1)
-    if repeated.any():
+    if repeated.any() and not may_repeat:
         row = int(np.argmax(repeated))
         raise MeshError(
             f"{what} {row} names a vertex twice (vertices {name_vertices(array[row])}): repair or remove it"

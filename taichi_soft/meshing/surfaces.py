@@ -120,7 +120,7 @@ def _surface(mesh: trimesh.Trimesh, name: str) -> Surface:
 
 def _of_arrays(vertices: Any, triangles: Any, name: str) -> Surface:
     points = as_points(np.asarray(vertices))
-    corners = as_indices(np.asarray(triangles), "triangles", 3, len(points), "triangle")
+    corners = as_indices(np.asarray(triangles), "triangles", 3, len(points), "triangle", may_repeat=True)
     normals = read_only(_normals(points, corners))
     return Surface(name, read_only(points), read_only(corners), normals)
 
