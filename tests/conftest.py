@@ -41,7 +41,8 @@ SECONDS = {
     "core/math/": (2, 0),
     "core/": (66, 90),
     "world/": (84, 397),
-    "bodies/": (15, 296),
+    "cages/": (70, 60),
+    "bodies/": (30, 296),
     "lab/": (0, 355),
     "cli/": (0, 135),
     "demos/": (0, 500),
@@ -58,11 +59,11 @@ SECONDS = {
 """What the tests of files that begin so take, those of `make test` and the soaks, with an empty kernel cache.
 Neighbours have worlds of the same kinds, which each worker compiles once."""
 
-NUMPY = ("meshing/", "elements/materials/", "test_layers")
+NUMPY = ("meshing/", "cages/", "elements/materials/", "test_layers")
 KERNEL = ("elements/", "contact/distances/", "contact/shapes/", "core/math/")
-WORLD = ("elements/laws/test_energy_laws",)
+WORLD = ("elements/laws/test_energy_laws", "cages/test_difficult_surfaces.py::test_a_body")
 SOAK = (
-    *("lab/", "demos/", "cli/"),
+    *("lab/", "demos/", "cli/", "cages/test_difficult_surfaces.py::test_a_body"),
     *(
         "solver/integrators/test_implicit_euler",
         "solver/integrators/test_motion",

@@ -66,7 +66,7 @@ def test_a_body_of_a_difficult_surface_falls_and_rests(fall, name):
     fall.require_rest(name)
 
 
-@pytest.mark.parametrize("scale", [pytest.param(0.001, marks=pytest.mark.soak), 1000.0])
+@pytest.mark.parametrize("scale", SCALED)
 def test_a_body_of_another_scale_falls_and_rests(scale):
     """Stiffness grows with size, as the weight on it does."""
     soft = Material(young=2e5 * scale, poisson=0.3, density=1000.0, damping_ratio=0.2)
