@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from engine_adapter import EngineAdapter, FixedStep
+from taichi_soft.bodies.skin_mesh import SkinMesh
 from taichi_soft.contact.collider import Collider
 from taichi_soft.core.checks import LARGEST_COUNT, as_positive
 from taichi_soft.core.errors import OptionError
@@ -29,6 +30,7 @@ from taichi_soft.render import (
 )
 from taichi_soft.render.colors import Color
 from taichi_soft.render.props import Prop, Scenery
+from taichi_soft.render.skin_colors import vertex_colors
 from taichi_soft.world.body import Body
 from taichi_soft.world.warm_up import warm_up_step
 from taichi_soft.world.world import World, context_of_world
@@ -141,7 +143,7 @@ def film(
         for number in range(count):
             positions = take.play(number)
             if artist and writer:
-                writer.write(artist.draw(positions, take.adapter, take.times))
+                writer.write(artist.draw(positions, take.normals, take.adapter, take.times))
             if on_frame:
                 on_frame(number + 1, count)
     return FilmReport(
@@ -162,7 +164,7 @@ def _warm_up(stage: Stage, take: _Take, artist: _Artist | None) -> None:
     positions = take.play(0)
     take.times.clear()
     if artist:
-        artist.draw(positions, take.adapter, take.times)
+        artist.draw(positions, take.normals, take.adapter, take.times)
         artist.times.clear()
 
 
@@ -187,6 +189,7 @@ class _Take:
         self.adapter = EngineAdapter(stage.world, stage.step, before_step=self._before_step)
         self.fps = fps
         self.buffers: list[NDArray[np.float32]] = []
+        self.normals: list[NDArray[np.float32]] = []
         self.times: list[float] = []
 
     def _before_step(self, world: World) -> None:
@@ -200,14 +203,41 @@ class _Take:
         if number > 0:
             self.adapter.advance(1.0 / self.fps)
         actors = self.stage.actors
-        if [actor.body.vertex_count for actor in actors] != [len(buffer) for buffer in self.buffers]:
-            self.buffers = [np.empty((actor.body.vertex_count, 3), dtype=np.float32) for actor in actors]
-        for actor, buffer in zip(actors, self.buffers, strict=True):
+        if [_vertex_count(actor) for actor in actors] != [len(buffer) for buffer in self.buffers]:
+            self.buffers = [np.empty((_vertex_count(actor), 3), dtype=np.float32) for actor in actors]
+            self.normals = [np.empty_like(buffer) for buffer in self.buffers]
+        for actor, buffer, normals in zip(actors, self.buffers, self.normals, strict=True):
             world = actor.world or self.stage.world
-            world.read_positions(actor.body, self.adapter.alpha, buffer)
+            at = 0
+            for mesh in _skins_of(actor):
+                rows = slice(at, at + mesh.vertex_count)
+                world.read_render_mesh(mesh, self.adapter.alpha, buffer[rows], normals[rows])
+                at += mesh.vertex_count
+            if at == 0:
+                world.read_positions(actor.body, self.adapter.alpha, buffer)
             buffer += np.asarray(actor.shift, dtype=np.float32)
         self.times.append(time.perf_counter() - start)
         return self.buffers
+
+
+def _skins_of(actor: Actor) -> tuple[SkinMesh, ...]:
+    """What is drawn in place of its body's surface, unless that is painted."""
+    return () if actor.paint else actor.body.render_meshes
+
+
+def _vertex_count(actor: Actor) -> int:
+    """Of what is drawn of it."""
+    return sum(mesh.vertex_count for mesh in _skins_of(actor)) or actor.body.vertex_count
+
+
+def _skin_surface(meshes: tuple[SkinMesh, ...], color: Color) -> Surface:
+    """All of them as one, in their own colours where they have any."""
+    counts = [mesh.vertex_count for mesh in meshes]
+    starts = np.cumsum([0, *counts[:-1]])
+    triangles = [mesh.triangles + start for mesh, start in zip(meshes, starts, strict=True)]
+    colors = [vertex_colors(mesh.visual, mesh.vertex_count, color) for mesh in meshes]
+    nowhere = np.zeros((sum(counts), 3), dtype=np.float32)
+    return Surface(nowhere, np.concatenate(triangles), color=np.concatenate(colors), normals=nowhere)
 
 
 class _Artist:
@@ -221,13 +251,19 @@ class _Artist:
         self.surfaces: dict[tuple[int, int], Surface] = {}  # by actor and version of its topology
 
     def draw(
-        self, positions: list[NDArray[np.float32]], now: EngineAdapter, step_times: list[float]
+        self,
+        positions: list[NDArray[np.float32]],
+        normals: list[NDArray[np.float32]],
+        now: EngineAdapter,
+        step_times: list[float],
     ) -> NDArray[np.uint8]:
-        """The picture of the bodies at `positions`, where they are `now`."""
+        """The picture of the bodies at `positions`, where they are `now`; `normals` are those of skins."""
         start = time.perf_counter()
         surfaces = [self._surface_of(actor) for actor in self.stage.actors]
-        for actor, surface, rows in zip(self.stage.actors, surfaces, positions, strict=True):
+        for actor, surface, rows, own in zip(self.stage.actors, surfaces, positions, normals, strict=True):
             surface.positions = rows
+            if surface.normals is not None:
+                surface.normals = own
             if actor.paint:
                 surface.color = actor.paint(actor.body)
         picture = self.renderer.render([*self.scenery.at(now.alpha), *surfaces])
@@ -247,7 +283,10 @@ class _Artist:
         """Its surface, made anew where a cut has changed it."""
         key = id(actor), actor.body.topology_version
         if key not in self.surfaces:
-            self.surfaces[key] = Surface.of(actor.body.mesh, color=actor.color)
+            skins = _skins_of(actor)
+            self.surfaces[key] = (
+                _skin_surface(skins, actor.color) if skins else Surface.of(actor.body.mesh, color=actor.color)
+            )
         return self.surfaces[key]
 
     def _draw_labels(self, picture: NDArray[np.uint8], positions: list[NDArray[np.float32]]) -> None:

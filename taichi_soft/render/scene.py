@@ -54,5 +54,8 @@ class SceneArrays:
         )
         normals = np.empty_like(positions)
         compute_normals(positions, triangles, normals)
+        for surface, offset in zip(surfaces, offsets, strict=True):
+            if surface.normals is not None:
+                normals[offset : offset + len(surface.positions)] = surface.normals
         colors = np.concatenate([surface.color for surface in surfaces])
         return cls(positions, normals, colors, triangles)

@@ -24,11 +24,19 @@ class Surface:
         triangles: (m, 3) vertex indices, counterclockwise seen from outside. Triangles are seen from
             outside only, and shadows take the surface to be closed.
         color: sRGB from 0 to 1, either (3,) for the whole body or (n, 3), one per vertex.
+        normals: (n, 3) of unit length to shade by instead; set them with the positions before each frame.
     Raises: OptionError for wrong shapes, positions that are not finite (a picture of an exploded body shows
         nothing) or colours out of range; MeshError for indices out of range.
     """
 
-    def __init__(self, positions: ArrayLike, triangles: ArrayLike, *, color: ArrayLike = PALETTE[0]) -> None:
+    def __init__(
+        self,
+        positions: ArrayLike,
+        triangles: ArrayLike,
+        *,
+        color: ArrayLike = PALETTE[0],
+        normals: ArrayLike | None = None,
+    ) -> None:
         first = as_array(positions, "positions", (None, 3))
         self.vertex_count = len(first)
         corners = to_array(triangles, "triangles").copy()
@@ -39,9 +47,15 @@ class Surface:
                 f"triangles name vertices {corners.min()} to {corners.max()}, there are {self.vertex_count}"
             )
         # Only vertices on the surface are projected and lit, those on sharp edges once per side.
-        self._used, self.triangles = split_at_creases(first, corners, ROUND)
+        if normals is None:
+            self._used, self.triangles = split_at_creases(first, corners, ROUND)
+        else:
+            self._used, self.triangles = np.arange(self.vertex_count), corners.astype(np.int32)
         self.positions = first
         self.color = color
+        self.normals: NDArray[np.float32] | None = None
+        if normals is not None:
+            self.normals = as_array(normals, "normals", (self.vertex_count, 3)).astype(np.float32)
 
     @classmethod
     def of(cls, mesh: BodyMesh, *, color: ArrayLike = PALETTE[0]) -> Surface:
