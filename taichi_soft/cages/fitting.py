@@ -25,6 +25,10 @@ stable step stays above 0.58 of the lattice's."""
 FLAT = 0.25
 """Part of its volume that the surface leaves of a tetrahedron, below which it is in the way of the fit."""
 
+NEAR = 93
+"""Voxels whose middles are at most the root of 8 from that of a vertex's own: a point that is found in one of
+them, and is not farther than a voxel is long, is the nearest."""
+
 REACH = 0.75
 """How far from a vertex its surface is looked for, in cubes."""
 
@@ -130,7 +134,9 @@ class _Nearest:
         self._solid = solid
         cells = int(np.ceil(reach / solid.spacing))
         offsets = np.argwhere(np.ones((2 * cells + 1,) * 3)) - cells
-        self._offsets = offsets[(offsets**2).sum(axis=1) <= (cells + 1) ** 2]
+        squares = (offsets**2).sum(axis=1)
+        order = np.argsort(squares, kind="stable")
+        self._offsets = offsets[order[squares[order] <= (cells + 1) ** 2]]
         points = np.full((*(n + 2 * cells for n in solid.fill.shape), 3), np.nan)
         inner = (slice(cells, -cells),) * 3
         points[inner] = np.where(_is_border(solid.fill)[..., None], solid.surface, np.nan)
@@ -139,19 +145,26 @@ class _Nearest:
     def __call__(self, places: FloatArray) -> FloatArray:
         """Of each of `places` (k, 3) [m]; itself where there is none in reach."""
         found = places.copy()
-        top = np.array(self._solid.fill.shape) - 1
-        for start in range(0, len(places), 512):
-            few = places[start : start + 512]
-            voxels = ((few - self._solid.origin) / self._solid.spacing).astype(np.int64)
-            near = np.clip(voxels, 0, top)[:, None] + self._offsets + self._pad
-            points = self._points[tuple(np.moveaxis(near, 2, 0))]
-            distance2 = ((points - few[:, None]) ** 2).sum(axis=2)
-            distance2[np.isnan(distance2)] = np.inf
-            best = distance2.argmin(axis=1)
-            rows = np.arange(len(few))
-            hit = np.isfinite(distance2[rows, best])
-            found[start : start + 512][hit] = points[rows, best][hit]
+        away = np.full(len(places), np.inf)
+        rest = np.arange(len(places))
+        for offsets, sure in ((self._offsets[:NEAR], self._solid.spacing), (self._offsets, np.inf)):
+            for start in range(0, len(rest), 512):
+                few = rest[start : start + 512]
+                found[few], away[few] = self._among(places[few], offsets)
+            rest = rest[~(away[rest] <= sure)]
         return np.asarray(found)
+
+    def _among(self, places: FloatArray, offsets: Ints) -> tuple[FloatArray, FloatArray]:
+        """The nearest in the voxels at `offsets` from each place, and how far it is; itself where none is."""
+        top = np.array(self._solid.fill.shape) - 1
+        voxels = ((places - self._solid.origin) / self._solid.spacing).astype(np.int64)
+        near = np.clip(voxels, 0, top)[:, None] + offsets + self._pad
+        points = self._points[tuple(np.moveaxis(near, 2, 0))]
+        distance = np.linalg.norm(points - places[:, None], axis=2)
+        distance[np.isnan(distance)] = np.inf
+        rows, best = np.arange(len(places)), distance.argmin(axis=1)
+        is_there = np.isfinite(distance[rows, best])
+        return np.where(is_there[:, None], points[rows, best], places), distance[rows, best]
 
 
 def _is_border(fill: FloatArray) -> NDArray[np.bool_]:

@@ -26,7 +26,4 @@ def joining(source: Any) -> str:
 
 def filling(surface: str) -> str:
     """How to get a body from a surface that the expression `surface` gives."""
-    return (
-        f"MeshShape({surface}, cell=0.05).voxel_mesh() fills it with cells, here of 5 cm; finer bodies that "
-        "follow it come from programs such as Gmsh, TetGen and fTetWild"
-    )
+    return f"SoftBodyAsset.from_surface({surface}, material) makes a body of it"

@@ -141,7 +141,7 @@ def _way_out(path: Path, points: NDArray[Any], blocks: list[Any], unknown: int) 
 
 def _surface(path: Path) -> str:
     name = path.with_suffix(".stl").name
-    return f"a surface: save it as {name}, then {filling(f'trimesh.load_mesh({name!r})')}"
+    return f"a surface: save it as {name}, then {filling(repr(name))}"
 
 
 def write_interchange(mesh: TetMesh, path: Path, suffix: str) -> None:

@@ -6,11 +6,8 @@
     .vtk, .vtu    VTK unstructured grids (.vtk written as text)
     .mesh         Medit, text
 
-Gmsh, VTK and Medit files need the extra `taichi-soft[io]`. A surface (.obj, .stl and the like) is no body;
-this fills it:
-
-    surface = trimesh.load_mesh("wheel.stl")
-    wheel = MeshShape(surface, cell=0.05).voxel_mesh()
+Gmsh, VTK and Medit files need the extra `taichi-soft[io]`. A surface (.obj, .stl and the like) has no
+tetrahedra; `SoftBodyAsset.from_surface` makes a body of it.
 """
 
 from __future__ import annotations
@@ -56,8 +53,7 @@ def load_mesh(path: str | os.PathLike[str], *, fix_orientation: bool = True) -> 
     source = as_path(path)
     suffix = source.suffix.lower()
     if suffix in SURFACES:
-        surface = f"trimesh.load_mesh({source.name!r})"
-        raise MeshError(f"{source.name}: a surface, which has no tetrahedra: {filling(surface)}")
+        raise MeshError(f"{source.name}: a surface, which has no tetrahedra: {filling(repr(source.name))}")
     converted = needing(f"`meshio convert {source.name} {source.stem}.vtu`", "meshio")
     _require_format(source, f"; of many others {converted} makes one of these")
     read = _read_npz if suffix == ".npz" else read_interchange if suffix in FORMATS else read_tetgen

@@ -329,7 +329,7 @@ def test_the_command_that_an_unknown_format_is_refused_with_makes_a_known_one(tm
 
 
 def test_surfaces_are_refused_with_the_way_to_fill_them(tmp_path):
-    fill = "MeshShape(trimesh.load_mesh('x.stl'), cell=0.05).voxel_mesh() fills it with cells, here of 5 cm"
+    fill = "SoftBodyAsset.from_surface('x.stl', material) makes a body of it"
     faces = meshio.Mesh(BALL.vertices, [("triangle", BALL.surface)])
     write(tmp_path / "x.vtk", "vtk", {}, faces)
     write(tmp_path / "x.msh", "gmsh", {}, faces)

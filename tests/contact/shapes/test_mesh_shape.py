@@ -9,7 +9,18 @@ import numpy as np
 import pytest
 import trimesh
 
-from taichi_soft import MeshError, MeshShape, OptionError, World, load_mesh, preset, rope, sphere, torus
+from taichi_soft import (
+    MeshError,
+    MeshShape,
+    OptionError,
+    SoftBodyAsset,
+    World,
+    load_mesh,
+    preset,
+    rope,
+    sphere,
+    torus,
+)
 
 CUBE = trimesh.creation.box((1, 1, 1))
 COARSE = 0.1
@@ -215,25 +226,30 @@ def test_the_way_to_a_body_that_a_refused_surface_names_runs_as_it_stands(tmp_pa
     monkeypatch.chdir(tmp_path)
     with pytest.raises(MeshError) as caught:
         load_mesh("wheel.stl")
-    (call,) = re.findall(r"(MeshShape\(.*?\.voxel_mesh\(\))", str(caught.value))
-    assert eval(call).volume == pytest.approx(1.0, rel=0.2)
+    (call,) = re.findall(r"(SoftBodyAsset\.from_surface\(.*?\))", str(caught.value))
+    asset = eval(call, {"SoftBodyAsset": SoftBodyAsset, "material": preset("cork")})
+    assert asset.description.masses.sum() == pytest.approx(preset("cork").density, rel=0.01)
 
 
-def test_a_surface_or_a_scene_in_the_place_of_a_body_is_told_the_way():
+@pytest.mark.parametrize("source", [CUBE, trimesh.Scene([CUBE])])
+def test_a_surface_or_a_scene_in_the_place_of_a_body_is_told_the_way(source):
+    way = r"got (Trimesh|Scene): SoftBodyAsset\.from_surface\(mesh, material\) makes a body of it"
+    with pytest.raises(MeshError, match=way):
+        World().add_body(source, preset("cork"))
+    with pytest.raises(MeshError, match=r"got int$"):
+        World().add_body(7, preset("cork"))
+
+
+def test_a_scene_in_the_place_of_a_mesh_shape_is_told_the_way():
     with pytest.raises(
-        MeshError, match=r"got Trimesh: MeshShape\(mesh, cell=0\.05\)\.voxel_mesh\(\) fills it"
-    ):
-        World().add_body(CUBE, preset("cork"))
-    for take in (MeshShape, lambda scene: World().add_body(scene, preset("cork"))):
-        with pytest.raises(
-            MeshError, match=r'got Scene: read the file by trimesh\.load\(path, force="mesh"\)'
-        ) as caught:
-            take(trimesh.Scene([CUBE]))
-        with pytest.raises(MeshError, match=r"got int$"):
-            take(7)
-        (call,) = re.findall(r"scene\.(.*)$", str(caught.value))
-        joined = eval(f"trimesh.Scene([CUBE]).{call}")
-        assert MeshShape(joined, cell=COARSE).bounds.tolist() == MeshShape(CUBE, cell=COARSE).bounds.tolist()
+        MeshError, match=r'got Scene: read the file by trimesh\.load\(path, force="mesh"\)'
+    ) as caught:
+        MeshShape(trimesh.Scene([CUBE]))
+    with pytest.raises(MeshError, match=r"got int$"):
+        MeshShape(7)
+    (call,) = re.findall(r"scene\.(.*)$", str(caught.value))
+    joined = eval(f"trimesh.Scene([CUBE]).{call}")
+    assert MeshShape(joined, cell=COARSE).bounds.tolist() == MeshShape(CUBE, cell=COARSE).bounds.tolist()
 
 
 @pytest.mark.parametrize("installed", [False, True])
