@@ -29,9 +29,10 @@ def sag(asset: SoftBodyAsset, gravity: float) -> float:
     is_held = len(asset.description.pinned) == len(mesh.vertices)
     if is_held or not (isinstance(mesh, TetMesh) and isinstance(material, Material)):
         return 0.0
-    shares = mesh.volumes / mesh.volumes.sum()
-    softness = shares @ (1.0 / asset.description.per_tet("young"))
-    density = shares @ asset.description.per_tet("density")
+    solid = mesh.volumes * mesh.fill  # whose constants are those of the material, however little it fills
+    shares = solid / solid.sum()
+    softness = shares @ (mesh.fill / asset.description.per_tet("young"))
+    density = shares @ (asset.description.per_tet("density") / mesh.fill)
     return float(density * gravity * np.ptp(mesh.vertices, axis=0).min() * softness)
 
 
@@ -41,7 +42,8 @@ def review_weight(assets: Iterable[SoftBodyAsset], gravity: NDArray[np.float64])
     worst = max(assets, key=lambda asset: sag(asset, pull))
     found = sag(worst, pull)
     if found > MOST_SAG:
-        young = np.mean(worst.description.per_tet("young"))
+        assert isinstance(worst.mesh, TetMesh)
+        young = np.mean(worst.description.per_tet("young") / worst.mesh.fill)
         warnings.warn(
             f"a body is too soft for its weight: {worst!r} weighs {found * young:.3g} Pa at its foot, and "
             f"its Young's modulus is {young:.3g} Pa. It may end flat and partly inside out. Take a "

@@ -76,7 +76,9 @@ def first_skin_mesh(body: SoftBody) -> SkinMesh:
     """Raises: OptionError for a body without skin; StateError for one that was removed."""
     require_alive(body)
     if not body.asset.skins:
-        raise OptionError(f"{body!r} has no skin: give its asset one by skin=, or draw body.render_mesh()")
+        raise OptionError(
+            f"mesh must be a RenderMesh, and {body!r} has no skin to stand for one: draw body.render_mesh()"
+        )
     return SkinMesh(body, body.asset.skins[0])
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from taichi_soft.cages.connected import parts_of
 from taichi_soft.cages.fitting import caps, fit
 from taichi_soft.cages.lattice import Lattice
-from taichi_soft.cages.marking import mark, split_hinges, without_flat
+from taichi_soft.cages.marking import mark, part_count, split_hinges, without_flat
 from taichi_soft.cages.masses import fitted
 from taichi_soft.cages.solid import Solid, solid_of
 from taichi_soft.core.checks import as_count, as_positive
@@ -27,8 +27,10 @@ Ints = NDArray[np.int64]
 FINENESS = 8
 """Voxels along a cube."""
 
+LEAST_FINENESS, MOST_FINENESS = 3, 16
+
 MOST_VOXELS = 1 << 22
-"""Above, voxels are coarser: at least 3 to a cube."""
+"""Above, voxels are coarser, but for `LEAST_FINENESS`."""
 
 SMALLEST_PART = 1e-3
 """Of the volume: smaller parts are dust."""
@@ -121,12 +123,11 @@ def lattice_cage(vertices: FloatArray, triangles: Ints, cell_size: float) -> Cag
     """
     used = vertices[np.unique(triangles)]
     low, high = used.min(axis=0), used.max(axis=0)
-    fineness = FINENESS
-    while fineness > 3 and np.prod((high - low) / cell_size * fineness + 3) > MOST_VOXELS:
-        fineness -= 1
-    solid = solid_of(vertices, triangles, cell_size / fineness)
+    solid = solid_of(vertices, triangles, _voxel_edge(vertices[triangles], cell_size))
     _require_solid(solid, high - low)
     points, volumes = solid.quadrature()
+    if solid.is_simple:
+        volumes *= abs(volume_within(vertices[triangles])) / volumes.sum()
     part_of_point = parts_of(solid.fill)[solid.fill > 0.0]
     lattice = Lattice.round(low, high, cell_size)
     places, corners, parts, offset = [], [], [], 0
@@ -138,6 +139,11 @@ def lattice_cage(vertices: FloatArray, triangles: Ints, cell_size: float) -> Cag
         numbers = mark(lattice, points[mine], volumes[mine])
         numbers = _peeled(lattice, numbers, solid)
         tets, lattice_vertices = split_hinges(lattice.corners_of(numbers))
+        if part_count(tets) > 1:
+            raise OptionError(
+                f"cells of {cell_size:.4g} m are too large: parts of the surface are so thin that the cage "
+                f"falls into {part_count(tets)} pieces. Take cell_size={0.5 * cell_size:.3g} or less"
+            )
         at = lattice.points_of(lattice_vertices)
         places.append(fit(at, tets, solid, cell_size))
         corners.append(tets + offset)
@@ -149,6 +155,25 @@ def lattice_cage(vertices: FloatArray, triangles: Ints, cell_size: float) -> Cag
     kept = np.isin(part_of_point, large)
     mesh = TetMesh(np.concatenate(places), np.concatenate(corners))
     return _filled(mesh, np.concatenate(parts), solid, points[kept], volumes[kept], start[kept])
+
+
+def volume_within(corners: FloatArray) -> float:
+    """Of a closed surface of triangles (m, 3, 3), by the divergence theorem [m^3]."""
+    return float(np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))) / 6.0
+
+
+def _voxel_edge(corners: FloatArray, cell_size: float) -> float:
+    """Of voxels in which the solid can be told [m].
+
+    A sheet is as thick as twice its volume over its surface: it is to have two voxels across.
+    """
+    doubled = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = 0.5 * float(np.linalg.norm(doubled, axis=1).sum())
+    edge = min(cell_size / FINENESS, max(abs(volume_within(corners)) / area, cell_size / MOST_FINENESS))
+    size = np.ptp(corners.reshape(-1, 3), axis=0)
+    while edge < cell_size / LEAST_FINENESS and np.prod(size / edge + 3.0) > MOST_VOXELS:
+        edge *= 1.1
+    return min(edge, cell_size / LEAST_FINENESS)
 
 
 def _require_solid(solid: Solid, size: FloatArray) -> None:

@@ -29,6 +29,9 @@ NEAR = 93
 """Voxels whose middles are at most the root of 8 from that of a vertex's own: a point that is found in one of
 them, and is not farther than a voxel is long, is the nearest."""
 
+CHUNK = 1 << 20
+"""Pairs of vertices and voxels that are looked at together."""
+
 REACH = 0.75
 """How far from a vertex its surface is looked for, in cubes."""
 
@@ -148,8 +151,9 @@ class _Nearest:
         away = np.full(len(places), np.inf)
         rest = np.arange(len(places))
         for offsets, sure in ((self._offsets[:NEAR], self._solid.spacing), (self._offsets, np.inf)):
-            for start in range(0, len(rest), 512):
-                few = rest[start : start + 512]
+            rows = max(1, CHUNK // len(offsets))
+            for start in range(0, len(rest), rows):
+                few = rest[start : start + rows]
                 found[few], away[few] = self._among(places[few], offsets)
             rest = rest[~(away[rest] <= sure)]
         return np.asarray(found)

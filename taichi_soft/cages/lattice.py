@@ -39,9 +39,12 @@ class Lattice:
         return self.edge**3 / 12.0
 
     @property
-    def tet_count(self) -> int:
-        """Numbers that tetrahedra can have."""
-        return 12 * int(np.prod(self.cubes))
+    def tets(self) -> Ints:
+        """Numbers of all tetrahedra, ascending."""
+        cubes = np.stack(np.unravel_index(np.arange(int(np.prod(self.cubes))), self.cubes))
+        numbers = np.arange(12 * cubes.shape[1]).reshape(3, -1, 4)
+        has_next = cubes < np.array(self.cubes)[:, None] - 1
+        return np.concatenate([numbers[axis][has_next[axis]].ravel() for axis in range(3)])
 
     def tet_at(self, points: FloatArray) -> Ints:
         """Number of the tetrahedron that holds each point within the inner cubes, (k,)."""

@@ -48,14 +48,44 @@ def mark(lattice: Lattice, points: FloatArray, volumes: FloatArray) -> Ints:
             break
         # The fullest of those that touch come first; what they cover is lost no longer.
         taken |= lost & (share >= 0.5 * _most_around(corners, np.where(lost, share, 0.0)))
-    taken = _joined(corners, share, taken, trace)
+    if part_count(corners[taken]) > 1:
+        taken |= share >= trace
     for _ in range(ROUNDS):
         loose = _hinges(corners[taken])
         added = ~taken & (share >= trace) & np.isin(corners, loose).any(axis=1)
         if not added.any():
             break
         taken |= added
-    return numbers[taken]
+    if part_count(corners[taken]) > 1:
+        taken |= share > 0.0
+    return _bridged(lattice, numbers[taken])
+
+
+def _bridged(lattice: Lattice, numbers: Ints) -> Ints:
+    """With tetrahedra that hold nothing, where parts meet at edges or vertices only: all in one part then,
+    unless parts do not meet at all."""
+    others, every = np.zeros(0, dtype=np.int64), np.zeros((0, 4), dtype=np.int64)
+    while True:
+        tets = lattice.corners_of(numbers)
+        parts = components(len(tets), face_pairs(tets))
+        ends = np.unique(np.stack([tets.ravel(), np.repeat(parts, 4)], axis=1), axis=0)
+        vertices, counts = np.unique(ends[:, 0], return_counts=True)
+        if (counts == 1).all():
+            return numbers
+        if len(every) == 0:
+            others = np.setdiff1d(lattice.tets, numbers)
+            every = lattice.corners_of(others)
+        # Those that touch most of the places where parts meet close the most gaps.
+        meets = np.isin(every, vertices[counts > 1]).sum(axis=1)
+        meets[np.isin(others, numbers)] = 0
+        if not meets.any():
+            return numbers
+        numbers = np.union1d(numbers, others[meets == meets.max()])
+
+
+def part_count(tets: Ints) -> int:
+    """How many parts hang together by faces."""
+    return int(components(len(tets), face_pairs(tets)).max(initial=-1)) + 1
 
 
 def _most_around(corners: Ints, share: FloatArray) -> FloatArray:
@@ -65,14 +95,6 @@ def _most_around(corners: Ints, share: FloatArray) -> FloatArray:
     local = local.reshape(-1, 4)
     np.maximum.at(most, local.ravel(), np.repeat(share, 4))
     return np.asarray(most[local].max(axis=1))
-
-
-def _joined(corners: Ints, share: FloatArray, taken: NDArray[np.bool_], trace: float) -> NDArray[np.bool_]:
-    """With all those that the solid passes through between parts of what is taken, if that has parts."""
-    parts = components(int(taken.sum()), face_pairs(corners[taken]))
-    if len(parts) == 0 or parts.max() == 0:
-        return taken
-    return taken | (share >= trace)
 
 
 def face_pairs(tets: Ints) -> Ints:
@@ -124,8 +146,9 @@ def without_flat(tets: Ints, flat: NDArray[np.bool_]) -> NDArray[np.bool_]:
         kept = ~taken_off
         parts = components(len(tets), pairs[kept[pairs].all(axis=1)])
         sizes = np.bincount(parts[kept], minlength=len(tets))
-        is_crumb = kept & (sizes[parts] <= CRUMB)
-        torn = kept & ~is_crumb & (parts != sizes.argmax())
+        is_main = parts == sizes.argmax()
+        is_crumb = kept & ~is_main & (sizes[parts] <= CRUMB)
+        torn = kept & ~is_crumb & ~is_main
         if not torn.any():
             return np.asarray(kept & ~is_crumb)
         taken_off &= ~np.isin(tets, tets[torn]).any(axis=1)

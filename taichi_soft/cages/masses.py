@@ -6,10 +6,13 @@ import numpy as np
 
 from taichi_soft.meshing.arrays import FloatArray
 
-LEAST = 0.25
+LEAST = 0.1
 """Of a vertex's share of the mass: lighter vertices would make the stable step shorter."""
 
 ROUNDS = 50
+
+HALVINGS = 12
+"""Of a step that leaves more lacking."""
 
 CLOSE = 1e-9
 """Of the mass: what the sums may lack."""
@@ -36,15 +39,21 @@ def fitted(
     equations = np.concatenate([np.ones((1, len(r))), r.T, (r[:, rows] * r[:, columns]).T])
     about = second - mass * np.outer(center, center)
     wanted = np.concatenate([[mass], np.zeros(3), about[rows, columns] / size**2])
+    shares = shares * (mass / shares.sum())
     least = LEAST * shares
-    multipliers = np.zeros(len(equations))
-    masses = shares
+    multipliers, masses = np.zeros(len(equations)), shares
+    lacking = wanted - equations @ masses
     for _ in range(ROUNDS):  # Newton's method on the dual problem, whose gradient is what the sums lack
-        free = masses > least
-        lacking = wanted - equations @ masses
         if np.abs(lacking).max() <= CLOSE * mass:
             break
-        weighted = equations * np.where(free, shares, 0.0)
-        multipliers += np.linalg.lstsq(weighted @ equations.T, lacking, rcond=1e-10)[0]
-        masses = np.maximum(shares * (1.0 + multipliers @ equations), least)
-    return masses
+        weighted = equations * np.where(masses > least, shares, 0.0)
+        step = np.linalg.lstsq(weighted @ equations.T, lacking, rcond=1e-10)[0]
+        for part in 0.5 ** np.arange(HALVINGS):
+            tried = np.maximum(shares * (1.0 + (multipliers + part * step) @ equations), least)
+            left = wanted - equations @ tried
+            if np.linalg.norm(left) < np.linalg.norm(lacking):
+                break
+        else:
+            break  # there are no such masses: these come near
+        multipliers, masses, lacking = multipliers + part * step, tried, left
+    return np.asarray(masses * (mass / masses.sum()))

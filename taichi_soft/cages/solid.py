@@ -38,6 +38,7 @@ class Solid:
     center: FloatArray  # (nx, ny, nz, 3), of what is inside, in voxels from the corner of each
     surface: FloatArray  # (nx, ny, nz, 3), mean of the crossings in a voxel [m], NaN where there are none
     open_share: float  # of all lines that meet the surface: those that do not come back to 0
+    is_simple: bool  # all do, and nowhere is anything twice inside: its triangles tell the volume
 
     @property
     def volume(self) -> float:
@@ -82,7 +83,9 @@ def solid_of(vertices: FloatArray, triangles: Ints, spacing: float) -> Solid:
     with np.errstate(invalid="ignore"):
         surface = origin + spacing * (sums / crossings[..., None])
     fill, center = _fill(rows)
-    return Solid(origin, spacing, fill, center, surface, open_lines / max(lines, 1))
+    deepest = max(float(np.abs(row.winding).max()) for row in rows)
+    is_simple = open_lines == 0 and deepest < 1.0 + 1e-6
+    return Solid(origin, spacing, fill, center, surface, open_lines / max(lines, 1), is_simple)
 
 
 class _Lines:
@@ -125,12 +128,12 @@ def _fill(rows: list[_Lines]) -> tuple[FloatArray, FloatArray]:
     """
     is_whole = np.stack([row.is_whole for row in rows])
     crossings = np.stack([row.crossings for row in rows])
-    windings = np.abs(np.stack([row.winding for row in rows]))
+    windings = np.stack([row.winding for row in rows])
     best = np.argmax(np.where(is_whole, 1.0 + _around(crossings), 0.0), axis=0)
     votes = np.where(is_whole | ~is_whole.any(axis=0), 1.0, 0.0)
-    by_vote = (votes * windings).sum(axis=0) / votes.sum(axis=0)
+    by_vote = np.abs((votes * windings).sum(axis=0)) / votes.sum(axis=0)
     is_crossed = (is_whole & (crossings > 0)).any(axis=0)
-    by_best = np.minimum(np.take_along_axis(windings, best[None], axis=0)[0], 1.0)
+    by_best = np.minimum(np.abs(np.take_along_axis(windings, best[None], axis=0)[0]), 1.0)
     center = np.full((*best.shape, 3), 0.5)
     for axis, row in enumerate(rows):
         mine = is_crossed & (best == axis)

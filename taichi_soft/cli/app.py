@@ -11,6 +11,7 @@ from rich.markup import escape
 
 from taichi_soft.cli.console import errors, say, version_of
 from taichi_soft.cli.demo import demo
+from taichi_soft.cli.doctor import doctor
 from taichi_soft.cli.drop_test import drop_test
 from taichi_soft.cli.info import info
 from taichi_soft.cli.profile import profile
@@ -27,7 +28,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for _command in (demo, info, replay, profile, drop_test, report, warm):
+for _command in (demo, info, doctor, replay, profile, drop_test, report, warm):
     app.command()(_command)
 
 

@@ -590,7 +590,8 @@ READERS: dict[str, str] = {
         time""",
     "Body": """aabb angular_momentum asset attachments center_of_mass deformations elastic_energy failure flipped_count flipped_tets
         gravitational_energy gravity_scale index is_alive is_asleep is_cut is_frozen is_held is_sheltered
-        kinetic_energy linear_damping masses material mesh momentum pinned plastic_strains pose solve_residual stable_step strains stresses surface
+        kinetic_energy linear_damping masses material mesh momentum pinned plastic_strains pose render_meshes
+        solve_residual stable_step strains stresses surface
         tet_origins tet_strain tet_stress tets topology_version velocities vertex_count vertex_origins vertex_strain
         vertex_stress volume volumes""",
     "Collider": """angular_impulse angular_velocity friction group impulse index is_alive mask position restitution
@@ -610,7 +611,7 @@ DEAD = {"Body": "dead_body", "Collider": "dead_collider", "Frame": "dead_frame",
 DEAD |= {"Attachment": "dead_hold", "Joint": "dead_joint", "Motor": "dead_motor"}
 
 READABLE_WHEN_DEAD: dict[str, str] = {
-    "Body": """asset index is_alive is_cut is_frozen masses material mesh surface tet_origins tets topology_version
+    "Body": """asset index is_alive is_cut is_frozen masses material mesh render_meshes surface tet_origins tets topology_version
         vertex_count vertex_origins""",
     "Collider": """angular_velocity friction group index is_alive mask position restitution rotation shape thickness
         velocity""",
