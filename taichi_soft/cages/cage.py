@@ -20,7 +20,7 @@ from taichi_soft.meshing import TetMesh
 from taichi_soft.meshing.arrays import FloatArray
 from taichi_soft.meshing.cage_mesh import CageMesh, lumped
 from taichi_soft.meshing.locating import Locator
-from taichi_soft.meshing.surfaces import Surface
+from taichi_soft.meshing.surfaces import Surface, joined
 
 Ints = NDArray[np.int64]
 
@@ -83,9 +83,7 @@ def build_cage(
     """The cage of a solid that surfaces enclose together. Arguments as of `SoftBodyAsset.from_surface`."""
     if method not in METHODS:
         raise OptionError(f"unknown method {method!r}: choose one of {', '.join(map(repr, METHODS))}")
-    starts = np.cumsum([0, *(len(surface.vertices) for surface in surfaces)])
-    vertices = np.concatenate([surface.vertices for surface in surfaces])
-    triangles = np.concatenate([surface.triangles + start for surface, start in zip(surfaces, starts)])  # noqa: B905
+    vertices, triangles = joined(surfaces)
     size = np.ptp(vertices[np.unique(triangles)], axis=0)
     return lattice_cage(vertices, triangles, _cell_size(size, cells, cell_size))
 
@@ -124,10 +122,11 @@ def lattice_cage(vertices: FloatArray, triangles: Ints, cell_size: float) -> Cag
     used = vertices[np.unique(triangles)]
     low, high = used.min(axis=0), used.max(axis=0)
     solid = solid_of(vertices, triangles, _voxel_edge(vertices[triangles], cell_size))
-    _require_solid(solid, high - low)
+    within = abs(volume_within(vertices[triangles]))
+    _require_solid(solid, high - low, within, cell_size)
     points, volumes = solid.quadrature()
     if solid.is_simple:
-        volumes *= abs(volume_within(vertices[triangles])) / volumes.sum()
+        volumes *= within / volumes.sum()
     part_of_point = parts_of(solid.fill)[solid.fill > 0.0]
     lattice = Lattice.round(low, high, cell_size)
     places, corners, parts, offset = [], [], [], 0
@@ -169,6 +168,8 @@ def _voxel_edge(corners: FloatArray, cell_size: float) -> float:
     """
     doubled = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     area = 0.5 * float(np.linalg.norm(doubled, axis=1).sum())
+    if area == 0.0:
+        raise MeshError("the surface has no area: it encloses nothing")
     edge = min(cell_size / FINENESS, max(abs(volume_within(corners)) / area, cell_size / MOST_FINENESS))
     size = np.ptp(corners.reshape(-1, 3), axis=0)
     while edge < cell_size / LEAST_FINENESS and np.prod(size / edge + 3.0) > MOST_VOXELS:
@@ -176,12 +177,21 @@ def _voxel_edge(corners: FloatArray, cell_size: float) -> float:
     return min(edge, cell_size / LEAST_FINENESS)
 
 
-def _require_solid(solid: Solid, size: FloatArray) -> None:
-    """Raises: MeshError where there is nothing to carry."""
+def _require_solid(solid: Solid, size: FloatArray, within: float, cell_size: float) -> None:
+    """Raises: MeshError where there is nothing to carry, OptionError where it is lost between the voxels.
+
+    Args: within: volume by the divergence theorem [m^3].
+    """
     if solid.open_share > OPEN:
         raise MeshError(
             f"the surface is open: {100 * solid.open_share:.3g} % of the lines through it do not come out "
             "again. Give a sheet a thickness (Blender: Solidify), or make a cloth of it by ParticleMesh"
+        )
+    least = FLATTEST * float(np.prod(size))
+    if solid.is_simple and within > least and solid.volume < 0.5 * within:
+        raise OptionError(
+            f"cells of {cell_size:.4g} m are too large: the solid of {within:.3g} m^3 is too thin for them. "
+            f"Take cell_size={0.5 * cell_size:.3g} or less"
         )
     if solid.volume <= FLATTEST * float(np.prod(np.maximum(size, solid.spacing))):
         raise MeshError(f"the surface encloses no volume ({solid.volume:.2g} m^3): give it a thickness")

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from taichi_soft.cages.connected import components
 from taichi_soft.cages.lattice import Lattice
 from taichi_soft.meshing.arrays import FloatArray
-from taichi_soft.meshing.topology import LOCAL_FACES
+from taichi_soft.meshing.topology import shared_faces
 
 Ints = NDArray[np.int64]
 
@@ -99,20 +99,13 @@ def _most_around(corners: Ints, share: FloatArray) -> FloatArray:
 
 def face_pairs(tets: Ints) -> Ints:
     """Tetrahedra that share a face, (k, 2)."""
-    faces = np.sort(tets[:, LOCAL_FACES], axis=2).reshape(-1, 3)
-    order = np.lexsort(faces.T)
-    same = (faces[order][1:] == faces[order][:-1]).all(axis=1)
-    return np.stack([order[:-1][same] // 4, order[1:][same] // 4], axis=1)
+    return shared_faces(tets) // 4
 
 
 def _fans(tets: Ints) -> Ints:
     """A number for each corner, (m, 4), alike for corners at the same vertex whose tetrahedra hang together
     by faces at that vertex."""
-    faces = np.sort(tets[:, LOCAL_FACES], axis=2)
-    flat = faces.reshape(-1, 3)
-    order = np.lexsort(flat.T)
-    same = (flat[order][1:] == flat[order][:-1]).all(axis=1)
-    one, other = order[:-1][same] // 4, order[1:][same] // 4
+    one, other = (shared_faces(tets) // 4).T
     pairs = []
     for k in range(4):
         for j in range(4):

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from taichi_soft.meshing.arrays import FloatArray
 from taichi_soft.meshing.tet_mesh import TetMesh
-from taichi_soft.meshing.topology import LOCAL_FACES
+from taichi_soft.meshing.topology import LOCAL_FACES, shared_faces
 
 Ints = NDArray[np.int64]
 
@@ -161,11 +161,8 @@ class _Bins:
 
 def _neighbours(tets: NDArray[np.integer]) -> Ints:
     """The tetrahedron beyond each face, (m, 4), -1 where there is none."""
-    flat = np.sort(tets[:, LOCAL_FACES], axis=2).reshape(-1, 3)
-    order = np.lexsort(flat.T)
-    same = (flat[order][1:] == flat[order][:-1]).all(axis=1)
-    one, other = order[:-1][same], order[1:][same]
-    neighbours = np.full(len(flat), -1)
+    one, other = shared_faces(tets).T
+    neighbours = np.full(4 * len(tets), -1)
     neighbours[one], neighbours[other] = other // 4, one // 4
     return neighbours.reshape(-1, 4)
 

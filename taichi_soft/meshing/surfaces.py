@@ -63,6 +63,15 @@ def read_surfaces(source: Any, up: Up | None = None) -> tuple[Surface, ...]:
     return tuple(_turned(surface, up or "z") for surface in _surfaces(source, ""))
 
 
+def joined(surfaces: tuple[Surface, ...]) -> tuple[FloatArray, NDArray[np.int64]]:
+    """Vertices (n, 3) [m] and triangles (m, 3) of all of them, as of one."""
+    starts = np.cumsum([0, *(len(each.vertices) for each in surfaces)])[:-1]
+    triangles = [
+        each.triangles.astype(np.int64) + start for each, start in zip(surfaces, starts, strict=True)
+    ]
+    return np.concatenate([each.vertices for each in surfaces]), np.concatenate(triangles)
+
+
 def _are_arrays(source: Any) -> bool:
     return len(source) == 2 and all(hasattr(part, "__len__") and not isinstance(part, str) for part in source)
 

@@ -53,6 +53,17 @@ def surface_of(tets: IntArray) -> IntArray:
     return np.ascontiguousarray(faces[np.sort(order[starts[counts == 1]])])
 
 
+def shared_faces(tets: NDArray[Any]) -> NDArray[np.int64]:
+    """Pairs of faces that are one, (k, 2): face i of tetrahedron t has number 4 t + i.
+
+    No face may belong to more than two.
+    """
+    flat = np.sort(tets[:, LOCAL_FACES], axis=2).reshape(-1, 3)
+    order = np.lexsort(flat.T)
+    same = (flat[order][1:] == flat[order][:-1]).all(axis=1)
+    return np.stack([order[:-1][same], order[1:][same]], axis=1)
+
+
 def first_duplicate(tets: IntArray) -> tuple[int, int] | None:
     """Two rows that name the same four vertices, lower row first; None if there are none."""
     order, starts, counts = groups(np.sort(tets, axis=1))

@@ -181,6 +181,8 @@ def test_the_same_surface_gives_the_same_cage():
         (([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]), {}, MeshError, "thickness"),
         (([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 1]]), {}, MeshError, "no volume"),
         (([[1, 1, 1]] * 3, [[0, 1, 2]]), {}, MeshError, "a point"),
+        (([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]]), {}, MeshError, "no area"),
+        (trimesh.creation.box((1.0, 0.001, 0.001)), {"cells": 1}, OptionError, "Take cell_size"),
     ],
 )
 def test_what_makes_no_cage_is_refused_with_the_way_out(source, options, error, text):

@@ -13,7 +13,7 @@ from taichi_soft.core.errors import MeshError
 from taichi_soft.lab.doctor.surface import NO_AREA
 from taichi_soft.meshing.arrays import FloatArray
 from taichi_soft.meshing.io import SURFACES
-from taichi_soft.meshing.surfaces import Surface
+from taichi_soft.meshing.surfaces import Surface, joined
 
 VOXELS = 96
 """Along the longest side, by which inside and outside are told apart."""
@@ -36,10 +36,7 @@ def write_mended(surfaces: tuple[Surface, ...], path: Path) -> tuple[int, int]:
     if path.suffix.lower() not in SURFACES:
         raise MeshError(f"{path.name}: unknown surface format {path.suffix!r}: use {', '.join(SURFACES)}")
     starts = np.cumsum([0, *(len(each.vertices) for each in surfaces)])
-    vertices = np.concatenate([each.vertices for each in surfaces])
-    triangles = np.concatenate(
-        [each.triangles.astype(np.int64) + start for each, start in zip(surfaces, starts[:-1], strict=True)]
-    )
+    vertices, triangles = joined(surfaces)
     size = float(np.ptp(vertices[np.unique(triangles)], axis=0).max())
     kept = _kept(vertices[triangles], triangles, size)
     faces, turned = triangles[kept], np.zeros(int(kept.sum()), dtype=np.bool_)

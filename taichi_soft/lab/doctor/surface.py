@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.cages.connected import components
-from taichi_soft.meshing.surfaces import Surface
+from taichi_soft.meshing.surfaces import Surface, joined
 
 Ints = NDArray[np.int64]
 
@@ -37,11 +37,7 @@ class SurfaceFacts:
 
 def facts_of(surfaces: tuple[Surface, ...]) -> SurfaceFacts:
     """Look at surfaces as one."""
-    starts = np.cumsum([0, *(len(each.vertices) for each in surfaces)])[:-1]
-    vertices = np.concatenate([each.vertices for each in surfaces])
-    triangles = np.concatenate(
-        [each.triangles.astype(np.int64) + start for each, start in zip(surfaces, starts, strict=True)]
-    )
+    vertices, triangles = joined(surfaces)
     size = float(np.ptp(vertices[np.unique(triangles)], axis=0).max())
     places = np.round(vertices / max(WELD * size, 1e-300)).astype(np.int64)
     welded = np.unique(places, axis=0, return_inverse=True)[1].reshape(-1)[triangles]
