@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from taichi_soft.bodies.kernels.skin import FRAME, ROW, write_skin
 from taichi_soft.bodies.render_mesh import RenderMesh
 from taichi_soft.bodies.skin import Skin
-from taichi_soft.bodies.soft_body import SoftBody, require_alive
+from taichi_soft.bodies.soft_body import SoftBody, record_of, require_alive
 from taichi_soft.core.errors import OptionError
 
 Floats32 = NDArray[np.float32]
@@ -69,17 +69,21 @@ def skin_meshes(body: SoftBody) -> tuple[SkinMesh, ...]:
     """Those of its asset; none where it was cut or torn."""
     if body.is_cut:
         return ()
-    return tuple(SkinMesh(body, skin) for skin in body.asset.skins)
+    record = record_of(body)
+    if record.skin_meshes is None:
+        record.skin_meshes = tuple(SkinMesh(body, skin) for skin in body.asset.skins)
+    return record.skin_meshes
 
 
 def first_skin_mesh(body: SoftBody) -> SkinMesh:
-    """Raises: OptionError for a body without skin; StateError for one that was removed."""
+    """Raises: OptionError for a body without skin, or cut; StateError for one that was removed."""
     require_alive(body)
-    if not body.asset.skins:
+    meshes = skin_meshes(body)
+    if not meshes:
         raise OptionError(
             f"mesh must be a RenderMesh, and {body!r} has no skin to stand for one: draw body.render_mesh()"
         )
-    return SkinMesh(body, body.asset.skins[0])
+    return meshes[0]
 
 
 def warm_up(state: Any) -> None:

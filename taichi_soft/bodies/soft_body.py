@@ -198,6 +198,7 @@ class BodyRecord:
     failure: Failure | None = None  # once it was asked for
     part: CutMesh | None = None  # of the asset's mesh, once it was cut
     topology_version: int = 0
+    skin_meshes: tuple[Any, ...] | None = None  # once they were asked for
 
     def become(self, part: CutMesh | None) -> None:
         """Take note of what cuts have left of the asset's mesh, None for all of it."""

@@ -26,6 +26,17 @@ def _row(rows: ti.template(), i):
 
 
 @ti.func
+def drawn_position(state: ti.template(), first, vertex, alpha):
+    """Of a vertex of the body whose particles begin at `first`, between two steps [m]."""
+    p = state.particle_of_vertex[first + vertex]
+    before, after = state.prev_position[p], state.particle_position[p]
+    x = before + alpha * (after - before)
+    if alpha == 1.0:
+        x = after
+    return x
+
+
+@ti.func
 def _block_count(positions: ti.template()):
     return (positions.shape[0] // 3 + LANES - 1) // LANES
 
@@ -52,11 +63,7 @@ def write_render_mesh(
         first = state.body_particles[body][0]
         for lane in range(LANES):
             i = table[block * STRIDE + lane]
-            p = state.particle_of_vertex[first + table[_block_count(positions) * STRIDE + i]]
-            before, after = state.prev_position[p], state.particle_position[p]
-            x = before + alpha * (after - before)
-            if alpha == 1.0:
-                x = after
+            x = drawn_position(state, first, table[_block_count(positions) * STRIDE + i], alpha)
             for k in ti.static(range(3)):
                 positions[3 * i + k] = x[k]
     ti.loop_config(serialize=is_serial)

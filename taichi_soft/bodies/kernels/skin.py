@@ -1,9 +1,11 @@
 """Vertices and normals of an artist's mesh that a body carries."""
 
+from taichi_soft.bodies.kernels.render_mesh import drawn_position
 from taichi_soft.core.runtime import ti
 
 FRAME = 12
-"""Numbers of a frame: where a vertex of the body is, and the gradient of the deformation there, by rows."""
+"""Numbers of a frame of a vertex of the body: the gradient F of the deformation there, by columns, and where
+the vertex is less F X / 2, with X its place at rest."""
 
 ROW = 10
 """Numbers of a vertex of the skin: four shares, where it aims, its normal at rest."""
@@ -13,18 +15,8 @@ NO_LENGTH = 1e-30
 
 
 @ti.func
-def _position(state: ti.template(), first, vertex, alpha):
-    p = state.particle_of_vertex[first + vertex]
-    before, after = state.prev_position[p], state.particle_position[p]
-    x = before + alpha * (after - before)
-    if alpha == 1.0:
-        x = after
-    return x
-
-
-@ti.func
-def _row(rows: ti.template(), at):
-    return ti.Vector([rows[at], rows[at + 1], rows[at + 2]])
+def _three(numbers: ti.template(), at):
+    return ti.Vector([numbers[at], numbers[at + 1], numbers[at + 2]])
 
 
 @ti.kernel
@@ -54,12 +46,12 @@ def write_skin(
     ti.loop_config(serialize=is_serial)
     for vertex in range(count):
         first = state.body_particles[body][0]
-        x = _position(state, first, vertex, alpha)
+        x = drawn_position(state, first, vertex, alpha)
         F = ti.Matrix.zero(ti.f32, 3, 3)
         for e in range(ints[vertex], ints[vertex + 1]):
-            edge = _position(state, first, ints[count + 1 + e], alpha) - x
-            F += edge.outer_product(_row(floats, 3 * e))
-        offset = x - 0.5 * (F @ _row(floats, 3 * (ints[count] + vertex)))
+            edge = drawn_position(state, first, ints[count + 1 + e], alpha) - x
+            F += edge.outer_product(_three(floats, 3 * e))
+        offset = x - 0.5 * (F @ _three(floats, 3 * (ints[count] + vertex)))
         for i in ti.static(range(3)):
             frames[FRAME * vertex + 9 + i] = offset[i]
             for j in ti.static(range(3)):
@@ -79,7 +71,7 @@ def write_skin(
             ti.Vector([frame[6], frame[7], frame[8]]),
             ti.Vector([frame[9], frame[10], frame[11]]),
         )
-        aim, normal = 0.5 * _row(floats, at + 4), _row(floats, at + 7)
+        aim, normal = 0.5 * _three(floats, at + 4), _three(floats, at + 7)
         x = offset + aim.x * a + aim.y * b + aim.z * c
         n = normal.x * b.cross(c) + normal.y * c.cross(a) + normal.z * a.cross(b)
         square = n.dot(n)
