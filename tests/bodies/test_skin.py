@@ -19,6 +19,7 @@ from taichi_soft import (
     sphere,
 )
 from taichi_soft.bodies import skin_mesh
+from taichi_soft.render.replay import replay
 
 JELLY = Material(1e5, 0.3, 1000.0)
 BAR = trimesh.creation.box((3.0, 0.6, 0.6)).subdivide().subdivide().subdivide()
@@ -203,3 +204,19 @@ def test_a_body_from_a_surface_falls_and_rests_on_its_floor():
     assert np.abs(body.velocities()).max() < 0.3
     assert abs(lowest) < 0.02 * 3.0  # of its size
     assert body.flipped_count() == 0
+
+
+def test_a_cage_is_in_a_recording_and_moves_the_same_again(tmp_path):
+    asset = SoftBodyAsset.from_surface(BLOB, JELLY, cells=5)
+    world = World(record=10)
+    world.add_body(asset, position=(0, 0, 1))
+    world.build()
+    for _ in range(20):
+        world.step(1 / 60)
+    report = replay(world.save_recording(tmp_path / "blob.recording"))
+    assert report.steps == 10
+    assert report.first_difference is None
+
+
+def test_a_body_has_the_same_skin_meshes_each_time_they_are_asked_for(zoo):
+    assert zoo.bar.render_meshes is zoo.bar.render_meshes
