@@ -653,6 +653,8 @@ MAKERS: dict[Any, dict[str, Kind]] = {
         "damping_model": choice("edge", **NAME_OF), "pinned": Kind(lambda g, rng: [0], NOT_VERTICES).but("empty"),
         "contact": choice(Contact(), none=None, number=1, text="soft"), "plasticity": choice(None, number=1, text="soft"),
         "spare_vertices": choice(4, **NOT_COUNTS), "tearing": choice(None, number=1, text="soft"),
+        "skin": choice((), none=None, number=1, text="no such file.obj", list=["virial"], flat=np.zeros((3, 3)), empty=([], []),
+                       nan=(BLOCK.vertices * NAN, BLOCK.surface), far=(BLOCK.vertices, BLOCK.surface + 99)),
     },
     Contact: {
         "friction": number(0.0, 1.0, below=-1.0), "thickness": or_none(number(0.0, 0.1, below=-1.0)), "itself": ANY_FLAG,

@@ -141,7 +141,7 @@ def test_a_world_without_bodies_goes_on(empty):
 
 
 READABLE = {"asset", "index", "is_alive", "is_frozen", "mesh", "material", "vertex_count", "tets", "surface"}
-READABLE |= {"masses", "is_cut", "topology_version", "vertex_origins", "tet_origins"}
+READABLE |= {"masses", "is_cut", "topology_version", "vertex_origins", "tet_origins", "render_meshes"}
 ARGUMENTS = {"set_motion": (np.zeros_like(MESH.vertices), np.zeros_like(MESH.vertices))}
 ARGUMENTS |= {"watch_stress": (1e4,), "watch_tearing": (1e4,), "cut": ()}
 UP = (0.0, 0.0, 1.0)
