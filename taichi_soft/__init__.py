@@ -73,6 +73,7 @@ from taichi_soft.events import (
     Torn,
     Woke,
 )
+from taichi_soft.feel import Behaviour, Feel, material_from_feel
 from taichi_soft.meshing import (
     MeshQuality,
     ParticleMesh,
@@ -104,6 +105,7 @@ __all__ = [
     "PRESETS",
     "AnisotropicMaterial",
     "Attachment",
+    "Behaviour",
     "Body",
     "BoxShape",
     "CageMesh",
@@ -118,6 +120,7 @@ __all__ = [
     "DroppedEventsWarning",
     "Event",
     "Failure",
+    "Feel",
     "FellAsleep",
     "Frame",
     "Froze",
@@ -181,6 +184,7 @@ __all__ = [
     "init",
     "internal_forces",
     "load_mesh",
+    "material_from_feel",
     "plane_angles",
     "preset",
     "rope",

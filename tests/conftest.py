@@ -42,6 +42,7 @@ SECONDS = {
     "core/": (66, 90),
     "world/": (84, 397),
     "cages/": (70, 60),
+    "feel/": (60, 40),
     "bodies/": (30, 296),
     "lab/": (0, 355),
     "cli/": (0, 135),
@@ -64,6 +65,7 @@ KERNEL = ("elements/", "contact/distances/", "contact/shapes/", "core/math/")
 WORLD = ("elements/laws/test_energy_laws", "cages/test_difficult_surfaces.py::test_a_body")
 SOAK = (
     *("lab/", "demos/", "cli/", "cages/test_difficult_surfaces.py::test_a_body"),
+    "feel/test_material_from_feel.py::test_random_wishes",
     *(
         "solver/integrators/test_implicit_euler",
         "solver/integrators/test_motion",

@@ -24,6 +24,7 @@ LAYERS = """
     solver
     persistence
     world
+    feel
     taichi_soft
     engine_adapter
     render

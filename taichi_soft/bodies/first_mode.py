@@ -18,8 +18,8 @@ _AT_ONCE = 4
 
 _MOST_ITERATIONS = 400
 _WINDOW, _CHANGE = 10, 5e-3
-"""Iterations, and change of the frequency's square in all of these, at which it ends. Of long bodies and of
-letters a single one changes little long before the end."""
+"""Iterations, and change of the frequency's square in all of these, at which it ends if nothing is said. Of
+long bodies and of letters a single one changes little long before the end."""
 
 _ROUND_OFF = 1e-9
 """Length of a direction, as a part of the longest, below which it is round-off: made longer it would be rigid
@@ -27,15 +27,23 @@ motion as well. Bodies of few tetrahedra have no other directions left."""
 
 
 def first_frequency(body: BodyDescription) -> float:
-    """Angular frequency of the slowest vibration of a body that nothing holds [rad/s]; 0 where it has none.
+    """Angular frequency of the slowest vibration of a body that nothing holds [rad/s], from above by less
+    than a fifth; 0 where it has none."""
+    return first_mode(body)[0]
+
+
+def first_mode(body: BodyDescription, change: float = _CHANGE) -> tuple[float, Floats]:
+    """The slowest vibration of a body that nothing holds: angular frequency [rad/s], and shape (n, 3), the
+    largest entry being 1; 0 and zeros where it has none.
 
     Ritz's method with polynomials of up to third order as a first guess, made better by locally optimal block
     conjugate gradients (Knyazev 2001). The value comes from above.
+    Args: change: of the frequency's square in 10 iterations, at which it ends.
     """
     vibration = vibration_of(body)
     rigid, bent = _polynomials(body)
     if bent.shape[1] == 0:
-        return 0.0
+        return 0.0, np.zeros_like(body.mesh.vertices)
     scale = vibration.diagonal()[:, None]
     u, image, value = _ritz(bent, _applied(vibration, bent))
     conjugate = conjugate_image = np.zeros((len(u), 0))
@@ -50,9 +58,10 @@ def first_frequency(body: BodyDescription) -> float:
         conjugate, conjugate_image = new - u @ part, new_image - image @ part
         u, image = new, new_image
         values.append(value[0])
-        if len(values) > _WINDOW and values[-1 - _WINDOW] - value[0] <= _CHANGE * value[0]:
+        if len(values) > _WINDOW and values[-1 - _WINDOW] - value[0] <= change * value[0]:
             break
-    return float(np.sqrt(max(value[0], 0.0)))
+    shape = u[:, 0].reshape(-1, 3) / np.sqrt(body.masses)[:, None]
+    return float(np.sqrt(max(value[0], 0.0))), shape / np.abs(shape).max()
 
 
 def _applied(vibration: Vibration, u: Floats) -> Floats:
