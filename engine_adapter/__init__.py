@@ -1,7 +1,8 @@
 """What a game loop talks to: fixed steps from frames of any length, and positions in between."""
 
 from engine_adapter.adapter import EngineAdapter
+from engine_adapter.budget import GivenUp
 from engine_adapter.fixed_step import FixedStep
 from engine_adapter.rollback import Rollback
 
-__all__ = ["EngineAdapter", "FixedStep", "Rollback"]
+__all__ = ["EngineAdapter", "FixedStep", "GivenUp", "Rollback"]

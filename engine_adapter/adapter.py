@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from time import perf_counter
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from engine_adapter.budget import Budget, GivenUp
 from engine_adapter.fixed_step import Accumulator, FixedStep
 from engine_adapter.rollback import Rollback
 from taichi_soft import Body, Event, OptionError, RenderMesh, StateError, World
@@ -33,6 +35,9 @@ class EngineAdapter:
         before_step: called with the world before every fixed step: the place to move colliders and frames,
             to push and to grab, so that it happens at the same moments whatever the frame rate.
         rewind_ticks: steps that `rewind` can go back; 0 keeps nothing.
+        budget_ms: what a fixed step may take [ms]. Where it takes longer, bodies with levels of detail get
+            coarser, the farthest first (see `see_from`), and finer again when there is time; see `given_up`.
+            None: all stay as they are.
     Raises: StateError if the world is not built; OptionError if `fixed_step` is not a FixedStep, or
         `before_step` cannot be called.
     """
@@ -44,6 +49,7 @@ class EngineAdapter:
         *,
         before_step: Callable[[World], object] | None = None,
         rewind_ticks: int = 0,
+        budget_ms: float | None = None,
     ) -> None:
         fixed_step = FixedStep() if fixed_step is None else fixed_step
         if not isinstance(world, World):
@@ -63,6 +69,8 @@ class EngineAdapter:
         self._rollback = Rollback(world, ticks) if ticks else None
         if self._rollback is not None:
             self._rollback.save()
+        self._rewind_ticks = ticks
+        self._budget = None if budget_ms is None else Budget(world, budget_ms)
         self._dropped_time = 0.0
         self._total_dropped_time = 0.0
 
@@ -107,7 +115,13 @@ class EngineAdapter:
         """
         if self._before_step is not None:
             self._before_step(self._world)
-        self._world.step(self._fixed_step.dt, self._fixed_step.substeps)
+        if self._budget is None:
+            self._world.step(self._fixed_step.dt, self._fixed_step.substeps)
+        else:
+            self._budget.prepare(self._rewind_ticks)
+            start = perf_counter()
+            self._world.step(self._fixed_step.dt, self._fixed_step.substeps)
+            self._budget.note(perf_counter() - start)
         if self._rollback is not None:
             self._rollback.save()
 
@@ -134,6 +148,27 @@ class EngineAdapter:
             self._dropped_time = dropped + (steps - made) * self._fixed_step.dt
             self._total_dropped_time += self._dropped_time
         return made
+
+    def see_from(self, viewer: ArrayLike) -> None:
+        """Say where the camera is, (3,) [m]: a budget lowers the levels of the farthest bodies first.
+
+        Raises: OptionError for what is no place; StateError without `budget_ms`.
+        """
+        self._required_budget.see_from(viewer)
+
+    @property
+    def given_up(self) -> GivenUp:
+        """Which bodies are coarser than they could be, and whether the budget is met.
+
+        Raises: StateError without `budget_ms`.
+        """
+        return self._required_budget.given_up
+
+    @property
+    def _required_budget(self) -> Budget:
+        if self._budget is None:
+            raise StateError("this adapter has no budget: make it with budget_ms")
+        return self._budget
 
     @one_thread
     def rewind(self, steps: int) -> None:
@@ -163,6 +198,8 @@ class EngineAdapter:
         """
         self._world.restore(data)
         self._accumulator.remainder = 0.0
+        if self._budget is not None:
+            self._budget.restart()
         if self._rollback is not None:
             self._rollback.save()
 

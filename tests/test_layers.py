@@ -19,6 +19,7 @@ LAYERS = """
     control
     contact
     fracture
+    levels
     queries
     events
     solver

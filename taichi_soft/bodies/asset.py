@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import KW_ONLY, dataclass, field
+from collections.abc import Sequence
+from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from taichi_soft.bodies.calibration import calibrated
 from taichi_soft.bodies.contact import DEFAULT_CONTACT, THIN, Contact
 from taichi_soft.bodies.description import BodyDescription, require_size
 from taichi_soft.bodies.first_mode import first_frequency
-from taichi_soft.bodies.layout import BodyArrays, arrange
+from taichi_soft.bodies.layout import BodyArrays, arrange, room_of
 from taichi_soft.bodies.plasticity import Plasticity
 from taichi_soft.bodies.skin import Skin, bound
 from taichi_soft.bodies.stability import StableStep, stable_step
@@ -63,6 +65,8 @@ class SoftBodyAsset:
         tearing: where it tears by itself, into its spare vertices; None for nowhere. Takes a `Material`.
         skin: what is drawn in place of its surface, as `read_surfaces` takes it: a file, a trimesh.Trimesh or
             Scene. See `Body.render_meshes`.
+        coarser: the same thing of fewer and fewer tetrahedra, as `with_coarser` makes it: levels of detail
+            for `Body.set_level`. Takes no spare vertices and no plasticity.
     Raises: MeshError, MaterialError or OptionError for bad input.
     """
 
@@ -79,6 +83,7 @@ class SoftBodyAsset:
     spare_vertices: int = 0
     tearing: Tearing | None = None
     skin: Any = ()
+    coarser: tuple[SoftBodyAsset, ...] = ()
     description: BodyDescription = field(init=False)
 
     def __post_init__(self) -> None:
@@ -108,6 +113,63 @@ class SoftBodyAsset:
         object.__setattr__(self, "pinned", pinned)
         object.__setattr__(self, "description", description)
         object.__setattr__(self, "skin", surfaces)
+        object.__setattr__(self, "coarser", self._checked_levels())
+
+    def _checked_levels(self) -> tuple[SoftBodyAsset, ...]:
+        if not isinstance(self.coarser, (tuple, list)) or not all(
+            isinstance(each, SoftBodyAsset) for each in self.coarser
+        ):
+            raise OptionError(f"coarser must be a tuple of assets, got {self.coarser!r}")
+        if self.coarser and (self.spare_vertices or self.plasticity is not None):
+            raise OptionError("an asset that is cut, tears or is bent for good has no levels of detail")
+        for level, each in enumerate(self.coarser, start=1):
+            if each.coarser or each.spare_vertices or each.plasticity is not None:
+                raise OptionError(f"level {level} must be without levels, cuts and plasticity of its own")
+            if each.description.model != self.description.model or each.contact != self.contact:
+                raise OptionError(f"level {level} must have the law and the contact of the finest")
+            if self.description.bonds is not None:
+                raise OptionError(f"law {self.law!r} has no levels of detail: it looks at edges")
+            room, needed = room_of(self.arrays, 0), room_of(each.arrays, 0)
+            if len(each.mesh.tets) > len(self.mesh.tets) or any(
+                n > m for n, m in zip(needed, room, strict=True)
+            ):
+                raise MeshError(
+                    f"level {level}: {len(each.mesh.tets)} tetrahedra and {needed[0]} vertices are not "
+                    f"fewer than the {len(self.mesh.tets)} and {room[0]} of the finest"
+                )
+        return tuple(self.coarser)
+
+    @property
+    def levels(self) -> tuple[SoftBodyAsset, ...]:
+        """All levels of detail, the finest first, which is this one."""
+        return (self, *self.coarser)
+
+    def with_coarser(self, *meshes: TetMesh) -> SoftBodyAsset:
+        """The same with levels of detail of these meshes, each coarser than the one before.
+
+        Their constants are such that they weigh as much and vibrate as fast in the slowest modes. Takes
+        seconds for each.
+        Raises: MeshError for a mesh that is not coarser; MaterialError for another material than one with a
+            number for each constant.
+        """
+        material = self.material
+        if not isinstance(material, Material) or any(
+            np.ndim(getattr(material, name)) for name in ("young", "poisson", "density")
+        ):
+            raise MaterialError("levels of detail take a Material with one number for each constant")
+        plain = {
+            name: getattr(self, name)
+            for name in ("law", "strain", "flips", "damping_model", "contact", "skin")
+        }
+        levels = []
+        for mesh in meshes:
+            if not isinstance(mesh, TetMesh):
+                raise MeshError(f"a level of detail must be a TetMesh, got {mesh!r}")
+            held = mesh.vertices[:, None] - self.mesh.vertices[self.description.pinned]
+            pinned = np.unique((held**2).sum(axis=2).argmin(axis=0)) if held.shape[1] else ()
+            bare = SoftBodyAsset(mesh, material, pinned=pinned, **plain)
+            levels.append(replace(bare, material=calibrated(self.description, bare.description)))
+        return replace(self, coarser=tuple(levels))
 
     def _require_tears(self, model: ElementModel) -> None:
         if not isinstance(self.tearing, Tearing):
@@ -136,7 +198,7 @@ class SoftBodyAsset:
         surface: Any,
         material: AnyMaterial,
         *,
-        cells: int | None = None,
+        cells: int | Sequence[int] | None = None,
         cell_size: float | None = None,
         method: CageMethod = "lattice",
         up: Up | None = None,
@@ -152,7 +214,8 @@ class SoftBodyAsset:
             surface: path of a .glb, .gltf, .obj, .ply, .stl or .off file, a trimesh.Trimesh or Scene, or
                 (vertices (n, 3) [m], triangles (m, 3)).
             material: of the solid.
-            cells: of the cage along the longest side; 10 if neither this nor cell_size is given.
+            cells: of the cage along the longest side; 10 if neither this nor cell_size is given. Several
+                numbers, the largest first, make levels of detail: see `with_coarser`.
             cell_size: edge of a cell [m], instead of `cells`.
             method: of making the cage; "lattice" needs no other package.
             up: axis that points up in the file; None takes "y" for .glb and .gltf, as their format has it,
@@ -162,8 +225,14 @@ class SoftBodyAsset:
             for cells out of range, with the memory that they would take.
         """
         surfaces = read_surfaces(surface, up)
-        cage = build_cage(surfaces, cells=cells, cell_size=cell_size, method=method)
-        return cls(cage.mesh, material, skin=surfaces, **options)
+        numbers: list[Any] = list(cells) if isinstance(cells, (tuple, list)) else [cells]
+        if not numbers:
+            raise OptionError("cells is empty: give a number, or some numbers for levels of detail")
+        finest, *coarser = (
+            build_cage(surfaces, cells=number, cell_size=cell_size, method=method).mesh for number in numbers
+        )
+        asset = cls(finest, material, skin=surfaces, **options)
+        return asset.with_coarser(*coarser) if coarser else asset
 
     @cached_property
     def skins(self) -> tuple[Skin, ...]:

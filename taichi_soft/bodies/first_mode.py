@@ -10,8 +10,8 @@ from taichi_soft.bodies.vibration import Vibration, vibration_of
 
 Floats = NDArray[np.float64]
 
-_MODES = 4
-"""That are looked for at once: round bodies have several of the same frequency."""
+_MORE = 3
+"""Modes that are looked for beside those that are asked for: round bodies have several of one frequency."""
 
 _AT_ONCE = 4
 """Columns that a product with the stiffness matrix takes: more fall out of a processor's cache."""
@@ -36,32 +36,44 @@ def first_mode(body: BodyDescription, change: float = _CHANGE) -> tuple[float, F
     """The slowest vibration of a body that nothing holds: angular frequency [rad/s], and shape (n, 3), the
     largest entry being 1; 0 and zeros where it has none.
 
+    Args: change: of the frequency's square in 10 iterations, at which it ends. The value comes from above.
+    """
+    frequencies, shapes = lowest_modes(body, 1, change)
+    if len(frequencies) == 0:
+        return 0.0, np.zeros_like(body.mesh.vertices)
+    return float(frequencies[0]), shapes[0] / np.abs(shapes[0]).max()
+
+
+def lowest_modes(body: BodyDescription, count: int, change: float) -> tuple[Floats, Floats]:
+    """The slowest vibrations of a body that nothing holds: angular frequencies [rad/s], ascending, and shapes
+    (k, n, 3), of which the squares weighted by mass sum to 1; fewer where it has no more.
+
     Ritz's method with polynomials of up to third order as a first guess, made better by locally optimal block
-    conjugate gradients (Knyazev 2001). The value comes from above.
-    Args: change: of the frequency's square in 10 iterations, at which it ends.
+    conjugate gradients (Knyazev 2001). The values come from above.
+    Args: change: of the sum of the frequencies' squares in 10 iterations, at which it ends.
     """
     vibration = vibration_of(body)
     rigid, bent = _polynomials(body)
     if bent.shape[1] == 0:
-        return 0.0, np.zeros_like(body.mesh.vertices)
-    scale = vibration.diagonal()[:, None]
-    u, image, value = _ritz(bent, _applied(vibration, bent))
+        return np.zeros(0), np.zeros((0, *body.mesh.vertices.shape))
+    scale, block = vibration.diagonal()[:, None], count + _MORE
+    u, image, value = _ritz(bent, _applied(vibration, bent), block)
     conjugate = conjugate_image = np.zeros((len(u), 0))
-    values = [value[0]]
-    while len(values) <= _MOST_ITERATIONS:
+    sums = [value[:count].sum()]
+    while len(sums) <= _MOST_ITERATIONS:
         step = (image - u * value) / scale
         step -= rigid @ (rigid.T @ step)
         directions = np.hstack([u, step, conjugate])
         images = np.hstack([image, _applied(vibration, step), conjugate_image])
-        new, new_image, value = _ritz(directions, images)
+        new, new_image, value = _ritz(directions, images, block)
         part = u.T @ new
         conjugate, conjugate_image = new - u @ part, new_image - image @ part
         u, image = new, new_image
-        values.append(value[0])
-        if len(values) > _WINDOW and values[-1 - _WINDOW] - value[0] <= change * value[0]:
+        sums.append(value[:count].sum())
+        if len(sums) > _WINDOW and sums[-1 - _WINDOW] - sums[-1] <= change * sums[-1]:
             break
-    shape = u[:, 0].reshape(-1, 3) / np.sqrt(body.masses)[:, None]
-    return float(np.sqrt(max(value[0], 0.0))), shape / np.abs(shape).max()
+    shapes = u[:, :count].T.reshape(-1, *body.mesh.vertices.shape) / np.sqrt(body.masses)[:, None]
+    return np.sqrt(np.maximum(value[:count], 0.0)), shapes
 
 
 def _applied(vibration: Vibration, u: Floats) -> Floats:
@@ -72,8 +84,8 @@ def _applied(vibration: Vibration, u: Floats) -> Floats:
     )
 
 
-def _ritz(directions: Floats, images: Floats) -> tuple[Floats, Floats, Floats]:
-    """The slowest vibrations that can be made of directions (3n, k), of which the images by K are given.
+def _ritz(directions: Floats, images: Floats, count: int) -> tuple[Floats, Floats, Floats]:
+    """The slowest `count` vibrations that can be made of directions (3n, k), of which images by K are given.
 
     Returns: these, their images and the squares of their frequencies.
     """
@@ -84,8 +96,8 @@ def _ritz(directions: Floats, images: Floats) -> tuple[Floats, Floats, Floats]:
     mixed = mixed[:, sizes > 1e-10] / np.sqrt(sizes[sizes > 1e-10])
     small = mixed.T @ (directions.T @ images) @ mixed
     values, vectors = np.linalg.eigh((small + small.T) / 2)
-    mixed = mixed @ vectors[:, :_MODES]
-    return directions @ mixed, images @ mixed, values[:_MODES]
+    mixed = mixed @ vectors[:, :count]
+    return directions @ mixed, images @ mixed, values[:count]
 
 
 def _orthonormal(directions: Floats) -> Floats:

@@ -49,7 +49,7 @@ class Skin:
 def bound(mesh: TetMesh, surfaces: tuple[Surface, ...]) -> tuple[Skin, ...]:
     """Surfaces bound to a mesh at rest."""
     locator = Locator(mesh)
-    neighbours, begins, slopes = _slopes(mesh)
+    neighbours, begins, slopes = slopes_of(mesh)
     skins = []
     for surface in surfaces:
         tets, shares = locator(surface.vertices)
@@ -63,7 +63,7 @@ def bound(mesh: TetMesh, surfaces: tuple[Surface, ...]) -> tuple[Skin, ...]:
     return tuple(skins)
 
 
-def _slopes(mesh: TetMesh) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats]:
+def slopes_of(mesh: TetMesh) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats]:
     """F of vertex i is the sum over its neighbours j of (x_j - x_i) times their row: neighbours (e,), where
     those of each vertex begin (n + 1,), and rows (e, 3) [1/m]."""
     corners, n = mesh.vertices[mesh.tets], len(mesh.vertices)

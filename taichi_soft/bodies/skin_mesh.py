@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from taichi_soft.bodies.kernels.skin import FRAME, ROW, write_skin
 from taichi_soft.bodies.render_mesh import RenderMesh
 from taichi_soft.bodies.skin import Skin
-from taichi_soft.bodies.soft_body import SoftBody, record_of, require_alive
+from taichi_soft.bodies.soft_body import SoftBody, present_asset, record_of, require_alive
 from taichi_soft.core.errors import OptionError
+from taichi_soft.meshing import TetMesh
 
 Floats32 = NDArray[np.float32]
 
@@ -26,13 +27,33 @@ class SkinMesh(RenderMesh):
     is cut or torn it is outdated, and there is no new one.
     """
 
-    def __init__(self, body: SoftBody, skin: Skin) -> None:
-        """Made by `Body.render_meshes`."""
-        corners = body.asset.mesh.tets[skin.tets]
-        nearest = corners[np.arange(len(corners)), skin.shares.argmax(axis=1)]
-        self._describe(body, nearest.astype(np.int64), skin.surface.triangles)
-        self._skin = skin
-        self._frames = np.empty(FRAME * body.vertex_count, dtype=np.float32)
+    def __init__(self, body: SoftBody, number: int) -> None:
+        """Made by `Body.render_meshes`, of the surface of the asset's skin that has this number."""
+        self._body, self._number = body, number
+        self._bind()
+
+    def _bind(self) -> None:
+        """To the tetrahedra that the body has now: levels of detail have others."""
+        body = self._body
+        asset, self._level = present_asset(body), record_of(body).level
+        self._skin: Skin = asset.skins[self._number]
+        assert isinstance(asset.mesh, TetMesh)
+        corners = asset.mesh.tets[self._skin.tets]
+        nearest = corners[np.arange(len(corners)), self._skin.shares.argmax(axis=1)]
+        self._describe(body, nearest.astype(np.int64), self._skin.surface.triangles)
+        self._frames = np.empty(FRAME * len(asset.mesh.vertices), dtype=np.float32)
+
+    @property
+    def _present_skin(self) -> Skin:
+        if self._level != record_of(self._body).level:
+            self._bind()
+        return self._skin
+
+    @property
+    def body_vertices(self) -> NDArray[np.int32]:
+        """The body's vertex that is nearest to each render vertex at rest, int32 (k,)."""
+        _ = self._present_skin
+        return super().body_vertices
 
     def __repr__(self) -> str:
         state = ", outdated" if self.is_outdated else ""
@@ -59,7 +80,7 @@ class SkinMesh(RenderMesh):
         return "a skin cannot follow a cut: draw body.render_mesh() in its place"
 
     def _write(self, state: Any, alpha: float, positions: Floats32, normals: Floats32) -> None:
-        skin, n = self._skin, self._body.vertex_count
+        skin, n = self._present_skin, self._body.vertex_count
         rows = positions.reshape(-1), normals.reshape(-1)
         is_serial = n + skin.vertex_count < FEWEST_SHARED
         write_skin(state, is_serial, self._body.index, n, alpha, skin.ints, skin.floats, self._frames, *rows)
@@ -71,7 +92,7 @@ def skin_meshes(body: SoftBody) -> tuple[SkinMesh, ...]:
         return ()
     record = record_of(body)
     if record.skin_meshes is None:
-        record.skin_meshes = tuple(SkinMesh(body, skin) for skin in body.asset.skins)
+        record.skin_meshes = tuple(SkinMesh(body, i) for i in range(len(body.asset.skin)))
     return record.skin_meshes
 
 

@@ -199,10 +199,11 @@ class BodyRecord:
     part: CutMesh | None = None  # of the asset's mesh, once it was cut
     topology_version: int = 0
     skin_meshes: tuple[Any, ...] | None = None  # once they were asked for
+    level: int = 0  # of detail, 0 being the finest
 
-    def become(self, part: CutMesh | None) -> None:
-        """Take note of what cuts have left of the asset's mesh, None for all of it."""
-        self.part = part
+    def become(self, part: CutMesh | None, level: int = 0) -> None:
+        """Take note of what cuts have left of the asset's mesh, None for all of it, and of its level."""
+        self.part, self.level = part, level
         self.topology_version += 1
 
 
@@ -234,6 +235,11 @@ class SoftBody(Handle):
     def asset(self) -> SoftBodyAsset:
         """What it shares with other bodies of its kind; `World.spawn` takes it."""
         return self._asset
+
+    @property
+    def level(self) -> int:
+        """Level of detail, 0 being the finest: see `set_level`."""
+        return self._record.level
 
     @property
     def index(self) -> int:
@@ -364,6 +370,11 @@ class SoftBody(Handle):
 def record_of(body: SoftBody) -> BodyRecord:
     """What is kept of a body, to read and to write."""
     return body._record
+
+
+def present_asset(body: SoftBody) -> SoftBodyAsset:
+    """What fills the slot of a body that was not cut: its asset, or a coarser level of it."""
+    return body._asset.levels[body._record.level]
 
 
 def context_of(body: SoftBody) -> Context:

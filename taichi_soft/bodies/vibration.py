@@ -81,6 +81,11 @@ class TetVibration(Vibration):
             total += 2 * h * self._dampers.apply(displaced)
         return np.asarray(total / self.root_mass)
 
+    def energies(self, displaced: Floats) -> Floats:
+        """u^T K u of each tetrahedron for displacements (k, n, 3) [m]: twice their energy, (k, m) [J]."""
+        corners = displaced[:, self._tets.rows].reshape(len(displaced), -1, 12)
+        return np.asarray(np.einsum("kti,tij,ktj->kt", corners, self._matrices, corners, optimize=True))
+
     def diagonal(self) -> Floats:
         """As `Vibration.diagonal`."""
         own = np.diagonal(self._matrices, axis1=1, axis2=2).reshape(-1, 4, 3, 1)

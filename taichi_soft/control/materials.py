@@ -11,7 +11,7 @@ from taichi_soft.bodies.description import BodyDescription
 from taichi_soft.bodies.fields import BodyFields
 from taichi_soft.bodies.kernels.constant_rows import write_fours, write_masses, write_numbers
 from taichi_soft.bodies.layout import BodyArrays, Ranges, rearrange
-from taichi_soft.bodies.soft_body import SoftBody, context_of, record_of, redescribe
+from taichi_soft.bodies.soft_body import SoftBody, context_of, present_asset, record_of, redescribe
 from taichi_soft.bodies.tet_constants import write_tet_constants
 from taichi_soft.control.change import change
 from taichi_soft.core.errors import MaterialError
@@ -42,7 +42,9 @@ def write_constants(state: BodyFields, body: SoftBody, description: BodyDescript
     masses = arrays.mass
     write_masses(state, place.particles[0], masses.astype(np.float32), (1.0 / masses).astype(np.float32))
     write_numbers(state.edge_damping, place.edges[0], arrays.edge_damping.astype(np.float32))
-    fading, interval = np.array(body.asset.vibration_row(description), dtype=np.float32).reshape(2, 1)
+    fading, interval = np.array(present_asset(body).vibration_row(description), dtype=np.float32).reshape(
+        2, 1
+    )
     speed = np.array([description.sound_speed], dtype=np.float32)
     write_numbers(state.body_sound_speed, body.index, speed)
     write_numbers(state.body_fading, body.index, fading)

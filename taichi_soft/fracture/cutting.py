@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from taichi_soft.bodies.asset import SoftBodyAsset
 from taichi_soft.bodies.cut_mesh import CutMesh
 from taichi_soft.bodies.description import BodyDescription
 from taichi_soft.bodies.fields import BodyFields, with_spare_rows
@@ -24,7 +25,7 @@ from taichi_soft.bodies.tet_constants import write_tet_constants
 from taichi_soft.control.attachments import share_attachments
 from taichi_soft.core.checks import as_array, as_vector
 from taichi_soft.core.errors import OptionError, StateError
-from taichi_soft.fracture.kernels.topology import MOTION_WIDTH, read_motion, write_body
+from taichi_soft.fracture.kernels.topology import MOTION_WIDTH, read_motion, write_body, write_kind
 from taichi_soft.meshing import TetMesh
 from taichi_soft.meshing.splitting import InnerFaces, loose_parts, split_vertices
 
@@ -193,7 +194,7 @@ def _settle(context: Context, body: SoftBody, pieces: list[_Piece], slots: list[
         rows[:, 20:26] *= (masses / rows[:, 15])[:, None]  # pushes and reactions are shared like the mass
         rows[:, 15] = masses
         present = None if inverses is None else inverses[piece.tets][piece.arrays.tet_order]
-        _write(context, state, slot, piece.arrays, rows, ACTIVE, body.index, present)
+        write_slot(context, state, slot, piece.arrays, rows, ACTIVE, body.index, present)
     built.has_changed()
     fallen = tuple(context.take_in(context, body.asset) for _ in pieces[1:])
     vertices, tets = body.vertex_origins, body.tet_origins
@@ -216,15 +217,27 @@ def warm_up(context: Context, state: BodyFields, slot: int) -> None:
     refill_slot(context, state, slot)
 
 
-def refill_slot(context: Context, state: BodyFields, slot: int, part: BodyArrays | None = None) -> None:
-    """Write the whole body of its asset, or a part of it, into a slot where another part was, at rest."""
-    arrays = context.slots.assets[slot].arrays if part is None else part
+def refill_slot(
+    context: Context, state: BodyFields, slot: int, level: int = 0, part: BodyArrays | None = None
+) -> None:
+    """Write the whole body of its asset, a level of it or a part, into a slot where another was, at rest."""
+    asset = context.slots.assets[slot].levels[level]
+    arrays = asset.arrays if part is None else part
     rows = np.zeros((len(arrays.mass), MOTION_WIDTH), dtype=np.float32)
-    _write(context, state, slot, arrays, rows, ABSENT, slot, None)
+    write_slot(context, state, slot, arrays, rows, ABSENT, slot, None)
+    write_surface(context, state, slot, asset)
     context.layout.bodies[slot] = arrays
 
 
-def _write(
+def write_surface(context: Context, state: BodyFields, slot: int, asset: SoftBodyAsset) -> None:
+    """Write what follows from an asset as a whole, where levels of detail differ in it."""
+    if context.slots.assets[slot].coarser:
+        described = asset.description
+        rows = [*asset.surface_row, described.sound_speed, *asset.vibration_row(described)]
+        write_kind(state, slot, np.array(rows, dtype=np.float32))
+
+
+def write_slot(
     context: Context,
     state: BodyFields,
     slot: int,
@@ -234,7 +247,13 @@ def _write(
     model_of: int,
     inverses: NDArray[np.float32] | None,
 ) -> None:
-    """`inverses`: of the rest shapes as they are, (m, 3, 3), where they may have flowed."""
+    """Write a body into a slot, in the middle of its motion.
+
+    Args:
+        motion: rows of its vertices, as `read_motion` has them.
+        status, model_of: as of `write_body`.
+        inverses: of the rest shapes as they are, (m, 3, 3), where they may have flowed.
+    """
     first = _real_blocks(np.swapaxes(arrays.rest_inverse, 1, 2), 9)
     present = first if inverses is None else _real_blocks(np.swapaxes(inverses, 1, 2), 9)
     write_body(

@@ -12,7 +12,7 @@ from taichi_soft.bodies.cut_mesh import CutMesh, name_of
 from taichi_soft.bodies.description import BodyDescription
 from taichi_soft.bodies.failure import FailedStep
 from taichi_soft.bodies.layout import BodyArrays
-from taichi_soft.bodies.soft_body import SoftBody, record_of
+from taichi_soft.bodies.soft_body import SoftBody, present_asset, record_of
 from taichi_soft.core.checks import as_count, as_number
 from taichi_soft.core.errors import SnapshotError, TaichiSoftError
 from taichi_soft.core.handles import serial_of
@@ -40,13 +40,14 @@ def write_manifest(context: WorldContext) -> dict[str, Any]:
 def _body_entry(body: SoftBody) -> list[Any]:
     record = record_of(body)
     failed, part = record.frozen_in, record.part
-    is_own = record.description is not body.asset.description
+    is_own = record.description is not present_asset(body).description
     return [
         serial_of(body),
         record.first_step,
         None if failed is None else [failed.step, failed.time, failed.substeps, failed.h, failed.is_braked],
         as_plain(record.description.material) if is_own else None,
         None if part is None else part.note,
+        record.level,
     ]
 
 
@@ -58,6 +59,7 @@ class BodyEntry:
     first_step: int
     failed: FailedStep | None
     part: CutMesh | None
+    level: int  # of detail
     description: BodyDescription
     arrays: BodyArrays | None  # of a part
 
@@ -130,11 +132,14 @@ def _require_serials(context: WorldContext, plain: dict[str, Any]) -> None:
 def _read_body(context: WorldContext, slot: int, entry: Any, part: CutMesh | None) -> BodyEntry | None:
     if entry is None:
         return None
-    serial, first_step, failed, material, _ = entry
-    asset = context.slots.assets[slot]
-    whole, present = asset.description, context.slots.slots[slot]
+    serial, first_step, failed, material, _, number = entry
+    levels, present = context.slots.assets[slot].levels, context.slots.slots[slot]
+    level = below(number, len(levels))
+    asset, whole = levels[level], levels[level].description
     if present is not None and (
-        serial_of(present) != serial or name_of(record_of(present).part) != name_of(part)
+        serial_of(present) != serial
+        or name_of(record_of(present).part) != name_of(part)
+        or record_of(present).level != level
     ):
         present = None
     own = None if present is None else record_of(present).description
@@ -167,6 +172,7 @@ def _read_body(context: WorldContext, slot: int, entry: Any, part: CutMesh | Non
         if failed is None
         else FailedStep(int(failed[0]), float(failed[1]), int(failed[2]), float(failed[3]), bool(failed[4])),
         part,
+        level,
         description,
         arrays,
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from taichi_soft.bodies.cut_mesh import name_of
 from taichi_soft.bodies.description import BodyDescription
-from taichi_soft.bodies.soft_body import SoftBody, record_of
+from taichi_soft.bodies.soft_body import SoftBody, present_asset, record_of
 from taichi_soft.control.materials import write_constants
 from taichi_soft.core.handles import serial_of
 from taichi_soft.core.serialisation import as_plain
@@ -32,13 +32,13 @@ def _put_back_body(context: WorldContext, state: State, slot: int, wanted: BodyE
         present = None
     if wanted is None:
         return
-    if present is not None and name_of(record_of(present).part) != name_of(wanted.part):
-        refill_slot(context, state, slot, wanted.arrays)
+    if present is not None and _fills(present) != (name_of(wanted.part), wanted.level):
+        refill_slot(context, state, slot, wanted.level, wanted.arrays)
     if present is None:
         present = _put_in(context, state, slot, wanted)
     record = record_of(present)
-    if name_of(record.part) != name_of(wanted.part):
-        record.become(wanted.part)
+    if _fills(present) != (name_of(wanted.part), wanted.level):
+        record.become(wanted.part, wanted.level)
         record.description = _before_material(present, wanted)
     record.first_step, record.frozen_in, record.failure = wanted.first_step, wanted.failed, None
     if as_plain(record.description.material) != as_plain(wanted.description.material):
@@ -46,11 +46,17 @@ def _put_back_body(context: WorldContext, state: State, slot: int, wanted: BodyE
     record.description = wanted.description
 
 
-def _take_out(context: WorldContext, state: State, body: SoftBody) -> None:
+def _fills(body: SoftBody) -> tuple[str, int]:
+    """What of its asset is in its slot."""
     record = record_of(body)
-    if record.description is not body.asset.description and not body.is_cut:
-        write_constants(state, body, body.asset.description)
-        record.description = body.asset.description
+    return name_of(record.part), record.level
+
+
+def _take_out(context: WorldContext, state: State, body: SoftBody) -> None:
+    record, whole = record_of(body), present_asset(body).description
+    if record.description is not whole and not body.is_cut:
+        write_constants(state, body, whole)
+        record.description = whole
     context.slots.leave(body)
     record.removed_in = context.clock.steps
 
@@ -58,14 +64,14 @@ def _take_out(context: WorldContext, state: State, body: SoftBody) -> None:
 def _put_in(context: WorldContext, state: State, slot: int, wanted: BodyEntry) -> SoftBody:
     """The handle that somebody holds of who lived there, or a new one."""
     asset = context.slots.assets[slot]
-    if wanted.part is not None or context.layout.bodies[slot] is not asset.arrays:
-        refill_slot(context, state, slot, wanted.arrays)
+    if wanted.part is not None or context.layout.bodies[slot] is not asset.levels[wanted.level].arrays:
+        refill_slot(context, state, slot, wanted.level, wanted.arrays)
     body = context.handles.find(wanted.serial, SoftBody)
     if body is None or body.index != slot or body.asset is not asset:
         body = context.make_body(context, slot, asset)
         context.handles.enlist(body, wanted.serial)
     record = record_of(body)
-    record.removed_in = None
+    record.removed_in, record.level = None, wanted.level
     record.description = _before_material(body, wanted)
     context.slots.enter_at(body)
     return body
@@ -73,4 +79,4 @@ def _put_in(context: WorldContext, state: State, slot: int, wanted: BodyEntry) -
 
 def _before_material(body: SoftBody, wanted: BodyEntry) -> BodyDescription:
     """What a slot was filled with, before it is given another material."""
-    return body.asset.description if wanted.part is None else wanted.description
+    return present_asset(body).description if wanted.part is None else wanted.description

@@ -49,7 +49,7 @@ def asset_digest(asset: SoftBodyAsset) -> str:
     contact: list[Any] = [float(touch.friction), thickness, touch.itself, touch.group, touch.mask]
     flow = None if asset.plasticity is None else [float(each) for each in asset.plasticity.row]
     tear = None if asset.tearing is None else [float(asset.tearing.stress), asset.tearing.most]
-    contact += [flow, asset.spare_vertices, tear]
+    contact += [flow, asset.spare_vertices, tear, [asset_digest(each) for each in asset.coarser]]
     content = [digest_of(described.mesh), digest_of(described.material), described.pinned.tolist()]
     return blake2b(to_json([as_plain(parts), content, contact]), digest_size=8).hexdigest()
 

@@ -91,7 +91,8 @@ def _asset(options: dict[str, Any]) -> SoftBodyAsset:
     mesh, material = from_plain(plain.pop("mesh")), from_plain(plain.pop("material"))
     for name in ("contact", "plasticity", "tearing"):
         plain[name] = from_plain(plain[name])
-    return SoftBodyAsset(mesh, material, **plain)
+    coarser = tuple(_asset(each) for each in plain.pop("coarser"))
+    return SoftBodyAsset(mesh, material, coarser=coarser, **plain)
 
 
 def _call(world: World, parts: dict[str, Any], serial: int, name: str, arguments: Any, options: Any) -> None:

@@ -14,7 +14,7 @@ from taichi_soft.bodies.failure import FailedStep, Failure
 from taichi_soft.bodies.kernels.readout import write_motion
 from taichi_soft.bodies.layout import Scene
 from taichi_soft.bodies.slots import Pools
-from taichi_soft.bodies.soft_body import SoftBody, record_of
+from taichi_soft.bodies.soft_body import SoftBody, present_asset, record_of
 from taichi_soft.bodies.status import ASLEEP, FROZEN
 from taichi_soft.contact.clearance import require_clear
 from taichi_soft.contact.colliders import Colliders
@@ -179,7 +179,7 @@ class Simulation:
     def box_of(self, body: SoftBody) -> tuple[NDArray[Any], NDArray[Any]]:
         """Corners of a box round a body and its skin, as it is now [m]."""
         lower, upper = body.aabb()
-        thickness = body.asset.surface_row[1]
+        thickness = present_asset(body).surface_row[1]
         return lower - thickness, upper + thickness
 
     def read(self, slot: int, kernel: Callable[..., Any], *arguments: Any) -> Any:
@@ -231,7 +231,7 @@ class Simulation:
     def require_clear(self, body: SoftBody, points: NDArray[np.float64]) -> None:
         """Raises: OptionError where points of a body's surface, (k, 3) [m], are crushed in a collider."""
         if self.colliders is not None:
-            require_clear(self.colliders.handles, body.asset, points, f"body {body.index}")
+            require_clear(self.colliders.handles, present_asset(body), points, f"body {body.index}")
 
     def joints_have_changed(self) -> None:
         """Let bodies that are joined be stepped together, where no step finds out by itself."""

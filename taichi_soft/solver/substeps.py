@@ -11,7 +11,7 @@ import numpy as np
 
 from taichi_soft.bodies.description import BodyDescription
 from taichi_soft.bodies.slots import Pools
-from taichi_soft.bodies.soft_body import SoftBody, record_of
+from taichi_soft.bodies.soft_body import SoftBody, present_asset, record_of
 from taichi_soft.bodies.stability import StableStep, stable_step
 from taichi_soft.core.checks import as_count, as_step
 from taichi_soft.core.errors import OptionError, SlowStepWarning, StateError, UnstableStepWarning
@@ -57,8 +57,9 @@ class Substeps:
     def stable_step(self, body: SoftBody) -> StableStep:
         """As `World.stable_step`."""
         described = record_of(body).description
-        if described is body.asset.description:
-            return body.asset.stable_step
+        present = present_asset(body)
+        if described is present.description:
+            return present.stable_step
         if described not in self._estimates:
             self._estimates[described] = stable_step(described.mesh, described.material, described.model)
         return self._estimates[described]
@@ -70,9 +71,9 @@ class Substeps:
         if self._is_implicit:
             seconds = as_step(dt)
             return max(1, math.ceil(0.999 * seconds / SOFT_CONTACT_STEP)) if self._soft_contact else 1
-        longest = min(asset.stable_step.recommended for asset in self._pools.kinds)
+        longest = min(each.stable_step.recommended for asset in self._pools.kinds for each in asset.levels)
         for body in self._pools.living:
-            if record_of(body).description is not body.asset.description:
+            if record_of(body).description is not present_asset(body).description:
                 longest = min(longest, self.stable_step(body).recommended)
         return max(1, math.ceil(as_step(dt) / longest))
 

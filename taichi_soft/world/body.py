@@ -17,6 +17,7 @@ from taichi_soft.core.checks import as_array, as_positive
 from taichi_soft.core.handles import recorded
 from taichi_soft.events import Event, StressExceeded, TearCandidates
 from taichi_soft.fracture.cutting import cut
+from taichi_soft.levels.level_change import set_level
 from taichi_soft.meshing.creases import ROUND
 from taichi_soft.solver.context import WorldContext
 from taichi_soft.world.body_control import BodyControl
@@ -114,6 +115,19 @@ class Body(BodyControl, BodyMeasures):
         x, v = as_array(positions, "positions", shape, "m"), as_array(velocities, "velocities", shape, "m/s")
         self._context.built.write_motion(self, x, v)
         self._record.frozen_in = self._record.failure = None
+
+    @recorded
+    def set_level(self, level: int) -> None:
+        """Go on with more or fewer tetrahedra: a level of detail of the asset, 0 being the finest.
+
+        Position, velocity, rotation and deformation pass over; centre of mass, momentum and angular momentum
+        are kept to round-off. The vertices nearest to pinned ones are pinned. Vertices and tetrahedra are
+        others: `topology_version` counts that. `render_meshes` stay, and are drawn from the new mesh.
+        Raises: OptionError for a level that the asset does not have; StateError for a body that is attached,
+            joined, grabbed or driven, frozen, or of a material of its own, and before `build`. Nothing is
+            changed then.
+        """
+        set_level(self, level)
 
     def watch_stress(self, threshold: float | None) -> None:
         """Record a `StressExceeded` in every step in which tetrahedra come over a stress.

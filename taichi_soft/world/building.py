@@ -131,7 +131,7 @@ def _add_floor(context: WorldContext) -> None:
 
 def _schedule(context: WorldContext, device: Device, has_contact: bool) -> Schedule:
     asked = context.settings.schedule
-    is_cut = any(asset.spare_vertices for asset in context.slots.kinds)
+    is_cut = any(asset.spare_vertices or asset.coarser for asset in context.slots.kinds)
     if is_cut and asked is Schedule.FLAT:
         raise OptionError("schedule 'flat' cuts no bodies: take 'per_body' or 'auto', or no spare_vertices")
     needs_bodies = context.settings.is_implicit or has_contact or is_cut
@@ -190,7 +190,7 @@ def _warm_up(context: WorldContext, state: State) -> None:
     """A body that comes and goes, so that nothing compiles where the first does in the game."""
     for asset in context.slots.kinds:
         slot = context.slots.assets.index(asset)
-        if asset.spare_vertices:
+        if asset.spare_vertices or asset.coarser:
             warm_up(context, state, slot)
         spawn_body(state, slot, asset.rest_rows)
         despawn_body(state, slot)

@@ -7,7 +7,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from taichi_soft.bodies.asset import Floats32, SoftBodyAsset
-from taichi_soft.bodies.soft_body import lives_in, record_of, require_alive
+from taichi_soft.bodies.soft_body import lives_in, present_asset, record_of, require_alive
 from taichi_soft.contact.clearance import free_points, require_clear
 from taichi_soft.control.materials import set_material
 from taichi_soft.core.checks import as_count
@@ -62,6 +62,7 @@ def _content(asset: SoftBodyAsset) -> tuple[Any, ...]:
         asset.plasticity,
         asset.spare_vertices,
         asset.tearing,
+        *(_content(each) for each in asset.coarser),
     )
 
 
@@ -113,8 +114,9 @@ def _let_go(context: WorldContext, body: Body) -> None:
     """Give up what is tied to a body, and a material that it was given, before its slot is emptied."""
     for each in context.slices:
         each.let_go(body)
-    if record_of(body).description is not body.asset.description and not body.is_cut:
-        set_material(body, body.asset.material)
+    present = present_asset(body)
+    if record_of(body).description is not present.description and not body.is_cut:
+        set_material(body, present.material)
 
 
 def _require_asset(asset: Any) -> None:

@@ -16,6 +16,7 @@ from taichi_soft.bodies.skin_mesh import warm_up as warm_up_skins
 from taichi_soft.control.drives import push_bodies, set_wind
 from taichi_soft.control.impulses import apply_radial_impulse
 from taichi_soft.control.rigid_transform import carry
+from taichi_soft.levels.level_change import bar_to_levels
 from taichi_soft.persistence.snapshot import restore_snapshot, state_hash, take_snapshot
 from taichi_soft.queries import cast_ray, cast_rays, find_closest_point, find_in_box, find_in_sphere
 from taichi_soft.solver.context import WorldContext
@@ -93,6 +94,10 @@ def _control(context: WorldContext, body: Body, other: Body | None) -> None:
     body.set_gravity_scale(body.gravity_scale)
     body.set_linear_damping(0.1)
     body.set_sheltered(True)
+    if body.asset.coarser and not bar_to_levels(body):
+        level = body.level
+        for other_level in (1 if level == 0 else 0, level):
+            body.set_level(other_level)
     body.set_material(body.material)
     body.pin(free[:1])
     body.set_targets(free[:1], body.positions()[free[:1]])

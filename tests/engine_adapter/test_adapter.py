@@ -49,7 +49,7 @@ def snapshot(adapter):
 
 
 def test_public_names():
-    assert sorted(engine_adapter.__all__) == ["EngineAdapter", "FixedStep", "Rollback"]
+    assert sorted(engine_adapter.__all__) == ["EngineAdapter", "FixedStep", "GivenUp", "Rollback"]
 
 
 def test_step_is_one_step_of_the_world(adapter, body, make_world):

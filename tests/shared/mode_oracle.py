@@ -13,7 +13,8 @@ def lumped_masses(mesh, density):
 
 
 def assembled_stiffness(mesh, young, poisson):
-    """K of linear finite elements, sparse (3n, 3n) [N/m]."""
+    """K of linear finite elements, sparse (3n, 3n) [N/m]; `young` for all, or of each."""
+    young = np.broadcast_to(young, len(mesh.tets))[:, None, None, None, None]
     lame, mu = young * poisson / ((1 + poisson) * (1 - 2 * poisson)), young / (2 * (1 + poisson))
     x = mesh.vertices[mesh.tets]
     gradients = np.linalg.inv(np.concatenate([np.ones((len(x), 4, 1)), x], axis=2))[:, 1:].swapaxes(1, 2)

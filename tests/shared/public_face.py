@@ -123,7 +123,7 @@ class Game:
         world.drain_events()
         self.listener = world.on(Event, print_nothing)
         self.listener.remove()
-        self.adapter = EngineAdapter(world, FixedStep(DT, SUBSTEPS), rewind_ticks=3)
+        self.adapter = EngineAdapter(world, FixedStep(DT, SUBSTEPS), rewind_ticks=3, budget_ms=1e6)
         self.rollback = Rollback(world, 3)
         self.rollback.save()
 
@@ -532,6 +532,7 @@ CALLS: dict[str, dict[str, Call]] = {
             "max_force": LOAD,
         }, _has_full_hands),
         "set_material": Call({"material": MATERIAL}),
+        "set_level": Call({"level": choice(0, **NOT_COUNTS, finer=1)}, perhaps),
         "set_damping": Call({"damping": Kind(
             lambda g, rng: rng.uniform(1.0, 9.0) if rng.integers(2) else rng.uniform(1.0, 9.0, len(g.receiver.tets)),
             NOT_NUMBERS | {"below": -1.0, "of another length": np.ones(M + 1), "nan in one": np.full(M, NAN)},
@@ -576,6 +577,7 @@ CALLS: dict[str, dict[str, Call]] = {
         "restore": Call({"data": DATA}),
         "state_hash": NOTHING,
         "drain_events": NOTHING,
+        "see_from": Call({"viewer": POINT}),
         "positions": Call({"body": BODY, "out": BUFFER}),
         "render_mesh": Call({"mesh": DRAWN, "positions": DRAWN_BUFFER, "normals": DRAWN_BUFFER}),
     },
@@ -590,7 +592,7 @@ READERS: dict[str, str] = {
         time""",
     "Body": """aabb angular_momentum asset attachments center_of_mass deformations elastic_energy failure flipped_count flipped_tets
         gravitational_energy gravity_scale index is_alive is_asleep is_cut is_frozen is_held is_sheltered
-        kinetic_energy linear_damping masses material mesh momentum pinned plastic_strains pose render_meshes
+        kinetic_energy level linear_damping masses material mesh momentum pinned plastic_strains pose render_meshes
         solve_residual stable_step strains stresses surface
         tet_origins tet_strain tet_stress tets topology_version velocities vertex_count vertex_origins vertex_strain
         vertex_stress volume volumes""",
@@ -602,7 +604,7 @@ READERS: dict[str, str] = {
     "Joint": """body force is_attached other particles""",
     "Motor": """body effort is_mounted limit measured_speed particles speed turns""",
     "Listener": """function is_active kind""",
-    "EngineAdapter": """alpha dropped_time fixed_step time total_dropped_time world""",
+    "EngineAdapter": """alpha dropped_time fixed_step given_up time total_dropped_time world""",
     "Rollback": """steps""",
 }
 """What is asked without arguments and changes nothing."""
@@ -611,7 +613,7 @@ DEAD = {"Body": "dead_body", "Collider": "dead_collider", "Frame": "dead_frame",
 DEAD |= {"Attachment": "dead_hold", "Joint": "dead_joint", "Motor": "dead_motor"}
 
 READABLE_WHEN_DEAD: dict[str, str] = {
-    "Body": """asset index is_alive is_cut is_frozen masses material mesh render_meshes surface tet_origins tets topology_version
+    "Body": """asset index is_alive is_cut is_frozen level masses material mesh render_meshes surface tet_origins tets topology_version
         vertex_count vertex_origins""",
     "Collider": """angular_velocity friction group index is_alive mask position restitution rotation shape thickness
         velocity""",
@@ -655,6 +657,7 @@ MAKERS: dict[Any, dict[str, Kind]] = {
         "spare_vertices": choice(4, **NOT_COUNTS), "tearing": choice(None, number=1, text="soft"),
         "skin": choice((), none=None, number=1, text="no such file.obj", list=["virial"], flat=np.zeros((3, 3)), empty=([], []),
                        nan=(BLOCK.vertices * NAN, BLOCK.surface), far=(BLOCK.vertices, BLOCK.surface + 99)),
+        "coarser": choice((), none=None, number=1, mesh=(BLOCK,), text="coarse"),
     },
     Contact: {
         "friction": number(0.0, 1.0, below=-1.0), "thickness": or_none(number(0.0, 0.1, below=-1.0)), "itself": ANY_FLAG,
@@ -685,7 +688,7 @@ MAKERS: dict[Any, dict[str, Kind]] = {
     EngineAdapter: {
         "world": Kind(lambda g, rng: g.world, {"none": None, "number": 1, "not built": Of(lambda g: g.other)}),
         "fixed_step": choice(FixedStep(), number=DT, text="fast"), "before_step": choice(None, print_nothing, number=1),
-        "rewind_ticks": choice(0, 2, **NOT_COUNTS),
+        "rewind_ticks": choice(0, 2, **NOT_COUNTS), "budget_ms": or_none(MODULUS),
     },
     Rollback: {
         "world": Kind(lambda g, rng: g.world, {"none": None, "number": 1, "not built": Of(lambda g: g.other)}),

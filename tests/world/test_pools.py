@@ -141,7 +141,15 @@ def test_a_world_without_bodies_goes_on(empty):
 
 
 READABLE = {"asset", "index", "is_alive", "is_frozen", "mesh", "material", "vertex_count", "tets", "surface"}
-READABLE |= {"masses", "is_cut", "topology_version", "vertex_origins", "tet_origins", "render_meshes"}
+READABLE |= {
+    "masses",
+    "is_cut",
+    "topology_version",
+    "vertex_origins",
+    "tet_origins",
+    "render_meshes",
+    "level",
+}
 ARGUMENTS = {"set_motion": (np.zeros_like(MESH.vertices), np.zeros_like(MESH.vertices))}
 ARGUMENTS |= {"watch_stress": (1e4,), "watch_tearing": (1e4,), "cut": ()}
 UP = (0.0, 0.0, 1.0)
@@ -154,7 +162,7 @@ ARGUMENTS |= {
 ARGUMENTS |= {"grab": (0, (1.0, 0.0, 0.0)), "pin": ([0],), "set_targets": ([0], [(9.0, 0.0, 0.0)])}
 ARGUMENTS |= {name: (1.0,) for name in ("set_damping", "set_gravity_scale", "set_linear_damping")}
 ARGUMENTS |= {"force_across": ((9.0, 0.0, 0.0), UP)}
-ARGUMENTS |= {"set_material": (JELLY,), "set_sheltered": (True,)}
+ARGUMENTS |= {"set_material": (JELLY,), "set_sheltered": (True,), "set_level": (0,)}
 
 
 def asked(body, name):

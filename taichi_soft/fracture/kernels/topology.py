@@ -130,3 +130,14 @@ def write_body(
         if ti.static(state.capacity.implicit):
             state.body_residual[body] = state.body_residual[model_of]
         state.body_status[body] = status
+
+
+@ti.kernel
+def write_kind(state: ti.template(), body: ti.i32, row: ti.types.ndarray(dtype=ti.f32, ndim=1)):
+    """Write `SoftBodyAsset.surface_row`, the speed of sound, and `SoftBodyAsset.vibration_row` of a body."""
+    state.body_edge[body] = row[2]
+    state.body_sound_speed[body] = row[3]
+    state.body_fading[body] = row[4]
+    state.body_fading_interval[body] = row[5]
+    if ti.static(state.capacity.contact.soft):
+        state.soft.body_surface[body] = ti.Vector([row[0], row[1], row[2]])

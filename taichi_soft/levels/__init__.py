@@ -1,0 +1,1 @@
+"""Bodies of more or fewer tetrahedra while they move."""
