@@ -1,0 +1,149 @@
+"""A scene in, a file out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from engine_adapter import EngineAdapter
+from taichi_soft.bake.clip import Take
+from taichi_soft.bake.formats import FORMATS, Format
+from taichi_soft.bake.gltf import Interpolation
+from taichi_soft.bake.recording import Progress, Scene, frames_in, record, steps_of
+from taichi_soft.bake.room import Room
+from taichi_soft.bake.vertex_texture import is_vat
+from taichi_soft.core.checks import LARGEST_COUNT, as_number, as_path, as_positive
+from taichi_soft.core.errors import BakeError, OptionError
+from taichi_soft.core.extras import require_extra
+from taichi_soft.core.part_folder import PartFolder
+from taichi_soft.world.world import World
+
+MEGABYTE = 1e6
+
+
+@dataclass(frozen=True)
+class BakeReport:
+    """What was written."""
+
+    path: Path
+    frames: int
+    fps: float
+    meshes: tuple[str, ...]  # their names
+    vertices: int  # of all meshes
+    size: int  # of all files [bytes]
+    left_out: tuple[str, ...]  # bodies that have no triangles
+
+
+def bake(
+    scene: Scene,
+    out: str | Path,
+    *,
+    seconds: float,
+    fps: float = 30.0,
+    interpolation: Interpolation = "linear",
+    limit: float = 1000.0,
+    on_room: Callable[[Room], object] | None = None,
+    on_frame: Progress | None = None,
+) -> BakeReport:
+    """Simulate, and write the meshes of all bodies and their motion into one file.
+
+    Frames lie `1 / fps` apart, the first at once and the last after `seconds`. Each is what the world had
+    after a fixed step: a world makes at least 60 steps a second, a whole number of them from frame to frame.
+    Args:
+        scene: a world, which is built if it is not yet; or an `EngineAdapter`, whose steps are made, with
+            what its `before_step` does. It goes on from where it stands.
+        out: .glb (glTF 2.0, morph targets), .npz (point cache), .vat (a folder: vertex-animation texture,
+            mesh, shaders) or .usdc (USD). What was there is replaced once all is written.
+        seconds: length of the clip [s].
+        fps: frames per second.
+        interpolation: between frames of a .glb: "linear" or "step".
+        limit: most that the file may hold [MB], told from the number of vertices and frames.
+        on_room: called once with what the file will take, before anything moves.
+        on_frame: called with (frames made, frames in all) after each.
+    Returns: what was written.
+    Raises: OptionError for a value out of range, for more than `limit`, and for frames between an adapter's
+        steps; MissingExtraError; StateError for a body that is cut or torn meanwhile, with the frame;
+        MeshError where nothing has triangles; BakeError where the file cannot be written. Nothing is written
+        then.
+    """
+    path = as_path(out)
+    form = _format_of(path)
+    length, rate = as_positive(seconds, "seconds", "s"), as_number(fps, "fps", 1e-3, 1e4)
+    most = as_positive(limit, "limit", "MB")
+    if interpolation not in ("linear", "step"):
+        raise OptionError(f"interpolation must be 'linear' or 'step', got {interpolation!r}")
+    if not isinstance(scene, (World, EngineAdapter)):
+        raise OptionError(f"scene must be a World or an EngineAdapter, got {type(scene).__name__}")
+    if length * rate > LARGEST_COUNT:
+        raise OptionError(f"seconds is {length:g} at {rate:g} per second: at most {LARGEST_COUNT:,} frames")
+    count = frames_in(length, rate)
+    steps_of(scene, rate)
+    _require_place(path)
+    if isinstance(scene, World) and not scene.is_built:
+        scene.build()
+    asked: list[Room] = []
+
+    def require_room(vertices: int) -> None:
+        room = Room(count, vertices, form.bytes_each * count * vertices)
+        form.require(count, vertices)
+        _require_limit(room, most, path)
+        if not asked and on_room:
+            on_room(room)
+        asked.append(room)
+
+    take = record(scene, count, rate, require_room, on_frame)
+    size = _write(take, form, path, interpolation)
+    names = tuple(clip.name for clip in take.clips)
+    return BakeReport(path, count, rate, names, take.vertex_count, size, take.left_out)
+
+
+def _format_of(path: Path) -> Format:
+    form = FORMATS.get(path.suffix.lower())
+    if form is None or not path.stem:
+        raise OptionError(f"cannot bake into {str(path)!r}: name a file that ends in {', '.join(FORMATS)}")
+    if form.needs:
+        require_extra(form.needs[0], f"a {path.suffix.lower()} file needs", *form.needs[1:])
+    return form
+
+
+def _require_place(path: Path) -> None:
+    """Raises: BakeError where what is there must not be replaced."""
+    wants_folder = path.suffix.lower() == ".vat"
+    if path.is_dir() and not (wants_folder and (is_vat(path) or not any(path.iterdir()))):
+        raise BakeError(f"cannot write {path}: it is a folder of something else: name another, or remove it")
+    if wants_folder and path.is_file():
+        raise BakeError(
+            f"cannot write {path}: it is a file, and .vat is a folder: name another, or remove it"
+        )
+
+
+def _require_limit(room: Room, limit: float, path: Path) -> None:
+    if room.size > limit * MEGABYTE:
+        smaller = "" if path.suffix.lower() == ".vat" else ", into .vat (9 bytes a vertex and frame, not 24)"
+        raise OptionError(
+            f"{path.name} would hold {room}, and the limit is {limit:g} MB: bake fewer --seconds or --fps, "
+            f"a coarser mesh{smaller}, or give a limit of {room.size / MEGABYTE + 1:.0f}"
+        )
+
+
+def _write(take: Take, form: Format, path: Path, interpolation: Interpolation) -> int:
+    """Write it beside its place, and move it there once it is whole. Returns: bytes."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        part = PartFolder(path.parent)
+    except OSError as error:
+        raise BakeError(f"cannot write {path}: {error.strerror or error}") from error
+    try:
+        made = part.path / f"bake{path.suffix.lower()}"
+        form.write(take, made, interpolation)
+        files = [each for each in made.rglob("*") if each.is_file()] if made.is_dir() else [made]
+        size = sum(each.stat().st_size for each in files)
+        if path.is_dir():
+            path.rename(part.path / "old")
+        made.replace(path)
+    except OSError as error:
+        raise BakeError(f"cannot write {path}: {error.strerror or error}") from error
+    finally:
+        part.remove()
+    return size
