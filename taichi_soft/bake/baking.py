@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -80,20 +81,21 @@ def bake(
     count = frames_in(length, rate)
     steps_of(scene, rate)
     _require_place(path)
-    if isinstance(scene, World) and not scene.is_built:
-        scene.build()
     asked: list[Room] = []
 
     def require_room(vertices: int) -> None:
-        room = Room(count, vertices, form.bytes_each * count * vertices)
+        room = Room(count, vertices, form.size(count, vertices))
         form.require(count, vertices)
         _require_limit(room, most, path)
         if not asked and on_room:
             on_room(room)
         asked.append(room)
 
-    take = record(scene, count, rate, require_room, on_frame)
-    size = _write(take, form, path, interpolation)
+    with _part_folder(path) as part:
+        if isinstance(scene, World) and not scene.is_built:
+            scene.build()
+        take = record(scene, count, rate, require_room, on_frame)
+        size = _write(take, form, part, path, interpolation)
     names = tuple(clip.name for clip in take.clips)
     return BakeReport(path, count, rate, names, take.vertex_count, size, take.left_out)
 
@@ -127,23 +129,30 @@ def _require_limit(room: Room, limit: float, path: Path) -> None:
         )
 
 
-def _write(take: Take, form: Format, path: Path, interpolation: Interpolation) -> int:
-    """Write it beside its place, and move it there once it is whole. Returns: bytes."""
+@contextmanager
+def _part_folder(path: Path) -> Iterator[Path]:
+    """A folder beside a file's place, until the file is there."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         part = PartFolder(path.parent)
     except OSError as error:
         raise BakeError(f"cannot write {path}: {error.strerror or error}") from error
     try:
-        made = part.path / f"bake{path.suffix.lower()}"
+        yield part.path
+    finally:
+        part.remove()
+
+
+def _write(take: Take, form: Format, part: Path, path: Path, interpolation: Interpolation) -> int:
+    """Write into the folder, and move it to its place once it is whole. Returns: bytes."""
+    try:
+        made = part / f"bake{path.suffix.lower()}"
         form.write(take, made, interpolation)
         files = [each for each in made.rglob("*") if each.is_file()] if made.is_dir() else [made]
         size = sum(each.stat().st_size for each in files)
         if path.is_dir():
-            path.rename(part.path / "old")
+            path.rename(part / "old")
         made.replace(path)
     except OSError as error:
         raise BakeError(f"cannot write {path}: {error.strerror or error}") from error
-    finally:
-        part.remove()
     return size

@@ -21,7 +21,7 @@ class Format(NamedTuple):
     """How a bake is written."""
 
     write: Callable[[Take, Path, Interpolation], object]
-    bytes_each: int  # of a vertex in a frame: its position and its normal
+    size: Callable[[int, int], int]  # of (frames, vertices) [bytes]
     needs: tuple[str, ...]  # extra and modules of it; none where numpy is enough
     require: Callable[[int, int], object]  # refuses (frames, vertices) that it cannot hold
 
@@ -30,19 +30,33 @@ def _any(frames: int, vertices: int) -> None:
     pass
 
 
+def _floats(frames: int, vertices: int) -> int:
+    """Positions and normals."""
+    return 24 * frames * vertices
+
+
+def _with_weights(frames: int, vertices: int) -> int:
+    """And a weight for each frame in each frame."""
+    return _floats(frames + 1, vertices) + 4 * frames**2
+
+
+def _pixels(frames: int, vertices: int) -> int:
+    return 9 * frames * vertices
+
+
 def _below_4_gib(frames: int, vertices: int) -> None:
-    if frames * vertices * 24 + 4 * frames**2 > LARGEST_GLB:
+    if _with_weights(frames, vertices) > LARGEST_GLB:
         raise OptionError(
             f"{vertices:,} vertices in {frames:,} frames are more than the 4 GiB that a .glb can hold: bake "
             "fewer --seconds or --fps, or a coarser mesh, or into .npz, .usdc or .vat"
         )
 
 
+GLTF = ("bake", "pygltflib", "PIL")
+
 FORMATS = {
-    ".glb": Format(write_glb, 24, ("bake", "pygltflib", "PIL"), _below_4_gib),
-    ".npz": Format(lambda take, path, _: write_npz(take, path), 24, (), _any),
-    ".vat": Format(
-        lambda take, path, _: write_vat(take, path), 9, ("bake", "pygltflib", "PIL"), require_pixels
-    ),
-    ".usdc": Format(lambda take, path, _: write_usd(take, path), 24, ("usd", "pxr"), _any),
+    ".glb": Format(write_glb, _with_weights, GLTF, _below_4_gib),
+    ".npz": Format(lambda take, path, _: write_npz(take, path), _floats, (), _any),
+    ".vat": Format(lambda take, path, _: write_vat(take, path), _pixels, GLTF, require_pixels),
+    ".usdc": Format(lambda take, path, _: write_usd(take, path), _floats, ("usd", "pxr"), _any),
 }

@@ -126,8 +126,8 @@ class _Recorder:
         if frame > 1:
             way_out = f"bake what comes before it, {(frame - 1) / self.fps:.6g} seconds"
         raise StateError(
-            f"{clip.name!r} was cut or torn by frame {frame} ({frame / self.fps:.6g} s): from there on it has "
-            f"other vertices, which no clip can carry: {way_out}"
+            f"{clip.name!r} was cut or torn by frame {frame} ({frame / self.fps:.6g} s): it has other "
+            f"vertices from there on, which no clip can carry: {way_out}"
         )
 
 

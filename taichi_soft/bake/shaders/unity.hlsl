@@ -1,5 +1,6 @@
 // A baked clip in Unity, for a Custom Function node of Shader Graph in the vertex stage: file this one, name
-// BakedVertex, input UV1 (the second set: it names the pixel of a vertex). Numbers are those of metadata.json.
+// BakedVertex, inputs vertex (UV1, the second set, which names the pixel of a vertex), seconds, and the pictures as
+// Bare Texture 2D. Numbers are those of metadata.json.
 //
 // Import position_high.png, position_low.png and normal.png with sRGB off, Non-Power of 2 "None", no mip maps, no
 // compression, filter "Point", and a max size not below theirs.
