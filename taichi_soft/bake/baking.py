@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -13,7 +14,7 @@ from taichi_soft.bake.formats import FORMATS, Format
 from taichi_soft.bake.gltf import Interpolation
 from taichi_soft.bake.recording import Progress, Scene, frames_in, record, steps_of
 from taichi_soft.bake.room import Room
-from taichi_soft.bake.vertex_texture import is_vat
+from taichi_soft.bake.vertex_texture import fits_texture, is_vat
 from taichi_soft.core.checks import LARGEST_COUNT, as_number, as_path, as_positive
 from taichi_soft.core.errors import BakeError, OptionError
 from taichi_soft.core.extras import require_extra
@@ -122,7 +123,8 @@ def _require_place(path: Path) -> None:
 
 def _require_limit(room: Room, limit: float, path: Path) -> None:
     if room.size > limit * MEGABYTE:
-        smaller = "" if path.suffix.lower() == ".vat" else ", into .vat (9 bytes a vertex and frame, not 24)"
+        is_vat_less = path.suffix.lower() != ".vat" and fits_texture(room.frames, room.vertices)
+        smaller = ", into .vat (9 bytes a vertex and frame, not 24)" if is_vat_less else ""
         raise OptionError(
             f"{path.name} would hold {room}, and the limit is {limit:g} MB: bake fewer --seconds or --fps, "
             f"a coarser mesh{smaller}, or give a limit of {room.size / MEGABYTE + 1:.0f}"
@@ -150,9 +152,24 @@ def _write(take: Take, form: Format, part: Path, path: Path, interpolation: Inte
         form.write(take, made, interpolation)
         files = [each for each in made.rglob("*") if each.is_file()] if made.is_dir() else [made]
         size = sum(each.stat().st_size for each in files)
-        if path.is_dir():
-            path.rename(part / "old")
-        made.replace(path)
+        _move(made, path, part / "old")
     except OSError as error:
         raise BakeError(f"cannot write {path}: {error.strerror or error}") from error
     return size
+
+
+def _move(made: Path, path: Path, old: Path) -> None:
+    """Put what is whole in its place. A folder keeps what others put into it, as Godot does with settings of
+    imports."""
+    if not path.is_dir():
+        made.replace(path)
+        return
+    for each in path.iterdir():
+        if each.is_file() and not (made / each.name).exists():
+            shutil.copy2(each, made / each.name)
+    path.rename(old)
+    try:
+        made.rename(path)
+    except OSError:
+        old.rename(path)
+        raise

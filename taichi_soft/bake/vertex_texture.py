@@ -33,14 +33,19 @@ SHADERS = ("godot.gdshader", "unity.hlsl")
 Floats = NDArray[np.float64]
 
 
+def fits_texture(frames: int, vertices: int) -> bool:
+    """Whether a texture can hold them."""
+    return -(-vertices // WIDEST) * frames <= TALLEST
+
+
 def require_pixels(frames: int, vertices: int) -> None:
     """Raises: OptionError where a texture would have too many rows."""
-    rows = -(-vertices // WIDEST) * frames
-    if rows > TALLEST:
-        most = TALLEST // -(-vertices // WIDEST)
+    if not fits_texture(frames, vertices):
+        each = -(-vertices // WIDEST)
         raise OptionError(
-            f"{vertices:,} vertices in {frames:,} frames are a texture of {rows:,} rows, and GPUs take "
-            f"{TALLEST:,}: bake at most {most:,} frames (fewer --seconds or --fps), or a coarser mesh"
+            f"{vertices:,} vertices in {frames:,} frames are a texture of {each * frames:,} rows, and GPUs "
+            f"take {TALLEST:,}: bake at most {TALLEST // each:,} frames (fewer --seconds or --fps), or a "
+            "coarser mesh"
         )
 
 

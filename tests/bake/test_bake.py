@@ -335,9 +335,11 @@ def test_a_second_bake_replaces_the_first(game, tmp_path):
     for frames in (3, 5):
         for name in ("play.glb", "play.vat"):
             bake(game.begin(), tmp_path / name, seconds=(frames - 1) / 30)
+        (tmp_path / "play.vat/normal.png.import").write_text("settings of an engine")
     assert len(Glb(tmp_path / "play.glb").channel("ring", "weights")[0]) == 5
     assert Vat(tmp_path / "play.vat").facts["frame_count"] == 5
     assert sorted(each.name for each in tmp_path.iterdir()) == ["play.glb", "play.vat"]
+    assert (tmp_path / "play.vat/normal.png.import").read_text() == "settings of an engine"
 
 
 def test_folders_and_files_of_something_else_stay(game, tmp_path):
