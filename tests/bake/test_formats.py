@@ -13,6 +13,7 @@ from trimesh.visual.material import SimpleMaterial
 
 from taichi_soft.bake.clip import Clip, Take
 from taichi_soft.bake.gltf import write_glb
+from taichi_soft.bake.usd import write_usd
 from taichi_soft.bake.vertex_texture import WIDEST, write_vat
 
 
@@ -112,3 +113,34 @@ def test_colours_of_vertices_or_triangles_are_kept(tmp_path, kind):
     held = glb.array(glb.primitive("clip")["attributes"]["COLOR_0"])
     np.testing.assert_array_equal(held, np.repeat(colors, 5, 0))
     assert glb.json["materials"][0]["pbrMetallicRoughness"]["metallicFactor"] == 0
+
+
+ODD = ("world", "a.b", "a_b", "1", "Äpfel", "")
+
+
+def test_meshes_keep_whatever_name_they_have_in_a_glb(tmp_path):
+    clips = [clip_of(5 + number, [0, 1], name=name) for number, name in enumerate(ODD[:-1])]
+    write_glb(take_of(*clips), tmp_path / "a.glb", "linear")
+    glb = Glb(tmp_path / "a.glb")
+    for clip in clips:
+        np.testing.assert_allclose(z_up(glb.shape(clip.name, 0.1)), clip.positions[1], atol=1e-6)
+
+
+def test_usd_gives_every_mesh_a_name_that_it_takes(tmp_path):
+    from pxr import Usd, UsdGeom
+
+    clips = [clip_of(5 + number, [0, 1], name=name) for number, name in enumerate(ODD)]
+    write_usd(take_of(*clips), tmp_path / "a.usdc")
+    stage = Usd.Stage.Open(str(tmp_path / "a.usdc"))
+    meshes = [UsdGeom.Mesh(prim) for prim in stage.Traverse() if prim.IsA(UsdGeom.Mesh)]
+    assert [len(mesh.GetPointsAttr().Get(0)) for mesh in meshes] == list(range(5, 11))
+    assert [mesh.GetPrim().GetName() for mesh in meshes[:4]] == ["world", "a_b", "a_b_2", "_1"]
+
+
+def test_clips_of_the_same_material_share_its_picture(tmp_path):
+    picture = Image.fromarray(np.full((4, 4, 3), 200, dtype=np.uint8))
+    visual = TextureVisuals(uv=np.zeros((5, 2)), material=SimpleMaterial(image=picture))
+    clips = [clip_of(5, [0, 1], name=name, visual=visual) for name in "ab"]
+    write_glb(take_of(*clips), tmp_path / "a.glb", "linear")
+    tree = Glb(tmp_path / "a.glb").json
+    assert len(tree["images"]) == len(tree["materials"]) == 1
