@@ -45,7 +45,7 @@ SECONDS = {
     "feel/": (60, 40),
     "bodies/": (30, 296),
     "lab/": (0, 355),
-    "cli/": (0, 135),
+    "cli/": (0, 225),
     "demos/": (0, 500),
     "docs/": (10, 400),
     "solver/": (75, 950),
@@ -53,6 +53,8 @@ SECONDS = {
     "fracture/": (19, 90),
     "engine_adapter/": (7, 0),
     "render/": (20, 0),
+    "bake/test_formats": (1, 0),
+    "bake/": (35, 0),
     "test_readme": (1, 10),
     "test_package": (5, 60),
     "": (21, 0),
@@ -60,7 +62,7 @@ SECONDS = {
 """What the tests of files that begin so take, those of `make test` and the soaks, with an empty kernel cache.
 Neighbours have worlds of the same kinds, which each worker compiles once."""
 
-NUMPY = ("meshing/", "cages/", "elements/materials/", "test_layers")
+NUMPY = ("meshing/", "cages/", "elements/materials/", "bake/test_formats", "test_layers")
 KERNEL = ("elements/", "contact/distances/", "contact/shapes/", "core/math/")
 WORLD = ("elements/laws/test_energy_laws", "cages/test_difficult_surfaces.py::test_a_body")
 SOAK = (

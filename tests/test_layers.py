@@ -29,6 +29,7 @@ LAYERS = """
     taichi_soft
     engine_adapter
     render
+    bake
     lab
     cli
     __main__

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 from rich.markup import escape
 
+from taichi_soft.cli.bake import bake
 from taichi_soft.cli.console import errors, say, version_of
 from taichi_soft.cli.demo import demo
 from taichi_soft.cli.doctor import doctor
@@ -28,7 +29,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for _command in (demo, info, doctor, replay, profile, drop_test, report, warm):
+for _command in (demo, info, doctor, bake, replay, profile, drop_test, report, warm):
     app.command()(_command)
 
 

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from taichi_soft.core.runtime import Device
 from taichi_soft.core.types import ArchName
@@ -24,6 +25,12 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print JSON and nothing els
 def say(line: str) -> None:
     """Print one line as one line, however narrow the terminal is."""
     console.print(line, soft_wrap=True, highlight=False)
+
+
+def progress_bar() -> Progress:
+    """How far something is, on a terminal only."""
+    columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
+    return Progress(*columns, console=errors, disable=not errors.is_terminal)
 
 
 def device_facts(device: Device) -> dict[str, Any]:

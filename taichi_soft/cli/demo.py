@@ -8,9 +8,8 @@ from typing import Annotated
 
 import typer
 from rich.markup import escape
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from taichi_soft.cli.console import Arch, Threads, errors, say
+from taichi_soft.cli.console import Arch, Threads, progress_bar, say
 from taichi_soft.core.compilation import shown_by
 from taichi_soft.core.errors import OptionError
 from taichi_soft.core.runtime import init
@@ -42,8 +41,7 @@ def demo(
     init(arch, threads)
     from taichi_soft.render.film import film
 
-    columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
-    bar = Progress(*columns, console=errors, disable=not errors.is_terminal)
+    bar = progress_bar()
     task = bar.add_task(name, total=None)
     with bar as progress, shown_by(lambda text: progress.update(task, description=escape(text) or name)):
         stage = module.stage()

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import importlib
 import os
-import runpy
-import sys
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,6 +12,7 @@ import typer
 from rich.markup import escape
 
 from taichi_soft.cli.console import Arch, Threads, errors, say
+from taichi_soft.cli.named_function import function_of
 from taichi_soft.core.compilation import BURST, shown_by
 from taichi_soft.core.errors import OptionError
 from taichi_soft.core.runtime import init, kernel_folder
@@ -33,7 +31,7 @@ def warm(
     threads: Threads = None,
 ) -> None:
     """Compile all that the worlds of a game need, so that its next start finds it."""
-    make = _function_of(worlds)
+    make = function_of(worlds, "which worlds")
     if out is not None:
         os.environ["TI_OFFLINE_CACHE_FILE_PATH"] = str(out.resolve())
     if threads is not None or arch != "auto":  # or a game may start Taichi as it likes
@@ -55,28 +53,6 @@ def warm(
     say(f"a start that builds the same worlds in the same order finds them in {escape(str(kernel_folder()))}")
     if out is not None:
         say("where TI_OFFLINE_CACHE_FILE_PATH names that folder")
-
-
-def _function_of(text: str) -> Callable[[], Any]:
-    """What `place:name` means: a function of a file or a module."""
-    place, _, name = text.rpartition(":")
-    if not place or not name.isidentifier():
-        raise OptionError(f"which worlds, must be like game.py:make_world, got {text!r}")
-    sys.path.insert(0, os.getcwd())
-    try:
-        function = _names_in(place).get(name)
-    except (ImportError, OSError) as error:
-        raise OptionError(f"cannot import {place!r}: {error}") from error
-    if not callable(function):
-        raise OptionError(f"{place!r} has no function {name!r}")
-    return function  # type: ignore[no-any-return]
-
-
-def _names_in(place: str) -> dict[str, Any]:
-    if not place.endswith(".py"):
-        return vars(importlib.import_module(place))
-    sys.path.insert(0, str(Path(place).parent.resolve()))
-    return runpy.run_path(place)
 
 
 def _worlds_of(found: Any, text: str) -> Iterable[Any]:

@@ -40,6 +40,10 @@ class VideoError(TaichiSoftError, OSError):
     """A video or picture could not be written as asked."""
 
 
+class BakeError(TaichiSoftError, OSError):
+    """A bake could not be written as asked."""
+
+
 class SweepError(TaichiSoftError, RuntimeError):
     """Points cannot be computed or kept as asked."""
 

@@ -9,6 +9,8 @@ from taichi_soft.core.errors import MissingExtraError
 EXTRAS = {
     "cli": {"typer": "typer", "rich": "rich"},
     "film": {"cv2": "opencv-python-headless", "imageio_ffmpeg": "imageio-ffmpeg"},
+    "bake": {"PIL": "pillow", "pygltflib": "pygltflib"},
+    "usd": {"pxr": "usd-core"},
     "io": {"meshio": "meshio"},
     "voronoi": {"scipy": "scipy"},
     "report": {

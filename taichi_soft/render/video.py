@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from taichi_soft.core.checks import as_count, as_number, as_path
 from taichi_soft.core.errors import StateError, VideoError
+from taichi_soft.core.part_folder import PartFolder
 from taichi_soft.render.containers import Container, Gif, Pictures, Stream
-from taichi_soft.render.part_folder import PartFolder
 
 CONTAINERS: dict[str, type[Container]] = {".mp4": Stream, ".webm": Stream, ".gif": Gif, ".png": Pictures}
 

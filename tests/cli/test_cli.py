@@ -26,7 +26,7 @@ def run(*arguments: str, cwd=None) -> subprocess.CompletedProcess:
     )
 
 
-@pytest.mark.parametrize("command", [(), ("demo",), ("info",), ("profile",), ("warm",)])
+@pytest.mark.parametrize("command", [(), ("demo",), ("info",), ("profile",), ("warm",), ("bake",)])
 def test_every_command_explains_itself(command):
     done = run(*command, "--help")
     assert done.returncode == 0

@@ -31,6 +31,8 @@ PAGES = {
 CODE = {
     name: re.findall(r"^```python\n(.*?)^```", text, re.DOTALL | re.MULTILINE) for name, text in PAGES.items()
 }
+PUBLIC = ("taichi_soft", "taichi_soft.bake", "engine_adapter")
+"""Modules of which a page may import the public names."""
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 
 
@@ -96,7 +98,7 @@ def help_of(*command):
 def test_every_command_and_option_of_a_page_exists(name):
     text = PAGES[name]
     for command, rest in re.findall(
-        r"taichi-soft (demo|info|profile|drop-test|report|replay)\b([^`\n|]*)", text
+        r"taichi-soft (bake|demo|info|profile|drop-test|report|replay)\b([^`\n|]*)", text
     ):
         for option in re.findall(r"(?<!\S)--[a-z-]+", rest):
             assert option in help_of(command), f"{name}: taichi-soft {command} {option}"
@@ -149,7 +151,7 @@ def test_presets_have_the_numbers_of_the_table():
 def test_code_of_a_page_imports_public_names_only(name):
     for block in CODE[name]:
         for node in ast.walk(ast.parse(block)):
-            if isinstance(node, ast.ImportFrom) and node.module in ("taichi_soft", "engine_adapter"):
+            if isinstance(node, ast.ImportFrom) and node.module in PUBLIC:
                 assert {each.name for each in node.names} <= set(sys.modules[node.module].__all__)
             elif isinstance(node, ast.ImportFrom):
                 assert not (node.module or "").startswith(("taichi_soft", "engine_adapter"))

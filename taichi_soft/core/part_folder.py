@@ -1,4 +1,4 @@
-"""Where a film is made until it is complete: a hidden folder beside its place."""
+"""Where a file is made until it is complete: a hidden folder beside its place."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import IO
 if sys.platform != "win32":
     import fcntl
 
-PREFIX, LOCK = ".taichi-soft-film-", "lock"
+PREFIX, LOCK = ".taichi-soft-part-", "lock"
 
 
 class PartFolder:

@@ -1,0 +1,175 @@
+"""A scene in, a file out."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from engine_adapter import EngineAdapter
+from taichi_soft.bake.clip import Take
+from taichi_soft.bake.formats import FORMATS, Format
+from taichi_soft.bake.gltf import Interpolation
+from taichi_soft.bake.recording import Progress, Scene, frames_in, record, steps_of
+from taichi_soft.bake.room import Room
+from taichi_soft.bake.vertex_texture import fits_texture, is_vat
+from taichi_soft.core.checks import LARGEST_COUNT, as_number, as_path, as_positive
+from taichi_soft.core.errors import BakeError, OptionError
+from taichi_soft.core.extras import require_extra
+from taichi_soft.core.part_folder import PartFolder
+from taichi_soft.world.world import World
+
+MEGABYTE = 1e6
+
+
+@dataclass(frozen=True)
+class BakeReport:
+    """What was written."""
+
+    path: Path
+    frames: int
+    fps: float
+    meshes: tuple[str, ...]  # their names
+    vertices: int  # of all meshes
+    size: int  # of all files [bytes]
+    left_out: tuple[str, ...]  # bodies that have no triangles
+
+
+def bake(
+    scene: Scene,
+    out: str | Path,
+    *,
+    seconds: float,
+    fps: float = 30.0,
+    interpolation: Interpolation = "linear",
+    limit: float = 1000.0,
+    on_room: Callable[[Room], object] | None = None,
+    on_frame: Progress | None = None,
+) -> BakeReport:
+    """Simulate, and write the meshes of all bodies and their motion into one file.
+
+    Frames lie `1 / fps` apart, the first at once and the last after `seconds`. Each is what the world had
+    after a fixed step: a world makes at least 60 steps a second, a whole number of them from frame to frame.
+    Args:
+        scene: a world, which is built if it is not yet; or an `EngineAdapter`, whose steps are made, with
+            what its `before_step` does. It goes on from where it stands.
+        out: .glb (glTF 2.0, morph targets), .npz (point cache), .vat (a folder: vertex-animation texture,
+            mesh, shaders) or .usdc (USD). What was there is replaced once all is written.
+        seconds: length of the clip [s].
+        fps: frames per second.
+        interpolation: between frames of a .glb: "linear" or "step".
+        limit: most that the file may hold [MB], told from the number of vertices and frames.
+        on_room: called once with what the file will take, before anything moves.
+        on_frame: called with (frames made, frames in all) after each.
+    Returns: what was written.
+    Raises: OptionError for a value out of range, for more than `limit`, and for frames between an adapter's
+        steps; MissingExtraError; StateError for a body that is cut or torn meanwhile, with the frame;
+        MeshError where nothing has triangles; BakeError where the file cannot be written. Nothing is written
+        then.
+    """
+    path = as_path(out)
+    form = _format_of(path)
+    length, rate = as_positive(seconds, "seconds", "s"), as_number(fps, "fps", 1e-3, 1e4)
+    most = as_positive(limit, "limit", "MB")
+    if interpolation not in ("linear", "step"):
+        raise OptionError(f"interpolation must be 'linear' or 'step', got {interpolation!r}")
+    if not isinstance(scene, (World, EngineAdapter)):
+        raise OptionError(f"scene must be a World or an EngineAdapter, got {type(scene).__name__}")
+    if length * rate > LARGEST_COUNT:
+        raise OptionError(f"seconds is {length:g} at {rate:g} per second: at most {LARGEST_COUNT:,} frames")
+    count = frames_in(length, rate)
+    steps_of(scene, rate)
+    _require_place(path)
+    asked: list[Room] = []
+
+    def require_room(vertices: int) -> None:
+        room = Room(count, vertices, form.size(count, vertices))
+        form.require(count, vertices)
+        _require_limit(room, most, path)
+        if not asked and on_room:
+            on_room(room)
+        asked.append(room)
+
+    with _part_folder(path) as part:
+        if isinstance(scene, World) and not scene.is_built:
+            scene.build()
+        take = record(scene, count, rate, require_room, on_frame)
+        size = _write(take, form, part, path, interpolation)
+    names = tuple(clip.name for clip in take.clips)
+    return BakeReport(path, count, rate, names, take.vertex_count, size, take.left_out)
+
+
+def _format_of(path: Path) -> Format:
+    form = FORMATS.get(path.suffix.lower())
+    if form is None or not path.stem:
+        raise OptionError(f"cannot bake into {str(path)!r}: name a file that ends in {', '.join(FORMATS)}")
+    if form.needs:
+        require_extra(form.needs[0], f"a {path.suffix.lower()} file needs", *form.needs[1:])
+    return form
+
+
+def _require_place(path: Path) -> None:
+    """Raises: BakeError where what is there must not be replaced."""
+    wants_folder = path.suffix.lower() == ".vat"
+    if path.is_dir() and not (wants_folder and (is_vat(path) or not any(path.iterdir()))):
+        raise BakeError(f"cannot write {path}: it is a folder of something else: name another, or remove it")
+    if wants_folder and path.is_file():
+        raise BakeError(
+            f"cannot write {path}: it is a file, and .vat is a folder: name another, or remove it"
+        )
+
+
+def _require_limit(room: Room, limit: float, path: Path) -> None:
+    if room.size > limit * MEGABYTE:
+        is_vat_less = path.suffix.lower() != ".vat" and fits_texture(room.frames, room.vertices)
+        smaller = ", into .vat (9 bytes a vertex and frame, not 24)" if is_vat_less else ""
+        raise OptionError(
+            f"{path.name} would hold {room}, and the limit is {limit:g} MB: bake fewer --seconds or --fps, "
+            f"a coarser mesh{smaller}, or give a limit of {room.size / MEGABYTE + 1:.0f}"
+        )
+
+
+@contextmanager
+def _part_folder(path: Path) -> Iterator[Path]:
+    """A folder beside a file's place, until the file is there."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        part = PartFolder(path.parent)
+    except OSError as error:
+        raise BakeError(f"cannot write {path}: {error.strerror or error}") from error
+    try:
+        yield part.path
+    finally:
+        part.remove()
+
+
+def _write(take: Take, form: Format, part: Path, path: Path, interpolation: Interpolation) -> int:
+    """Write into the folder, and move it to its place once it is whole. Returns: bytes."""
+    try:
+        made = part / f"bake{path.suffix.lower()}"
+        form.write(take, made, interpolation)
+        files = [each for each in made.rglob("*") if each.is_file()] if made.is_dir() else [made]
+        size = sum(each.stat().st_size for each in files)
+        _move(made, path, part / "old")
+    except OSError as error:
+        raise BakeError(f"cannot write {path}: {error.strerror or error}") from error
+    return size
+
+
+def _move(made: Path, path: Path, old: Path) -> None:
+    """Put what is whole in its place. A folder keeps what others put into it, as Godot does with settings of
+    imports."""
+    if not path.is_dir():
+        made.replace(path)
+        return
+    for each in path.iterdir():
+        if each.is_file() and not (made / each.name).exists():
+            shutil.copy2(each, made / each.name)
+    path.rename(old)
+    try:
+        made.rename(path)
+    except OSError:
+        old.rename(path)
+        raise

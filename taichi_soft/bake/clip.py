@@ -1,0 +1,96 @@
+"""One mesh through time, and all of them: what the formats write."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Floats32 = NDArray[np.float32]
+Ints32 = NDArray[np.int32]
+
+
+@dataclass(eq=False)
+class Clip:
+    """One render mesh of one body, from the frame in which the body came to that in which it went.
+
+    A frame in which nothing moved is the same array as the one before it.
+    """
+
+    name: str  # no other clip has it
+    triangles: Ints32  # (m, 3)
+    visual: Any  # trimesh's; None where there is none
+    first: int  # frame of the bake in which the body is there first
+    positions: list[Floats32] = field(default_factory=list)  # (k, 3) each [m], z up
+    normals: list[Floats32] = field(default_factory=list)  # (k, 3) each, of unit length
+
+    @property
+    def vertex_count(self) -> int:
+        """Number of vertices, k."""
+        return len(self.positions[0])
+
+    @property
+    def end(self) -> int:
+        """The frame behind the last one in which the body is there."""
+        return self.first + len(self.positions)
+
+    @property
+    def uv(self) -> Floats | None:
+        """Texture coordinates (k, 2) from the lower left; None where the mesh has none."""
+        uv = getattr(self.visual, "uv", None)
+        if uv is None or len(uv) != self.vertex_count:
+            return None
+        return np.asarray(uv, dtype=np.float64)[:, :2]
+
+    def add(self, positions: Floats32, normals: Floats32) -> None:
+        """Take in the next frame."""
+        if self.positions and np.array_equal(positions, self.positions[-1]):
+            if np.array_equal(normals, self.normals[-1]):
+                positions, normals = self.positions[-1], self.normals[-1]
+        self.positions.append(positions)
+        self.normals.append(normals)
+
+    def is_there(self, frame: int) -> bool:
+        """Whether the body is in the world at a frame of the bake."""
+        return self.first <= frame < self.end
+
+    def at(self, frame: int) -> tuple[Floats32, Floats32]:
+        """Positions and normals at a frame; where the body is not there, those of the nearest one."""
+        index = min(max(frame - self.first, 0), len(self.positions) - 1)
+        return self.positions[index], self.normals[index]
+
+    def targets(self) -> tuple[list[int], list[int]]:
+        """Frames of the clip that differ from the first one, each of them once, and by frame of the clip the
+        place of its shape among them, -1 for that of the first frame."""
+        shapes, place, current = [], [-1], -1
+        for index in range(1, len(self.positions)):
+            before = index - 1
+            same = self.positions[index] is self.positions[before]
+            if not (same and self.normals[index] is self.normals[before]):
+                shapes.append(index)
+                current = len(shapes) - 1
+            place.append(current)
+        return shapes, place
+
+
+@dataclass(frozen=True)
+class Take:
+    """All clips of a bake."""
+
+    clips: tuple[Clip, ...]
+    frame_count: int
+    fps: float
+    left_out: tuple[str, ...]  # bodies that have nothing to draw
+
+    @property
+    def times(self) -> Floats:
+        """Of the frames, from the first on [s]."""
+        return np.arange(self.frame_count) / self.fps
+
+    @property
+    def vertex_count(self) -> int:
+        """Number of vertices of all clips."""
+        return sum(clip.vertex_count for clip in self.clips)

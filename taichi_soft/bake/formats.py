@@ -1,0 +1,62 @@
+"""The formats of a bake, by the end of the file's name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+from taichi_soft.bake.clip import Take
+from taichi_soft.bake.gltf import Interpolation, write_glb
+from taichi_soft.bake.point_cache import write_npz
+from taichi_soft.bake.usd import write_usd
+from taichi_soft.bake.vertex_texture import require_pixels, write_vat
+from taichi_soft.core.errors import OptionError
+
+LARGEST_GLB = 4 * 1024**3 - 1
+"""Bytes: a .glb tells its length in 32 bits."""
+
+
+class Format(NamedTuple):
+    """How a bake is written."""
+
+    write: Callable[[Take, Path, Interpolation], object]
+    size: Callable[[int, int], int]  # of (frames, vertices) [bytes]
+    needs: tuple[str, ...]  # extra and modules of it; none where numpy is enough
+    require: Callable[[int, int], object]  # refuses (frames, vertices) that it cannot hold
+
+
+def _any(frames: int, vertices: int) -> None:
+    pass
+
+
+def _floats(frames: int, vertices: int) -> int:
+    """Positions and normals."""
+    return 24 * frames * vertices
+
+
+def _with_weights(frames: int, vertices: int) -> int:
+    """And a weight for each frame in each frame."""
+    return _floats(frames + 1, vertices) + 4 * frames**2
+
+
+def _pixels(frames: int, vertices: int) -> int:
+    return 9 * frames * vertices
+
+
+def _below_4_gib(frames: int, vertices: int) -> None:
+    if _with_weights(frames, vertices) > LARGEST_GLB:
+        raise OptionError(
+            f"{vertices:,} vertices in {frames:,} frames are more than the 4 GiB that a .glb can hold: bake "
+            "fewer --seconds or --fps, or a coarser mesh, or into .npz, .usdc or .vat"
+        )
+
+
+GLTF = ("bake", "pygltflib", "PIL")
+
+FORMATS = {
+    ".glb": Format(write_glb, _with_weights, GLTF, _below_4_gib),
+    ".npz": Format(lambda take, path, _: write_npz(take, path), _floats, (), _any),
+    ".vat": Format(lambda take, path, _: write_vat(take, path), _pixels, GLTF, require_pixels),
+    ".usdc": Format(lambda take, path, _: write_usd(take, path), _floats, ("usd", "pxr"), _any),
+}

@@ -1,0 +1,52 @@
+"""A point cache: every vertex in every frame, as NumPy reads it.
+
+| array | shape | what it is |
+|---|---|---|
+| positions | (frames, vertices, 3) float32 | of all meshes, one behind the other [m]; z is up |
+| normals | (frames, vertices, 3) float32 | of unit length |
+| triangles | (triangles, 3) int32 | vertices, counterclockwise seen from outside |
+| uvs | (vertices, 2) float32 | texture coordinates from the lower left; NaN where a mesh has none |
+| times | (frames,) float64 | from the first frame on [s] |
+| names | (meshes,) | of the meshes |
+| vertex_starts, triangle_starts | (meshes + 1,) int64 | where each mesh begins, and where the last one ends |
+| is_there | (frames, meshes) bool | where false, the body is not in the world: it has its nearest shape |
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from taichi_soft.bake.clip import Clip, Take
+
+
+def write_npz(take: Take, path: Path) -> None:
+    """Write the arrays of the table above."""
+    clips = take.clips
+    starts = np.cumsum([0, *(clip.vertex_count for clip in clips)])
+    shape = take.frame_count, take.vertex_count, 3
+    positions, normals = np.empty(shape, dtype=np.float32), np.empty(shape, dtype=np.float32)
+    for frame in range(take.frame_count):
+        for clip, start, end in zip(clips, starts, starts[1:], strict=False):
+            positions[frame, start:end], normals[frame, start:end] = clip.at(frame)
+    with path.open("wb") as file:
+        np.savez(
+            file,
+            positions=positions,
+            normals=normals,
+            triangles=np.concatenate([c.triangles + s for c, s in zip(clips, starts, strict=False)]).astype(
+                np.int32
+            ),
+            uvs=np.concatenate([_uv(clip) for clip in clips]),
+            times=take.times,
+            names=np.array([clip.name for clip in clips]),
+            vertex_starts=starts,
+            triangle_starts=np.cumsum([0, *(len(clip.triangles) for clip in clips)]),
+            is_there=np.array([[c.is_there(f) for c in clips] for f in range(take.frame_count)]),
+        )
+
+
+def _uv(clip: Clip) -> np.ndarray:
+    uv = clip.uv
+    return (np.full((clip.vertex_count, 2), np.nan) if uv is None else uv).astype(np.float32)

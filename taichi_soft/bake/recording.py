@@ -1,0 +1,145 @@
+"""A world stepped frame by frame, with what its bodies look like in each."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from engine_adapter import EngineAdapter
+from taichi_soft.bake.clip import Clip, Take
+from taichi_soft.bodies.render_mesh import RenderMesh
+from taichi_soft.bodies.skin_mesh import SkinMesh
+from taichi_soft.core.errors import MeshError, OptionError, StateError
+from taichi_soft.world.body import Body
+from taichi_soft.world.world import World
+
+STEPS_PER_SECOND = 60.0
+"""Least number of fixed steps of a world that comes without an adapter: as `FixedStep` has it."""
+
+NEAR = 1e-6
+"""Part of a step by which a frame may miss it: frame rates such as 29.97 are not exact."""
+
+WHOLE = 1e-3
+"""Part of a frame that may be missing of the last one: 0.3333 s at 30 per second are ten frames."""
+
+Scene = World | EngineAdapter
+Progress = Callable[[int, int], None]
+
+
+def steps_of(scene: Scene, fps: float) -> Callable[[], None]:
+    """What makes the steps from one frame to the next. A frame lies on a step, so that what is baked is what
+    the world had.
+
+    Raises: OptionError where frames fall between the steps of an adapter.
+    """
+    if isinstance(scene, EngineAdapter):
+        adapter, dt = scene, scene.fixed_step.dt
+        count = round(1.0 / (fps * dt))
+        if count < 1 or abs(1.0 / (fps * dt) - count) > NEAR * count:
+            rates = ", ".join(f"{1.0 / (n * dt):g}" for n in (1, 2, 3, 4))
+            raise OptionError(
+                f"fps is {fps:g}: frames fall between the adapter's steps of {dt:g} s: use {rates}, or a "
+                f"FixedStep(dt=1 / {math.ceil(STEPS_PER_SECOND / fps) * fps:g})"
+            )
+        return lambda: _repeat(adapter.step, count)
+    world, count = scene, max(1, math.ceil(STEPS_PER_SECOND / fps - NEAR))
+    return lambda: _repeat(lambda: world.step(1.0 / (fps * count)), count)
+
+
+def record(
+    scene: Scene,
+    frame_count: int,
+    fps: float,
+    require_room: Callable[[int], object],
+    on_frame: Progress | None = None,
+) -> Take:
+    """Make the steps, and keep every frame; the first shows the world as it stands.
+
+    Args:
+        scene: a built world, or the adapter that steps it.
+        require_room: called with the number of vertices before the first frame, and when bodies came.
+        on_frame: called with (frames made, frames in all) after each.
+    Raises: StateError for a body that is cut or torn meanwhile, with the frame; MeshError where no body has
+        triangles; what `require_room` and steps raise.
+    """
+    advance = steps_of(scene, fps)
+    recorder = _Recorder(scene.world if isinstance(scene, EngineAdapter) else scene, fps, require_room)
+    for frame in range(frame_count):
+        if frame:
+            advance()
+        recorder.take(frame)
+        if on_frame:
+            on_frame(frame + 1, frame_count)
+    clips = tuple(clip for _, clip in recorder.drawn)
+    if not clips:
+        raise MeshError(f"no body has triangles in any of the {frame_count} frames: there is nothing to bake")
+    return Take(clips, frame_count, fps, tuple(recorder.left_out))
+
+
+@dataclass
+class _Recorder:
+    """Clips as they grow."""
+
+    world: World
+    fps: float
+    require_room: Callable[[int], object]
+    drawn: list[tuple[RenderMesh, Clip]] = field(default_factory=list)
+    left_out: list[str] = field(default_factory=list)
+    known: set[Body] = field(default_factory=set)
+
+    def take(self, frame: int) -> None:
+        """Look at every body as it is now."""
+        there = set(self.world.bodies)
+        new = [body for body in self.world.bodies if body not in self.known]
+        for body in new:
+            self._begin(body, frame)
+        if new:
+            self.require_room(sum(mesh.vertex_count for mesh, _ in self.drawn))
+        for mesh, clip in self.drawn:
+            if mesh.body in there:
+                self._require_whole(mesh, clip, frame)
+                clip.add(*self.world.read_render_mesh(mesh, 1.0))
+
+    def _begin(self, body: Body, frame: int) -> None:
+        self.known.add(body)
+        meshes: tuple[RenderMesh, ...] = body.render_meshes
+        try:
+            meshes = meshes or (body.render_mesh(),)
+        except MeshError:  # a rope has no triangles
+            self.left_out.append(f"body {body.index}")
+        for mesh in meshes:
+            name = self._free_name(mesh, body)
+            self.drawn.append((mesh, Clip(name, mesh.triangles, _visual(mesh), frame)))
+
+    def _free_name(self, mesh: RenderMesh, body: Body) -> str:
+        name = (mesh.name if isinstance(mesh, SkinMesh) else "") or f"body_{body.index}"
+        taken = {clip.name for _, clip in self.drawn}
+        others = (f"{name}_{number}" for number in range(2, len(taken) + 3))
+        return name if name not in taken else next(each for each in others if each not in taken)
+
+    def _require_whole(self, mesh: RenderMesh, clip: Clip, frame: int) -> None:
+        if not mesh.is_outdated:
+            return
+        way_out = "cut it before the bake begins"
+        if frame > 1:
+            way_out = f"bake what comes before it, {(frame - 1) / self.fps:.6g} seconds"
+        raise StateError(
+            f"{clip.name!r} was cut or torn by frame {frame} ({frame / self.fps:.6g} s): it has other "
+            f"vertices from there on, which no clip can carry: {way_out}"
+        )
+
+
+def _visual(mesh: RenderMesh) -> Any:
+    return mesh.visual if isinstance(mesh, SkinMesh) else None
+
+
+def _repeat(call: Callable[[], object], count: int) -> None:
+    for _ in range(count):
+        call()
+
+
+def frames_in(seconds: float, fps: float) -> int:
+    """Frames from 0 to `seconds`, both of them included."""
+    return math.floor(seconds * fps + WHOLE) + 1

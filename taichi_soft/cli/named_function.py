@@ -1,0 +1,40 @@
+"""A function of a user's file or module, named on the command line: `game.py:make_world`."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import runpy
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from taichi_soft.core.errors import OptionError
+
+
+def function_of(text: str, what: str) -> Callable[[], Any]:
+    """What `place:name` means.
+
+    Args:
+        what: it is to give, as "which worlds".
+    Raises: OptionError for other text, what cannot be imported, and a name that is not there.
+    """
+    place, _, name = text.rpartition(":")
+    if not place or not name.isidentifier():
+        raise OptionError(f"{what}, must be like game.py:make_world, got {text!r}")
+    sys.path.insert(0, os.getcwd())
+    try:
+        function = _names_in(place).get(name)
+    except (ImportError, OSError) as error:
+        raise OptionError(f"cannot import {place!r}: {error}") from error
+    if not callable(function):
+        raise OptionError(f"{place!r} has no function {name!r}")
+    return function  # type: ignore[no-any-return]
+
+
+def _names_in(place: str) -> dict[str, Any]:
+    if not place.endswith(".py"):
+        return vars(importlib.import_module(place))
+    sys.path.insert(0, str(Path(place).parent.resolve()))
+    return runpy.run_path(place)
