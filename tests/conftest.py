@@ -64,7 +64,10 @@ Neighbours have worlds of the same kinds, which each worker compiles once."""
 
 NUMPY = ("meshing/", "cages/", "elements/materials/", "bake/test_formats", "test_layers")
 KERNEL = ("elements/", "contact/distances/", "contact/shapes/", "core/math/")
-WORLD = ("elements/laws/test_energy_laws", "cages/test_difficult_surfaces.py::test_a_body")
+WORLD = (
+    *("elements/laws/test_energy_laws", "cages/test_difficult_surfaces.py::test_a_body"),
+    "cages/test_methods.py::test_a_body",
+)
 SOAK = (
     *("lab/", "demos/", "cli/", "cages/test_difficult_surfaces.py::test_a_body"),
     "feel/test_material_from_feel.py::test_random_wishes",

@@ -16,6 +16,7 @@ from taichi_soft.core.package_data import ASSETS, DEMOS
 
 ROOT = Path(__file__).resolve().parents[1]
 CORE = ("taichi", "numpy", "trimesh")
+MESHERS = ("tetgen", "ftetwild")
 
 
 def packages_of(extra):
@@ -41,7 +42,14 @@ def test_without_an_extra_a_game_installs_taichi_numpy_and_trimesh():
 def test_an_extra_installs_the_packages_that_are_asked_for(extra):
     asked = set(extras.EXTRAS[extra].values())
     assert asked <= packages_of(extra)
-    assert packages_of(extra) <= packages_of("all")
+    assert packages_of(extra) <= packages_of("dev")
+    if extra not in MESHERS:
+        assert packages_of(extra) <= packages_of("all")
+
+
+def test_what_a_game_is_shipped_with_holds_no_mesher_of_others():
+    """TetGen is under the AGPL, and fTetWild has no wheels for some machines."""
+    assert packages_of("all").isdisjoint(set().union(*map(packages_of, MESHERS)))
 
 
 def test_the_core_imports_no_package_of_an_extra():

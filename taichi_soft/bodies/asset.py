@@ -16,14 +16,22 @@ from taichi_soft.bodies.description import BodyDescription, require_size
 from taichi_soft.bodies.first_mode import first_frequency
 from taichi_soft.bodies.layout import BodyArrays, arrange, room_of
 from taichi_soft.bodies.plasticity import Plasticity
+from taichi_soft.bodies.short_steps import warn_of_short_steps
 from taichi_soft.bodies.skin import Skin, bound
 from taichi_soft.bodies.stability import StableStep, stable_step
 from taichi_soft.bodies.tearing import Tearing
-from taichi_soft.cages import CageMethod, build_cage
+from taichi_soft.cages import tetrahedra_of
 from taichi_soft.core.checks import as_count, as_indices, as_rotation, as_vector
 from taichi_soft.core.constants import POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.core.errors import MaterialError, MeshError, OptionError
-from taichi_soft.core.types import DampingModel, DampingModelName, FlipsName, LawName, StrainName
+from taichi_soft.core.types import (
+    CageMethodName,
+    DampingModel,
+    DampingModelName,
+    FlipsName,
+    LawName,
+    StrainName,
+)
 from taichi_soft.elements.laws import ElementModel, default_law, element_model, fit_model
 from taichi_soft.elements.materials import AnisotropicMaterial, AnyMaterial, Material, SpringMaterial
 from taichi_soft.meshing import BodyMesh, ParticleMesh, TetMesh
@@ -200,7 +208,8 @@ class SoftBodyAsset:
         *,
         cells: int | Sequence[int] | None = None,
         cell_size: float | None = None,
-        method: CageMethod = "lattice",
+        method: CageMethodName = "lattice",
+        time_limit: float | None = None,
         up: Up | None = None,
         **options: Any,
     ) -> SoftBodyAsset:
@@ -217,22 +226,33 @@ class SoftBodyAsset:
             cells: of the cage along the longest side; 10 if neither this nor cell_size is given. Several
                 numbers, the largest first, make levels of detail: see `with_coarser`.
             cell_size: edge of a cell [m], instead of `cells`.
-            method: of making the cage; "lattice" needs no other package.
+            method: of making the tetrahedra. "lattice" takes every surface, needs no other package and gives
+                the longest substeps. Two others fill the surface, in a process of their own: "ftetwild"
+                (extra `ftetwild`: fTetWild, MPL-2.0) follows it within a twentieth of a cell, and is not the
+                same on every run. "tetgen" (extra `tetgen`) keeps every triangle of a closed one. TetGen's
+                licence is the AGPL: it asks for the source of all that is shipped or served with it.
+            time_limit: of such a process, after which it is ended [s]; None takes 120.
             up: axis that points up in the file; None takes "y" for .glb and .gltf, as their format has it,
                 and "z" for all else.
-            options: further arguments of `SoftBodyAsset`.
-        Raises: MeshError for a surface that cannot be read or encloses nothing, with the way out; OptionError
-            for cells out of range, with the memory that they would take.
+            options: further arguments of `SoftBodyAsset`. A `skin` is drawn in place of the surface.
+        Raises: MeshError for a surface that cannot be read or encloses nothing, with the way out, and for a
+            process that crashes or takes too long; OptionError for cells out of range, with the memory that
+            they would take; MissingExtraError without the package of the method.
         """
         surfaces = read_surfaces(surface, up)
         numbers: list[Any] = list(cells) if isinstance(cells, (tuple, list)) else [cells]
         if not numbers:
             raise OptionError("cells is empty: give a number, or some numbers for levels of detail")
-        finest, *coarser = (
-            build_cage(surfaces, cells=number, cell_size=cell_size, method=method).mesh for number in numbers
-        )
-        asset = cls(finest, material, skin=surfaces, **options)
-        return asset.with_coarser(*coarser) if coarser else asset
+        meshes = []
+        for number in numbers:
+            mesh, cell = tetrahedra_of(
+                surfaces, cells=number, cell_size=cell_size, method=method, time_limit=time_limit
+            )
+            if method != "lattice":
+                warn_of_short_steps(mesh, cell, method)
+            meshes.append(mesh)
+        asset = cls(meshes[0], material, **{"skin": surfaces, **options})
+        return asset.with_coarser(*meshes[1:]) if meshes[1:] else asset
 
     @cached_property
     def skins(self) -> tuple[Skin, ...]:

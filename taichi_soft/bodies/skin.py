@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from taichi_soft.bodies.kernels.skin import in_lanes
 from taichi_soft.meshing import TetMesh
 from taichi_soft.meshing.arrays import read_only
 from taichi_soft.meshing.locating import Locator
@@ -56,8 +57,9 @@ def bound(mesh: TetMesh, surfaces: tuple[Surface, ...]) -> tuple[Skin, ...]:
         corners = mesh.tets[tets]
         inside = np.einsum("kc,kcx->kx", shares, mesh.vertices[corners])
         aims = 2.0 * surface.vertices - inside
-        ints = np.concatenate([begins, neighbours, corners.ravel()]).astype(np.int32)
-        floats = [slopes, mesh.vertices, np.concatenate([shares, aims, surface.normals], axis=1)]
+        ints = np.concatenate([begins, neighbours, in_lanes(corners)]).astype(np.int32)
+        rows_of_each = np.concatenate([shares, aims, surface.normals], axis=1)
+        floats = [slopes, mesh.vertices, in_lanes(rows_of_each)]
         rows = np.concatenate([part.ravel() for part in floats]).astype(np.float32)
         skins.append(Skin(surface, tets.astype(np.int32), shares, read_only(ints), read_only(rows)))
     return tuple(skins)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.bodies.kernels.skin import FRAME, ROW, write_skin
+from taichi_soft.bodies.kernels.skin import FRAME, LANES, ROW, write_skin
 from taichi_soft.bodies.render_mesh import RenderMesh
 from taichi_soft.bodies.skin import Skin
 from taichi_soft.bodies.soft_body import SoftBody, present_asset, record_of, require_alive
@@ -109,7 +109,7 @@ def first_skin_mesh(body: SoftBody) -> SkinMesh:
 
 def warm_up(state: Any) -> None:
     """Compile what a skin's frame calls, for few vertices and for many: of a vertex without neighbours."""
-    ints, floats = np.zeros(2 + 4, dtype=np.int32), np.zeros(3 + ROW, dtype=np.float32)
+    ints, floats = np.zeros(2 + 4 * LANES, np.int32), np.zeros(3 + ROW * LANES, np.float32)
     frames, positions, normals = np.empty(FRAME, dtype=np.float32), *np.empty((2, 3), dtype=np.float32)
     for is_serial in (True, False):
         write_skin(state, is_serial, 0, 1, 1.0, ints, floats, frames, positions, normals)

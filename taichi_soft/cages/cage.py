@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from taichi_soft.cages.cell_size import cell_size_of
 from taichi_soft.cages.connected import parts_of
 from taichi_soft.cages.fitting import caps, fit
 from taichi_soft.cages.lattice import Lattice
 from taichi_soft.cages.marking import mark, part_count, split_hinges, without_flat
 from taichi_soft.cages.masses import fitted
 from taichi_soft.cages.solid import Solid, solid_of
-from taichi_soft.core.checks import as_count, as_positive
 from taichi_soft.core.errors import MeshError, OptionError
 from taichi_soft.meshing import TetMesh
 from taichi_soft.meshing.arrays import FloatArray
@@ -46,17 +45,6 @@ MOST_SHARE = 1.5
 PEELS = 4
 """Layers of flat tetrahedra that are taken off at most."""
 
-CageMethod = Literal["lattice"]
-METHODS = ("lattice",)
-
-DEFAULT_CELLS = 10
-"""Along the longest side: some thousand tetrahedra, of which a game has many."""
-
-MOST_CUBES = 150_000
-
-BYTES_PER_CUBE = 27 * 250
-"""Of the voxels in it, while the cage is made."""
-
 OPEN = 0.5
 """Of all lines that meet a surface: more that do not leave it again, and it is a sheet."""
 
@@ -74,40 +62,12 @@ class Cage:
 
 
 def build_cage(
-    surfaces: tuple[Surface, ...],
-    *,
-    cells: int | None = None,
-    cell_size: float | None = None,
-    method: CageMethod = "lattice",
+    surfaces: tuple[Surface, ...], *, cells: int | None = None, cell_size: float | None = None
 ) -> Cage:
     """The cage of a solid that surfaces enclose together. Arguments as of `SoftBodyAsset.from_surface`."""
-    if method not in METHODS:
-        raise OptionError(f"unknown method {method!r}: choose one of {', '.join(map(repr, METHODS))}")
     vertices, triangles = joined(surfaces)
     size = np.ptp(vertices[np.unique(triangles)], axis=0)
-    return lattice_cage(vertices, triangles, _cell_size(size, cells, cell_size))
-
-
-def _cell_size(size: FloatArray, cells: int | None, cell_size: float | None) -> float:
-    """Edge of the lattice's cubes [m]. Raises: OptionError for none, or too many of them."""
-    longest = float(size.max())
-    if not longest > 0.0:
-        raise MeshError("the surface is a point: it encloses nothing")
-    if cells is not None and cell_size is not None:
-        raise OptionError(f"cells={cells!r} and cell_size={cell_size!r}: give one of them")
-    if cell_size is None:
-        edge = longest / as_count(DEFAULT_CELLS if cells is None else cells, "cells", 1, 1_000_000)
-    else:
-        edge = as_positive(cell_size, "cell_size", "m")
-        if edge > 2.0 * longest:
-            raise OptionError(f"cell_size is {edge:g} m, and the surface is {longest:g} m long: take less")
-    cubes = float(np.prod(np.ceil(size / edge) + 2.0))
-    if cubes > MOST_CUBES:
-        raise OptionError(
-            f"cells of {edge:.4g} m make a lattice of {cubes:.3g} cubes, which takes about "
-            f"{cubes * BYTES_PER_CUBE / 2**30:,.1f} GiB to fit: stay below {MOST_CUBES:,} cubes"
-        )
-    return edge
+    return lattice_cage(vertices, triangles, cell_size_of(size, cells, cell_size))
 
 
 def lattice_cage(vertices: FloatArray, triangles: Ints, cell_size: float) -> Cage:

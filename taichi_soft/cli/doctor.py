@@ -21,6 +21,7 @@ def doctor(
     file: Annotated[Path, typer.Argument(help="A surface (.glb, .obj, .ply, .stl, .off), or tetrahedra.")],
     material: Annotated[str, typer.Option(help="A preset; `taichi-soft info` lists them.")] = "gelatine",
     cells: Annotated[int | None, typer.Option(help="Of the cage, along the longest side; 10.")] = None,
+    method: Annotated[str, typer.Option(help="Of meshing: lattice, ftetwild or tetgen.")] = "lattice",
     up: Annotated[str | None, typer.Option(help="Axis that points up in the file: y or z.")] = None,
     fix: Annotated[
         Path | None,
@@ -38,7 +39,7 @@ def doctor(
     made_of = preset(material)  # type: ignore[arg-type]
     init(arch, threads)
     with errors.status("making a body and timing its frames"):
-        found = diagnose(file, made_of, cells=cells, up=up)  # type: ignore[arg-type]
+        found = diagnose(file, made_of, cells=cells, method=method, up=up)  # type: ignore[arg-type]
     if as_json:
         print(json.dumps(found.as_plain(), indent=2))
     else:

@@ -22,6 +22,8 @@ EXTRAS = {
         "skfem": "scikit-fem",
     },
     "cluster": {"distributed": "distributed"},
+    "tetgen": {"tetgen": "tetgen"},
+    "ftetwild": {"pytetwild": "pytetwild"},
 }
 """By extra: its modules, and the packages that have them, as in pyproject.toml."""
 

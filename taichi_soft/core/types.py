@@ -76,6 +76,7 @@ IntegratorName: TypeAlias = (
 )
 ScheduleName: TypeAlias = Schedule | Literal["auto", "per_body", "flat"]
 ArchName: TypeAlias = Literal["auto", "cpu", "cuda", "vulkan", "metal"]
+CageMethodName: TypeAlias = Literal["lattice", "tetgen", "ftetwild"]
 LawName: TypeAlias = Literal[
     "virial",
     "face",

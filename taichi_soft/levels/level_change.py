@@ -81,8 +81,8 @@ def bar_to_levels(body: SoftBody) -> str:
         return f"body {body.index} is frozen: bring it back with set_motion before its level changes"
     if record_of(body).description is not present_asset(body).description:
         return (
-            f"body {body.index} was given a material of its own, which its other levels do not have: spawn it "
-            "anew from an asset of that material"
+            f"body {body.index} was given a material of its own, which its other levels do not have: spawn "
+            "it anew from an asset of that material"
         )
     return ""
 
@@ -93,7 +93,6 @@ def _passed(over: Passage, motion: Floats, masses: Floats) -> Floats:
     rows = np.zeros((len(masses), MOTION_WIDTH))
     rows[:, :INV_MASS] = over(motion[:, :INV_MASS])
     for position, velocity in ((POSITION, VELOCITY), (EARLIER_POSITION, EARLIER_VELOCITY)):
-        earlier = motion[:, position], motion[:, velocity]
         earlier = motion[:, position], motion[:, velocity]
         _keep_momentum(*earlier, old, rows[:, position], rows[:, velocity], masses)
     rows[:, MASS], rows[:, INV_MASS] = masses, 1.0 / masses

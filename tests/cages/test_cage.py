@@ -177,7 +177,6 @@ def test_the_same_surface_gives_the_same_cage():
         (ball(), {"cells": 0}, OptionError, "cells"),
         (ball(), {"cells": 5, "cell_size": 0.1}, OptionError, "one of them"),
         (ball(), {"cell_size": 9.0}, OptionError, "take less"),
-        (ball(), {"method": "voxels"}, OptionError, "'lattice'"),
         (([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]), {}, MeshError, "thickness"),
         (([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 1]]), {}, MeshError, "no volume"),
         (([[1, 1, 1]] * 3, [[0, 1, 2]]), {}, MeshError, "a point"),

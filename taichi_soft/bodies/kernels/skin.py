@@ -1,5 +1,7 @@
 """Vertices and normals of an artist's mesh that a body carries."""
 
+import numpy as np
+
 from taichi_soft.bodies.kernels.render_mesh import drawn_position
 from taichi_soft.core.runtime import ti
 
@@ -10,8 +12,20 @@ the vertex is less F X / 2, with X its place at rest."""
 ROW = 10
 """Numbers of a vertex of the skin: four shares, where it aims, its normal at rest."""
 
+LANES = 16
+"""Vertices of the skin whose numbers lie side by side, and which are computed so."""
+
 NO_LENGTH = 1e-30
 """Square of a normal below which it has no direction: float32 ends there."""
+
+
+def in_lanes(rows: np.ndarray) -> np.ndarray:
+    """Rows (k, n) as the kernel reads them: of `LANES` after each other the first numbers, then the second,
+    and so on; 0 where the last block has no more, (blocks n LANES,)."""
+    blocks = -(-len(rows) // LANES)
+    padded = np.zeros((blocks * LANES, rows.shape[1]), dtype=rows.dtype)
+    padded[: len(rows)] = rows
+    return padded.reshape(blocks, LANES, -1).swapaxes(1, 2).ravel()
 
 
 @ti.func
@@ -37,9 +51,9 @@ def write_skin(
     Args:
         count: vertices of the body.
         ints: where the neighbours of each of these begin, the last end, the neighbours, and the four vertices
-            of the body that each vertex of the skin hangs on.
+            of the body that each vertex of the skin hangs on: `in_lanes`.
         floats: the row of each neighbour in the gradient, the body's vertices at rest, and `ROW` numbers for
-            each vertex of the skin.
+            each vertex of the skin: `in_lanes`.
         frames: to work in, (FRAME count,).
         positions, normals: (3 k,).
     """
@@ -56,28 +70,37 @@ def write_skin(
             frames[FRAME * vertex + 9 + i] = offset[i]
             for j in ti.static(range(3)):
                 frames[FRAME * vertex + 3 * j + i] = F[i, j]
+    edges, size = ints[count], positions.shape[0] // 3
     ti.loop_config(serialize=is_serial)
-    for v in range(positions.shape[0] // 3):
-        edges = ints[count]
-        at = 3 * (edges + count) + ROW * v
-        frame = ti.Vector.zero(ti.f32, FRAME)
-        for c in ti.static(range(4)):
-            start, share = FRAME * ints[count + 1 + edges + 4 * v + c], floats[at + c]
-            for i in range(FRAME):
-                frame[i] += share * frames[start + i]
-        a, b, c, offset = (
-            ti.Vector([frame[0], frame[1], frame[2]]),
-            ti.Vector([frame[3], frame[4], frame[5]]),
-            ti.Vector([frame[6], frame[7], frame[8]]),
-            ti.Vector([frame[9], frame[10], frame[11]]),
-        )
-        aim, normal = 0.5 * _three(floats, at + 4), _three(floats, at + 7)
-        x = offset + aim.x * a + aim.y * b + aim.z * c
-        n = normal.x * b.cross(c) + normal.y * c.cross(a) + normal.z * a.cross(b)
-        square = n.dot(n)
-        n *= ti.rsqrt(ti.max(square, NO_LENGTH))
-        if square <= NO_LENGTH:
-            n = ti.Vector([0.0, 0.0, 1.0])
-        for k in ti.static(range(3)):
-            positions[3 * v + k] = x[k]
-            normals[3 * v + k] = n[k]
+    for block in range((size + LANES - 1) // LANES):
+        rows = 3 * (edges + count) + ROW * LANES * block
+        corners = count + 1 + edges + 4 * LANES * block
+        drawn = ti.Vector.zero(ti.f32, 6 * LANES)
+        for lane in range(LANES):  # reads arrays and writes a local one only: so LLVM vectorises it
+            frame = ti.Vector.zero(ti.f32, FRAME)
+            for c in ti.static(range(4)):
+                start, share = FRAME * ints[corners + LANES * c + lane], floats[rows + LANES * c + lane]
+                for i in ti.static(range(FRAME)):
+                    frame[i] += share * frames[start + i]
+            a, b, c, offset = (
+                ti.Vector([frame[0], frame[1], frame[2]]),
+                ti.Vector([frame[3], frame[4], frame[5]]),
+                ti.Vector([frame[6], frame[7], frame[8]]),
+                ti.Vector([frame[9], frame[10], frame[11]]),
+            )
+            at = rows + 4 * LANES + lane
+            x = offset + 0.5 * (floats[at] * a + floats[at + LANES] * b)
+            x += 0.5 * floats[at + 2 * LANES] * c
+            n = floats[at + 3 * LANES] * b.cross(c) + floats[at + 4 * LANES] * c.cross(a)
+            n += floats[at + 5 * LANES] * a.cross(b)
+            square = n.dot(n)
+            scale = ti.rsqrt(ti.max(square, NO_LENGTH))
+            has_length = square > NO_LENGTH
+            for k in ti.static(range(3)):
+                drawn[LANES * k + lane] = x[k]
+                drawn[LANES * (3 + k) + lane] = ti.select(has_length, scale * n[k], 1.0 if k == 2 else 0.0)
+        for lane in range(ti.min(LANES, size - LANES * block)):
+            v = LANES * block + lane
+            for k in ti.static(range(3)):
+                positions[3 * v + k] = drawn[LANES * k + lane]
+                normals[3 * v + k] = drawn[LANES * (3 + k) + lane]

@@ -15,6 +15,7 @@ from taichi_soft.bodies.asset import SoftBodyAsset
 from taichi_soft.bodies.sag import MOST_SAG, sag
 from taichi_soft.core.constants import GRAVITY_EARTH
 from taichi_soft.core.errors import MeshError, TaichiSoftError
+from taichi_soft.core.types import CageMethodName
 from taichi_soft.elements.materials import Material
 from taichi_soft.lab.doctor.surface import SurfaceFacts, facts_of
 from taichi_soft.meshing import TetMesh, load_mesh
@@ -86,13 +87,20 @@ class Diagnosis:
         self.findings.append(Finding(grade, text))
 
 
-def diagnose(path: Path, material: Material, *, cells: int | None = None, up: Up | None = None) -> Diagnosis:
+def diagnose(
+    path: Path,
+    material: Material,
+    *,
+    cells: int | None = None,
+    method: CageMethodName = "lattice",
+    up: Up | None = None,
+) -> Diagnosis:
     """Look at a file, make a body of it, and time its frames.
 
     Args:
         path: of a surface that `read_surfaces` takes, or of tetrahedra that `load_mesh` takes.
         material: of the body.
-        cells, up: as of `SoftBodyAsset.from_surface`.
+        cells, method, up: as of `SoftBodyAsset.from_surface`.
     Raises: MeshError or OptionError for what cannot be read.
     """
     found = Diagnosis(path.name)
@@ -101,7 +109,7 @@ def diagnose(path: Path, material: Material, *, cells: int | None = None, up: Up
         found.surface = facts_of(surfaces)
         _judge_surface(found, found.surface)
         try:
-            asset = SoftBodyAsset.from_surface(surfaces, material, cells=cells)
+            asset = SoftBodyAsset.from_surface(surfaces, material, cells=cells, method=method)
         except MeshError as error:
             found.say(Grade.BAD, str(error))
             return found

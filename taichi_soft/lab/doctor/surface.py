@@ -8,12 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.cages.connected import components
+from taichi_soft.cages.welding import places_of
 from taichi_soft.meshing.surfaces import Surface, joined
 
 Ints = NDArray[np.int64]
-
-WELD = 1e-7
-"""Of the longest side: vertices that are nearer count as one. float32 files round by as much."""
 
 NO_AREA = 1e-12
 """Twice the area over the square of the longest side."""
@@ -39,8 +37,7 @@ def facts_of(surfaces: tuple[Surface, ...]) -> SurfaceFacts:
     """Look at surfaces as one."""
     vertices, triangles = joined(surfaces)
     size = float(np.ptp(vertices[np.unique(triangles)], axis=0).max())
-    places = np.round(vertices / max(WELD * size, 1e-300)).astype(np.int64)
-    welded = np.unique(places, axis=0, return_inverse=True)[1].reshape(-1)[triangles]
+    welded = places_of(vertices, size)[triangles]
     a, b, c = np.moveaxis(vertices[triangles], 1, 0)
     doubled = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     is_flat = (doubled <= NO_AREA * size**2) | (np.diff(np.sort(welded, axis=1), axis=1) == 0).any(axis=1)

@@ -10,6 +10,7 @@ from surfaces import ball, joined, with_some_turned, with_triangles, without
 
 from taichi_soft import Material, MeshError, box, save_mesh
 from taichi_soft.cli import main
+from taichi_soft.core.extras import missing_packages
 from taichi_soft.lab.doctor import Grade, diagnose
 from taichi_soft.lab.doctor.mending import write_mended
 from taichi_soft.lab.doctor.surface import facts_of
@@ -99,6 +100,24 @@ def test_what_is_thinner_than_a_cell_is_noted(tmp_path):
     sheet = trimesh.creation.box((1.0, 1.0, 0.01))
     found = diagnose(written(sheet, tmp_path / "sheet.stl"), RUBBER, cells=6)
     assert any("thinner than a cell" in each.text for each in found.findings)
+
+
+@pytest.mark.skipif(bool(missing_packages("ftetwild")), reason="needs pytetwild: the extra ftetwild")
+def test_another_method_makes_another_body(tmp_path, capsys):
+    file = written(ball(0.5, 2), tmp_path / "ball.stl")
+    found = diagnose(file, RUBBER, cells=5, method="ftetwild")
+    assert found.is_fit
+    assert found.figures["mass [kg]"] == pytest.approx(1000 * ball(0.5, 2).volume, rel=0.03)
+    assert found.figures["tetrahedra"] != diagnose(file, RUBBER, cells=5).figures["tetrahedra"]
+    assert run("doctor", str(file), "--cells", "5", "--method", "voxels") != 0
+    assert "'ftetwild'" in "".join(capsys.readouterr())
+
+
+@pytest.mark.skipif(bool(missing_packages("tetgen")), reason="needs tetgen: the extra of that name")
+def test_what_a_mesher_refuses_is_bad_with_the_way_out(tmp_path):
+    found = diagnose(written(without(BALL, 0.02), tmp_path / "open.ply"), RUBBER, method="tetgen")
+    assert not found.is_fit
+    assert "method='lattice'" in found.findings[-1].text
 
 
 def test_tetrahedra_are_looked_at_too(tmp_path):
