@@ -1,22 +1,34 @@
-"""Colours of an artist's mesh: from its texture, its material, its vertices, or the caller's."""
+"""Looks of an artist's mesh: its texture, and colours from its material, its vertices, or the caller's."""
 
 import numpy as np
 import pytest
 import trimesh
 
-from taichi_soft.render.skin_colors import vertex_colors
+from taichi_soft.render.skin_looks import texture_picture, vertex_colors
 
 PIL = pytest.importorskip("PIL.Image")
 OTHERWISE = (0.2, 0.4, 0.6)
+PICTURE = PIL.fromarray(np.zeros((2, 2, 3), np.uint8))
 
 
-def test_a_texture_is_looked_up_from_its_lower_left():
-    pixels = np.zeros((2, 2, 3), np.uint8)
-    pixels[0, 0], pixels[0, 1], pixels[1, 0], pixels[1, 1] = (255, 0, 0), (0, 255, 0), (0, 0, 255), (255,) * 3
-    uv = [(0.1, 0.9), (0.9, 0.9), (0.1, 0.1), (0.9, 0.1), (1.1, -0.1)]  # the last repeats
-    visual = trimesh.visual.TextureVisuals(uv=uv, image=PIL.fromarray(pixels))
-    found = vertex_colors(visual, 5, OTHERWISE)
-    np.testing.assert_allclose(found, [(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 1), (1, 0, 0)])
+def test_a_texture_lies_on_what_has_a_place_on_it_for_each_vertex():
+    visual = trimesh.visual.TextureVisuals(uv=np.zeros((5, 2)), image=PICTURE)
+    assert texture_picture(visual, 5) is not None
+    assert texture_picture(visual, 4) is None
+    assert texture_picture(trimesh.visual.TextureVisuals(image=PICTURE), 5) is None
+    assert texture_picture(trimesh.creation.box().visual, 8) is None
+    assert texture_picture(None, 8) is None
+
+
+def test_a_texture_is_multiplied_by_the_factor_of_its_material_or_else_by_white():
+    uv = np.zeros((3, 2))
+    plain = trimesh.visual.TextureVisuals(uv=uv, image=PICTURE)
+    np.testing.assert_allclose(vertex_colors(plain, 3, OTHERWISE), np.ones((3, 3)))
+    material = trimesh.visual.material.PBRMaterial(
+        baseColorTexture=PICTURE, baseColorFactor=[0, 255, 0, 255]
+    )
+    tinted = trimesh.visual.TextureVisuals(uv=uv, material=material)
+    np.testing.assert_allclose(vertex_colors(tinted, 3, OTHERWISE), [(0, 1, 0)] * 3)
 
 
 def test_a_material_without_texture_gives_its_own_colour():

@@ -1,0 +1,82 @@
+"""Toy elephants, each the artist's mesh on a cage of tetrahedra, fall down a flight of steps; their ears flap."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+from PIL import Image
+
+from engine_adapter import FixedStep
+from taichi_soft import BoxShape, Contact, Material, SoftBodyAsset, World
+from taichi_soft.cli import main
+from taichi_soft.core.package_data import ASSETS
+from taichi_soft.render import Camera
+from taichi_soft.render.film import Actor, Stage
+
+TOY = ASSETS / "elephant.glb"
+HEIGHT = 0.5  # of the toy in that file [m]
+CELLS = 9  # of the cages along their longest side
+DENSITY, POISSON, DAMPING = 200.0, 0.4, 0.08  # of all of them [kg/m^3], -, share of critical
+STEPS, RISE, TREAD, WIDTH = 3, 0.3, 0.62, 3.2  # how many, and of each: height, depth, width [m]
+STONE = ((0.80, 0.74, 0.68), (0.88, 0.82, 0.75), (0.95, 0.90, 0.83))  # colours, from the lowest
+THICKNESS = 0.01  # of the skins of the bodies [m]
+DRAG = 0.3  # [1/s]
+STEP = FixedStep(dt=1 / 200)  # short: what has to be made again, where one is squashed far, is little
+
+HERD: tuple[tuple[float, float, str, tuple[float, float, float], tuple[float, float, float]], ...] = (
+    (0.60, 2.5e4, "rgb", (0.0, 0.35, 0.35), (0.0, -1.1, 0.0)),
+    (0.50, 2.0e4, "brg", (-0.85, 0.35, 0.75), (0.1, -1.2, 0.0)),
+    (0.50, 4.0e4, "grb", (0.85, 0.35, 1.0), (-0.1, -1.3, 0.0)),
+    (0.40, 2.0e4, "bgr", (-0.45, -0.35, 1.25), (0.2, -0.8, 0.0)),
+    (0.40, 2.0e4, "rbg", (0.42, 0.30, 1.75), (-0.1, -1.0, 0.0)),
+)
+"""Each one's height [m], Young's modulus [Pa] and dye, its place over the top step and its first velocity [m/s]."""
+
+
+def dyed(dye: str) -> trimesh.Scene:
+    """The toy, with its cloth in another colour: what is bluer than red gets its channels in that order."""
+    toy = trimesh.load_scene(TOY)
+    for mesh in toy.geometry.values():
+        look = mesh.visual.material
+        plain = np.asarray(look.baseColorTexture.convert("RGB"), dtype=np.float32)
+        share = np.clip((plain[..., 2:] - plain[..., :1]) / 50.0, 0.0, 1.0)
+        other = plain[..., ["rgb".index(channel) for channel in dye]]
+        look.baseColorTexture = Image.fromarray((plain + share * (other - plain)).astype(np.uint8))
+    return toy
+
+
+def stage() -> Stage:
+    """The elephants over the steps, upright."""
+    world = World(soft_contact=True, friction=0.6)
+    colors = {}
+    for i in range(STEPS):
+        depth = TREAD * (STEPS - i)
+        step = world.add_collider(
+            BoxShape((WIDTH, depth, RISE)), position=(0.0, -depth / 2, RISE * (i + 0.5)), friction=0.6
+        )
+        colors[step] = STONE[i % len(STONE)]
+    contact = Contact(friction=0.5, thickness=THICKNESS)
+    for size, young, dye, place, _ in HERD:
+        toy = dyed(dye).scaled(size / HEIGHT)
+        material = Material(young, POISSON, DENSITY, damping_ratio=DAMPING)
+        asset = SoftBodyAsset.from_surface(toy, material, cells=CELLS, up="y", contact=contact)
+        world.add_body(asset, position=(0.0, -TREAD, STEPS * RISE) + np.array(place))
+    world.build()
+    for body, (_, _, _, _, velocity) in zip(world.bodies, HERD, strict=True):
+        body.set_linear_damping(DRAG)
+        body.set_velocity(velocity)
+    camera = Camera.framing(
+        (-1.5, -2.6, 0.0), (1.5, 0.0, 2.6), aspect=16 / 9, azimuth=-68, elevation=16, margin=1.0
+    )
+    actors = [Actor(body) for body in world.bodies]
+    return Stage("toy elephants", world, actors, camera, STEP, 5.0, collider_colors=colors)
+
+
+def proof(stage: Stage) -> float:
+    """How many elephants."""
+    return float(len(stage.actors))
+
+
+if __name__ == "__main__":
+    main("demo", "elephants")
