@@ -48,7 +48,14 @@ EAR, EAR_SIZE = np.array([0.40, 0.02, 0.735]), np.array([0.235, 0.0, 0.265])  # 
 EAR_TURN, EAR_TILT = 0.45, 0.22  # forward about z, outward about y [rad]
 EAR_THICKNESS = 0.052  # half of it
 TRUNK = np.array(
-    [[0, -0.20, 0.70], [0, -0.34, 0.64], [0, -0.43, 0.53], [0, -0.48, 0.42], [0, -0.565, 0.365], [0, -0.64, 0.41]]
+    [
+        [0, -0.20, 0.70],
+        [0, -0.34, 0.64],
+        [0, -0.43, 0.53],
+        [0, -0.48, 0.42],
+        [0, -0.565, 0.365],
+        [0, -0.64, 0.41],
+    ]
 )
 TRUNK_RADII = (0.125, 0.105, 0.085, 0.073, 0.066, 0.064)
 FEET = np.array([[-0.27, -0.46, 0.125], [0.27, -0.46, 0.125]])
@@ -190,7 +197,9 @@ def paint(p: Floats) -> Floats:
     over(colors, INNER_EAR, inner)
     along, beside = on_trunk(p)
     ring = np.abs((along / 0.07) % 1.0 - 0.5) * 0.07
-    over(colors, TUFT, 0.6 * soft(beside - 0.02) * soft(0.16 - along) * soft(along - 0.5) * soft(ring - 0.006))
+    over(
+        colors, TUFT, 0.6 * soft(beside - 0.02) * soft(0.16 - along) * soft(along - 0.5) * soft(ring - 0.006)
+    )
     tip = np.linalg.norm(p - (TRUNK[-1] + np.array([0, -0.045, 0.04])), axis=1)
     over(colors, INNER_EAR, soft(tip - 0.042))
     over(colors, CHEEK, 0.75 * soft(np.linalg.norm(mirrored - [0.185, -0.225, 0.665], axis=1) - 0.045, 0.05))

@@ -244,6 +244,32 @@ def test_the_ends_of_the_rope_bridge_carry_all_that_fell_onto_it():
         assert body.flipped_count() == 0
 
 
+def test_the_elephants_land_whole_on_the_steps_and_their_ears_have_swung():
+    """Nothing of them lies in a step or in the floor, by the boxes that the steps are, and no ear is torn off."""
+    demo = load_demo("elephants")
+    stage = demo.stage()
+    bodies = [actor.body for actor in stage.actors]
+    assert len(bodies) == len(demo.HERD)
+    game = EngineAdapter(stage.world, stage.step, before_step=stage.act)
+    ears = [[] for _ in bodies]
+    while stage.world.time < 6.0:
+        game.step()
+        for swings, body in zip(ears, bodies, strict=True):
+            if stage.world.step_count % 4 == 0:
+                swings.append(demo.ear_span(body))
+    assert demo.proof(stage) == len(bodies)
+    for body, swings in zip(bodies, ears, strict=True):
+        assert body.failure is None
+        assert body.flipped_count() == 0
+        assert body.volume() == pytest.approx(body.mesh.volume, rel=0.15)
+        assert np.ptp(swings) > 0.1
+        x, y, z = body.positions().T
+        for i in range(demo.STEPS):  # counted from below; each goes back to y = 0 under those above it
+            inside = (np.abs(x) < demo.WIDTH / 2) & (y > -demo.TREAD * (demo.STEPS - i)) & (y < 0)
+            assert (z[inside] > demo.RISE * (i + 1) - 0.01).all()
+        assert z.min() > -0.01
+
+
 def test_two_machines_with_late_inputs_are_in_the_same_state_in_every_tick():
     """Once all inputs are known; before that each has guessed wrong, seen other states, and gone back."""
     share, stage = run("rollback", 3.0)
@@ -281,7 +307,7 @@ def test_a_film_shows_what_was_cut_off(tmp_path):
 def test_there_are_the_demos_of_the_readme():
     assert demo_names() == [
         *("attach", "bars", "bounce", "bowl", "bridge", "cloth", "compare", "cut", "density", "dents"),
-        *("drape", "grab", "jelly", "many", "playground", "rollback", "tower", "wheels"),
+        *("drape", "elephants", "grab", "jelly", "many", "playground", "rollback", "tower", "wheels"),
     ]
 
 

@@ -24,9 +24,7 @@ def test_a_texture_is_multiplied_by_the_factor_of_its_material_or_else_by_white(
     uv = np.zeros((3, 2))
     plain = trimesh.visual.TextureVisuals(uv=uv, image=PICTURE)
     np.testing.assert_allclose(vertex_colors(plain, 3, OTHERWISE), np.ones((3, 3)))
-    material = trimesh.visual.material.PBRMaterial(
-        baseColorTexture=PICTURE, baseColorFactor=[0, 255, 0, 255]
-    )
+    material = trimesh.visual.material.PBRMaterial(baseColorTexture=PICTURE, baseColorFactor=[0, 255, 0, 255])
     tinted = trimesh.visual.TextureVisuals(uv=uv, material=material)
     np.testing.assert_allclose(vertex_colors(tinted, 3, OTHERWISE), [(0, 1, 0)] * 3)
 
