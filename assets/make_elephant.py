@@ -5,18 +5,19 @@
 #     "numpy>=2",
 #     "pillow>=12",
 #     "scikit-image==0.26.0",
+#     "scipy>=1.15",
 #     "trimesh>=5",
 #     "xatlas==0.0.11",
 # ]
 # ///
 """Make `elephant.glb`: a toy elephant that sits, 0.5 m high, with a painted texture.
 
-`uv run assets/make_elephant.py`, or with the packages above installed, `python assets/make_elephant.py`. The same
-packages make the same file. All lengths below are in heights of the toy; z is up and it looks along -y. The file
-has y up, as glTF wants it.
+`uv run assets/make_elephant.py`, or with the packages above installed, `python assets/make_elephant.py`.
+The same packages make the same file. All lengths below are in heights of the toy, about; z is up and it looks
+along -y. The file has y up, as glTF wants it.
 
-Its shape is where a function of space is zero: round parts, blended. Its colours are a function of space as well,
-looked up at every pixel of the texture.
+Its shape is where a function of space is zero: round parts, blended. Its colours are a function of space as
+well, looked up at every pixel of the texture.
 """
 
 from __future__ import annotations
@@ -134,7 +135,7 @@ def gradient(p: Floats) -> Floats:
 
 
 def surface() -> tuple[Floats, NDArray[np.int64], Floats]:
-    """Vertices, triangles and normals: marching cubes, made coarser where it is flat, put back on the solid."""
+    """Vertices, triangles and normals: marching cubes, coarser where it is flat, put back on the solid."""
     axes = [np.arange(lo, hi, GRID) for lo, hi in zip(LOW, HIGH, strict=True)]
     values = solid(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1))
     points, triangles, _, _ = marching_cubes(values, 0.0, spacing=(GRID,) * 3, gradient_direction="descent")
@@ -172,7 +173,7 @@ def over(colors: Floats, paint: tuple[float, ...], share: Floats) -> None:
 
 
 def spots(p: Floats) -> Floats:
-    """How far places are from the rims of round spots of several sizes, spread evenly over its back and sides."""
+    """How far places are from the rims of round spots of several sizes, spread over its back and sides."""
     rng = np.random.default_rng(5)
     places = rng.uniform([-0.3, -0.1, 0.05], [0.3, 0.35, 1.0], (400, 3))
     kept: list[tuple[Floats, float]] = []

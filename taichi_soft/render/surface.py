@@ -27,8 +27,8 @@ class Surface:
         color: sRGB from 0 to 1, either (3,) for the whole body or (n, 3), one per vertex.
         normals: (n, 3) of unit length to shade by instead; set them with the positions before each frame.
         texture: a picture on it, which is multiplied by `color`: give that as white, to see it as it is.
-        uv: (n, 2), where the vertices lie on the texture: (0, 0) at its lower left, (1, 1) at its upper right;
-            beyond that it repeats.
+        uv: (n, 2), where the vertices lie on the texture: (0, 0) at its lower left, (1, 1) at its upper
+            right; beyond that it repeats.
     Raises: OptionError for wrong shapes, a texture without `uv` or the reverse, positions that are not finite
         (a picture of an exploded body shows nothing) or colours out of range; MeshError for indices out of
         range.

@@ -98,7 +98,7 @@ class SceneTextures:
         begins = np.cumsum([0, *(len(each.levels) for each in held)])[:-1]
         starts = np.cumsum([0, *(len(each.texels) for each in held)])[:-1]
         first = {id(each): int(begin) for each, begin in zip(held, begins, strict=True)}
-        levels = [each.levels + (start, 0, 0, 0) for each, start in zip(held, starts, strict=True)]
+        levels = [each.levels + np.array([start, 0, 0, 0]) for each, start in zip(held, starts, strict=True)]
         return cls(
             np.concatenate(uv),
             np.repeat([first.get(id(each), -1) for each in textures], triangle_counts).astype(np.int32),

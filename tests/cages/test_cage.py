@@ -93,7 +93,7 @@ def test_it_hangs_together_as_the_solid_does(made):
 
 
 def eigenproblem(mesh):
-    """K and M of K u = w^2 M u of a free body, strain being constant in each tetrahedron, put together here."""
+    """K and M of K u = w^2 M u of a free body, its strain constant in each tetrahedron, put together here."""
     body = BodyDescription(mesh, RUBBER, element_model("virial"))
     corners = mesh.vertices[mesh.tets]
     inverse = np.linalg.inv(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2))

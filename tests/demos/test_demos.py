@@ -245,7 +245,7 @@ def test_the_ends_of_the_rope_bridge_carry_all_that_fell_onto_it():
 
 
 def test_the_elephants_land_whole_on_the_steps_and_their_ears_have_swung():
-    """Nothing of them lies in a step or in the floor, by the boxes that the steps are, and no ear is torn off."""
+    """Nothing of them lies in a step or in the floor, by the boxes that the steps are."""
     demo = load_demo("elephants")
     stage = demo.stage()
     bodies = [actor.body for actor in stage.actors]

@@ -88,7 +88,7 @@ def test_a_texture_of_one_colour_looks_as_that_colour_and_is_multiplied_by_the_s
 def test_it_repeats_beyond_its_edges(renderer):
     _, is_quad = places()
     one = renderer.render([textured(CHECKS)]).astype(int)
-    other = renderer.render([textured(CHECKS, uv=UV + (3.0, -2.0))]).astype(int)
+    other = renderer.render([textured(CHECKS, uv=np.add(UV, (3.0, -2.0)))]).astype(int)
     assert np.abs(one - other)[is_quad].max() <= 2
 
 
@@ -105,9 +105,9 @@ def test_surfaces_side_by_side_keep_their_own_textures(renderer):
     _, is_quad = places()
     ahead = textured(np.tile(BRIGHT, (2, 2, 1)).astype(np.uint8))
     alone = renderer.render([textured(CHECKS)])
-    ahead.positions = CORNERS + (0.0, -9.0, 0.0)  # behind the camera
+    ahead.positions = np.add(CORNERS, (0.0, -9.0, 0.0))  # behind the camera
     plain = quad(color=(0.1, 0.9, 0.1))
-    plain.positions = CORNERS + (0.0, 3.0, 0.0)  # hidden
+    plain.positions = np.add(CORNERS, (0.0, 3.0, 0.0))  # hidden
     together = renderer.render([ahead, textured(CHECKS), plain])
     assert np.abs(alone.astype(int) - together)[is_quad].max() <= 1
 
@@ -116,7 +116,7 @@ def test_surfaces_side_by_side_keep_their_own_textures(renderer):
     "pixels", [None, 3, np.zeros((4, 4)), np.zeros((4, 4, 3)), np.zeros((0, 4, 3), np.uint8), "red"]
 )
 def test_what_is_no_picture_is_refused(pixels):
-    with pytest.raises(OptionError, match="pixels|texture"):
+    with pytest.raises(OptionError, match=r"pixels|texture"):
         Texture(pixels)
 
 
