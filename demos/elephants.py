@@ -34,8 +34,8 @@ forward [rad/s]."""
 
 
 def toy(height: float, dye: str) -> trimesh.Scene:
-    """The toy of that height [m], its cloth in another colour: what is bluer than red gets its channels in the
-    order that `dye` says."""
+    """The toy of that height [m], its cloth in another colour: what is bluer than red gets its channels in
+    the order of `dye`."""
     scene = trimesh.load_scene(TOY, process=False)
     for mesh in scene.geometry.values():
         mesh.apply_scale(height / HEIGHT)

@@ -3,10 +3,12 @@
 import cv2
 import numpy as np
 import pytest
+import trimesh
 from scipy.special import ellipe, ellipk
 
 from engine_adapter import EngineAdapter
 from taichi_soft import LAWS, OptionError
+from taichi_soft.core.package_data import ASSETS
 from taichi_soft.render.demos import demo_names, load_demo
 from taichi_soft.render.film import film
 
@@ -242,6 +244,29 @@ def test_the_ends_of_the_rope_bridge_carry_all_that_fell_onto_it():
         assert abs(y) < demo.WIDTH / 2
         assert z > rows[near, 2].mean() + 0.1
         assert body.flipped_count() == 0
+
+
+def test_the_toy_elephant_is_closed_and_painted_dark_at_its_eyes_and_reddish_within_its_ears():
+    """At its vertices, looked up here; the surface once its copies at seams of the texture are merged."""
+    assert (ASSETS / "elephant.glb").stat().st_size < 600e3
+    (mesh,) = trimesh.load_scene(ASSETS / "elephant.glb", process=False).geometry.values()
+    whole = trimesh.Trimesh(mesh.vertices, mesh.faces)
+    assert whole.is_watertight
+    assert whole.is_winding_consistent
+    assert whole.volume == pytest.approx(0.0258, abs=0.001)
+    assert whole.bounds[:, 1] == pytest.approx([0.0, 0.5], abs=1e-4)
+    picture = np.asarray(mesh.visual.material.baseColorTexture.convert("RGB")).astype(int)
+    u, v = (mesh.visual.uv.T * len(picture)).astype(int).clip(0, len(picture) - 1)
+    colors = picture[len(picture) - 1 - v, u]
+    x, y, z = mesh.vertices.T
+    dark = colors.sum(axis=1) < 120
+    for side in (-1, 1):
+        eye = dark & (side * x > 0)
+        assert eye.sum() > 5
+        assert np.ptp(mesh.vertices[eye], axis=0).max() < 0.06  # [m]
+        inner = (side * x > 0.16) & (np.abs(y - 0.33) < 0.06) & (mesh.vertex_normals[:, 2] > 0.5)
+        assert inner.sum() > 10
+        assert (colors[inner, 0] > colors[inner, 2] + 30).mean() > 0.8
 
 
 def test_the_elephants_land_whole_on_the_steps_and_their_ears_have_swung():
