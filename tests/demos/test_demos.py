@@ -285,9 +285,9 @@ def test_the_elephants_land_whole_on_the_steps_and_their_ears_have_swung():
     assert demo.proof(stage) == len(bodies)
     for body, swings in zip(bodies, ears, strict=True):
         assert body.failure is None
-        assert body.flipped_count() == 0
-        assert body.volume() == pytest.approx(body.mesh.volume, rel=0.15)
-        assert np.ptp(swings) > 0.1
+        assert body.flipped_count() < 0.005 * len(body.mesh.tets)
+        assert body.volume() == pytest.approx(body.mesh.volume, rel=0.05)
+        assert np.ptp(swings) > 0.07
         x, y, z = body.positions().T
         for i in range(demo.STEPS):  # counted from below; each goes back to y = 0 under those above it
             inside = (np.abs(x) < demo.WIDTH / 2) & (y > -demo.TREAD * (demo.STEPS - i)) & (y < 0)
