@@ -5,9 +5,8 @@ import pytest
 
 from taichi_soft import init
 from taichi_soft.core.errors import OptionError
-from taichi_soft.render import Camera, Renderer, Surface
+from taichi_soft.render import Camera, Renderer, Surface, Texture
 from taichi_soft.render.colors import to_linear
-from taichi_soft.render.texture import Texture
 
 SIZE = (200, 160)
 CAMERA = Camera((0.6, -2.2, 0.9), (0.0, 0.0, 0.0))
