@@ -31,6 +31,7 @@ def main() -> None:
     stills = [still(name, moment) for name, moment in MOMENTS.items()]
     rows = [np.hstack(stills[i : i + 2]) for i in range(0, len(stills), 2)]
     cv2.imwrite(str(FOLDER / "demos.png"), np.vstack(rows))
+    cv2.imwrite(str(FOLDER / "elephants.png"), still("elephants", 0.52, (1040, 585)))
     cv2.imwrite(str(FOLDER / "laws.png"), still("compare", 0.72, (1040, 585)))
 
 

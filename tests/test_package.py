@@ -123,8 +123,8 @@ def test_a_wheel_works_without_the_checkout(built, tmp_path):
     assert {each.name for each in (tmp_path / "site/taichi_soft/demos").glob("*.py")} == {
         each.name for each in DEMOS.glob("*.py")
     }
-    assert {each.name for each in (tmp_path / "site/taichi_soft/assets").glob("*.npz")} == {
-        each.name for each in ASSETS.glob("*.npz")
+    assert {each.name for each in (tmp_path / "site/taichi_soft/assets").glob("*.[ng]*")} == {
+        each.name for each in ASSETS.glob("*.[ng]*")
     }
     assert (
         re.findall(r"\]\((?!https?:)[^)]*\)", description) == []

@@ -11,6 +11,7 @@ from taichi_soft.bodies.description import BodyDescription
 from taichi_soft.bodies.forces import StillBody
 from taichi_soft.core.types import DampingModel
 from taichi_soft.meshing import BodyMesh, TetMesh
+from taichi_soft.meshing.cage_mesh import lumped
 
 Floats = NDArray[np.float64]
 
@@ -92,17 +93,22 @@ class TetVibration(Vibration):
         return np.asarray(self._tets.sum(own) / self.root_mass**2).ravel()
 
     def element_bounds(self) -> Floats:
-        """Largest w^2 of every tetrahedron on its own quarter masses, (m,) [1/s^2]: none of the body is above
-        the largest (Irons and Treharne 1971).
+        """Largest w^2 of every tetrahedron on its own share of the masses of its vertices, (m,) [1/s^2]: none
+        of the body is above the largest (Irons and Treharne 1971).
 
-        K_e = V b^T C b, where b maps displacements to strain in Voigt's order, has the spectrum of the 6x6
-        matrix L^T (b b^T) L with L L^T = C.
+        K_e = V b^T C b, where b maps displacements to strain in Voigt's order, has on corner masses
+        r V density / 4 the spectrum of the 6x6 matrix 4 / density L^T (b r^-1 b^T) L with L L^T = C. The
+        ratios r are 1 but in cages, whose vertices carry more or less than a quarter of what is round them.
         """
+        mesh, density = self.body.mesh, self.body.per_tet("density")
+        assert isinstance(mesh, TetMesh)
+        quarters = lumped(mesh.tets, mesh.volumes * density, len(mesh.vertices))
+        ratios = np.repeat((self.body.masses / quarters)[mesh.tets], 3, axis=1)[:, None, :]
         # Nothing beside the largest entry, but it keeps ratios near -1 and 1/2 from failing by round-off.
         floor = 1e-12 * np.abs(self.stiffness).max(axis=(1, 2))
         root = np.linalg.cholesky(self.stiffness + floor[:, None, None] * np.eye(6))
-        gram = np.swapaxes(root, 1, 2) @ (self.strains @ np.swapaxes(self.strains, 1, 2)) @ root
-        return np.asarray(np.linalg.eigvalsh(gram)[:, -1] * 4.0 / self.body.per_tet("density"))
+        gram = np.swapaxes(root, 1, 2) @ ((self.strains / ratios) @ np.swapaxes(self.strains, 1, 2)) @ root
+        return np.asarray(np.linalg.eigvalsh(gram)[:, -1] * 4.0 / density)
 
 
 class BondVibration(Vibration):

@@ -8,7 +8,7 @@ from taichi_soft.core.errors import MissingExtraError
 
 EXTRAS = {
     "cli": {"typer": "typer", "rich": "rich"},
-    "film": {"cv2": "opencv-python-headless", "imageio_ffmpeg": "imageio-ffmpeg"},
+    "film": {"cv2": "opencv-python-headless", "imageio_ffmpeg": "imageio-ffmpeg", "PIL": "pillow"},
     "bake": {"PIL": "pillow", "pygltflib": "pygltflib"},
     "usd": {"pxr": "usd-core"},
     "io": {"meshio": "meshio"},

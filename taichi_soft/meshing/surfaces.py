@@ -110,7 +110,7 @@ def _of_scene(scene: trimesh.Scene, name: str) -> list[Surface]:
         matrix, geometry = scene.graph[node]
         mesh = scene.geometry[geometry]
         if hasattr(mesh, "faces") and len(mesh.faces):
-            moved = mesh.copy()
+            moved = mesh.copy(include_cache=True)  # with the normals of the file
             moved.apply_transform(matrix)
             found.append(_surface(moved, str(node)))
     if not found:

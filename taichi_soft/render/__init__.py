@@ -5,6 +5,7 @@ from taichi_soft.render.colors import FLIPPED, PALETTE, ColorScale, colormap, hi
 from taichi_soft.render.overlay import Corner, draw_color_scale, draw_labels, draw_legend, draw_text
 from taichi_soft.render.renderer import Renderer
 from taichi_soft.render.surface import Surface
+from taichi_soft.render.texture import Texture
 from taichi_soft.render.video import VideoWriter
 
 __all__ = [
@@ -15,6 +16,7 @@ __all__ = [
     "Corner",
     "Renderer",
     "Surface",
+    "Texture",
     "VideoWriter",
     "colormap",
     "draw_color_scale",

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -30,7 +31,8 @@ from taichi_soft.render import (
 )
 from taichi_soft.render.colors import Color
 from taichi_soft.render.props import Prop, Scenery
-from taichi_soft.render.skin_colors import vertex_colors
+from taichi_soft.render.skin_looks import texture_picture, vertex_colors
+from taichi_soft.render.texture import Texture
 from taichi_soft.world.body import Body
 from taichi_soft.world.warm_up import warm_up_step
 from taichi_soft.world.world import World, context_of_world
@@ -230,16 +232,6 @@ def _vertex_count(actor: Actor) -> int:
     return sum(mesh.vertex_count for mesh in _skins_of(actor)) or actor.body.vertex_count
 
 
-def _skin_surface(meshes: tuple[SkinMesh, ...], color: Color) -> Surface:
-    """All of them as one, in their own colours where they have any."""
-    counts = [mesh.vertex_count for mesh in meshes]
-    starts = np.cumsum([0, *counts[:-1]])
-    triangles = [mesh.triangles + start for mesh, start in zip(meshes, starts, strict=True)]
-    colors = [vertex_colors(mesh.visual, mesh.vertex_count, color) for mesh in meshes]
-    nowhere = np.zeros((sum(counts), 3), dtype=np.float32)
-    return Surface(nowhere, np.concatenate(triangles), color=np.concatenate(colors), normals=nowhere)
-
-
 class _Artist:
     """Draws a stage and writes beside it what the steps cost."""
 
@@ -248,7 +240,8 @@ class _Artist:
         self.fps = fps
         self.renderer = Renderer(*size, camera=stage.camera, floor=stage.world.settings.floor)
         self.times: list[float] = []
-        self.surfaces: dict[tuple[int, int], Surface] = {}  # by actor and version of its topology
+        self.surfaces: dict[tuple[int, int], list[Surface]] = {}  # by actor and version of its topology
+        self.textures: dict[int, tuple[Any, Texture]] = {}  # by picture, which is kept: its id stays its own
 
     def draw(
         self,
@@ -259,14 +252,19 @@ class _Artist:
     ) -> NDArray[np.uint8]:
         """The picture of the bodies at `positions`, where they are `now`; `normals` are those of skins."""
         start = time.perf_counter()
-        surfaces = [self._surface_of(actor) for actor in self.stage.actors]
-        for actor, surface, rows, own in zip(self.stage.actors, surfaces, positions, normals, strict=True):
-            surface.positions = rows
-            if surface.normals is not None:
-                surface.normals = own
-            if actor.paint:
-                surface.color = actor.paint(actor.body)
-        picture = self.renderer.render([*self.scenery.at(now.alpha), *surfaces])
+        surfaces = self.scenery.at(now.alpha).copy()
+        for actor, rows, own in zip(self.stage.actors, positions, normals, strict=True):
+            at = 0
+            for surface in self._surfaces_of(actor):
+                its = slice(at, at + surface.vertex_count)
+                at += surface.vertex_count
+                surface.positions = rows[its]
+                if surface.normals is not None:
+                    surface.normals = own[its]
+                if actor.paint:
+                    surface.color = actor.paint(actor.body)
+                surfaces.append(surface)
+        picture = self.renderer.render(surfaces)
         self._draw_labels(picture, positions)
         lines = [self.stage.title, f"t = {now.time:.2f} s   {speed_of(step_times, self.fps)}".rstrip()]
         if self.stage.caption:
@@ -279,15 +277,30 @@ class _Artist:
         self.times.append(time.perf_counter() - start)
         return picture
 
-    def _surface_of(self, actor: Actor) -> Surface:
-        """Its surface, made anew where a cut has changed it."""
+    def _surfaces_of(self, actor: Actor) -> list[Surface]:
+        """Its skins, or else its surface, made anew where a cut has changed it."""
         key = id(actor), actor.body.topology_version
         if key not in self.surfaces:
-            skins = _skins_of(actor)
-            self.surfaces[key] = (
-                _skin_surface(skins, actor.color) if skins else Surface.of(actor.body.mesh, color=actor.color)
-            )
+            skins = [self._skin_surface(mesh, actor.color) for mesh in _skins_of(actor)]
+            self.surfaces[key] = skins or [Surface.of(actor.body.mesh, color=actor.color)]
         return self.surfaces[key]
+
+    def _skin_surface(self, mesh: SkinMesh, color: Color) -> Surface:
+        """In its own colours and texture where it has any."""
+        picture, texture = texture_picture(mesh.visual, mesh.vertex_count), None
+        if picture is not None:
+            if id(picture) not in self.textures:
+                self.textures[id(picture)] = picture, Texture(np.asarray(picture.convert("RGB")))
+            texture = self.textures[id(picture)][1]
+        nowhere = np.zeros((mesh.vertex_count, 3), dtype=np.float32)
+        return Surface(
+            nowhere,
+            mesh.triangles,
+            color=vertex_colors(mesh.visual, mesh.vertex_count, color),
+            normals=nowhere,
+            texture=texture,
+            uv=None if texture is None else mesh.visual.uv,
+        )
 
     def _draw_labels(self, picture: NDArray[np.uint8], positions: list[NDArray[np.float32]]) -> None:
         """A caption on the floor in front of each body that has one, clear of it."""

@@ -14,7 +14,14 @@ rows = ti.types.ndarray(dtype=ti.f32, ndim=2)
 ints = ti.types.ndarray(dtype=ti.i32, ndim=1)
 int_rows = ti.types.ndarray(dtype=ti.i32, ndim=2)
 image = ti.types.ndarray(dtype=ti.f32, ndim=3)
+byte_rows = ti.types.ndarray(dtype=ti.u8, ndim=2)
 picture = ti.types.ndarray(dtype=ti.u8, ndim=3)
+
+
+@ti.func
+def row_vec2(array: ti.template(), i):
+    """Row i of an (n, 2) array as a vector."""
+    return ti.Vector([array[i, 0], array[i, 1]])
 
 
 @ti.func

@@ -13,7 +13,7 @@ from taichi_soft.core.errors import OptionError
 from taichi_soft.core.runtime import init, is_initialized, ti
 from taichi_soft.render.backdrop_kernels import paint_backdrop
 from taichi_soft.render.camera import Camera
-from taichi_soft.render.colors import to_srgb
+from taichi_soft.render.colors import to_linear, to_srgb
 from taichi_soft.render.floor_tiles import FloorTiles
 from taichi_soft.render.raster import NOTHING_BEHIND, ROTATED_GRID, Raster
 from taichi_soft.render.scene import SceneArrays
@@ -65,6 +65,7 @@ class Renderer:
         self._backdrop = np.empty((self.height, self.width, 4), dtype=np.float32)
         self._plain = np.empty((self.height, self.width, 3), dtype=np.uint8)
         self._encode = 255.0 * to_srgb(np.linspace(0.0, 1.0, 4096, dtype=np.float32))
+        self._decode = to_linear(np.arange(256, dtype=np.float32) / 255.0)
         self._camera: Camera | None = None
         self.camera = camera
 
@@ -140,6 +141,11 @@ class Renderer:
             scene.normals,
             scene.colors,
             scene.triangles,
+            scene.textures.uv,
+            scene.textures.first_level,
+            scene.textures.texels,
+            scene.textures.levels,
+            self._decode,
             self._raster.planes,
             self._raster.tile_begin,
             self._tiles.shadowed(maps.extents),

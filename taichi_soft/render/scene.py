@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from taichi_soft.core.errors import OptionError
 from taichi_soft.render.geometry_kernels import compute_normals
 from taichi_soft.render.surface import Surface
+from taichi_soft.render.texture import SceneTextures
 
 
 @dataclass(frozen=True)
@@ -20,12 +21,14 @@ class SceneArrays:
     Attributes:
         positions, normals, colors: float32 (n, 3), [m], unit length, linear light.
         triangles: int32 (m, 3), outward counterclockwise.
+        textures: of vertices and triangles.
     """
 
     positions: NDArray[np.float32]
     normals: NDArray[np.float32]
     colors: NDArray[np.float32]
     triangles: NDArray[np.int32]
+    textures: SceneTextures
 
     @property
     def is_empty(self) -> bool:
@@ -45,7 +48,8 @@ class SceneArrays:
                 raise OptionError(f"render takes Surface objects, got {type(surface).__name__}")
         if not surfaces:
             nothing = np.zeros((1, 3), dtype=np.float32)
-            return cls(nothing, nothing, nothing, np.zeros((1, 3), dtype=np.int32))
+            textures = SceneTextures.of([None], [None], [1], [1])
+            return cls(nothing, nothing, nothing, np.zeros((1, 3), dtype=np.int32), textures)
         positions = np.concatenate([surface.positions for surface in surfaces])
         counts = [len(surface.positions) for surface in surfaces]
         offsets = np.cumsum([0, *counts[:-1]], dtype=np.int32)
@@ -58,4 +62,10 @@ class SceneArrays:
             if surface.normals is not None:
                 normals[offset : offset + len(surface.positions)] = surface.normals
         colors = np.concatenate([surface.color for surface in surfaces])
-        return cls(positions, normals, colors, triangles)
+        textures = SceneTextures.of(
+            [surface.texture for surface in surfaces],
+            [surface.uv for surface in surfaces],
+            counts,
+            [len(surface.triangles) for surface in surfaces],
+        )
+        return cls(positions, normals, colors, triangles, textures)

@@ -4,8 +4,21 @@
 
 from taichi_soft.core.runtime import ti
 from taichi_soft.render.backdrop_kernels import pixel_ray, smoothstep, write_pixel
-from taichi_soft.render.kernel_types import TILE, image, int_rows, ints, picture, reals, row_vec3, rows, vec3
+from taichi_soft.render.kernel_types import (
+    TILE,
+    byte_rows,
+    image,
+    int_rows,
+    ints,
+    picture,
+    reals,
+    row_vec2,
+    row_vec3,
+    rows,
+    vec3,
+)
 from taichi_soft.render.light_funcs import floor_shadow, glow, sunlight
+from taichi_soft.render.texture_funcs import texture_light
 
 
 @ti.func
@@ -24,6 +37,18 @@ def interpolate(vertex_rows: ti.template(), triangles: ti.template(), t, weights
         row_vec3(vertex_rows, triangles[t, 0]),
         row_vec3(vertex_rows, triangles[t, 1]),
         row_vec3(vertex_rows, triangles[t, 2]),
+    )
+    return weights.x * a + weights.y * b + weights.z * c
+
+
+@ti.func
+def place_on_texture(uvs: ti.template(), triangles: ti.template(), planes: ti.template(), t, u, v):
+    """Texture coordinates of the plane of triangle t at (u, v), also beside the triangle."""
+    weights = corner_weights(planes, t, u, v)
+    a, b, c = (
+        row_vec2(uvs, triangles[t, 0]),
+        row_vec2(uvs, triangles[t, 1]),
+        row_vec2(uvs, triangles[t, 2]),
     )
     return weights.x * a + weights.y * b + weights.z * c
 
@@ -49,6 +74,11 @@ def shade(
     normals: rows,
     colors: rows,
     triangles: int_rows,
+    uvs: rows,
+    first_level: ints,
+    texels: byte_rows,
+    levels: int_rows,
+    decode: reals,
     planes: rows,
     tile_begin: ints,
     tile_shadowed: ints,
@@ -63,6 +93,9 @@ def shade(
         reach: height [m] up to which the floor darkens what is above it.
         light, texel, light_depth: the sun's shadow map, as `shadows.ShadowMaps` has them.
         near_shadow, far_shadow, far_height, contact, contact_place: the floor's shadows, from there too.
+        uvs, first_level, texels, levels: as `texture.SceneTextures` has them; a texture is multiplied by the
+            colours of the vertices.
+        decode: linear light of sRGB 0 to 255.
         tile_shadowed: 0 for tiles whose floor no shadow reaches.
         backdrop, plain: what `paint_backdrop` painted.
         out: (height, width, 3).
@@ -92,6 +125,16 @@ def shade(
                             p = interpolate(positions, triangles, t, weights)
                             n = interpolate(normals, triangles, t, weights)
                             c = interpolate(colors, triangles, t, weights)
+                            if first_level[t] >= 0:
+                                c *= texture_light(
+                                    texels,
+                                    levels,
+                                    decode,
+                                    first_level[t],
+                                    place_on_texture(uvs, triangles, planes, t, u, v),
+                                    place_on_texture(uvs, triangles, planes, t, u + 1.0, v),
+                                    place_on_texture(uvs, triangles, planes, t, u, v + 1.0),
+                                )
                             n = n / ti.sqrt(ti.max(n.dot(n), 1e-20))
                             view = (eye - p) / ti.sqrt((eye - p).dot(eye - p))
                             lit = 0.0

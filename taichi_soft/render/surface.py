@@ -10,6 +10,7 @@ from taichi_soft.core.errors import MeshError, OptionError
 from taichi_soft.meshing import BodyMesh, ParticleMesh, TetMesh
 from taichi_soft.meshing.creases import ROUND, split_at_creases
 from taichi_soft.render.colors import PALETTE, to_linear
+from taichi_soft.render.texture import Texture
 
 # Coordinates beyond this [m] come from an explosion; their products would overflow in float32.
 FARTHEST = 1e7
@@ -25,8 +26,12 @@ class Surface:
             outside only, and shadows take the surface to be closed.
         color: sRGB from 0 to 1, either (3,) for the whole body or (n, 3), one per vertex.
         normals: (n, 3) of unit length to shade by instead; set them with the positions before each frame.
-    Raises: OptionError for wrong shapes, positions that are not finite (a picture of an exploded body shows
-        nothing) or colours out of range; MeshError for indices out of range.
+        texture: a picture on it, which is multiplied by `color`: give that as white, to see it as it is.
+        uv: (n, 2), where the vertices lie on the texture: (0, 0) at its lower left, (1, 1) at its upper
+            right; beyond that it repeats.
+    Raises: OptionError for wrong shapes, a texture without `uv` or the reverse, positions that are not finite
+        (a picture of an exploded body shows nothing) or colours out of range; MeshError for indices out of
+        range.
     """
 
     def __init__(
@@ -36,6 +41,8 @@ class Surface:
         *,
         color: ArrayLike = PALETTE[0],
         normals: ArrayLike | None = None,
+        texture: Texture | None = None,
+        uv: ArrayLike | None = None,
     ) -> None:
         first = as_array(positions, "positions", (None, 3))
         self.vertex_count = len(first)
@@ -56,6 +63,14 @@ class Surface:
         self.normals: NDArray[np.float32] | None = None
         if normals is not None:
             self.normals = as_array(normals, "normals", (self.vertex_count, 3)).astype(np.float32)
+        if not (texture is None or isinstance(texture, Texture)):
+            raise OptionError(f"texture must be a Texture, got {type(texture).__name__}")
+        if (texture is None) != (uv is None):
+            raise OptionError("texture and uv go together: give both or neither")
+        self.texture = texture
+        self.uv: NDArray[np.float32] | None = None
+        if uv is not None:
+            self.uv = as_array(uv, "uv", (self.vertex_count, 2))[self._used].astype(np.float32)
 
     @classmethod
     def of(cls, mesh: BodyMesh, *, color: ArrayLike = PALETTE[0]) -> Surface:

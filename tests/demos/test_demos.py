@@ -3,10 +3,12 @@
 import cv2
 import numpy as np
 import pytest
+import trimesh
 from scipy.special import ellipe, ellipk
 
 from engine_adapter import EngineAdapter
 from taichi_soft import LAWS, OptionError
+from taichi_soft.core.package_data import ASSETS
 from taichi_soft.render.demos import demo_names, load_demo
 from taichi_soft.render.film import film
 
@@ -244,6 +246,55 @@ def test_the_ends_of_the_rope_bridge_carry_all_that_fell_onto_it():
         assert body.flipped_count() == 0
 
 
+def test_the_toy_elephant_is_closed_and_painted_dark_at_its_eyes_and_reddish_within_its_ears():
+    """At its vertices, looked up here; the surface once its copies at seams of the texture are merged."""
+    assert (ASSETS / "elephant.glb").stat().st_size < 600e3
+    (mesh,) = trimesh.load_scene(ASSETS / "elephant.glb", process=False).geometry.values()
+    whole = trimesh.Trimesh(mesh.vertices, mesh.faces)
+    assert whole.is_watertight
+    assert whole.is_winding_consistent
+    assert whole.volume == pytest.approx(0.0258, abs=0.001)
+    assert whole.bounds[:, 1] == pytest.approx([0.0, 0.5], abs=1e-4)
+    picture = np.asarray(mesh.visual.material.baseColorTexture.convert("RGB")).astype(int)
+    u, v = (mesh.visual.uv.T * len(picture)).astype(int).clip(0, len(picture) - 1)
+    colors = picture[len(picture) - 1 - v, u]
+    x, y, _ = mesh.vertices.T
+    dark = colors.sum(axis=1) < 120
+    for side in (-1, 1):
+        eye = dark & (side * x > 0)
+        assert eye.sum() > 5
+        assert np.ptp(mesh.vertices[eye], axis=0).max() < 0.06  # [m]
+        inner = (side * x > 0.16) & (np.abs(y - 0.33) < 0.06) & (mesh.vertex_normals[:, 2] > 0.5)
+        assert inner.sum() > 10
+        assert (colors[inner, 0] > colors[inner, 2] + 30).mean() > 0.6  # the others are on its rim
+
+
+def test_the_elephants_land_whole_on_the_steps_and_their_ears_have_swung():
+    """Nothing of them lies in a step or in the floor, by the boxes that the steps are."""
+    demo = load_demo("elephants")
+    stage = demo.stage()
+    bodies = [actor.body for actor in stage.actors]
+    assert len(bodies) == len(demo.HERD)
+    game = EngineAdapter(stage.world, stage.step, before_step=stage.act)
+    ears = [[] for _ in bodies]
+    while stage.world.time < 5.0:
+        game.step()
+        for swings, body in zip(ears, bodies, strict=True):
+            if stage.world.step_count % 4 == 0:
+                swings.append(demo.ear_span(body))
+    assert demo.proof(stage) == len(bodies)
+    for body, swings in zip(bodies, ears, strict=True):
+        assert body.failure is None
+        assert body.flipped_count() < 0.005 * len(body.mesh.tets)
+        assert body.volume() == pytest.approx(body.mesh.volume, rel=0.05)
+        assert np.ptp(swings) > 0.07
+        x, y, z = body.positions().T
+        for i in range(demo.STEPS):  # counted from below; each goes back to y = 0 under those above it
+            inside = (np.abs(x) < demo.WIDTH / 2) & (y > -demo.TREAD * (demo.STEPS - i)) & (y < 0)
+            assert (z[inside] > demo.RISE * (i + 1) - 0.01).all()
+        assert z.min() > -0.01
+
+
 def test_two_machines_with_late_inputs_are_in_the_same_state_in_every_tick():
     """Once all inputs are known; before that each has guessed wrong, seen other states, and gone back."""
     share, stage = run("rollback", 3.0)
@@ -281,7 +332,7 @@ def test_a_film_shows_what_was_cut_off(tmp_path):
 def test_there_are_the_demos_of_the_readme():
     assert demo_names() == [
         *("attach", "bars", "bounce", "bowl", "bridge", "cloth", "compare", "cut", "density", "dents"),
-        *("drape", "grab", "jelly", "many", "playground", "rollback", "tower", "wheels"),
+        *("drape", "elephants", "grab", "jelly", "many", "playground", "rollback", "tower", "wheels"),
     ]
 
 

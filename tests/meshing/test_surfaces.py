@@ -64,6 +64,22 @@ def test_normals_point_outwards_and_have_unit_length():
     np.testing.assert_allclose(np.linalg.norm(found.normals, axis=1), 1.0)
 
 
+@pytest.mark.parametrize("turn", [0.0, 0.7])
+def test_normals_are_those_of_the_file_where_it_has_any(tmp_path, turn):
+    """Of a ball cut into single triangles, whose own normals would be those of facets; where a node turns the
+    mesh, they turn with it."""
+    ball = trimesh.creation.icosphere(subdivisions=1)
+    ball.unmerge_vertices()
+    smooth = trimesh.Trimesh(ball.vertices, ball.faces, vertex_normals=ball.vertices, process=False)
+    node = trimesh.transformations.rotation_matrix(turn, (1, 0, 0))
+    scene = trimesh.Scene()
+    scene.add_geometry(smooth, transform=node)
+    (tmp_path / "ball.glb").write_bytes(scene.export(file_type="glb", include_normals=True))
+    (found,) = read_surfaces(tmp_path / "ball.glb", up="z")
+    np.testing.assert_allclose(found.normals, found.vertices, atol=1e-5)
+    np.testing.assert_allclose(found.vertices, ball.vertices @ node[:3, :3].T, atol=1e-5)
+
+
 @pytest.mark.parametrize(
     ("name", "content", "text"),
     [

@@ -3,9 +3,11 @@
 import cv2
 import numpy as np
 import pytest
+import trimesh
+from PIL import Image
 
 from engine_adapter import FixedStep
-from taichi_soft import BoxShape, Material, OptionError, VideoError, World, box
+from taichi_soft import BoxShape, Material, OptionError, SoftBodyAsset, VideoError, World, box
 from taichi_soft.render import Camera, ColorScale, Renderer, VideoWriter
 from taichi_soft.render.film import Actor, Stage, film, speed_of
 from taichi_soft.render.props import SLATE, Scenery
@@ -17,6 +19,32 @@ def falling_box(dt: float = 1 / 50) -> Stage:
     world.build()
     camera = Camera.framing((-1, -1, 0), (1, 1, 5))
     return Stage("box", world, [Actor(body, label="box")], camera, FixedStep(dt=dt), 1.0)
+
+
+def test_skins_are_drawn_with_their_textures(tmp_path):
+    """A crate whose corners are blue and whose faces have a red middle: no vertex has that colour. Beside it
+    stands one without a texture, in the colour of its actor."""
+    crate = trimesh.creation.box()
+    normals = np.repeat(crate.face_normals, 3, axis=0)
+    crate.unmerge_vertices()
+    flat = np.argsort(np.abs(normals), axis=1, kind="stable")[:, :2]
+    uv = np.take_along_axis(crate.vertices, flat, axis=1) + 0.5
+    pixels = np.full((8, 8, 3), (20, 20, 230), np.uint8)
+    pixels[2:6, 2:6] = (230, 20, 20)
+    picture = trimesh.visual.TextureVisuals(uv=uv, image=Image.fromarray(pixels))
+    textured = trimesh.Trimesh(crate.vertices, crate.faces, process=False, visual=picture)
+    world = World()
+    for mesh, x in ((textured, -0.8), (trimesh.creation.box(), 0.8)):
+        asset = SoftBodyAsset.from_surface(mesh, Material(1e6, 0.2, 1000.0), cells=3)
+        world.add_body(asset, position=(x, 0, 0.6))
+    world.build()
+    actors = [Actor(body, (0.1, 0.9, 0.1)) for body in world.bodies]
+    stage = Stage("", world, actors, Camera.framing((-1.4, -1, 0), (1.4, 1, 1.2)), FixedStep(dt=1 / 50), 1.0)
+    film(stage, tmp_path / "s.png", seconds=0.02, size=(200, 150))
+    blue, green, red = cv2.imread(str(next(tmp_path.glob("s_*.png")))).astype(int)[40:].T
+    assert ((red > blue + 60) & (red > green + 60)).sum() > 300
+    assert ((blue > red + 60) & (blue > green + 60)).sum() > 300
+    assert ((green > red + 60) & (green > blue + 60)).sum() > 600
 
 
 def test_frames_show_every_fixed_step_where_both_rates_agree(tmp_path):

@@ -7,6 +7,7 @@ from taichi_soft import init
 from taichi_soft.render import Camera
 from taichi_soft.render.raster import ROTATED_GRID, Raster
 from taichi_soft.render.scene import SceneArrays
+from taichi_soft.render.texture import SceneTextures
 
 WIDTH, HEIGHT = 200, 140
 CAMERA = Camera((0.0, -4.0, 0.0))  # looks along +y; x to the right, z up
@@ -21,7 +22,9 @@ def scene(*triangles):
     """Triangles given by their corners, each with vertices of its own."""
     positions = np.array(triangles, dtype=np.float32).reshape(-1, 3)
     corners = np.arange(len(positions), dtype=np.int32).reshape(-1, 3)
-    return SceneArrays(positions, np.zeros_like(positions), np.zeros_like(positions), corners)
+    nothing = np.zeros_like(positions)
+    plain = SceneTextures.of([None], [None], [len(positions)], [len(corners)])
+    return SceneArrays(positions, nothing, nothing, corners, plain)
 
 
 def draw(parts, camera=CAMERA, width=WIDTH, height=HEIGHT):

@@ -1,0 +1,55 @@
+"""How an artist's mesh looks: its texture, and a colour of each vertex."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Floats32 = NDArray[np.float32]
+
+UNSAID = np.full(3, 102 / 255, dtype=np.float32)
+"""The grey that trimesh gives a material without a colour."""
+
+
+def texture_picture(visual: Any, count: int) -> Any:
+    """Pillow's image that lies on it, or None.
+
+    Args:
+        visual: trimesh's, or None.
+        count: of vertices. Each needs its place on the image.
+    """
+    if getattr(visual, "kind", None) != "texture":
+        return None
+    material = visual.material
+    image = getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
+    return image if visual.uv is not None and len(visual.uv) == count else None
+
+
+def vertex_colors(visual: Any, count: int, otherwise: ArrayLike) -> Floats32:
+    """sRGB from 0 to 1, (count, 3). A texture is multiplied by them.
+
+    Args:
+        visual: trimesh's, or None.
+        count: of vertices.
+        otherwise: colour (3,) where there is neither a texture nor a colour.
+    """
+    rows = np.broadcast_to(np.asarray(otherwise, dtype=np.float32), (count, 3)).copy()
+    kind = getattr(visual, "kind", None)
+    if kind == "texture":
+        factor = getattr(visual.material, "baseColorFactor", None)
+        if texture_picture(visual, count) is not None:
+            rows[:] = 1.0 if factor is None else _as_colors(factor)[:3]
+        elif factor is not None and not np.array_equal(_as_colors(factor)[:3], UNSAID):
+            rows[:] = _as_colors(factor)[:3]
+    elif kind in ("vertex", "face"):
+        rows = _as_colors(visual.vertex_colors)[:, :3]
+    return np.ascontiguousarray(rows, dtype=np.float32)
+
+
+def _as_colors(values: Any) -> Floats32:
+    """From 0 to 1, whether whole numbers up to 255 are given or reals up to 1."""
+    array = np.asarray(values)
+    scale = 255.0 if array.dtype.kind in "iu" else 1.0
+    return np.asarray(np.clip(array.astype(np.float32) / scale, 0.0, 1.0), dtype=np.float32)
