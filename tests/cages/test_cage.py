@@ -73,12 +73,12 @@ def test_mass_centre_and_inertia_are_those_of_the_solid_to_one_per_cent(made):
     )
 
 
-def test_the_stable_step_is_at_least_a_seventh_of_the_lattices(made):
-    """A seventh where the solid is thinner than a cell, and vertices beside it carry little."""
+def test_the_stable_step_is_at_least_0_3_of_the_lattices(made):
+    """It is the shorter the less of the cells is solid: vertices beside a thin sheet carry little."""
     found = made[1].mesh
     cell = np.ptp(made[0].vertices, axis=0).max() / 12
     limit = stable_step(found, RUBBER, element_model("virial")).limit
-    assert limit > LATTICE_STEP / 7 * cell / np.sqrt(1e6 / 1000.0)
+    assert limit > 0.3 * LATTICE_STEP * cell / np.sqrt(1e6 / 1000.0)
 
 
 def test_it_hangs_together_as_the_solid_does(made):
