@@ -19,8 +19,8 @@ SHARPEST, FLATTEST = 20.0, 145.0
 """Dihedral angles that are kept [degrees]."""
 
 STIFFEST = 3.0
-"""Largest sum of squared gradients of a tetrahedron's shape functions, over that of the lattice's: were vertices
-as heavy as there, the stable step would stay above 0.58 of the lattice's."""
+"""Largest sum of squared gradients of a tetrahedron's shape functions, over that of the lattice's: were
+vertices as heavy as there, the stable step would stay above 0.58 of the lattice's."""
 
 FLAT = 0.25
 """Part of its volume that the surface leaves of a tetrahedron, below which it is in the way of the fit."""

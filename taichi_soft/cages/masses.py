@@ -7,8 +7,7 @@ import numpy as np
 from taichi_soft.meshing.arrays import FloatArray
 
 LEAST = 0.5
-"""Of a vertex's share of the mass: lighter ones vibrate fast, and make the stable step shorter. At 0.1 the step
-of a ring thinner than a cell is half as long; inertia gains a thousandth by it."""
+"""Of a vertex's share of the mass: lighter ones vibrate fast, and make the stable step shorter."""
 
 ROUNDS = 50
 

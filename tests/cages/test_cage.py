@@ -67,18 +67,17 @@ def test_mass_centre_and_inertia_are_those_of_the_solid_to_one_per_cent(made):
     assert weights.sum() == pytest.approx(mesh.volume, rel=0.01)
     np.testing.assert_allclose(center, mesh.center_mass, atol=0.01 * np.ptp(mesh.vertices, axis=0).max())
     # Vertices beside a sheet of a quarter of a cell cannot be as light as they would have to be.
-    close = 0.015 if np.ptp(mesh.vertices, axis=0).min() < 0.7 and mesh.volume < 0.03 else 0.01
+    close = 0.02 if np.ptp(mesh.vertices, axis=0).min() < 0.7 and mesh.volume < 0.03 else 0.01
     np.testing.assert_allclose(
         np.linalg.eigvalsh(inertia), np.linalg.eigvalsh(mesh.moment_inertia), rtol=close
     )
 
 
-def test_the_stable_step_is_at_least_0_3_of_the_lattices(made):
-    """It is the shorter the less of the cells is solid: vertices beside a thin sheet carry little."""
+def test_the_stable_step_is_at_least_0_45_of_the_lattices(made):
     found = made[1].mesh
     cell = np.ptp(made[0].vertices, axis=0).max() / 12
     limit = stable_step(found, RUBBER, element_model("virial")).limit
-    assert limit > 0.3 * LATTICE_STEP * cell / np.sqrt(1e6 / 1000.0)
+    assert limit > 0.45 * LATTICE_STEP * cell / np.sqrt(1e6 / 1000.0)
 
 
 def test_it_hangs_together_as_the_solid_does(made):
