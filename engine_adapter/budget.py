@@ -91,8 +91,8 @@ class Budget:
     def _repeat(self, changes: list[tuple[int, int]]) -> None:
         bodies = {serial_of(body): body for body in self._world.bodies}
         for serial, level in changes:
-            if serial in bodies:
-                bodies[serial].set_level(level)
+            if serial in bodies:  # with other inputs something may hold it now
+                _has_changed(bodies[serial], level)
 
     @property
     def _load(self) -> int:

@@ -92,13 +92,14 @@ class _Recorder:
     def take(self, frame: int) -> None:
         """Look at every body as it is now."""
         there = set(self.world.bodies)
+        self.known &= there  # what was away and comes back, by a restored state, begins a clip of its own
         new = [body for body in self.world.bodies if body not in self.known]
         for body in new:
             self._begin(body, frame)
         if new:
             self.require_room(sum(mesh.vertex_count for mesh, _ in self.drawn))
         for mesh, clip in self.drawn:
-            if mesh.body in there:
+            if mesh.body in there and clip.end == frame:
                 self._require_whole(mesh, clip, frame)
                 clip.add(*self.world.read_render_mesh(mesh, 1.0))
 
@@ -108,7 +109,8 @@ class _Recorder:
         try:
             meshes = meshes or (body.render_mesh(),)
         except MeshError:  # a rope has no triangles
-            self.left_out.append(f"body {body.index}")
+            name = f"body {body.index}"
+            self.left_out += [name] if name not in self.left_out else []
         for mesh in meshes:
             name = self._free_name(mesh, body)
             self.drawn.append((mesh, Clip(name, mesh.triangles, _visual(mesh), frame)))
@@ -122,11 +124,12 @@ class _Recorder:
     def _require_whole(self, mesh: RenderMesh, clip: Clip, frame: int) -> None:
         if not mesh.is_outdated:
             return
-        way_out = "cut it before the bake begins"
+        way_out = "do that before the bake begins"
         if frame > 1:
             way_out = f"bake what comes before it, {(frame - 1) / self.fps:.6g} seconds"
         raise StateError(
-            f"{clip.name!r} was cut or torn by frame {frame} ({frame / self.fps:.6g} s): it has other "
+            f"{clip.name!r} was cut, torn or given another level of detail by frame {frame} "
+            f"({frame / self.fps:.6g} s): it has other "
             f"vertices from there on, which no clip can carry: {way_out}"
         )
 

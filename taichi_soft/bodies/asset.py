@@ -46,6 +46,9 @@ DAMPING_INTERVAL = 0.5
 """Between two times that vibrations are damped, over the time in which the first mode turns by a radian: 12
 times in its period."""
 
+APART = 0.25
+"""Of a body's size, by which the sides of a level of detail may lie away from those of the finest."""
+
 
 @dataclass(frozen=True, eq=False)
 class SoftBodyAsset:
@@ -137,15 +140,30 @@ class SoftBodyAsset:
                 raise OptionError(f"level {level} must have the law and the contact of the finest")
             if self.description.bonds is not None:
                 raise OptionError(f"law {self.law!r} has no levels of detail: it looks at edges")
-            room, needed = room_of(self.arrays, 0), room_of(each.arrays, 0)
-            if len(each.mesh.tets) > len(self.mesh.tets) or any(
-                n > m for n, m in zip(needed, room, strict=True)
-            ):
-                raise MeshError(
-                    f"level {level}: {len(each.mesh.tets)} tetrahedra and {needed[0]} vertices are not "
-                    f"fewer than the {len(self.mesh.tets)} and {room[0]} of the finest"
-                )
+            self._require_coarser(level, each)
         return tuple(self.coarser)
+
+    def _require_coarser(self, level: int, asset: SoftBodyAsset) -> None:
+        """Raises: MeshError for a level that is not coarser than the one before, or of something else."""
+        before = (self, *self.coarser)[level - 1]
+        room, needed = room_of(self.arrays, 0), room_of(asset.arrays, 0)
+        if len(asset.mesh.tets) >= len(before.mesh.tets) or any(
+            n > m for n, m in zip(needed, room, strict=True)
+        ):
+            raise MeshError(
+                f"level {level}: {len(asset.mesh.tets)} tetrahedra and {needed[0]} vertices are not fewer "
+                "than the "
+                f"{len(before.mesh.tets)} and {len(before.mesh.vertices)} of the level before"
+            )
+        (low, high), (own_low, own_high) = (
+            (each.mesh.vertices.min(axis=0), each.mesh.vertices.max(axis=0)) for each in (self, asset)
+        )
+        size = float((high - low).max())
+        if max(np.abs(own_low - low).max(), np.abs(own_high - high).max()) > APART * size:
+            raise MeshError(
+                f"level {level} lies from {own_low.round(4).tolist()} to {own_high.round(4).tolist()} m, the "
+                f"finest from {low.round(4).tolist()} to {high.round(4).tolist()}: it must be the same thing"
+            )
 
     @property
     def levels(self) -> tuple[SoftBodyAsset, ...]:
@@ -240,7 +258,9 @@ class SoftBodyAsset:
             they would take; MissingExtraError without the package of the method.
         """
         surfaces = read_surfaces(surface, up)
-        numbers: list[Any] = list(cells) if isinstance(cells, (tuple, list)) else [cells]
+        numbers: list[Any] = [cells]
+        if isinstance(cells, (tuple, list, np.ndarray)):
+            numbers = [as_count(number, "cells", 1, 1_000_000) for number in cells]
         if not numbers:
             raise OptionError("cells is empty: give a number, or some numbers for levels of detail")
         meshes = []

@@ -8,6 +8,7 @@ goes with its modulus. Of all moduli with the right frequencies those are taken 
 
 from __future__ import annotations
 
+import logging
 from dataclasses import replace
 
 import numpy as np
@@ -17,6 +18,8 @@ from taichi_soft.bodies.description import BodyDescription
 from taichi_soft.bodies.first_mode import lowest_modes
 from taichi_soft.bodies.vibration import TetVibration
 from taichi_soft.elements.materials import Material
+
+_log = logging.getLogger(__name__)
 
 Floats = NDArray[np.float64]
 
@@ -28,6 +31,9 @@ EXACT = 2e-3
 
 CLOSE = 0.01
 """Of the frequencies, at which the update ends."""
+
+PROMISED = 0.05
+"""Beyond it a word is said."""
 
 MOST_UPDATES = 6
 
@@ -50,14 +56,17 @@ def calibrated(fine: BodyDescription, coarse: BodyDescription) -> Material:
     density = material.density * fine.masses.sum() / coarse.masses.sum()
     wanted, _ = lowest_modes(fine, MODES, EXACT)
     factors = np.zeros(len(coarse.mesh.tets))  # logarithms
-    body = coarse
+    best, least = coarse.material, np.inf
     for _ in range(MOST_UPDATES):
         young = material.young * np.exp(factors)
         body = replace(coarse, material=replace(material, young=young, density=density))
         found, shapes = lowest_modes(body, MODES, EXACT)
         count = min(len(wanted), len(found))
         gaps = 2.0 * np.log(wanted[:count] / found[:count])
-        if count == 0 or np.abs(gaps).max() < 2.0 * CLOSE:
+        miss = float(np.abs(gaps).max(initial=0.0)) / 2.0
+        if miss < least:
+            best, least = body.material, miss
+        if miss < CLOSE:
             break
         shares = TetVibration(body).energies(shapes[:count]) / found[:count, None] ** 2
         # A factor for all first: it costs nothing, where the sum of squares would spread it unevenly.
@@ -65,6 +74,12 @@ def calibrated(fine: BodyDescription, coarse: BodyDescription) -> Material:
         factors += whole + np.linalg.pinv(shares, rcond=ALIKE) @ (gaps - whole)
         middle = np.median(factors)
         factors = middle + np.clip(factors - middle, -np.log(MOST_CHANGE), np.log(MOST_CHANGE))
-    result = body.material
-    assert isinstance(result, Material)
-    return result
+    if least > PROMISED:
+        _log.warning(
+            "%r has lowest frequencies up to %.0f %% from those of the finest level: it is too coarse for "
+            "more",
+            coarse.mesh,
+            100.0 * least,
+        )
+    assert isinstance(best, Material)
+    return best

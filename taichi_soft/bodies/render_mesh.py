@@ -32,7 +32,7 @@ class RenderMesh:
         while running:
             game.advance(seconds_since_last_frame)
             if skin.is_outdated:
-                ...  # the body was cut: make mesh and buffers anew
+                ...  # the body was cut, or changed its level: make mesh and buffers anew
             game.render_mesh(skin, vertices, normals)
 
     It has the vertices on the surface only, one copy for each side of a sharp edge. It stays as it is: a cut
@@ -97,7 +97,7 @@ class RenderMesh:
 
     @property
     def is_outdated(self) -> bool:
-        """Whether the body was cut, torn or restored to another cut since: then make a new one."""
+        """Whether the body was cut, torn, given another level or restored since: then make a new one."""
         return self._topology_version != self._body.topology_version
 
 
@@ -117,7 +117,8 @@ def require_current(mesh: RenderMesh) -> None:
     require_alive(body)
     if mesh.is_outdated:
         raise StateError(
-            f"body {body.index} was cut, torn or restored since this render mesh was made (topology_version "
+            f"body {body.index} was cut, torn, given another level or restored since this render mesh was "
+            "made (topology_version "
             f"{mesh.topology_version}, now {body.topology_version}): {mesh._way_out}"
         )
 

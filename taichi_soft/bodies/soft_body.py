@@ -200,6 +200,7 @@ class BodyRecord:
     topology_version: int = 0
     skin_meshes: tuple[Any, ...] | None = None  # once they were asked for
     level: int = 0  # of detail, 0 being the finest
+    held: NDArray[np.int64] | None = None  # of the finest level: what pins of a coarser one stand for
 
     def become(self, part: CutMesh | None, level: int = 0) -> None:
         """Take note of what cuts have left of the asset's mesh, None for all of it, and of its level."""

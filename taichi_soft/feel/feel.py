@@ -91,7 +91,7 @@ def material_from_feel(
 
     Sag and frequency both follow from Young's modulus. One of them sets it; where both are wished for, the
     frequency does, and gravity is scaled for the sag. What is found is simulated, and meets each wish to 5 %.
-    It takes seconds.
+    It takes seconds, and starts Taichi as it is by default where nobody has called `init`.
     Args:
         mesh: the body at rest, as it stands, z being up. Of an artist's mesh the cage, `asset.mesh`.
         sag: lowering of its highest point as it stands on a floor, over its height.
@@ -148,11 +148,7 @@ class _Body:
         young = self.weight / MOST_SAG
         material = self.material(young, DAMPING_RATIO * self.omega(young))
         standing = self.trial.stand(material, share / MOST_SAG, 2 * pi / self.omega(young), 0.0)
-        if standing.turn > LEANS:
-            raise OptionError(
-                f"the body does not stand as its mesh is: it leans by {degrees(standing.turn):.0f} degrees. "
-                "Turn the mesh so that it stands, z being up, or wish for wobble_hz without sag"
-            )
+        _require_upright(standing.turn)
         return standing.held
 
     def share_for(self, sag: float) -> float:
@@ -233,6 +229,8 @@ class _Search:
                 f"so soft a body does not bear its own weight: {standing.flipped} tetrahedra are inside out. "
                 "Wish for less sag or a higher wobble_hz"
             )
+        if self.sag is not None:
+            _require_upright(standing.turn)
         held, free = (standing.held, standing.free) if standing.turn <= LEANS else (nan, nan)
         predicted = Behaviour(held, sqrt(omega**2 - self.rate**2) / (2 * pi), settle)
         simulated = Behaviour(free, frequency, DECAYS / rate if rate > 0 else inf)
@@ -262,7 +260,8 @@ class _Search:
             count = min(max(swings, SWINGS[0]), SWINGS[1])
             nearest = count / hz if self.wobble_hz else sqrt((2 * pi * count) ** 2 + DECAYS**2) / omega
             raise OptionError(
-                f"settle_s {self.settle_s:g} is {swings:.3g} periods at {hz:.3g} Hz, where {SWINGS[0]:g} to "
+                f"settle_s {DECAYS / self.rate:.3g} is {swings:.3g} periods at {hz:.3g} Hz, where "
+                f"{SWINGS[0]:g} to "
                 f"{SWINGS[1]:g} can be: the nearest is {nearest:.3g}"
             )
         scale = self.gravity_scale
@@ -288,3 +287,12 @@ class _Search:
                 f"so stiff a body takes {MOST_SUBSTEPS * excess:,.0f} substeps of a 60 Hz frame, where "
                 f"{MOST_SUBSTEPS} can be: {way_out}. A coarser mesh takes fewer"
             )
+
+
+def _require_upright(turn: float) -> None:
+    """Raises: OptionError for a body that leans by too much [rad] to have a sag."""
+    if turn > LEANS:
+        raise OptionError(
+            f"the body does not stand as its mesh is: it leans by {degrees(turn):.0f} degrees. Turn the mesh "
+            "so that it stands, z being up, or wish for wobble_hz without sag"
+        )

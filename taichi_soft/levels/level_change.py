@@ -1,8 +1,9 @@
 """A body that goes on with more or fewer tetrahedra.
 
-Positions, velocities and what was before the last step pass over as a skin is drawn: see `Passage`. Then the
-body is moved, and its velocities are given a rigid motion, so that centre of mass, momentum and angular
-momentum are to round-off what they were. What is finer than the new mesh is lost, with its energy.
+Positions, velocities and what was before the last step pass over as a skin is drawn: see `Passage`. Then a
+body that nothing holds is moved, and its velocities are given a rigid motion, so that centre of mass,
+momentum and angular momentum are to round-off what they were. What is finer than the new mesh is lost, with
+its energy.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from taichi_soft.bodies.pose import best_fitting_pose
 from taichi_soft.bodies.soft_body import (
     SoftBody,
     context_of,
@@ -26,6 +28,7 @@ from taichi_soft.fracture.kernels.topology import MOTION_WIDTH, read_motion
 from taichi_soft.levels.passage import Passage, passage
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 POSITION, VELOCITY, EARLIER_POSITION, EARLIER_VELOCITY = (slice(k, k + 3) for k in (0, 3, 6, 9))
 INV_MASS, MASS, AIM = 12, 15, 16
@@ -53,7 +56,8 @@ def set_level(body: SoftBody, level: Any) -> None:
     over, arrays = passage(body.asset, before, wanted), target.arrays
     motion = np.empty((body.vertex_count, MOTION_WIDTH), dtype=np.float32)
     read_motion(state, body.index, motion)
-    rows = _passed(over, motion.astype(np.float64), target.description.masses).astype(np.float32)
+    held = _held_at(body, wanted)
+    rows = _passed(over, motion.astype(np.float64), target.description.masses, held).astype(np.float32)
     status = int(state.body_status[body.index])
     write_slot(context, state, body.index, arrays, rows, status, body.index, None)
     write_surface(context, state, body.index, target)
@@ -87,34 +91,77 @@ def bar_to_levels(body: SoftBody) -> str:
     return ""
 
 
-def _passed(over: Passage, motion: Floats, masses: Floats) -> Floats:
-    """Rows of `read_motion` for the vertices of another level."""
+def _passed(over: Passage, motion: Floats, masses: Floats, held: Ints) -> Floats:
+    """Rows of `read_motion` for the vertices of another level, of which some are held."""
     old = motion[:, MASS]
     rows = np.zeros((len(masses), MOTION_WIDTH))
     rows[:, :INV_MASS] = over(motion[:, :INV_MASS])
-    for position, velocity in ((POSITION, VELOCITY), (EARLIER_POSITION, EARLIER_VELOCITY)):
-        earlier = motion[:, position], motion[:, velocity]
-        _keep_momentum(*earlier, old, rows[:, position], rows[:, velocity], masses)
     rows[:, MASS], rows[:, INV_MASS] = masses, 1.0 / masses
-    rows[:, PUSH] = masses[:, None] / masses.sum() * motion[:, PUSH].sum(axis=0)
-    held = np.flatnonzero(motion[:, INV_MASS] == 0.0)
     if len(held):
-        places = over.nearest(held)
-        rows[places, INV_MASS] = 0.0
-        rows[places, VELOCITY] = motion[held, VELOCITY]
-        rows[places, AIM] = motion[held, AIM]
-        rows[places, TARGET] = motion[held, TARGET] + rows[places, POSITION] - motion[held, POSITION]
+        _hold(over, motion, rows, held)
+    else:  # a body that is held shares its momentum with what holds it
+        for x, v in ((POSITION, VELOCITY), (EARLIER_POSITION, EARLIER_VELOCITY)):
+            _keep_momentum(motion[:, x], motion[:, v], old, rows[:, x], rows[:, v], masses)
+    center = old @ motion[:, POSITION] / old.sum()
+    push = motion[:, PUSH]
+    torque = np.cross(motion[:, POSITION] - center, push).sum(axis=0)
+    rows[:, PUSH] = masses[:, None] * _rigid(rows[:, POSITION] - center, masses, push.sum(axis=0), torque)
     return rows
+
+
+def _hold(over: Passage, motion: Floats, rows: Floats, held: Ints) -> None:
+    """Let vertices be held as those of the level before are that are nearest to each.
+
+    What is held together stays together: the held ones move as a rigid body does that fits those before best,
+    and each by what the nearest one is beside that. So nothing creeps from change to change.
+    """
+    sources = np.flatnonzero(motion[:, INV_MASS] == 0.0)
+    nearest = sources[over.nearest_sources(held, sources)]
+    before, after = over.places
+    for part in (POSITION, EARLIER_POSITION):
+        pose = best_fitting_pose(before[sources], motion[sources, part], np.ones(len(sources)))
+        beside = motion[nearest, part] - (before[nearest] @ pose.rotation.T + pose.position)
+        rows[held, part] = after[held] @ pose.rotation.T + pose.position + beside
+    rows[held, INV_MASS] = 0.0
+    rows[held, VELOCITY] = motion[nearest, VELOCITY]
+    rows[held, AIM] = motion[nearest, AIM]
+    rows[held, TARGET] = motion[nearest, TARGET] + rows[held, POSITION] - motion[nearest, POSITION]
 
 
 def _keep_momentum(x: Floats, v: Floats, m: Floats, new_x: Floats, new_v: Floats, masses: Floats) -> None:
     """Move `new_x` and change `new_v`, so that centre, momentum and angular momentum are those of x and v."""
-    center, drift = m @ x / m.sum(), m @ v / m.sum()
+    center = m @ x / m.sum()
     new_x += center - masses @ new_x / masses.sum()
-    new_v += drift - masses @ new_v / masses.sum()
     arms = new_x - center
+    momentum = m @ v - masses @ new_v
     spin = (m[:, None] * np.cross(x - center, v)).sum(axis=0)
-    missing = spin - (masses[:, None] * np.cross(arms, new_v)).sum(axis=0)
+    spin -= (masses[:, None] * np.cross(arms, new_v)).sum(axis=0)
+    new_v += _rigid(arms, masses, momentum, spin)
+
+
+def _rigid(arms: Floats, masses: Floats, momentum: Floats, spin: Floats) -> Floats:
+    """Velocities of the rigid motion that has a momentum, and an angular momentum about the centre of mass;
+    or accelerations, of a force and a torque. (n, 3), for places `arms` from about the centre."""
+    arms = arms - masses @ arms / masses.sum()
     squares = (masses * (arms**2).sum(axis=1)).sum()
     inertia = squares * np.eye(3) - (masses[:, None] * arms).T @ arms
-    new_v += np.cross(np.linalg.lstsq(inertia, missing, rcond=1e-9)[0], arms)
+    turning = np.linalg.lstsq(inertia, spin, rcond=1e-9)[0]
+    return np.asarray(momentum / masses.sum() + np.cross(turning, arms))
+
+
+def _held_at(body: SoftBody, level: int) -> Ints:
+    """Vertices of a level that are to be held: those nearest to what is held of the finest level."""
+    record, present = record_of(body), body.pinned.astype(np.int64)
+    if record.level == 0:
+        record.held = present if len(present) else None
+    elif record.held is None or not np.array_equal(_nearest_at(body, record.level), present):
+        # Pinned meanwhile: what is nearest to that, in the finest level.
+        record.held = passage(body.asset, record.level, 0).nearest(present) if len(present) else None
+    return _nearest_at(body, level)
+
+
+def _nearest_at(body: SoftBody, level: int) -> Ints:
+    held = record_of(body).held
+    if held is None:
+        return np.zeros(0, dtype=np.int64)
+    return np.unique(held) if level == 0 else np.unique(passage(body.asset, 0, level).nearest(held))

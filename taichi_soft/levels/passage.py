@@ -32,7 +32,7 @@ class Passage:
         self._owners, self._begins = np.repeat(np.arange(len(begins) - 1), np.diff(begins)), begins[:-1]
         held = np.einsum("kc,kcx->kx", self._shares, mesh.vertices[self._corners])
         self._arms = (2.0 * aims - held)[:, None] - mesh.vertices[self._corners]
-        self._distances = (source.mesh.vertices, aims)
+        self.places = source.mesh.vertices, aims  # of both, at rest
 
     def __call__(self, rows: Floats) -> Floats:
         """Positions, velocities or other quantities (n, q) of the source's vertices, for those of the target,
@@ -44,8 +44,14 @@ class Passage:
 
     def nearest(self, vertices: Ints) -> Ints:
         """Vertices of the target that are nearest to some of the source, at rest."""
-        source, target = self._distances
+        source, target = self.places
         apart = ((source[vertices, None] - target) ** 2).sum(axis=2)
+        return np.asarray(apart.argmin(axis=1))
+
+    def nearest_sources(self, targets: Ints, sources: Ints) -> Ints:
+        """Which of some vertices of the source is nearest to each of some of the target, at rest."""
+        source, target = self.places
+        apart = ((target[targets, None] - source[sources]) ** 2).sum(axis=2)
         return np.asarray(apart.argmin(axis=1))
 
 
@@ -58,3 +64,12 @@ def passage(asset: SoftBodyAsset, source: int, target: int) -> Passage:
     if (source, target) not in of_asset:
         of_asset[source, target] = Passage(asset.levels[source], asset.levels[target])
     return of_asset[source, target]
+
+
+def prepare_passages(asset: SoftBodyAsset) -> None:
+    """Make all that an asset has: each takes a tenth of a second to some, too long within a frame."""
+    count = len(asset.levels)
+    for source in range(count):
+        for target in range(count):
+            if source != target:
+                passage(asset, source, target)

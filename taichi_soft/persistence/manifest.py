@@ -48,6 +48,7 @@ def _body_entry(body: SoftBody) -> list[Any]:
         as_plain(record.description.material) if is_own else None,
         None if part is None else part.note,
         record.level,
+        None if record.held is None or record.level == 0 else record.held.tolist(),
     ]
 
 
@@ -60,6 +61,7 @@ class BodyEntry:
     failed: FailedStep | None
     part: CutMesh | None
     level: int  # of detail
+    held: NDArray[np.int64] | None  # see `BodyRecord`
     description: BodyDescription
     arrays: BodyArrays | None  # of a part
 
@@ -132,7 +134,7 @@ def _require_serials(context: WorldContext, plain: dict[str, Any]) -> None:
 def _read_body(context: WorldContext, slot: int, entry: Any, part: CutMesh | None) -> BodyEntry | None:
     if entry is None:
         return None
-    serial, first_step, failed, material, _, number = entry
+    serial, first_step, failed, material, _, number, held = entry
     levels, present = context.slots.assets[slot].levels, context.slots.slots[slot]
     level = below(number, len(levels))
     asset, whole = levels[level], levels[level].description
@@ -173,6 +175,7 @@ def _read_body(context: WorldContext, slot: int, entry: Any, part: CutMesh | Non
         else FailedStep(int(failed[0]), float(failed[1]), int(failed[2]), float(failed[3]), bool(failed[4])),
         part,
         level,
+        None if held is None else np.array([below(k, len(levels[0].mesh.vertices)) for k in held], np.int64),
         description,
         arrays,
     )

@@ -41,6 +41,7 @@ def _put_back_body(context: WorldContext, state: State, slot: int, wanted: BodyE
         record.become(wanted.part, wanted.level)
         record.description = _before_material(present, wanted)
     record.first_step, record.frozen_in, record.failure = wanted.first_step, wanted.failed, None
+    record.held = wanted.held
     if as_plain(record.description.material) != as_plain(wanted.description.material):
         write_constants(state, present, wanted.description)
     record.description = wanted.description
@@ -71,7 +72,9 @@ def _put_in(context: WorldContext, state: State, slot: int, wanted: BodyEntry) -
         body = context.make_body(context, slot, asset)
         context.handles.enlist(body, wanted.serial)
     record = record_of(body)
-    record.removed_in, record.level = None, wanted.level
+    record.removed_in = None
+    if _fills(body) != (name_of(wanted.part), wanted.level):
+        record.become(wanted.part, wanted.level)
     record.description = _before_material(body, wanted)
     context.slots.enter_at(body)
     return body

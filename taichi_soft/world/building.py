@@ -133,7 +133,9 @@ def _schedule(context: WorldContext, device: Device, has_contact: bool) -> Sched
     asked = context.settings.schedule
     is_cut = any(asset.spare_vertices or asset.coarser for asset in context.slots.kinds)
     if is_cut and asked is Schedule.FLAT:
-        raise OptionError("schedule 'flat' cuts no bodies: take 'per_body' or 'auto', or no spare_vertices")
+        raise OptionError(
+            "schedule 'flat' takes no bodies that are cut or have levels of detail: take 'per_body' or 'auto'"
+        )
     needs_bodies = context.settings.is_implicit or has_contact or is_cut
     return choose_schedule(asked, context.layout, device, needs_bodies=needs_bodies)
 

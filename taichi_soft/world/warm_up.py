@@ -13,10 +13,12 @@ import numpy as np
 
 from taichi_soft.bodies.render_mesh import warm_up as warm_up_render_meshes
 from taichi_soft.bodies.skin_mesh import warm_up as warm_up_skins
+from taichi_soft.bodies.soft_body import record_of
 from taichi_soft.control.drives import push_bodies, set_wind
 from taichi_soft.control.impulses import apply_radial_impulse
 from taichi_soft.control.rigid_transform import carry
 from taichi_soft.levels.level_change import bar_to_levels
+from taichi_soft.levels.passage import prepare_passages
 from taichi_soft.persistence.snapshot import restore_snapshot, state_hash, take_snapshot
 from taichi_soft.queries import cast_ray, cast_rays, find_closest_point, find_in_box, find_in_sphere
 from taichi_soft.solver.context import WorldContext
@@ -54,6 +56,8 @@ def warm_up(context: WorldContext) -> None:
         for body in {body.asset: body for body in bodies}.values():
             _control(context, body, next((each for each in bodies if each is not body), None))
             _measure(context, body)
+        for asset in context.slots.kinds:
+            prepare_passages(asset)
         warm_up_render_meshes(context.built.state)
         if any(asset.skin for asset in context.slots.assets):
             warm_up_skins(context.built.state)
@@ -95,9 +99,10 @@ def _control(context: WorldContext, body: Body, other: Body | None) -> None:
     body.set_linear_damping(0.1)
     body.set_sheltered(True)
     if body.asset.coarser and not bar_to_levels(body):
-        level = body.level
+        level, version = body.level, body.topology_version
         for other_level in (1 if level == 0 else 0, level):
             body.set_level(other_level)
+        record_of(body).topology_version = version  # what was drawn of it is as it was
     body.set_material(body.material)
     body.pin(free[:1])
     body.set_targets(free[:1], body.positions()[free[:1]])

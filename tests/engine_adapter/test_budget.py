@@ -147,6 +147,25 @@ def test_steps_that_are_made_again_get_the_levels_that_they_had(clock):
         assert (game.state_hash(), levels(bodies)) == expected
 
 
+def test_steps_that_are_made_again_with_other_inputs_leave_what_is_held_then(clock):
+    held = []
+
+    def before_step(world):
+        if held and world.step_count == 2:
+            held.append(world.bodies[-1].attach([0], world.add_frame(position=(0, 0, 0))))
+
+    game, bodies = row_of(
+        clock, budget_ms=1e3 * clock.per_tet * COUNT * SIZES[0] / 2, rewind_ticks=30, before_step=before_step
+    )
+    while bodies[-1].level < 2:
+        game.step()
+    game.rewind(game.world.step_count)
+    held.append(None)
+    for _ in range(10):
+        game.step()
+    assert bodies[-1].level < 2
+
+
 def test_without_a_budget_nothing_changes_and_asking_is_refused(clock):
     game, bodies = row_of(clock, 2)
     clock.per_tet *= 1e6

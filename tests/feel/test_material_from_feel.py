@@ -174,6 +174,8 @@ def test_a_body_that_tips_over_has_no_sag_but_a_frequency():
     leaning = type(column)(column.vertices @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]).T, column.tets)
     with pytest.raises(OptionError, match="does not stand as its mesh is"):
         material_from_feel(leaning, sag=0.01)
+    with pytest.raises(OptionError, match="does not stand as its mesh is"):
+        material_from_feel(box((0.15, 0.15, 1.0), (2, 2, 12)), sag=0.05, wobble_hz=3.0)
     feel = material_from_feel(leaning, wobble_hz=20.0)
     assert np.isnan(feel.simulated.sag)
     assert feel.simulated.wobble_hz == pytest.approx(20.0, rel=PROMISED)
