@@ -1,0 +1,75 @@
+"""Three puddings on a tray that is jerked aside: each sags, wobbles and settles as it was wished for."""
+
+import numpy as np
+import trimesh
+
+from engine_adapter import FixedStep
+from taichi_soft import BoxShape, Contact, Material, SoftBodyAsset, World, material_from_feel
+from taichi_soft.cli import main
+from taichi_soft.render import PALETTE, Camera
+from taichi_soft.render.film import Actor, Stage
+
+WISHES = (
+    {"sag": 0.010, "wobble_hz": 12.0, "settle_s": 0.4},
+    {"sag": 0.030, "wobble_hz": 7.0, "settle_s": 1.0},
+    {"sag": 0.055, "wobble_hz": 4.0, "settle_s": 3.0},
+)
+"""Of each: share of its height that it sags, frequency in the air [Hz], time until it is still [s]."""
+
+PROFILE = ((0.0, 0.0), (0.50, 0.0), (0.52, 0.05), (0.40, 0.45), (0.36, 0.52), (0.28, 0.55), (0.0, 0.55))
+"""Radius and height of its outline [m]."""
+
+CELLS, DENSITY, POISSON = 9, 300.0, 0.4
+SPACE = 1.5  # from one to the next [m]
+TRAY = (4.6, 1.5, 0.1)  # length, width, thickness [m]
+JERK_AT, JERK, JERK_TIME = 0.5, 0.12, 0.12  # when, how far and for how long the tray goes aside [s, m, s]
+STEP = FixedStep(dt=1 / 100)
+
+
+def stage() -> Stage:
+    """The puddings on the tray, each of the material that was found for it."""
+    pudding = trimesh.creation.revolve(np.array(PROFILE), sections=64)
+    plain = Material(1e5, POISSON, DENSITY)
+    cage = SoftBodyAsset.from_surface(pudding, plain, cells=CELLS)
+    feels = [material_from_feel(cage.mesh, **wish, poisson=POISSON, density=DENSITY) for wish in WISHES]
+    world = World(floor=0.0)
+    tray = world.add_collider(BoxShape(TRAY), position=(0, 0, TRAY[2] / 2 + 0.2), friction=1.0)
+    contact = Contact(friction=1.0)
+    for i, feel in enumerate(feels):
+        asset = SoftBodyAsset(cage.mesh, feel.material, skin=cage.skin, contact=contact)
+        world.add_body(asset, position=(SPACE * (i - 1), 0, TRAY[2] + 0.205))
+    world.build()
+    for body, feel in zip(world.bodies, feels, strict=True):
+        body.set_gravity_scale(feel.gravity_scale)
+
+    def jerk(world: World) -> None:
+        since = world.time - JERK_AT
+        speed = 0.0
+        if 0.0 <= since < 2.0 * JERK_TIME:  # there and back
+            speed = JERK / JERK_TIME * (1.0 if since < JERK_TIME else -1.0)
+        tray.set_velocity((0.0, speed, 0.0))
+
+    colors = [PALETTE[i] for i in (0, 4, 2)]
+    actors = [Actor(body, color) for body, color in zip(world.bodies, colors, strict=True)]
+    legend = [
+        (color, f"{wish['wobble_hz']:g} Hz, still after {wish['settle_s']:g} s")
+        for color, wish in zip(colors, WISHES, strict=True)
+    ]
+    camera = Camera.framing((-2.2, -0.7, 0.2), (2.2, 0.7, 1.0), aspect=16 / 9, azimuth=-75, elevation=14)
+    made = Stage("as wished for", world, actors, camera, STEP, 5.0, act=jerk, legend=legend)
+    made.feels = feels  # type: ignore[attr-defined]
+    return made
+
+
+def proof(stage: Stage) -> float:
+    """By which share the wish was missed most that was missed most."""
+    misses = [
+        abs(getattr(feel.simulated, name) / wish - 1)
+        for feel, wishes in zip(stage.feels, WISHES, strict=True)  # type: ignore[attr-defined]
+        for name, wish in wishes.items()
+    ]
+    return max(misses)
+
+
+if __name__ == "__main__":
+    main("demo", "feel")
