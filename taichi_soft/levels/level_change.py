@@ -113,8 +113,14 @@ def _keep_momentum(x: Floats, v: Floats, m: Floats, new_x: Floats, new_v: Floats
     new_x += center - masses @ new_x / masses.sum()
     new_v += drift - masses @ new_v / masses.sum()
     arms = new_x - center
-    spin = (m[:, None] * np.cross(x - center, v)).sum(axis=0)
-    missing = spin - (masses[:, None] * np.cross(arms, new_v)).sum(axis=0)
-    squares = (masses * (arms**2).sum(axis=1)).sum()
-    inertia = squares * np.eye(3) - (masses[:, None] * arms).T @ arms
-    new_v += np.cross(np.linalg.lstsq(inertia, missing, rcond=1e-9)[0], arms)
+    missing = _spin(x - center, v, m) - _spin(arms, new_v, masses)
+    moments = (masses[:, None] * arms).T @ arms
+    inertia = np.trace(moments) * np.eye(3) - moments
+    a, b, c = np.linalg.lstsq(inertia, missing, rcond=1e-9)[0]
+    new_v += arms @ np.array([[0, c, -b], [-c, 0, a], [b, -a, 0]])
+
+
+def _spin(arms: Floats, v: Floats, masses: Floats) -> Floats:
+    """Sum of m r x v, (3,)."""
+    products = (masses[:, None] * arms).T @ v
+    return np.array([products[i - 2, i - 1] - products[i - 1, i - 2] for i in range(3)])

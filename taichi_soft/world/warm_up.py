@@ -17,6 +17,7 @@ from taichi_soft.control.drives import push_bodies, set_wind
 from taichi_soft.control.impulses import apply_radial_impulse
 from taichi_soft.control.rigid_transform import carry
 from taichi_soft.levels.level_change import bar_to_levels
+from taichi_soft.levels.passage import prepare
 from taichi_soft.persistence.snapshot import restore_snapshot, state_hash, take_snapshot
 from taichi_soft.queries import cast_ray, cast_rays, find_closest_point, find_in_box, find_in_sphere
 from taichi_soft.solver.context import WorldContext
@@ -54,6 +55,8 @@ def warm_up(context: WorldContext) -> None:
         for body in {body.asset: body for body in bodies}.values():
             _control(context, body, next((each for each in bodies if each is not body), None))
             _measure(context, body)
+        for asset in context.slots.kinds:
+            prepare(asset)
         warm_up_render_meshes(context.built.state)
         if any(asset.skin for asset in context.slots.assets):
             warm_up_skins(context.built.state)
