@@ -14,9 +14,10 @@ from taichi_soft import Body, StateError, World
 from taichi_soft.core.checks import as_positive, as_vector
 from taichi_soft.core.handles import serial_of
 
-FULL, ROOMY = 0.8, 0.6
-"""Of the budget: what a step is expected to take after levels were lowered, and what it may take at most
-after some were raised. The gap between them keeps levels from going up and down for ever."""
+TIGHT, FULL, ROOMY = 0.85, 0.75, 0.6
+"""Of the budget: what a step is expected to take where levels are lowered, until it is expected to take FULL,
+and what it may take at most after some were raised. Single steps take longer than the median, by a sixth or
+so, and fit the budget, too. The gaps keep levels from going up and down for ever."""
 
 REMEMBERED = 8
 """Steps of which the median says what a tetrahedron costs: one that was interrupted does not count."""
@@ -114,7 +115,7 @@ class Budget:
 
     def _changes(self) -> list[tuple[Body, int]]:
         """Make those that are due."""
-        if self._expected(self._load) > self.seconds:
+        if self._expected(self._load) > TIGHT * self.seconds:
             return self._lowered(self._load)
         return self._raised(self._load) if self._calm >= PATIENCE else []
 
