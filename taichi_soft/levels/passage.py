@@ -54,19 +54,20 @@ def _weights(
     A corner has its share (k, 4), and passes on its gradient along its arm (k, 4, 3): what its neighbours
     differ from it, by `slopes_of`.
     """
-    neighbours, begins, slopes = slopes_of(mesh)
+    neighbours, first, slopes = slopes_of(mesh)
     n, corner = len(mesh.vertices), corners.ravel().astype(np.int64)
-    counts = np.diff(begins)[corner]
+    counts = np.diff(first)[corner]
     pair = np.repeat(np.arange(len(corner)), counts)  # a corner of an aim, and a neighbour of that
-    place = np.arange(len(pair)) - np.repeat(np.cumsum(counts) - counts, counts) + begins[corner[pair]]
+    place = np.arange(len(pair)) - np.repeat(np.cumsum(counts) - counts, counts) + first[corner[pair]]
     along = np.einsum("ex,ex->e", slopes[place], (shares[:, :, None] * arms).reshape(-1, 3)[pair])
     own = shares.ravel() - np.bincount(pair, along, len(corner))
     aim = np.repeat(np.arange(len(corners)), 4)
     keys, entry = np.unique(
         np.concatenate([aim * n + corner, aim[pair] * n + neighbours[place]]), return_inverse=True
     )
+    begins = np.searchsorted(keys, np.arange(len(corners)) * n)
     weights = np.bincount(entry, np.concatenate([own, along]))
-    return keys % n, np.searchsorted(keys, np.arange(len(corners)) * n), weights
+    return np.asarray(keys % n, np.int64), np.asarray(begins, np.int64), np.asarray(weights, np.float64)
 
 
 _known: weakref.WeakKeyDictionary[SoftBodyAsset, dict[tuple[int, int], Passage]] = weakref.WeakKeyDictionary()

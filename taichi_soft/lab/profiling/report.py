@@ -161,15 +161,14 @@ def _budget_table(budgets: list[Budget]) -> Table:
 def _kept_budget_tables(runs: list[KeptBudget]) -> Iterator[tuple[str, Table]]:
     """A column for the run without a budget, and one for that with it."""
     table = _table("", *("with a budget" if run.is_kept else "without" for run in runs))
-    for name, spread_of in (
-        ("step", lambda run: run.step),
-        ("step, once it is met", lambda run: run.settled),
-        ("frame", lambda run: run.frame),
-        ("deciding, in a frame without a change", lambda run: run.deciding),
-        ("deciding and changing, in others", lambda run: run.changing),
+    for name, attribute in (
+        ("step", "step"),
+        ("step, once it is met", "settled"),
+        ("frame", "frame"),
+        ("deciding, in a frame without a change", "deciding"),
+        ("deciding and changing, in others", "changing"),
     ):
-        spreads = [spread_of(run) for run in runs]
-        table.add_row(name, *map(_late_cells, spreads))
+        table.add_row(name, *(_late_cells(getattr(run, attribute)) for run in runs))
     for name, value_of in (
         ("steps over the budget", lambda run: f"{run.late:.1%}"),
         ("over it, once it is met", lambda run: f"{run.late_settled:.1%}"),
@@ -182,11 +181,8 @@ def _kept_budget_tables(runs: list[KeptBudget]) -> Iterator[tuple[str, Table]]:
     ):
         table.add_row(name, *map(value_of, runs))
     bodies = sum(runs[0].levels.values())
-    yield (
     limit = f"a budget of {runs[0].budget:.2f} ms a step"
     yield f"{bodies} bodies with levels of detail, {limit}; times: p50, p99, most [ms]", table
-        table,
-    )
 
 
 def _late_cells(spread: Spread | None) -> str:
