@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 from statistics import median
+from time import perf_counter
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,18 +14,22 @@ from taichi_soft import Body, StateError, World
 from taichi_soft.core.checks import as_positive, as_vector
 from taichi_soft.core.handles import serial_of
 
-FULL, ROOMY = 0.8, 0.6
-"""Of the budget: what a step is expected to take after levels were lowered, and what it may take at most
-after one was raised. The gap between them keeps levels from going up and down for ever."""
+TIGHT, FULL, ROOMY = 0.85, 0.75, 0.6
+"""Of the budget: what a step is expected to take where levels are lowered, until it is expected to take FULL,
+and what it may take at most after some were raised. Single steps take longer than the median, by a sixth or
+so, and fit the budget, too. The gaps keep levels from going up and down for ever."""
 
 REMEMBERED = 8
 """Steps of which the median says what a tetrahedron costs: one that was interrupted does not count."""
 
 PATIENCE = 30
-"""Steps without a change before a level is raised: half a second of a game."""
+"""Steps without a change before levels are raised: half a second of a game."""
 
-MOST_CHANGES = 4
-"""Bodies whose level changes before one step: each costs some milliseconds itself."""
+TRY_AGAIN = 8
+"""Steps after which it is looked again where nothing could be given up: looking takes time, too."""
+
+CHANGING = 0.5
+"""Of the budget: what changes of level may take before one step. One is made in any case."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +50,9 @@ class Budget:
         self._world = world
         self._viewer: NDArray[np.float64] | None = None
         self._costs: deque[float] = deque(maxlen=REMEMBERED)  # of a tetrahedron in a step [s]
-        self._calm = 0  # steps since a level changed
+        self._load = 0  # tetrahedra in the coming step, or the last one
+        self._calm = 0  # steps since a level changed, or none could be raised
+        self._waits = 0  # steps until it is looked again what could be lowered
         self._decided: dict[int, list[tuple[int, int]]] = {}  # handle and level, by step
         self._newest = -1  # step that was decided last
 
@@ -57,7 +64,7 @@ class Budget:
     def given_up(self) -> GivenUp:
         """As things are."""
         levels = {body: body.level for body in self._world.bodies if body.level}
-        expected = self._expected(self._load)
+        expected = self._expected(self._tets())
         return GivenUp(levels, 1e3 * expected, expected <= self.seconds)
 
     def note(self, seconds: float) -> None:
@@ -74,10 +81,14 @@ class Budget:
         step = self._world.step_count
         if step <= self._newest:
             self._repeat(self._decided.get(step, []))
+            self._load = self._tets()
             return
         self._newest = step
+        self._load = self._tets()
         changes = self._changes()
         self._calm = 0 if changes else self._calm + 1
+        if changes:
+            self._load = self._tets()
         if changes and ticks:
             self._decided[step] = [(serial_of(body), level) for body, level in changes]
         for old in [each for each in self._decided if each < step - ticks]:
@@ -86,7 +97,7 @@ class Budget:
     def restart(self) -> None:
         """The world was put to another state: what was decided belongs to another course of events."""
         self._decided.clear()
-        self._newest, self._calm = -1, 0
+        self._newest, self._calm, self._waits = -1, 0, 0
 
     def _repeat(self, changes: list[tuple[int, int]]) -> None:
         bodies = {serial_of(body): body for body in self._world.bodies}
@@ -94,8 +105,7 @@ class Budget:
             if serial in bodies:  # with other inputs something may hold it now
                 _has_changed(bodies[serial], level)
 
-    @property
-    def _load(self) -> int:
+    def _tets(self) -> int:
         """Tetrahedra that move, or may."""
         return sum(len(body.tets) for body in self._world.bodies)
 
@@ -105,38 +115,52 @@ class Budget:
 
     def _changes(self) -> list[tuple[Body, int]]:
         """Make those that are due."""
-        load = self._load
-        if self._expected(load) > self.seconds:
-            return self._lowered(load)
-        return self._raised(load) if self._calm >= PATIENCE else []
+        if self._expected(self._load) > TIGHT * self.seconds:
+            return self._lowered(self._load)
+        return self._raised(self._load) if self._calm >= PATIENCE else []
 
     def _lowered(self, load: float) -> list[tuple[Body, int]]:
-        """The farthest first, by one level each, until a step is expected to fit."""
+        """The farthest first, by one level each, until a step is expected to fit. Sleepers cost nothing."""
+        if self._waits:
+            self._waits -= 1
+            return []
         changes: list[tuple[Body, int]] = []
-        for body in self._by_distance(reverse=True):
-            if len(changes) == MOST_CHANGES or self._expected(load) <= FULL * self.seconds:
+        start = perf_counter()
+        for body in self._by_distance(self._with_levels(1), reverse=True):
+            if self._expected(load) <= FULL * self.seconds or (changes and self._is_late(start)):
                 break
-            before, coarser = len(body.tets), body.level + 1
-            if coarser < len(body.asset.levels) and _has_changed(body, coarser):
+            before = len(body.tets)
+            if not body.is_asleep and _has_changed(body, body.level + 1):
                 load -= before - len(body.tets)
-                changes.append((body, coarser))
+                changes.append((body, body.level))
+        self._waits = 0 if changes else TRY_AGAIN
         return changes
 
     def _raised(self, load: float) -> list[tuple[Body, int]]:
-        """The nearest that can be, by one level."""
-        for body in self._by_distance(reverse=False):
-            if body.level:
-                finer = body.level - 1
-                more = len(body.asset.levels[finer].mesh.tets) - len(body.tets)
-                if self._expected(load + more) > ROOMY * self.seconds:
-                    return []
-                if _has_changed(body, finer):
-                    return [(body, finer)]
-        return []
+        """The nearest first, by one level each, as long as a step is expected to fit."""
+        changes: list[tuple[Body, int]] = []
+        start = perf_counter()
+        for body in self._by_distance(self._with_levels(-1), reverse=False):
+            finer = body.level - 1
+            more = len(body.asset.levels[finer].mesh.tets) - len(body.tets)
+            if self._expected(load + more) > ROOMY * self.seconds or (changes and self._is_late(start)):
+                break
+            if _has_changed(body, finer):
+                load += more
+                changes.append((body, finer))
+        self._calm = 0
+        return changes
 
-    def _by_distance(self, *, reverse: bool) -> list[Body]:
-        """Bodies that have levels, from the nearest to the farthest; by slot where nobody looks."""
-        bodies = [body for body in self._world.bodies if len(body.asset.levels) > 1]
+    def _is_late(self, start: float) -> bool:
+        """Whether changes since a moment take too long for one frame."""
+        return perf_counter() - start > CHANGING * self.seconds
+
+    def _with_levels(self, change: int) -> list[Body]:
+        """Bodies whose level may change by 1 or -1, by slot."""
+        return [body for body in self._world.bodies if 0 <= body.level + change < len(body.asset.levels)]
+
+    def _by_distance(self, bodies: list[Body], *, reverse: bool) -> list[Body]:
+        """From the nearest to the farthest; by slot where nobody looks."""
         if self._viewer is None:
             return bodies[::-1] if reverse else bodies
         apart = [float(np.linalg.norm(body.center_of_mass() - self._viewer)) for body in bodies]

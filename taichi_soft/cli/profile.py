@@ -13,6 +13,9 @@ from taichi_soft.cli.console import Arch, AsJson, Threads, console, device_facts
 from taichi_soft.core.errors import OptionError
 from taichi_soft.core.runtime import init
 
+IN_TURN = 15
+"""Steps at least in which a budget is measured."""
+
 
 def profile(
     bodies: Annotated[int, typer.Option(min=1, max=4096, help="Spheres of 1,280 tetrahedra.")] = 16,
@@ -33,6 +36,9 @@ def profile(
     ] = False,
     game: Annotated[
         bool, typer.Option("--game", help="What contact, sleep, spawning and unused features cost.")
+    ] = False,
+    budget: Annotated[
+        bool, typer.Option("--budget", help="Whether a budget is kept by levels of detail: minutes.")
     ] = False,
     repeats: Annotated[int, typer.Option(min=3, help="Measurements of each figure.")] = 121,
     as_json: AsJson = False,
@@ -71,6 +77,9 @@ def profile(
             found["features"] = profiling.measure_features(max(3, repeats // 3))
             found["heap"] = profiling.measure_heaps(device.threads, max(3, repeats // 2))
             found["moments"] = profiling.measure_moments(max(3, repeats // 2))
+        if budget:
+            status.update("measuring a budget")
+            found["kept_budget"] = profiling.measure_kept_budget(max(IN_TURN, 5 * repeats))
     if as_json:
         rows = {key: [asdict(row) for row in value] for key, value in found.items()}
         print(json.dumps({"device": device_facts(device), **rows}, indent=2))

@@ -134,19 +134,18 @@ def _keep_momentum(x: Floats, v: Floats, m: Floats, new_x: Floats, new_v: Floats
     new_x += center - masses @ new_x / masses.sum()
     arms = new_x - center
     momentum = m @ v - masses @ new_v
-    spin = (m[:, None] * np.cross(x - center, v)).sum(axis=0)
-    spin -= (masses[:, None] * np.cross(arms, new_v)).sum(axis=0)
-    new_v += _rigid(arms, masses, momentum, spin)
+    new_v += _rigid(arms, masses, momentum, _spin(x - center, v, m) - _spin(arms, new_v, masses))
 
 
 def _rigid(arms: Floats, masses: Floats, momentum: Floats, spin: Floats) -> Floats:
     """Velocities of the rigid motion that has a momentum, and an angular momentum about the centre of mass;
     or accelerations, of a force and a torque. (n, 3), for places `arms` from about the centre."""
     arms = arms - masses @ arms / masses.sum()
-    squares = (masses * (arms**2).sum(axis=1)).sum()
-    inertia = squares * np.eye(3) - (masses[:, None] * arms).T @ arms
-    turning = np.linalg.lstsq(inertia, spin, rcond=1e-9)[0]
-    return np.asarray(momentum / masses.sum() + np.cross(turning, arms))
+    moments = (masses[:, None] * arms).T @ arms
+    inertia = np.trace(moments) * np.eye(3) - moments
+    a, b, c = np.linalg.lstsq(inertia, spin, rcond=1e-9)[0]
+    turning = np.array([[0, c, -b], [-c, 0, a], [b, -a, 0]])
+    return np.asarray(momentum / masses.sum() + arms @ turning)
 
 
 def _held_at(body: SoftBody, level: int) -> Ints:
@@ -165,3 +164,9 @@ def _nearest_at(body: SoftBody, level: int) -> Ints:
     if held is None:
         return np.zeros(0, dtype=np.int64)
     return np.unique(held) if level == 0 else np.unique(passage(body.asset, 0, level).nearest(held))
+
+
+def _spin(arms: Floats, v: Floats, masses: Floats) -> Floats:
+    """Sum of m r x v, (3,)."""
+    products = (masses[:, None] * arms).T @ v
+    return np.array([products[i - 2, i - 1] - products[i - 1, i - 2] for i in range(3)])

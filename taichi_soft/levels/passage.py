@@ -26,21 +26,17 @@ class Passage:
         """Find where the one lies in the other, at rest."""
         mesh, aims = source.mesh, target.mesh.vertices
         assert isinstance(mesh, TetMesh)
-        tets, self._shares = Locator(mesh)(aims)
-        self._corners = mesh.tets[tets]
-        self._neighbours, begins, self._slopes = slopes_of(mesh)
-        self._owners, self._begins = np.repeat(np.arange(len(begins) - 1), np.diff(begins)), begins[:-1]
-        held = np.einsum("kc,kcx->kx", self._shares, mesh.vertices[self._corners])
-        self._arms = (2.0 * aims - held)[:, None] - mesh.vertices[self._corners]
+        tets, shares = Locator(mesh)(aims)
+        corners = mesh.tets[tets]
+        held = np.einsum("kc,kcx->kx", shares, mesh.vertices[corners])
+        arms = (2.0 * aims - held)[:, None] - mesh.vertices[corners]
+        self._sources, self._begins, self._weights = _weights(mesh, corners, shares, 0.5 * arms)
         self.places = source.mesh.vertices, aims  # of both, at rest
 
     def __call__(self, rows: Floats) -> Floats:
         """Positions, velocities or other quantities (n, q) of the source's vertices, for those of the target,
         (k, q)."""
-        differences = rows[self._neighbours] - rows[self._owners]
-        gradients = np.add.reduceat(differences[:, :, None] * self._slopes[:, None], self._begins, axis=0)
-        pulled = np.einsum("kcqy,kcy->kcq", gradients[self._corners], self._arms)
-        return np.asarray(np.einsum("kc,kcq->kq", self._shares, rows[self._corners] + 0.5 * pulled))
+        return np.add.reduceat(rows[self._sources] * self._weights[:, None], self._begins, axis=0)
 
     def nearest(self, vertices: Ints) -> Ints:
         """Vertices of the target that are nearest to some of the source, at rest."""
@@ -55,6 +51,31 @@ class Passage:
         return np.asarray(apart.argmin(axis=1))
 
 
+def _weights(
+    mesh: TetMesh, corners: NDArray[np.int32], shares: Floats, arms: Floats
+) -> tuple[Ints, Ints, Floats]:
+    """Of the sum that each of k vertices is: vertices of the mesh (e,), where those of each begin (k,), and
+    their weights (e,).
+
+    A corner has its share (k, 4), and passes on its gradient along its arm (k, 4, 3): what its neighbours
+    differ from it, by `slopes_of`.
+    """
+    neighbours, first, slopes = slopes_of(mesh)
+    n, corner = len(mesh.vertices), corners.ravel().astype(np.int64)
+    counts = np.diff(first)[corner]
+    pair = np.repeat(np.arange(len(corner)), counts)  # a corner of an aim, and a neighbour of that
+    place = np.arange(len(pair)) - np.repeat(np.cumsum(counts) - counts, counts) + first[corner[pair]]
+    along = np.einsum("ex,ex->e", slopes[place], (shares[:, :, None] * arms).reshape(-1, 3)[pair])
+    own = shares.ravel() - np.bincount(pair, along, len(corner))
+    aim = np.repeat(np.arange(len(corners)), 4)
+    keys, entry = np.unique(
+        np.concatenate([aim * n + corner, aim[pair] * n + neighbours[place]]), return_inverse=True
+    )
+    begins = np.searchsorted(keys, np.arange(len(corners)) * n)
+    weights = np.bincount(entry, np.concatenate([own, along]))
+    return np.asarray(keys % n, np.int64), np.asarray(begins, np.int64), np.asarray(weights, np.float64)
+
+
 _known: weakref.WeakKeyDictionary[SoftBodyAsset, dict[tuple[int, int], Passage]] = weakref.WeakKeyDictionary()
 
 
@@ -66,10 +87,11 @@ def passage(asset: SoftBodyAsset, source: int, target: int) -> Passage:
     return of_asset[source, target]
 
 
-def prepare_passages(asset: SoftBodyAsset) -> None:
-    """Make all that an asset has: each takes a tenth of a second to some, too long within a frame."""
-    count = len(asset.levels)
-    for source in range(count):
-        for target in range(count):
+def prepare(asset: SoftBodyAsset) -> None:
+    """Make all that a change of level takes, and that is slow to make: a tenth of a second and more."""
+    for source in range(len(asset.levels)):
+        for target in range(len(asset.levels)):
             if source != target:
                 passage(asset, source, target)
+    for each in asset.coarser:
+        _ = each.arrays, each.surface_row, each.first_frequency

@@ -18,7 +18,7 @@ from taichi_soft.control.drives import push_bodies, set_wind
 from taichi_soft.control.impulses import apply_radial_impulse
 from taichi_soft.control.rigid_transform import carry
 from taichi_soft.levels.level_change import bar_to_levels
-from taichi_soft.levels.passage import prepare_passages
+from taichi_soft.levels.passage import prepare
 from taichi_soft.persistence.snapshot import restore_snapshot, state_hash, take_snapshot
 from taichi_soft.queries import cast_ray, cast_rays, find_closest_point, find_in_box, find_in_sphere
 from taichi_soft.solver.context import WorldContext
@@ -57,7 +57,7 @@ def warm_up(context: WorldContext) -> None:
             _control(context, body, next((each for each in bodies if each is not body), None))
             _measure(context, body)
         for asset in context.slots.kinds:
-            prepare_passages(asset)
+            prepare(asset)
         warm_up_render_meshes(context.built.state)
         if any(asset.skin for asset in context.slots.assets):
             warm_up_skins(context.built.state)

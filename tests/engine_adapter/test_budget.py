@@ -4,13 +4,14 @@ The clock is ours: a step takes as long as the tetrahedra that are in the world 
 """
 
 import warnings
+from itertools import pairwise
 
 import numpy as np
 import pytest
 import trimesh
 
 from engine_adapter import EngineAdapter, FixedStep
-from taichi_soft import Material, OptionError, SoftBodyAsset, StateError, World
+from taichi_soft import Body, Material, OptionError, SoftBodyAsset, StateError, World
 
 KIND = SoftBodyAsset.from_surface(
     trimesh.creation.icosphere(subdivisions=3, radius=0.4), Material(1e5, 0.4, 1000.0), cells=(6, 4, 3)
@@ -207,3 +208,39 @@ def test_frozen_bodies_and_bodies_without_levels_are_left_alone(clock):
             game.step()
     assert (one.level, other.level) == (0, 0)
     assert not game.given_up.is_met
+
+
+def test_changes_that_take_long_are_spread_over_frames(clock, monkeypatch):
+    budget = 1e3 * clock.per_tet * COUNT * SIZES[0] / 2
+    moments = iter(np.arange(1e4) * 1e-3 * budget)  # each look at the clock a whole budget after the last
+    monkeypatch.setattr("engine_adapter.budget.perf_counter", lambda: next(moments))
+    game, bodies = row_of(clock, budget_ms=budget)
+    seen = [levels(bodies)]
+    for _ in range(40):
+        game.step()
+        seen.append(levels(bodies))
+    at_once = [sum(abs(np.subtract(one, other))) for one, other in pairwise(seen)]
+    assert max(at_once) == 1
+    assert game.given_up.is_met
+
+
+def test_where_nothing_can_be_done_it_is_looked_now_and_then_only(clock, monkeypatch):
+    game, bodies = row_of(clock, budget_ms=1e3 * clock.per_tet * COUNT * SIZES[0] / 2)
+    game.see_from(EYE)
+    for _ in range(100):
+        game.step()
+    assert max(levels(bodies)) > 0
+    looks = []
+    center_of_mass = Body.center_of_mass
+    monkeypatch.setattr(Body, "center_of_mass", lambda body: looks.append(body) or center_of_mass(body))
+    for _ in range(90):
+        game.step()
+    assert 0 < len(looks) <= 4 * COUNT
+
+
+def test_who_sleeps_is_not_woken_to_be_coarser(clock, monkeypatch):
+    monkeypatch.setattr(Body, "is_asleep", property(lambda body: body.index == 2))
+    game, bodies = row_of(clock, budget_ms=1e3 * clock.per_tet * COUNT * SIZES[2] / 2)
+    for _ in range(60):
+        game.step()
+    assert levels(bodies) == [2, 2, 0, 2, 2, 2]

@@ -265,6 +265,21 @@ def test_warming_up_changes_levels_and_leaves_every_bit(flying):
     assert (world.state_hash(), body.level, body.positions().tobytes()) == before
 
 
+def test_after_warming_up_no_change_of_a_level_has_anything_to_prepare(monkeypatch):
+    kind = SoftBodyAsset.from_surface(RING, RUBBER, cells=(6, 4, 3))
+    world = World()
+    world.reserve(kind, 1)
+    body = world.spawn(kind, position=(0, 0, 2.0))
+    world.build()
+    world.warm_up()
+    monkeypatch.delattr("taichi_soft.levels.passage.Locator")
+    monkeypatch.delattr("taichi_soft.bodies.asset.first_frequency")
+    monkeypatch.delattr("taichi_soft.bodies.asset.arrange")
+    for level in (1, 2, 1, 0):
+        body.set_level(level)
+    assert body.level == 0
+
+
 def test_a_slot_that_a_coarse_body_leaves_is_fine_again_for_the_next(flying):
     world, body = flying
     body.set_level(2)

@@ -13,6 +13,7 @@ from taichi_soft.lab.profiling.game import (
     measure_moments,
 )
 from taichi_soft.lab.profiling.implicit import ImplicitGain, measure_implicit
+from taichi_soft.lab.profiling.kept_budget import KeptBudget, measure_kept_budget
 from taichi_soft.lab.profiling.law_costs import LawCost, measure_laws
 from taichi_soft.lab.profiling.phases import Phases, measure_phases
 from taichi_soft.lab.profiling.scaling import Scaling, measure_scaling
@@ -27,6 +28,7 @@ __all__ = [
     "FeatureCost",
     "Heap",
     "ImplicitGain",
+    "KeptBudget",
     "LawCost",
     "Moments",
     "Phases",
@@ -41,6 +43,7 @@ __all__ = [
     "measure_features",
     "measure_heaps",
     "measure_implicit",
+    "measure_kept_budget",
     "measure_laws",
     "measure_moments",
     "measure_phases",

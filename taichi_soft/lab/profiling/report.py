@@ -11,6 +11,7 @@ from rich.table import Table
 from taichi_soft.elements.laws import LAWS
 from taichi_soft.elements.laws.law import ANISOTROPIC
 from taichi_soft.lab.profiling.budget import Budget
+from taichi_soft.lab.profiling.kept_budget import KeptBudget
 from taichi_soft.lab.profiling.law_costs import LawCost
 from taichi_soft.lab.profiling.phases import Phases
 from taichi_soft.lab.profiling.spread import Spread
@@ -78,6 +79,8 @@ def tables(found: dict[str, Any]) -> Iterator[tuple[str, Table]]:
         for row in found["moments"]:
             table.add_row(row.name, *_cells(row.cost, 3))
         yield "What happens once", table
+    if "kept_budget" in found:
+        yield from _kept_budget_tables(found["kept_budget"])
 
 
 def law_rows(costs: list[LawCost]) -> list[dict[str, Any]]:
@@ -153,6 +156,37 @@ def _budget_table(budgets: list[Budget]) -> Table:
     for each in budgets:
         table.add_row(f"{each.rate} Hz", str(each.substeps), str(each.bodies), f"{each.tets:,}")
     return table
+
+
+def _kept_budget_tables(runs: list[KeptBudget]) -> Iterator[tuple[str, Table]]:
+    """A column for the run without a budget, and one for that with it."""
+    table = _table("", *("with a budget" if run.is_kept else "without" for run in runs))
+    for name, attribute in (
+        ("step", "step"),
+        ("step, once it is met", "settled"),
+        ("frame", "frame"),
+        ("deciding, in a frame without a change", "deciding"),
+        ("deciding and changing, in others", "changing"),
+    ):
+        table.add_row(name, *(_late_cells(getattr(run, attribute)) for run in runs))
+    for name, value_of in (
+        ("steps over the budget", lambda run: f"{run.late:.1%}"),
+        ("over it, once it is met", lambda run: f"{run.late_settled:.1%}"),
+        ("met after steps", lambda run: "never" if run.met_after is None else str(run.met_after)),
+        ("frames with changes", lambda run: str(run.frames_with_changes)),
+        ("bodies at level", lambda run: ", ".join(f"{level}: {n}" for level, n in run.levels.items())),
+        ("tetrahedra in the end", lambda run: f"{run.tets:,}"),
+        ("non-finite bodies", lambda run: str(run.frozen)),
+        ("stolen", lambda run: "?" if run.stolen is None else f"{run.stolen:.0%}"),
+    ):
+        table.add_row(name, *map(value_of, runs))
+    bodies = sum(runs[0].levels.values())
+    limit = f"a budget of {runs[0].budget:.2f} ms a step"
+    yield f"{bodies} bodies with levels of detail, {limit}; times: p50, p99, most [ms]", table
+
+
+def _late_cells(spread: Spread | None) -> str:
+    return "-" if spread is None else f"{spread.median:.2f} {spread.p99:.2f} {spread.most:.2f}"
 
 
 def _ratio_table(names: tuple[str, str], rows: list[tuple[int, Spread, Spread, Spread]]) -> Table:
