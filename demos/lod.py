@@ -1,4 +1,4 @@
-"""Soft rings roll down a slope towards the camera, of more tetrahedra the nearer they are."""
+"""Soft balls roll down a chute towards the camera, of more tetrahedra the nearer they are."""
 
 import numpy as np
 import trimesh
@@ -10,36 +10,33 @@ from taichi_soft.cli import main
 from taichi_soft.render import PALETTE, Camera
 from taichi_soft.render.film import Actor, Stage
 
-CELLS = (10, 7, 5)  # of the levels along the longest side, the finest first
-DISTANCES = (7.5, 11.0)  # from the camera, beyond which the second and the third level do [m]
+CELLS = (10, 6, 4)  # of the levels along a ball, the finest first
+DISTANCES = (10.3, 13.8)  # from the camera, beyond which the second and the third level do [m]
 SLACK = 0.5  # that a body must come nearer before it is finer again [m]
-JELLY = Material(young=6.0e4, poisson=0.4, density=300.0)
-COUNT = 5
-SLOPE, LENGTH, WIDTH = 0.26, 16.0, 6.0  # [rad], [m], [m]
+JELLY = Material(young=3.0e4, poisson=0.4, density=200.0)
+RADIUS, COUNT = 0.5, 5
+SLOPE, LENGTH, WIDTH = 0.22, 14.0, 6.6  # [rad], [m], [m]
 COLORS = tuple(PALETTE[i] for i in (0, 2, 3))  # of the levels
 STEP = FixedStep(dt=1 / 50)
 
 
 def stage() -> Stage:
-    """The rings upright at the upper end of the slope."""
-    ring = trimesh.creation.torus(0.55, 0.22)
-    ring.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, (0, 1, 0)))
-    asset = SoftBodyAsset.from_surface(ring, JELLY, cells=CELLS, contact=Contact(friction=0.8))
+    """The balls above the upper end of the chute; at its lower end is a wall."""
+    ball = trimesh.creation.icosphere(subdivisions=4, radius=RADIUS)
+    asset = SoftBodyAsset.from_surface(ball, JELLY, cells=CELLS, contact=Contact(friction=0.8))
     world = World(friction=0.8)
     turn = (np.sin(SLOPE / 2), 0.0, 0.0, np.cos(SLOPE / 2))
     middle = 0.5 * LENGTH * np.array([0.0, np.cos(SLOPE), np.sin(SLOPE)])
     world.add_collider(BoxShape((WIDTH, LENGTH, 0.2)), position=middle, rotation=turn, friction=0.8)
+    world.add_collider(BoxShape((WIDTH, 0.2, 1.0)), position=(0.0, 0.3, 0.5))
     for i in range(COUNT):
-        y = 0.92 * LENGTH - 1.2 * (i % 2) - 0.4 * i
-        place = (1.15 * (i - (COUNT - 1) / 2), y, y * np.tan(SLOPE) + 1.0)
-        world.add_body(asset, position=place, velocity=(0.0, -1.5, 0.0))
+        y = LENGTH - 1.0 - 0.7 * ((3 * i) % COUNT)
+        place = (1.2 * (i - (COUNT - 1) / 2), y, y * np.tan(SLOPE) + 1.3)
+        world.add_body(asset, position=place, velocity=(0.0, -2.5, 0.0))
     world.build()
-    camera = Camera.framing((-2.6, 0.0, 0.2), (2.6, 6.0, 2.5), aspect=16 / 9, azimuth=-90, elevation=16)
-    eye = np.asarray(camera.eye)
-
-    def choose(world: World) -> None:
-        for body in world.bodies:
-            body.set_level(level_of(body, eye))
+    camera = Camera(eye=(0.0, -7.0, 5.6), target=(0.0, 4.6, 2.3), fov_degrees=38.0)
+    choice = Choice(np.asarray(camera.eye))
+    choice(world)
 
     def caption() -> str:
         now = sum(len(body.tets) for body in world.bodies)
@@ -47,9 +44,22 @@ def stage() -> Stage:
 
     actors = [Actor(body, paint=paint) for body in world.bodies]
     legend = [(color, f"{cells} cells") for color, cells in zip(COLORS, CELLS, strict=True)]
-    return Stage(
-        "levels of detail", world, actors, camera, STEP, 5.0, act=choose, caption=caption, legend=legend
-    )
+    made = Stage("levels of detail", world, actors, camera, STEP, 4.5, act=choice, legend=legend)
+    made.caption = caption
+    return made
+
+
+class Choice:
+    """Of a level for each ball before every step, and which levels each has had."""
+
+    def __init__(self, eye: NDArray[np.float64]) -> None:
+        self.eye = eye
+        self.seen: dict[Body, set[int]] = {}
+
+    def __call__(self, world: World) -> None:
+        for body in world.bodies:
+            body.set_level(level_of(body, self.eye))
+            self.seen.setdefault(body, set()).add(body.level)
 
 
 def level_of(body: Body, eye: NDArray[np.float64]) -> int:
@@ -66,8 +76,9 @@ def paint(body: Body) -> NDArray[np.float32]:
 
 
 def proof(stage: Stage) -> float:
-    """How many rings have come down and are fine now."""
-    return float(sum(body.level == 0 and body.center_of_mass()[1] < 4.0 for body in stage.world.bodies))
+    """How many balls have had every level on their way."""
+    assert isinstance(stage.act, Choice)
+    return float(sum(levels == set(range(len(CELLS))) for levels in stage.act.seen.values()))
 
 
 if __name__ == "__main__":

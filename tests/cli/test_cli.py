@@ -47,7 +47,19 @@ def test_demo_without_a_name_lists_the_demos_with_a_summary_each():
     lines = done.stdout.splitlines()
     assert [line.split()[0] for line in lines] == [
         *("attach", "bars", "bounce", "bowl", "bridge", "cloth", "compare", "cut", "density", "dents"),
-        *("drape", "elephants", "grab", "jelly", "many", "playground", "rollback", "tower", "wheels"),
+        *(
+            "drape",
+            "elephants",
+            "feel",
+            "grab",
+            "jelly",
+            "lod",
+            "many",
+            "playground",
+            "rollback",
+            "tower",
+            "wheels",
+        ),
     ]
 
 

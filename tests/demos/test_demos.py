@@ -307,6 +307,36 @@ def test_two_machines_with_late_inputs_are_in_the_same_state_in_every_tick():
         assert machine.wrong > 20
 
 
+def test_every_ball_that_rolls_near_has_every_level_on_its_way_and_stays_whole():
+    count, stage = run("lod", 4.5)
+    demo = load_demo("lod")
+    assert count == demo.COUNT
+    for body in stage.world.bodies:
+        assert not body.is_frozen
+        assert np.ptp(body.positions(), axis=0) == pytest.approx([2 * demo.RADIUS] * 3, rel=0.3)
+
+
+def test_puddings_sag_and_wobble_as_they_were_wished_for():
+    """The sag of each on the tray before it is jerked, beside what was wished for."""
+    demo = load_demo("feel")
+    stage = demo.stage()
+    assert demo.proof(stage) < 0.05
+    heights = [np.ptp(body.mesh.vertices[:, 2]) for body in stage.world.bodies]
+    tops = []
+    while stage.world.time < demo.JERK_AT - 1e-9:
+        stage.act(stage.world)
+        stage.world.step(stage.step.dt)
+        tops.append([body.positions()[:, 2].max() for body in stage.world.bodies])
+    sags = 1.0 - (np.mean(tops[-25:], axis=0) - demo.TRAY[2] - 0.2) / heights
+    np.testing.assert_allclose(sags, [wish["sag"] for wish in demo.WISHES], atol=0.012)
+    while stage.world.time < demo.JERK_AT + 3.0:
+        stage.act(stage.world)
+        stage.world.step(stage.step.dt)
+    for body in stage.world.bodies:
+        assert not body.is_frozen
+        assert np.abs(body.velocities()).max() < 0.1
+
+
 @pytest.mark.parametrize("name", demo_names())
 def test_every_demo_can_be_filmed(name, tmp_path):
     stage = load_demo(name).stage()
@@ -332,7 +362,19 @@ def test_a_film_shows_what_was_cut_off(tmp_path):
 def test_there_are_the_demos_of_the_readme():
     assert demo_names() == [
         *("attach", "bars", "bounce", "bowl", "bridge", "cloth", "compare", "cut", "density", "dents"),
-        *("drape", "elephants", "grab", "jelly", "many", "playground", "rollback", "tower", "wheels"),
+        *(
+            "drape",
+            "elephants",
+            "feel",
+            "grab",
+            "jelly",
+            "lod",
+            "many",
+            "playground",
+            "rollback",
+            "tower",
+            "wheels",
+        ),
     ]
 
 
