@@ -2,12 +2,13 @@
 
 Velocities v become P v + k (v - P v): P v is the rigid motion with the momentum and angular momentum of v,
 and k = exp(-2 zeta w seconds), w being the angular frequency of the body's first mode and zeta its damping
-ratio. The factor is a contraction that is symmetric in the mass: where it acts on the velocities after a kick
-and before they move anything, leapfrog stays stable for each step for which it is without. With D the factor,
+ratio. It acts on the velocities at the time of the positions, in the middle of a kick. There leapfrog keeps, of
+each mode of frequency w,
 
-    D^-1 (x_(n+1) - x_n) = x_n - x_(n-1) - h^2 K x_n,
+    v^2 + w^2 (1 - h^2 w^2 / 4) x^2,
 
-which is leapfrog with the mass D^-1 >= 1 but for a damper that only takes energy.
+and less of v is less of that, for every stable step and however often it is done. Of velocities half a step
+later it also keeps h w^2 x v: what damped these every third substep, say, pumped modes of three substeps.
 """
 
 from taichi_soft.bodies.kernels.particles import gravity_on
@@ -15,6 +16,7 @@ from taichi_soft.bodies.status import FEELS_REACTION
 from taichi_soft.contact.distances.floor import resolve_floor
 from taichi_soft.core.constants import LANES, ROW_BITS
 from taichi_soft.core.runtime import ti
+from taichi_soft.core.types import Integrator
 
 MOST_FADING = 0.43
 """What damping takes from a vibration in one substep, at most: exp(-0.43) = 0.65 is left, d below. The kick
@@ -214,15 +216,24 @@ def kept_vibration(state: ti.template(), body, h, s, substeps):
 
 
 @ti.func
+def _to_positions(program: ti.template(), kick, h):
+    """The part of a kick [s] that brings velocities to the time of the positions, in a substep of `h` [s]."""
+    part = kick
+    if ti.static(program.integrator in (Integrator.LEAPFROG, Integrator.LAZY_LEAPFROG)):
+        part = kick - 0.5 * h
+    return part
+
+
+@ti.func
 def damp_vibration(state: ti.template(), program: ti.template(), body, kick, h, s, substeps):
     """What damping takes from a body in substep `s` of `substeps` of `h` [s] each.
 
-    It comes before the kick of `kick` [s] by the forces that the body feels, and takes its share of what that
-    will make of the velocities.
+    It comes before the kick of `kick` [s] by the forces that the body feels, and takes its share of what the
+    velocities will be in the middle of that.
     """
     keep = kept_vibration(state, body, h, s, substeps)
     if keep < 1.0:
-        fade_vibration(state, program, body, kick, h, keep)
+        fade_vibration(state, program, body, _to_positions(program, kick, h), h, keep)
     if state.body_is_braked[body] == 1:
         _limit_vibration(state, program, body, kick, FARTHEST * state.body_edge[body] / h)
 
@@ -245,6 +256,6 @@ def damp_body(state: ti.template(), program: ti.template(), body, kick, h, s, su
     rounding does not depend on what else a world has."""
     keep = kept_vibration(state, body, h, s, substeps)
     if keep < 1.0:
-        _fade_body(state, program, body, kick, h, keep)
+        _fade_body(state, program, body, _to_positions(program, kick, h), h, keep)
     if state.body_is_braked[body] == 1:
         _limit_body(state, program, body, kick, FARTHEST * state.body_edge[body] / h)
