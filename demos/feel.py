@@ -4,7 +4,7 @@ import numpy as np
 import trimesh
 
 from engine_adapter import FixedStep
-from taichi_soft import BoxShape, Contact, Material, SoftBodyAsset, World, material_from_feel
+from taichi_soft import BoxShape, Collider, Contact, Feel, Material, SoftBodyAsset, World, material_from_feel
 from taichi_soft.cli import main
 from taichi_soft.render import PALETTE, Camera
 from taichi_soft.render.film import Actor, Stage
@@ -42,13 +42,6 @@ def stage() -> Stage:
     for body, feel in zip(world.bodies, feels, strict=True):
         body.set_gravity_scale(feel.gravity_scale)
 
-    def jerk(world: World) -> None:
-        since = world.time - JERK_AT
-        speed = 0.0
-        if 0.0 <= since < 2.0 * JERK_TIME:  # there and back
-            speed = JERK / JERK_TIME * (1.0 if since < JERK_TIME else -1.0)
-        tray.set_velocity((0.0, speed, 0.0))
-
     colors = [PALETTE[i] for i in (0, 4, 2)]
     actors = [Actor(body, color) for body, color in zip(world.bodies, colors, strict=True)]
     legend = [
@@ -56,16 +49,28 @@ def stage() -> Stage:
         for color, wish in zip(colors, WISHES, strict=True)
     ]
     camera = Camera.framing((-2.2, -0.7, 0.2), (2.2, 0.7, 1.0), aspect=16 / 9, azimuth=-75, elevation=14)
-    made = Stage("as wished for", world, actors, camera, STEP, 5.0, act=jerk, legend=legend)
-    made.feels = feels  # type: ignore[attr-defined]
-    return made
+    return Stage("as wished for", world, actors, camera, STEP, 5.0, act=Jerk(tray, feels), legend=legend)
+
+
+class Jerk:
+    """Of the tray, there and back, and what the puddings on it are made of."""
+
+    def __init__(self, tray: Collider, feels: list[Feel]) -> None:
+        self.tray, self.feels = tray, feels
+
+    def __call__(self, world: World) -> None:
+        since, speed = world.time - JERK_AT, 0.0
+        if 0.0 <= since < 2.0 * JERK_TIME:
+            speed = JERK / JERK_TIME * (1.0 if since < JERK_TIME else -1.0)
+        self.tray.set_velocity((0.0, speed, 0.0))
 
 
 def proof(stage: Stage) -> float:
     """By which share the wish was missed most that was missed most."""
+    assert isinstance(stage.act, Jerk)
     misses = [
         abs(getattr(feel.simulated, name) / wish - 1)
-        for feel, wishes in zip(stage.feels, WISHES, strict=True)  # type: ignore[attr-defined]
+        for feel, wishes in zip(stage.act.feels, WISHES, strict=True)
         for name, wish in wishes.items()
     ]
     return max(misses)

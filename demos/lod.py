@@ -44,9 +44,8 @@ def stage() -> Stage:
 
     actors = [Actor(body, paint=paint) for body in world.bodies]
     legend = [(color, f"{cells} cells") for color, cells in zip(COLORS, CELLS, strict=True)]
-    made = Stage("levels of detail", world, actors, camera, STEP, 4.5, act=choice, legend=legend)
-    made.caption = caption
-    return made
+    title = "levels of detail"
+    return Stage(title, world, actors, camera, STEP, 4.5, act=choice, caption=caption, legend=legend)
 
 
 class Choice:

@@ -2,8 +2,8 @@
 
 Velocities v become P v + k (v - P v): P v is the rigid motion with the momentum and angular momentum of v,
 and k = exp(-2 zeta w seconds), w being the angular frequency of the body's first mode and zeta its damping
-ratio. It acts on the velocities at the time of the positions, in the middle of a kick. There leapfrog keeps, of
-each mode of frequency w,
+ratio. It acts on the velocities at the time of the positions, in the middle of a kick. There leapfrog keeps,
+of each mode of frequency w,
 
     v^2 + w^2 (1 - h^2 w^2 / 4) x^2,
 
