@@ -334,7 +334,7 @@ def test_puddings_sag_and_wobble_as_they_were_wished_for():
         stage.world.step(stage.step.dt)
     for body in stage.world.bodies:
         assert not body.is_frozen
-        assert np.abs(body.velocities()).max() < 0.1
+        assert np.abs(body.velocities()).max() < 0.2  # of a tray that moved at 1 m/s
 
 
 @pytest.mark.parametrize("name", demo_names())
