@@ -19,6 +19,7 @@ from taichi_soft.elements.materials import Material
 from taichi_soft.elements.materials.material import DAMPING_RATIO
 from taichi_soft.feel.trial import Trial
 from taichi_soft.meshing import TetMesh
+from taichi_soft.solver.substeps import FRAME, MANY_SUBSTEPS
 
 _log = logging.getLogger(__name__)
 
@@ -44,12 +45,6 @@ SCALES = 0.05, 20.0
 
 SWINGS = 1.0, 100.0
 """Periods until a vibration has settled: fewer are not seen as a vibration, more not as its end."""
-
-MOST_SUBSTEPS = 500
-"""Of a frame of a game: from there on `World` warns that a body is too stiff or too fine."""
-
-FRAME = 1 / 60
-"""Of a game [s]."""
 
 LEANS = 0.2
 """Turn of a body [rad] from which on it does not stand: it rolls or tips over."""
@@ -217,11 +212,8 @@ class _Search:
     def _tried(self) -> Feel:
         """What the constants make of the body, by its statics and slowest mode, and in a simulation."""
         omega, trial = self.body.omega(self.young), self.body.trial
-        material, period, settle = (
-            self.body.material(self.young, self.rate),
-            2 * pi / omega,
-            DECAYS / self.rate,
-        )
+        period, settle = 2 * pi / omega, DECAYS / self.rate
+        material = self.body.material(self.young, self.rate)
         frequency, rate = trial.ring(material, self.body.mode, period)
         standing = trial.stand(material, self.gravity_scale, period, settle)
         if standing.flipped:
@@ -261,8 +253,7 @@ class _Search:
             nearest = count / hz if self.wobble_hz else sqrt((2 * pi * count) ** 2 + DECAYS**2) / omega
             raise OptionError(
                 f"settle_s {DECAYS / self.rate:.3g} is {swings:.3g} periods at {hz:.3g} Hz, where "
-                f"{SWINGS[0]:g} to "
-                f"{SWINGS[1]:g} can be: the nearest is {nearest:.3g}"
+                f"{SWINGS[0]:g} to {SWINGS[1]:g} can be: the nearest is {nearest:.3g}"
             )
         scale = self.gravity_scale
         if not SCALES[0] <= scale <= SCALES[1]:
@@ -277,15 +268,15 @@ class _Search:
                 f"wobble_hz {hz:.3g} is so soft that the body turns inside out by its own weight: the "
                 f"nearest is {hz * sqrt(share / MOST_SAG):.3g}, or wish for a sag, which scales gravity"
             )
-        excess = body.substeps * sqrt(self.young) / MOST_SUBSTEPS
+        excess = body.substeps * sqrt(self.young) / MANY_SUBSTEPS
         if excess > 1.0:
             if self.wobble_hz is None and self.sag is not None:
                 way_out = f"the nearest sag is {self.sag * excess**2:.3g}"
             else:
                 way_out = f"the nearest wobble_hz is {hz / excess:.3g}"
             raise OptionError(
-                f"so stiff a body takes {MOST_SUBSTEPS * excess:,.0f} substeps of a 60 Hz frame, where "
-                f"{MOST_SUBSTEPS} can be: {way_out}. A coarser mesh takes fewer"
+                f"so stiff a body takes {MANY_SUBSTEPS * excess:,.0f} substeps of a 60 Hz frame, where "
+                f"{MANY_SUBSTEPS} can be: {way_out}. A coarser mesh takes fewer"
             )
 
 
