@@ -332,9 +332,9 @@ def test_puddings_sag_and_wobble_as_they_were_wished_for():
     while stage.world.time < demo.JERK_AT + 3.0:
         stage.act(stage.world)
         stage.world.step(stage.step.dt)
-    for body in stage.world.bodies:
+    for body, still in zip(stage.world.bodies, (0.05, 0.4, 1.0), strict=True):  # of a tray at 1 m/s
         assert not body.is_frozen
-        assert np.abs(body.velocities()).max() < 0.2  # of a tray that moved at 1 m/s
+        assert np.abs(body.velocities()).max() < still
 
 
 @pytest.mark.parametrize("name", demo_names())

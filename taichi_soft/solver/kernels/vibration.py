@@ -201,7 +201,8 @@ def _slower(beside, most):
 def kept_vibration(state: ti.template(), body, h, s, substeps):
     """The share of its vibration that a body keeps in substep `s` of `substeps` of `h` [s] each.
 
-    Below 1 every few substeps only, but many times in a period of the first mode.
+    Below 1 every few substeps only, but many times in a period of the first mode. Not always after the same
+    number of them: a mode that does not move whenever it would be damped would go on for ever.
     """
     keep, rate, interval = 1.0, state.body_fading[body], state.body_fading_interval[body]
     if state.body_is_braked[body] == 1:
@@ -210,6 +211,8 @@ def kept_vibration(state: ti.template(), body, h, s, substeps):
         whole = substeps * h
         wanted = ti.ceil(whole * ti.max(1.0 / interval, rate / MOST_FADING))
         times = ti.min(substeps, ti.cast(ti.min(wanted, 1e6), ti.i32))
+        while times < substeps and substeps % times == 0:
+            times += 1
         if (s + 1) * times // substeps > s * times // substeps:
             keep = ti.exp(-ti.min(rate * whole / times, MOST_FADING))
     return keep
