@@ -116,7 +116,7 @@ def pudding_in_space():
 
 
 def test_a_light_vertex_fades_with_the_rest_however_rarely_damping_acts():
-    """Damping acts every few substeps. The outermost vertices of this cage vibrate in about three: what damped
+    """Damping acts every few substeps. Outermost vertices of this cage vibrate in about three. What damped
     velocities half a substep from the positions pumped them, from 0.3 to 4 m/s in five seconds."""
     world, body = pudding_in_space()
     rest = body.mesh.vertices
