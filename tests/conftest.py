@@ -43,7 +43,7 @@ SECONDS = {
     "world/": (84, 397),
     "cages/": (70, 60),
     "feel/": (60, 90),
-    "levels/": (90, 0),
+    "levels/": (45, 90),
     "bodies/": (30, 296),
     "lab/": (0, 355),
     "cli/": (0, 225),
@@ -55,7 +55,7 @@ SECONDS = {
     "engine_adapter/": (7, 0),
     "render/": (20, 0),
     "bake/test_formats": (1, 0),
-    "bake/": (35, 0),
+    "bake/": (20, 20),
     "test_readme": (1, 10),
     "test_package": (5, 60),
     "": (21, 0),
@@ -95,6 +95,8 @@ SOAK = (
     *(f"test_package.py::test_a_{name}" for name in ("source", "wheel")),
     "docs/test_pages.py::test_the_code",
     *("control/test_joints.py::test_a_recording", "test_readme.py::test_the_level"),
+    *(f"levels/test_levels.py::test_{name}" for name in ("levels_in_contact", "after_warming", "warming")),
+    "bake/test_bake.py::test_a_body_that_goes",
 )
 """Tiers, by the beginnings of files or tests. SOAK compiles or runs for more than some 40 s with an empty
 cache and is left to `make test-all`; NUMPY runs no kernel, KERNEL some by themselves; the rest, and
