@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.cages.hull import Hull
+from taichi_soft.core.errors import MeshError
 from taichi_soft.meshing import TetMesh
 from taichi_soft.meshing.arrays import read_only
 from taichi_soft.meshing.locating import Locator
@@ -44,7 +45,10 @@ class BoundHull:
 
 
 def bind(mesh: TetMesh, hull: Hull) -> BoundHull:
-    """A hull bound to a mesh at rest."""
+    """A hull bound to a mesh at rest.
+
+    Raises: MeshError where most points are too far from the mesh to be of the same thing.
+    """
     tets, nearest = Locator(mesh)(hull.points)
     corners = mesh.vertices[mesh.tets[tets]]
     edges = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
@@ -53,6 +57,13 @@ def bind(mesh: TetMesh, hull: Hull) -> BoundHull:
     # As far along the way from the nearest point of the mesh as weights allow; float32 adds up to 1 later.
     with np.errstate(divide="ignore", invalid="ignore"):
         allowed = np.where(way < 0.0, (FARTHEST - nearest) / way, np.inf).min(axis=1)
+    moved = int((allowed < 1.0).sum())
+    if 2 * moved > len(allowed):
+        low, high = hull.points.min(axis=0), hull.points.max(axis=0)
+        raise MeshError(
+            f"{moved} of {len(allowed)} points of the hull, which lies from {low.round(4).tolist()} to "
+            f"{high.round(4).tolist()} m, are far from {mesh!r}: give one of the same thing"
+        )
     weights = nearest + np.minimum(allowed, 1.0)[:, None] * way
     vertices = mesh.tets[tets].astype(np.int32)
     points = np.einsum("hc,hcx->hx", weights, corners)
