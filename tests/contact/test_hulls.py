@@ -255,8 +255,8 @@ def test_a_body_falls_asleep_on_its_hull_and_wakes():
     for _ in range(240):
         world.step(DT)
     assert body.is_asleep
-    wall = world.add_collider(BoxShape((0.2, 0.2, 0.2)), position=(5, 0, 0.5))
-    wall.velocity = (-6, 0, 0)
+    wall = world.add_collider(BoxShape((0.2, 0.2, 0.2)), position=(5, 0, 0.25))
+    wall.set_velocity((-6, 0, 0))
     for _ in range(60):
         world.step(DT)
     assert not body.is_asleep

@@ -7,13 +7,11 @@ Impulses are equal and opposite. What is too near already is moved apart without
 
 from taichi_soft.bodies.kernels.particles import inv_mass_of, moves
 from taichi_soft.contact.fields import SLOTS
-from taichi_soft.contact.kernels.hull import (
-    inv_mass_at,
-    mark_touched,
-    motion_of,
+from taichi_soft.contact.kernels.hull_solver import (
+    mark_points,
     note_mobility,
-    push_point,
-    shift_point,
+    push_points_apart,
+    solve_points,
 )
 from taichi_soft.core.math.finite import is_finite
 from taichi_soft.core.runtime import ti
@@ -56,66 +54,15 @@ def note_levers(state: ti.template(), slot):
     state.soft.slot_levers[slot] = way.dot(n) * gradients
     state.soft.slot_inv_mass[slot] = ti.Vector(
         [
-            inv_mass_at(state, p),
-            inv_mass_at(state, corners[0]),
-            inv_mass_at(state, corners[1]),
-            inv_mass_at(state, corners[2]),
+            inv_mass_of(state, p),
+            inv_mass_of(state, corners[0]),
+            inv_mass_of(state, corners[1]),
+            inv_mass_of(state, corners[2]),
         ]
     )
-    if ti.static(state.capacity.contact.hull):
-        note_mobility(state, slot, corners)
     state.soft.slot_moves[slot] = ti.Vector([moves(state, p), moves(state, corners[0])])
-
-
-@ti.func
-def _velocities(state: ti.template(), p, corners):
-    """Of a vertex, and of the corners of a triangle row by row [m/s]."""
-    v = state.particle_velocity[p]
-    corner_v = ti.Matrix.rows(
-        [
-            state.particle_velocity[corners[0]],
-            state.particle_velocity[corners[1]],
-            state.particle_velocity[corners[2]],
-        ]
-    )
     if ti.static(state.capacity.contact.hull):
-        _, v = motion_of(state, p)
-        for i in ti.static(range(3)):
-            _, corner = motion_of(state, corners[i])
-            for k in ti.static(range(3)):
-                corner_v[i, k] = corner[k]
-    return v, corner_v
-
-
-@ti.func
-def _moved(state: ti.template(), slot, shares):
-    """Velocities that impulses at the corners of a triangle give these, in `shares` of 1 N s [m/s]."""
-    found = shares * state.soft.slot_inv_mass[slot].yzw
-    if ti.static(state.capacity.contact.hull):
-        found = state.hull.slot_mobility[slot] @ shares
-    return found
-
-
-@ti.func
-def _mobility(state: ti.template(), slot, shares, tilt):
-    """Inverse mass of a triangle whose corners take `shares` of an impulse and, across it, `tilt` [1/kg]."""
-    corner_m = state.soft.slot_inv_mass[slot].yzw
-    found = corner_m.dot(shares * shares + tilt * tilt)
-    if ti.static(state.capacity.contact.hull):
-        found = shares.dot(_moved(state, slot, shares)) + tilt.dot(_moved(state, slot, tilt))
-    return found
-
-
-@ti.func
-def _push_points_apart(state: ti.template(), p, corners, slot, depth):
-    """As `_push_apart`, of points of hulls."""
-    normal, weights = state.soft.slot_normal[slot], state.soft.slot_weights[slot]
-    total = state.soft.slot_inv_mass[slot][0] + weights.dot(_moved(state, slot, weights))
-    if total > 0.0:
-        impulse = PUSH_OUT * depth / total * normal
-        shift_point(state, p, impulse)
-        for i in range(3):
-            shift_point(state, corners[i], -weights[i] * impulse)
+        note_mobility(state, slot, p, corners)
 
 
 @ti.func
@@ -144,9 +91,14 @@ def _solve_contact(state: ti.template(), soft: ti.template(), slot, p, corners, 
     normal, weights, shares = soft.slot_normal[slot], soft.slot_weights[slot], soft.slot_shares[slot]
     face, levers, moves = soft.slot_face[slot], soft.slot_levers[slot], soft.slot_moves[slot]
     m, corner_m = soft.slot_inv_mass[slot][0], soft.slot_inv_mass[slot].yzw
-    v, corner_v = _velocities(state, p, corners)
-    v, corner_v = moves[0] * v, moves[1] * corner_v
-    given, corner_given = ti.Vector.zero(ti.f32, 3), ti.Matrix.zero(ti.f32, 3, 3)  # impulses on points [N s]
+    v = moves[0] * state.particle_velocity[p]
+    corner_v = moves[1] * ti.Matrix.rows(
+        [
+            state.particle_velocity[corners[0]],
+            state.particle_velocity[corners[1]],
+            state.particle_velocity[corners[2]],
+        ]
+    )
 
     normal_impulse = soft.slot_normal_impulse[slot]
     push = normal_impulse
@@ -154,20 +106,13 @@ def _solve_contact(state: ti.template(), soft: ti.template(), slot, p, corners, 
         allowed = -ti.max(soft.slot_gap[slot], 0.0) / h
         approach = v.dot(normal) - weights.dot(corner_v @ normal)
         total = m + (weights * weights).dot(corner_m)
-        if ti.static(state.capacity.contact.hull):
-            total = m + weights.dot(_moved(state, slot, weights))
         wanted_impulse = ti.max(normal_impulse + (allowed - approach) / ti.max(total, 1e-30), 0.0)
         push = wanted_impulse - normal_impulse
         normal_impulse = wanted_impulse
         soft.slot_normal_impulse[slot] = normal_impulse
     if is_finite(push * normal):
         v += m * push * normal
-        if ti.static(state.capacity.contact.hull):
-            given += push * normal
-            corner_given -= (push * weights).outer_product(normal)
-            corner_v -= (push * _moved(state, slot, weights)).outer_product(normal)
-        else:
-            corner_v -= (push * weights * corner_m).outer_product(normal)
+        corner_v -= (push * weights * corner_m).outer_product(normal)
 
     friction_impulse = soft.slot_friction_impulse[slot]
     # Where nothing presses any more, friction takes back what it gave in an earlier sweep.
@@ -177,36 +122,21 @@ def _solve_contact(state: ti.template(), soft: ti.template(), slot, p, corners, 
             relative = v - corner_v.transpose() @ shares + levers.transpose() @ (corner_v @ face)
             sliding = relative - relative.dot(normal) * normal
             tilt = levers @ (sliding / ti.max(sliding.norm(), 1e-30))
-            total = m + _mobility(state, slot, shares, tilt)
+            total = m + corner_m.dot(shares * shares + tilt * tilt)
             wanted = friction_impulse - sliding / ti.max(total, 1e-30)
             wanted *= ti.min(1.0, friction * normal_impulse / ti.max(wanted.norm(), 1e-30))
             soft.slot_friction_impulse[slot] = wanted
             change = wanted - friction_impulse
         if is_finite(change):
             v += m * change
-            if ti.static(state.capacity.contact.hull):
-                given += change
-                corner_given -= shares.outer_product(change) - (levers @ change).outer_product(face)
-            else:
-                taken = (corner_m * shares).outer_product(change)
-                corner_v -= taken - (corner_m * (levers @ change)).outer_product(face)
+            taken = (corner_m * shares).outer_product(change)
+            corner_v -= taken - (corner_m * (levers @ change)).outer_product(face)
 
-    if ti.static(state.capacity.contact.hull):
-        push_point(state, p, given)
+    if moves[0] > 0.0:
+        state.particle_velocity[p] = v
+    if moves[1] > 0.0:
         for i in ti.static(range(3)):
-            push_point(
-                state,
-                corners[i],
-                ti.Vector([corner_given[i, 0], corner_given[i, 1], corner_given[i, 2]]),
-            )
-    else:
-        if moves[0] > 0.0:
-            state.particle_velocity[p] = v
-        if moves[1] > 0.0:
-            for i in ti.static(range(3)):
-                state.particle_velocity[corners[i]] = ti.Vector(
-                    [corner_v[i, 0], corner_v[i, 1], corner_v[i, 2]]
-                )
+            state.particle_velocity[corners[i]] = ti.Vector([corner_v[i, 0], corner_v[i, 1], corner_v[i, 2]])
     return int(normal_impulse > 0.0)
 
 
@@ -216,17 +146,21 @@ def _solve_slot(state: ti.template(), slot, h, sweep):
     p, corners = state.soft.slot_vertices[slot].x, state.soft.slot_vertices[slot].yzw
     mine = state.soft.body_surface[state.particle_body[p]]
     theirs = state.soft.body_surface[state.particle_body[corners[0]]]
-    if (
+    if ti.static(state.capacity.contact.hull):
+        friction = ti.sqrt(mine.x * theirs.x)
+        if solve_points(state, state.soft, slot, p, corners, friction, h, int(sweep == 0)) == 1:
+            mark_points(state, p, corners)
+    elif (
         _solve_contact(state, state.soft, slot, p, corners, ti.sqrt(mine.x * theirs.x), h, int(sweep == 0))
         == 1
     ):
-        mark_touched(state, p)
+        state.contact.particle_touches[p] = 1
         for i in ti.static(range(3)):
-            mark_touched(state, corners[i])
+            state.contact.particle_touches[corners[i]] = 1
     depth = -state.soft.slot_gap[slot] - SLACK * 0.5 * (mine.y + theirs.y)
     if sweep == SWEEPS and depth > 0.0:
         if ti.static(state.capacity.contact.hull):
-            _push_points_apart(state, p, corners, slot, depth)
+            push_points_apart(state, p, corners, slot, PUSH_OUT * depth)
         else:
             _push_apart(state, p, corners, slot, depth)
 

@@ -44,7 +44,7 @@ def inv_mass_at(state: ti.template(), p):
 
 
 @ti.real_func
-def _shared_mobility(state: ti.template(), p: ti.i32, q: ti.i32) -> ti.f32:
+def shared_mobility(state: ti.template(), p: ti.i32, q: ti.i32) -> ti.f32:
     """How fast an impulse of 1 N s at one point makes another of the same body [m/s]."""
     mobility = ti.cast(0.0, ti.f32)
     mine, theirs = state.hull.carriers[p], state.hull.carriers[q]
@@ -54,16 +54,6 @@ def _shared_mobility(state: ti.template(), p: ti.i32, q: ti.i32) -> ti.f32:
             if mine[i] == theirs[k]:
                 mobility += own_weights[i] * their_weights[k] * inv_mass_of(state, mine[i])
     return mobility
-
-
-@ti.func
-def note_mobility(state: ti.template(), slot, corners):
-    """Of a contact's triangle: its corners may hang on the same particles."""
-    for i in ti.static(range(3)):
-        for k in ti.static(range(i + 1)):
-            mobility = _shared_mobility(state, corners[i], corners[k])
-            state.hull.slot_mobility[slot][i, k] = mobility
-            state.hull.slot_mobility[slot][k, i] = mobility
 
 
 @ti.func

@@ -25,10 +25,17 @@ def _find_boxes(state: ti.template(), body_count, dt):
         if state.body_status[body] == ASLEEP:
             continue  # in the box that it fell asleep in
         outer = state.touching.body_outer[body]
-        first_x, first_v = motion_of(state, state.touching.outer_particle[outer[0]])
-        lower, upper, slow, fast = first_x, first_x, first_v, first_v
+        p = state.touching.outer_particle[outer[0]]
+        lower, upper = state.particle_position[p], state.particle_position[p]
+        slow, fast = state.particle_velocity[p], state.particle_velocity[p]
+        if ti.static(state.capacity.contact.hull):
+            lower, slow = motion_of(state, p)
+            upper, fast = lower, slow
         for k in range(outer[0], outer[1]):
-            x, v = motion_of(state, state.touching.outer_particle[k])
+            p = state.touching.outer_particle[k]
+            x, v = state.particle_position[p], state.particle_velocity[p]
+            if ti.static(state.capacity.contact.hull):
+                x, v = motion_of(state, p)
             lower, upper = ti.min(lower, x, x + dt * v), ti.max(upper, x, x + dt * v)
             slow, fast = ti.min(slow, v), ti.max(fast, v)
         surface = state.soft.body_surface[body]
