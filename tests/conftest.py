@@ -29,7 +29,7 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 SECONDS = {
     "contact/distances/": (9, 0),
     "contact/shapes/": (3, 0),
-    "contact/": (114, 187),
+    "contact/": (114, 400),
     "solver/test_sleep": (3, 0),
     "solver/test_islands": (6, 0),
     "solver/test_repeated_steps": (2, 0),
@@ -77,6 +77,7 @@ SOAK = (
         "solver/integrators/test_implicit_euler",
         "solver/integrators/test_motion",
         "contact/test_implicit_contact",
+        "contact/test_hulls",
     ),
     *("solver/test_threads", "solver/test_long_steps", "solver/test_gpu_launch"),
     *("solver/test_damping_ratio", "world/test_bodies", "world/test_pools", "world/test_finite_readout"),

@@ -12,18 +12,21 @@ from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies.calibration import calibrated
 from taichi_soft.bodies.contact import DEFAULT_CONTACT, THIN, Contact
-from taichi_soft.bodies.description import BodyDescription, require_size
+from taichi_soft.bodies.description import BodyDescription, outer_vertices, require_size
 from taichi_soft.bodies.first_mode import first_frequency
-from taichi_soft.bodies.layout import BodyArrays, arrange, room_of
+from taichi_soft.bodies.hull import BoundHull, bind
+from taichi_soft.bodies.layout import BodyArrays, HullArrays, arrange, room_of
 from taichi_soft.bodies.plasticity import Plasticity
 from taichi_soft.bodies.short_steps import warn_of_short_steps
 from taichi_soft.bodies.skin import Skin, bound
 from taichi_soft.bodies.stability import StableStep, stable_step
 from taichi_soft.bodies.tearing import Tearing
 from taichi_soft.cages import tetrahedra_of
+from taichi_soft.cages.hull import as_hull
 from taichi_soft.core.checks import as_count, as_indices, as_rotation, as_vector
 from taichi_soft.core.constants import POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.core.errors import MaterialError, MeshError, OptionError
+from taichi_soft.core.serialisation import digest_of
 from taichi_soft.core.types import (
     CageMethodName,
     DampingModel,
@@ -76,6 +79,10 @@ class SoftBodyAsset:
         tearing: where it tears by itself, into its spare vertices; None for nowhere. Takes a `Material`.
         skin: what is drawn in place of its surface, as `read_surfaces` takes it: a file, a trimesh.Trimesh or
             Scene. See `Body.render_meshes`.
+        hull: by what it touches others in place of the surface of its tetrahedra: by so many points of its
+            skin, 12 to 20,000, and triangles between them; or by the vertices and triangles of a surface of
+            your own, as `read_surfaces` takes it. None for the surface. See docs/artists-mesh.md. Takes
+            tetrahedra, no spare vertices, and no contact of the body with itself.
         coarser: the same thing of fewer and fewer tetrahedra, as `with_coarser` makes it: levels of detail
             for `Body.set_level`. Takes no spare vertices and no plasticity.
     Raises: MeshError, MaterialError or OptionError for bad input.
@@ -94,6 +101,7 @@ class SoftBodyAsset:
     spare_vertices: int = 0
     tearing: Tearing | None = None
     skin: Any = ()
+    hull: Any = None
     coarser: tuple[SoftBodyAsset, ...] = ()
     description: BodyDescription = field(init=False)
 
@@ -124,6 +132,9 @@ class SoftBodyAsset:
         object.__setattr__(self, "pinned", pinned)
         object.__setattr__(self, "description", description)
         object.__setattr__(self, "skin", surfaces)
+        object.__setattr__(self, "hull", as_hull(self.hull, surfaces))
+        if self.hull is not None:
+            self._require_hull()
         object.__setattr__(self, "coarser", self._checked_levels())
 
     def _checked_levels(self) -> tuple[SoftBodyAsset, ...]:
@@ -138,6 +149,8 @@ class SoftBodyAsset:
                 raise OptionError(f"level {level} must be without levels, cuts and plasticity of its own")
             if each.description.model != self.description.model or each.contact != self.contact:
                 raise OptionError(f"level {level} must have the law and the contact of the finest")
+            if each.hull is not self.hull and digest_of(each.hull) != digest_of(self.hull):
+                raise OptionError(f"level {level} must have the hull of the finest")
             if self.description.bonds is not None:
                 raise OptionError(f"law {self.law!r} has no levels of detail: it looks at edges")
             self._require_coarser(level, each)
@@ -185,7 +198,7 @@ class SoftBodyAsset:
             raise MaterialError("levels of detail take a Material with one number for each constant")
         plain = {
             name: getattr(self, name)
-            for name in ("law", "strain", "flips", "damping_model", "contact", "skin")
+            for name in ("law", "strain", "flips", "damping_model", "contact", "skin", "hull")
         }
         levels = []
         for mesh in meshes:
@@ -196,6 +209,14 @@ class SoftBodyAsset:
             bare = SoftBodyAsset(mesh, material, pinned=pinned, **plain)
             levels.append(replace(bare, material=calibrated(self.description, bare.description)))
         return replace(self, coarser=tuple(levels))
+
+    def _require_hull(self) -> None:
+        if not isinstance(self.mesh, TetMesh):
+            raise MeshError(f"a hull needs tetrahedra to hang on, and {self.mesh!r} has none")
+        if self.spare_vertices:
+            raise OptionError("an asset that is cut or tears takes no hull: it cannot follow a cut")
+        if self.contact.itself:
+            raise OptionError("contact of a body with itself takes no hull: leave out the one or the other")
 
     def _require_tears(self, model: ElementModel) -> None:
         if not isinstance(self.tearing, Tearing):
@@ -283,9 +304,28 @@ class SoftBodyAsset:
         return bound(self.mesh, self.skin)
 
     @cached_property
+    def bound_hull(self) -> BoundHull | None:
+        """Its hull, bound to its tetrahedra."""
+        if self.hull is None:
+            return None
+        assert isinstance(self.mesh, TetMesh)
+        return bind(self.mesh, self.hull)
+
+    @cached_property
     def arrays(self) -> BodyArrays:
         """The body in the order in which the kernels walk it: slow to make, and made once."""
-        return arrange(self.description)
+        arrays, hull = arrange(self.description), self.bound_hull
+        if hull is None:
+            return arrays
+        carriers = arrays.rank[hull.vertices]
+        return replace(arrays, hull=HullArrays(carriers, hull.weights, hull.triangles))
+
+    def touching_points(self, x: Floats) -> Floats:
+        """Where the points are by which it touches colliders, of vertices at `x` (n, 3) [m]."""
+        hull = self.bound_hull
+        if hull is None:
+            return x[outer_vertices(self.mesh)]
+        return np.asarray(np.einsum("hc,hcx->hx", hull.weights, x[hull.vertices]))
 
     @cached_property
     def stable_step(self) -> StableStep:
@@ -314,10 +354,13 @@ class SoftBodyAsset:
 
     @cached_property
     def surface_row(self) -> tuple[float, float, float]:
-        """Friction, thickness [m] and mean edge [m] of the surface, or of all where it has no triangles."""
+        """Friction, thickness [m] and mean edge [m] of what touches: the hull, or the surface, or all edges
+        where there are no triangles."""
         corners = self.mesh.surface if len(self.mesh.surface) else self.mesh.edges
         ends = self.mesh.vertices[np.concatenate([corners[:, :2], corners[:, -2:]])]
         edge = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).mean())
+        if self.bound_hull is not None:
+            edge = self.bound_hull.mean_edge
         thickness = self.contact.thickness
         return self.contact.friction, THIN * edge if thickness is None else thickness, edge
 
@@ -374,7 +417,7 @@ class SoftBodyAsset:
     def _require_place(self, x: Floats, origin: Floats, floor: float | None) -> None:
         if not np.abs(x).max() < POSITION_LIMIT:
             raise OptionError(f"position puts the body beyond {POSITION_LIMIT:g} m: stay nearer the origin")
-        lowest, highest = float(x[:, 2].min()), float(x[:, 2].max())
+        lowest, highest = float(self.touching_points(x)[:, 2].min()), float(x[:, 2].max())
         if floor is not None and lowest < floor - 1e-3 * (highest - lowest):
             depth = floor - lowest
             raise OptionError(

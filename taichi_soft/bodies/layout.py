@@ -36,6 +36,15 @@ class BondArrays:
 
 
 @dataclass(frozen=True)
+class HullArrays:
+    """What a body touches others by in place of its surface: see `bodies.hull`."""
+
+    vertices: Ints  # (h, 4) particles of this body that carry each point
+    weights: Floats  # (h, 4)
+    triangles: Ints  # (t, 3) of the points
+
+
+@dataclass(frozen=True)
 class BodyArrays:
     """One body in the order in which the kernels walk it."""
 
@@ -58,6 +67,7 @@ class BodyArrays:
     pinned: Ints  # particles that do not move
     triangles: Ints  # (f, 3) of the surface, in the caller's order
     outer: Ints  # particles that can touch something: those of the surface, or all where there is no inside
+    hull: HullArrays | None = None  # what touches in their place
 
     @property
     def expansion_modulus(self) -> Floats:
@@ -145,12 +155,19 @@ class Scene:
 def room_of(body: BodyArrays, spare_vertices: int) -> tuple[int, int, int, int, int]:
     """Rows of particles, edges, blocks of edges, triangles and outer particles for a body and its copies.
 
+    The points of a hull come behind its particles. Its triangles and points have rows of their own elsewhere,
+    with the numbers of those of the surface.
+
     A cut has some three edges, and on either side two triangles, for each vertex that it goes through, and up
     to twice as many where it is small and ends inside (Euler's formula).
     """
     if spare_vertices == 0:
         exact = body.mass, body.edge_vertices, body.edge_blocks, body.triangles, body.outer
         particles, edges, blocks, triangles, outer = (len(rows) for rows in exact)
+        if body.hull is not None:
+            points = len(body.hull.vertices)
+            particles += points
+            triangles, outer = max(triangles, len(body.hull.triangles)), max(outer, points)
         return particles, edges, blocks, triangles, outer
     particles = len(body.mass) + spare_vertices
     edges = len(body.edge_vertices) + 6 * spare_vertices

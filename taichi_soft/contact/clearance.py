@@ -52,7 +52,13 @@ def require_clear(
 
 
 def free_points(asset: SoftBodyAsset, rows: NDArray[np.float32]) -> NDArray[np.float64]:
-    """Outer vertices that are not pinned, (n, 3) [m], of a body that begins as `rows` (n, 8) say."""
+    """Outer vertices, or points of its hull, that are not pinned, (n, 3) [m], of a body that begins as `rows`
+    (n, 8) say."""
+    hull = asset.bound_hull
+    if hull is not None:
+        moves = (rows[hull.vertices, 6] > 0.0).any(axis=1)
+        points: NDArray[np.float64] = asset.touching_points(rows[:, :3].astype(np.float64))[moves]
+        return points
     outer = outer_vertices(asset.mesh)
     free = outer[rows[outer, 6] > 0.0]
     return rows[free, :3].astype(np.float64)

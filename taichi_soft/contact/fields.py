@@ -31,6 +31,7 @@ class ContactCapacity:
     colliders: int = 0
     samples: int = 0  # of the grids of height fields and meshes
     soft: bool = False  # whether bodies touch each other
+    hull: bool = False  # whether any of them does so by a hull
 
 
 @holds_fields

@@ -22,10 +22,17 @@ from taichi_soft.bodies.layout import BodyArrays, arrange_part, blocks_of
 from taichi_soft.bodies.soft_body import Context, SoftBody, bars_to_cut, context_of, record_of, redescribe
 from taichi_soft.bodies.status import ABSENT, ACTIVE
 from taichi_soft.bodies.tet_constants import write_tet_constants
+from taichi_soft.contact.hull_fields import touching_rows
 from taichi_soft.control.attachments import share_attachments
 from taichi_soft.core.checks import as_array, as_vector
 from taichi_soft.core.errors import OptionError, StateError
-from taichi_soft.fracture.kernels.topology import MOTION_WIDTH, read_motion, write_body, write_kind
+from taichi_soft.fracture.kernels.topology import (
+    MOTION_WIDTH,
+    read_motion,
+    write_body,
+    write_kind,
+    write_touching,
+)
 from taichi_soft.meshing import TetMesh
 from taichi_soft.meshing.splitting import InnerFaces, loose_parts, split_vertices
 
@@ -274,6 +281,8 @@ def write_slot(
         arrays.outer,
     )
     write_tet_constants(state, context.layout.ranges[slot].blocks[0], arrays)
+    if state.capacity.contact.hull:  # type: ignore[attr-defined]
+        write_touching(state, slot, *touching_rows(arrays, context.layout.ranges[slot]))
 
 
 def _real_blocks(rows: NDArray[Any], width: int) -> NDArray[np.float32]:

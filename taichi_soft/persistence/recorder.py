@@ -215,6 +215,7 @@ def _asset_options(asset: SoftBodyAsset) -> dict[str, Any]:
         "contact": as_plain(asset.contact),
         "plasticity": as_plain(asset.plasticity),
         "tearing": as_plain(asset.tearing),
+        "hull": None if asset.hull is None else plain_of(asset.hull),
         "coarser": [_asset_options(each) for each in asset.coarser],
         **{name: as_plain(getattr(asset, name)) for name in names},
     }

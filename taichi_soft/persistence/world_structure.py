@@ -50,6 +50,7 @@ def asset_digest(asset: SoftBodyAsset) -> str:
     flow = None if asset.plasticity is None else [float(each) for each in asset.plasticity.row]
     tear = None if asset.tearing is None else [float(asset.tearing.stress), asset.tearing.most]
     contact += [flow, asset.spare_vertices, tear, [asset_digest(each) for each in asset.coarser]]
+    contact += [] if asset.hull is None else [digest_of(asset.hull)]
     content = [digest_of(described.mesh), digest_of(described.material), described.pinned.tolist()]
     return blake2b(to_json([as_plain(parts), content, contact]), digest_size=8).hexdigest()
 

@@ -89,8 +89,8 @@ def _rebuilt(made_of: dict[str, Any]) -> tuple[World, dict[str, Any]]:
 def _asset(options: dict[str, Any]) -> SoftBodyAsset:
     plain = dict(options)
     mesh, material = from_plain(plain.pop("mesh")), from_plain(plain.pop("material"))
-    for name in ("contact", "plasticity", "tearing"):
-        plain[name] = from_plain(plain[name])
+    for name in ("contact", "plasticity", "tearing", "hull"):
+        plain[name] = from_plain(plain.get(name))
     coarser = tuple(_asset(each) for each in plain.pop("coarser"))
     return SoftBodyAsset(mesh, material, coarser=coarser, **plain)
 

@@ -177,9 +177,13 @@ class Simulation:
                 self._is_still = False
 
     def box_of(self, body: SoftBody) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Corners of a box round a body and its skin, as it is now [m]."""
+        """Corners of a box round a body and what it touches others by, as it is now [m]."""
         lower, upper = body.aabb()
-        thickness = present_asset(body).surface_row[1]
+        asset = present_asset(body)
+        if asset.hull is not None:
+            points = asset.touching_points(body.positions().astype(np.float64))
+            lower, upper = np.minimum(lower, points.min(axis=0)), np.maximum(upper, points.max(axis=0))
+        thickness = asset.surface_row[1]
         return lower - thickness, upper + thickness
 
     def read(self, slot: int, kernel: Callable[..., Any], *arguments: Any) -> Any:

@@ -10,6 +10,7 @@ from taichi_soft.bodies.capacity import BodyCapacity
 from taichi_soft.bodies.fields import BodyFields
 from taichi_soft.bodies.layout import Scene
 from taichi_soft.contact.fields import ContactCapacity, ContactFields, SoftContactFields
+from taichi_soft.contact.hull_fields import HullFields
 from taichi_soft.control.kernels.grabs import GrabFields
 from taichi_soft.control.kernels.joints import JointFields
 from taichi_soft.control.kernels.motors import MotorFields
@@ -50,9 +51,16 @@ class State(BodyFields):
                 self.particle_hold = ti.Vector.field(4, self.real, n)
         if capacity.contact.soft:
             self.soft = SoftContactFields(n, bodies, capacity.outer, capacity.triangles)
+        if capacity.contact.hull:
+            self.hull = HullFields(n, bodies, capacity.outer, capacity.triangles, soft=capacity.contact.soft)
         self.progress = Progress.field(shape=bodies)  # type: ignore[attr-defined]  # of each island
         if capacity.has_contact:
             self.jobs = JobFields(bodies)
+
+    @property
+    def touching(self) -> Any:
+        """Where the fields are that say what of each body touches others."""
+        return self.hull if self.capacity.contact.hull else self
 
     @property
     def carried(self) -> dict[str, list[list[Any]]]:
@@ -89,6 +97,8 @@ class State(BodyFields):
         contact.island_count[None] = count
         fill(contact.island_first, np.arange(count + 1))
         fill(contact.island_body, np.arange(count))
+        if self.capacity.contact.hull:
+            self.hull.load(self.loader, scene)
         if self.capacity.contact.soft:
             fill(self.soft.sweep_order, np.arange(count))
             fill(self.soft.slot_count, np.zeros(0))

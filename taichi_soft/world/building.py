@@ -51,7 +51,10 @@ def build(context: WorldContext) -> Simulation:
     device = init()
     context.built_with = [digest_of(handle.shape) for handle in colliders.all_handles]
     has_contact = (
-        contact.soft or contact.sleep_speed > 0.0 or len(colliders.handles) + contact.collider_room > 0
+        contact.soft
+        or contact.sleep_speed > 0.0
+        or len(colliders.handles) + contact.collider_room > 0
+        or _has_hulls(context)
     )
     if has_contact:
         _add_floor(context)
@@ -115,6 +118,11 @@ def _add_floor(context: WorldContext) -> None:
         raise OptionError("schedule 'flat' has no colliders: it takes 'per_body' or 'auto'")
     if settings.integrator is Integrator.EXPLICIT_EULER:
         raise OptionError("integrator 'explicit_euler' has no colliders: any other has")
+    if settings.is_implicit and _has_hulls(context):
+        raise OptionError(
+            "integrator 'implicit_euler' takes no hulls, it holds vertices: take 'leapfrog', or assets "
+            "without hull"
+        )
     if settings.floor is not None:
         floor = context.floor_collider = context.colliders.add(
             PlaneShape(),
@@ -145,6 +153,7 @@ def _capacity(context: WorldContext, settings: Settings, has_contact: bool) -> C
     if has_contact:
         chosen = context.contact
         contact = context.colliders.capacity(chosen.collider_room, chosen.sample_room, soft=chosen.soft)
+        contact = replace(contact, hull=_has_hulls(context))
     return Capacity.of(
         context.layout,
         parallel=settings.schedule is Schedule.FLAT,
@@ -164,6 +173,10 @@ def _program(context: WorldContext, settings: Settings, device: Device, has_cont
         _is_plastic(context),
         device.threads,
     )
+
+
+def _has_hulls(context: WorldContext) -> bool:
+    return any(asset.hull is not None for asset in context.slots.kinds)
 
 
 def _is_plastic(context: WorldContext) -> bool:

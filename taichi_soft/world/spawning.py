@@ -12,6 +12,7 @@ from taichi_soft.contact.clearance import free_points, require_clear
 from taichi_soft.control.materials import set_material
 from taichi_soft.core.checks import as_count
 from taichi_soft.core.errors import OptionError, StateError
+from taichi_soft.core.serialisation import digest_of
 from taichi_soft.fracture.cutting import refill_slot
 from taichi_soft.fracture.tearing import Tears
 from taichi_soft.solver.context import WorldContext
@@ -62,6 +63,7 @@ def _content(asset: SoftBodyAsset) -> tuple[Any, ...]:
         asset.plasticity,
         asset.spare_vertices,
         asset.tearing,
+        None if asset.hull is None else digest_of(asset.hull),
         *(_content(each) for each in asset.coarser),
     )
 

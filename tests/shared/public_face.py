@@ -657,6 +657,8 @@ MAKERS: dict[Any, dict[str, Kind]] = {
         "spare_vertices": choice(4, **NOT_COUNTS), "tearing": choice(None, number=1, text="soft"),
         "skin": choice((), none=None, number=1, text="no such file.obj", list=["virial"], flat=np.zeros((3, 3)), empty=([], []),
                        nan=(BLOCK.vertices * NAN, BLOCK.surface), far=(BLOCK.vertices, BLOCK.surface + 99)),
+        "hull": choice(None, number=1, real=0.5, nan=NAN, text="no such file.obj", list=["virial"], object=object(),
+                       flat=np.zeros((3, 3)), empty=([], []), far=(BLOCK.vertices, BLOCK.surface + 99)),
         "coarser": choice((), none=None, number=1, mesh=(BLOCK,), text="coarse"),
     },
     Contact: {

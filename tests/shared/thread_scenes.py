@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import trimesh
 
 ROOT = Path(__file__).parents[2]
 if __name__ == "__main__":
@@ -19,7 +20,7 @@ if __name__ == "__main__":
 # ruff: noqa: E402
 import random_play
 
-from taichi_soft import Contact, Material, SpringMaterial, World, box, cloth, init, sphere
+from taichi_soft import Contact, Material, SoftBodyAsset, SpringMaterial, World, box, cloth, init, sphere
 from taichi_soft.bodies.render_mesh import FEWEST_SHARED
 
 CUBE = box(cells=(2, 2, 2))
@@ -149,6 +150,20 @@ def played():
     return hashes
 
 
+def hulled():
+    """Balls that touch by their hulls, thrown into a corner, beside a box without a hull."""
+    world = World(soft_contact=True, collider_room=1)
+    ball = trimesh.creation.icosphere(subdivisions=2, radius=0.3)
+    asset = SoftBodyAsset.from_surface(ball, JELLY, cells=5, hull=200)
+    for i in range(4):
+        world.add_body(asset, position=(0.5 * (i % 2), 0.1 * i, 0.35 + 0.55 * i), velocity=(1, 1, 0))
+    world.add_body(box((0.5, 0.5, 0.5), (2, 2, 2)), JELLY, position=(1.0, 0.3, 0.3))
+    world.build()
+    for _ in range(40):
+        world.step(DT)
+    return motion(world)
+
+
 SCENES = {
     "crowd": crowd,
     "heap": heap,
@@ -156,6 +171,7 @@ SCENES = {
     "joined, passing": lambda: joined({"collider_room": 1}),
     "fallen, per body": lambda: fallen("per_body"),
     "fallen, flat": lambda: fallen("flat"),
+    "hulled": hulled,
     "torn": torn,
     "drawn": drawn,
     "played": played,

@@ -15,6 +15,7 @@ from taichi_soft.contact.kernels.candidates import (
     note_lost,
 )
 from taichi_soft.contact.kernels.filters import may_touch
+from taichi_soft.contact.kernels.hull import is_held
 from taichi_soft.contact.kernels.vertex_grid import MOST_EDGES, boxes_overlap, cell_of, fill_grid, find_box
 from taichi_soft.control.kernels.joints import are_joined
 from taichi_soft.core.constants import LANES, ROW_BITS
@@ -63,13 +64,13 @@ def _search_triangle(
     lower = ti.max(state.soft.triangle_lower[triangle] - margin, lowest)
     upper = ti.min(state.soft.triangle_upper[triangle] + margin, highest)
     if (upper - lower).max() <= MOST_EDGES * ti.max(state.soft.body_surface[other].z, 1e-6):
-        corners = state.triangle_vertices[triangle]
+        corners = state.touching.triangle_vertices[triangle]
         a = state.particle_position[corners[0]]
         b = state.particle_position[corners[1]]
         c = state.particle_position[corners[2]]
-        is_held = 0
+        is_joint_there = 0
         for i in ti.static(range(3)):
-            is_held = is_held | state.joints.is_held[corners[i]]
+            is_joint_there = is_joint_there | is_held(state, corners[i])
         low, high = cell_of(lower, lowest, cells, cell), cell_of(upper, lowest, cells, cell)
         for cz in range(low.z, high.z + 1):
             for cy in range(low.y, high.y + 1):
@@ -79,9 +80,9 @@ def _search_triangle(
                     x = state.soft.cell_position[item]
                     wanted = ti.max(lower - x, x - upper).max() <= 0.0
                     k = state.soft.cell_item[item]
-                    p = state.outer_particle[k]
+                    p = state.touching.outer_particle[k]
                     if wanted and is_joined == 1:
-                        wanted = is_held | state.joints.is_held[p] == 0
+                        wanted = is_joint_there | is_held(state, p) == 0
                     if wanted and other == body:
                         edge = state.soft.body_surface[other].z
                         wanted = not _is_self_neighbour(state, p, corners, edge)
@@ -97,12 +98,12 @@ def _search_triangle(
 @ti.func
 def _search_pair(state: ti.template(), body, other, margin, thickness):
     """Vertices of `body` near triangles of `other`, within `margin` [m]; they touch at `thickness` [m]."""
-    outer = state.body_outer[body]
+    outer = state.touching.body_outer[body]
     table = ti.Vector([4 * outer[0] + body, outer[0]])  # first row of the cells and of the items
     count, lowest, highest, cells, cell = fill_grid(state, table, body, other, margin)
     if count > 0:
         is_joined = are_joined(state, body, other)
-        triangles = state.body_triangles[other]
+        triangles = state.touching.body_triangles[other]
         near_lowest, near_highest = lowest - margin, highest + margin
         for block in range((triangles[1] - triangles[0] + LANES - 1) // LANES):
             first = (triangles[0] + block * LANES) & ROW_BITS
@@ -216,3 +217,8 @@ def note_way(state: ti.template(), body: ti.i32, shared: ti.math.vec3):
             state.soft.particle_gone[first + lane] = gone[lane]
         farthest = ti.max(farthest, gone)
     state.soft.body_gone[body] = farthest.max()
+    if ti.static(state.capacity.contact.hull):
+        for p in range(state.hull.body_points[body][0], state.hull.body_points[body][1]):
+            way = (state.particle_position[p] - state.soft.searched_position[p] - shared).norm()
+            state.soft.particle_gone[p] = way
+            state.soft.body_gone[body] = ti.max(state.soft.body_gone[body], way)

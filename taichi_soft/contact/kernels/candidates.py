@@ -14,9 +14,9 @@ def forget_candidates(state: ti.template(), body):
     A search that began without the impulses of the last substep would let all sag a little, once a step, and
     a heap would never cease to tremble.
     """
-    outer = state.body_outer[body]
+    outer = state.touching.body_outer[body]
     for k in range(outer[0], outer[1]):
-        p = state.outer_particle[k]
+        p = state.touching.outer_particle[k]
         state.soft.kept_normal_impulse[p] = 0.0
     first_slot = outer[0] * SLOTS
     for k in range(first_slot, first_slot + state.soft.contact_count[body]):
@@ -76,7 +76,7 @@ def list_candidates(state: ti.template(), body, thickness):
     Args:
         thickness: the greatest at which it touches another body [m].
     """
-    outer = state.body_outer[body]
+    outer = state.touching.body_outer[body]
     total = 0
     for k in range(outer[0], outer[1]):
         total += state.soft.found_count[k]
@@ -89,10 +89,10 @@ def list_candidates(state: ti.template(), body, thickness):
             state.soft.found_triangle[row] = state.soft.found_triangle[last]
             state.soft.found_distance[row] = state.soft.found_distance[last]
             state.soft.found_count[k] = state.soft.found_count[k] - 1
-        p = state.outer_particle[k]
+        p = state.touching.outer_particle[k]
         for row in range(k * FOUND, k * FOUND + state.soft.found_count[k]):
             triangle = state.soft.found_triangle[row]
-            corners = state.triangle_vertices[triangle]
+            corners = state.touching.triangle_vertices[triangle]
             other = state.particle_body[corners[0]]
             mutual = 0.5 * (state.soft.body_surface[body].y + state.soft.body_surface[other].y)
             state.soft.slot_vertices[slot] = ti.Vector([p, corners[0], corners[1], corners[2]])

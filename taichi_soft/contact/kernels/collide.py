@@ -46,11 +46,11 @@ def find_near_colliders(state: ti.template(), body: ti.i32, reach: ti.f32, since
     Args:
         since, left: time since the start of the step, and until its end [s].
     """
-    outer, particles = state.body_outer[body], state.body_particles[body]
-    first = state.particle_position[state.outer_particle[outer[0]]]
+    outer, particles = state.touching.body_outer[body], state.body_particles[body]
+    first = state.particle_position[state.touching.outer_particle[outer[0]]]
     lower, upper = first, first
     for k in range(outer[0], outer[1]):
-        x = state.particle_position[state.outer_particle[k]]
+        x = state.particle_position[state.touching.outer_particle[k]]
         lower, upper = ti.min(lower, x), ti.max(upper, x)
     is_deep = reach > DEEP * state.body_edge[body]
     if is_deep:
@@ -80,8 +80,12 @@ def find_near_colliders(state: ti.template(), body: ti.i32, reach: ti.f32, since
             clearance = _clearance(state, p, row, count, reach, since, left)
             # One that went in unseen is not thrown out at once.
             state.contact.particle_clearance[p] = ti.select(clearance < 0.0, UNSEEN, clearance)
+        if ti.static(state.capacity.contact.hull):
+            if state.hull.body_points[body][0] < state.hull.body_points[body][1]:  # and these do not touch
+                for k in range(state.body_outer[body][0], state.body_outer[body][1]):
+                    state.contact.particle_clearance[state.outer_particle[k]] = UNSEEN
     for k in range(outer[0], outer[1]):
-        p = state.outer_particle[k]
+        p = state.touching.outer_particle[k]
         state.contact.particle_clearance[p] = _clearance(state, p, row, count, reach, since, left)
 
 

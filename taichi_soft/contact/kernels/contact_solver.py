@@ -7,6 +7,12 @@ Impulses are equal and opposite. What is too near already is moved apart without
 
 from taichi_soft.bodies.kernels.particles import inv_mass_of, moves
 from taichi_soft.contact.fields import SLOTS
+from taichi_soft.contact.kernels.hull_solver import (
+    mark_points,
+    note_mobility,
+    push_points_apart,
+    solve_points,
+)
 from taichi_soft.core.math.finite import is_finite
 from taichi_soft.core.runtime import ti
 
@@ -55,6 +61,8 @@ def note_levers(state: ti.template(), slot):
         ]
     )
     state.soft.slot_moves[slot] = ti.Vector([moves(state, p), moves(state, corners[0])])
+    if ti.static(state.capacity.contact.hull):
+        note_mobility(state, slot, p, corners)
 
 
 @ti.func
@@ -138,7 +146,11 @@ def _solve_slot(state: ti.template(), slot, h, sweep):
     p, corners = state.soft.slot_vertices[slot].x, state.soft.slot_vertices[slot].yzw
     mine = state.soft.body_surface[state.particle_body[p]]
     theirs = state.soft.body_surface[state.particle_body[corners[0]]]
-    if (
+    if ti.static(state.capacity.contact.hull):
+        friction = ti.sqrt(mine.x * theirs.x)
+        if solve_points(state, state.soft, slot, p, corners, friction, h, int(sweep == 0)) == 1:
+            mark_points(state, p, corners)
+    elif (
         _solve_contact(state, state.soft, slot, p, corners, ti.sqrt(mine.x * theirs.x), h, int(sweep == 0))
         == 1
     ):
@@ -147,7 +159,10 @@ def _solve_slot(state: ti.template(), slot, h, sweep):
             state.contact.particle_touches[corners[i]] = 1
     depth = -state.soft.slot_gap[slot] - SLACK * 0.5 * (mine.y + theirs.y)
     if sweep == SWEEPS and depth > 0.0:
-        _push_apart(state, p, corners, slot, depth)
+        if ti.static(state.capacity.contact.hull):
+            push_points_apart(state, p, corners, slot, PUSH_OUT * depth)
+        else:
+            _push_apart(state, p, corners, slot, depth)
 
 
 @ti.real_func
@@ -157,6 +172,6 @@ def solve_island(state: ti.template(), island: ti.i32, h: ti.f32):
     for sweep in range(SWEEPS + 1):
         for i in range(first, last):
             body = state.contact.island_body[i]
-            row = state.body_outer[body][0] * SLOTS
+            row = state.touching.body_outer[body][0] * SLOTS
             for k in range(row, row + state.soft.contact_count[body]):
                 _solve_slot(state, state.soft.contact_slot[k], h, sweep)

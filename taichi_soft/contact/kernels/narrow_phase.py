@@ -34,7 +34,7 @@ def _list_near(state: ti.template(), body, given, h):
         given: speed that either may get from others [m/s].
         h: substep [s].
     """
-    first_slot, slots, count = state.body_outer[body][0] * SLOTS, state.soft.slot_count[body], 0
+    first_slot, slots, count = state.touching.body_outer[body][0] * SLOTS, state.soft.slot_count[body], 0
     for block in range((slots + LANES - 1) // LANES):
         first = (first_slot + block * LANES) & ROW_BITS
         is_near = ti.Vector.zero(ti.i32, LANES)
@@ -166,7 +166,7 @@ def _find_near_gaps(state: ti.template(), body, count, given, h):
         count: of the near ones.
         given, h: as in `_list_near`.
     """
-    first_slot = state.body_outer[body][0] * SLOTS
+    first_slot = state.touching.body_outer[body][0] * SLOTS
     vertex, first_row, shallowest, behind = -1, first_slot, ti.cast(-1e30, ti.f32), -1
     for block in range((count + LANES - 1) // LANES):
         first = (first_slot + block * LANES) & ROW_BITS
@@ -217,7 +217,7 @@ def _find_near_gaps(state: ti.template(), body, count, given, h):
 @ti.real_func
 def find_gaps(state: ti.template(), body: ti.i32, given: ti.f32, h: ti.f32):
     """List the contacts of a body's vertices; `given` and `h` as in `_list_near`."""
-    first_slot, before = state.body_outer[body][0] * SLOTS, state.soft.contact_count[body]
+    first_slot, before = state.touching.body_outer[body][0] * SLOTS, state.soft.contact_count[body]
     near = _list_near(state, body, given, h)
     for k in range(first_slot, first_slot + before):
         state.soft.slot_gap[state.soft.contact_slot[k]] = NO_CONTACT

@@ -36,7 +36,7 @@ def add_touches(state: ti.template(), island):
     first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
     for i in range(first, last):
         body = state.contact.island_body[i]
-        first_slot = state.body_outer[body][0] * SLOTS
+        first_slot = state.touching.body_outer[body][0] * SLOTS
         for k in range(first_slot, first_slot + state.soft.contact_count[body]):
             slot = state.soft.contact_slot[k]
             normal_impulse = state.soft.slot_normal_impulse[slot]

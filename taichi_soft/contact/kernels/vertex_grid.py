@@ -32,22 +32,26 @@ def boxes_overlap(lower, upper, other_lower, other_upper):
 @ti.func
 def find_box(state: ti.template(), body):
     """Boxes round the surface of a body, and round each of its triangles, as they are now."""
-    outer = state.body_outer[body]
-    lower = state.particle_position[state.outer_particle[outer[0]]]
+    outer = state.touching.body_outer[body]
+    lower = state.particle_position[state.touching.outer_particle[outer[0]]]
     upper = lower
     for k in range(outer[0], outer[1]):
-        x = state.particle_position[state.outer_particle[k]]
+        x = state.particle_position[state.touching.outer_particle[k]]
         state.soft.found_count[k] = 0
         lower, upper = ti.min(lower, x), ti.max(upper, x)
     particles = state.body_particles[body]
     for p in range(particles[0], particles[1]):
         state.soft.searched_position[p] = state.particle_position[p]
         state.soft.particle_gone[p] = 0.0
+    if ti.static(state.capacity.contact.hull):
+        for p in range(state.hull.body_points[body][0], state.hull.body_points[body][1]):
+            state.soft.searched_position[p] = state.particle_position[p]
+            state.soft.particle_gone[p] = 0.0
     state.contact.body_lower[body] = lower
     state.contact.body_upper[body] = upper
-    triangles = state.body_triangles[body]
+    triangles = state.touching.body_triangles[body]
     for t in range(triangles[0], triangles[1]):
-        corners = state.triangle_vertices[t]
+        corners = state.touching.triangle_vertices[t]
         a = state.particle_position[corners[0]]
         b = state.particle_position[corners[1]]
         c = state.particle_position[corners[2]]
@@ -84,10 +88,10 @@ def fill_grid(state: ti.template(), table, body, other, margin):
     """
     lower, upper = state.contact.body_lower[other] - margin, state.contact.body_upper[other] + margin
     lowest, highest = upper, lower
-    outer = state.body_outer[body]
+    outer = state.touching.body_outer[body]
     count = 0
     for k in range(outer[0], outer[1]):
-        x = state.particle_position[state.outer_particle[k]]
+        x = state.particle_position[state.touching.outer_particle[k]]
         if ti.max(lower - x, x - upper).max() <= 0.0:
             state.soft.item[table[1] + count] = k
             count += 1
@@ -101,7 +105,7 @@ def fill_grid(state: ti.template(), table, body, other, margin):
         for pass_number in range(2):
             for i in range(table[1], table[1] + count):
                 k = state.soft.item[i]
-                x = state.particle_position[state.outer_particle[k]]
+                x = state.particle_position[state.touching.outer_particle[k]]
                 row = table[0] + _row_of(cell_of(x, lowest, cells, cell), cells)
                 # It counts up, and then down again to the first.
                 at = state.soft.cell_first[row] + 1 - 2 * pass_number

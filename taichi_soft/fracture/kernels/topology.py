@@ -133,6 +133,34 @@ def write_body(
 
 
 @ti.kernel
+def write_touching(
+    state: ti.template(),
+    body: ti.i32,
+    outer: ti.types.ndarray(dtype=ti.i32, ndim=1),
+    triangles: ti.types.ndarray(dtype=ti.i32, ndim=2),
+    carriers: ti.types.ndarray(dtype=ti.i32, ndim=2),
+    weights: ti.types.ndarray(dtype=ti.f32, ndim=2),
+):
+    """Write what touches of a body, where any has a hull: see `contact.hull_fields.touching_rows`."""
+    ti.loop_config(serialize=True)
+    for _ in range(1):
+        p0 = state.body_particles[body][0]
+        o0, t0 = state.hull.body_outer[body][0], state.hull.body_triangles[body][0]
+        first = state.hull.body_points[body][0]
+        for i in range(outer.shape[0]):
+            state.hull.outer_particle[o0 + i] = p0 + outer[i]
+        for i in range(triangles.shape[0]):
+            for k in ti.static(range(3)):
+                state.hull.triangle_vertices[t0 + i][k] = p0 + triangles[i, k]
+        for i in range(carriers.shape[0]):
+            for k in ti.static(range(4)):
+                state.hull.carriers[first + i][k] = p0 + carriers[i, k]
+                state.hull.weights[first + i][k] = weights[i, k]
+        state.hull.body_outer[body] = ti.Vector([o0, o0 + outer.shape[0]])
+        state.hull.body_triangles[body] = ti.Vector([t0, t0 + triangles.shape[0]])
+
+
+@ti.kernel
 def write_kind(state: ti.template(), body: ti.i32, row: ti.types.ndarray(dtype=ti.f32, ndim=1)):
     """Write `SoftBodyAsset.surface_row`, the speed of sound, and `SoftBodyAsset.vibration_row` of a body."""
     state.body_edge[body] = row[2]

@@ -10,6 +10,7 @@ from taichi_soft.bodies.kernels.particles import particle_is_sound, remember_par
 from taichi_soft.bodies.status import ABSENT, ACTIVE, FEELS_REACTION, FROZEN
 from taichi_soft.contact.kernels.candidates import forget_candidates
 from taichi_soft.contact.kernels.collide import forget_contacts
+from taichi_soft.contact.kernels.hull import place_points
 from taichi_soft.contact.kernels.rebound import begin_rebounds, take_back_rebounds
 from taichi_soft.contact.kernels.touches import forget_touches
 from taichi_soft.core.runtime import ti
@@ -80,6 +81,10 @@ def _begin_contacts(state: ti.template(), program: ti.template(), body):
             state.contact.body_speed_beside[body] = 0.0
             for p in range(particles[0], particles[1]):
                 state.soft.particle_speed[p] = 0.0
+            if ti.static(state.capacity.contact.hull):
+                place_points(state, body)
+                for p in range(state.hull.body_points[body][0], state.hull.body_points[body][1]):
+                    state.soft.particle_speed[p] = 0.0
 
 
 @ti.func

@@ -11,6 +11,7 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.core.types import Integrator
 from taichi_soft.elements.kernels.internal_forces import clear_forces
 from taichi_soft.solver.kernels.attempts import body_is_sound
+from taichi_soft.solver.kernels.sleep import note_way_of_hulled
 from taichi_soft.solver.kernels.untangling import untangle_body
 
 
@@ -40,6 +41,8 @@ def _end_active_body(state: ti.template(), program: ti.template(), body, substep
         if ti.static(program.has_plasticity):
             flow_body(state, body, substeps * h)
         untangle_body(state, program, body, substeps * h)
+        if ti.static(state.capacity.contact.hull):
+            note_way_of_hulled(state, body, substeps * h)
         if ti.static(program.integrator == Integrator.IMPLICIT_EULER):
             failed = int(state.body_residual[body] > state.solver[None][0])
     elif ti.static(program.has_contact):

@@ -1,6 +1,7 @@
 """Drift among colliders: new positions from velocities, and what colliders in the way make of both."""
 
 from taichi_soft.contact.kernels.collide import collided, find_near_colliders
+from taichi_soft.contact.kernels.hull import collide_points, has_hull, place_points
 from taichi_soft.contact.kernels.rebound import limit_rebounds
 from taichi_soft.core.constants import LANES, ROW_BITS
 from taichi_soft.core.runtime import ti
@@ -73,13 +74,22 @@ def drift_body(state: ti.template(), body: ti.i32, job: Job):
     gone = state.contact.gone[body] + job.fastest * h
     if not (state.contact.reach[body] >= gone):
         # A quarter more than the rest of the step needs at this speed.
+        place_points(state, body)
         find_near_colliders(state, body, 1.25 * job.fastest * job.left + 1e-3, since, job.left)
         gone = job.fastest * h
     state.contact.gone[body] = gone
+    if ti.static(state.capacity.contact.hull):
+        if state.contact.near_count[body] > 0:
+            collide_points(state, body, h, since, gone)
     particles = state.body_particles[body]
     way2 = ti.Vector.zero(state.real, LANES)
     for block in range((particles[1] - particles[0] + LANES - 1) // LANES):
         first = (particles[0] + block * LANES) & ROW_BITS
         way2 = ti.max(way2, _drift_block(state, body, first, particles[1] - first, h, since, gone))
+    place_points(state, body)
     limit_rebounds(state, body, since + h)
-    note_motion(state, body, ti.sqrt(way2.max()) / h)
+    if ti.static(state.capacity.contact.hull):
+        if not has_hull(state, body):  # it is looked at after the step: see `note_way_of_hulled`
+            note_motion(state, body, ti.sqrt(way2.max()) / h)
+    else:
+        note_motion(state, body, ti.sqrt(way2.max()) / h)

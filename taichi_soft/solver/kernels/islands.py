@@ -7,6 +7,7 @@ that stays clear of all others is an island of its own.
 from taichi_soft.bodies.kernels.particles import gravity_on
 from taichi_soft.bodies.status import ABSENT, ASLEEP
 from taichi_soft.contact.kernels.filters import may_touch
+from taichi_soft.contact.kernels.hull import motion_of
 from taichi_soft.control.kernels.joints import MOST_JOINTS, mark_held
 from taichi_soft.core.runtime import ti
 
@@ -23,13 +24,18 @@ def _find_boxes(state: ti.template(), body_count, dt):
             continue
         if state.body_status[body] == ASLEEP:
             continue  # in the box that it fell asleep in
-        outer = state.body_outer[body]
-        p = state.outer_particle[outer[0]]
+        outer = state.touching.body_outer[body]
+        p = state.touching.outer_particle[outer[0]]
         lower, upper = state.particle_position[p], state.particle_position[p]
         slow, fast = state.particle_velocity[p], state.particle_velocity[p]
+        if ti.static(state.capacity.contact.hull):
+            lower, slow = motion_of(state, p)
+            upper, fast = lower, slow
         for k in range(outer[0], outer[1]):
-            p = state.outer_particle[k]
+            p = state.touching.outer_particle[k]
             x, v = state.particle_position[p], state.particle_velocity[p]
+            if ti.static(state.capacity.contact.hull):
+                x, v = motion_of(state, p)
             lower, upper = ti.min(lower, x, x + dt * v), ti.max(upper, x, x + dt * v)
             slow, fast = ti.min(slow, v), ti.max(fast, v)
         surface = state.soft.body_surface[body]

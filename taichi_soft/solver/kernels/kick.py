@@ -4,6 +4,7 @@ Between the two the island takes velocities away, in joints and in contact of bo
 """
 
 from taichi_soft.bodies.kernels.particles import gravity_on
+from taichi_soft.contact.kernels.hull import note_points
 from taichi_soft.core.constants import LANES, ROW_BITS
 from taichi_soft.core.math.tensors import widened
 from taichi_soft.core.runtime import ti
@@ -143,5 +144,8 @@ def kick_among_colliders(
             state, program, body, kick, job.drift_time, job.velocity
         )
         is_stable = int(change <= JOLT * state.body_sound_speed[body])
+        if ti.static(state.capacity.contact.hull):
+            of_points, beside_of_points = note_points(state, body, job.velocity)
+            speed, beside = ti.max(speed, of_points), ti.max(beside, beside_of_points)
     _note_speeds(state, program, body, job.h, speed, beside, mean_beside, is_stable)
     return is_stable

@@ -2,6 +2,7 @@
 
 from taichi_soft.bodies.status import ACTIVE, ASLEEP
 from taichi_soft.contact.fields import NO_COLLIDER
+from taichi_soft.contact.kernels.hull import has_hull, place_points
 from taichi_soft.core.runtime import ti
 
 CALM_TIME = 0.5
@@ -55,6 +56,17 @@ def note_motion(state: ti.template(), body, speed):
 
 
 @ti.func
+def note_way_of_hulled(state: ti.template(), body, dt):
+    """The same of a body with a hull, by its way through a step of `dt` [s]: what carries points in contact
+    goes to and fro from substep to substep, and stays where it is."""
+    if has_hull(state, body):
+        way = ti.cast(0.0, ti.f32)
+        for p in range(state.body_particles[body][0], state.body_particles[body][1]):
+            way = ti.max(way, (state.particle_position[p] - state.prev_position[p]).norm())
+        note_motion(state, body, way / dt)
+
+
+@ti.func
 def _put_to_sleep(state: ti.template(), body):
     """Stop a body where it is, and remember the box round it; when it wakes it counts anew."""
     particles = state.body_particles[body]
@@ -66,6 +78,11 @@ def _put_to_sleep(state: ti.template(), body):
         state.prev_position[p] = x
         state.particle_velocity[p] = ti.Vector.zero(state.real, 3)
         state.prev_velocity[p] = ti.Vector.zero(state.real, 3)
+    if ti.static(state.capacity.contact.hull):
+        place_points(state, body)
+        for p in range(state.hull.body_points[body][0], state.hull.body_points[body][1]):
+            x = state.particle_position[p]
+            lower, upper = ti.min(lower, x), ti.max(upper, x)
     state.contact.body_lower[body], state.contact.body_upper[body] = lower, upper
     state.body_velocity_lag[body] = 0.0
     state.contact.calm[body] = 0.0

@@ -47,6 +47,9 @@ def spawn_body(state: ti.template(), body: ti.i32, rows: ti.types.ndarray(dtype=
             particles = state.body_particles[body]
             for p in range(particles[0], particles[1]):
                 state.contact.particle_touches[p] = 0
+            if ti.static(state.capacity.contact.hull and state.capacity.contact.soft):
+                for p in range(state.hull.body_points[body][0], state.hull.body_points[body][1]):
+                    state.soft.kept_normal_impulse[p] = 0.0
         state.body_status[body] = ACTIVE
 
 

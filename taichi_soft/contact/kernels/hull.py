@@ -1,0 +1,164 @@
+"""Points of hulls: where they are, how fast, and what an impulse at one does to the particles that carry it.
+
+In a world without hulls a particle is its own carrier, and all of this is what it would be without this file.
+"""
+
+from taichi_soft.bodies.kernels.particles import inv_mass_of
+from taichi_soft.contact.distances.sweep import TOUCHING
+from taichi_soft.contact.kernels.collide import collided
+from taichi_soft.core.runtime import ti
+
+STILL = 0.01 * TOUCHING
+"""Way [m] below which a point is where it was: rounding, which would make what rests creep."""
+
+
+LIFT = 0.5
+"""Part of the way to where it has to be that a point is moved at once: its neighbours, which hang on the same
+particles, go with it."""
+
+
+@ti.func
+def motion_of(state: ti.template(), p):
+    """Position [m] and velocity [m/s] of a particle, or of a point as its carriers are now."""
+    x, v = state.particle_position[p], state.particle_velocity[p]
+    if ti.static(state.capacity.contact.hull):
+        who, weights = state.hull.carriers[p], state.hull.weights[p]
+        x, v = ti.Vector.zero(ti.f32, 3), ti.Vector.zero(ti.f32, 3)
+        for k in ti.static(range(4)):
+            x += weights[k] * state.particle_position[who[k]]
+            v += weights[k] * state.particle_velocity[who[k]]
+    return x, v
+
+
+@ti.func
+def inv_mass_at(state: ti.template(), p):
+    """Inverse mass of a particle or a point [1/kg]; zero where the body does not move."""
+    inv_mass = ti.cast(0.0, ti.f32)
+    if ti.static(state.capacity.contact.hull):
+        who, weights = state.hull.carriers[p], state.hull.weights[p]
+        for k in ti.static(range(4)):
+            inv_mass += weights[k] * weights[k] * inv_mass_of(state, who[k])
+    else:
+        inv_mass = inv_mass_of(state, p)
+    return inv_mass
+
+
+@ti.real_func
+def shared_mobility(state: ti.template(), p: ti.i32, q: ti.i32) -> ti.f32:
+    """How fast an impulse of 1 N s at one point makes another of the same body [m/s]."""
+    mobility = ti.cast(0.0, ti.f32)
+    mine, theirs = state.hull.carriers[p], state.hull.carriers[q]
+    own_weights, their_weights = state.hull.weights[p], state.hull.weights[q]
+    for i in range(4):
+        for k in range(4):
+            if mine[i] == theirs[k]:
+                mobility += own_weights[i] * their_weights[k] * inv_mass_of(state, mine[i])
+    return mobility
+
+
+@ti.func
+def push_point(state: ti.template(), p, impulse):
+    """Give a particle, or the carriers of a point, an impulse [N s]. What does not move takes none."""
+    who, weights = state.hull.carriers[p], state.hull.weights[p]
+    for k in range(4):
+        change = weights[k] * inv_mass_of(state, who[k]) * impulse
+        state.particle_velocity[who[k]] = state.particle_velocity[who[k]] + change
+
+
+@ti.func
+def shift_point(state: ti.template(), p, impulse):
+    """Move a particle, or the carriers of a point, as far as an impulse [N s] would within a second."""
+    who, weights = state.hull.carriers[p], state.hull.weights[p]
+    for k in range(4):
+        change = weights[k] * inv_mass_of(state, who[k]) * impulse
+        state.particle_position[who[k]] = state.particle_position[who[k]] + change
+
+
+@ti.func
+def mark_touched(state: ti.template(), p):
+    """Note that something holds a particle, or the carriers of a point."""
+    if ti.static(state.capacity.contact.hull):
+        who, weights = state.hull.carriers[p], state.hull.weights[p]
+        for k in range(4):
+            if weights[k] != 0.0:
+                state.contact.particle_touches[who[k]] = 1
+    else:
+        state.contact.particle_touches[p] = 1
+
+
+@ti.func
+def is_held(state: ti.template(), p):
+    """Whether a joint holds a particle, or any carrier of a point (1)."""
+    held = 0
+    if ti.static(state.capacity.contact.hull):
+        who, weights = state.hull.carriers[p], state.hull.weights[p]
+        for k in range(4):
+            if weights[k] != 0.0:
+                held = held | state.joints.is_held[who[k]]
+    else:
+        held = state.joints.is_held[p]
+    return held
+
+
+@ti.func
+def has_hull(state: ti.template(), body):
+    """Whether a body touches others by a hull."""
+    points = state.hull.body_points[body]
+    return points[0] < points[1]
+
+
+@ti.func
+def place_points(state: ti.template(), body):
+    """Put the points of a hull where their carriers are."""
+    if ti.static(state.capacity.contact.hull):
+        for p in range(state.hull.body_points[body][0], state.hull.body_points[body][1]):
+            x, _ = motion_of(state, p)
+            state.particle_position[p] = x
+
+
+@ti.func
+def note_points(state: ti.template(), body, common):
+    """Put the points of a hull where their carriers are, and note how fast they are.
+
+    Returns: the highest speed [m/s], and the highest beside the `common` velocity.
+    """
+    speed, beside = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32)
+    if ti.static(state.capacity.contact.hull):
+        for p in range(state.hull.body_points[body][0], state.hull.body_points[body][1]):
+            x, v = motion_of(state, p)
+            own = (v - common).norm()
+            state.particle_position[p] = x
+            if ti.static(state.capacity.contact.soft):
+                state.soft.particle_speed[p] = own
+            speed, beside = ti.max(speed, v.norm()), ti.max(beside, own)
+    return speed, beside
+
+
+@ti.func
+def _collide_point(state: ti.template(), body, p, h, since):
+    """What colliders make of the velocities and places of a point's carriers."""
+    inv_mass = inv_mass_at(state, p)
+    if inv_mass > 0.0:
+        x, v = motion_of(state, p)
+        state.particle_inv_mass[p] = inv_mass
+        state.contact.particle_touches[p] = 0
+        x_new, v_new = collided(state, body, p, x, v, h, since)
+        if state.contact.particle_touches[p] == 1:
+            push_point(state, p, (v_new - v) / inv_mass)
+            way = x_new - x - h * v_new
+            if way.norm() > STILL:
+                shift_point(state, p, LIFT / inv_mass * way)
+            mark_touched(state, p)
+
+
+@ti.real_func
+def collide_points(state: ti.template(), body: ti.i32, h: ti.f32, since: ti.f32, gone: ti.f32):
+    """What colliders make of the velocities and places of a body whose hull meets them, before it drifts.
+
+    One point after the other, each as those before have left it. To go through all again would part what has
+    come to rest: no impulse is taken back. Where a point has to go elsewhere than its new velocity takes it,
+    its carriers are moved there as an impulse would move them.
+    """
+    for p in range(state.hull.body_points[body][0], state.hull.body_points[body][1]):
+        if not (state.contact.particle_clearance[p] > gone):
+            _collide_point(state, body, p, h, since)

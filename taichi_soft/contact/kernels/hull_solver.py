@@ -1,0 +1,102 @@
+"""Impulses between points of hulls and triangles between such: what `contact_solver` does for particles.
+
+A particle is a point that carries itself. Corners of one triangle may hang on the same particles: an impulse
+at one moves the others too, by `HullFields.slot_mobility`.
+"""
+
+from taichi_soft.contact.kernels.hull import (
+    inv_mass_at,
+    mark_touched,
+    motion_of,
+    push_point,
+    shared_mobility,
+    shift_point,
+)
+from taichi_soft.core.math.finite import is_finite
+from taichi_soft.core.runtime import ti
+
+
+@ti.func
+def note_mobility(state: ti.template(), slot, p, corners):
+    """Of a contact: inverse mass of its point, and what impulses at the corners make of each other."""
+    state.soft.slot_inv_mass[slot][0] = inv_mass_at(state, p)
+    for i in ti.static(range(3)):
+        for k in ti.static(range(i + 1)):
+            mobility = shared_mobility(state, corners[i], corners[k])
+            state.hull.slot_mobility[slot][i, k] = mobility
+            state.hull.slot_mobility[slot][k, i] = mobility
+
+
+@ti.func
+def solve_points(state: ti.template(), soft: ti.template(), slot, p, corners, friction, h, is_first):
+    """As `contact_solver` solves one contact. Returns: whether the two are pressed together (1)."""
+    normal, weights, shares = soft.slot_normal[slot], soft.slot_weights[slot], soft.slot_shares[slot]
+    face, levers, moves = soft.slot_face[slot], soft.slot_levers[slot], soft.slot_moves[slot]
+    m, mobility = soft.slot_inv_mass[slot][0], state.hull.slot_mobility[slot]
+    _, v = motion_of(state, p)
+    v *= moves[0]
+    corner_v = ti.Matrix.zero(ti.f32, 3, 3)
+    for i in ti.static(range(3)):
+        _, corner = motion_of(state, corners[i])
+        for k in ti.static(range(3)):
+            corner_v[i, k] = moves[1] * corner[k]
+    impulse, corner_impulses = ti.Vector.zero(ti.f32, 3), ti.Matrix.zero(ti.f32, 3, 3)
+
+    normal_impulse = soft.slot_normal_impulse[slot]
+    push = normal_impulse
+    if is_first == 0:
+        allowed = -ti.max(soft.slot_gap[slot], 0.0) / h
+        approach = v.dot(normal) - weights.dot(corner_v @ normal)
+        total = m + weights.dot(mobility @ weights)
+        wanted_impulse = ti.max(normal_impulse + (allowed - approach) / ti.max(total, 1e-30), 0.0)
+        push = wanted_impulse - normal_impulse
+        normal_impulse = wanted_impulse
+        soft.slot_normal_impulse[slot] = normal_impulse
+    if is_finite(push * normal):
+        given = -push * weights.outer_product(normal)
+        impulse += push * normal
+        corner_impulses += given
+        v += m * push * normal
+        corner_v += mobility @ given
+
+    friction_impulse = soft.slot_friction_impulse[slot]
+    if normal_impulse > 0.0 or ti.abs(friction_impulse).max() > 0.0:
+        change = friction_impulse
+        if is_first == 0:
+            relative = v - corner_v.transpose() @ shares + levers.transpose() @ (corner_v @ face)
+            sliding = relative - relative.dot(normal) * normal
+            tilt = levers @ (sliding / ti.max(sliding.norm(), 1e-30))
+            total = m + shares.dot(mobility @ shares) + tilt.dot(mobility @ tilt)
+            wanted = friction_impulse - sliding / ti.max(total, 1e-30)
+            wanted *= ti.min(1.0, friction * normal_impulse / ti.max(wanted.norm(), 1e-30))
+            soft.slot_friction_impulse[slot] = wanted
+            change = wanted - friction_impulse
+        if is_finite(change):
+            impulse += change
+            corner_impulses -= shares.outer_product(change) - (levers @ change).outer_product(face)
+
+    push_point(state, p, impulse)
+    for i in ti.static(range(3)):
+        on_corner = ti.Vector([corner_impulses[i, 0], corner_impulses[i, 1], corner_impulses[i, 2]])
+        push_point(state, corners[i], on_corner)
+    return int(normal_impulse > 0.0)
+
+
+@ti.func
+def push_points_apart(state: ti.template(), p, corners, slot, way):
+    """Move apart what is too near by `way` [m], without giving it a velocity."""
+    normal, weights = state.soft.slot_normal[slot], state.soft.slot_weights[slot]
+    total = state.soft.slot_inv_mass[slot][0] + weights.dot(state.hull.slot_mobility[slot] @ weights)
+    if total > 0.0:
+        impulse = way / total * normal
+        shift_point(state, p, impulse)
+        for i in ti.static(range(3)):
+            shift_point(state, corners[i], -weights[i] * impulse)
+
+
+@ti.func
+def mark_points(state: ti.template(), p, corners):
+    """Note that something holds the carriers of a point and of a triangle's corners."""
+    mark_touched(state, p)
+    for i in ti.static(range(3)):
+        mark_touched(state, corners[i])
