@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property
@@ -41,6 +42,8 @@ from taichi_soft.meshing import BodyMesh, ParticleMesh, TetMesh
 from taichi_soft.meshing.arrays import read_only
 from taichi_soft.meshing.cage_mesh import CageMesh
 from taichi_soft.meshing.surfaces import Up, read_surfaces
+
+_log = logging.getLogger(__name__)
 
 Floats = NDArray[np.float64]
 Floats32 = NDArray[np.float32]
@@ -249,6 +252,7 @@ class SoftBodyAsset:
         cell_size: float | None = None,
         method: CageMethodName = "lattice",
         time_limit: float | None = None,
+        refine: int | None = None,
         up: Up | None = None,
         **options: Any,
     ) -> SoftBodyAsset:
@@ -271,6 +275,10 @@ class SoftBodyAsset:
                 same on every run. "tetgen" (extra `tetgen`) keeps every triangle of a closed one. TetGen's
                 licence is the AGPL: it asks for the source of all that is shipped or served with it.
             time_limit: of such a process, after which it is ended [s]; None takes 120.
+            refine: of "lattice": how often cells are halved, at most, round limbs and sheets that would be
+                left out, thinner than about a sixteenth of a cell: 0 to 3, and 1 if None. Each time halves
+                the substep. What stays left out is drawn, but neither bends nor touches anything. Both is
+                logged, with the `cell_size` that keeps it.
             up: axis that points up in the file; None takes "y" for .glb and .gltf, as their format has it,
                 and "z" for all else.
             options: further arguments of `SoftBodyAsset`. A `skin` is drawn in place of the surface.
@@ -286,12 +294,19 @@ class SoftBodyAsset:
             raise OptionError("cells is empty: give a number, or some numbers for levels of detail")
         meshes = []
         for number in numbers:
-            mesh, cell = tetrahedra_of(
-                surfaces, cells=number, cell_size=cell_size, method=method, time_limit=time_limit
+            made = tetrahedra_of(
+                surfaces,
+                cells=number,
+                cell_size=cell_size,
+                method=method,
+                time_limit=time_limit,
+                refine=refine,
             )
             if method != "lattice":
-                warn_of_short_steps(mesh, cell, method)
-            meshes.append(mesh)
+                warn_of_short_steps(made.mesh, made.cell_size, method)
+            for words in made.told:
+                _log.warning("%s", words)
+            meshes.append(made.mesh)
         asset = cls(meshes[0], material, **{"skin": surfaces, **options})
         return asset.with_coarser(*meshes[1:]) if meshes[1:] else asset
 

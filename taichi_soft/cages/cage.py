@@ -7,29 +7,21 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.cages.cell_size import cell_size_of
 from taichi_soft.cages.connected import parts_of
 from taichi_soft.cages.fitting import caps, fit
+from taichi_soft.cages.graded import GradedLattice
 from taichi_soft.cages.lattice import Lattice
 from taichi_soft.cages.marking import mark, part_count, split_hinges, without_flat
 from taichi_soft.cages.masses import fitted
-from taichi_soft.cages.solid import Solid, solid_of
-from taichi_soft.core.errors import MeshError, OptionError
+from taichi_soft.cages.solid import Solid
+from taichi_soft.cages.thin import Thin
+from taichi_soft.core.errors import OptionError
 from taichi_soft.meshing import TetMesh
 from taichi_soft.meshing.arrays import FloatArray
 from taichi_soft.meshing.cage_mesh import CageMesh, lumped
 from taichi_soft.meshing.locating import Locator
-from taichi_soft.meshing.surfaces import Surface, joined
 
 Ints = NDArray[np.int64]
-
-FINENESS = 8
-"""Voxels along a cube."""
-
-LEAST_FINENESS, MOST_FINENESS = 3, 16
-
-MOST_VOXELS = 1 << 22
-"""Above, voxels are coarser, but for `LEAST_FINENESS`."""
 
 SMALLEST_PART = 1e-3
 """Of the volume: smaller parts are dust."""
@@ -48,12 +40,6 @@ it as hard as they are full, and a light vertex vibrates fast. Stable steps gain
 PEELS = 4
 """Layers of flat tetrahedra that are taken off at most."""
 
-OPEN = 0.5
-"""Of all lines that meet a surface: more that do not leave it again, and it is a sheet."""
-
-FLATTEST = 1e-6
-"""Volume over that of the box round it, below which nothing is enclosed but rounding."""
-
 
 @dataclass(frozen=True, eq=False)
 class Cage:
@@ -62,105 +48,57 @@ class Cage:
     mesh: CageMesh
     solid: Solid
     part: Ints  # (m,), of the solid that each tetrahedron belongs to
+    octave: Ints  # (m,), how often the cells were halved there
+    thin: Thin | None = None  # limbs and sheets that cells as large as asked for leave out
 
 
-def build_cage(
-    surfaces: tuple[Surface, ...], *, cells: int | None = None, cell_size: float | None = None
+def cage_in(
+    lattice: Lattice | GradedLattice, solid: Solid, within: float, kept: NDArray[np.bool_] | None = None
 ) -> Cage:
-    """The cage of a solid that surfaces enclose together. Arguments as of `SoftBodyAsset.from_surface`."""
-    vertices, triangles = joined(surfaces)
-    size = np.ptp(vertices[np.unique(triangles)], axis=0)
-    return lattice_cage(vertices, triangles, cell_size_of(size, cells, cell_size))
-
-
-def lattice_cage(vertices: FloatArray, triangles: Ints, cell_size: float) -> Cage:
-    """A cage of a lattice's tetrahedra.
+    """The cage of a solid in a lattice.
 
     Args:
-        vertices: of the surface, (n, 3) [m].
-        triangles: (m, 3).
-        cell_size: edge of the lattice's cubes [m].
-    Raises: MeshError for a surface that encloses nothing, or is open for the most part.
+        within: volume by the divergence theorem [m^3].
+        kept: voxels that are not to be lost, of the shape of the solid's.
+    Raises: OptionError where it falls into pieces.
     """
-    used = vertices[np.unique(triangles)]
-    low, high = used.min(axis=0), used.max(axis=0)
-    solid = solid_of(vertices, triangles, _voxel_edge(vertices[triangles], cell_size))
-    within = abs(volume_within(vertices[triangles]))
-    _require_solid(solid, high - low, within, cell_size)
     points, volumes = solid.quadrature()
     if solid.is_simple:
         volumes *= within / volumes.sum()
-    part_of_point = parts_of(solid.fill)[solid.fill > 0.0]
-    lattice = Lattice.round(low, high, cell_size)
-    places, corners, parts, offset = [], [], [], 0
+    is_full = solid.fill > 0.0
+    part_of_point = parts_of(solid.fill)[is_full]
+    is_kept = None if kept is None else kept[is_full]
+    places, corners, parts, octaves, offset = [], [], [], [], 0
     tet_count = 0
     start = np.full(len(points), -1)
     large = np.flatnonzero(np.bincount(part_of_point, volumes) >= SMALLEST_PART * volumes.sum())
     for number, part in enumerate(large):
         mine = part_of_point == part
-        numbers = mark(lattice, points[mine], volumes[mine])
+        numbers = mark(lattice, points[mine], volumes[mine], None if is_kept is None else is_kept[mine])
         numbers = _peeled(lattice, numbers, solid)
         tets, lattice_vertices = split_hinges(lattice.corners_of(numbers))
         if part_count(tets) > 1:
             raise OptionError(
-                f"cells of {cell_size:.4g} m are too large: parts of the surface are so thin that the cage "
-                f"falls into {part_count(tets)} pieces. Take cell_size={0.5 * cell_size:.3g} or less"
+                f"cells of {lattice.edge:.4g} m are too large: parts of the surface are so thin that the "
+                f"cage falls into {part_count(tets)} pieces. Take cell_size={0.5 * lattice.edge:.3g} or less"
             )
         at = lattice.points_of(lattice_vertices)
-        places.append(fit(at, tets, solid, cell_size))
+        octave = lattice.octaves_of(numbers)
+        places.append(fit(at, tets, octave, solid, lattice.edge))
         corners.append(tets + offset)
         parts.append(np.full(len(tets), number))
+        octaves.append(octave)
         at_points = lattice.tet_at(points[mine])
         found = np.minimum(np.searchsorted(numbers, at_points), len(numbers) - 1)
         start[mine] = np.where(numbers[found] == at_points, found + tet_count, -1)
         offset, tet_count = offset + len(at), tet_count + len(tets)
-    kept = np.isin(part_of_point, large)
+    in_large = np.isin(part_of_point, large)
     mesh = TetMesh(np.concatenate(places), np.concatenate(corners))
-    return _filled(mesh, np.concatenate(parts), solid, points[kept], volumes[kept], start[kept])
+    filled = _filled(mesh, solid, points[in_large], volumes[in_large], start[in_large])
+    return Cage(filled, solid, np.concatenate(parts), np.concatenate(octaves))
 
 
-def volume_within(corners: FloatArray) -> float:
-    """Of a closed surface of triangles (m, 3, 3), by the divergence theorem [m^3]."""
-    return float(np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))) / 6.0
-
-
-def _voxel_edge(corners: FloatArray, cell_size: float) -> float:
-    """Of voxels in which the solid can be told [m].
-
-    A sheet is as thick as twice its volume over its surface: it is to have two voxels across.
-    """
-    doubled = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    area = 0.5 * float(np.linalg.norm(doubled, axis=1).sum())
-    if area == 0.0:
-        raise MeshError("the surface has no area: it encloses nothing")
-    edge = min(cell_size / FINENESS, max(abs(volume_within(corners)) / area, cell_size / MOST_FINENESS))
-    size = np.ptp(corners.reshape(-1, 3), axis=0)
-    while edge < cell_size / LEAST_FINENESS and np.prod(size / edge + 3.0) > MOST_VOXELS:
-        edge *= 1.1
-    return min(edge, cell_size / LEAST_FINENESS)
-
-
-def _require_solid(solid: Solid, size: FloatArray, within: float, cell_size: float) -> None:
-    """Raises: MeshError where there is nothing to carry, OptionError where it is lost between the voxels.
-
-    Args: within: volume by the divergence theorem [m^3].
-    """
-    if solid.open_share > OPEN:
-        raise MeshError(
-            f"the surface is open: {100 * solid.open_share:.3g} % of the lines through it do not come out "
-            "again. Give a sheet a thickness (Blender: Solidify), or make a cloth of it by ParticleMesh"
-        )
-    least = FLATTEST * float(np.prod(size))
-    if solid.is_simple and within > least and solid.volume < 0.5 * within:
-        raise OptionError(
-            f"cells of {cell_size:.4g} m are too large: the solid of {within:.3g} m^3 is too thin for them. "
-            f"Take cell_size={0.5 * cell_size:.3g} or less"
-        )
-    if solid.volume <= FLATTEST * float(np.prod(np.maximum(size, solid.spacing))):
-        raise MeshError(f"the surface encloses no volume ({solid.volume:.2g} m^3): give it a thickness")
-
-
-def _peeled(lattice: Lattice, numbers: Ints, solid: Solid) -> Ints:
+def _peeled(lattice: Lattice | GradedLattice, numbers: Ints, solid: Solid) -> Ints:
     """Without tetrahedra that would lie flat in the surface, as long as what is left hangs together."""
     for _ in range(PEELS):
         corners = lattice.corners_of(numbers)
@@ -173,9 +111,7 @@ def _peeled(lattice: Lattice, numbers: Ints, solid: Solid) -> Ints:
     return numbers
 
 
-def _filled(
-    mesh: TetMesh, parts: Ints, solid: Solid, points: FloatArray, volumes: FloatArray, start: Ints
-) -> Cage:
+def _filled(mesh: TetMesh, solid: Solid, points: FloatArray, volumes: FloatArray, start: Ints) -> CageMesh:
     tet, shares = Locator(mesh)(points, start)
     carried = np.bincount(tet, volumes, len(mesh.tets))
     fill = np.clip(carried / mesh.volumes, LEAST_SHARE, MOST_SHARE)
@@ -187,4 +123,4 @@ def _filled(
     vertex_volumes = fitted(
         mesh.vertices, np.asarray(held, dtype=np.float64), float(volumes.sum()), volumes @ points, second
     )
-    return Cage(CageMesh(mesh.vertices, mesh.tets, fill, vertex_volumes), solid, parts)
+    return CageMesh(mesh.vertices, mesh.tets, fill, vertex_volumes)

@@ -25,9 +25,9 @@ vertices as heavy as there, the stable step would stay above 0.58 of the lattice
 FLAT = 0.25
 """Part of its volume that the surface leaves of a tetrahedron, below which it is in the way of the fit."""
 
-NEAR = 93
-"""Voxels whose middles are at most the root of 8 from that of a vertex's own: a point that is found in one of
-them, and is not farther than a voxel is long, is the nearest."""
+NEAR = (2.83, 6.0, 12.0)
+"""How far the middles of voxels are from that of a vertex's own, in voxels, which are looked at first, then
+next, ...: a point that is found in one of them, and is nearer by the diagonal of a voxel, is the nearest."""
 
 CHUNK = 1 << 20
 """Pairs of vertices and voxels that are looked at together."""
@@ -36,14 +36,15 @@ REACH = 0.75
 """How far from a vertex its surface is looked for, in cubes."""
 
 
-def fit(vertices: FloatArray, tets: Ints, solid: Solid, edge: float) -> FloatArray:
+def fit(vertices: FloatArray, tets: Ints, octaves: Ints, solid: Solid, edge: float) -> FloatArray:
     """New places of the vertices, (n, 3) [m].
 
     Args:
         vertices: of the lattice, (n, 3) [m].
         tets: (m, 4).
+        octaves: how often the lattice's cubes are halved at each tetrahedron, (m,).
         solid: whose surface is sought.
-        edge: of the lattice's cubes [m].
+        edge: of the lattice's largest cubes [m].
     """
     surface = surface_of(tets.astype(np.int32))
     is_outer = np.zeros(len(vertices), dtype=np.bool_)
@@ -52,7 +53,8 @@ def fit(vertices: FloatArray, tets: Ints, solid: Solid, edge: float) -> FloatArr
     inner_mean = _Mean(tets[:, LOCAL_EDGES].reshape(-1, 2), len(vertices))
     outer_mean = _Mean(surface[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), len(vertices))
     nearest = _Nearest(solid, REACH * edge)
-    limit = STIFFEST * float(_stiffness(vertices[tets]).max())
+    finer = 4.0**octaves
+    limit = np.asarray(STIFFEST * float((_stiffness(vertices[tets]) / finer).max()) * finer)
     places = vertices.copy()
     for step in range(PASSES):
         wanted = 0.5 * (places + inner_mean(places))
@@ -73,7 +75,7 @@ def caps(vertices: FloatArray, tets: Ints, solid: Solid, edge: float) -> NDArray
     return np.asarray(np.isin(tets, outer).all(axis=1) & (after < FLAT * before))
 
 
-def _moved(places: FloatArray, wanted: FloatArray, tets: Ints, limit: float) -> FloatArray:
+def _moved(places: FloatArray, wanted: FloatArray, tets: Ints, limit: FloatArray) -> FloatArray:
     """As far towards `wanted` as all tetrahedra stay good, each vertex by halves."""
     part = np.ones(len(places))
     for halving in range(HALVINGS + 1):
@@ -89,7 +91,7 @@ def _moved(places: FloatArray, wanted: FloatArray, tets: Ints, limit: float) -> 
     return tried
 
 
-def _is_spoilt(corners: FloatArray, limit: float) -> NDArray[np.bool_]:
+def _is_spoilt(corners: FloatArray, limit: FloatArray) -> NDArray[np.bool_]:
     gradients, volumes = _gradients(corners)
     lengths = np.linalg.norm(gradients, axis=2)
     one, other = LOCAL_EDGES.T
@@ -139,7 +141,9 @@ class _Nearest:
         offsets = np.argwhere(np.ones((2 * cells + 1,) * 3)) - cells
         squares = (offsets**2).sum(axis=1)
         order = np.argsort(squares, kind="stable")
-        self._offsets = offsets[order[squares[order] <= (cells + 1) ** 2]]
+        squares = squares[order]
+        self._offsets = offsets[order[squares <= (cells + 1) ** 2]]
+        self._near = [(np.searchsorted(squares, r**2), (r - 3**0.5) * solid.spacing) for r in NEAR]
         points = np.full((*(n + 2 * cells for n in solid.fill.shape), 3), np.nan)
         inner = (slice(cells, -cells),) * 3
         points[inner] = np.where(_is_border(solid.fill)[..., None], solid.surface, np.nan)
@@ -150,7 +154,8 @@ class _Nearest:
         found = places.copy()
         away = np.full(len(places), np.inf)
         rest = np.arange(len(places))
-        for offsets, sure in ((self._offsets[:NEAR], self._solid.spacing), (self._offsets, np.inf)):
+        for count, sure in (*self._near, (len(self._offsets), np.inf)):
+            offsets = self._offsets[:count]
             rows = max(1, CHUNK // len(offsets))
             for start in range(0, len(rest), rows):
                 few = rest[start : start + rows]

@@ -33,10 +33,13 @@ class Lattice:
         nx, ny, nz = (int(n) + 2 for n in inner)
         return cls(origin, edge, (nx, ny, nz))
 
-    @property
-    def tet_volume(self) -> float:
-        """[m^3]."""
-        return self.edge**3 / 12.0
+    def volumes_of(self, numbers: Ints) -> FloatArray:
+        """[m^3], (k,), alike for all."""
+        return np.full(len(numbers), self.edge**3 / 12.0)
+
+    def octaves_of(self, numbers: Ints) -> Ints:
+        """How often cubes were halved for each tetrahedron, (k,): never."""
+        return np.zeros(len(numbers), dtype=np.int64)
 
     @property
     def tets(self) -> Ints:

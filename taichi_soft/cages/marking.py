@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.cages.connected import components
+from taichi_soft.cages.graded import GradedLattice
 from taichi_soft.cages.lattice import Lattice
 from taichi_soft.meshing.arrays import FloatArray
 from taichi_soft.meshing.topology import shared_faces
@@ -29,17 +30,25 @@ ROUNDS = 3
 """In which tetrahedra are added where others hang together at an edge or a vertex only."""
 
 
-def mark(lattice: Lattice, points: FloatArray, volumes: FloatArray) -> Ints:
+def mark(
+    lattice: Lattice | GradedLattice,
+    points: FloatArray,
+    volumes: FloatArray,
+    kept: NDArray[np.bool_] | None = None,
+) -> Ints:
     """Numbers of the tetrahedra to take, ascending.
 
     Args:
         points: that stand for one connected solid, (k, 3) [m].
         volumes: of each, (k,) [m^3].
+        kept: those that are not to be lost, however thin the solid is there, (k,).
     """
     at = lattice.tet_at(points)
     numbers, place = np.unique(at, return_inverse=True)
-    share = np.bincount(place.reshape(-1), volumes) / lattice.tet_volume
+    share = np.bincount(place.reshape(-1), volumes) / lattice.volumes_of(numbers)
     trace = min(TRACE, 0.5 * float(share.max()))
+    if kept is not None:
+        share[place.reshape(-1)[kept]] = np.maximum(share[place.reshape(-1)[kept]], trace)
     corners = lattice.corners_of(numbers)
     taken = share >= HALF
     while True:
@@ -61,7 +70,7 @@ def mark(lattice: Lattice, points: FloatArray, volumes: FloatArray) -> Ints:
     return _bridged(lattice, numbers[taken])
 
 
-def _bridged(lattice: Lattice, numbers: Ints) -> Ints:
+def _bridged(lattice: Lattice | GradedLattice, numbers: Ints) -> Ints:
     """With tetrahedra that hold nothing, where parts meet at edges or vertices only: all in one part then,
     unless parts do not meet at all."""
     others, every = np.zeros(0, dtype=np.int64), np.zeros((0, 4), dtype=np.int64)

@@ -29,7 +29,7 @@ def test_all_tetrahedra_are_alike_and_fill_space_without_gaps():
     assert mesh.volumes == pytest.approx(np.full(len(mesh.tets), 0.1**3 / 12))
     assert mesh.quality.min_dihedral == pytest.approx(np.full(len(mesh.tets), 60.0))
     assert mesh.quality.max_dihedral == pytest.approx(np.full(len(mesh.tets), 90.0))
-    assert LATTICE.tet_volume == pytest.approx(0.1**3 / 12)
+    assert LATTICE.volumes_of(np.arange(2)) == pytest.approx([0.1**3 / 12] * 2)
     # Of a solid without cavities, vertices - edges + faces - tetrahedra is 1 (Euler).
     faces = (4 * len(mesh.tets) + len(mesh.surface)) // 2
     assert len(mesh.vertices) - len(mesh.edges) + faces - len(mesh.tets) == 1

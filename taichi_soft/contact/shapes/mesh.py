@@ -15,7 +15,6 @@ from taichi_soft.contact.shapes.grid_cache import grid_key, read_grid, write_gri
 from taichi_soft.contact.shapes.shape import SEAM, Shape, Triangles
 from taichi_soft.core.errors import OptionError
 from taichi_soft.core.serialisation import serialised
-from taichi_soft.meshing import TetMesh, voxels
 from taichi_soft.meshing.arrays import FloatArray, IntArray, read_only
 
 
@@ -87,17 +86,6 @@ class MeshShape(Shape):
         """Lower and upper corner of the mesh, (2, 3) [m]."""
         corners: NDArray[np.float64] = read_only(ClosedMesh(self.vertices, self.triangles).bounds)
         return corners
-
-    def voxel_mesh(self) -> TetMesh:
-        """A soft body in its place: a cube of five tetrahedra round every node of the grid that lies inside.
-
-        Its surface is stepped, and its volume near that of the solid; a tenth of the longest side is a cell
-        that games can afford. Raises: MeshError where no node lies inside.
-        """
-        inside = self.samples.reshape(self.resolution) < 0
-        filled = np.argwhere(inside)
-        body = voxels(inside, self.cell)
-        return body.translated(self._grid.origin + self.cell * (filled.min(axis=0) + filled.max(axis=0)) / 2)
 
     def depths(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """How deep points (n, 3) in its frame lie inside, (n,) [m], below 0 outside; from its grid."""

@@ -13,6 +13,7 @@ import numpy as np
 
 from taichi_soft.bodies.asset import SoftBodyAsset
 from taichi_soft.bodies.sag import MOST_SAG, sag
+from taichi_soft.cages import tetrahedra_of
 from taichi_soft.core.constants import GRAVITY_EARTH
 from taichi_soft.core.errors import MeshError, TaichiSoftError
 from taichi_soft.core.types import CageMethodName
@@ -109,10 +110,16 @@ def diagnose(
         found.surface = facts_of(surfaces)
         _judge_surface(found, found.surface)
         try:
-            asset = SoftBodyAsset.from_surface(surfaces, material, cells=cells, method=method)
+            made = tetrahedra_of(surfaces, cells=cells, method=method)
         except MeshError as error:
             found.say(Grade.BAD, str(error))
             return found
+        asset = SoftBodyAsset(made.mesh, material, skin=surfaces)
+        for words in made.told:
+            found.say(Grade.NOTE, words)
+        if made.is_refined:
+            plain = tetrahedra_of(surfaces, cells=cells, refine=0).mesh
+            _judge_refinement(found, asset, SoftBodyAsset(plain, material))
     else:
         asset = SoftBodyAsset(load_mesh(path), material)
         _judge_size(found, float(np.ptp(asset.mesh.vertices, axis=0).max()))
@@ -148,6 +155,17 @@ def _judge_surface(found: Diagnosis, facts: SurfaceFacts) -> None:
     ):
         if count:
             found.say(Grade.NOTE, f"{count:,} {text}")
+
+
+def _judge_refinement(found: Diagnosis, asset: SoftBodyAsset, plain: SoftBodyAsset) -> None:
+    """Say what limbs and sheets cost that are too thin for the cells."""
+    counts = [len(each.mesh.tets) for each in (plain, asset) if isinstance(each.mesh, TetMesh)]
+    shorter = plain.stable_step.recommended / asset.stable_step.recommended
+    found.say(
+        Grade.NOTE,
+        f"to keep them takes {counts[1]:,} tetrahedra instead of {counts[0]:,}, and substeps that are "
+        f"{shorter:.1f} times as short",
+    )
 
 
 def _judge_body(found: Diagnosis, asset: SoftBodyAsset) -> None:

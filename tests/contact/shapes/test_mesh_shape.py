@@ -200,27 +200,6 @@ sys.stdout.buffer.write(MeshShape(torus(0.8, 0.25), cell=0.04, cache=False).samp
     assert done.stdout == MeshShape(torus(0.8, 0.25), cell=0.04, cache=False).samples.tobytes()
 
 
-def test_a_body_of_cells_fills_a_surface_where_it_is():
-    """Two boxes that do not touch, each filled to within a cell."""
-    mesh = trimesh.util.concatenate([box_at((1, 0.5, 2), (3, 0, -1)), box_at((0.3, 0.3, 0.3), (5, 0, 0))])
-    body = MeshShape(mesh, cell=0.1).voxel_mesh()
-    cells = body.volume / 0.1**3
-    assert cells == pytest.approx(round(cells), abs=1e-6)
-    assert 0.7 * mesh.volume < body.volume < 1.3 * mesh.volume
-    np.testing.assert_allclose([body.vertices.min(axis=0), body.vertices.max(axis=0)], mesh.bounds, atol=0.1)
-    apart = body.vertices[:, 0] > 4
-    np.testing.assert_allclose(body.vertices[apart].mean(axis=0), (5, 0, 0), atol=0.05)
-
-
-def test_finer_cells_fill_a_ball_better():
-    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.5)
-    missing = [
-        abs(MeshShape(ball, cell=cell).voxel_mesh().volume / ball.volume - 1) for cell in (0.2, 0.1, 0.05)
-    ]
-    assert missing[0] > missing[1] > missing[2]
-    assert missing[2] < 0.02
-
-
 def test_the_way_to_a_body_that_a_refused_surface_names_runs_as_it_stands(tmp_path, monkeypatch):
     box_at((1, 1, 1), (0, 0, 0.5)).export(tmp_path / "wheel.stl")
     monkeypatch.chdir(tmp_path)

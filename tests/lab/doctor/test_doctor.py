@@ -103,6 +103,16 @@ def test_what_is_thinner_than_a_cell_is_noted(tmp_path):
 
 
 @pytest.mark.skipif(bool(missing_packages("ftetwild")), reason="needs pytetwild: the extra ftetwild")
+def test_legs_too_thin_for_the_cells_are_noted_with_what_they_cost(tmp_path):
+    leg = trimesh.creation.box((0.01, 0.01, 1.0)).apply_translation((0.0, 0.0, -0.8))  # a 30th of a cell
+    found = diagnose(written(joined(BALL, leg), tmp_path / "stilt.stl"), RUBBER, cells=6)
+    notes = " ".join(each.text for each in found.findings if each.grade is Grade.NOTE)
+    assert found.is_fit
+    assert "too thin for cells" in notes
+    assert "times as short" in notes
+    assert f"{found.figures['tetrahedra']:,} tetrahedra" in notes
+
+
 def test_another_method_makes_another_body(tmp_path, capsys):
     file = written(ball(0.5, 2), tmp_path / "ball.stl")
     found = diagnose(file, RUBBER, cells=5, method="ftetwild")
