@@ -89,6 +89,7 @@ class State(BodyFields):
         contact.island_count[None] = count
         fill(contact.island_first, np.arange(count + 1))
         fill(contact.island_body, np.arange(count))
+        fill(contact.body_island, np.arange(count))
         if self.capacity.contact.soft:
             fill(self.soft.sweep_order, np.arange(count))
             fill(self.soft.slot_count, np.zeros(0))
