@@ -77,7 +77,7 @@ class Simulation:
         if goes_on:
             self.readout.has_moved()
             found = self.launch(substeps, h)
-            self.troubled, self._is_still = max(found, 0), found == ALL_SLEEP and not self._skips
+            self.troubled, self._is_still = max(found, 0), found == ALL_SLEEP
         if colliders is not None:
             colliders.finish(seconds)
         reports = self._note_failures(substeps, h) if self.troubled else []
@@ -88,8 +88,8 @@ class Simulation:
         if loss:
             warnings.warn(loss, DroppedEventsWarning, stacklevel=4)
         if self._skips:
-            end_skips(self.state, len(self.pools.slots))
-            self._skips = False
+            skipped = end_skips(self.state, len(self.pools.slots))
+            self._is_still, self._skips = self._is_still and not skipped, False
         for body, pieces in self.tears.tear():
             self.events.note_torn(clock.steps - 1, clock.time, body, pieces)
         return reports

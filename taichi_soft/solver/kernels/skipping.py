@@ -34,10 +34,13 @@ def skip_bodies(state: ti.template(), bodies: ti.types.ndarray(dtype=ti.i32, ndi
 
 
 @ti.kernel
-def end_skips(state: ti.template(), body_count: ti.i32):
+def end_skips(state: ti.template(), body_count: ti.i32) -> ti.i32:
     """After a step: who skipped it moves again. It is drawn where it stands, nothing has touched it, and what
     a force field did is over.
+
+    Returns: how many skipped it.
     """
+    skipped = 0
     ti.loop_config(serialize=True)
     for body in range(body_count):
         if state.body_status[body] == SKIPPING:
@@ -48,3 +51,5 @@ def end_skips(state: ti.template(), body_count: ti.i32):
                 forget_contacts(state, body)
             state.body_drives[body] = state.body_drives[body] & ~PUSHED
             state.body_status[body] = ACTIVE
+            skipped += 1
+    return skipped
