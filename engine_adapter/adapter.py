@@ -35,9 +35,10 @@ class EngineAdapter:
         before_step: called with the world before every fixed step: the place to move colliders and frames,
             to push and to grab, so that it happens at the same moments whatever the frame rate.
         rewind_ticks: steps that `rewind` can go back; 0 keeps nothing.
-        budget_ms: what a fixed step may take [ms]. Where it takes longer, bodies with levels of detail get
-            coarser, the farthest first (see `see_from`), and finer again when there is time; see `given_up`.
-            None: all stay as they are.
+        budget_ms: what a fixed step may take [ms], with changes before it. Where it takes longer, bodies with
+            levels of detail get coarser, the farthest first (see `see_from`), and the farthest skip steps
+            where that is not enough. They get all back when there is time. See `given_up`. None: all stay as
+            they are.
     Raises: StateError if the world is not built; OptionError if `fixed_step` is not a FixedStep, or
         `before_step` cannot be called.
     """
@@ -150,7 +151,7 @@ class EngineAdapter:
         return made
 
     def see_from(self, viewer: ArrayLike) -> None:
-        """Say where the camera is, (3,) [m]: a budget lowers the levels of the farthest bodies first.
+        """Say where the camera is, (3,) [m]: a budget takes from the farthest bodies first.
 
         Raises: OptionError for what is no place; StateError without `budget_ms`.
         """
@@ -158,7 +159,7 @@ class EngineAdapter:
 
     @property
     def given_up(self) -> GivenUp:
-        """Which bodies are coarser than they could be, and whether the budget is met.
+        """Which bodies are coarser than they could be, which skip steps, and whether the budget is met.
 
         Raises: StateError without `budget_ms`.
         """

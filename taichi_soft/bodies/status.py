@@ -1,7 +1,8 @@
 """What a body is doing, and what is done to it, as numbers in its fields."""
 
-ACTIVE, FROZEN, ASLEEP, ABSENT = 0, 1, 2, 3
-"""Status of a body: it moves, it went non-finite and rests, it sleeps, its slot is empty."""
+ACTIVE, FROZEN, ASLEEP, SKIPPING, ABSENT = 0, 1, 2, 3, 4
+"""Status of a body: it moves, it went non-finite and rests, it sleeps, it skips the coming step, its slot is
+empty."""
 
 MOVES_PINS, FEELS_REACTION, PUSHED, DAMPED, SHELTERED, GRABBED, JOINED = 1, 2, 4, 8, 16, 32, 64
 """Bits of `body_drives`: some pinned particles have somewhere to go; what they take up is added up;

@@ -101,7 +101,7 @@ class ContactFields:
         """What the next step depends on: of each particle, each body, each body and collider."""
         return [
             [self.particle_touches],
-            [self.calm, self.body_lower, self.body_upper],  # the box in which it sleeps
+            [self.calm, self.body_lower, self.body_upper, self.body_island],  # the box in which it sleeps
             [self.impulse, self.angular_impulse, self.rebound],
         ]
 

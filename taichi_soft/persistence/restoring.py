@@ -20,7 +20,7 @@ def put_back(context: WorldContext, manifest: Manifest) -> None:
     clock.steps, clock.time, clock.last_dt = manifest.steps, manifest.time, manifest.last_dt
     for slot, wanted in enumerate(manifest.bodies):
         _put_back_body(context, simulation.state, slot, wanted)
-    simulation.has_changed()
+    simulation.was_restored()
     context.substeps.forget()
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -29,7 +29,8 @@ from taichi_soft.events import EventLog
 from taichi_soft.fracture.tearing import Tears
 from taichi_soft.solver.failures import find_failure
 from taichi_soft.solver.kernels.implicit_euler import MOST_PIECES
-from taichi_soft.solver.kernels.islands import list_joined_islands
+from taichi_soft.solver.kernels.islands import list_joined_islands, read_islands
+from taichi_soft.solver.kernels.skipping import end_skips, skip_bodies
 from taichi_soft.solver.kernels.sleep import wake_body, wake_near
 from taichi_soft.solver.kernels.spawn import despawn_body, spawn_body
 from taichi_soft.solver.kernels.step import ALL_SLEEP
@@ -59,6 +60,7 @@ class Simulation:
     tears: Tears
     readout: Readout = field(init=False)
     troubled: int = 0  # bodies that failed in the last step, or whose solves were not exact
+    _skips: bool = True  # somebody may stand still in the coming step
     _is_still: bool = False  # none was awake after the last step, and nothing was changed since
     _warned: set[int] = field(default_factory=set)  # slots of bodies with such solves
 
@@ -85,6 +87,9 @@ class Simulation:
         loss = self.events.collect(clock.steps - 1, clock.time, seconds)
         if loss:
             warnings.warn(loss, DroppedEventsWarning, stacklevel=4)
+        if self._skips:
+            skipped = end_skips(self.state, len(self.pools.slots))
+            self._is_still, self._skips = self._is_still and not skipped, False
         for body, pieces in self.tears.tear():
             self.events.note_torn(clock.steps - 1, clock.time, body, pieces)
         return reports
@@ -95,6 +100,7 @@ class Simulation:
         if self.colliders is not None:
             self.colliders.prepare(seconds)
         self.launch(1, seconds)
+        end_skips(self.state, len(self.pools.slots))
         self.state.body_status.to_numpy()  # as where a body fails
 
     def _note_failures(self, substeps: int, h: float) -> list[str]:
@@ -158,6 +164,24 @@ class Simulation:
         self._warned.discard(slot)
         self._is_still = False
         despawn_body(self.state, slot)
+
+    def skip(self, slots: Sequence[int]) -> None:
+        """Let bodies stand still in the coming step."""
+        if slots:
+            skip_bodies(self.state, np.array(slots, dtype=np.int32))
+            self._skips = True
+            self.has_changed()
+
+    def islands(self) -> list[tuple[SoftBody, ...]]:
+        """Bodies that the last step moved together, by slot; who came since then is alone."""
+        numbers = np.arange(len(self.pools.slots), dtype=np.int32)
+        if self.program.has_contact:
+            read_islands(self.state, numbers)
+        found: dict[int, list[SoftBody]] = {}
+        for body in self.pools.living:
+            is_new = record_of(body).first_step == self.clock.steps
+            found.setdefault(-1 - body.index if is_new else int(numbers[body.index]), []).append(body)
+        return [tuple(bodies) for bodies in found.values()]
 
     def wake(self, slot: int) -> None:
         """Wake a body, or all for -1."""
@@ -245,6 +269,11 @@ class Simulation:
     def was_cut(self, body: SoftBody) -> None:
         """Take note that a body has other vertices."""
         self.events.renew_watches(body)
+
+    def was_restored(self) -> None:
+        """Take note that the fields are those of a snapshot."""
+        self._skips = True
+        self.has_changed()
 
     def has_changed(self) -> None:
         """Take note that the fields were written to."""

@@ -97,6 +97,7 @@ class State(BodyFields):
         contact.island_count[None] = count
         fill(contact.island_first, np.arange(count + 1))
         fill(contact.island_body, np.arange(count))
+        fill(contact.body_island, np.arange(count))
         if self.capacity.contact.hull:
             self.hull.load(self.loader, scene)
         if self.capacity.contact.soft:

@@ -51,6 +51,8 @@ def warm_up(context: WorldContext) -> None:
         living = cast("tuple[Body, ...]", context.slots.living)
         bodies = [body for body in living if not body.is_frozen]
         set_wind(context, (1.0, 0.0, 0.0), 1.2, 1.0)
+        context.built.skip([body.index for body in bodies])
+        context.built.trial_step(SHORTEST)
         push_bodies([(body, np.ones_like(body.positions())) for body in bodies])
         apply_radial_impulse(context, (0.0, 0.0, 0.0), 0.0, 1.0)
         for body in {body.asset: body for body in bodies}.values():

@@ -130,6 +130,37 @@ class WorldBodies(WorldParts):
         """
         despawn(self._context, body)
 
+    @recorded
+    def skip_step(self, bodies: Sequence[Body]) -> None:
+        """Let bodies stand still in the coming step, for what is far away and costs too much.
+
+        They keep their velocities and go on with them in the step after: who skips every other step moves at
+        half its speed. Neither gravity nor a force field acts meanwhile, and what impulses give counts in the
+        step after. A body makes the step after all where one that may touch it or is joined to it makes it
+        (see `islands`), where it is attached, where a moving collider is near, and where `apply_force` pushes
+        it or targets of its pins move. One that sleeps or is frozen stays so. Further calls add bodies.
+        Args:
+            bodies: of this world.
+        Raises: OptionError for what is no list of bodies of this world; StateError for one that was removed,
+            and before `build`.
+        """
+        simulation = self._built
+        if not isinstance(bodies, (list, tuple)):
+            raise OptionError(f"bodies must be a list of this world's bodies, got {bodies!r}")
+        for body in bodies:
+            require_own(self._context, body)
+        simulation.skip([body.index for body in bodies])
+
+    @property
+    def islands(self) -> list[tuple[Body, ...]]:
+        """Bodies that came near each other in the last step or are joined, directly or through others.
+
+        Each is in one island, by slot. Without `soft_contact` only joints make islands. A body that came
+        since the last step is alone.
+        Raises: StateError before `build`.
+        """
+        return cast("list[tuple[Body, ...]]", self._built.islands())
+
     def stable_step(self, body: Body) -> StableStep:
         """Estimate of the largest stable substep of a body; bodies of one asset share it until they are cut.
 

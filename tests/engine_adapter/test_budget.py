@@ -1,6 +1,7 @@
-"""A budget of milliseconds: what is far gets coarser where steps take too long, and finer when there is time.
+"""A budget of milliseconds: what is far gets coarser and skips steps where they take too long, and finer when
+there is time.
 
-The clock is ours: a step takes as long as the tetrahedra that are in the world say.
+The clock is ours: a step takes as long as the tetrahedra that move in it say.
 """
 
 import warnings
@@ -19,6 +20,7 @@ KIND = SoftBodyAsset.from_surface(
 SIZES = [len(level.mesh.tets) for level in KIND.levels]
 COUNT = 6
 EYE = np.array([-10.0, 0.0, 0.5])
+DRIFT = np.array([0.0, 0.1, 0.0])  # [m/s]: who stands still skips steps
 
 
 class Clock:
@@ -28,14 +30,18 @@ class Clock:
     def __init__(self):
         self.world, self.per_tet, self.now, self.is_second = None, 1e-6, 0.0, False
         self.rng = np.random.default_rng(4)
-        self.steps = []
+        self.steps, self.skipped, self.places = [], [], {}
 
     def __call__(self):
+        places = {body: body.positions() for body in self.world.bodies}
         if self.is_second:
-            cost = self.per_tet * sum(len(body.tets) for body in self.world.bodies)
+            stood = {body for body, x in places.items() if np.array_equal(x, self.places[body])}
+            cost = self.per_tet * sum(len(body.tets) for body in self.world.bodies if body not in stood)
+            cost += 1e-9
             self.steps.append(cost)
+            self.skipped.append({body.index for body in stood})
             self.now += cost * (1 + 0.03 * self.rng.random()) + (5e-3 if self.rng.random() < 0.03 else 0.0)
-        self.is_second = not self.is_second
+        self.is_second, self.places = not self.is_second, places
         return self.now
 
 
@@ -46,11 +52,11 @@ def clock(monkeypatch):
     return made
 
 
-def row_of(clock, count=COUNT, **options):
-    """Balls in a row on the floor, the first nearest to the eye."""
-    world = World()
+def row_of(clock, count=COUNT, apart=2.0, soft_contact=False, **options):
+    """Balls in a row that drift side by side, the first nearest to the eye."""
+    world = World(gravity=(0, 0, 0), floor=None, soft_contact=soft_contact)
     world.reserve(KIND, count)
-    bodies = [world.spawn(KIND, position=(2.0 * i, 0.0, 0.41)) for i in range(count)]
+    bodies = [world.spawn(KIND, position=(apart * i, 0.0, 0.4), velocity=DRIFT) for i in range(count)]
     world.build()
     clock.world = world
     game = EngineAdapter(world, FixedStep(dt=1 / 60), **options)
@@ -114,12 +120,85 @@ def test_what_moves_away_is_lowered_in_place_of_what_came_near(clock):
 
 
 def test_a_budget_that_cannot_be_met_is_told(clock):
-    game, bodies = row_of(clock, budget_ms=1e3 * clock.per_tet * COUNT * SIZES[2] / 2)
+    game, bodies = row_of(clock, budget_ms=1e3 * clock.per_tet * SIZES[2] / 2)
     for _ in range(60):
         game.step()
     assert levels(bodies) == [2] * COUNT
     assert not game.given_up.is_met
-    assert game.given_up.step_ms == pytest.approx(1e3 * clock.per_tet * COUNT * SIZES[2], rel=0.05)
+    assert game.given_up.step_ms == pytest.approx(1e3 * clock.steps[-1], rel=0.05)
+    assert_moves_at_least_at_a_quarter(clock.skipped)
+
+
+def assert_moves_at_least_at_a_quarter(skipped):
+    """Of each step who skips it. The nearest makes all steps."""
+    for at in range(len(skipped) - 3):
+        assert not set.intersection(*skipped[at : at + 4])
+    assert not any(0 in each for each in skipped)
+
+
+def test_the_farthest_skip_steps_where_all_are_as_coarse_as_can_be(clock, monkeypatch):
+    monkeypatch.setattr("engine_adapter.budget.perf_counter", lambda: 0.0)  # deciding takes no time
+    budget = 1e3 * clock.per_tet * COUNT * SIZES[2]
+    game, bodies = row_of(clock, budget_ms=budget)
+    game.see_from(EYE)
+    for _ in range(100):
+        game.step()
+    assert levels(bodies) == [2] * COUNT
+    settled = clock.skipped[40:]
+    skippers = set.union(*settled)
+    assert skippers == set(range(COUNT - len(skippers), COUNT))
+    assert len(skippers) <= 4
+    assert max(clock.steps[40:]) < 1e-3 * budget
+    assert_moves_at_least_at_a_quarter(settled)
+    assert game.given_up.skipping == tuple(bodies[i] for i in sorted(skippers, reverse=True))
+    assert game.given_up.is_met
+
+
+def test_steps_fit_at_once_while_levels_change_one_by_one(clock, monkeypatch):
+    budget = 1e3 * clock.per_tet * COUNT * SIZES[0] / 2
+    moments = iter(np.arange(1e4) * 0.3e-3 * budget)
+    monkeypatch.setattr("engine_adapter.budget.perf_counter", lambda: next(moments))
+    game, _ = row_of(clock, budget_ms=budget)
+    game.see_from(EYE)
+    for _ in range(60):
+        game.step()
+    assert max(clock.steps[1:]) < 1.001e-3 * budget
+    assert clock.skipped[1]
+    assert not any(clock.skipped[30:])
+    assert game.given_up.skipping == ()
+
+
+def test_skipping_ends_before_any_level_is_raised(clock, monkeypatch):
+    monkeypatch.setattr("engine_adapter.budget.perf_counter", lambda: 0.0)  # deciding takes no time
+    game, bodies = row_of(clock, budget_ms=1e3 * clock.per_tet * COUNT * SIZES[2] * 0.85)
+    game.see_from(EYE)
+    for _ in range(100):
+        game.step()
+    coarse, count = levels(bodies), len(clock.skipped)
+    assert any(clock.skipped[-4:])
+    clock.per_tet /= 20
+    found = []
+    for _ in range(400):
+        game.step()
+        found.append(levels(bodies))
+    raised = next(k for k, each in enumerate(found) if each != coarse)
+    assert not any(clock.skipped[count + raised - 29 :])
+    assert found[-1] == [0] * COUNT
+
+
+def test_bodies_that_touch_skip_steps_together(clock):
+    budget = 1e3 * clock.per_tet * 4 * SIZES[2] * 0.85
+    game, bodies = row_of(clock, 4, 3.0, True, budget_ms=budget)
+    game.see_from(EYE)
+    x = bodies[2].positions()
+    bodies[2].set_motion(x - x.mean(axis=0) + bodies[3].center_of_mass() - (0.78, 0, 0), DRIFT + 0 * x)
+    for _ in range(60):
+        game.step()
+    assert game.world.islands == [(bodies[0],), (bodies[1],), (bodies[2], bodies[3])]
+    settled = clock.skipped[30:]
+    assert any({2, 3} <= each for each in settled)
+    assert all((2 in each) == (3 in each) for each in settled)
+    assert_moves_at_least_at_a_quarter(settled)
 
 
 def test_what_is_held_keeps_its_level(clock):
@@ -128,24 +207,29 @@ def test_what_is_held_keeps_its_level(clock):
     for _ in range(60):
         game.step()
     assert levels(bodies) == [2, 2, 0, 2, 2, 2]
+    assert bodies[2] not in game.given_up.skipping
     hold.release()
     for _ in range(10):
         game.step()
     assert levels(bodies) == [2] * COUNT
 
 
-def test_steps_that_are_made_again_get_the_levels_that_they_had(clock):
-    game, bodies = row_of(clock, budget_ms=1e3 * clock.per_tet * COUNT * SIZES[0] / 2, rewind_ticks=30)
+@pytest.mark.parametrize("budget", [COUNT * SIZES[0] / 2, COUNT * SIZES[2] * 0.85])
+def test_steps_that_are_made_again_get_the_levels_that_they_had(clock, budget):
+    game, bodies = row_of(clock, budget_ms=1e3 * clock.per_tet * budget, rewind_ticks=30)
     hashes = []
     for _ in range(20):
         game.step()
         hashes.append((game.state_hash(), levels(bodies)))
     assert len({tuple(each) for _, each in hashes}) > 1
+    skipped = clock.skipped[1:]
+    assert any(skipped)
     game.rewind(19)
     clock.per_tet *= 100  # the machine has become slow: that must not matter
     for expected in hashes[1:]:
         game.step()
         assert (game.state_hash(), levels(bodies)) == expected
+    assert clock.skipped[20:] == skipped
 
 
 def test_steps_that_are_made_again_with_other_inputs_leave_what_is_held_then(clock):

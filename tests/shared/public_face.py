@@ -280,11 +280,12 @@ NOT_BODIES = {
     "of another world": Of(lambda g: g.foreign_body), "collider": Of(lambda g: g.collider),
 }  # fmt: skip
 BODY = Kind(lambda game, rng: one_of(game.world.bodies, rng), NOT_BODIES)
-BODIES = or_none(Kind(
+SOME_BODIES = Kind(
     lambda game, rng: list(game.world.bodies)[: rng.integers(0, 3)],
     {"number": 1, "numbers": [0, 1], "one body": Of(lambda g: g.free), "removed": Of(lambda g: [g.dead_body]),
      "of another world": Of(lambda g: [g.free, g.foreign_body]), "nothings": [None]},
-))  # fmt: skip
+)  # fmt: skip
+BODIES = or_none(SOME_BODIES)
 FLAG = choice(True, False, none=None, number=1, text="yes", array=np.array([True, False]), nan=NAN)
 BUFFER = Kind(
     lambda game, rng: None,
@@ -467,6 +468,7 @@ CALLS: dict[str, dict[str, Call]] = {
             "restitution": or_none(number(0.0, 1.0, below=-0.1, above=1.1)), "thickness": number(0.0, 0.02, below=-1.0),
             "group": GROUP, "mask": GROUP,
         }, _has_no_room),
+        "skip_step": Call({"bodies": SOME_BODIES}),
         "stable_step": Call({"body": BODY.but("removed", "of another world")}),
         "stable_substeps": Call({"dt": STEP_LENGTH}),
         "step": Call({"dt": STEP_LENGTH, "substeps": choice(6, 8, 12, **NOT_COUNTS, zero=0).but("none")}),
@@ -588,7 +590,7 @@ CALLS: dict[str, dict[str, Call]] = {
 }  # fmt: skip
 
 READERS: dict[str, str] = {
-    "World": """bodies colliders dropped_events floor_collider frames grabs is_built joints last_dt motors restore_count settings slot_count step_count
+    "World": """bodies colliders dropped_events floor_collider frames grabs is_built islands joints last_dt motors restore_count settings slot_count step_count
         time""",
     "Body": """aabb angular_momentum asset attachments center_of_mass deformations elastic_energy failure flipped_count flipped_tets
         gravitational_energy gravity_scale index is_alive is_asleep is_cut is_frozen is_held is_sheltered

@@ -6,7 +6,7 @@ are between.
 """
 
 from taichi_soft.bodies.kernels.particles import gravity_on
-from taichi_soft.bodies.status import DAMPED, FEELS_REACTION, PUSHED, SHELTERED
+from taichi_soft.bodies.status import ACTIVE, DAMPED, FEELS_REACTION, PUSHED, SHELTERED, SKIPPING
 from taichi_soft.core.runtime import ti
 
 
@@ -90,6 +90,8 @@ def add_push(
     """Push `particles` of one body throughout the coming step, each with its mass times (3,) [m/s^2]."""
     ti.loop_config(serialize=True)
     for _ in range(1):
+        if state.body_status[body] == SKIPPING:  # what a force field does to it counts in its own time
+            state.body_status[body] = ACTIVE
         _open_pushes(state, body)
         a = ti.Vector([acceleration[0], acceleration[1], acceleration[2]])
         for i in range(particles.shape[0]):

@@ -5,7 +5,7 @@ any more (`ARRIVED`, with the velocity of the step before still to be taken from
 (`WITH_FRAME` plus its number), in whose axes its target is.
 """
 
-from taichi_soft.bodies.status import ACTIVE, ASLEEP, FEELS_REACTION, FROZEN, MOVES_PINS
+from taichi_soft.bodies.status import ACTIVE, ASLEEP, FEELS_REACTION, FROZEN, MOVES_PINS, SKIPPING
 from taichi_soft.core.runtime import ti
 
 STILL, TO_TARGET, ARRIVED, WITH_FRAME = 0, 1, 2, 3
@@ -148,7 +148,8 @@ def aim_pinned(
             if moving == 0:
                 state.body_drives[body] = drives & ~MOVES_PINS
             waiting += int(moving > 0)
-            if moving > 0 and state.body_status[body] == ASLEEP:
+            status = state.body_status[body]
+            if moving > 0 and (status == ASLEEP or status == SKIPPING):  # noqa: SIM109 - Taichi has no `in`
                 state.body_status[body] = ACTIVE
     return waiting
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from time import perf_counter
+from time import perf_counter, process_time
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from taichi_soft.bodies.asset import SoftBodyAsset
 from taichi_soft.elements.materials import Material
 from taichi_soft.lab.profiling.spread import Spread
 from taichi_soft.lab.profiling.stolen import processor_ticks, stolen_since
+from taichi_soft.world.body import Body
 from taichi_soft.world.world import World
 
 DT = 1 / 60
@@ -44,7 +46,9 @@ class KeptBudget:
 
     budget: float  # [ms]; the steps without one are held against it, too
     is_kept: bool  # whether there was a budget to keep
+    is_fixed: bool  # whether levels were those of such a run's end, from the beginning
     step: Spread  # [ms]: `World.step`
+    work: Spread  # [ms]: what the processors worked on it, without waiting for other programs
     settled: Spread  # [ms]: the same, from when the budget was met, or of all steps
     frame: Spread  # [ms]: `EngineAdapter.step`, with what deciding takes and changes of level
     late: float  # part of all steps that took longer than the budget
@@ -53,20 +57,25 @@ class KeptBudget:
     deciding: Spread | None  # [ms]: all of a frame but its step, in frames without a change
     changing: Spread | None  # [ms]: the same, in frames with changes; None where there were none
     frames_with_changes: int
+    skipped: float  # part of all steps of all bodies that they stood still in
     levels: dict[int, int]  # bodies at each level, in the end
+    levels_in_order: tuple[int, ...]  # of each body
     tets: int  # in the end
     frozen: int  # bodies that went non-finite
     stolen: float | None  # part of the processors' time that the host gave to other machines
 
 
 def measure_kept_budget(steps: int = 600) -> list[KeptBudget]:
-    """Measure bodies without a budget, and the same with half of what their median step took.
+    """Measure bodies without a budget, and the same with half of what their median step took. Then again
+    without one, at the levels that they had in the end: what then is longer than the median is the machine.
 
     One after the other, as a game has one world. Nobody sleeps, or there would be nothing to save.
     """
     kinds = _kinds()
-    free = _measure(kinds, steps, None)
-    return [free, _measure(kinds, steps, free.budget)]
+    levels = (0,) * ROWS**2
+    free = _measure(kinds, steps, None, levels)
+    kept = _measure(kinds, steps, free.budget, levels)
+    return [free, kept, _measure(kinds, steps, free.budget, kept.levels_in_order, is_fixed=True)]
 
 
 def _kinds() -> list[SoftBodyAsset]:
@@ -80,8 +89,8 @@ def _kinds() -> list[SoftBodyAsset]:
     return [SoftBodyAsset.from_surface(surface, material, cells=CELLS) for surface in surfaces]
 
 
-def _toys(kinds: list[SoftBodyAsset]) -> _TimedWorld:
-    """Side by side on the floor, where they were let fall."""
+def _toys(kinds: list[SoftBodyAsset], levels: Sequence[int]) -> _TimedWorld:
+    """Side by side on the floor, where they were let fall, and then changed to `levels`."""
     world = _TimedWorld(soft_contact=True, sleep_speed=0.0)
     for kind in kinds:
         world.reserve(kind, -(-(ROWS**2) // len(kinds)))
@@ -93,6 +102,8 @@ def _toys(kinds: list[SoftBodyAsset]) -> _TimedWorld:
     world.warm_up()
     for _ in range(SETTLING):
         world.step(DT)
+    for body, level in zip(world.bodies, levels, strict=True):
+        body.set_level(level)
     return world
 
 
@@ -103,12 +114,20 @@ class _TimedWorld(World):
         """As a World."""
         super().__init__(**options)
         self.took: list[float] = []  # [ms]
+        self.work: list[float] = []  # [ms]: of the processors
+        self.skipped = 0
 
     def step(self, dt: float, substeps: int | None = None) -> None:
         """As a World."""
-        start = perf_counter()
+        start, work = perf_counter(), process_time()
         super().step(dt, substeps)
         self.took.append(1e3 * (perf_counter() - start))
+        self.work.append(1e3 * (process_time() - work))
+
+    def skip_step(self, bodies: Sequence[Body]) -> None:
+        """As a World."""
+        self.skipped += len(bodies)
+        super().skip_step(bodies)
 
 
 @dataclass
@@ -151,6 +170,7 @@ def tell(course: Course, limit: float, **facts: Any) -> KeptBudget:
         changing=Spread.of(changing) if changing else None,
         frames_with_changes=len(changing),
         levels=dict(sorted(Counter(course.levels[-1]).items())),
+        levels_in_order=course.levels[-1],
         **facts,
     )
 
@@ -159,12 +179,21 @@ def _late(steps: list[float], limit: float) -> float:
     return sum(step > limit for step in steps) / len(steps)
 
 
-def _measure(kinds: list[SoftBodyAsset], steps: int, budget: float | None) -> KeptBudget:
-    world = _toys(kinds)
-    game = EngineAdapter(world, FixedStep(dt=DT), budget_ms=budget)
-    if budget is not None:
+def _measure(
+    kinds: list[SoftBodyAsset],
+    steps: int,
+    budget: float | None,
+    levels: Sequence[int],
+    *,
+    is_fixed: bool = False,
+) -> KeptBudget:
+    is_kept = budget is not None and not is_fixed
+    world = _toys(kinds, levels)
+    game = EngineAdapter(world, FixedStep(dt=DT), budget_ms=budget if is_kept else None)
+    if is_kept:
         game.see_from(EYE)
     world.took.clear()
+    world.work.clear()
     course = Course(world.took, [], [_levels(world)])
     before = processor_ticks()
     for _ in range(steps):
@@ -176,7 +205,10 @@ def _measure(kinds: list[SoftBodyAsset], steps: int, budget: float | None) -> Ke
     return tell(
         course,
         SHARE * float(np.median(world.took)) if budget is None else budget,
-        is_kept=budget is not None,
+        is_kept=is_kept,
+        is_fixed=is_fixed,
+        work=Spread.of(world.work),
+        skipped=world.skipped / (steps * len(world.bodies)),
         tets=sum(len(body.tets) for body in world.bodies),
         frozen=sum(body.is_frozen for body in world.bodies),
         stolen=stolen,

@@ -159,21 +159,26 @@ def _budget_table(budgets: list[Budget]) -> Table:
 
 
 def _kept_budget_tables(runs: list[KeptBudget]) -> Iterator[tuple[str, Table]]:
-    """A column for the run without a budget, and one for that with it."""
-    table = _table("", *("with a budget" if run.is_kept else "without" for run in runs))
+    """A column for the run without a budget, one for that with it, one for the levels of its end."""
+    names = ("with a budget" if run.is_kept else "its levels" if run.is_fixed else "without" for run in runs)
+    table = _table("", *names)
     for name, attribute in (
         ("step", "step"),
         ("step, once it is met", "settled"),
+        ("what processors worked on a step", "work"),
         ("frame", "frame"),
         ("deciding, in a frame without a change", "deciding"),
         ("deciding and changing, in others", "changing"),
     ):
         table.add_row(name, *(_late_cells(getattr(run, attribute)) for run in runs))
     for name, value_of in (
+        ("step: p99 over p50", lambda run: f"{run.step.p99 / run.step.median:.2f}"),
+        ("the same, once it is met", lambda run: f"{run.settled.p99 / run.settled.median:.2f}"),
         ("steps over the budget", lambda run: f"{run.late:.1%}"),
         ("over it, once it is met", lambda run: f"{run.late_settled:.1%}"),
         ("met after steps", lambda run: "never" if run.met_after is None else str(run.met_after)),
         ("frames with changes", lambda run: str(run.frames_with_changes)),
+        ("steps of bodies that are skipped", lambda run: f"{run.skipped:.1%}"),
         ("bodies at level", lambda run: ", ".join(f"{level}: {n}" for level, n in run.levels.items())),
         ("tetrahedra in the end", lambda run: f"{run.tets:,}"),
         ("non-finite bodies", lambda run: str(run.frozen)),

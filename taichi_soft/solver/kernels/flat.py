@@ -28,7 +28,7 @@ from taichi_soft.elements.kernels.internal_forces import clear_forces
 from taichi_soft.solver.kernels.motion import JOLT, moved_particle
 from taichi_soft.solver.kernels.vibration import damp_vibration, kept_vibration
 
-_FAILING, _DONE = 4, 5  # above the status of any body: the step is made again, or need not be
+_FAILING, _DONE = 5, 6  # above the status of any body: the step is made again, or need not be
 
 
 @ti.func

@@ -154,6 +154,14 @@ def find_islands(state: ti.template(), body_count: ti.i32, dt: ti.f32):
 
 
 @ti.kernel
+def read_islands(state: ti.template(), islands: ti.types.ndarray(dtype=ti.i32, ndim=1)):
+    """In which island each body was in the last step."""
+    ti.loop_config(serialize=True)
+    for body in range(islands.shape[0]):
+        islands[body] = state.contact.body_island[body]
+
+
+@ti.kernel
 def list_joined_islands(state: ti.template(), body_count: ti.i32):
     """The islands where bodies do not touch each other: what joints make of them, until those change."""
     ti.loop_config(serialize=True)

@@ -1,6 +1,6 @@
 """Sleep: islands in which nothing has moved for a while are left alone until something comes near."""
 
-from taichi_soft.bodies.status import ACTIVE, ASLEEP
+from taichi_soft.bodies.status import ACTIVE, ASLEEP, SKIPPING
 from taichi_soft.contact.fields import NO_COLLIDER
 from taichi_soft.contact.kernels.hull import has_hull, place_points
 from taichi_soft.core.runtime import ti
@@ -14,10 +14,10 @@ NEAR = 0.01
 
 @ti.func
 def _wake_in_box(state: ti.template(), body_count, lower, upper):
-    """Wake sleeping bodies whose box is near another. Returns how many."""
+    """Wake bodies that sleep or stand still whose box is near another. Returns how many."""
     woken = 0
     for body in range(body_count):
-        if state.body_status[body] == ASLEEP:
+        if state.body_status[body] == ASLEEP or state.body_status[body] == SKIPPING:
             above = (lower - state.contact.body_upper[body]).max()
             if ti.max(above, (state.contact.body_lower[body] - upper).max()) <= NEAR:
                 state.body_status[body] = ACTIVE
@@ -43,7 +43,7 @@ def wake_island(state: ti.template(), island: ti.i32) -> ti.i32:
     if is_awake == 1:
         for i in range(first, last):
             body = state.contact.island_body[i]
-            if state.body_status[body] == ASLEEP:
+            if state.body_status[body] == ASLEEP or state.body_status[body] == SKIPPING:
                 state.body_status[body] = ACTIVE
     return is_awake
 

@@ -7,8 +7,10 @@ from taichi_soft import Material, SoftBodyAsset
 from taichi_soft.lab.profiling import kept_budget, measure_kept_budget
 from taichi_soft.lab.profiling.kept_budget import Course, first_met, tell
 from taichi_soft.lab.profiling.report import tables
+from taichi_soft.lab.profiling.spread import Spread
 
-FACTS = {"is_kept": True, "tets": 7, "frozen": 0, "stolen": None}
+FACTS = {"is_kept": True, "is_fixed": False, "tets": 7, "frozen": 0, "stolen": None, "skipped": 0.0}
+FACTS["work"] = Spread.of([1.0])
 
 
 @pytest.mark.parametrize(
@@ -53,16 +55,20 @@ def test_the_budget_is_half_of_what_the_same_bodies_take_without_one(monkeypatch
     monkeypatch.setattr(kept_budget, "_kinds", kinds)
     monkeypatch.setattr(kept_budget, "ROWS", 2)
     monkeypatch.setattr(kept_budget, "SETTLING", 2)
-    without, kept = runs = measure_kept_budget(12)
-    assert (without.is_kept, kept.is_kept) == (False, True)
-    assert without.budget == kept.budget == pytest.approx(without.step.median / 2)
+    without, kept, fixed = runs = measure_kept_budget(12)
+    assert [(run.is_kept, run.is_fixed) for run in runs] == [(False, False), (True, False), (False, True)]
+    assert without.budget == kept.budget == fixed.budget == pytest.approx(without.step.median / 2)
+    assert (fixed.levels_in_order, fixed.tets) == (kept.levels_in_order, kept.tets)
+    assert (without.skipped, fixed.skipped) == (0.0, 0.0)
+    assert 0.0 <= kept.skipped <= 0.75
     assert without.levels == {0: 4}
     assert sum(kept.levels.values()) == 4
     assert kept.tets <= without.tets
     assert without.frozen == kept.frozen == 0
     for run in runs:
         assert run.frame.most >= run.step.most > 0.0
+        assert run.work.most > 0.0
         assert run.frames_with_changes == 0 or run.is_kept
     ((title, table),) = tables({"kept_budget": runs})
     assert "4 bodies with levels of detail" in title
-    assert [column.header for column in table.columns] == ["", "without", "with a budget"]
+    assert [column.header for column in table.columns] == ["", "without", "with a budget", "its levels"]

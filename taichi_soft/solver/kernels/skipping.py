@@ -1,0 +1,55 @@
+"""Bodies that stand still for one step: they cost nothing in it, and go on with the velocities that they had.
+
+As sleepers, they make the step after all where something comes near that moves: see `wake_island`.
+"""
+
+from taichi_soft.bodies.kernels.particles import remember_particle
+from taichi_soft.bodies.status import ACTIVE, PUSHED, SKIPPING
+from taichi_soft.contact.kernels.collide import forget_contacts
+from taichi_soft.core.runtime import ti
+
+
+@ti.func
+def _note_box(state: ti.template(), body):
+    """Note the box round a body, within which a moving collider is near it."""
+    particles = state.body_particles[body]
+    lower = state.particle_position[particles[0]]
+    upper = lower
+    for p in range(particles[0], particles[1]):
+        x = state.particle_position[p]
+        lower, upper = ti.min(lower, x), ti.max(upper, x)
+    state.contact.body_lower[body], state.contact.body_upper[body] = lower, upper
+
+
+@ti.kernel
+def skip_bodies(state: ti.template(), bodies: ti.types.ndarray(dtype=ti.i32, ndim=1)):
+    """Let bodies stand still in the coming step, but those that a force pushes in it."""
+    ti.loop_config(serialize=True)
+    for i in range(bodies.shape[0]):
+        body = bodies[i]
+        if state.body_status[body] == ACTIVE and state.body_drives[body] & PUSHED == 0:
+            state.body_status[body] = SKIPPING
+            if ti.static(state.capacity.has_contact):
+                _note_box(state, body)
+
+
+@ti.kernel
+def end_skips(state: ti.template(), body_count: ti.i32) -> ti.i32:
+    """After a step: who skipped it moves again. It is drawn where it stands, nothing has touched it, and what
+    a force field did is over.
+
+    Returns: how many skipped it.
+    """
+    skipped = 0
+    ti.loop_config(serialize=True)
+    for body in range(body_count):
+        if state.body_status[body] == SKIPPING:
+            particles = state.body_particles[body]
+            for p in range(particles[0], particles[1]):
+                remember_particle(state, p)
+            if ti.static(state.capacity.has_contact):
+                forget_contacts(state, body)
+            state.body_drives[body] = state.body_drives[body] & ~PUSHED
+            state.body_status[body] = ACTIVE
+            skipped += 1
+    return skipped
