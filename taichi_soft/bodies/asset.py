@@ -292,7 +292,7 @@ class SoftBodyAsset:
             numbers = [as_count(number, "cells", 1, 1_000_000) for number in cells]
         if not numbers:
             raise OptionError("cells is empty: give a number, or some numbers for levels of detail")
-        meshes = []
+        meshes: list[TetMesh] = []
         for number in numbers:
             made = tetrahedra_of(
                 surfaces,

@@ -1,4 +1,4 @@
-"""An artist's mesh on a body: where it is drawn as the body rests, turns, bends, and is cut."""
+"""An artist's mesh on a body: where it is drawn as the body rests, turns, bends, is cut and torn."""
 
 import numpy as np
 import pytest
@@ -13,6 +13,7 @@ from taichi_soft import (
     SoftBodyAsset,
     SpringMaterial,
     StateError,
+    Tearing,
     World,
     box,
     rope,
@@ -142,6 +143,22 @@ def test_a_skin_does_not_follow_a_cut_and_says_so(zoo):
         zoo.draw(skin)
     assert zoo.carrier.render_meshes == ()
     assert zoo.carrier.render_mesh().vertex_count > 0
+
+
+def test_a_skin_does_not_follow_a_tear_and_says_so():
+    asset = SoftBodyAsset.from_surface(BAR, JELLY, cells=10, tearing=Tearing(2e3), spare_vertices=200)
+    world = World(floor=None, gravity=(0, 0, 0))
+    body = world.add_body(asset)
+    world.build()
+    (skin,) = body.render_meshes
+    assert not skin.is_outdated
+    places = body.positions()
+    body.set_motion(places, 3.0 * np.sign(places) * (1.0, 0.0, 0.0))  # both halves away from the middle
+    world.step(1 / 60)
+    assert skin.is_outdated
+    assert body.render_meshes == ()
+    with pytest.raises(StateError, match=r"torn.*cannot follow"):
+        world.read_render_mesh(skin, 1.0)
 
 
 def test_names_textures_and_the_nearest_vertices_are_told(tmp_path):
