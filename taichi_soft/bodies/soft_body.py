@@ -130,6 +130,7 @@ class Slice:
 
     name = ""  # of its part of a snapshot
     bars_cuts = True  # whether a body that it holds is not cut and does not tear
+    bars_levels = True  # whether the level of detail of such a body does not change
 
     def __init__(self, context: Context) -> None:
         """Nothing yet."""

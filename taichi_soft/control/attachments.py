@@ -23,7 +23,7 @@ class Attachment(Handle):
 
     Where the body is cut or tears, they are held on, and so are copies of them: `particles` has them all. If
     it falls apart, `body` is the largest piece that has some; what another has is held by an attachment of
-    its own, in its `Body.attachments`.
+    its own, in its `Body.attachments`. Where the level of detail changes, the nearest vertices are held on.
     """
 
     def __init__(
@@ -93,6 +93,7 @@ class Attachments(Slice):
 
     name = "attachments"
     bars_cuts = False  # `share_attachments` lets pieces hang on
+    bars_levels = False  # see `levels.hanging`
 
     @property
     def _frames(self) -> Frames:

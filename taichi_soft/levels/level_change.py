@@ -25,6 +25,7 @@ from taichi_soft.core.checks import as_count
 from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.fracture.cutting import write_slot, write_surface
 from taichi_soft.fracture.kernels.topology import MOTION_WIDTH, read_motion
+from taichi_soft.levels.hanging import hang_on, hanging_at, let_hold
 from taichi_soft.levels.passage import Passage, passage
 
 Floats = NDArray[np.float64]
@@ -54,15 +55,19 @@ def set_level(body: SoftBody, level: Any) -> None:
         return
     state, target = context.built.state, body.asset.levels[wanted]
     over, arrays = passage(body.asset, before, wanted), target.arrays
-    motion = np.empty((body.vertex_count, MOTION_WIDTH), dtype=np.float32)
-    read_motion(state, body.index, motion)
+    found = np.empty((body.vertex_count, MOTION_WIDTH), dtype=np.float32)
+    read_motion(state, body.index, found)
+    motion = found.astype(np.float64)
     held = _held_at(body, wanted)
-    rows = _passed(over, motion.astype(np.float64), target.description.masses, held).astype(np.float32)
+    hanging = hanging_at(body, over, np.flatnonzero(motion[:, INV_MASS] == 0.0), held, wanted)
+    rows = _passed(over, motion, target.description.masses, held)
+    hang_on(hanging, motion, rows)
     status = int(state.body_status[body.index])
-    write_slot(context, state, body.index, arrays, rows, status, body.index, None)
+    write_slot(context, state, body.index, arrays, rows.astype(np.float32), status, body.index, None)
     write_surface(context, state, body.index, target)
     record_of(body).become(None, wanted)
     redescribe(body, target.description, arrays)
+    let_hold(hanging)
     context.built.was_cut(body)
     context.built.rouse(body.index)
 
@@ -75,7 +80,7 @@ def bar_to_levels(body: SoftBody) -> str:
     context = context_of(body)
     if context.fields is None:
         return "the world is not built: call world.build() first, and change what moves"
-    holds = [each.name for each in context.slices if each.holds(body)]
+    holds = [each.name for each in context.slices if each.bars_levels and each.holds(body)]
     if holds:
         return (
             f"body {body.index} has {' and '.join(holds)} that name its vertices: release or remove them "

@@ -121,11 +121,12 @@ class Body(BodyControl, BodyMeasures):
         """Go on with more or fewer tetrahedra: a level of detail of the asset, 0 being the finest.
 
         Position, velocity, rotation and deformation pass over; centre of mass, momentum and angular momentum
-        are kept to round-off. The vertices nearest to pinned ones are pinned. Vertices and tetrahedra are
-        others: `topology_version` counts that. `render_meshes` stay, and are drawn from the new mesh.
-        Raises: OptionError for a level that the asset does not have; StateError for a body that is attached,
-            joined, grabbed or driven, frozen, or of a material of its own, and before `build`. Nothing is
-            changed then.
+        are kept to round-off. The vertices nearest to pinned ones are pinned, and attachments hold those
+        nearest to what they held. Vertices and tetrahedra are others: `topology_version` counts that.
+        `render_meshes` stay, and are drawn from the new mesh.
+        Raises: OptionError for a level that the asset does not have; StateError for a body that is joined,
+            grabbed or driven, frozen, or of a material of its own, where the level has no vertex for an
+            attachment, and before `build`. Nothing is changed then.
         """
         set_level(self, level)
 

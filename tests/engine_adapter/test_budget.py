@@ -203,7 +203,7 @@ def test_bodies_that_touch_skip_steps_together(clock):
 
 def test_what_is_held_keeps_its_level(clock):
     game, bodies = row_of(clock, budget_ms=1e3 * clock.per_tet * COUNT * SIZES[2] / 2)
-    hold = bodies[2].attach([0], game.world.add_frame(position=(0, 0, 0)))
+    hold = bodies[2].grab(0)
     for _ in range(60):
         game.step()
     assert levels(bodies) == [2, 2, 0, 2, 2, 2]
@@ -237,7 +237,7 @@ def test_steps_that_are_made_again_with_other_inputs_leave_what_is_held_then(clo
 
     def before_step(world):
         if held and world.step_count == 2:
-            held.append(world.bodies[-1].attach([0], world.add_frame(position=(0, 0, 0))))
+            held.append(world.bodies[-1].grab(0))
 
     game, bodies = row_of(
         clock, budget_ms=1e3 * clock.per_tet * COUNT * SIZES[0] / 2, rewind_ticks=30, before_step=before_step

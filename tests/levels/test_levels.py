@@ -217,6 +217,81 @@ def test_a_push_keeps_its_force_and_its_torque(flying):
         assert spin == pytest.approx(found[0][1], abs=2e-3 * np.abs(found[0][1]).max())
 
 
+def hung_bar(two_way=False):
+    """A bar of three levels, of which a frame holds the one end and another frame the other."""
+    asset = SoftBodyAsset(BAR[0], RUBBER).with_coarser(*BAR[1:])
+    world = World(floor=None)
+    body = world.add_body(asset, position=(0, 0, 2))
+    world.build()
+    ends = [np.flatnonzero(BAR[0].vertices[:, 0] == end) for end in (-0.6, 0.6)]
+    frames = [world.add_frame(position=(x, 0.1, 2), rotation=TURNED) for x in (-0.6, 0.6)]
+    holds = [body.attach(end, frame, two_way=two_way) for end, frame in zip(ends, frames, strict=True)]
+    return world, body, frames, holds, ends
+
+
+TURNED = np.array([[0.0, -1.0, 0.0], [0.6, 0.0, -0.8], [0.8, 0.0, 0.6]])
+
+
+def test_attachments_pass_to_the_nearest_vertices_and_go_with_their_frames():
+    """By the rest shapes, turned and shifted as the frame is."""
+    world, body, (left, _), holds, ends = hung_bar()
+    for _ in range(20):
+        world.step(DT)
+    for level in (1, 2, 0, 2):
+        body.set_level(level)
+        rest = BAR[level].vertices
+        for hold, end in zip(holds, (rest[:, 0].min(), rest[:, 0].max()), strict=True):
+            assert hold.is_attached
+            assert sorted(hold.particles) == np.flatnonzero(rest[:, 0] == end).tolist()
+        world.restore(world.snapshot())
+        if level == 0:
+            assert [hold.particles.tolist() for hold in holds] == [end.tolist() for end in ends]
+    turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    rest, start = BAR[2].vertices, np.array([-0.6, 0.1, 2.0])
+    for k in range(1, 61):
+        left.move_to(
+            start + k / 60 * np.array([0.1, 0, 0.2]),
+            np.linalg.matrix_power(turn, 1 if k == 60 else 0) @ TURNED,
+        )
+        world.step(DT)
+    particles = holds[0].particles
+    expected = (rest[particles] + [0, 0, 2] - start) @ turn.T + start + [0.1, 0, 0.2]
+    assert np.abs(body.positions()[particles] - expected).max() < 1e-3
+    held = holds[1].particles
+    assert np.abs(body.positions()[held] - rest[held] - [0, 0, 2]).max() < 1e-3
+    holds[0].release()
+    assert body.pinned.tolist() == sorted(held.tolist())
+
+
+def test_what_hangs_pulls_with_its_weight_before_and_after_a_change():
+    world, body, _, holds, _ = hung_bar(two_way=True)
+    body.set_linear_damping(8.0)
+    weight = 9.80665 * body.masses.sum()
+    for level in (0, 2, 1, 0):
+        before = sum(hold.force for hold in holds) if level else None
+        body.set_level(level)
+        if level:
+            assert sum(hold.force for hold in holds) == pytest.approx(before, abs=1e-4 * weight)
+        for _ in range(240):
+            world.step(DT)
+        assert sum(hold.force for hold in holds) == pytest.approx([0, 0, -weight], abs=0.01 * weight)
+
+
+def test_an_attachment_that_would_hold_nothing_bars_the_change_and_stays():
+    world, body, frames, holds, _ = hung_bar()
+    near = BAR[2].vertices[np.argmin(np.linalg.norm(BAR[2].vertices, axis=1))]
+    first, second = np.argsort(np.linalg.norm(BAR[0].vertices - near, axis=1))[:2]
+    body.attach([first], frames[0])
+    body.set_level(2)
+    body.set_level(0)
+    other = body.attach([second], frames[1])
+    before = world.state_hash()
+    with pytest.raises(StateError, match="would hold nothing at level 2"):
+        body.set_level(2)
+    assert (world.state_hash(), body.level, other.is_attached) == (before, 0, True)
+    assert all(hold.is_attached for hold in holds)
+
+
 def test_a_restored_body_of_another_level_outdates_what_was_drawn_of_it(flying):
     world, body = flying
     body.set_level(2)
@@ -317,10 +392,9 @@ def test_levels_in_contact_change_back_and_forth_and_the_pile_stays_whole():
 
 def test_what_names_vertices_bars_a_change_and_is_named(flying):
     world, body = flying
-    frame = world.add_frame(position=(0, 0, 0))
-    hold = body.attach([0], frame)
+    hold = body.grab(0)
     before = world.state_hash()
-    with pytest.raises(StateError, match="has attachments that name its vertices"):
+    with pytest.raises(StateError, match="has grabs that name its vertices"):
         body.set_level(1)
     assert (world.state_hash(), body.level) == (before, 0)
     hold.release()
