@@ -168,8 +168,8 @@ class SoftBodyAsset:
         ):
             raise MeshError(
                 f"level {level}: {len(asset.mesh.tets)} tetrahedra and {needed[0]} vertices are not fewer "
-                "than the "
-                f"{len(before.mesh.tets)} and {len(before.mesh.vertices)} of the level before"
+                f"than the {len(before.mesh.tets)} and {len(before.mesh.vertices)} of the level before: take "
+                "fewer cells, or leave smaller cells round thin limbs out (from_surface, refine=0)"
             )
         (low, high), (own_low, own_high) = (
             (each.mesh.vertices.min(axis=0), each.mesh.vertices.max(axis=0)) for each in (self, asset)
