@@ -82,10 +82,10 @@ class SoftBodyAsset:
         tearing: where it tears by itself, into its spare vertices; None for nowhere. Takes a `Material`.
         skin: what is drawn in place of its surface, as `read_surfaces` takes it: a file, a trimesh.Trimesh or
             Scene. See `Body.render_meshes`.
-        hull: by what it touches others in place of the surface of its tetrahedra: by so many points of its
-            skin, 12 to 20,000, and triangles between them; or by the vertices and triangles of a surface of
-            your own, as `read_surfaces` takes it. None for the surface. See docs/artists-mesh.md. Takes
-            tetrahedra, no spare vertices, and no contact of the body with itself.
+        hull: by what it touches others in place of the surface of its tetrahedra: by points of its skin and
+            triangles between them, so many (12 to 20,000) or, if True, enough; or by the vertices and
+            triangles of a surface of your own, as `read_surfaces` takes it. None for the surface. See
+            docs/artists-mesh.md. Takes tetrahedra, no spare vertices, and no contact of the body with itself.
         coarser: the same thing of fewer and fewer tetrahedra, as `with_coarser` makes it: levels of detail
             for `Body.set_level`. Takes no spare vertices and no plasticity.
     Raises: MeshError, MaterialError or OptionError for bad input.
@@ -135,7 +135,8 @@ class SoftBodyAsset:
         object.__setattr__(self, "pinned", pinned)
         object.__setattr__(self, "description", description)
         object.__setattr__(self, "skin", surfaces)
-        object.__setattr__(self, "hull", as_hull(self.hull, surfaces))
+        outer = len(self.mesh.surface_vertices) if isinstance(self.mesh, TetMesh) else 0
+        object.__setattr__(self, "hull", as_hull(self.hull, surfaces, outer))
         if self.hull is not None:
             self._require_hull()
         object.__setattr__(self, "coarser", self._checked_levels())

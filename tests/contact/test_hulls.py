@@ -269,7 +269,7 @@ def test_a_body_falls_asleep_on_its_hull_and_wakes():
         (11, OptionError, "hull"),
         (20_001, OptionError, "hull"),
         (100.5, OptionError, "hull"),
-        (True, OptionError, "hull"),
+        (False, OptionError, "hull"),
         ("nowhere.glb", MeshError, "nowhere.glb"),
         ((POINTS, [[0, 1, 1]]), MeshError, "twice"),
     ],
@@ -277,6 +277,11 @@ def test_a_body_falls_asleep_on_its_hull_and_wakes():
 def test_bad_hulls_are_refused(hull, error, words):
     with pytest.raises(error, match=words):
         SoftBodyAsset.from_surface(ball(), JELLY, cells=4, hull=hull)
+
+
+def test_without_a_number_a_hull_has_about_twice_the_outer_vertices_of_the_cage():
+    asset = SoftBodyAsset.from_surface(ball(), JELLY, cells=4, hull=True)
+    assert len(asset.hull.points) == pytest.approx(2 * len(np.unique(asset.mesh.surface)), rel=0.2)
 
 
 def test_what_takes_no_hull_is_refused():
