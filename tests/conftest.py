@@ -43,7 +43,7 @@ SECONDS = {
     "world/": (84, 397),
     "cages/": (120, 75),
     "feel/": (60, 90),
-    "levels/": (45, 90),
+    "levels/": (85, 150),
     "bodies/": (30, 296),
     "lab/": (0, 355),
     "cli/": (0, 225),
@@ -96,7 +96,11 @@ SOAK = (
     *(f"persistence/test_snapshot.py::test_{name}" for name in ("rest_shapes", "other_integrators")),
     *(f"test_package.py::test_a_{name}" for name in ("source", "wheel")),
     "docs/test_pages.py::test_the_code",
-    *("control/test_joints.py::test_a_recording", "test_readme.py::test_the_level"),
+    *(
+        "control/test_joints.py::test_a_recording",
+        "levels/test_holding.py::test_recordings",
+        "test_readme.py::test_the_level",
+    ),
     *(f"levels/test_levels.py::test_{name}" for name in ("levels_in_contact", "after_warming", "warming")),
     "bake/test_bake.py::test_a_body_that_goes",
     # Worlds of kinds that one test has to itself; joints and motors by leapfrog are in `make test`.

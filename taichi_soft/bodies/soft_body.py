@@ -130,7 +130,7 @@ class Slice:
 
     name = ""  # of its part of a snapshot
     bars_cuts = True  # whether a body that it holds is not cut and does not tear
-    bars_levels = True  # whether the level of detail of such a body does not change
+    bars_levels = True  # whether a change of its level of detail has no place for what holds it
 
     def __init__(self, context: Context) -> None:
         """Nothing yet."""

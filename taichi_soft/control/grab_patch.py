@@ -31,7 +31,7 @@ class Patch:
 
 
 def patch_round(body: BodyDescription, corners: NDArray[np.int32], weights: NDArray[np.float64]) -> Patch:
-    """The patch round a point of the surface at rest, given in barycentric coordinates of three vertices."""
+    """The patch round a point at rest, given in barycentric coordinates of three or four vertices."""
     mesh = body.mesh
     distance = np.linalg.norm(mesh.vertices - weights @ mesh.vertices[corners], axis=1)
     radius = max(

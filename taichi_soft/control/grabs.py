@@ -11,12 +11,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies.soft_body import RowsOf, SoftBody, context_of, record_of
 from taichi_soft.control.change import change, numbers, require_substeps, rows_of
-from taichi_soft.control.grab_patch import patch_round
+from taichi_soft.control.grab_patch import Patch, patch_round
 from taichi_soft.control.kernels.grabs import (
+    CORNERS,
+    FORCE,
+    LIMITS,
     MOST_GRABS,
     PATCH_ROWS,
+    PLACE,
     end_grab,
-    read_grab_force,
+    read_grab,
     write_grab,
     write_grab_target,
 )
@@ -63,9 +67,7 @@ class Grab(Handle):
         Raises: StateError once released.
         """
         self._require_held()
-        found = np.empty(3, dtype=np.float32)
-        read_grab_force(context_of(self.body).built.state, self._number, found)
-        return found
+        return _read(self)[1][FORCE]
 
     @recorded
     def move(self, point: ArrayLike) -> None:
@@ -91,15 +93,12 @@ class Grabs(Numbered[Grab]):
     """All grabs of one world, by number."""
 
     name = "grabs"
+    bars_levels = False  # see `hold_at`
     most, way_out = MOST_GRABS, "release"
-
-    def holds(self, body: SoftBody) -> bool:
-        """Whether it is grabbed."""
-        return any(grab.body is body for grab in self.by_number.values())
 
     def let_go(self, body: SoftBody) -> None:
         """Release all that hold a body."""
-        for grab in [each for each in self.by_number.values() if each.body is body]:
+        for grab in self.holding(body):
             grab.release()
 
     def warm_up(self, body: SoftBody, other: SoftBody | None, step: Callable[[], None]) -> None:
@@ -191,9 +190,59 @@ def grab_at(
     free = context_of(body).of(Grabs).free_number()
     patch = patch_round(record_of(body).description, corners, weights)
     spring = (mass * omega**2, 2 * mass * omega, 2 * HIGHEST_SPEED / omega)
-    row = numbers(weights, target, *spring, min(strongest, patch.strength), strongest, 1 / mass)
-    rows, shares = rows_of(body, patch.vertices), patch.shares.astype(np.float32)
-    change(body, write_grab, free, body.index, rows_of(body, corners), row, rows, shares)
+    limits = (min(strongest, patch.strength), strongest, 1 / mass)
+    row = numbers(weights, 0.0, target, *spring, limits, np.zeros(3))
+    _write(body, free, np.append(corners, corners[0]), row, patch)
     grabs[free] = Grab(body, free, target)
     handles_of(body).enlist(grabs[free])
     return grabs[free]
+
+
+def place_of(grab: Grab) -> NDArray[np.float64]:
+    """The point of its body that a grab pulls at, in the rest shape, (3,) [m]."""
+    body, (corners, row) = grab.body, _read(grab)
+    rows = rows_of(body, np.arange(body.vertex_count, dtype=np.int32))
+    order = np.argsort(rows)
+    vertices = order[np.searchsorted(rows, corners, sorter=order)]
+    weights = row[PLACE].astype(np.float64)
+    return np.asarray(weights / weights.sum() @ body.mesh.vertices[vertices])
+
+
+def hold_at(grab: Grab, place: NDArray[np.float64]) -> None:
+    """Let a grab hold the tetrahedra that its body has now, round a point of the rest shape, (3,) [m].
+
+    Its target, spring and strongest pull stay, and the force of the last substep.
+    """
+    body, (_, row) = grab.body, _read(grab)
+    corners, weights = _tetrahedron_at(body, place)
+    patch = patch_round(record_of(body).description, corners, weights)
+    on_patch, strongest = LIMITS.start, LIMITS.start + 1
+    row[PLACE], row[on_patch] = weights, min(row[strongest], patch.strength)
+    _write(body, grab._number, corners, row, patch)
+
+
+def _read(grab: Grab) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    """Rows of the corners and the numbers of a grab, as `write_grab` takes them."""
+    corners, row = np.empty(CORNERS, dtype=np.int32), np.empty(FORCE.stop, dtype=np.float32)
+    read_grab(context_of(grab.body).built.state, grab._number, corners, row)
+    return corners, row
+
+
+def _write(
+    body: SoftBody, number: int, corners: NDArray[np.int32], row: NDArray[np.float32], patch: Patch
+) -> None:
+    rows, shares = rows_of(body, patch.vertices), patch.shares.astype(np.float32)
+    change(body, write_grab, number, body.index, rows_of(body, corners), row, rows, shares)
+
+
+def _tetrahedron_at(
+    body: SoftBody, place: NDArray[np.float64]
+) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    """Corners and barycentric coordinates of a point of the rest shape, (4,) each; of one outside in the
+    tetrahedron that it is least outside of."""
+    ends = body.mesh.vertices[body.tets]
+    arms = np.swapaxes(ends[:, 1:] - ends[:, :1], 1, 2)
+    rest = np.linalg.solve(arms, (place - ends[:, 0])[..., None])[..., 0]
+    weights = np.concatenate([1.0 - rest.sum(axis=1, keepdims=True), rest], axis=1)
+    best = weights.min(axis=1).argmax()
+    return body.tets[best], weights[best]

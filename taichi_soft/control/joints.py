@@ -108,11 +108,7 @@ class Joints(Numbered[Joint]):
 
     def holding(self, body: SoftBody) -> list[Joint]:
         """Those that hold a body, from either side."""
-        return [joint for joint in self.by_number.values() if body in (joint.body, joint.other)]
-
-    def holds(self, body: SoftBody) -> bool:
-        """Whether it is joined to another body."""
-        return bool(self.holding(body))
+        return [joint for joint in self.handles if body in (joint.body, joint.other)]
 
     def let_go(self, body: SoftBody) -> None:
         """Release all that hold a body."""

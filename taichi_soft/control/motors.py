@@ -157,13 +157,9 @@ class Motors(Numbered[Motor]):
         """Particles that all motors drive together."""
         return sum(len(motor.particles) for motor in self.by_number.values())
 
-    def holds(self, body: SoftBody) -> bool:
-        """Whether one drives it."""
-        return any(motor.body is body for motor in self.by_number.values())
-
     def let_go(self, body: SoftBody) -> None:
         """Remove all that drive a body."""
-        for motor in [each for each in self.by_number.values() if each.body is body]:
+        for motor in self.holding(body):
             motor.remove()
 
     def warm_up(self, body: SoftBody, other: SoftBody | None, step: Callable[[], None]) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Generic, TypeVar
 
-from taichi_soft.bodies.soft_body import Context, Slice
+from taichi_soft.bodies.soft_body import Context, Slice, SoftBody
 from taichi_soft.core.errors import StateError
 from taichi_soft.core.handles import Handle
 
@@ -26,6 +26,14 @@ class Numbered(Slice, Generic[Kind]):
     def handles(self) -> list[Kind]:
         """Of all there are, by number."""
         return [each for _, each in sorted(self.by_number.items())]
+
+    def holding(self, body: SoftBody) -> list[Kind]:
+        """Those that hold a body, by number."""
+        return [each for each in self.handles if each.body is body]  # type: ignore[attr-defined]
+
+    def holds(self, body: SoftBody) -> bool:
+        """Whether there are such."""
+        return bool(self.holding(body))
 
     def free_number(self) -> int:
         """The lowest. Raises: StateError where there is none."""

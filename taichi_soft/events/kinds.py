@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 from taichi_soft.bodies.failure import Failure
 from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.contact.collider import Collider
+from taichi_soft.control.attachments import Attachment
+from taichi_soft.control.joints import Joint
+from taichi_soft.control.motors import Motor
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -21,6 +24,17 @@ class Event:
 
     step: int  # of the world, counted from 0
     time: float  # [s], at the end of that step
+
+
+@dataclass(frozen=True, eq=False)
+class Released(Event):
+    """`Body.set_level` with `release=True` has released what has no place at the new level.
+
+    It happens before a step: `step` is the coming one, and `time` is that at its beginning.
+    """
+
+    body: SoftBody
+    handles: tuple[Attachment | Joint | Motor, ...]  # which are dead now
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,6 +118,7 @@ class Torn(Event):
 
 
 KINDS: tuple[type[Event], ...] = (
+    Released,
     ContactBegan,
     ContactEnded,
     StressExceeded,

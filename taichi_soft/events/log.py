@@ -9,7 +9,7 @@ from typing import Any
 from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.events.event_state import Known, Memory
-from taichi_soft.events.kinds import CONTACT_KINDS, KINDS, Event, Torn
+from taichi_soft.events.kinds import CONTACT_KINDS, KINDS, Event, Released, Torn
 from taichi_soft.events.observer import Observer
 
 MOST_EVENTS = 10_000
@@ -108,6 +108,11 @@ class EventLog:
         """What the step that ended at `time` [s] has pulled too hard has torn a body."""
         if Torn in self._kinds:
             self._waiting.append(Torn(step, time, body, pieces))
+
+    def note_released(self, step: int, time: float, body: SoftBody, handles: tuple[Any, ...]) -> None:
+        """A change of its level before `step`, at `time` [s], has released what held a body."""
+        if handles and Released in self._kinds:
+            self._waiting.append(Released(step, time, body, handles))
 
     def remember(self) -> Memory:
         """What the events of coming steps depend on."""

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from taichi_soft.bodies.soft_body import SoftBody, context_of
 from taichi_soft.control.frames import Frames
-from taichi_soft.core.errors import StateError
 from taichi_soft.levels.passage import Passage
 
 Floats = NDArray[np.float64]
@@ -26,24 +25,17 @@ Hanging = list[tuple[Any, NDArray[np.int32]]]
 """Attachments of a body, and what each will hold."""
 
 
-def hanging_at(body: SoftBody, over: Passage, sources: Ints, held: Ints, level: int) -> Hanging:
-    """What the attachments of a body will hold at another level.
+def hanging_at(body: SoftBody, over: Passage, held: Ints) -> Hanging:
+    """What the attachments of a body will hold at another level; nothing where it has no vertex for one.
 
-    Args: sources: vertices that are held now. held: those that will be.
-    Raises: StateError where there is no vertex for one of them.
+    Args: held: vertices that will be held there.
     """
     attachments = context_of(body).of(Frames).holding(body)
     if not attachments:
         return []
+    sources = body.pinned.astype(np.int64)
     nearest = sources[over.nearest_sources(held, sources)]
-    found = [(each, held[np.isin(nearest, each.particles)].astype(np.int32)) for each in attachments]
-    for each, particles in found:
-        if not len(particles):
-            raise StateError(
-                f"{each!r} would hold nothing at level {level}, where its vertices have no place of their "
-                "own: release it before the level changes"
-            )
-    return found
+    return [(each, held[np.isin(nearest, each.particles)].astype(np.int32)) for each in attachments]
 
 
 def hang_on(hanging: Hanging, motion: Floats, rows: Floats) -> None:

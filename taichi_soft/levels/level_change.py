@@ -3,7 +3,7 @@
 Positions, velocities and what was before the last step pass over as a skin is drawn: see `Passage`. Then a
 body that nothing holds is moved, and its velocities are given a rigid motion, so that centre of mass,
 momentum and angular momentum are to round-off what they were. What is finer than the new mesh is lost, with
-its energy.
+its energy. What holds the body goes on to hold it where the new mesh has its place.
 """
 
 from __future__ import annotations
@@ -21,11 +21,14 @@ from taichi_soft.bodies.soft_body import (
     record_of,
     redescribe,
 )
-from taichi_soft.core.checks import as_count
+from taichi_soft.control.grabs import Grabs, hold_at, place_of
+from taichi_soft.control.numbered import Numbered
+from taichi_soft.core.checks import as_count, as_flag
 from taichi_soft.core.errors import OptionError, StateError
+from taichi_soft.core.handles import Handle
 from taichi_soft.fracture.cutting import write_slot, write_surface
 from taichi_soft.fracture.kernels.topology import MOTION_WIDTH, read_motion
-from taichi_soft.levels.hanging import hang_on, hanging_at, let_hold
+from taichi_soft.levels.hanging import Hanging, hang_on, hanging_at, let_hold
 from taichi_soft.levels.passage import Passage, passage
 
 Floats = NDArray[np.float64]
@@ -37,9 +40,10 @@ TARGET, PUSH = slice(17, 20), slice(20, 23)
 """Columns of `read_motion`."""
 
 
-def set_level(body: SoftBody, level: Any) -> None:
-    """As `Body.set_level`."""
+def set_level(body: SoftBody, level: Any, release: Any) -> tuple[Handle, ...]:
+    """As `Body.set_level`. Returns: what was released."""
     context = context_of(body)
+    may_release = as_flag(release, "release")
     before = record_of(body).level
     wanted = as_count(level, "level", 0)
     count = len(body.asset.levels)
@@ -48,18 +52,18 @@ def set_level(body: SoftBody, level: Any) -> None:
             f"level is {wanted}, and the asset of body {body.index} has {count}: from_surface with "
             "cells=(12, 8, 5) makes several"
         )
-    bar = bar_to_levels(body)
+    bar = bar_to_levels(body, may_release=may_release)
     if bar:
         raise StateError(bar)
     if wanted == before:
-        return
+        return ()
     state, target = context.built.state, body.asset.levels[wanted]
     over, arrays = passage(body.asset, before, wanted), target.arrays
+    released, held, hanging = _make_room(body, over, wanted, may_release=may_release)
+    grabbed = [(grab, place_of(grab)) for grab in context.of(Grabs).holding(body)]
     found = np.empty((body.vertex_count, MOTION_WIDTH), dtype=np.float32)
     read_motion(state, body.index, found)
     motion = found.astype(np.float64)
-    held = _held_at(body, wanted)
-    hanging = hanging_at(body, over, np.flatnonzero(motion[:, INV_MASS] == 0.0), held, wanted)
     rows = _passed(over, motion, target.description.masses, held)
     hang_on(hanging, motion, rows)
     status = int(state.body_status[body.index])
@@ -68,23 +72,27 @@ def set_level(body: SoftBody, level: Any) -> None:
     record_of(body).become(None, wanted)
     redescribe(body, target.description, arrays)
     let_hold(hanging)
+    for grab, place in grabbed:
+        hold_at(grab, place)
     context.built.was_cut(body)
     context.built.rouse(body.index)
+    return tuple(released)
 
 
-def bar_to_levels(body: SoftBody) -> str:
+def bar_to_levels(body: SoftBody, *, may_release: bool = False) -> str:
     """Why the level of a body cannot change now, and the way out; "" where it can.
 
+    Args: may_release: what has no place at another level is no bar.
     Raises: StateError where the body or its world is gone.
     """
     context = context_of(body)
     if context.fields is None:
         return "the world is not built: call world.build() first, and change what moves"
     holds = [each.name for each in context.slices if each.bars_levels and each.holds(body)]
-    if holds:
+    if holds and not may_release:
         return (
             f"body {body.index} has {' and '.join(holds)} that name its vertices: release or remove them "
-            "before its level changes"
+            "before its level changes, or let set_level do so with release=True"
         )
     if body.is_frozen:
         return f"body {body.index} is frozen: bring it back with set_motion before its level changes"
@@ -94,6 +102,36 @@ def bar_to_levels(body: SoftBody) -> str:
             "it anew from an asset of that material"
         )
     return ""
+
+
+def _make_room(
+    body: SoftBody, over: Passage, level: int, *, may_release: bool
+) -> tuple[list[Handle], Ints, Hanging]:
+    """Release what has no place at another level.
+
+    Returns: that; the vertices that will be held; what will hold them.
+
+    Raises: StateError where there is an attachment without a place that may not be released.
+    """
+    released: list[Handle] = []
+    for each in context_of(body).slices:
+        if each.bars_levels and isinstance(each, Numbered):
+            released += each.holding(body)
+            each.let_go(body)
+    while True:  # without what was released fewer vertices are held, and others may have no place
+        held = _held_at(body, level)
+        hanging = hanging_at(body, over, held)
+        homeless = [each for each, particles in hanging if not len(particles)]
+        if not homeless:
+            return released, held, hanging
+        if not may_release:
+            raise StateError(
+                f"{homeless[0]!r} would hold nothing at level {level}, where its vertices have no place of "
+                "their own: release it before the level changes, or let set_level do so with release=True"
+            )
+        for each in homeless:
+            each.release()
+        released += homeless
 
 
 def _passed(over: Passage, motion: Floats, masses: Floats, held: Ints) -> Floats:

@@ -117,18 +117,24 @@ class Body(BodyControl, BodyMeasures):
         self._record.frozen_in = self._record.failure = None
 
     @recorded
-    def set_level(self, level: int) -> None:
+    def set_level(self, level: int, *, release: bool = False) -> None:
         """Go on with more or fewer tetrahedra: a level of detail of the asset, 0 being the finest.
 
         Position, velocity, rotation and deformation pass over; centre of mass, momentum and angular momentum
-        are kept to round-off. The vertices nearest to pinned ones are pinned, and attachments hold those
-        nearest to what they held. Vertices and tetrahedra are others: `topology_version` counts that.
-        `render_meshes` stay, and are drawn from the new mesh.
-        Raises: OptionError for a level that the asset does not have; StateError for a body that is joined,
-            grabbed or driven, frozen, or of a material of its own, where the level has no vertex for an
-            attachment, and before `build`. Nothing is changed then.
+        are kept to round-off. The vertices nearest to pinned ones are pinned, attachments hold those
+        nearest to what they held, and grabs go on at the same point of the rest shape, with their target and
+        strongest pull. Vertices and tetrahedra are others: `topology_version` counts that. `render_meshes`
+        stay, and are drawn from the new mesh.
+        Args:
+            level: 0 or more.
+            release: let go of what has no place at the new level, with an event `Released`: joints, motors,
+                and attachments for which it has no vertex. Otherwise these bar the change.
+        Raises: OptionError for a level that the asset does not have; StateError for a body that is frozen or
+            of a material of its own, for what bars the change, and before `build`. Nothing is changed then.
         """
-        set_level(self, level)
+        released = set_level(self, level, release)
+        clock = self._context.clock
+        self._context.built.events.note_released(clock.steps, clock.time, self, released)
 
     def watch_stress(self, threshold: float | None) -> None:
         """Record a `StressExceeded` in every step in which tetrahedra come over a stress.

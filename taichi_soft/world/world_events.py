@@ -43,9 +43,9 @@ class WorldEvents(WorldParts):
     def drain_events(self) -> list[Event]:
         """All events since the last call, after those who listen have heard of them.
 
-        They come step by step; within a step by kind (contacts begun and ended, stress, tear candidates,
-        sleep, waking, freezing, tearing), then by the indices of bodies. Up to 10,000 wait, then the oldest
-        are dropped, with a `DroppedEventsWarning` in the step.
+        They come step by step; within a step by kind (released before it, contacts begun and ended, stress,
+        tear candidates, sleep, waking, freezing, tearing), then by the indices of bodies. Up to 10,000 wait,
+        then the oldest are dropped, with a `DroppedEventsWarning` in the step.
 
         An exception of a listener keeps no other from hearing of any event: the first is raised at the end.
         The next call then returns these events with those that came since, and listeners hear of none twice.

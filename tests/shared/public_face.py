@@ -534,7 +534,7 @@ CALLS: dict[str, dict[str, Call]] = {
             "max_force": LOAD,
         }, _has_full_hands),
         "set_material": Call({"material": MATERIAL}),
-        "set_level": Call({"level": choice(0, **NOT_COUNTS, finer=1)}, perhaps),
+        "set_level": Call({"level": choice(0, **NOT_COUNTS, finer=1), "release": FLAG}, perhaps),
         "set_damping": Call({"damping": Kind(
             lambda g, rng: rng.uniform(1.0, 9.0) if rng.integers(2) else rng.uniform(1.0, 9.0, len(g.receiver.tets)),
             NOT_NUMBERS | {"below": -1.0, "of another length": np.ones(M + 1), "nan in one": np.full(M, NAN)},

@@ -19,6 +19,13 @@ from taichi_soft.core.runtime import holds_fields, ti
 MOST_GRABS, PATCH_ROWS = 16, 128
 """Grabs of one world at a time, and particles that one of them holds."""
 
+CORNERS = 4
+"""Particles between which its point lies: of a triangle, or of a tetrahedron once the level of detail has
+changed."""
+
+PLACE, LIMITS, FORCE = slice(0, 4), slice(10, 13), slice(13, 16)
+"""Columns of `write_grab` and `read_grab`."""
+
 
 @holds_fields
 class GrabFields:
@@ -27,8 +34,8 @@ class GrabFields:
     def __init__(self, real: Any) -> None:
         """Allocate; contents are zero."""
         self.body = ti.field(ti.i32, MOST_GRABS)  # its number plus 1, 0 where nothing is held
-        self.corners = ti.Vector.field(3, ti.i32, MOST_GRABS)
-        self.weights = ti.Vector.field(3, real, MOST_GRABS)  # of the corners
+        self.corners = ti.Vector.field(CORNERS, ti.i32, MOST_GRABS)
+        self.weights = ti.Vector.field(CORNERS, real, MOST_GRABS)  # of the corners
         self.target = ti.Vector.field(3, real, MOST_GRABS)  # [m]
         self.spring = ti.Vector.field(3, real, MOST_GRABS)  # see `write_grab`
         self.limits = ti.Vector.field(3, real, MOST_GRABS)
@@ -42,7 +49,9 @@ class GrabFields:
         more."""
         for numbers in (self.body, self.count, self.particle, self.share):
             loader.fill(numbers, np.zeros(0))
-        for rows in (self.corners, self.weights, self.target, self.spring, self.limits, self.force):
+        for places in (self.corners, self.weights):
+            loader.fill(places, np.zeros((0, CORNERS)))
+        for rows in (self.target, self.spring, self.limits, self.force):
             loader.fill(rows, np.zeros((0, 3)))
 
     def carried(self) -> list[list[Any]]:
@@ -59,7 +68,7 @@ def _stretch(state: ti.template(), g):
     """From where a grab wants its point to where that is [m], no longer than the longest."""
     corners, weights = state.grabs.corners[g], state.grabs.weights[g]
     point = ti.Vector.zero(state.real, 3)
-    for i in ti.static(range(3)):
+    for i in ti.static(range(CORNERS)):
         point += weights[i] * state.particle_position[corners[i]]
     stretch = point - state.grabs.target[g]
     return stretch * ti.min(1.0, state.grabs.spring[g].z / ti.max(stretch.norm(), 1e-12))
@@ -170,24 +179,27 @@ def write_grab(
     patch: ti.types.ndarray(dtype=ti.i32, ndim=1),
     shares: ti.types.ndarray(dtype=ti.f32, ndim=1),
 ):
-    """Begin a grab.
+    """Begin a grab, or let one hold other particles.
 
     Args:
-        corners: particles of the triangle, (3,).
+        corners: particles between which its point lies, (4,).
         numbers: their weights, the point to pull to [m]; of the spring stiffness [N/m], damping [N s/m] and
-            longest stretch [m]; strongest pull on the patch and on all [N]; 1 / mass of the body [1/kg].
+            longest stretch [m]; strongest pull on the patch and on all [N]; 1 / mass of the body [1/kg];
+            with what it pulled in the last substep [N].
         patch: particles, at most `PATCH_ROWS`.
         shares: of them.
     """
     ti.loop_config(serialize=True)
     for _ in range(1):
         state.grabs.body[g] = body + 1
-        state.grabs.corners[g] = ti.Vector([corners[0], corners[1], corners[2]])
-        state.grabs.weights[g] = ti.Vector([numbers[0], numbers[1], numbers[2]])
-        state.grabs.target[g] = ti.Vector([numbers[3], numbers[4], numbers[5]])
-        state.grabs.spring[g] = ti.Vector([numbers[6], numbers[7], numbers[8]])
-        state.grabs.limits[g] = ti.Vector([numbers[9], numbers[10], numbers[11]])
-        state.grabs.force[g] = ti.Vector.zero(state.real, 3)
+        for k in ti.static(range(CORNERS)):
+            state.grabs.corners[g][k] = corners[k]
+            state.grabs.weights[g][k] = numbers[k]
+        for k in ti.static(range(3)):
+            state.grabs.target[g][k] = numbers[4 + k]
+            state.grabs.spring[g][k] = numbers[7 + k]
+            state.grabs.limits[g][k] = numbers[10 + k]
+            state.grabs.force[g][k] = numbers[13 + k]
         state.grabs.count[g] = patch.shape[0]
         for i in range(patch.shape[0]):
             state.grabs.particle[g * PATCH_ROWS + i] = patch[i]
@@ -214,7 +226,18 @@ def end_grab(state: ti.template(), g: ti.i32, body: ti.i32):
 
 
 @ti.kernel
-def read_grab_force(state: ti.template(), g: ti.i32, force: ti.types.ndarray(dtype=ti.f32, ndim=1)):
-    """With what a grab pulled in the last substep, (3,) [N]."""
+def read_grab(
+    state: ti.template(),
+    g: ti.i32,
+    corners: ti.types.ndarray(dtype=ti.i32, ndim=1),
+    numbers: ti.types.ndarray(dtype=ti.f32, ndim=1),
+):
+    """Corners and numbers of a grab as `write_grab` takes them, (4,) and (16,)."""
+    for k in ti.static(range(CORNERS)):
+        corners[k] = state.grabs.corners[g][k]
+        numbers[k] = state.grabs.weights[g][k]
     for k in ti.static(range(3)):
-        force[k] = state.grabs.force[g][k]
+        numbers[4 + k] = state.grabs.target[g][k]
+        numbers[7 + k] = state.grabs.spring[g][k]
+        numbers[10 + k] = state.grabs.limits[g][k]
+        numbers[13 + k] = state.grabs.force[g][k]
