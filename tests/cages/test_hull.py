@@ -60,7 +60,7 @@ def test_points_are_carried_by_weights_of_a_tetrahedron():
     nearest point of the cage."""
     rod = trimesh.creation.cylinder(0.02, 1.0, sections=8).apply_translation((0, 0, 1.2))
     parts = read_surfaces(surfaces.joined(BALL, rod))
-    mesh, _ = tetrahedra_of(read_surfaces(BALL), cells=6)
+    mesh = tetrahedra_of(read_surfaces(BALL), cells=6).mesh
     hull = hull_of(parts, 400)
     carried = bind(mesh, hull)
     assert carried.weights.sum(axis=1) == pytest.approx(np.ones(len(hull.points)))
