@@ -64,6 +64,8 @@ class Hull:
     def __post_init__(self) -> None:
         points = as_points(self.points)
         corners = as_indices(self.triangles, "triangles", 3, len(points), "triangle", may_repeat=False)
+        if not np.ptp(points[corners].reshape(-1, 3), axis=0).max() > 0.0:
+            raise MeshError("hull has no extent: the corners of its triangles all lie in one place")
         object.__setattr__(self, "points", read_only(points))
         object.__setattr__(self, "triangles", read_only(corners.astype(np.int32)))
 

@@ -13,7 +13,7 @@ from taichi_soft.control.materials import set_material
 from taichi_soft.core.checks import as_count
 from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.core.serialisation import digest_of
-from taichi_soft.fracture.cutting import refill_slot
+from taichi_soft.fracture.cutting import refill_slot, write_surface
 from taichi_soft.fracture.tearing import Tears
 from taichi_soft.solver.context import WorldContext
 from taichi_soft.world.body import Body
@@ -139,6 +139,8 @@ def enter(context: WorldContext, asset: SoftBodyAsset, rows: Floats32) -> Body:
     else:
         if context.layout.bodies[slot] is not asset.arrays:
             refill_slot(context, simulation.state, slot)
+        else:  # a snapshot may have brought along what the level of an earlier body had here
+            write_surface(context, simulation.state, slot, asset)
         simulation.fill(slot, rows)
     return take_in(context, asset)
 

@@ -263,6 +263,22 @@ def test_a_body_falls_asleep_on_its_hull_and_wakes():
     assert body.center_of_mass()[0] < -0.1
 
 
+def test_a_body_that_skips_a_step_makes_it_where_a_collider_comes_near_its_hull():
+    """The hull stands 0.15 m out of the cage, and the collider comes near that alone."""
+    wide = trimesh.creation.box((0.6, 0.6, 0.6)).subdivide()
+    asset = SoftBodyAsset(box((0.3, 0.3, 0.3), (2, 2, 2)), JELLY, skin=wide, hull=60)
+    world = World(soft_contact=True, collider_room=2)
+    body = world.add_body(asset, position=(0, 0, 3.0))
+    world.build()
+    wall = world.add_collider(BoxShape((0.1, 0.1, 0.1)), position=(0.38, 0, 3.0))
+    for speed, stands in ((-1.5, False), (0.0, True)):
+        wall.set_velocity((speed, 0, 0))
+        before = body.positions()
+        world.skip_step([body])
+        world.step(DT)
+        assert np.array_equal(body.positions(), before) == stands
+
+
 @pytest.mark.parametrize(
     ("hull", "error", "words"),
     [
@@ -272,6 +288,7 @@ def test_a_body_falls_asleep_on_its_hull_and_wakes():
         (False, OptionError, "hull"),
         ("nowhere.glb", MeshError, "nowhere.glb"),
         ((POINTS, [[0, 1, 1]]), MeshError, "twice"),
+        ((np.zeros((4, 3)), FACES), MeshError, "no extent"),
     ],
 )
 def test_bad_hulls_are_refused(hull, error, words):

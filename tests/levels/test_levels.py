@@ -450,3 +450,26 @@ def test_levels_that_are_none_are_refused():
     with pytest.raises(OptionError, match="cells is empty"):
         SoftBodyAsset.from_surface(RING, RUBBER, cells=())
     assert SoftBodyAsset(sphere(0.5, 2), RUBBER).levels[0].coarser == ()
+
+
+def test_what_spawns_after_a_rewind_does_not_take_over_the_level_of_who_was_there_before():
+    """Vibrations of the finest level fade at its own rate, whatever was in the slot when the snapshot was
+    taken and when it is restored."""
+    damped = SoftBodyAsset(BAR[0], Material(8e4, 0.4, 900.0, damping_ratio=0.3)).with_coarser(BAR[1])
+    world = World(floor=None)
+    world.reserve(damped, 1)
+    world.build()
+
+    def spawned():
+        body = world.spawn(damped, angular_velocity=(0, 6, 2))
+        for _ in range(5):
+            world.step(DT)
+        return body
+
+    first = spawned()
+    first.set_level(1)
+    world.despawn(first)
+    kept = world.snapshot()
+    expected = spawned().velocities()
+    world.restore(kept)
+    np.testing.assert_array_equal(spawned().velocities(), expected)

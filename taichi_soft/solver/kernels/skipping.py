@@ -6,6 +6,7 @@ As sleepers, they make the step after all where something comes near that moves:
 from taichi_soft.bodies.kernels.particles import remember_particle
 from taichi_soft.bodies.status import ACTIVE, PUSHED, SKIPPING
 from taichi_soft.contact.kernels.collide import forget_contacts
+from taichi_soft.contact.kernels.hull import place_points
 from taichi_soft.core.runtime import ti
 
 
@@ -18,6 +19,11 @@ def _note_box(state: ti.template(), body):
     for p in range(particles[0], particles[1]):
         x = state.particle_position[p]
         lower, upper = ti.min(lower, x), ti.max(upper, x)
+    if ti.static(state.capacity.contact.hull):
+        place_points(state, body)
+        for p in range(state.hull.body_points[body][0], state.hull.body_points[body][1]):
+            x = state.particle_position[p]
+            lower, upper = ti.min(lower, x), ti.max(upper, x)
     state.contact.body_lower[body], state.contact.body_upper[body] = lower, upper
 
 
