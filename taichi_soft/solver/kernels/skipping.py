@@ -6,25 +6,8 @@ As sleepers, they make the step after all where something comes near that moves:
 from taichi_soft.bodies.kernels.particles import remember_particle
 from taichi_soft.bodies.status import ACTIVE, PUSHED, SKIPPING
 from taichi_soft.contact.kernels.collide import forget_contacts
-from taichi_soft.contact.kernels.hull import place_points
 from taichi_soft.core.runtime import ti
-
-
-@ti.func
-def _note_box(state: ti.template(), body):
-    """Note the box round a body, within which a moving collider is near it."""
-    particles = state.body_particles[body]
-    lower = state.particle_position[particles[0]]
-    upper = lower
-    for p in range(particles[0], particles[1]):
-        x = state.particle_position[p]
-        lower, upper = ti.min(lower, x), ti.max(upper, x)
-    if ti.static(state.capacity.contact.hull):
-        place_points(state, body)
-        for p in range(state.hull.body_points[body][0], state.hull.body_points[body][1]):
-            x = state.particle_position[p]
-            lower, upper = ti.min(lower, x), ti.max(upper, x)
-    state.contact.body_lower[body], state.contact.body_upper[body] = lower, upper
+from taichi_soft.solver.kernels.sleep import note_box
 
 
 @ti.kernel
@@ -36,7 +19,7 @@ def skip_bodies(state: ti.template(), bodies: ti.types.ndarray(dtype=ti.i32, ndi
         if state.body_status[body] == ACTIVE and state.body_drives[body] & PUSHED == 0:
             state.body_status[body] = SKIPPING
             if ti.static(state.capacity.has_contact):
-                _note_box(state, body)
+                note_box(state, body)
 
 
 @ti.kernel

@@ -67,23 +67,31 @@ def note_way_of_hulled(state: ti.template(), body, dt):
 
 
 @ti.func
-def _put_to_sleep(state: ti.template(), body):
-    """Stop a body where it is, and remember the box round it; when it wakes it counts anew."""
+def note_box(state: ti.template(), body):
+    """Remember the box round a body that stands still, and round its hull."""
     particles = state.body_particles[body]
     lower = state.particle_position[particles[0]]
     upper = lower
     for p in range(particles[0], particles[1]):
         x = state.particle_position[p]
         lower, upper = ti.min(lower, x), ti.max(upper, x)
-        state.prev_position[p] = x
-        state.particle_velocity[p] = ti.Vector.zero(state.real, 3)
-        state.prev_velocity[p] = ti.Vector.zero(state.real, 3)
     if ti.static(state.capacity.contact.hull):
         place_points(state, body)
         for p in range(state.hull.body_points[body][0], state.hull.body_points[body][1]):
             x = state.particle_position[p]
             lower, upper = ti.min(lower, x), ti.max(upper, x)
     state.contact.body_lower[body], state.contact.body_upper[body] = lower, upper
+
+
+@ti.func
+def _put_to_sleep(state: ti.template(), body):
+    """Stop a body where it is; when it wakes it counts anew."""
+    particles = state.body_particles[body]
+    for p in range(particles[0], particles[1]):
+        state.prev_position[p] = state.particle_position[p]
+        state.particle_velocity[p] = ti.Vector.zero(state.real, 3)
+        state.prev_velocity[p] = ti.Vector.zero(state.real, 3)
+    note_box(state, body)
     state.body_velocity_lag[body] = 0.0
     state.contact.calm[body] = 0.0
     state.body_status[body] = ASLEEP
