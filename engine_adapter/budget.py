@@ -213,7 +213,12 @@ class Budget:
 
 
 def _has_changed(body: Body, level: int) -> bool:
-    """Change the level of a body, unless something holds it: see `Body.set_level`."""
+    """Change the level of a body, unless something bars it: see `Body.set_level`.
+
+    What is held gets no coarser: a player may have it in hand.
+    """
+    if body.is_held and level > body.level:
+        return False
     try:
         body.set_level(level)
     except StateError:
