@@ -128,6 +128,7 @@ def _measure(context: WorldContext, body: Body) -> None:
 
 def _ask(context: WorldContext) -> None:
     """Ask every query."""
+    context.built.islands()
     state, slots, far = context.built.state, context.slots.slots, np.array([0.0, 0.0, 1e4])
     cast_ray(state, slots, far, -UP, math.inf, None, True)
     for count in (1, 1000):  # few are traced by one thread, many by all
