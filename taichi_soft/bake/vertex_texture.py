@@ -28,7 +28,26 @@ LEVELS = 65535
 """Of 16 bits."""
 
 METADATA = "metadata.json"
-SHADERS = ("godot.gdshader", "unity.hlsl")
+GODOT_3 = {
+    "godot": "3 (GLES3)",
+    "import": 'Compress/Mode "Lossless", Mipmaps, Filter,\n// Repeat, Srgb and Fix Alpha Border off',
+    "data": "",
+    "picture": " : hint_albedo",
+    "colour": " : hint_color",
+}
+GODOT_4 = {
+    "godot": "4",
+    "import": 'Compress/Mode "Lossless", Mipmaps/Generate and\n// Process/Fix Alpha Border off',
+    "data": " : filter_nearest, repeat_disable",
+    "picture": " : source_color, hint_default_white",
+    "colour": " : source_color",
+}
+SHADERS = {
+    "godot.gdshader": ("godot.gdshader", GODOT_4),
+    "godot3.shader": ("godot.gdshader", GODOT_3),
+    "unity.hlsl": ("unity.hlsl", {}),
+}
+"""File: what it is made from, and the words of that engine in it."""
 
 Floats = NDArray[np.float64]
 
@@ -82,8 +101,8 @@ def write_vat(take: Take, folder: Path) -> None:
         "meshes": _mesh_facts(take),
     }
     (folder / METADATA).write_text(json.dumps(facts, indent=2) + "\n", encoding="utf-8")
-    for name in SHADERS:
-        (folder / name).write_text(_shader(name, facts), encoding="utf-8")
+    for name, (template, words) in SHADERS.items():
+        (folder / name).write_text(_shader(template, words, facts), encoding="utf-8")
 
 
 def is_vat(folder: Path) -> bool:
@@ -145,11 +164,11 @@ def _write_picture(path: Path, pixels: NDArray[np.uint8]) -> None:
     Image.fromarray(pixels).save(path, format="PNG")
 
 
-def _shader(name: str, facts: dict[str, Any]) -> str:
-    text = (Path(__file__).parent / "shaders" / name).read_text(encoding="utf-8")
-    for key in ("lowest", "highest"):
-        text = text.replace(f"@{key}@", ", ".join(f"{value:.9g}" for value in facts[key]))
-    for key in ("frame_count", "rows_per_frame", "fps"):
-        value = facts[key]
-        text = text.replace(f"@{key}@", str(value) if isinstance(value, int) else repr(float(value)))
+def _shader(template: str, words: dict[str, str], facts: dict[str, Any]) -> str:
+    text = (Path(__file__).parent / "shaders" / template).read_text(encoding="utf-8")
+    numbers = {key: ", ".join(f"{value:.9g}" for value in facts[key]) for key in ("lowest", "highest")}
+    numbers |= {key: str(facts[key]) for key in ("frame_count", "rows_per_frame")}
+    numbers["fps"] = repr(float(facts["fps"]))
+    for key, value in (words | numbers).items():
+        text = text.replace(f"@{key}@", value)
     return text

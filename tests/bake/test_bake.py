@@ -274,7 +274,7 @@ def test_what_is_not_in_the_world_is_one_point_of_a_vertex_texture(baked):
 def test_shaders_have_the_numbers_of_the_bake(baked):
     folder = baked[0] / "play.vat"
     facts = json.loads((folder / "metadata.json").read_text())
-    for name in ("godot.gdshader", "unity.hlsl"):
+    for name in ("godot.gdshader", "godot3.shader", "unity.hlsl"):
         text = (folder / name).read_text()
         assert "@" not in text
         assert f"= {FRAMES};" in text
