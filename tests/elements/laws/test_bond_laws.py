@@ -195,6 +195,10 @@ class TestGivenSprings:
     def test_a_bar_of_springs_is_as_stiff_as_its_cross_section(self):
         material = SpringMaterial.from_young(2e6, 0.01, self.MESH.edge_lengths)
         assert material.stiffness.tolist() == [2e6 * 0.01 / 5, 2e6 * 0.01 / 3]
+        each = SpringMaterial.from_young(2e6, [0.01, 0.02], self.MESH.edge_lengths)
+        assert each.stiffness.tolist() == [2e6 * 0.01 / 5, 2e6 * 0.02 / 3]
+        with pytest.raises(MaterialError, match="area has 3 values and lengths has 2: give one per edge"):
+            SpringMaterial.from_young(2e6, [0.01, 0.02, 0.03], self.MESH.edge_lengths)
 
     def test_a_spring_of_no_length_left_has_no_force(self):
         x = self.MESH.vertices.copy()

@@ -166,6 +166,10 @@ def test_particles_have_no_frames():
         internal_forces(rope, AnisotropicMaterial(WOOD, 500.0), rope.vertices, law="springs")
 
 
+def test_edges_are_damped_only_where_that_is_asked_for():
+    assert AnisotropicMaterial(WOOD, 500.0).damping == 0.0
+
+
 def test_the_material_of_some_tetrahedra_has_their_values_and_those_given_for_all():
     frames = frames_along(np.random.default_rng(2).normal(size=(4, 3)))
     rows = np.array([2, 0, 2])

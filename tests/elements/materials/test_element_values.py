@@ -52,6 +52,16 @@ def test_steel_as_in_the_tables():
     assert steel.damping == 0.0
 
 
+@pytest.mark.parametrize("nu", [-0.4, 0.0, 0.3])
+def test_the_stiffness_matrix_inverts_the_compliance_of_a_bar_and_of_a_sheared_block(nu):
+    """Strains 1 / E along and -nu / E across for unit pulls, 2 (1 + nu) / E for a unit shear."""
+    young = np.array([1e5, 3e6])
+    for E, matrix in zip(young, Material(young, nu, 1.0).stiffness_matrices(2), strict=True):
+        compliance = np.diag([1 + nu] * 3 + [2 * (1 + nu)] * 3) / E
+        compliance[:3, :3] -= nu / E
+        np.testing.assert_allclose(matrix @ compliance, np.eye(6), atol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("name", "value", "text"),
     [
