@@ -209,7 +209,7 @@ REFUSED = {
     "unused vertex": (TWO, [[0, 1, 2, 3]], "vertex 4 belongs to no tetrahedron"),
     "three at a face": (FAN, [[0, 1, 2, 3], [0, 2, 1, 4], [0, 1, 2, 5]], "vertices .* is shared by 3 tetra"),
     "overlapping, far down": (
-        np.vstack([CORNER + [9, 0, 0], FOLDED]),
+        np.vstack([np.add(CORNER, 9), FOLDED]),
         [[0, 1, 2, 3], [4, 5, 6, 7], [4, 5, 6, 8]],
         "tetrahedra 1 and 2 lie on the same side",
     ),
