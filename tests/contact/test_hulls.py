@@ -243,7 +243,7 @@ def test_a_hull_stays_where_it_is_when_the_level_changes():
     world = World(floor=0.0, soft_contact=True)
     body = world.add_body(asset, position=(0, 0, 0.02))
     world.build()
-    at_rest(world, body, 1.0)
+    at_rest(world, body, 1.5)
     body.set_level(1)
     assert abs(at_rest(world, body, 1.0)[:, 2].min()) < 0.004
 
