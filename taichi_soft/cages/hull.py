@@ -123,8 +123,11 @@ def hull_of(surfaces: tuple[Surface, ...], count: Any) -> Hull:
 
 def _nearest(vertices: FloatArray, triangles: Ints, chosen: Ints, patch: Ints) -> Ints:
     """Which of the chosen vertices is nearest to each, along edges, (n,); or that of its patch, where no edges
-    lead to one. Triangles between such neighbours lie round their corners: those between patches fold over
-    where a patch has its point at the rim."""
+    lead to one.
+
+    Triangles between these lie round their corners. Those between patches fold over where a patch has its
+    point at the rim.
+    """
     edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     edges = np.unique(np.concatenate([edges, edges[:, ::-1]]), axis=0)
     lengths = np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1)
