@@ -122,8 +122,8 @@ def hull_of(surfaces: tuple[Surface, ...], count: Any) -> Hull:
 
 
 def _nearest(vertices: FloatArray, triangles: Ints, chosen: Ints, patch: Ints) -> Ints:
-    """Which of the chosen vertices is nearest to each, along edges, (n,); or that of its patch, where no edges
-    lead to one.
+    """Which of the chosen vertices is nearest to each, along edges, (n,); or that of its patch, where no
+    edges lead to one.
 
     Triangles between these lie round their corners. Those between patches fold over where a patch has its
     point at the rim.
@@ -143,7 +143,7 @@ def _nearest(vertices: FloatArray, triangles: Ints, chosen: Ints, patch: Ints) -
         is_open = len(first) > 0
         distance[edges[first, 1]] = way[first]
         owner[edges[first, 1]] = owner[edges[first, 0]]
-    return owner
+    return np.asarray(owner, dtype=np.int64)
 
 
 def _chosen(vertices: FloatArray, normals: FloatArray, tips: Ints, cell: float) -> tuple[Ints, Ints]:
