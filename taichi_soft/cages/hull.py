@@ -117,7 +117,33 @@ def hull_of(surfaces: tuple[Surface, ...], count: Any) -> Hull:
         else:
             low = middle
     chosen, patch = _chosen(vertices, normals, tips, high)
-    return Hull(vertices[chosen], _between(patch[triangles]).astype(np.int32))
+    corners = _nearest(vertices, triangles, chosen, patch)[triangles]
+    return Hull(vertices[chosen], _without_fins(_between(corners)).astype(np.int32))
+
+
+def _nearest(vertices: FloatArray, triangles: Ints, chosen: Ints, patch: Ints) -> Ints:
+    """Which of the chosen vertices is nearest to each, along edges, (n,); or that of its patch, where no
+    edges lead to one.
+
+    Triangles between these lie round their corners. Those between patches fold over where a patch has its
+    point at the rim.
+    """
+    edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    edges = np.unique(np.concatenate([edges, edges[:, ::-1]]), axis=0)
+    lengths = np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1)
+    owner, distance = patch.copy(), np.full(len(vertices), np.inf)
+    owner[chosen], distance[chosen] = np.arange(len(chosen)), 0.0
+    is_open = True
+    while is_open:  # rounds of Bellman and Ford
+        way = distance[edges[:, 0]] + lengths
+        order = np.lexsort((owner[edges[:, 0]], way, edges[:, 1]))
+        ends = edges[order, 1]
+        first = order[np.r_[True, ends[1:] != ends[:-1]]]
+        first = first[way[first] < distance[edges[first, 1]]]
+        is_open = len(first) > 0
+        distance[edges[first, 1]] = way[first]
+        owner[edges[first, 1]] = owner[edges[first, 0]]
+    return np.asarray(owner, dtype=np.int64)
 
 
 def _chosen(vertices: FloatArray, normals: FloatArray, tips: Ints, cell: float) -> tuple[Ints, Ints]:
@@ -222,3 +248,11 @@ def _between(corners: Ints) -> Ints:
     lead = corners.argmin(axis=1)
     rows = np.arange(len(corners))[:, None]
     return np.unique(corners[rows, (lead[:, None] + np.arange(3)) % 3], axis=0).reshape(-1, 3)
+
+
+def _without_fins(triangles: Ints) -> Ints:
+    """Without pairs of the same corners that face opposite ways: they enclose nothing."""
+    corners = np.sort(triangles, axis=1)
+    _, number, count = np.unique(corners, axis=0, return_inverse=True, return_counts=True)
+    is_single = count[number.reshape(-1)] == 1
+    return triangles[is_single] if is_single.any() else triangles

@@ -262,11 +262,15 @@ class Colliders(Slice):
 
     def require(self, read: Any, rows_of: RowsOf) -> None:
         """Raises: ValueError where an impulse that contact goes on with is not finite."""
+        impulses: list[Any] = []
         if self._contact is not None and self._contact.capacity.soft:
             soft = self.context.built.state.soft
-            for field in (soft.kept_normal_impulse, soft.kept_friction_impulse):
-                if not np.abs(rows_of(field)).max() <= MOST_IMPULSE:
-                    raise ValueError("particles are out of reach, or not finite")
+            impulses += [soft.kept_normal_impulse, soft.kept_friction_impulse]
+        if self._contact is not None and self._contact.capacity.hull:
+            impulses += self.context.built.state.hull.held_impulses
+        for field in impulses:
+            if not np.abs(rows_of(field)).max() <= MOST_IMPULSE:
+                raise ValueError("particles are out of reach, or not finite")
 
     def restore(self, read: Any) -> None:
         """Let there be the colliders that were `read`, and no other."""

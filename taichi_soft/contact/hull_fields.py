@@ -7,6 +7,8 @@ their places as those of particles, and passes on to the particles that carry th
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,6 +16,9 @@ from taichi_soft.bodies.layout import BodyArrays, Ranges, Scene
 from taichi_soft.contact.fields import SLOTS
 from taichi_soft.core.field_loader import Loader
 from taichi_soft.core.runtime import holds_fields, ti
+
+TOUCHES = 4
+"""Colliders that a point of a hull may meet in a substep."""
 
 
 @holds_fields
@@ -30,9 +35,39 @@ class HullFields:
         self.body_points = ti.Vector.field(2, ti.i32, bodies)  # rows of the points; none without a hull
         self.carriers = ti.Vector.field(4, ti.i32, particles)
         self.weights = ti.Vector.field(4, ti.f32, particles)
+        # Contacts with colliders in a substep, of each body from its first one on: normal of the collider,
+        # how fast it is there, how fast the point may be along the normal beside it [m/s]; how far behind the
+        # surface its way would end [m] that began at the place [m] with the velocity [m/s].
+        touches = TOUCHES * outer
+        self.touch_point = ti.field(ti.i32, touches)
+        self.touch_collider = ti.field(ti.i32, touches)
+        self.touch_normal = ti.Vector.field(3, ti.f32, touches)
+        self.touch_surface = ti.Vector.field(3, ti.f32, touches)
+        self.touch_allowed = ti.field(ti.f32, touches)
+        self.touch_beyond = ti.field(ti.f32, touches)
+        self.touch_start = ti.Vector.field(3, ti.f32, touches)
+        self.touch_start_velocity = ti.Vector.field(3, ti.f32, touches)
+        self.touch_inv_mass = ti.field(ti.f32, touches)  # of the point [1/kg]
+        self.touch_normal_impulse = ti.field(ti.f32, touches)  # on the point [N s]
+        self.touch_friction_impulse = ti.Vector.field(3, ti.f32, touches)
+        # Of each point: two colliders that it touched in the last substep, counted from 1, or 0, and their
+        # impulses on it [N s].
+        self.held_by = ti.Vector.field(2, ti.i32, particles)
+        self.held_normal_impulse = ti.Vector.field(2, ti.f32, particles)
+        self.held_friction_impulse = ti.Vector.field(3, ti.f32, particles)
+        self.held_second_friction_impulse = ti.Vector.field(3, ti.f32, particles)
         if soft:
             # Of each contact: how fast an impulse of 1 N s at one corner of the triangle makes another [m/s].
             self.slot_mobility = ti.Matrix.field(3, 3, ti.f32, outer * SLOTS)
+
+    def carried(self) -> list[Any]:
+        """What the next step depends on, of each particle."""
+        return [self.held_by, *self.held_impulses]
+
+    @property
+    def held_impulses(self) -> list[Any]:
+        """Fields of the impulses that a substep begins with."""
+        return [self.held_normal_impulse, self.held_friction_impulse, self.held_second_friction_impulse]
 
     def load(self, loader: Loader, scene: Scene) -> None:
         """Fill from `scene`."""
@@ -57,6 +92,7 @@ class HullFields:
         loader.fill(self.body_points, np.array(points))
         loader.fill(self.carriers, carriers)
         loader.fill(self.weights, weights)
+        loader.fill(self.held_by, np.zeros((0, 2)))
 
 
 def touching_rows(

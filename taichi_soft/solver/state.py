@@ -70,6 +70,8 @@ class State(BodyFields):
             groups["joints"], groups["colliders"] = self.joints.carried(), self.contact.carried()
         if self.capacity.contact.soft:
             groups["colliders"][0] += self.soft.carried()
+        if self.capacity.contact.hull:
+            groups["colliders"][0] += self.hull.carried()
         return groups
 
     def load(self, scene: Scene, models: list[int], kinds: NDArray[np.float64] | None = None) -> None:

@@ -50,6 +50,20 @@ def test_triangles_face_outward_whichever_way_those_of_the_surface_face(share):
     assert outward.mean() > (0.95 if share in (0.0, 1.0) else 0.9)
 
 
+@pytest.mark.parametrize("count", [300, 500, 1000])
+def test_triangles_close_the_surface_without_folds(count):
+    """Each edge of a ball's hull belongs to two triangles, and Euler's formula holds. All face outward."""
+    hull = hull_of(read_surfaces(BALL), count)
+    corners = hull.triangles.astype(int)
+    edges = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])
+    there, back = ({tuple(edge) for edge in each} for each in (edges, edges[:, ::-1]))
+    assert len(there) == len(edges)
+    assert there == back
+    assert len(corners) == 2 * len(np.unique(corners)) - 4
+    a, b, c = np.moveaxis(hull.points[corners], 1, 0)
+    assert np.einsum("ti,ti->t", np.cross(b - a, c - a), a + b + c).min() > -1e-5
+
+
 def test_walls_within_belong_to_no_hull():
     within = surfaces.joined(BALL, trimesh.creation.box((0.5, 0.5, 0.5)))
     assert np.linalg.norm(hull_of(read_surfaces(within), 300).points, axis=1).min() > 0.95

@@ -20,7 +20,7 @@ UNSEEN = 1e30
 
 
 @ti.func
-def _in_frame(contact: ti.template(), c, x, time):
+def in_frame(contact: ti.template(), c, x, time):
     """A point in the frame that a collider has `time` [s] after the start of the step."""
     position = contact.collider_position[c] + contact.collider_velocity[c] * time
     return turned_back(spun(contact.collider_rotation[c], contact.collider_spin[c] * time), x - position)
@@ -34,7 +34,7 @@ def _clearance(
     x, clearance = state.particle_position[p], ti.cast(reach, ti.f32)
     for i in range(count):
         c = state.contact.near[row + i]
-        distance = distance_from(state.contact, c, _in_frame(state.contact, c, x, since))
+        distance = distance_from(state.contact, c, in_frame(state.contact, c, x, since))
         clearance = ti.min(clearance, distance - state.contact.collider_speed[c] * left)
     return clearance
 
@@ -127,8 +127,8 @@ def collided(state: ti.template(), body, p, start, way_velocity, h, since):
         slack = ti.select(touches == 0, 0.0, TOUCHING)
         for k in range(state.contact.near_count[body]):
             c = state.contact.near[row + k]
-            a = _in_frame(state.contact, c, x, since + (1.0 - left) * h)
-            b = _in_frame(state.contact, c, x + way, since + h)
+            a = in_frame(state.contact, c, x, since + (1.0 - left) * h)
+            b = in_frame(state.contact, c, x + way, since + h)
             part, near, far, n = first_touch(state.contact, c, a, b, slack)
             if part < earliest:
                 earliest, which, distance, beyond, normal = part, k, near, far, n

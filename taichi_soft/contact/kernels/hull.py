@@ -4,17 +4,7 @@ In a world without hulls a particle is its own carrier, and all of this is what 
 """
 
 from taichi_soft.bodies.kernels.particles import inv_mass_of
-from taichi_soft.contact.distances.sweep import TOUCHING
-from taichi_soft.contact.kernels.collide import collided
 from taichi_soft.core.runtime import ti
-
-STILL = 0.01 * TOUCHING
-"""Way [m] below which a point is where it was: rounding, which would make what rests creep."""
-
-
-LIFT = 0.5
-"""Part of the way to where it has to be that a point is moved at once: its neighbours, which hang on the same
-particles, go with it."""
 
 
 @ti.func
@@ -132,33 +122,3 @@ def note_points(state: ti.template(), body, common):
                 state.soft.particle_speed[p] = own
             speed, beside = ti.max(speed, v.norm()), ti.max(beside, own)
     return speed, beside
-
-
-@ti.func
-def _collide_point(state: ti.template(), body, p, h, since):
-    """What colliders make of the velocities and places of a point's carriers."""
-    inv_mass = inv_mass_at(state, p)
-    if inv_mass > 0.0:
-        x, v = motion_of(state, p)
-        state.particle_inv_mass[p] = inv_mass
-        state.contact.particle_touches[p] = 0
-        x_new, v_new = collided(state, body, p, x, v, h, since)
-        if state.contact.particle_touches[p] == 1:
-            push_point(state, p, (v_new - v) / inv_mass)
-            way = x_new - x - h * v_new
-            if way.norm() > STILL:
-                shift_point(state, p, LIFT / inv_mass * way)
-            mark_touched(state, p)
-
-
-@ti.real_func
-def collide_points(state: ti.template(), body: ti.i32, h: ti.f32, since: ti.f32, gone: ti.f32):
-    """What colliders make of the velocities and places of a body whose hull meets them, before it drifts.
-
-    One point after the other, each as those before have left it. To go through all again would part what has
-    come to rest: no impulse is taken back. Where a point has to go elsewhere than its new velocity takes it,
-    its carriers are moved there as an impulse would move them.
-    """
-    for p in range(state.hull.body_points[body][0], state.hull.body_points[body][1]):
-        if not (state.contact.particle_clearance[p] > gone):
-            _collide_point(state, body, p, h, since)

@@ -11,6 +11,7 @@ from taichi_soft.bodies.status import ABSENT, ACTIVE, FEELS_REACTION, FROZEN
 from taichi_soft.contact.kernels.candidates import forget_candidates
 from taichi_soft.contact.kernels.collide import forget_contacts
 from taichi_soft.contact.kernels.hull import place_points
+from taichi_soft.contact.kernels.hull_colliders import forget_held, forget_held_if_free
 from taichi_soft.contact.kernels.rebound import begin_rebounds, take_back_rebounds
 from taichi_soft.contact.kernels.touches import forget_touches
 from taichi_soft.core.runtime import ti
@@ -74,6 +75,8 @@ def _begin_contacts(state: ti.template(), program: ti.template(), body):
         for p in range(particles[0], particles[1]):
             state.prev_contact[p] = state.particle_contact[p]
     begin_rebounds(state, body)
+    if ti.static(state.capacity.contact.hull):
+        forget_held_if_free(state, body)
     forget_contacts(state, body)
     state.contact.is_exploding[body] = 0
     if ti.static(program.has_soft_contact):
@@ -103,6 +106,8 @@ def _put_back_body(state: ti.template(), program: ti.template(), body):
                 state.particle_contact[p] = state.prev_contact[p]
         take_back_rebounds(state, body)
         forget_contacts(state, body)
+        if ti.static(state.capacity.contact.hull):
+            forget_held(state, body)
         if ti.static(program.has_soft_contact):
             forget_candidates(state, body)  # for good, as the island looks for others before it goes on
 

@@ -1,7 +1,8 @@
 """Drift among colliders: new positions from velocities, and what colliders in the way make of both."""
 
 from taichi_soft.contact.kernels.collide import collided, find_near_colliders
-from taichi_soft.contact.kernels.hull import collide_points, has_hull, place_points
+from taichi_soft.contact.kernels.hull import has_hull, place_points
+from taichi_soft.contact.kernels.hull_colliders import collide_points, forget_held
 from taichi_soft.contact.kernels.rebound import limit_rebounds
 from taichi_soft.core.constants import LANES, ROW_BITS
 from taichi_soft.core.runtime import ti
@@ -72,7 +73,8 @@ def drift_body(state: ti.template(), body: ti.i32, job: Job):
     """New positions of one body, and what colliders in the way make of velocities."""
     h, since = job.h, job.since
     gone = state.contact.gone[body] + job.fastest * h
-    if not (state.contact.reach[body] >= gone):
+    is_new = int(not (state.contact.reach[body] >= gone))
+    if is_new == 1:
         # A quarter more than the rest of the step needs at this speed.
         place_points(state, body)
         find_near_colliders(state, body, 1.25 * job.fastest * job.left + 1e-3, since, job.left)
@@ -81,6 +83,8 @@ def drift_body(state: ti.template(), body: ti.i32, job: Job):
     if ti.static(state.capacity.contact.hull):
         if state.contact.near_count[body] > 0:
             collide_points(state, body, h, since, gone)
+        elif is_new == 1:
+            forget_held(state, body)
     particles = state.body_particles[body]
     way2 = ti.Vector.zero(state.real, LANES)
     for block in range((particles[1] - particles[0] + LANES - 1) // LANES):

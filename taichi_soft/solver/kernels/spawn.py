@@ -3,6 +3,7 @@
 from taichi_soft.bodies.kernels.plasticity import restore_shape
 from taichi_soft.bodies.status import ABSENT, ACTIVE
 from taichi_soft.contact.kernels.collide import forget_contacts
+from taichi_soft.contact.kernels.hull_colliders import forget_held
 from taichi_soft.core.runtime import ti
 
 
@@ -47,6 +48,8 @@ def spawn_body(state: ti.template(), body: ti.i32, rows: ti.types.ndarray(dtype=
             particles = state.body_particles[body]
             for p in range(particles[0], particles[1]):
                 state.contact.particle_touches[p] = 0
+            if ti.static(state.capacity.contact.hull):
+                forget_held(state, body)
             if ti.static(state.capacity.contact.hull and state.capacity.contact.soft):
                 for p in range(state.hull.body_points[body][0], state.hull.body_points[body][1]):
                     state.soft.kept_normal_impulse[p] = 0.0
