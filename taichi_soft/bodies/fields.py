@@ -5,6 +5,7 @@ a game runs stalls it. A closed world therefore gives its fields back, and the n
 them takes them over with its kernels compiled.
 """
 
+import gc
 from functools import partial
 from typing import Any, TypeVar
 
@@ -325,6 +326,7 @@ def _tet_blocks(
 
 
 _free: list[BodyFields] = []
+_made: list[BodyFields] = []
 
 Kind = TypeVar("Kind", bound=BodyFields)
 
@@ -333,14 +335,23 @@ Kind = TypeVar("Kind", bound=BodyFields)
 def acquire(kind: type[Kind], capacity: BodyCapacity, program: Program) -> Kind:
     """Fields of a kind with room for that: of those that closed worlds gave back one for which the step of
     `program` is compiled, and of these the smallest; or new ones."""
-    fitting = [each for each in _free if type(each) is kind and each.capacity.has_room_for(capacity)]
-    if fitting:
-        fields = min(fitting, key=lambda each: (program not in each.programs, each.capacity.rooms))
-        _free.remove(fields)
-    else:
+    fields = _best(kind, capacity, program)
+    if (fields is None or program not in fields.programs) and len(_free) < len(_made):
+        gc.collect()  # of worlds that are gone, but for a cycle such as a traceback makes
+        fields = _best(kind, capacity, program)
+    if fields is None:
         fields = make_fields(partial(kind, capacity))
+        _made.append(fields)
+    else:
+        _free.remove(fields)
     fields.programs.add(program)
     return fields
+
+
+def _best(kind: type[Kind], capacity: BodyCapacity, program: Program) -> Kind | None:
+    """Of the fields that are free."""
+    fitting = [each for each in _free if type(each) is kind and each.capacity.has_room_for(capacity)]
+    return min(fitting, key=lambda each: (program not in each.programs, each.capacity.rooms), default=None)
 
 
 def release(fields: BodyFields) -> None:

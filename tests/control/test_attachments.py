@@ -337,7 +337,7 @@ def test_a_refused_call_changes_nothing(plain, name):
 
 
 def test_the_flat_schedule_attaches_one_way_only(cube, jelly):
-    world = World(schedule="flat", floor=None)
+    world = World(schedule="flat", floor=-1e3)  # as above
     body = world.add_body(cube, jelly)
     world.build()
     frame = world.add_frame()

@@ -198,7 +198,7 @@ def test_what_was_pinned_at_a_coarse_level_is_held_at_the_finest(flying):
     assert near.max() < 0.15
 
 
-def test_a_push_keeps_its_force_and_its_torque(flying):
+def test_a_push_keeps_its_force_and_its_torque():
     """What it does in the next step is what it would have done: momentum and spin, without gravity."""
     world = World(gravity=(0, 0, 0), floor=None)
     world.reserve(KIND, 1)
