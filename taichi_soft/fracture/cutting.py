@@ -232,16 +232,20 @@ def refill_slot(
     arrays = asset.arrays if part is None else part
     rows = np.zeros((len(arrays.mass), MOTION_WIDTH), dtype=np.float32)
     write_slot(context, state, slot, arrays, rows, ABSENT, slot, None)
-    write_surface(context, state, slot, asset)
+    _write_kind(state, slot, asset)  # who was there before may have been of another material
     context.layout.bodies[slot] = arrays
 
 
 def write_surface(context: Context, state: BodyFields, slot: int, asset: SoftBodyAsset) -> None:
     """Write what follows from an asset as a whole, where levels of detail differ in it."""
     if context.slots.assets[slot].coarser:
-        described = asset.description
-        rows = [*asset.surface_row, described.sound_speed, *asset.vibration_row(described)]
-        write_kind(state, slot, np.array(rows, dtype=np.float32))
+        _write_kind(state, slot, asset)
+
+
+def _write_kind(state: BodyFields, slot: int, asset: SoftBodyAsset) -> None:
+    described = asset.description
+    rows = [*asset.surface_row, described.sound_speed, *asset.vibration_row(described)]
+    write_kind(state, slot, np.array(rows, dtype=np.float32))
 
 
 def write_slot(

@@ -30,7 +30,7 @@ from taichi_soft.fracture.tearing import Tears
 from taichi_soft.solver.failures import find_failure
 from taichi_soft.solver.kernels.implicit_euler import MOST_PIECES
 from taichi_soft.solver.kernels.islands import list_joined_islands, read_islands
-from taichi_soft.solver.kernels.skipping import end_skips, skip_bodies
+from taichi_soft.solver.kernels.skipping import begin_skips, end_skips, skip_bodies
 from taichi_soft.solver.kernels.sleep import wake_body, wake_near
 from taichi_soft.solver.kernels.spawn import despawn_body, spawn_body
 from taichi_soft.solver.kernels.step import ALL_SLEEP
@@ -76,6 +76,8 @@ class Simulation:
             goes_on = colliders.prepare(seconds) or goes_on
         if goes_on:
             self.readout.has_moved()
+            if self._skips and self.program.has_contact:
+                begin_skips(self.state, len(self.pools.slots))
             found = self.launch(substeps, h)
             self.troubled, self._is_still = max(found, 0), found == ALL_SLEEP
         if colliders is not None:
@@ -99,6 +101,7 @@ class Simulation:
         self.frames.aim(self.state, len(self.pools.slots), seconds)
         if self.colliders is not None:
             self.colliders.prepare(seconds)
+            begin_skips(self.state, len(self.pools.slots))
         self.launch(1, seconds)
         end_skips(self.state, len(self.pools.slots))
         self.state.body_status.to_numpy()  # as where a body fails

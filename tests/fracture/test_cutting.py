@@ -240,6 +240,32 @@ def test_a_slot_in_which_a_part_was_takes_a_whole_body_again(swinging):
         assert len(body.tets) == len(BAR.tets)
 
 
+@pytest.mark.parametrize("young", [1e5, 4e5])
+def test_a_slot_in_which_a_part_of_another_material_was_takes_a_body_of_its_own_kind(swinging, young):
+    """Bit for bit: nothing of the damping, nor of the speed of sound, that the body was given before the cut."""
+    world, body = swinging()
+    body.set_material(Material(young, 0.3, 1000.0 * SPREAD, 20.0, damping_ratio=0.5))
+    (piece,) = body.cut(plane=ALONG)
+    slots = [body.index, piece.index]
+    before = world.snapshot()
+    for each in (body, piece):
+        world.despawn(each)
+    for index in slots:  # the lowest free one is taken first
+        body = world.spawn(body.asset, velocity=(1.0, 0.0, 0.5), angular_velocity=(2.0, 1.0, 3.0))
+        assert body.index == index
+        for _ in range(5):
+            world.step(DT, 12)
+        assert bits(body) == swinging.first
+    world.restore(before)
+    for each in world.bodies:
+        assert each.material.damping_ratio == 0.5
+        world.despawn(each)
+    again = world.spawn(body.asset, velocity=(1.0, 0.0, 0.5), angular_velocity=(2.0, 1.0, 3.0))
+    for _ in range(5):
+        world.step(DT, 12)
+    assert bits(again) == swinging.first
+
+
 def test_cuts_are_the_same_every_time(swinging):
     told = []
     for _ in range(2):

@@ -182,6 +182,33 @@ def test_what_pushes_or_moves_it_makes_it_step_after_all(pile):
         assert np.array_equal(alone.positions(), before) == expected
 
 
+@pytest.mark.parametrize("is_restored", [False, True])
+def test_who_is_put_beside_a_moving_collider_after_it_was_told_to_skip_makes_the_step(pile, is_restored):
+    """Two blocks in the air, told to skip: the ball flies beside the one place, where one of them is put."""
+    alone, elsewhere = pile.bodies[2], 3 * FAR + (0, 0, 3.0)
+    ball = pile.add_collider(SphereShape(0.2), position=elsewhere + (0, 0, 0.48))
+    ball.set_velocity((0, 0, -6.0))
+    pile.skip_step([alone])
+    alone.teleport(elsewhere)
+    if is_restored:  # who restores has not been told where the boxes were
+        data = pile.snapshot()
+        pile.step(DT)
+        pile.restore(data)
+    before = alone.positions()
+    pile.step(DT)
+    assert not np.array_equal(alone.positions(), before)
+    assert ball.impulse[2] > 0.0
+
+
+def test_who_is_put_away_from_a_moving_collider_after_it_was_told_to_skip_stands_still(pile):
+    alone = pile.bodies[2]
+    ball = pile.add_collider(SphereShape(0.2), position=2 * FAR + (0, 0, 3.48))
+    ball.set_velocity((0, 0, -2.0))
+    pile.skip_step([alone])
+    alone.teleport(3 * FAR + (0, 0, 3.0))
+    assert stood_still(pile)[2]
+
+
 def test_an_impulse_counts_in_the_step_after_and_a_field_acts_in_the_steps_that_are_made(pile):
     alone = pile.bodies[2]
     data = pile.snapshot()

@@ -71,14 +71,15 @@ def _kick_block(state: ti.template(), program: ti.template(), first, count, grav
         for i in ti.static(range(3)):
             positions[lane, i] = x[i]
             velocities[lane, i] = v[i]
+        # What presses against others gains speed only to lose it to them.
+        was_touched = state.contact.particle_touches[p] == 1
         if ti.static(program.has_soft_contact):
             speeds_beside[lane] = (v - common).norm()
-            # What presses against others gains speed only to lose it to them.
-            was_touched = state.contact.particle_touches[p] == 1
             beside = ti.select(was_touched, v_before, v) - common
             beside2[lane] = ti.select(lane < count, beside.dot(beside), 0.0)
         speed2[lane] = ti.select(lane < count, v.dot(v), 0.0)
-        acceleration2[lane] = ti.select(lane < count, acceleration.dot(acceleration), 0.0)
+        is_free = lane < count and not was_touched
+        acceleration2[lane] = ti.select(is_free, acceleration.dot(acceleration), 0.0)
     if count >= LANES:
         _put_block(state, program, first, LANES, positions, velocities, speeds_beside)
     else:

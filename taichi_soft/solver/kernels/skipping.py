@@ -7,7 +7,7 @@ from taichi_soft.bodies.kernels.particles import remember_particle
 from taichi_soft.bodies.status import ACTIVE, PUSHED, SKIPPING
 from taichi_soft.contact.kernels.collide import forget_contacts
 from taichi_soft.core.runtime import ti
-from taichi_soft.solver.kernels.sleep import note_box
+from taichi_soft.solver.kernels.sleep import note_boxes_of_skipping
 
 
 @ti.kernel
@@ -18,8 +18,14 @@ def skip_bodies(state: ti.template(), bodies: ti.types.ndarray(dtype=ti.i32, ndi
         body = bodies[i]
         if state.body_status[body] == ACTIVE and state.body_drives[body] & PUSHED == 0:
             state.body_status[body] = SKIPPING
-            if ti.static(state.capacity.has_contact):
-                note_box(state, body)
+
+
+@ti.kernel
+def begin_skips(state: ti.template(), body_count: ti.i32):
+    """Before a step that some skip: where they are now is where something may come near them."""
+    ti.loop_config(serialize=True)
+    for _ in range(1):
+        note_boxes_of_skipping(state, body_count)
 
 
 @ti.kernel

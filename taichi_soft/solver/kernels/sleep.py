@@ -83,6 +83,15 @@ def note_box(state: ti.template(), body):
     state.contact.body_lower[body], state.contact.body_upper[body] = lower, upper
 
 
+@ti.real_func
+def note_boxes_of_skipping(state: ti.template(), body_count: ti.i32):
+    """Remember the boxes round bodies that skip the coming step: they may have been moved since they were
+    told to."""
+    for body in range(body_count):
+        if state.body_status[body] == SKIPPING:
+            note_box(state, body)
+
+
 @ti.func
 def _put_to_sleep(state: ti.template(), body):
     """Stop a body where it is; when it wakes it counts anew."""
@@ -138,6 +147,7 @@ def wake_near(
     woken = 0
     ti.loop_config(serialize=True)
     for _ in range(1):
+        note_boxes_of_skipping(state, body_count)
         lower, upper = ti.Vector([box[0], box[1], box[2]]), ti.Vector([box[3], box[4], box[5]])
         woken = _wake_in_box(state, body_count, lower, upper)
     return woken

@@ -51,10 +51,13 @@ def fixed_step(state: ti.template(), program: ti.template(), island, substeps, h
         end = ti.min(first + left, count)
         if first == 0:
             _begin_attempt(state, program, island, run)
-        _make_substeps(state, program, island, first, end, count, h / finer, run)
-        left -= end - first
-        if end == count:
-            if run.attempt == last or (run.is_stable & island_is_sound(state, program, island)) == 1:
+        is_last = int(run.attempt == last)
+        _make_substeps(state, program, island, end, count, h / finer, is_last, run)
+        left -= run.s - first
+        if is_last == 0 and run.is_stable == 0:
+            _put_back(state, program, island, run, halvings)
+        elif run.s == count:
+            if (is_last | island_is_sound(state, program, island)) == 1:
                 is_good = 1
             else:
                 _put_back(state, program, island, run, halvings)
@@ -88,13 +91,14 @@ def _begin_attempt(state: ti.template(), program: ti.template(), island, run: ti
 
 @ti.func
 def _make_substeps(
-    state: ti.template(), program: ti.template(), island, first, end, count, h, run: ti.template()
+    state: ti.template(), program: ti.template(), island, end, count, h, is_last, run: ti.template()
 ):
-    """Substeps from `first` to before `end`, of so many in an attempt."""
-    for s in range(first, end):
+    """Substeps to before `end`, of so many in an attempt, which ends where it is found to be too coarse."""
+    while run.s < end and (run.is_stable | is_last) == 1:
+        s = run.s
         now = Moment(s=s, substeps=count, h=h, since=s * h, left=h * (count - s))
         substep(state, program, island, now, run)
-    run.s = end
+        run.s = s + 1
 
 
 @ti.func
