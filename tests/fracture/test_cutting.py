@@ -242,7 +242,7 @@ def test_a_slot_in_which_a_part_was_takes_a_whole_body_again(swinging):
 
 @pytest.mark.parametrize("young", [1e5, 4e5])
 def test_a_slot_in_which_a_part_of_another_material_was_takes_a_body_of_its_own_kind(swinging, young):
-    """Bit for bit: nothing of the damping, nor of the speed of sound, that the body was given before the cut."""
+    """Bit for bit: nothing of the damping or speed of sound that the body was given before the cut."""
     world, body = swinging()
     body.set_material(Material(young, 0.3, 1000.0 * SPREAD, 20.0, damping_ratio=0.5))
     (piece,) = body.cut(plane=ALONG)

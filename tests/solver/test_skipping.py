@@ -186,7 +186,7 @@ def test_what_pushes_or_moves_it_makes_it_step_after_all(pile):
 def test_who_is_put_beside_a_moving_collider_after_it_was_told_to_skip_makes_the_step(pile, is_restored):
     """Two blocks in the air, told to skip: the ball flies beside the one place, where one of them is put."""
     alone, elsewhere = pile.bodies[2], 3 * FAR + (0, 0, 3.0)
-    ball = pile.add_collider(SphereShape(0.2), position=elsewhere + (0, 0, 0.48))
+    ball = pile.add_collider(SphereShape(0.2), position=np.add(elsewhere, (0, 0, 0.48)))
     ball.set_velocity((0, 0, -6.0))
     pile.skip_step([alone])
     alone.teleport(elsewhere)
