@@ -19,7 +19,7 @@ DENSITY, POISSON, DAMPING = 200.0, 0.4, 0.08  # of all of them [kg/m^3], -, shar
 STEPS, RISE, TREAD, WIDTH = 3, 0.26, 0.66, 2.7  # how many, and of each: height, depth, width [m]
 STONE = ((0.80, 0.74, 0.68), (0.88, 0.82, 0.75), (0.95, 0.90, 0.83))  # colours, from the lowest
 THICKNESS = 0.01  # of the skins of the bodies [m]
-DRAG = 0.6  # [1/s]
+DRAG = 0.8  # [1/s]
 STEP = FixedStep(dt=1 / 200)  # short: what has to be made again, where one is squashed far, is little
 
 HERD = (
