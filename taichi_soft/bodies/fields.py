@@ -334,7 +334,10 @@ Kind = TypeVar("Kind", bound=BodyFields)
 @in_turn
 def acquire(kind: type[Kind], capacity: BodyCapacity, program: Program) -> Kind:
     """Fields of a kind with room for that: of those that closed worlds gave back one for which the step of
-    `program` is compiled, and of these the smallest; or new ones."""
+    `program` is compiled, and of these the smallest; or new ones.
+
+    To find some, what worlds that are gone have left behind may be collected.
+    """
     fields = _best(kind, capacity, program)
     if (fields is None or program not in fields.programs) and len(_free) < len(_made):
         gc.collect()  # of worlds that are gone, but for a cycle such as a traceback makes

@@ -266,10 +266,13 @@ class Colliders(Slice):
         if self._contact is not None and self._contact.capacity.soft:
             soft = self.context.built.state.soft
             impulses += [soft.kept_normal_impulse, soft.kept_friction_impulse]
+        rows = [rows_of(field) for field in impulses]
         if self._contact is not None and self._contact.capacity.hull:
-            impulses += self.context.built.state.hull.held_impulses
-        for field in impulses:
-            if not np.abs(rows_of(field)).max() <= MOST_IMPULSE:
+            hull = self.context.built.state.hull
+            is_held = rows_of(hull.held_by).max(axis=1) > 0  # what lies in the other rows is never read
+            rows += [rows_of(field)[is_held] for field in hull.held_impulses]
+        for row in rows:
+            if not np.abs(row).max(initial=0.0) <= MOST_IMPULSE:
                 raise ValueError("particles are out of reach, or not finite")
 
     def restore(self, read: Any) -> None:

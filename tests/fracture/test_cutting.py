@@ -257,6 +257,7 @@ def test_a_slot_in_which_a_part_of_another_material_was_takes_a_body_of_its_own_
             world.step(DT, 12)
         assert bits(body) == swinging.first
     world.restore(before)
+    assert world.snapshot() == before  # with the speed of sound that each had
     for each in world.bodies:
         assert each.material.damping_ratio == 0.5
         world.despawn(each)

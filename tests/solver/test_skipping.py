@@ -330,3 +330,22 @@ def test_joined_bodies_are_an_island_without_contact_between_bodies():
     assert stood_still(world, lambda: world.skip_step([bodies[0]])) == [True, False, False]
     apart = [np.linalg.norm(b.center_of_mass() - a.center_of_mass()) for a, b in pairwise(world.bodies)]
     assert min(apart) > 0.3
+
+
+@pytest.mark.parametrize(("is_beside", "moves"), [(True, True), (False, False)])
+def test_where_nobody_sleeps_a_skipper_that_is_teleported_is_looked_for_where_it_is(is_beside, moves):
+    """A ball flies at the place where it is put, or at the one that it left."""
+    world = World(soft_contact=True, sleep_speed=0.0, collider_room=1, gravity=(0, 0, 0))
+    body = world.add_body(BLOCK, SOFT, position=(0, 0, 3))
+    world.build()
+    world.step(DT)
+    there = np.add(FAR, (0, 0, 3))
+    target = there if is_beside else np.array([0.0, 0.0, 3.0])
+    ball = world.add_collider(SphereShape(0.2), position=np.add(target, (0, 0, 0.48)))
+    ball.set_velocity((0, 0, -2.0))
+    world.skip_step([body])
+    body.teleport(there)
+    before = body.positions()
+    world.step(DT)
+    assert np.array_equal(body.positions(), before) != moves
+    assert (ball.impulse[2] > 0.0) == moves

@@ -35,7 +35,7 @@ def forget_held(state: ti.template(), body):
 
 @ti.func
 def forget_held_if_free(state: ti.template(), body):
-    """The same at the start of a step, before the last impulses are cleared: unless there were any."""
+    """The same before a step, if nothing touched the body in the last one, whose impulses are still there."""
     felt = ti.cast(0.0, ti.f32)
     for row in range(body * state.contact.capacity.colliders, (body + 1) * state.contact.capacity.colliders):
         felt = ti.max(felt, ti.abs(state.contact.impulse[row]).max())
@@ -155,10 +155,11 @@ def _note_impulse(state: ti.template(), body, row, turn, time):
         state.hull.touch_normal_impulse[row],
         state.hull.touch_friction_impulse[row],
     )
+    state.contact.angular_impulse[pair] = state.contact.angular_impulse[pair] - turn
     if normal_impulse > 0.0:
         impulse = -normal_impulse * n - friction_impulse
         centre = state.contact.collider_position[c] + state.contact.collider_velocity[c] * time
-        angular_impulse = (state.hull.touch_start[row] - centre).cross(impulse) - turn
+        angular_impulse = (state.hull.touch_start[row] - centre).cross(impulse)
         state.contact.impulse[pair] = state.contact.impulse[pair] + impulse
         state.contact.angular_impulse[pair] = state.contact.angular_impulse[pair] + angular_impulse
         if state.contact.collider_surface[c].y >= 0.0:

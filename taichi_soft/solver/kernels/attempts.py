@@ -1,9 +1,9 @@
 """A step is made in attempts: where bodies were before it, and whether an attempt was fine enough.
 
 Substeps are chosen for small deformation. An impact faster than sound flattens tetrahedra, and flat ones are
-stiffer. Where an attempt ends non-finite, or forces changed a velocity by more than `JOLT` at once, the
-island is put back. It makes the step again with twice as many substeps, and so on. The last attempt brakes
-vibrations sharply; momentum and spin stay.
+stiffer. Where forces change a velocity by more than `JOLT` at once an attempt ends, or where it comes out
+non-finite. The island is put back, and makes the step again with twice as many substeps, and so on. The last
+attempt brakes vibrations sharply; momentum and spin stay.
 """
 
 from taichi_soft.bodies.kernels.particles import particle_is_sound, remember_particle, restore_particle

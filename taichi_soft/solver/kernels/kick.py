@@ -10,7 +10,7 @@ from taichi_soft.core.math.tensors import widened
 from taichi_soft.core.runtime import ti
 from taichi_soft.core.types import Integrator
 from taichi_soft.solver.kernels.implicit_contact import kick_implicitly
-from taichi_soft.solver.kernels.motion import JOLT
+from taichi_soft.solver.kernels.motion import JOLT, PRESSED
 from taichi_soft.solver.step_fields import Job
 
 EXPLODING = 20.0
@@ -52,7 +52,8 @@ def _kick_block(state: ti.template(), program: ti.template(), first, count, grav
     """New velocities from the forces, which are cleared, of up to `LANES` particles from `first` on, and
     positions after `way` [s] with them. What lies behind them is computed too, and counts nothing.
 
-    Returns: of each the square of its speed, of that beside the `common` velocity, and of its acceleration.
+    Returns: of each the square of its speed, of that beside the `common` velocity, and of its acceleration,
+    which counts less where something held it.
     """
     positions = ti.Matrix.zero(state.real, LANES, 3)
     velocities = ti.Matrix.zero(state.real, LANES, 3)
@@ -78,8 +79,8 @@ def _kick_block(state: ti.template(), program: ti.template(), first, count, grav
             beside = ti.select(was_touched, v_before, v) - common
             beside2[lane] = ti.select(lane < count, beside.dot(beside), 0.0)
         speed2[lane] = ti.select(lane < count, v.dot(v), 0.0)
-        is_free = lane < count and not was_touched
-        acceleration2[lane] = ti.select(is_free, acceleration.dot(acceleration), 0.0)
+        counts = ti.select(was_touched, 1.0 / PRESSED**2, 1.0)
+        acceleration2[lane] = ti.select(lane < count, counts * acceleration.dot(acceleration), 0.0)
     if count >= LANES:
         _put_block(state, program, first, LANES, positions, velocities, speeds_beside)
     else:
@@ -92,7 +93,7 @@ def _kick_body(state: ti.template(), program: ti.template(), body, kick, way, co
     """New velocities from the forces, which are cleared, and positions after `way` [s] with them.
 
     Returns: the highest speed [m/s], the highest and the mean beside the `common` velocity, and the largest
-    change.
+    change, which counts less of what something held.
     """
     particles, gravity = state.body_particles[body], gravity_on(state, body)
     count = particles[1] - particles[0]

@@ -10,6 +10,10 @@ JOLT = 1.0
 body. Stable vibrations stay below it, on slivers too: a stable substep is about as long as sound takes to
 cross the smallest tetrahedron."""
 
+PRESSED = 4.0
+"""The same for a particle that something held in the last substep, over `JOLT`: most of its change is taken
+by what it presses against."""
+
 
 @ti.func
 def moved_particle(state: ti.template(), program: ti.template(), p, force, gravity, h, kick):
