@@ -159,7 +159,7 @@ def _steering(state: State) -> list[tuple[int, Any]]:
     """Fields of real numbers that the next step begins with, beside positions and velocities."""
     particle = [state.prev_position, state.prev_velocity, state.particle_mass, state.particle_inv_mass]
     particle += [state.particle_target, state.particle_push]
-    body = [state.body_velocity_lag, state.body_gravity_scale, state.body_damping]
+    body = [state.body_velocity_lag, state.body_gravity_scale, state.body_damping, state.body_sound_speed]
     shape = [state.tet_rest_inverse] if state.capacity.plastic else []
     owners = (PARTICLE, particle), (BODY, body), (SHAPE, shape)
     return [(owner, field) for owner, fields in owners for field in fields] + [(WORLD, state.wind)]

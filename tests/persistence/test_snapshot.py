@@ -371,7 +371,7 @@ def set_word(at, to):
     return change
 
 
-# From behind: grabs (16), wind (4), eight words for each of the two bodies.
+# From behind: grabs (16), wind (4), nine words for each of the two bodies.
 @pytest.mark.parametrize(
     "change",
     [
@@ -398,8 +398,9 @@ def set_word(at, to):
         set_word(0, np.float32(1e30).view(np.int32)),
         set_word(14, 77),
         set_word(-16, 99),
-        set_word(-16 - 4 - 16, 9),
-        set_word(-16 - 4 - 4, np.float32(np.nan).view(np.int32)),
+        set_word(-16 - 4 - 18, 9),
+        set_word(-16 - 4 - 5, np.float32(np.nan).view(np.int32)),
+        set_word(-16 - 4 - 1, np.float32(np.nan).view(np.int32)),
     ],
 )
 def test_what_is_whole_but_makes_no_sense_is_refused(small, change):
