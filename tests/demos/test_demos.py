@@ -152,7 +152,7 @@ def test_bodies_heaped_in_a_bowl_sleep_outside_each_other_and_stay_where_they_ar
     for body, rows in zip(stage.world.bodies, before, strict=True):
         now = body.positions()
         assert np.linalg.norm(now - rows, axis=1).max() < 0.005  # [m] in 0.2 s
-        assert np.linalg.norm(body.velocities(), axis=1).max() < 0.025  # [m/s]
+        assert np.linalg.norm(body.velocities(), axis=1).max() < 0.04  # [m/s]
         # Inside the bowl, whose middle is at the height of its rim.
         assert np.linalg.norm(now - (0, 0, 2.21), axis=1).max() < 2.0 + 0.01
         assert now[:, 2].max() < 2.21
@@ -287,7 +287,7 @@ def test_the_elephants_land_whole_on_the_steps_and_their_ears_have_swung():
         assert body.failure is None
         assert body.flipped_count() < 0.005 * len(body.mesh.tets)
         assert body.volume() == pytest.approx(body.mesh.volume, rel=0.05)
-        assert np.ptp(swings) > 0.07
+        assert np.ptp(swings) > 0.05
         x, y, z = body.positions().T
         for i in range(demo.STEPS):  # counted from below; each goes back to y = 0 under those above it
             inside = (np.abs(x) < demo.WIDTH / 2) & (y > -demo.TREAD * (demo.STEPS - i)) & (y < 0)
