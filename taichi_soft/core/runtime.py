@@ -13,6 +13,8 @@ import functools
 import io
 import logging
 import os
+import shutil
+import tempfile
 import threading
 from _thread import start_new_thread
 from collections.abc import Callable, Sequence
@@ -87,6 +89,7 @@ _log = logging.getLogger(__name__)
 
 _device: Device | None = None
 _process = 0  # that started Taichi
+_own_cache: str | None = None  # of kernels that check indices
 _jobs: SimpleQueue[Callable[[], object]] = SimpleQueue()  # of the thread that started it
 _is_served = threading.Lock()
 _home = 0  # identity of that thread
@@ -172,10 +175,16 @@ def init(arch: ArchName = "auto", threads: int | None = None, cores: Sequence[in
 
 def _start(arch: ArchName, reason: str, threads: int, cores: tuple[int, ...], is_left_to_us: bool) -> None:
     """Start Taichi, with its workers on these cores if there are any, and note the device."""
-    global _device, _process
+    global _device, _process, _own_cache
     is_checked = os.environ.get(DEBUG) == "1"
     before, since = (thread_ids(), number_now()) if cores else (set(), 0)
-    await_lock(ti.lang.impl.default_cfg().offline_cache_file_path)
+    options = {}
+    if is_checked:
+        # What is kept does not notice changed options. But without a cache Taichi 1.7 takes kernels for one
+        # that differ only in which instance of a real function they call.
+        options["offline_cache_file_path"] = _own_cache = tempfile.mkdtemp()
+    else:
+        await_lock(ti.lang.impl.default_cfg().offline_cache_file_path)
     with contextlib.redirect_stdout(io.StringIO()):  # Taichi announces itself
         ti.init(
             arch=getattr(ti, arch),
@@ -183,7 +192,7 @@ def _start(arch: ArchName, reason: str, threads: int, cores: tuple[int, ...], is
             default_fp=ti.f32,
             default_ip=ti.i32,
             debug=is_checked,
-            offline_cache=not is_checked,  # which does not notice changed options
+            offline_cache=True,
             offline_cache_max_size_of_files=1
             << 29,  # a game of many kinds of worlds fills the default 100 MB
             enable_fallback=False,
@@ -192,6 +201,7 @@ def _start(arch: ArchName, reason: str, threads: int, cores: tuple[int, ...], is
             make_cpu_multithreading_loop=False,  # it would put up to 512 bodies into one thread
             unrolling_limit=0,  # no warning
             log_level=ti.ERROR,
+            **options,
         )
     if is_checked:
         check_real_functions()
@@ -218,6 +228,8 @@ def _end() -> None:
             FIRST_LAUNCHES.close()
         await_lock(ti.lang.impl.current_cfg().offline_cache_file_path)
         ti.reset()
+        if _own_cache is not None:
+            shutil.rmtree(_own_cache, ignore_errors=True)
         with contextlib.suppress(OSError):  # the folder takes no files
             FIRST_LAUNCHES.keep()
 
