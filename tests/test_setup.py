@@ -11,8 +11,22 @@ OLD = 'case "$2" in *version_info*) exit 1;; *) echo 3.9.2;; esac'
 NO_VENV = 'case "$2" in *ensurepip*) exit 1;; *) exit 0;; esac'
 NO_NETWORK = """
 case "$1 $2" in
-  "-m venv") mkdir -p "$3/bin"; cp "$0" "$3/bin/python";;
+  "-m venv") mkdir -p "$4/bin"; cp "$0" "$4/bin/python";;
   "-m pip") echo "ERROR: no network" >&2; exit 1;;
+esac
+"""
+OLD_PIP = """
+case "$1 $2" in
+  "-m venv") mkdir -p "$4/bin"; cp "$0" "$4/bin/python";;
+  "-m ensurepip") echo 'echo installs: "$@"' > "$(dirname "$0")/pip";;
+  "-m pip") test -e "$(dirname "$0")/pip" && shift 2 && . "$(dirname "$0")/pip";;
+esac
+"""
+NEW_PIP = """
+case "$1 $2" in
+  "-m venv") mkdir -p "$4/bin"; cp "$0" "$4/bin/python";;
+  "-m ensurepip") exit 1;;
+  "-m pip") test "$3" = --python && shift 4 && echo installs: "$@";;
 esac
 """
 
@@ -70,3 +84,12 @@ def test_a_failed_installation_ends_with_what_to_do(setup):
     first, last = done.stderr.splitlines()
     assert first == "ERROR: no network"
     assert last.startswith("taichi-soft: the packages could not be installed")
+
+
+@pytest.mark.parametrize("program", [OLD_PIP, NEW_PIP])
+def test_an_environment_gets_a_pip_from_whatever_the_interpreter_has(setup, program):
+    done = setup({"mine": program}, tools=True, PYTHON="mine")
+    assert done.returncode == 0, done.stderr
+    (said,) = (line for line in done.stdout.splitlines() if line.startswith("installs: install"))
+    assert said.endswith("-e .[demo]")
+    assert (" pip -e" in said) == (program is NEW_PIP)
