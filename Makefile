@@ -27,7 +27,7 @@ $(VENV)/.%: pyproject.toml setup.sh
 setup: $(VENV)/.dev
 
 demo: $(VENV)/.demo
-	@$(BIN)/taichi-soft demo bounce --out out/bounce.mp4
+	@$(BIN)/taichi-soft demo bounce --seconds 5 --out out/bounce.mp4
 
 test: $(VENV)/.test
 	@$(BIN)/python -m pytest -m "not soak"
