@@ -147,7 +147,11 @@ POSES = {
 
 
 @pytest.mark.parametrize("pose", POSES)
-@pytest.mark.parametrize("mode", [*SOLID, *((name, None, None) for name in [*PAIRWISE, *FROZEN, *COMPARED])])
+@pytest.mark.parametrize(
+    "mode",
+    [*SOLID, *((name, None, None) for name in [*PAIRWISE, *FROZEN, *COMPARED])],
+    ids=[*SOLID_IDS, *PAIRWISE, *FROZEN, *COMPARED],
+)
 def test_the_projected_system_is_symmetric_and_never_negative(mode, pose):
     """So that masses make it positive definite. At rest it is the exact gradient."""
     law, strain, flips = mode
