@@ -34,7 +34,7 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 SECONDS = {
     "contact/distances/": (9, 0),
     "contact/shapes/": (3, 0),
-    "contact/": (114, 400),
+    "contact/": (85, 430),
     "solver/test_sleep": (3, 0),
     "solver/test_islands": (6, 0),
     "solver/test_repeated_steps": (2, 0),
@@ -46,16 +46,16 @@ SECONDS = {
     "persistence/": (15, 163),
     "engine_adapter/test_rollback": (30, 0),
     "core/math/": (2, 0),
-    "core/": (66, 90),
+    "core/": (60, 96),
     "world/": (84, 397),
-    "cages/": (120, 75),
+    "cages/": (80, 115),
     "feel/": (60, 90),
     "levels/": (85, 150),
     "bodies/": (30, 296),
     "lab/": (0, 355),
     "cli/": (0, 225),
     "demos/": (0, 620),
-    "docs/": (10, 400),
+    "docs/": (2, 408),
     "solver/": (50, 1275),
     "elements/": (75, 130),
     "fracture/": (19, 90),
@@ -78,7 +78,7 @@ WORLD = (
     "cages/test_thin.py::test_a_table_on",
 )
 SOAK = (
-    *("lab/", "demos/", "cli/", "cages/test_difficult_surfaces.py::test_a_body"),
+    *("lab/", "demos/", "cli/"),
     "feel/test_material_from_feel.py::test_random_wishes",
     "feel/test_material_from_feel.py::test_what_cannot",
     *(
@@ -124,6 +124,17 @@ SOAK = (
     *("contact/test_narrow_phase.py::test_a_tip", "persistence/test_snapshot.py::test_a_rope"),
     # Meshers that are in none of the extras of `make test`.
     "cages/test_methods",
+    # What takes long although its kernels are there; others of its kind are in `make test`.
+    *(
+        "cages/test_difficult_surfaces",
+        "cages/test_cage.py::test_a_bar_along",
+        "cages/test_thin.py::test_the_cell",
+    ),
+    *("cages/test_thin.py::test_the_octaves", "contact/test_soft_contact.py::test_a_coarse_plate"),
+    "contact/test_piles.py::test_a_block_bears_one_of_many_times_its_mass_for_a_minute[1000-50.0",
+    "contact/test_colliders.py::test_a_sheet_of_1_cm_lands_without_freezing[0.01",
+    *("core/test_kernel_cache.py::test_a_lock", "docs/test_pages.py::test_every_command"),
+    "meshing/test_locating.py::test_a_point_outside_gets_the_nearest_point_of_the_mesh[torus-5.0",
     # Processes that compile worlds; the first one of its kind is in `make test`.
     *("core/test_signals.py::test_a_film", "core/test_runtime.py::test_more_threads"),
 )
