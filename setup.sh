@@ -44,7 +44,7 @@ if [ ! -x "$venv/bin/pip" ]; then
     echo "1/2 making the environment $venv with $("$python" --version)"
     rm -rf "$venv"
     "$python" -m venv --without-pip "$venv" || fail "$python could not make $venv, for the reason above"
-    # The interpreter's own pip installs another with the rest, in a tenth of the time that ensurepip takes.
+    # The interpreter's own pip installs another with the rest: quicker than ensurepip.
     if "$python" -m pip --python "$venv/bin/python" --version >/dev/null 2>&1; then
         echo "2/2 $installing"
         "$python" -m pip --python "$venv/bin/python" install --no-compile --disable-pip-version-check pip -e ".[$extra]" ||

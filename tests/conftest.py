@@ -72,11 +72,7 @@ Neighbours have worlds of the same kinds, which each worker compiles once."""
 
 NUMPY = ("meshing/", "cages/", "elements/materials/", "bake/test_formats", "test_layers")
 KERNEL = ("elements/", "contact/distances/", "contact/shapes/", "core/math/")
-WORLD = (
-    *("elements/laws/test_energy_laws", "cages/test_difficult_surfaces.py::test_a_body"),
-    "cages/test_methods.py::test_a_body",
-    "cages/test_thin.py::test_a_table_on",
-)
+WORLD = ("elements/laws/test_energy_laws", "cages/test_thin.py::test_a_table_on")
 SOAK = (
     *("lab/", "demos/", "cli/"),
     "feel/test_material_from_feel.py::test_random_wishes",
@@ -124,7 +120,7 @@ SOAK = (
     *("contact/test_narrow_phase.py::test_a_tip", "persistence/test_snapshot.py::test_a_rope"),
     # Meshers that are in none of the extras of `make test`.
     "cages/test_methods",
-    # What takes long although its kernels are there; others of its kind are in `make test`.
+    # What takes long although its kernels are there.
     *(
         "cages/test_difficult_surfaces",
         "cages/test_cage.py::test_a_bar_along",

@@ -89,7 +89,7 @@ _log = logging.getLogger(__name__)
 
 _device: Device | None = None
 _process = 0  # that started Taichi
-_own_cache: str | None = None  # of kernels that check indices
+_checked_kernels: str | None = None  # folder of those that check indices
 _jobs: SimpleQueue[Callable[[], object]] = SimpleQueue()  # of the thread that started it
 _is_served = threading.Lock()
 _home = 0  # identity of that thread
@@ -175,14 +175,14 @@ def init(arch: ArchName = "auto", threads: int | None = None, cores: Sequence[in
 
 def _start(arch: ArchName, reason: str, threads: int, cores: tuple[int, ...], is_left_to_us: bool) -> None:
     """Start Taichi, with its workers on these cores if there are any, and note the device."""
-    global _device, _process, _own_cache
+    global _device, _process, _checked_kernels
     is_checked = os.environ.get(DEBUG) == "1"
     before, since = (thread_ids(), number_now()) if cores else (set(), 0)
     options = {}
     if is_checked:
         # What is kept does not notice changed options. But without a cache Taichi 1.7 takes kernels for one
         # that differ only in which instance of a real function they call.
-        options["offline_cache_file_path"] = _own_cache = tempfile.mkdtemp()
+        options["offline_cache_file_path"] = _checked_kernels = tempfile.mkdtemp()
     else:
         await_lock(ti.lang.impl.default_cfg().offline_cache_file_path)
     with contextlib.redirect_stdout(io.StringIO()):  # Taichi announces itself
@@ -228,8 +228,8 @@ def _end() -> None:
             FIRST_LAUNCHES.close()
         await_lock(ti.lang.impl.current_cfg().offline_cache_file_path)
         ti.reset()
-        if _own_cache is not None:
-            shutil.rmtree(_own_cache, ignore_errors=True)
+        if _checked_kernels is not None:
+            shutil.rmtree(_checked_kernels, ignore_errors=True)
         with contextlib.suppress(OSError):  # the folder takes no files
             FIRST_LAUNCHES.keep()
 
