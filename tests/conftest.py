@@ -18,6 +18,9 @@ from taichi_soft.bodies.capacity import LEAST
 from taichi_soft.core.extras import missing_packages
 from taichi_soft.core.runtime import DEBUG
 
+ARCH = "TAICHI_SOFT_TEST_ARCH"
+"""Name of the environment variable with which the tests run elsewhere than on the CPU: "cuda"."""
+
 settings.register_profile("same every time", derandomize=True, deadline=None)
 settings.load_profile("same every time")
 
@@ -285,7 +288,7 @@ def share_the_kernels():
 def share_the_cores():
     """Tests that run side by side take a core each: threads would wait for those of others."""
     if "PYTEST_XDIST_WORKER" in os.environ:
-        init("cpu", threads=1)
+        init(os.environ.get(ARCH, "cpu"), threads=1)
 
 
 def _read_only(n):

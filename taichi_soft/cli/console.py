@@ -15,7 +15,7 @@ from taichi_soft.core.types import ArchName
 console = Console()
 errors = Console(stderr=True)
 
-Arch = Annotated[ArchName, typer.Option(help="Device: auto is the CPU; cuda, vulkan and metal are untried.")]
+Arch = Annotated[ArchName, typer.Option(help="Device: auto is the CPU; vulkan and metal are untried.")]
 Threads = Annotated[
     int | None, typer.Option(help="CPU threads; by default one per core, bound to it on Linux.")
 ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal, TypeAlias
 
 import typer
 from rich.markup import escape
@@ -12,6 +12,8 @@ from rich.markup import escape
 from taichi_soft.cli.console import Arch, AsJson, Threads, console, device_facts, errors, say
 from taichi_soft.core.errors import OptionError
 from taichi_soft.core.runtime import init
+
+GpuName: TypeAlias = Literal["cuda", "vulkan", "metal"]
 
 IN_TURN = 15
 """Steps at least in which a budget is measured."""
@@ -28,6 +30,9 @@ def profile(
     scaling: Annotated[
         bool, typer.Option("--scaling", help="Compare 64 spheres on one thread and on all.")
     ] = False,
+    gpu: Annotated[
+        GpuName | None, typer.Option(help="Compare the CPU's threads with this kind of GPU: minutes.")
+    ] = None,
     implicit: Annotated[
         bool, typer.Option("--implicit", help="Compare implicit Euler with leapfrog and with scipy.")
     ] = False,
@@ -66,6 +71,10 @@ def profile(
         if scaling:
             status.update("measuring threads")
             found["scaling"] = profiling.measure_scaling(device.threads, device.cores, max(3, repeats // 3))
+        if gpu:
+            status.update("measuring a GPU")
+            repeated = max(3, repeats // 12)
+            found["devices"] = profiling.measure_devices(gpu, device.threads, device.cores, repeated)
         if implicit:
             status.update("measuring implicit steps")
             found["implicit"] = profiling.measure_implicit(max(3, repeats // 12))

@@ -104,8 +104,9 @@ def init(arch: ArchName = "auto", threads: int | None = None, cores: Sequence[in
     A second call with compatible arguments does nothing, because starting again would destroy the
     fields of every world. Where the environment has TAICHI_SOFT_DEBUG=1, kernels check every index.
     Args:
-        arch: "auto" or "cpu"; or a GPU by name, "cuda", "vulkan" or "metal". "auto" takes the CPU: the GPU
-            kernels have been tested on a CPU only, and games want their GPU for pictures.
+        arch: "auto" or "cpu"; or a GPU by name, "cuda", "vulkan" or "metal". "auto" takes the CPU,
+            which is faster at what games have (docs/speed.md), and games want their GPU for pictures.
+            "vulkan" and "metal" are untried.
         threads: CPU worker threads, 1 or more, of which no more are used than there are cores available to
             this process. The system moves them from core to core, and often wakes two on one: short frames
             then take nearly as long as with one thread.
@@ -197,7 +198,7 @@ def _start(arch: ArchName, reason: str, threads: int, cores: tuple[int, ...], is
             << 29,  # a game of many kinds of worlds fills the default 100 MB
             enable_fallback=False,
             cfg_optimization=False,  # halves the compile time; the kernels run as fast without it
-            detect_read_only=False,  # a GPU might not see what a real function wrote; untried
+            detect_read_only=False,  # a GPU might not see what a real function wrote
             make_cpu_multithreading_loop=False,  # it would put up to 512 bodies into one thread
             unrolling_limit=0,  # no warning
             log_level=ti.ERROR,
@@ -266,8 +267,8 @@ def make_fields(function: Callable[[], Result]) -> Result:
 
 def _at_home(function: Callable[[], Result], arch: str) -> Result:
     """Call what Taichi 1.7 does in one and the same thread only: start, and lay out fields. Whichever thread
-    comes first may end soon, so on a CPU it is a thread of our own. On a GPU it is the caller's:
-    untried; and where indices are checked, which ends the process in ours."""
+    comes first may end soon, so on a CPU it is a thread of our own. On a GPU it is the caller's;
+    and where indices are checked, which ends the process in ours."""
     if arch != "cpu" or os.environ.get(DEBUG) == "1":
         return function()
     found: Future[Result] = Future()

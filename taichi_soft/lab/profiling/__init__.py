@@ -4,6 +4,7 @@ from taichi_soft.lab.profiling.baseline import Baseline, compile_baseline, find_
 from taichi_soft.lab.profiling.budget import Budget, measure_budget
 from taichi_soft.lab.profiling.comparison import Comparison, compare_with_baseline
 from taichi_soft.lab.profiling.crossover import Crossover, measure_crossover
+from taichi_soft.lab.profiling.devices import DeviceGain, measure_devices
 from taichi_soft.lab.profiling.game import (
     FeatureCost,
     Heap,
@@ -25,6 +26,7 @@ __all__ = [
     "Budget",
     "Comparison",
     "Crossover",
+    "DeviceGain",
     "FeatureCost",
     "Heap",
     "ImplicitGain",
@@ -40,6 +42,7 @@ __all__ = [
     "find_compiler",
     "measure_budget",
     "measure_crossover",
+    "measure_devices",
     "measure_features",
     "measure_heaps",
     "measure_implicit",

@@ -44,6 +44,12 @@ def tables(found: dict[str, Any]) -> Iterator[tuple[str, Table]]:
             gains = [f"{x:.2f}" for x in (row.speedup.least, row.speedup.median, row.speedup.most)]
             table.add_row(str(row.substeps), str(row.threads), *times, *gains)
         yield "64 spheres on several threads [ms]", table
+    if "devices" in found:
+        table = _table("bodies", "tetrahedra", "CPU", "GPU", "gain least", "median", "most")
+        for row in found["devices"]:
+            times = f"{row.cpu.median:.2f}", f"{row.gpu.median:.2f}"
+            table.add_row(str(row.bodies), f"{row.tets:,}", *times, *_ratios(row.gain))
+        yield "A frame of 8 substeps without contact, positions read after it [ms, median]", table
     if "implicit" in found:
         table = _table("", "step [ms]", "other's", "ms per s", "other's", "gain least", "median", "most")
         for row in found["implicit"]:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from dataclasses import dataclass
 
-from taichi_soft.core.errors import DeviceError
+from taichi_soft.lab.profiling.process import Process
 from taichi_soft.lab.profiling.spread import Spread
 
 BODIES = 64
@@ -40,41 +38,6 @@ class Scaling:
     speedup: Spread  # pair by pair
 
 
-class _Stepper:
-    """A process of its own that makes steps when asked."""
-
-    def __init__(self, threads: int, cores: tuple[int, ...] = ()) -> None:
-        program = _PROGRAM.format(threads=threads, cores=cores or None, bodies=BODIES, steps=STEPS_PER_TURN)
-        self._threads = threads
-        self._process = subprocess.Popen(
-            [sys.executable, "-c", program],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            text=True,
-        )
-
-    def __enter__(self) -> _Stepper:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._process.communicate()
-
-    def time_step(self, substeps: int) -> float:
-        """What a step takes [s]. Raises: DeviceError if the process has failed."""
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        try:
-            self._process.stdin.write(f"{substeps}\n")
-            self._process.stdin.flush()
-            return float(self._process.stdout.readline())
-        except (OSError, ValueError):
-            raise DeviceError(
-                f"a process of {self._threads} threads failed: try `taichi-soft profile --threads "
-                f"{self._threads}`, which shows why"
-            ) from None
-
-
 def measure_scaling(threads: int, cores: tuple[int, ...], repeats: int) -> list[Scaling]:
     """Time one thread and `threads`, in turns: a machine that slows down for a while slows both.
 
@@ -82,13 +45,19 @@ def measure_scaling(threads: int, cores: tuple[int, ...], repeats: int) -> list[
         cores: to which the latter are bound, or none.
     Raises: DeviceError if a process fails.
     """
-    with _Stepper(1) as single, _Stepper(threads, cores) as parallel:
+    with _start(1) as single, _start(threads, cores) as parallel:
         return [_compare(single, parallel, threads, substeps, repeats) for substeps in SUBSTEPS]
 
 
-def _compare(single: _Stepper, parallel: _Stepper, threads: int, substeps: int, repeats: int) -> Scaling:
+def _start(threads: int, cores: tuple[int, ...] = ()) -> Process:
+    program = _PROGRAM.format(threads=threads, cores=cores or None, bodies=BODIES, steps=STEPS_PER_TURN)
+    advice = f"try `taichi-soft profile --threads {threads}`, which shows why"
+    return Process(program, f"a process of {threads} threads", advice)
+
+
+def _compare(single: Process, parallel: Process, threads: int, substeps: int, repeats: int) -> Scaling:
     turns = range(WARM_TURNS + repeats)
-    pairs = [(single.time_step(substeps), parallel.time_step(substeps)) for _ in turns][WARM_TURNS:]
+    pairs = [(single.ask(str(substeps)), parallel.ask(str(substeps))) for _ in turns][WARM_TURNS:]
     ones, others = zip(*pairs, strict=True)
     return Scaling(
         substeps,

@@ -11,10 +11,12 @@ from taichi_soft.core.errors import DeviceError
 from taichi_soft.lab.profiling import (
     compare_with_baseline,
     compile_baseline,
+    devices,
     find_compiler,
     game,
     measure_budget,
     measure_crossover,
+    measure_devices,
     measure_heaps,
     measure_moments,
     scaling,
@@ -105,6 +107,17 @@ def test_scaling_says_which_process_failed(monkeypatch):
     monkeypatch.setattr(scaling, "_PROGRAM", "raise SystemExit({threads})")
     with pytest.raises(DeviceError, match=r"process of 1 threads failed: try .*--threads 1"):
         scaling.measure_scaling(2, (), 3)
+
+
+def test_a_device_is_compared_with_the_processor_scene_by_scene(monkeypatch):
+    one, many = measure_devices("cpu", 1, (), 3, ((1, 2), (2, 0)))
+    assert (one.bodies, one.tets, many.bodies, many.tets) == (1, 40, 2, 2560)
+    assert 0 < one.gain.least <= one.gain.median <= one.gain.most
+    table = dict(tables({"devices": [one, many]}))
+    assert [each.row_count for each in table.values()] == [2]
+    monkeypatch.setattr(devices, "_PROGRAM", "raise SystemExit")
+    with pytest.raises(DeviceError, match=r"process on 'cpu' failed: try .*--arch cpu"):
+        measure_devices("cuda", 1, (), 3)
 
 
 def test_stolen_time_is_told_of_what_the_processors_were_wanted_for(monkeypatch, tmp_path):
