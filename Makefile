@@ -1,5 +1,5 @@
 # make demo: set everything up, drop the thesis's sphere, write out/bounce.mp4
-# make test: set everything up, run the tests that take minutes; make test-all: those that take half an hour, too
+# make test: set everything up, run the tests that take minutes; make test-all: those that take an hour, too
 
 .DEFAULT_GOAL := help
 .PHONY: help setup demo test test-fast test-all test-bounds lint profile docs clean
@@ -11,7 +11,7 @@ help:
 	@echo "make demo     set up, drop a soft sphere, write out/bounce.mp4"
 	@echo "make test     set up, run the tests, but those that take long"
 	@echo "make test-fast  set up, run tests without worlds: for the inner loop"
-	@echo "make test-all set up with every extra, run every test: half an hour"
+	@echo "make test-all set up with every extra, run every test: an hour"
 	@echo "make test-bounds  set up, run kernels with every index checked: takes minutes"
 	@echo "make profile  set up, measure what a frame costs here"
 	@echo "make docs     set up, build the documentation into out/docs"

@@ -121,10 +121,16 @@ def _of_scene(scene: trimesh.Scene, name: str) -> list[Surface]:
 def _surface(mesh: trimesh.Trimesh, name: str) -> Surface:
     if len(mesh.faces) == 0:
         raise MeshError("there are no triangles in it")
-    surface = _of_arrays(mesh.vertices, mesh.faces, name)
-    # Those of the file, where it has any: copies of a vertex at a seam of the texture share them.
-    normals = _unit(np.asarray(mesh.vertex_normals, dtype=np.float64))
-    return Surface(name, surface.vertices, surface.triangles, read_only(normals), mesh.visual)
+    surface, normals = _of_arrays(mesh.vertices, mesh.faces, name), None
+    if "vertex_normals" in mesh._cache:  # of the file: copies of a vertex at a seam of the texture share them
+        normals = read_only(_unit(np.asarray(mesh.vertex_normals, dtype=np.float64)))
+    return Surface(
+        name,
+        surface.vertices,
+        surface.triangles,
+        surface.normals if normals is None else normals,
+        mesh.visual,
+    )
 
 
 def _of_arrays(vertices: Any, triangles: Any, name: str) -> Surface:
@@ -135,15 +141,19 @@ def _of_arrays(vertices: Any, triangles: Any, name: str) -> Surface:
 
 
 def _normals(points: FloatArray, triangles: IntArray) -> FloatArray:
-    """Means of those of the triangles round each vertex, by area, (n, 3)."""
-    a, b, c = np.moveaxis(points[triangles], 1, 0)
-    areas = np.repeat(np.cross(b - a, c - a), 3, axis=0)
-    sums = [np.bincount(triangles.ravel(), areas[:, k], len(points)) for k in range(3)]
+    """Means of those of the triangles round each vertex, by their angles there, (n, 3)."""
+    corners = points[triangles]
+    ahead, back = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
+    across = np.cross(ahead, back)  # along the normal, at each corner
+    size = np.linalg.norm(across, axis=2)
+    angles = np.where(size > 0.0, np.arctan2(size, np.einsum("tcx,tcx->tc", ahead, back)), 0.0)
+    weighed = (angles[:, :, None] * _unit(across)).reshape(-1, 3)
+    sums = [np.bincount(triangles.ravel(), weighed[:, k], len(points)) for k in range(3)]
     return _unit(np.stack(sums, axis=1))
 
 
 def _unit(normals: NDArray[Any]) -> FloatArray:
-    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    lengths = np.linalg.norm(normals, axis=-1, keepdims=True)
     return np.where(lengths > 0, normals / np.where(lengths > 0, lengths, 1.0), [0.0, 0.0, 1.0])
 
 

@@ -64,6 +64,14 @@ def test_normals_point_outwards_and_have_unit_length():
     np.testing.assert_allclose(np.linalg.norm(found.normals, axis=1), 1.0)
 
 
+def test_normals_at_a_cubes_corners_lie_on_its_diagonals_however_its_faces_are_cut():
+    """By angles: by areas the corners with more triangles of a face would lean to it. A triangle without area
+    counts for nothing."""
+    cube = trimesh.creation.box((2, 2, 2))
+    (found,) = read_surfaces((cube.vertices, np.concatenate([cube.faces, [[0, 0, 1], [3, 4, 3]]])))
+    np.testing.assert_allclose(found.normals, cube.vertices / np.sqrt(3), atol=1e-12)
+
+
 @pytest.mark.parametrize("turn", [0.0, 0.7])
 def test_normals_are_those_of_the_file_where_it_has_any(tmp_path, turn):
     """Of a ball cut into single triangles, whose own normals would be those of facets; where a node turns the
