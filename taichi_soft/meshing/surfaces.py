@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
+import logging
 import os
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -121,16 +124,21 @@ def _of_scene(scene: trimesh.Scene, name: str) -> list[Surface]:
 def _surface(mesh: trimesh.Trimesh, name: str) -> Surface:
     if len(mesh.faces) == 0:
         raise MeshError("there are no triangles in it")
-    surface, normals = _of_arrays(mesh.vertices, mesh.faces, name), None
-    if "vertex_normals" in mesh._cache:  # of the file: copies of a vertex at a seam of the texture share them
-        normals = read_only(_unit(np.asarray(mesh.vertex_normals, dtype=np.float64)))
-    return Surface(
-        name,
-        surface.vertices,
-        surface.triangles,
-        surface.normals if normals is None else normals,
-        mesh.visual,
-    )
+    surface = _of_arrays(mesh.vertices, mesh.faces, name)
+    # Those of the file, where it has any: copies of a vertex at a seam of the texture share them.
+    with _silent(logging.getLogger("trimesh.util")):
+        normals = _unit(np.asarray(mesh.vertex_normals, dtype=np.float64))
+    return Surface(name, surface.vertices, surface.triangles, read_only(normals), mesh.visual)
+
+
+@contextlib.contextmanager
+def _silent(log: logging.Logger) -> Iterator[None]:
+    """While normals are computed without scipy: trimesh writes a traceback, and does it in another way."""
+    was, log.disabled = log.disabled, True
+    try:
+        yield
+    finally:
+        log.disabled = was
 
 
 def _of_arrays(vertices: Any, triangles: Any, name: str) -> Surface:

@@ -1,5 +1,7 @@
 """Surfaces read as their artist made them: order, axes, parts, texture; and what is no surface."""
 
+import logging
+
 import numpy as np
 import pytest
 import trimesh
@@ -70,6 +72,18 @@ def test_normals_at_a_cubes_corners_lie_on_its_diagonals_however_its_faces_are_c
     cube = trimesh.creation.box((2, 2, 2))
     (found,) = read_surfaces((cube.vertices, np.concatenate([cube.faces, [[0, 0, 1], [3, 4, 3]]])))
     np.testing.assert_allclose(found.normals, cube.vertices / np.sqrt(3), atol=1e-12)
+
+
+def test_normals_without_scipy_are_made_in_silence(monkeypatch, caplog):
+    def missing(*_, **__):
+        raise ModuleNotFoundError("No module named 'scipy'")
+
+    monkeypatch.setattr(trimesh.geometry, "index_sparse", missing)
+    cube = trimesh.creation.box((2, 2, 2))
+    (found,) = read_surfaces(trimesh.Trimesh(cube.vertices, cube.faces, process=False))
+    np.testing.assert_allclose(found.normals, cube.vertices / np.sqrt(3), atol=1e-12)
+    assert caplog.text == ""
+    assert not logging.getLogger("trimesh.util").disabled
 
 
 @pytest.mark.parametrize("turn", [0.0, 0.7])
