@@ -10,7 +10,7 @@ import numpy as np
 from engine_adapter import EngineAdapter, FixedStep
 from taichi_soft.core.types import ArchName
 from taichi_soft.lab.profiling.phases import TINY_H, spheres
-from taichi_soft.lab.profiling.process import Process
+from taichi_soft.lab.profiling.process import Process, compare_processes
 from taichi_soft.lab.profiling.spread import Spread, time_calls
 from taichi_soft.meshing import TetMesh, box, sphere
 
@@ -18,7 +18,6 @@ SUBSTEPS = 8
 SCENES = ((1, 6), (1, 14), (1, 28), (16, 0), (256, 0))
 """Bodies, and cells along each side of a box; 0: a sphere of 1,280 tetrahedra. None touches another."""
 
-WARM_TURNS = 2
 STEPS_PER_TURN = 3
 
 _PROGRAM = """
@@ -95,16 +94,8 @@ def _start(arch: ArchName, threads: int | None, cores: tuple[int, ...] | None) -
 
 
 def _compare(cpu: Process, gpu: Process, bodies: int, cells: int, repeats: int) -> DeviceGain:
-    scene = f"{bodies} {cells}"
-    pairs = [(cpu.ask(scene), gpu.ask(scene)) for _ in range(WARM_TURNS + repeats)][WARM_TURNS:]
-    ones, others = zip(*pairs, strict=True)
-    return DeviceGain(
-        bodies,
-        bodies * len(_mesh(cells).tets),
-        Spread.of(list(ones)).scaled(1e3),
-        Spread.of(list(others)).scaled(1e3),
-        Spread.of([one / other for one, other in pairs]),
-    )
+    tets = bodies * len(_mesh(cells).tets)
+    return DeviceGain(bodies, tets, *compare_processes(cpu, gpu, f"{bodies} {cells}", repeats))
 
 
 def _mesh(cells: int) -> TetMesh:

@@ -1,4 +1,4 @@
-"""A Python process of its own, asked line by line: Taichi's device and threads are fixed per process."""
+"""Python processes asked line by line, in turns: Taichi's device and threads are fixed per process."""
 
 from __future__ import annotations
 
@@ -6,16 +6,19 @@ import subprocess
 import sys
 
 from taichi_soft.core.errors import DeviceError
+from taichi_soft.lab.profiling.spread import Spread
+
+WARM_TURNS = 2
 
 
 class Process:
-    """Answers each line with a number."""
+    """Answers each line with a time [s]."""
 
     def __init__(self, program: str, name: str, advice: str) -> None:
         """Start it.
 
         Args:
-            program: its source, which reads lines and prints a number for each.
+            program: its source, which reads lines and prints a time [s] for each.
             name: what a message calls it.
             advice: what to try where it fails.
         """
@@ -44,3 +47,13 @@ class Process:
             return float(self._process.stdout.readline())
         except (OSError, ValueError):
             raise DeviceError(self._failure) from None
+
+
+def compare_processes(one: Process, other: Process, line: str, repeats: int) -> tuple[Spread, Spread, Spread]:
+    """Ask two in turns, after some to warm up: a machine that slows down for a while slows both.
+
+    Returns: the times of each [ms], and `one` over `other`, pair by pair.
+    """
+    pairs = [(one.ask(line), other.ask(line)) for _ in range(WARM_TURNS + repeats)][WARM_TURNS:]
+    ones, others = ([pair[i] for pair in pairs] for i in (0, 1))
+    return Spread.of(ones).scaled(1e3), Spread.of(others).scaled(1e3), Spread.of([a / b for a, b in pairs])

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from taichi_soft.lab.profiling.process import Process
+from taichi_soft.lab.profiling.process import Process, compare_processes
 from taichi_soft.lab.profiling.spread import Spread
 
 BODIES = 64
 SUBSTEPS = (4, 14)
 """Of a step: what this body needs at 60 Hz, and the thesis's 700 per second at 50 Hz."""
 
-WARM_TURNS = 2
 STEPS_PER_TURN = 5
 
 _PROGRAM = """
@@ -39,30 +38,20 @@ class Scaling:
 
 
 def measure_scaling(threads: int, cores: tuple[int, ...], repeats: int) -> list[Scaling]:
-    """Time one thread and `threads`, in turns: a machine that slows down for a while slows both.
+    """Time one thread and `threads`, in turns.
 
     Args:
         cores: to which the latter are bound, or none.
     Raises: DeviceError if a process fails.
     """
     with _start(1) as single, _start(threads, cores) as parallel:
-        return [_compare(single, parallel, threads, substeps, repeats) for substeps in SUBSTEPS]
+        return [
+            Scaling(substeps, threads, *compare_processes(single, parallel, str(substeps), repeats))
+            for substeps in SUBSTEPS
+        ]
 
 
 def _start(threads: int, cores: tuple[int, ...] = ()) -> Process:
     program = _PROGRAM.format(threads=threads, cores=cores or None, bodies=BODIES, steps=STEPS_PER_TURN)
     advice = f"try `taichi-soft profile --threads {threads}`, which shows why"
     return Process(program, f"a process of {threads} threads", advice)
-
-
-def _compare(single: Process, parallel: Process, threads: int, substeps: int, repeats: int) -> Scaling:
-    turns = range(WARM_TURNS + repeats)
-    pairs = [(single.ask(str(substeps)), parallel.ask(str(substeps))) for _ in turns][WARM_TURNS:]
-    ones, others = zip(*pairs, strict=True)
-    return Scaling(
-        substeps,
-        threads,
-        Spread.of(list(ones)).scaled(1e3),
-        Spread.of(list(others)).scaled(1e3),
-        Spread.of([one / other for one, other in pairs]),
-    )
