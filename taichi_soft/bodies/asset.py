@@ -27,6 +27,7 @@ from taichi_soft.cages.hull import as_hull
 from taichi_soft.core.checks import as_count, as_indices, as_rotation, as_vector
 from taichi_soft.core.constants import POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.core.errors import MaterialError, MeshError, OptionError
+from taichi_soft.core.math.rotations import turned
 from taichi_soft.core.serialisation import digest_of
 from taichi_soft.core.types import (
     CageMethodName,
@@ -381,7 +382,8 @@ class SoftBodyAsset:
         return self.contact.friction, THIN * edge if thickness is None else thickness, edge
 
     @cached_property
-    def _center_of_mass(self) -> Floats:
+    def center_of_mass(self) -> Floats:
+        """Of its mesh, (3,) [m]."""
         masses = self.description.masses
         return np.asarray(masses @ self.mesh.vertices / masses.sum())
 
@@ -412,7 +414,7 @@ class SoftBodyAsset:
         origin, turn = as_vector(position, "position", "m"), as_rotation(rotation)
         drift = as_vector(velocity, "velocity", "m/s", VELOCITY_LIMIT)
         spin = as_vector(angular_velocity, "angular_velocity", "rad/s")
-        x = self.mesh.vertices @ turn.T + origin
+        x = turned(self.mesh.vertices, turn) + origin
         self._require_place(x, origin, floor)
         rows: Floats32 = self.rest_rows.copy()
         rows[:, :3] = x
@@ -420,7 +422,8 @@ class SoftBodyAsset:
         if spin.any():
             a, b, c = spin
             turning = np.array([[0, -c, b], [c, 0, -a], [-b, a, 0]])  # spin x r = turning @ r
-            rows[:, 3:6] += (x - (turn @ self._center_of_mass + origin)) @ turning.T
+            center = turned(self.center_of_mass[None], turn) + origin
+            rows[:, 3:6] += turned(x - center, turning)
             fastest = float(np.abs(rows[:, 3:6]).max())
             if not fastest < VELOCITY_LIMIT:
                 raise OptionError(

@@ -15,7 +15,7 @@ from taichi_soft.core.checks import as_rotation, as_vector
 from taichi_soft.core.constants import VELOCITY_LIMIT
 from taichi_soft.core.errors import StateError
 from taichi_soft.core.handles import Handle, recorded
-from taichi_soft.core.math.rotations import matrix_of, quaternion_of
+from taichi_soft.core.math.rotations import length_of, matrix_of, quaternion_of, turned
 
 Floats = NDArray[np.float64]
 
@@ -54,13 +54,14 @@ class ColliderRow:
     def way(self, dt: float) -> tuple[Floats, Floats, Floats]:
         """Corners of a box round its way through `dt` [s], (3,) [m] each; its highest speed, (1,) [m/s]."""
         lower, upper = self.shape.bounds
-        speed, spin = float(np.linalg.norm(self.velocity)), float(np.linalg.norm(self.spin))
+        speed, spin = length_of(self.velocity), length_of(self.spin)
         if not np.isfinite([lower, upper]).all():
             far = np.full(3, 1e30)
             return -far, far, np.array([speed if spin == 0.0 else 1e30])
         corners = np.array([[(lower, upper)[i >> k & 1][k] for k in range(3)] for i in range(8)])
-        radius = float(np.linalg.norm(corners, axis=1).max())
-        places = corners @ matrix_of(self.rotation).T
+        x, y, z = corners.T
+        radius = float(np.sqrt(x * x + y * y + z * z).max())
+        places = turned(corners, matrix_of(self.rotation))
         if spin > 0.0:
             places = radius * np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]])
         start, end = self.position + places, self.position + dt * self.velocity + places

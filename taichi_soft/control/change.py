@@ -54,6 +54,11 @@ def named_particles(body: SoftBody, particles: ArrayLike, name: str = "particles
     return vertices
 
 
+def mass_of(body: SoftBody, vertices: NDArray[np.int32]) -> float:
+    """Of vertices of a body [kg], added one after the other: so does the native library."""
+    return float(np.cumsum(body.masses[vertices])[-1])
+
+
 def rows_of(body: SoftBody, vertices: NDArray[np.int32]) -> NDArray[np.int32]:
     """Where vertices of a body lie in the fields. Raises: StateError before `World.build`."""
     return context_of(body).built.rows_of(body.index, vertices)

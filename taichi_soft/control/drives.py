@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies.soft_body import Context, SoftBody, context_of
-from taichi_soft.control.change import change, numbers, require_substeps, rows_of, some_particles
+from taichi_soft.control.change import change, mass_of, numbers, require_substeps, rows_of, some_particles
 from taichi_soft.control.impulses import LARGEST_IMPULSE
 from taichi_soft.control.kernels.drives import (
     add_push,
@@ -34,7 +34,7 @@ def apply_force(body: SoftBody, force: ArrayLike, particles: ArrayLike | None) -
     """As `Body.apply_force`."""
     total = as_vector(force, "force", "N", LARGEST_IMPULSE)
     vertices = some_particles(body, particles)
-    acceleration = total / body.masses[vertices].sum()
+    acceleration = total / mass_of(body, vertices)
     if not np.abs(acceleration).max() < LARGEST_PUSH:
         raise OptionError(
             f"force would accelerate vertices by {np.abs(acceleration).max():.4g} m/s^2: "

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from taichi_soft.bodies.soft_body import Context, SoftBody
-from taichi_soft.control.change import attempt, change, numbers, rouse, rows_of, some_particles
+from taichi_soft.control.change import attempt, change, mass_of, numbers, rouse, rows_of, some_particles
 from taichi_soft.control.kernels.impulses import add_impulse_near, add_radial_impulse, add_velocity
 from taichi_soft.core.checks import as_number, as_vector
 from taichi_soft.core.constants import VELOCITY_LIMIT
@@ -23,7 +23,7 @@ def apply_impulse(body: SoftBody, impulse: ArrayLike, particles: ArrayLike | Non
     """As `Body.apply_impulse`."""
     momentum = as_vector(impulse, "impulse", "N s", LARGEST_IMPULSE)
     vertices = some_particles(body, particles)
-    velocity = momentum / body.masses[vertices].sum()
+    velocity = momentum / mass_of(body, vertices)
     _require_speed(float(np.linalg.norm(velocity)), "impulse")
     change(body, add_velocity, rows_of(body, vertices), numbers(velocity))
 

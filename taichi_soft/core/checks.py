@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.core.constants import POSITION_LIMIT
 from taichi_soft.core.errors import OptionError
+from taichi_soft.core.math.rotations import length_of, turning_rows
 
 Floats = NDArray[np.float64]
 Floats32 = NDArray[np.float32]
@@ -159,9 +160,9 @@ def as_rotation(value: Any) -> Floats:
         return np.eye(3)
     if to_array(value, "rotation").shape == (4,):
         quaternion = as_array(value, "rotation", (4,), "quaternion x, y, z, w")
-        length = float(np.linalg.norm(quaternion))
+        length = length_of(quaternion)
         _require_unit(np.array([length]), "rotation")
-        return np.array(_turning_rows(*(quaternion / length).tolist()))
+        return np.array(turning_rows(*(quaternion / length).tolist()))
     matrix = as_array(value, "rotation", (3, 3), "or quaternion of shape (4,)")
     return np.asarray(_rotations(matrix[None], "rotation")[0])
 
@@ -192,7 +193,7 @@ def _rotations(matrices: Floats, name: str) -> Floats:
 def _from_quaternions(quaternions: Floats, name: str) -> Floats:
     lengths = np.linalg.norm(quaternions, axis=1)
     _require_unit(lengths, name)
-    return np.moveaxis(np.array(_turning_rows(*(quaternions / lengths[:, None]).T)), 2, 0)
+    return np.moveaxis(np.array(turning_rows(*(quaternions / lengths[:, None]).T)), 2, 0)
 
 
 def _require_unit(lengths: Floats, name: str) -> None:
@@ -201,15 +202,6 @@ def _require_unit(lengths: Floats, name: str) -> None:
         raise OptionError(
             f"{name}{_which(bad)} is a quaternion of length {lengths[bad.argmax()]:g}: normalise it"
         )
-
-
-def _turning_rows(x: Any, y: Any, z: Any, w: Any) -> list[list[Any]]:
-    """Rows of the matrix that turns as a unit quaternion does, of numbers or arrays."""
-    return [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]
 
 
 def _which(bad: NDArray[np.bool_]) -> str:

@@ -48,7 +48,7 @@ def drop(cushion, mass, steps):
 
 @pytest.mark.parametrize(("mass", "sway"), [(500.0, 0.12), (100.0, 0.03), (20.0, 0.03)])
 def test_a_rigid_ball_comes_to_rest_on_a_soft_block_and_gains_no_energy(cushion, mass, sway):
-    """One as heavy as the block still sways after half of the time: the mean over it is not yet the weight."""
+    """One as heavy as the block still sways in the second half: its mean is not yet the weight."""
     ball, energy, pushes = drop(cushion, mass, 960)
     assert energy.max() <= 1.001 * energy[0]
     assert 0.2 < ball.position[2] < 0.26 + 0.25 + RADIUS

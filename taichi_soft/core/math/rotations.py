@@ -1,6 +1,13 @@
-"""Rotations as unit quaternions (x, y, z, w), in NumPy."""
+"""Rotations as unit quaternions (x, y, z, w), in float64.
+
+Each sum is written out in its order, so that another language gets the same bits: libraries of linear algebra
+round a dot product as they like.
+"""
 
 from __future__ import annotations
+
+import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,32 +15,60 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 
+def turning_rows(x: Any, y: Any, z: Any, w: Any) -> list[list[Any]]:
+    """Rows of the matrix that turns as a unit quaternion does, of numbers or arrays."""
+    return [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+
+
+def length_of(vector: Floats) -> float:
+    """Of three or four numbers."""
+    total = 0.0
+    for each in vector.tolist():
+        total += each * each
+    return math.sqrt(total)
+
+
+def turned(points: Floats, rows: Floats) -> Floats:
+    """Points (n, 3), each multiplied by a matrix (3, 3)."""
+    x, y, z = points[:, 0], points[:, 1], points[:, 2]
+    return np.stack([row[0] * x + row[1] * y + row[2] * z for row in rows], axis=1)
+
+
 def quaternion_of(matrix: Floats) -> Floats:
     """The quaternion of a rotation matrix (3, 3), with w of 0 or more."""
     # 4 q q^T, whose rows are all q times one of its components: the longest is the most exact.
     m = matrix
+    trace = m[0, 0] + m[1, 1] + m[2, 2]
     skew = np.array([m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]])
     square = np.empty((4, 4))
-    square[:3, :3] = m + m.T + (1.0 - np.trace(m)) * np.eye(3)
+    square[:3, :3] = m + m.T + (1.0 - trace) * np.eye(3)
     square[3, :3] = square[:3, 3] = skew
-    square[3, 3] = 1.0 + np.trace(m)
+    square[3, 3] = 1.0 + trace
     row = square[np.argmax(np.diag(square))]
-    quaternion = row / np.linalg.norm(row)
+    quaternion = row / length_of(row)
     return -quaternion if quaternion[3] < 0 else quaternion
 
 
 def matrix_of(quaternion: Floats) -> Floats:
     """The rotation matrix (3, 3) of a unit quaternion."""
-    axis, w = quaternion[:3], quaternion[3]
-    cross = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
-    return np.asarray(np.eye(3) + 2.0 * w * cross + 2.0 * cross @ cross)
+    return np.array(turning_rows(*quaternion.tolist()))
 
 
 def multiplied(second: Floats, first: Floats) -> Floats:
     """The turn `first` and then `second`."""
-    a, w = second[:3], second[3]
-    b, u = first[:3], first[3]
-    return np.r_[w * b + u * a + np.cross(a, b), w * u - a @ b]
+    (a, b, c, w), (d, e, f, u) = second.tolist(), first.tolist()
+    return np.array(
+        [
+            w * d + u * a + (b * f - c * e),
+            w * e + u * b + (c * d - a * f),
+            w * f + u * c + (a * e - b * d),
+            w * u - (a * d + b * e + c * f),
+        ]
+    )
 
 
 def rotation_vector(start: Floats, end: Floats) -> Floats:
@@ -41,15 +76,15 @@ def rotation_vector(start: Floats, end: Floats) -> Floats:
     turn = multiplied(end, np.r_[-start[:3], start[3]])
     if turn[3] < 0:
         turn = -turn
-    sine = np.linalg.norm(turn[:3])
+    sine = length_of(turn[:3])
     if sine < 1e-12:
         return np.asarray(2.0 * turn[:3])
-    return np.asarray(turn[:3] / sine * (2.0 * np.arctan2(sine, turn[3])))
+    return np.asarray(turn[:3] / sine * (2.0 * math.atan2(sine, turn[3])))
 
 
 def turned_by(quaternion: Floats, vector: Floats) -> Floats:
     """A quaternion turned further by a rotation vector [rad], of unit length."""
-    angle = float(np.linalg.norm(vector))
-    axis = vector * (0.5 if angle == 0.0 else np.sin(0.5 * angle) / angle)
-    result = multiplied(np.r_[axis, np.cos(0.5 * angle)], quaternion)
-    return np.asarray(result / np.linalg.norm(result))
+    angle = length_of(vector)
+    axis = vector * (0.5 if angle == 0.0 else math.sin(0.5 * angle) / angle)
+    result = multiplied(np.r_[axis, math.cos(0.5 * angle)], quaternion)
+    return np.asarray(result / length_of(result))
