@@ -30,6 +30,7 @@ LAYERS = """
     engine_adapter
     render
     bake
+    export
     lab
     cli
     __main__

@@ -357,6 +357,11 @@ def _best(kind: type[Kind], capacity: BodyCapacity, program: Program) -> Kind | 
     return min(fitting, key=lambda each: (program not in each.programs, each.capacity.rooms), default=None)
 
 
+def made_fields() -> list[BodyFields]:
+    """All that this process has made, in use or not, in their order."""
+    return list(_made)
+
+
 def release(fields: BodyFields) -> None:
     """Take back the fields of a world that is gone."""
     _free.append(fields)

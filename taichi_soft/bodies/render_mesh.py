@@ -48,7 +48,7 @@ class RenderMesh:
             triangles: render vertices, (m, 3).
         """
         self._describe(body, vertices, triangles)
-        self._table = _table(vertices, triangles)
+        self._table = render_table(vertices, triangles)
 
     def _describe(self, body: SoftBody, vertices: NDArray[np.int64], triangles: Ints32) -> None:
         self._body = body
@@ -132,7 +132,9 @@ def read_render_mesh(
 
 def warm_up(state: Any) -> None:
     """Compile what `read_render_mesh` calls, for few vertices and for many."""
-    table = _table(np.zeros(3, dtype=np.int64), np.arange(3).reshape(1, 3))  # of a vertex of the first body
+    table = render_table(
+        np.zeros(3, dtype=np.int64), np.arange(3).reshape(1, 3)
+    )  # of a vertex of the first body
     positions, normals = np.empty((2, 3, 3), dtype=np.float32)
     for is_serial in (True, False):
         _write(state, is_serial, 0, 1.0, table, positions, normals)
@@ -150,7 +152,7 @@ def _write(
     write_render_mesh(state, is_serial, body, alpha, table, positions.reshape(-1), normals.reshape(-1))
 
 
-def _table(vertices: NDArray[np.int64], triangles: NDArray[Any]) -> Ints32:
+def render_table(vertices: NDArray[np.int64], triangles: NDArray[Any]) -> Ints32:
     """What the kernel walks, in one array, because each argument of a kernel costs as much as some hundred
     vertices: blocks, the body's vertex of each render vertex, where the further triangles of each block begin
     in the table and behind the last one end, and these triangles.

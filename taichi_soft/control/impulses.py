@@ -50,8 +50,9 @@ def apply_radial_impulse(context: Context, center: ArrayLike, impulse: float, ra
     origin = as_vector(center, "center", "m")
     momentum = as_number(impulse, "impulse", -LARGEST_IMPULSE, LARGEST_IMPULSE)
     reach = as_number(radius, "radius", 1e-9, 1e9, "a number above 0 m, from 1e-9 to 1e9")
-    row = numbers(origin, reach, momentum)
-    _require_speed(context.built.attempt(add_radial_impulse, len(context.slots.slots), row), "impulse")
+    row, found = numbers(origin, reach, momentum), np.empty(1, dtype=np.float32)
+    context.built.attempt(add_radial_impulse, len(context.slots.slots), row, found)
+    _require_speed(float(found[0]), "impulse")
     context.built.has_changed()
     context.built.wake_near(origin - reach, origin + reach)
 

@@ -50,7 +50,9 @@ def set_targets(body: SoftBody, particles: ArrayLike, positions: ArrayLike) -> N
         raise OptionError(f"positions must lie within {POSITION_LIMIT:g} m of zero")
     require_unattached(body, vertices)
     order = np.argsort(given, kind="stable")
-    loose = attempt(body, write_targets, rows_of(body, vertices), targets[order].astype(np.float32))
+    rows, found = targets[order].astype(np.float32), np.empty(1, dtype=np.int32)
+    attempt(body, write_targets, rows_of(body, vertices), rows, found)
+    loose = int(found[0])
     if loose >= 0:
         raise StateError(f"vertex {vertices[loose]} of body {body.index} is not pinned: call body.pin first")
     rouse(body)

@@ -23,7 +23,9 @@ def set_velocity(body: SoftBody, linear: ArrayLike, angular: ArrayLike) -> None:
     motion = numbers(
         as_vector(linear, "linear", "m/s", VELOCITY_LIMIT), as_vector(angular, "angular", "rad/s")
     )
-    fastest = attempt(body, write_rigid_velocity, body.index, motion)
+    found = np.empty(1, dtype=np.float32)
+    attempt(body, write_rigid_velocity, body.index, motion, found)
+    fastest = float(found[0])
     if not fastest < VELOCITY_LIMIT:
         raise OptionError(
             f"linear and angular make some vertices {fastest:.4g} m/s fast: keep below {VELOCITY_LIMIT:g} m/s"

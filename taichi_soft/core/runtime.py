@@ -17,12 +17,12 @@ import shutil
 import tempfile
 import threading
 from _thread import start_new_thread
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from pathlib import Path
 from queue import SimpleQueue
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from taichi_soft.core.cores import (
     available_cores,
@@ -48,7 +48,17 @@ from taichi_soft.core.taichi_patches import (
 from taichi_soft.core.threads import in_turn, leave_behind
 from taichi_soft.core.types import ArchName
 
-__all__ = ["Device", "device", "holds_fields", "init", "is_initialized", "kernel_folder", "make_fields", "ti"]
+__all__ = [
+    "Device",
+    "device",
+    "export_kernels",
+    "holds_fields",
+    "init",
+    "is_initialized",
+    "kernel_folder",
+    "make_fields",
+    "ti",
+]
 
 Result = TypeVar("Result")
 Class = TypeVar("Class", bound=type)
@@ -93,6 +103,7 @@ _checked_kernels: str | None = None  # folder of those that check indices
 _jobs: SimpleQueue[Callable[[], object]] = SimpleQueue()  # of the thread that started it
 _is_served = threading.Lock()
 _home = 0  # identity of that thread
+_first_field: Any = None  # in a layout by itself: an empty one cannot be exported
 
 
 @in_turn
@@ -176,7 +187,7 @@ def init(arch: ArchName = "auto", threads: int | None = None, cores: Sequence[in
 
 def _start(arch: ArchName, reason: str, threads: int, cores: tuple[int, ...], is_left_to_us: bool) -> None:
     """Start Taichi, with its workers on these cores if there are any, and note the device."""
-    global _device, _process, _checked_kernels
+    global _device, _process, _checked_kernels, _first_field
     is_checked = os.environ.get(DEBUG) == "1"
     before, since = (thread_ids(), number_now()) if cores else (set(), 0)
     options = {}
@@ -209,6 +220,7 @@ def _start(arch: ArchName, reason: str, threads: int, cores: tuple[int, ...], is
         let_whole_numbers_overflow()
     elif arch == "cpu":
         FIRST_LAUNCHES.open(KnownKernels(kernel_folder()))
+    _first_field = ti.field(ti.i32, ())
     ti.lang.impl.get_runtime().materialize()  # once, by the first kernel otherwise, in whichever thread
     _process = os.getpid()
     atexit.register(_end)
@@ -263,6 +275,25 @@ def make_fields(function: Callable[[], Result]) -> Result:
         return made
 
     return _at_home(make, device().arch)
+
+
+def export_kernels(folder: Path, kernels: Mapping[str, tuple[Any, dict[str, Any]]], fields: Any) -> None:
+    """Write kernels for programs without Python: the last thing that this process does with Taichi.
+
+    Args:
+        kernels: by name, each with its template arguments, and an array like each of the others.
+        fields: the first fields of each of the layouts that they are compiled for.
+    """
+
+    def write() -> None:
+        module = ti.aot.Module(ti.x64)
+        for number, field in enumerate([_first_field, *fields]):
+            module.add_field(f"layout{number}", field)
+        for name, (kernel, arguments) in kernels.items():
+            module.add_kernel(kernel, arguments, name)
+        module.save(str(folder))
+
+    _at_home(write, device().arch)
 
 
 def _at_home(function: Callable[[], Result], arch: str) -> Result:

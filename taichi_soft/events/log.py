@@ -75,6 +75,11 @@ class EventLog:
         self._observer.begin(kinds, self._kinds)
         self._kinds, self._was_asked = kinds, True
 
+    @property
+    def is_recording(self) -> bool:
+        """Whether somebody asked for events."""
+        return self._was_asked
+
     def on(self, kind: type[Event], function: Callable[[Any], object]) -> Listener:
         """See `World.on`."""
         parts = self._parts(kind)

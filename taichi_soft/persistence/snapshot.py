@@ -82,6 +82,12 @@ def _table(context: WorldContext, entries: dict[str, list[list[Any]]]) -> Words:
     return row_table(state, scene.particle_count, slots, scene.block_count, counts)
 
 
+def carried_rows(context: WorldContext) -> list[int]:
+    """How many rows of each group of fields a snapshot has: of its `owners`, in their order."""
+    rows: list[int] = _table(context, write_manifest(context)["slices"])[:-1, 0].tolist()
+    return rows
+
+
 def restore_snapshot(context: WorldContext, data: Any) -> None:
     """As `World.restore`."""
     state = context.built.state

@@ -64,18 +64,27 @@ class Substeps:
             self._estimates[described] = stable_step(described.mesh, described.material, described.model)
         return self._estimates[described]
 
-    def stable_count(self, dt: float) -> int:
-        """As `World.stable_substeps`."""
+    @property
+    def rule(self) -> tuple[float, float]:
+        """Of a step, as many substeps are stable as its length times the first, over the second [s], is
+        rounded up to.
+
+        Raises: StateError for a world without bodies.
+        """
         if not self._pools.slots:
             raise StateError("the world is empty: call add_body or reserve first")
         if self._is_implicit:
-            seconds = as_step(dt)
-            return max(1, math.ceil(0.999 * seconds / SOFT_CONTACT_STEP)) if self._soft_contact else 1
+            return (0.999, SOFT_CONTACT_STEP) if self._soft_contact else (1.0, math.inf)
         longest = min(each.stable_step.recommended for asset in self._pools.kinds for each in asset.levels)
         for body in self._pools.living:
             if record_of(body).description is not present_asset(body).description:
                 longest = min(longest, self.stable_step(body).recommended)
-        return max(1, math.ceil(as_step(dt) / longest))
+        return 1.0, longest
+
+    def stable_count(self, dt: float) -> int:
+        """As `World.stable_substeps`."""
+        share, longest = self.rule
+        return max(1, math.ceil(share * as_step(dt) / longest))
 
     def review(self) -> None:
         """Before a world is built: say how many substeps a frame will take, where these are many.

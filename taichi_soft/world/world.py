@@ -289,3 +289,8 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
 def context_of_world(world: World) -> WorldContext:
     """What is behind its public face, for what the library builds upon it."""
     return world._context
+
+
+def force_field_of(world: World) -> ForceField | None:
+    """What `set_force_field` was given last."""
+    return world._force_field

@@ -76,12 +76,14 @@ def add_radial_impulse(
     state: ti.template(),
     body_count: ti.i32,
     place: ti.types.ndarray(dtype=ti.f32, ndim=1),
-) -> ti.f32:
+    found: ti.types.ndarray(dtype=ti.f32, ndim=1),
+):
     """Push all bodies away from a point, each by its own share of mass in reach.
 
     Args:
         place: centre [m], radius [m], impulse on a body at the centre [N s]: (5,).
-    Returns: the largest change of speed that it can make [m/s]; if that is too large, nothing is changed.
+        found: receives the largest change of speed that it can make [m/s], (1,); if that is too large,
+            nothing is changed.
     """
     highest = ti.cast(0.0, ti.f32)
     ti.loop_config(serialize=True)
@@ -100,7 +102,7 @@ def add_radial_impulse(
                 if 0.0 < distance2 < radius2:
                     change = speed * falloff(distance2, radius2) / ti.sqrt(distance2) * away
                     _change_velocity(state, p, change)
-    return highest
+    found[0] = highest
 
 
 @ti.func

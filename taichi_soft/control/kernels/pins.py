@@ -47,10 +47,13 @@ def write_targets(
     state: ti.template(),
     particles: ti.types.ndarray(dtype=ti.i32, ndim=1),
     targets: ti.types.ndarray(dtype=ti.f32, ndim=2),
-) -> ti.i32:
+    found: ti.types.ndarray(dtype=ti.i32, ndim=1),
+):
     """Say where pinned particles are at the end of the coming step [m].
 
-    Returns: the number of the first in `particles` that is not pinned, with nothing changed, or -1.
+    Args:
+        found: receives the number of the first in `particles` that is not pinned, with nothing changed, or
+            -1: (1,).
     """
     loose = -1
     ti.loop_config(serialize=True)
@@ -65,7 +68,7 @@ def write_targets(
                 state.particle_aim[p] = TO_TARGET
                 body = state.particle_body[p]
                 state.body_drives[body] = state.body_drives[body] | MOVES_PINS
-    return loose
+    found[0] = loose
 
 
 @ti.kernel

@@ -23,13 +23,16 @@ def _relative(state: ti.template(), p, center):
 
 @ti.kernel
 def write_rigid_velocity(
-    state: ti.template(), body: ti.i32, motion: ti.types.ndarray(dtype=ti.f32, ndim=1)
-) -> ti.f32:
+    state: ti.template(),
+    body: ti.i32,
+    motion: ti.types.ndarray(dtype=ti.f32, ndim=1),
+    found: ti.types.ndarray(dtype=ti.f32, ndim=1),
+):
     """Set the velocities of one body, but for pinned particles, to those of a rigid one.
 
     Args:
         motion: velocity of the centre of mass [m/s], angular velocity [rad/s]: (6,).
-    Returns: the highest speed [m/s]; if that is too high, nothing is changed.
+        found: receives the highest speed [m/s], (1,); if that is too high, nothing is changed.
     """
     fastest = ti.cast(0.0, ti.f32)
     ti.loop_config(serialize=True)
@@ -46,7 +49,7 @@ def write_rigid_velocity(
                     velocity = linear + angular.cross(_relative(state, p, center))
                     state.particle_velocity[p] = velocity
             state.body_velocity_lag[body] = 0.0
-    return fastest
+    found[0] = fastest
 
 
 @ti.func

@@ -1,0 +1,92 @@
+"""A world as a folder for engines without Python."""
+
+from __future__ import annotations
+
+import os
+import runpy
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.markup import escape
+
+from taichi_soft.cli.console import Threads, progress_bar, say
+from taichi_soft.cli.named_function import function_of
+from taichi_soft.core.errors import OptionError
+from taichi_soft.core.runtime import init
+
+
+def export(
+    scene: Annotated[
+        str,
+        typer.Argument(help="Script that makes a World, or a function that returns one: game.py:make."),
+    ],
+    out: Annotated[Path, typer.Option(help="Folder to write: game.softworld.")],
+    axes: Annotated[str, typer.Option(help="Of the engine: z-up, y-up (Godot), unity, unreal.")] = "z-up",
+    threads: Threads = None,
+) -> None:
+    """Write a world with its kernels, which a C library steps in an engine without Python.
+
+    A script need not know of it: its world is taken as it leaves it, and built if it is not. Bodies, assets,
+    colliders and frames are called as the script's variables are.
+    """
+    init("cpu", threads)
+    world, names = _found_in(scene)
+    from taichi_soft.export import export_world
+
+    with progress_bar() as progress:
+        task = progress.add_task("compiling", total=None)
+        if not world.is_built:
+            world.build()
+        report = export_world(world, out, axes=axes, names=names)
+        progress.update(task, description="done")
+    counts = ", ".join(f"{len(each)} {kind}{'' if len(each) == 1 else 's'}" for kind, each in _plural(report))
+    say(
+        f"wrote {escape(str(report.path))}: {escape(counts)}; {report.kernels} kernels, "
+        f"{report.size / 1e6:.1f} MB"
+    )
+
+
+def _plural(report: Any) -> list[tuple[str, list[str]]]:
+    words = {"body": "slot", "mesh": "draw list"}
+    return [(words.get(kind, kind), each) for kind, each in report.names.items()]
+
+
+def _found_in(scene: str) -> tuple[Any, dict[Any, str]]:
+    """The world of a script or function, and names of what is in it."""
+    from engine_adapter import EngineAdapter
+    from taichi_soft import World
+
+    if scene.endswith(".py"):
+        sys.path[:0] = [str(Path(scene).parent.resolve()), os.getcwd()]
+        try:
+            made = runpy.run_path(scene, run_name="taichi_soft_scene")
+        except OSError as error:
+            raise OptionError(f"cannot read {scene}: {error.strerror}") from error
+        worlds = {id(each): each for each in made.values() if isinstance(each, World)}
+        if len(worlds) != 1:
+            raise OptionError(f"{scene} must make one World in a variable of its own, and has {len(worlds)}")
+        return next(iter(worlds.values())), _names_in(made)
+    found = function_of(scene, "which scene")()
+    world = found.world if isinstance(found, EngineAdapter) else found
+    if not isinstance(world, World):
+        raise OptionError(f"{scene} must return a World or an EngineAdapter, got {found!r}")
+    return world, {}
+
+
+def _names_in(made: Mapping[str, Any]) -> dict[Any, str]:
+    """Names of what a world has, by the variables that hold it; of what is in a list, with its place."""
+    from taichi_soft import Body, Collider, Frame, SoftBodyAsset
+
+    found: dict[Any, str] = {}
+    for name, value in made.items():
+        if name.startswith("__"):
+            continue
+        several = list(enumerate(value)) if isinstance(value, (list, tuple)) else []
+        several = list(value.items()) if isinstance(value, dict) else several
+        for text, each in [(name, value), *((f"{name}[{key}]", each) for key, each in several)]:
+            if isinstance(each, (Body, Collider, Frame, SoftBodyAsset)):
+                found.setdefault(each, text)
+    return found

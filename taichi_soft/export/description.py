@@ -1,0 +1,134 @@
+"""All that a world file says of a world beside its kernels: named arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.bodies.asset import SoftBodyAsset
+from taichi_soft.bodies.description import outer_vertices
+from taichi_soft.contact.collider import ColliderRow, row_of
+from taichi_soft.control.frames import Frames
+from taichi_soft.core.runtime import device
+from taichi_soft.export.archive import words
+from taichi_soft.export.layout import FLOAT, WHOLE, image_of, place_of, places_of
+from taichi_soft.export.meshes import ExportedMesh
+from taichi_soft.persistence.kernels.packing import carried, owners
+from taichi_soft.persistence.snapshot import carried_rows
+from taichi_soft.solver.context import WorldContext
+
+Arrays = dict[str, NDArray[Any]]
+
+
+def description_of(
+    context: WorldContext, meshes: Sequence[ExportedMesh], names: Mapping[str, Sequence[str]], axes: Any
+) -> Arrays:
+    """Arrays by name: see `engine_adapter/native/src/world_file.cpp`, which reads them."""
+    arrays: Arrays = {
+        "package": words([version("taichi-soft"), version("taichi")]),
+        "host_axes": np.asarray(axes, dtype=np.float64),
+        **{f"names/{kind}": words(each) for kind, each in names.items()},
+        **_of_world(context),
+        **_of_fields(context),
+        **_of_frames(context),
+    }
+    for number, asset in enumerate(context.slots.kinds):
+        arrays |= {f"asset{number}/{name}": each for name, each in _of_asset(asset).items()}
+    for number, mesh in enumerate(meshes):
+        arrays |= {f"mesh{number}/{name}": each for name, each in _of_mesh(mesh).items()}
+    if context.built.colliders is not None:
+        arrays |= _of_colliders([row_of(each) for each in context.colliders.all_handles])
+    return arrays
+
+
+def _of_world(context: WorldContext) -> Arrays:
+    settings, built = context.settings, context.built
+    share, longest = context.substeps.rule
+    kinds = list(context.slots.kinds)
+    return {
+        "world/flags": _ints([built.program.has_contact, built.sleeps]),
+        "world/counts": _ints([len(context.slots.slots), context.layout.particle_count, device().threads]),
+        "world/stable": _floats([share, longest]),
+        "world/floor": _floats([] if settings.floor is None else [settings.floor]),
+        "world/steps": np.array([context.clock.steps], dtype=np.int64),
+        "world/clock": _floats([context.clock.time, context.clock.last_dt]),
+        "slots/asset": _ints([kinds.index(asset) for asset in context.slots.assets]),
+        "slots/begin": _ints([each.particles[0] for each in context.layout.ranges]),
+    }
+
+
+def _of_fields(context: WorldContext) -> Arrays:
+    state = context.built.state
+    places = places_of(state)
+    rows = carried_rows(context)
+    kept = [(place_of(f), rows[owner]) for owner in owners(state) for f, _, _ in carried(state, owner)]
+    return {
+        "fields/names": words(list(places)),
+        "fields/places": np.array([_plain(each) for each in places.values()], dtype=np.int64),
+        "fields/carried": np.array([(*_plain(each), count) for each, count in kept], dtype=np.int64),
+        "fields/image": image_of(state),
+    }
+
+
+def _plain(place: Any) -> tuple[int, ...]:
+    assert place.kind in (FLOAT, WHOLE)
+    return (place.offset, place.stride, place.count, place.width, place.kind)
+
+
+def _of_asset(asset: SoftBodyAsset) -> Arrays:
+    return {
+        "rest_rows": asset.rest_rows,
+        "vertices": _floats(asset.mesh.vertices),
+        "masses": _floats(asset.description.masses),
+        "center": _floats(asset.center_of_mass),
+        "pinned": _ints(asset.description.pinned),
+        "outer": _ints(outer_vertices(asset.mesh)),
+        "rank": _ints(asset.arrays.rank),
+        "thickness": _floats([asset.surface_row[1]]),
+    }
+
+
+def _of_mesh(mesh: ExportedMesh) -> Arrays:
+    return {
+        "kind": _ints([mesh.asset, mesh.is_skin, mesh.is_serial, mesh.vertex_count]),
+        "triangles": _ints(mesh.triangles),
+        "ints": mesh.ints,
+        "floats": mesh.floats,
+        "uv": mesh.uv,
+    }
+
+
+def _of_colliders(rows: Sequence[ColliderRow]) -> Arrays:
+    return {
+        "colliders/alive": _ints([row.is_alive for row in rows]),
+        "colliders/pose": _floats([[*row.position, *row.rotation] for row in rows]),
+        "colliders/motion": _floats([[*row.velocity, *row.spin] for row in rows]),
+        "colliders/target": _floats([_target_of(row) for row in rows]),
+        "colliders/bounds": _floats([row.shape.bounds.ravel() for row in rows]),
+        "colliders/skin": _floats([row.skin for row in rows]),
+    }
+
+
+def _target_of(row: ColliderRow) -> list[float]:
+    """Whether it has one, and its pose."""
+    return [0.0] * 8 if row.target is None else [1.0, *np.concatenate(row.target).tolist()]
+
+
+def _of_frames(context: WorldContext) -> Arrays:
+    frames = context.of(Frames)
+    return {
+        "frames/alive": _ints([each is not None for each in frames.rows]),
+        "frames/poses": np.stack([frames.present, frames.coming]).astype(np.float32),
+    }
+
+
+def _ints(numbers: Any) -> NDArray[np.int32]:
+    return np.asarray(numbers).astype(np.int32)
+
+
+def _floats(numbers: Any) -> NDArray[np.float64]:
+    return np.asarray(numbers, dtype=np.float64)

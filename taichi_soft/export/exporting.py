@@ -1,0 +1,109 @@
+"""A built world written as a folder for the native library, whole or not at all."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from taichi_soft.bodies.fields import made_fields
+from taichi_soft.control.frames import Frames
+from taichi_soft.core.errors import OptionError, StateError
+from taichi_soft.core.part_folder import PartFolder
+from taichi_soft.core.runtime import export_kernels
+from taichi_soft.export.archive import words, written
+from taichi_soft.export.axes import axes_of
+from taichi_soft.export.description import description_of
+from taichi_soft.export.meshes import meshes_of
+from taichi_soft.export.module import kernels_of
+from taichi_soft.export.refusals import require_native
+from taichi_soft.solver.context import WorldContext
+from taichi_soft.world.world import World, context_of_world, force_field_of
+
+WORLD, KERNELS = "world.tsw", "kernels"
+"""Names in the folder."""
+
+
+@dataclass(frozen=True)
+class ExportReport:
+    """What was written."""
+
+    path: Path
+    size: int  # of all files [bytes]
+    kernels: int
+    names: dict[str, list[str]]  # of bodies, assets, colliders, frames and meshes
+
+
+def export_world(
+    world: World, path: Path, *, axes: str = "z-up", names: Mapping[Any, str] | None = None
+) -> ExportReport:
+    """Write a built world, as it is now, as a folder that the native library loads.
+
+    It ends what this process can do with Taichi: worlds can be asked nothing any more.
+    Args:
+        path: of the folder, which must not be there yet, or be an earlier one.
+        axes: of the engine, see `AXES`.
+        names: of bodies, assets, colliders and frames, by which the game finds them; others get one with
+            their number, such as body3.
+    Raises: StateError for a world that is not built; OptionError for a path that is taken or cannot be
+        written, and for what the native library does not run, by name.
+    """
+    matrix = axes_of(axes)
+    if not world.is_built:
+        raise StateError("the world is not built: call world.build() before it is exported")
+    context = context_of_world(world)
+    require_native(context)
+    if force_field_of(world) is not None:
+        raise OptionError("the native library does not run this world: it has a force field, in Python")
+    if path.exists() and not (path / WORLD).is_file():
+        raise OptionError(f"{path} is there and no world file: give another --out")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        part = PartFolder(path.parent)
+    except OSError as error:
+        raise OptionError(f"cannot write {path}: {error.strerror}") from error
+    try:
+        return _written(context, path, part, matrix, dict(names or {}))
+    finally:
+        part.remove()
+
+
+def _written(
+    context: WorldContext, path: Path, part: PartFolder, matrix: Any, given: dict[Any, str]
+) -> ExportReport:
+    assets = context.slots.kinds
+    names = {
+        "asset": [given.get(each, f"asset{i}") for i, each in enumerate(assets)],
+        "body": [
+            f"body{i}" if each is None else given.get(each, f"body{i}")
+            for i, each in enumerate(context.slots.slots)
+        ],
+        "collider": [given.get(each, f"collider{i}") for i, each in enumerate(context.colliders.all_handles)],
+        "frame": [
+            f"frame{i}" if each is None else given.get(each, f"frame{i}")
+            for i, each in enumerate(context.of(Frames).rows)
+        ],
+    }
+    meshes = [mesh for i, asset in enumerate(assets) for mesh in meshes_of(i, asset, names["asset"][i])]
+    names["mesh"] = [mesh.name for mesh in meshes]
+    arrays = description_of(context, meshes, names, matrix)
+    kernels = kernels_of(context, meshes)
+    new = part.path / path.name
+    folder = new / KERNELS
+    folder.mkdir(parents=True)
+    export_kernels(folder, kernels, [each.particle_position for each in made_fields()])
+    files = sorted(each for each in folder.iterdir() if each.is_file())
+    contents = [each.read_bytes() for each in files]
+    arrays["kernels/names"] = words(list(kernels))
+    arrays["kernels/files"] = words([each.name for each in files])
+    arrays["kernels/sums"] = np.array([(len(each), zlib.crc32(each)) for each in contents], dtype=np.int64)
+    whole = written(arrays)
+    (new / WORLD).write_bytes(whole)
+    if path.exists():
+        path.rename(part.path / "before")
+    new.rename(path)
+    return ExportReport(path, len(whole) + sum(map(len, contents)), len(kernels), names)

@@ -1,0 +1,1 @@
+"""What a world file has kernels for that Python does otherwise."""

@@ -1,0 +1,83 @@
+"""Where each number of a world's fields lies in memory."""
+
+from __future__ import annotations
+
+import ctypes
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.core.errors import OptionError
+from taichi_soft.core.runtime import ti
+from taichi_soft.export.kernels.root import read_root
+from taichi_soft.solver.state import State
+
+FLOAT, WHOLE = 0, 1
+"""Kinds of numbers, all of 4 bytes."""
+
+
+@dataclass(frozen=True)
+class FieldPlace:
+    """Of a field: element i begins `stride` i bytes behind `offset`, and has `width` numbers."""
+
+    offset: int  # from where the layout begins
+    stride: int
+    count: int
+    width: int
+    kind: int
+
+
+def places_of(state: State) -> dict[str, FieldPlace]:
+    """Of all fields whose elements lie in one piece, by name, with a dot before those of a slice."""
+    found = {}
+    for name, field in _fields(state, ""):
+        place = place_of(field)
+        if place is not None:
+            found[name] = place
+    return found
+
+
+def _fields(holder: Any, prefix: str) -> list[tuple[str, Any]]:
+    found: list[tuple[str, Any]] = []
+    for name, value in vars(holder).items():
+        if isinstance(value, ti.lang.struct.StructField):
+            found += [(f"{prefix}{name}.{key}", value.get_member_field(key)) for key in value.keys]
+        elif isinstance(value, ti.Field):
+            found.append((prefix + name, value))
+        elif getattr(type(value), "_data_oriented", False):
+            found += _fields(value, f"{prefix}{name}.")
+    return found
+
+
+def place_of(field: Any) -> FieldPlace | None:
+    """None where its components lie apart."""
+    components = [each.ptr.snode() for each in field.vars]
+    first = components[0]
+    dense = first.parent
+    if any(
+        each.offset_bytes_in_parent_cell != first.offset_bytes_in_parent_cell + 4 * i
+        or each.parent.id != dense.id
+        for i, each in enumerate(components)
+    ):
+        return None
+    return FieldPlace(
+        dense.offset_bytes_in_parent_cell + first.offset_bytes_in_parent_cell,
+        dense.cell_size_bytes,
+        int(np.prod(field.shape)),
+        len(components),
+        WHOLE if field.dtype == ti.i32 else FLOAT,
+    )
+
+
+def image_of(state: State) -> NDArray[np.uint8]:
+    """All numbers of all fields, as they lie in memory."""
+    found = np.zeros(1, dtype=np.uint64)
+    read_root(state, found)
+    place = place_of(state.particle_position)
+    if place is None:
+        raise OptionError("this version of Taichi lays out fields in another way: take taichi 1.7.4")
+    root = state.particle_position.vars[0].ptr.snode().parent.parent
+    begin = int(found[0]) - place.offset
+    return np.frombuffer(ctypes.string_at(begin, root.cell_size_bytes), dtype=np.uint8)

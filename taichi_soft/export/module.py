@@ -1,0 +1,68 @@
+"""The kernels of a world file, each with what it is compiled for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from taichi_soft.contact.kernels.collider_rows import sum_collider_impulses
+from taichi_soft.control.kernels.drives import add_push
+from taichi_soft.control.kernels.impulses import add_impulse_near, add_radial_impulse, add_velocity
+from taichi_soft.control.kernels.pins import aim_pinned, free_particles, pin_particles, write_targets
+from taichi_soft.control.kernels.rigid_motion import jump, write_rigid_velocity
+from taichi_soft.core.runtime import device, ti
+from taichi_soft.export.kernels.root import read_root
+from taichi_soft.export.meshes import ExportedMesh
+from taichi_soft.solver.context import WorldContext
+from taichi_soft.solver.kernels.sleep import wake_body, wake_near
+from taichi_soft.solver.kernels.spawn import despawn_body, spawn_body
+from taichi_soft.solver.kernels.step import step_in_turn, step_islands, step_per_body
+
+Kernels = dict[str, tuple[Any, dict[str, Any]]]
+
+_SERIAL = {
+    "aim_pinned": aim_pinned,
+    "spawn_body": spawn_body,
+    "despawn_body": despawn_body,
+    "write_rigid_velocity": write_rigid_velocity,
+    "jump": jump,
+    "add_velocity": add_velocity,
+    "add_impulse_near": add_impulse_near,
+    "add_radial_impulse": add_radial_impulse,
+    "add_push": add_push,
+    "pin_particles": pin_particles,
+    "free_particles": free_particles,
+    "write_targets": write_targets,
+    "read_root": read_root,
+}
+"""Those that every world has, by name."""
+
+
+def kernels_of(context: WorldContext, meshes: Sequence[ExportedMesh]) -> Kernels:
+    """All that the native library calls in this world, by name."""
+    state, program = context.built.state, context.built.program
+    found = {name: _example(kernel, state=state) for name, kernel in _SERIAL.items()}
+    if program.has_contact:
+        found["step"] = _example(step_islands, state=state, program=program)
+        found["sum_collider_impulses"] = _example(sum_collider_impulses, contact=state.contact)
+    elif len(context.slots.slots) == 1 or device().threads == 1:
+        found["step"] = _example(step_in_turn, state=state, program=program)
+    else:
+        found["step"] = _example(step_per_body, state=state, program=program)
+    if context.built.sleeps:
+        found["wake_body"] = _example(wake_body, state=state)
+        found["wake_near"] = _example(wake_near, state=state)
+    for mesh in meshes:
+        name, kernel = mesh.kernel
+        found[name] = _example(kernel, state=state, is_serial=mesh.is_serial)
+    return found
+
+
+def _example(kernel: Any, **templates: Any) -> tuple[Any, dict[str, Any]]:
+    """A kernel with its template arguments, and an array like each of those that it takes."""
+    arguments = dict(templates)
+    for argument in kernel._primal.arguments:
+        if isinstance(argument.annotation, ti.types.ndarray_type.NdarrayType):
+            kind = argument.annotation
+            arguments[argument.name] = ti.ndarray(kind.dtype, (1,) * kind.ndim)
+    return kernel, arguments
