@@ -19,7 +19,8 @@ from taichi_soft.core.math.rotations import length_of, matrix_of, quaternion_of,
 
 Floats = NDArray[np.float64]
 
-_FASTEST_SPIN = 1e4  # [rad/s]
+FASTEST_SPIN = 1e4
+"""[rad/s]"""
 
 
 @dataclass(eq=False)
@@ -203,7 +204,7 @@ class Collider(Handle):
         """Move on like this until told otherwise: (3,) [m/s] and (3,) [rad/s] about its position."""
         colliders, row = self._colliders(), self._row
         velocity = as_vector(linear, "linear", "m/s", VELOCITY_LIMIT)
-        spin = as_vector(angular, "angular", "rad/s", _FASTEST_SPIN)
+        spin = as_vector(angular, "angular", "rad/s", FASTEST_SPIN)
         row.velocity, row.spin, row.target = velocity, spin, None
         colliders.moved(row)
 

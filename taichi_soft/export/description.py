@@ -11,8 +11,11 @@ from numpy.typing import NDArray
 
 from taichi_soft.bodies.asset import SoftBodyAsset
 from taichi_soft.bodies.description import outer_vertices
-from taichi_soft.contact.collider import ColliderRow, row_of
+from taichi_soft.contact.collider import FASTEST_SPIN, ColliderRow, row_of
+from taichi_soft.control.drives import LARGEST_PUSH
 from taichi_soft.control.frames import Frames
+from taichi_soft.control.impulses import LARGEST_IMPULSE
+from taichi_soft.core.constants import POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.core.runtime import device
 from taichi_soft.export.archive import words
 from taichi_soft.export.layout import FLOAT, WHOLE, image_of, place_of, places_of
@@ -53,6 +56,9 @@ def _of_world(context: WorldContext) -> Arrays:
         "world/flags": _ints([built.program.has_contact, built.sleeps]),
         "world/counts": _ints([len(context.slots.slots), context.layout.particle_count, device().threads]),
         "world/stable": _floats([share, longest]),
+        "world/limits": _floats(
+            [POSITION_LIMIT, VELOCITY_LIMIT, FASTEST_SPIN, LARGEST_IMPULSE, LARGEST_PUSH]
+        ),
         "world/floor": _floats([] if settings.floor is None else [settings.floor]),
         "world/steps": np.array([context.clock.steps], dtype=np.int64),
         "world/clock": _floats([context.clock.time, context.clock.last_dt]),

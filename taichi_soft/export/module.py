@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from taichi_soft.bodies.kernels.readout import read_positions
 from taichi_soft.contact.kernels.collider_rows import sum_collider_impulses
 from taichi_soft.control.kernels.drives import add_push
 from taichi_soft.control.kernels.impulses import add_impulse_near, add_radial_impulse, add_velocity
@@ -33,6 +34,7 @@ _SERIAL = {
     "pin_particles": pin_particles,
     "free_particles": free_particles,
     "write_targets": write_targets,
+    "read_positions": read_positions,
     "read_root": read_root,
 }
 """Those that every world has, by name."""

@@ -1,0 +1,210 @@
+/* taichi-soft without Python: worlds that `taichi-soft export` wrote, stepped by a C library.
+ *
+ *     ts_scene scene = 0;
+ *     ts_world world = 0;
+ *     ts_scene_load("game.softworld", &scene);
+ *     ts_world_create(scene, &world);
+ *     for (;;) {
+ *         ts_world_advance(world, seconds_since_last_frame, NULL);
+ *         ts_body_mesh(world, body, mesh, vertices, normals, vertex_count);
+ *     }
+ *
+ * Every function returns TS_OK, or an error below 0 with a text in ts_last_error(); then nothing was changed.
+ * A handle is a number; one that was destroyed, or never was, is refused. A world takes calls of one thread at
+ * a time and refuses others with TS_ERROR_BUSY; several worlds may be used by several threads at once.
+ *
+ * Places, turns and impulses are in the axes and the unit of length of the engine for which the world was
+ * exported; masses in kg, times in s, angles in rad. Turns are unit quaternions x, y, z, w. Buffers are the
+ * caller's, of as many numbers as are said; nothing is kept of them.
+ */
+#ifndef TAICHI_SOFT_H
+#define TAICHI_SOFT_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#if defined(_WIN32)
+#ifdef TAICHI_SOFT_BUILDS
+#define TS_API __declspec(dllexport)
+#else
+#define TS_API __declspec(dllimport)
+#endif
+#else
+#define TS_API __attribute__((visibility("default")))
+#endif
+
+#define TS_VERSION 1
+
+typedef int32_t ts_result;
+
+enum {
+  TS_OK = 0,
+  TS_ERROR_ARGUMENT = -1, /* a value out of range, not finite, or a null pointer */
+  TS_ERROR_HANDLE = -2,   /* no such scene, world or body, or no more */
+  TS_ERROR_BUSY = -3,     /* another thread is in a call of this world */
+  TS_ERROR_FILE = -4,     /* a world file that is not there, not whole or damaged */
+  TS_ERROR_VERSION = -5,  /* a world file or a struct of another version */
+  TS_ERROR_SIZE = -6,     /* a buffer that does not fit */
+  TS_ERROR_STATE = -7,    /* what the world cannot do now: a full pool, an attached body */
+  TS_ERROR_SNAPSHOT = -8, /* bytes that are no snapshot of this world */
+  TS_ERROR_RUNTIME = -9   /* Taichi, or the system, has failed */
+};
+
+typedef uint64_t ts_scene; /* a world file in memory; 0 is none */
+typedef uint64_t ts_world; /* an instance of it that moves */
+typedef uint64_t ts_body;  /* who lives in a slot: another one that comes later has another number */
+
+enum { TS_BODY = 0, TS_ASSET = 1, TS_COLLIDER = 2, TS_FRAME = 3, TS_MESH = 4 }; /* kinds of names */
+
+enum { TS_ACTIVE = 0, TS_FROZEN = 1, TS_ASLEEP = 2 }; /* status of a body */
+
+TS_API uint32_t ts_version(void);
+/* Of the last error in this thread; "" before the first. */
+TS_API const char* ts_last_error(void);
+
+/* ---- scenes ---- */
+
+typedef struct ts_scene_info {
+  uint32_t struct_size; /* set by the caller */
+  int32_t slot_count;   /* bodies that there can be at once */
+  int32_t asset_count, collider_count, frame_count, mesh_count;
+} ts_scene_info;
+
+typedef struct ts_asset_info {
+  uint32_t struct_size;
+  int32_t vertex_count;
+  int32_t slot_count; /* bodies of it that there can be at once */
+  float mass;         /* of each [kg] */
+} ts_asset_info;
+
+typedef struct ts_mesh_info {
+  uint32_t struct_size;
+  int32_t asset;
+  int32_t vertex_count, triangle_count;
+  int32_t has_uv;
+} ts_mesh_info;
+
+/* Read a folder that `taichi-soft export` wrote, and compile its kernels: takes seconds. */
+TS_API ts_result ts_scene_load(const char* folder, ts_scene* scene);
+/* Its worlds go on; what it holds is given back with the last of them. */
+TS_API ts_result ts_scene_unload(ts_scene scene);
+TS_API ts_result ts_scene_get_info(ts_scene scene, ts_scene_info* info);
+TS_API ts_result ts_scene_find(ts_scene scene, int32_t kind, const char* name, int32_t* number);
+/* At most `capacity` bytes, the zero at the end included. */
+TS_API ts_result ts_scene_get_name(ts_scene scene, int32_t kind, int32_t number, char* name, size_t capacity);
+TS_API ts_result ts_asset_get_info(ts_scene scene, int32_t asset, ts_asset_info* info);
+TS_API ts_result ts_mesh_get_info(ts_scene scene, int32_t mesh, ts_mesh_info* info);
+/* Triangles, 3 numbers each: counterclockwise seen from outside, clockwise in engines with left-handed axes. */
+TS_API ts_result ts_mesh_get_triangles(ts_scene scene, int32_t mesh, uint32_t* indices, size_t count);
+/* Texture coordinates, 2 numbers each, v upwards. */
+TS_API ts_result ts_mesh_get_uv(ts_scene scene, int32_t mesh, float* uv, size_t count);
+
+/* ---- worlds ---- */
+
+typedef struct ts_fixed_step {
+  uint32_t struct_size;
+  int32_t substeps;  /* of a step; 0 for as many as are stable */
+  int32_t max_steps; /* that one frame may make; time beyond is dropped */
+  double dt;         /* [s] */
+} ts_fixed_step;
+
+typedef struct ts_clock {
+  uint32_t struct_size;
+  int32_t steps_made; /* by the last ts_world_advance */
+  int64_t steps;      /* so far */
+  double time;        /* simulated [s] */
+  double alpha;       /* how far the picture is from the previous step to the last one, 0 to 1 */
+  double dropped;     /* time dropped so far [s] */
+} ts_clock;
+
+/* Called before each step of ts_world_advance: the place to move colliders and frames, and to push. */
+typedef void (*ts_before_step)(ts_world world, void* user);
+
+/* A world as it was exported. The first of a scene takes as long as loading, later ones little. */
+TS_API ts_result ts_world_create(ts_scene scene, ts_world* world);
+TS_API ts_result ts_world_destroy(ts_world world);
+TS_API ts_result ts_world_set_fixed_step(ts_world world, const ts_fixed_step* step);
+TS_API ts_result ts_world_on_step(ts_world world, ts_before_step function, void* user);
+/* One step of `dt` [s] in `substeps` equal parts; 0 chooses as many as are stable. */
+TS_API ts_result ts_world_step(ts_world world, double dt, int32_t substeps);
+/* Put in the time of a frame [s] and make the steps that are due. `clock` may be null. */
+TS_API ts_result ts_world_advance(ts_world world, double seconds, ts_clock* clock);
+TS_API ts_result ts_world_get_clock(ts_world world, ts_clock* clock);
+TS_API ts_result ts_world_stable_substeps(ts_world world, double dt, int32_t* substeps);
+TS_API ts_result ts_world_wake(ts_world world);
+TS_API ts_result ts_world_set_wind(ts_world world, const double velocity[3], double density, double drag);
+TS_API ts_result ts_world_radial_impulse(ts_world world, const double center[3], double impulse, double radius);
+/* A number that tells states apart: that of Python's world in the same state. */
+TS_API ts_result ts_world_hash(ts_world world, uint64_t* hash);
+/* With a null buffer only the size [bytes] is given. */
+TS_API ts_result ts_world_snapshot(ts_world world, void* buffer, size_t capacity, size_t* size);
+TS_API ts_result ts_world_restore(ts_world world, const void* bytes, size_t size);
+
+/* ---- bodies ---- */
+
+typedef struct ts_placement {
+  uint32_t struct_size;
+  int32_t reserved;
+  double position[3]; /* of the mesh's origin */
+  double rotation[4];
+  double velocity[3]; /* of the centre of mass */
+  double spin[3];     /* [rad/s] */
+} ts_placement;
+
+TS_API ts_result ts_world_spawn(ts_world world, int32_t asset, const ts_placement* place, ts_body* body);
+TS_API ts_result ts_world_despawn(ts_world world, ts_body body);
+/* Who lives in a slot; 0 for nobody. */
+TS_API ts_result ts_world_get_body(ts_world world, int32_t slot, ts_body* body);
+TS_API ts_result ts_body_get_asset(ts_world world, ts_body body, int32_t* asset);
+TS_API ts_result ts_body_get_status(ts_world world, ts_body body, int32_t* status);
+/* Of its vertices, 3 numbers each: after the last step, or with alpha below 1 on the way from the one before. */
+TS_API ts_result ts_body_positions(ts_world world, ts_body body, double alpha, float* positions, size_t count);
+/* What is drawn, alpha of ts_clock on the way: places and normals of unit length, 3 numbers a vertex each. */
+TS_API ts_result ts_body_mesh(ts_world world, ts_body body, int32_t mesh, float* positions, float* normals,
+                              size_t count);
+TS_API ts_result ts_body_center(ts_world world, ts_body body, double center[3]);
+TS_API ts_result ts_body_set_velocity(ts_world world, ts_body body, const double linear[3], const double spin[3]);
+/* The centre of mass to a place, turned about it, with its velocity (1) or at rest (0). */
+TS_API ts_result ts_body_teleport(ts_world world, ts_body body, const double center[3], const double turn[4],
+                                  int32_t keeps_velocity);
+/* Of a list of vertices; a null list with a count of 0 stands for all. */
+TS_API ts_result ts_body_apply_impulse(ts_world world, ts_body body, const double impulse[3],
+                                       const int32_t* vertices, size_t count);
+TS_API ts_result ts_body_apply_force(ts_world world, ts_body body, const double force[3], const int32_t* vertices,
+                                     size_t count);
+TS_API ts_result ts_body_impulse_at(ts_world world, ts_body body, const double impulse[3], const double point[3],
+                                    double radius);
+TS_API ts_result ts_body_set_gravity_scale(ts_world world, ts_body body, double scale);
+TS_API ts_result ts_body_set_damping(ts_world world, ts_body body, double rate);
+TS_API ts_result ts_body_set_sheltered(ts_world world, ts_body body, int32_t is_sheltered);
+TS_API ts_result ts_body_pin(ts_world world, ts_body body, const int32_t* vertices, size_t count);
+TS_API ts_result ts_body_unpin(ts_world world, ts_body body, const int32_t* vertices, size_t count);
+/* Where pinned vertices are after the coming step, 3 numbers each. */
+TS_API ts_result ts_body_set_targets(ts_world world, ts_body body, const int32_t* vertices, size_t count,
+                                     const float* targets);
+
+/* ---- colliders and frames, by their numbers in the scene ---- */
+
+typedef struct ts_pose {
+  double position[3];
+  double rotation[4];
+} ts_pose;
+
+/* Be there at the end of the coming step, and push who is in the way. */
+TS_API ts_result ts_collider_move_to(ts_world world, int32_t collider, const ts_pose* pose);
+TS_API ts_result ts_collider_set_velocity(ts_world world, int32_t collider, const double linear[3],
+                                          const double spin[3]);
+TS_API ts_result ts_collider_teleport(ts_world world, int32_t collider, const ts_pose* pose);
+TS_API ts_result ts_collider_get_pose(ts_world world, int32_t collider, ts_pose* pose);
+/* What bodies gave it in the last step, and the moment of that about its place. Either may be null. */
+TS_API ts_result ts_collider_get_impulse(ts_world world, int32_t collider, double impulse[3], double moment[3]);
+TS_API ts_result ts_frame_move_to(ts_world world, int32_t frame, const ts_pose* pose);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,561 @@
+// The functions of taichi_soft.h: each checks its arguments, takes the world's turn, and lets no exception out.
+
+#include <algorithm>
+#include <cstring>
+#include <new>
+
+#include "handles.hpp"
+#include "scene.hpp"
+#include "world.hpp"
+
+using namespace taichi_soft;
+
+namespace {
+
+Handles<Scene>& scenes() {
+  static auto* found = new Handles<Scene>("scene");  // never destroyed: threads may outlive main
+  return *found;
+}
+
+Handles<World>& worlds() {
+  static auto* found = new Handles<World>("world");
+  return *found;
+}
+
+thread_local char last_error[512] = "";
+
+void note(const char* text) {
+  std::strncpy(last_error, text, sizeof last_error - 1);
+  last_error[sizeof last_error - 1] = 0;
+}
+
+template <typename Function>
+ts_result guarded(Function function) noexcept {
+  try {
+    function();
+    return TS_OK;
+  } catch (const Error& error) {
+    note(error.what());
+    return error.code;
+  } catch (const std::bad_alloc&) {
+    note("there is not enough memory");
+  } catch (const std::exception& error) {
+    note(error.what());
+  } catch (...) {
+    note("unknown error");
+  }
+  return TS_ERROR_RUNTIME;
+}
+
+// A world for the time of one call, which no other thread can use meanwhile.
+class Turn {
+ public:
+  explicit Turn(ts_world handle) : world_(worlds().find(handle)), lock_(world_->turn, std::try_to_lock) {
+    if (!lock_.owns_lock()) fail(TS_ERROR_BUSY, "another thread is in a call of this world");
+  }
+  World* operator->() const { return world_.get(); }
+  World& operator*() const { return *world_; }
+  const Axes& axes() const { return world_->scene().axes; }
+
+ private:
+  std::shared_ptr<World> world_;  // before the lock, which is given back first
+  std::unique_lock<std::mutex> lock_;
+};
+
+template <typename Pointer>
+Pointer given(Pointer pointer, const char* name) {
+  if (pointer == nullptr) fail(TS_ERROR_ARGUMENT, "%s is null", name);
+  return pointer;
+}
+
+const double* finite(const double* numbers, size_t count, const char* name) {
+  given(numbers, name);
+  for (size_t i = 0; i < count; ++i) {
+    if (!(std::fabs(numbers[i]) <= 1e30)) fail(TS_ERROR_ARGUMENT, "%s has %g in it", name, numbers[i]);
+  }
+  return numbers;
+}
+
+Vector place(const Turn& world, const double* host, const char* name) {
+  const Vector found = world.axes().place_in(finite(host, 3, name));
+  for (double each : found) {
+    if (!(std::fabs(each) < world->scene().position_limit)) {
+      fail(TS_ERROR_ARGUMENT, "%s is %g m away: stay within %g m", name, each, world->scene().position_limit);
+    }
+  }
+  return found;
+}
+
+// Of a velocity or an impulse, which have places' axes and unit.
+Vector vector(const Turn& world, const double* host, const char* name) {
+  const Vector found = world.axes().place_in(finite(host, 3, name));
+  for (double each : found) {
+    if (!(std::fabs(each) <= world->scene().impulse_limit)) fail(TS_ERROR_ARGUMENT, "%s is too large: %g", name, each);
+  }
+  return found;
+}
+
+Vector spin(const Turn& world, const double* host, const char* name) {
+  return world.axes().turn_in(finite(host, 3, name));
+}
+
+Quaternion rotation(const Turn& world, const double* host, const char* name) {
+  Quaternion found = world.axes().rotation_in(finite(host, 4, name));
+  const double length = length_of(found);
+  if (!(std::fabs(length - 1.0) <= 1e-3)) {
+    fail(TS_ERROR_ARGUMENT, "%s is a quaternion of length %g: normalise it", name, length);
+  }
+  for (double& each : found) each = each / length;
+  return found;
+}
+
+Pose pose(const Turn& world, const ts_pose* host) {
+  given(host, "pose");
+  // As Python, which takes matrices as well.
+  const Quaternion turn = quaternion_of(matrix_of(rotation(world, host->rotation, "rotation")));
+  return {place(world, host->position, "position"), turn};
+}
+
+Vertices list(const int32_t* vertices, size_t count) {
+  if (count > 0) given(vertices, "vertices");
+  if (count > 100000000) fail(TS_ERROR_ARGUMENT, "count is %zu: no body has so many vertices", count);
+  return {vertices, count};
+}
+
+template <typename Struct>
+Struct* sized(Struct* given_struct, const char* name) {
+  given(given_struct, name);
+  if (given_struct->struct_size != sizeof(Struct)) {
+    fail(TS_ERROR_VERSION, "%s has struct_size %u: set it to sizeof, which is %zu in this version", name,
+         given_struct->struct_size, sizeof(Struct));
+  }
+  return given_struct;
+}
+
+void require_size(size_t count, size_t needed, const char* name) {
+  if (count != needed) fail(TS_ERROR_SIZE, "%s has room for %zu numbers: give room for %zu", name, count, needed);
+}
+
+const Mesh& mesh_of(const Scene& scene, int32_t mesh) {
+  if (mesh < 0 || size_t(mesh) >= scene.meshes.size()) {
+    fail(TS_ERROR_ARGUMENT, "there is no mesh %d: there are %zu, from 0", mesh, scene.meshes.size());
+  }
+  return scene.meshes[size_t(mesh)];
+}
+
+}  // namespace
+
+extern "C" {
+
+uint32_t ts_version(void) { return TS_VERSION; }
+
+const char* ts_last_error(void) { return last_error; }
+
+ts_result ts_scene_load(const char* folder, ts_scene* scene) {
+  return guarded([&] {
+    given(scene, "scene");
+    *scene = scenes().add(std::make_shared<Scene>(given(folder, "folder")));
+  });
+}
+
+ts_result ts_scene_unload(ts_scene scene) {
+  return guarded([&] { scenes().remove(scene); });
+}
+
+ts_result ts_scene_get_info(ts_scene scene, ts_scene_info* info) {
+  return guarded([&] {
+    const auto found = scenes().find(scene);
+    sized(info, "info");
+    info->slot_count = found->slot_count;
+    info->asset_count = int32_t(found->assets.size());
+    info->collider_count = int32_t(found->names(TS_COLLIDER).size());
+    info->frame_count = int32_t(found->names(TS_FRAME).size());
+    info->mesh_count = int32_t(found->meshes.size());
+  });
+}
+
+ts_result ts_scene_find(ts_scene scene, int32_t kind, const char* name, int32_t* number) {
+  return guarded([&] {
+    const auto found = scenes().find(scene);
+    given(number, "number");
+    const auto& names = found->names(kind);
+    const auto at = std::find(names.begin(), names.end(), given(name, "name"));
+    if (at == names.end()) fail(TS_ERROR_ARGUMENT, "nothing of that kind is called %.100s", name);
+    *number = int32_t(at - names.begin());
+  });
+}
+
+ts_result ts_scene_get_name(ts_scene scene, int32_t kind, int32_t number, char* name, size_t capacity) {
+  return guarded([&] {
+    const auto found = scenes().find(scene);
+    given(name, "name");
+    const auto& names = found->names(kind);
+    if (number < 0 || size_t(number) >= names.size()) fail(TS_ERROR_ARGUMENT, "there is no %d: there are %zu", number, names.size());
+    const std::string& text = names[size_t(number)];
+    if (capacity < text.size() + 1) fail(TS_ERROR_SIZE, "name has room for %zu bytes: give %zu", capacity, text.size() + 1);
+    std::memcpy(name, text.c_str(), text.size() + 1);
+  });
+}
+
+ts_result ts_asset_get_info(ts_scene scene, int32_t asset, ts_asset_info* info) {
+  return guarded([&] {
+    const auto found = scenes().find(scene);
+    sized(info, "info");
+    if (asset < 0 || size_t(asset) >= found->assets.size()) {
+      fail(TS_ERROR_ARGUMENT, "there is no asset %d: there are %zu, from 0", asset, found->assets.size());
+    }
+    const Asset& row = found->assets[size_t(asset)];
+    double mass = 0.0;
+    for (double each : row.masses) mass += each;
+    info->vertex_count = int32_t(row.vertex_count());
+    info->slot_count = row.slot_count;
+    info->mass = float(mass);
+  });
+}
+
+ts_result ts_mesh_get_info(ts_scene scene, int32_t mesh, ts_mesh_info* info) {
+  return guarded([&] {
+    const auto found = scenes().find(scene);
+    sized(info, "info");
+    const Mesh& row = mesh_of(*found, mesh);
+    info->asset = row.asset;
+    info->vertex_count = int32_t(row.vertex_count);
+    info->triangle_count = int32_t(row.triangles.count / 3);
+    info->has_uv = row.uv.count != 0;
+  });
+}
+
+ts_result ts_mesh_get_triangles(ts_scene scene, int32_t mesh, uint32_t* indices, size_t count) {
+  return guarded([&] {
+    const auto found = scenes().find(scene);
+    given(indices, "indices");
+    const Mesh& row = mesh_of(*found, mesh);
+    require_size(count, row.triangles.count, "indices");
+    std::copy(row.triangles.begin(), row.triangles.end(), indices);
+  });
+}
+
+ts_result ts_mesh_get_uv(ts_scene scene, int32_t mesh, float* uv, size_t count) {
+  return guarded([&] {
+    const auto found = scenes().find(scene);
+    given(uv, "uv");
+    const Mesh& row = mesh_of(*found, mesh);
+    require_size(count, row.uv.count, "uv");
+    std::copy(row.uv.begin(), row.uv.end(), uv);
+  });
+}
+
+ts_result ts_world_create(ts_scene scene, ts_world* world) {
+  return guarded([&] {
+    given(world, "world");
+    *world = worlds().add(std::make_shared<World>(scenes().find(scene)));
+  });
+}
+
+ts_result ts_world_destroy(ts_world world) {
+  return guarded([&] {
+    const Turn turn(world);  // or it would go while another thread is in a call
+    worlds().remove(world);
+  });
+}
+
+ts_result ts_world_set_fixed_step(ts_world world, const ts_fixed_step* step) {
+  return guarded([&] {
+    const Turn turn(world);
+    sized(step, "step");
+    turn->set_fixed_step(step->dt, step->substeps, step->max_steps);
+  });
+}
+
+ts_result ts_world_on_step(ts_world world, ts_before_step function, void* user) {
+  return guarded([&] { Turn(world)->on_step(function, user); });
+}
+
+ts_result ts_world_step(ts_world world, double dt, int32_t substeps) {
+  return guarded([&] { Turn(world)->step(dt, substeps); });
+}
+
+ts_result ts_world_advance(ts_world world, double seconds, ts_clock* clock) {
+  return guarded([&] {
+    if (clock != nullptr) sized(clock, "clock");
+    const int32_t due = Turn(world)->steps_due(seconds);
+    for (int32_t i = 0; i < due; ++i) {
+      ts_before_step before = nullptr;
+      void* user = nullptr;
+      {
+        const Turn turn(world);
+        before = turn->before_step();
+        user = turn->user();
+      }
+      if (before != nullptr) before(world, user);  // which calls functions of this world
+      Turn(world)->step_in_time();
+    }
+    if (clock != nullptr) Turn(world)->write_clock(clock, due);
+  });
+}
+
+ts_result ts_world_get_clock(ts_world world, ts_clock* clock) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn->write_clock(sized(clock, "clock"), 0);
+  });
+}
+
+ts_result ts_world_stable_substeps(ts_world world, double dt, int32_t* substeps) {
+  return guarded([&] {
+    const Turn turn(world);
+    *given(substeps, "substeps") = turn->stable_substeps(dt);
+  });
+}
+
+ts_result ts_world_wake(ts_world world) {
+  return guarded([&] { Turn(world)->wake(); });
+}
+
+ts_result ts_world_set_wind(ts_world world, const double velocity[3], double density, double drag) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn->set_wind(vector(turn, velocity, "velocity"), density, drag);
+  });
+}
+
+ts_result ts_world_radial_impulse(ts_world world, const double center[3], double impulse, double radius) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn->radial_impulse(place(turn, center, "center"), turn.axes().length_in(impulse), turn.axes().length_in(radius));
+  });
+}
+
+ts_result ts_world_hash(ts_world world, uint64_t* hash) {
+  return guarded([&] {
+    const Turn turn(world);
+    *given(hash, "hash") = turn->hash();
+  });
+}
+
+ts_result ts_world_snapshot(ts_world world, void* buffer, size_t capacity, size_t* size) {
+  return guarded([&] {
+    const Turn turn(world);
+    given(size, "size");
+    const size_t needed = turn->snapshot_size();
+    if (buffer != nullptr) {
+      if (capacity < needed) fail(TS_ERROR_SIZE, "buffer has %zu bytes: give %zu", capacity, needed);
+      turn->snapshot(static_cast<char*>(buffer));
+    }
+    *size = needed;
+  });
+}
+
+ts_result ts_world_restore(ts_world world, const void* bytes, size_t size) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn->restore(static_cast<const char*>(given(bytes, "bytes")), size);
+  });
+}
+
+ts_result ts_world_spawn(ts_world world, int32_t asset, const ts_placement* where, ts_body* body) {
+  return guarded([&] {
+    const Turn turn(world);
+    sized(where, "place");
+    given(body, "body");
+    const Vector drift = vector(turn, where->velocity, "velocity");
+    for (double each : drift) {
+      if (!(std::fabs(each) < turn->scene().velocity_limit)) fail(TS_ERROR_ARGUMENT, "velocity is too fast: %g", each);
+    }
+    *body = turn->spawn(asset, place(turn, where->position, "position"), rotation(turn, where->rotation, "rotation"),
+                        drift, spin(turn, where->spin, "spin"));
+  });
+}
+
+ts_result ts_world_despawn(ts_world world, ts_body body) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn->despawn(turn->slot_of(body));
+  });
+}
+
+ts_result ts_world_get_body(ts_world world, int32_t slot, ts_body* body) {
+  return guarded([&] {
+    const Turn turn(world);
+    *given(body, "body") = turn->body_in(slot);
+  });
+}
+
+ts_result ts_body_get_asset(ts_world world, ts_body body, int32_t* asset) {
+  return guarded([&] {
+    const Turn turn(world);
+    *given(asset, "asset") = turn->scene().asset_of_slot[size_t(turn->slot_of(body))];
+  });
+}
+
+ts_result ts_body_get_status(ts_world world, ts_body body, int32_t* status) {
+  return guarded([&] {
+    const Turn turn(world);
+    *given(status, "status") = turn->status_of(turn->slot_of(body));
+  });
+}
+
+ts_result ts_body_positions(ts_world world, ts_body body, double alpha, float* positions, size_t count) {
+  return guarded([&] {
+    const Turn turn(world);
+    const int32_t slot = turn->slot_of(body);
+    require_size(count, 3 * turn->asset_of(slot).vertex_count(), "positions");
+    turn->read_positions(slot, alpha, given(positions, "positions"));
+  });
+}
+
+ts_result ts_body_mesh(ts_world world, ts_body body, int32_t mesh, float* positions, float* normals, size_t count) {
+  return guarded([&] {
+    const Turn turn(world);
+    const int32_t slot = turn->slot_of(body);
+    const Mesh& row = mesh_of(turn->scene(), mesh);
+    if (row.asset != turn->scene().asset_of_slot[size_t(slot)]) {
+      fail(TS_ERROR_ARGUMENT, "mesh %d is of asset %d, and the body is of another", mesh, row.asset);
+    }
+    require_size(count, 3 * row.vertex_count, "positions");
+    turn->read_mesh(slot, mesh, given(positions, "positions"), normals);
+  });
+}
+
+ts_result ts_body_center(ts_world world, ts_body body, double center[3]) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn.axes().place_out(turn->center_of(turn->slot_of(body)), given(center, "center"));
+  });
+}
+
+ts_result ts_body_set_velocity(ts_world world, ts_body body, const double linear[3], const double turning[3]) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn->set_velocity(turn->slot_of(body), vector(turn, linear, "linear"), spin(turn, turning, "spin"));
+  });
+}
+
+ts_result ts_body_teleport(ts_world world, ts_body body, const double center[3], const double turn_by[4],
+                           int32_t keeps_velocity) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn->teleport(turn->slot_of(body), place(turn, center, "center"), rotation(turn, turn_by, "turn"),
+                   keeps_velocity != 0);
+  });
+}
+
+ts_result ts_body_apply_impulse(ts_world world, ts_body body, const double impulse[3], const int32_t* vertices,
+                                size_t count) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn->apply_impulse(turn->slot_of(body), vector(turn, impulse, "impulse"), list(vertices, count));
+  });
+}
+
+ts_result ts_body_apply_force(ts_world world, ts_body body, const double force[3], const int32_t* vertices,
+                              size_t count) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn->apply_force(turn->slot_of(body), vector(turn, force, "force"), list(vertices, count));
+  });
+}
+
+ts_result ts_body_impulse_at(ts_world world, ts_body body, const double impulse[3], const double point[3],
+                             double radius) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn->impulse_at(turn->slot_of(body), vector(turn, impulse, "impulse"), place(turn, point, "point"),
+                     turn.axes().length_in(radius));
+  });
+}
+
+ts_result ts_body_set_gravity_scale(ts_world world, ts_body body, double scale) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn->set_gravity_scale(turn->slot_of(body), scale);
+  });
+}
+
+ts_result ts_body_set_damping(ts_world world, ts_body body, double rate) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn->set_damping(turn->slot_of(body), rate);
+  });
+}
+
+ts_result ts_body_set_sheltered(ts_world world, ts_body body, int32_t is_sheltered) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn->set_sheltered(turn->slot_of(body), is_sheltered != 0);
+  });
+}
+
+ts_result ts_body_pin(ts_world world, ts_body body, const int32_t* vertices, size_t count) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn->pin(turn->slot_of(body), list(vertices, count));
+  });
+}
+
+ts_result ts_body_unpin(ts_world world, ts_body body, const int32_t* vertices, size_t count) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn->unpin(turn->slot_of(body), list(vertices, count));
+  });
+}
+
+ts_result ts_body_set_targets(ts_world world, ts_body body, const int32_t* vertices, size_t count,
+                              const float* targets) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn->set_targets(turn->slot_of(body), list(vertices, count), given(targets, "targets"));
+  });
+}
+
+ts_result ts_collider_move_to(ts_world world, int32_t collider, const ts_pose* where) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn->move_collider(collider, pose(turn, where));
+  });
+}
+
+ts_result ts_collider_set_velocity(ts_world world, int32_t collider, const double linear[3],
+                                   const double turning[3]) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn->set_collider_velocity(collider, vector(turn, linear, "linear"), spin(turn, turning, "spin"));
+  });
+}
+
+ts_result ts_collider_teleport(ts_world world, int32_t collider, const ts_pose* where) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn->teleport_collider(collider, pose(turn, where));
+  });
+}
+
+ts_result ts_collider_get_pose(ts_world world, int32_t collider, ts_pose* where) {
+  return guarded([&] {
+    const Turn turn(world);
+    given(where, "pose");
+    const Pose& found = turn->collider(collider).pose;
+    turn.axes().place_out(found.position, where->position);
+    turn.axes().rotation_out(found.rotation, where->rotation);
+  });
+}
+
+ts_result ts_collider_get_impulse(ts_world world, int32_t collider, double impulse[3], double moment[3]) {
+  return guarded([&] {
+    const Turn turn(world);
+    Vector found, about;
+    turn->collider_impulse(collider, &found, &about);
+    if (impulse != nullptr) turn.axes().place_out(found, impulse);
+    if (moment != nullptr) turn.axes().moment_out(about, moment);
+  });
+}
+
+ts_result ts_frame_move_to(ts_world world, int32_t frame, const ts_pose* where) {
+  return guarded([&] {
+    const Turn turn(world);
+    given(where, "pose");
+    turn->move_frame(frame, {place(turn, where->position, "position"), rotation(turn, where->rotation, "rotation")});
+  });
+}
+
+}  // extern "C"

@@ -1,0 +1,50 @@
+// Named arrays in one file: see taichi_soft/export/archive.py, which writes them.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace taichi_soft {
+
+std::vector<char> read_file(const std::string& path);
+uint32_t checksum(const char* bytes, size_t size);  // CRC-32, of IEEE 802.3
+
+class Archive {
+ public:
+  explicit Archive(const std::string& path);
+
+  // The numbers of an array, for as long as the archive lives. Fails where there is none of that type.
+  template <typename Number>
+  struct View {
+    const Number* data;
+    std::vector<size_t> sizes;
+    size_t count;
+    const Number& operator[](size_t i) const { return data[i]; }
+    const Number* begin() const { return data; }
+    const Number* end() const { return data + count; }
+  };
+
+  template <typename Number>
+  View<Number> get(const std::string& name) const;
+  // The same with so many numbers in each row, or it fails.
+  template <typename Number>
+  View<Number> rows(const std::string& name, size_t width) const;
+  std::vector<std::string> texts(const std::string& name) const;
+  bool has(const std::string& name) const { return entries_.count(name) != 0; }
+
+ private:
+  struct Entry {
+    uint32_t type;
+    std::vector<size_t> sizes;
+    size_t count;
+    const char* data;
+  };
+  const Entry& entry(const std::string& name, uint32_t type) const;
+
+  std::vector<char> bytes_;
+  std::map<std::string, Entry> entries_;
+};
+
+}  // namespace taichi_soft

@@ -1,0 +1,31 @@
+// What a call has against its arguments: caught at the boundary, where it becomes a code and a text.
+#pragma once
+
+#include <cstdarg>
+#include <cstdint>
+#include <cstdio>
+#include <stdexcept>
+#include <string>
+
+#include "taichi_soft.h"
+
+namespace taichi_soft {
+
+struct Error : std::runtime_error {
+  ts_result code;
+  Error(ts_result code, const std::string& text) : std::runtime_error(text), code(code) {}
+};
+
+#if defined(__GNUC__)
+__attribute__((format(printf, 2, 3)))
+#endif
+[[noreturn]] inline void fail(ts_result code, const char* format, ...) {
+  char text[512];
+  va_list values;
+  va_start(values, format);
+  std::vsnprintf(text, sizeof text, format, values);
+  va_end(values);
+  throw Error(code, text);
+}
+
+}  // namespace taichi_soft

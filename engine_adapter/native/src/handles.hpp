@@ -1,0 +1,58 @@
+// What handles stand for. A number that is checked, because a pointer that is used once too often cannot be.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "error.hpp"
+
+namespace taichi_soft {
+
+template <typename Thing>
+class Handles {
+ public:
+  explicit Handles(const char* name) : name_(name) {}
+
+  uint64_t add(std::shared_ptr<Thing> thing) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    size_t row = 0;
+    while (row < rows_.size() && rows_[row].thing) ++row;
+    if (row == rows_.size()) rows_.push_back({});
+    rows_[row].thing = std::move(thing);
+    return uint64_t(++rows_[row].generation) << 32 | (row + 1);
+  }
+
+  // It lives for as long as the caller keeps what is returned.
+  std::shared_ptr<Thing> find(uint64_t handle) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return row_of(handle).thing;
+  }
+
+  // Forget a handle; whoever is in a call keeps the thing until that ends.
+  std::shared_ptr<Thing> remove(uint64_t handle) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return std::move(row_of(handle).thing);
+  }
+
+ private:
+  struct Row {
+    std::shared_ptr<Thing> thing;
+    uint32_t generation = 0;
+  };
+
+  Row& row_of(uint64_t handle) {
+    const uint64_t row = (handle & 0xFFFFFFFFu) - 1;
+    if (handle == 0 || row >= rows_.size() || !rows_[row].thing || rows_[row].generation != handle >> 32) {
+      fail(TS_ERROR_HANDLE, "there is no %s %llu, or no more", name_, static_cast<unsigned long long>(handle));
+    }
+    return rows_[row];
+  }
+
+  const char* name_;
+  std::mutex mutex_;
+  std::vector<Row> rows_;
+};
+
+}  // namespace taichi_soft

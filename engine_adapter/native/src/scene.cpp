@@ -1,0 +1,188 @@
+#include "scene.hpp"
+
+#include <filesystem>
+
+#include "error.hpp"
+
+namespace taichi_soft {
+
+namespace {
+
+[[noreturn]] void out_of_order(const char* what) {
+  fail(TS_ERROR_FILE, "the world file is not in order: %s. Export it again", what);
+}
+
+bool are_below(const Archive::View<int32_t>& numbers, size_t limit) {
+  for (int32_t number : numbers) {
+    if (number < 0 || static_cast<size_t>(number) >= limit) return false;
+  }
+  return true;
+}
+
+Place place_from(const int64_t* row, size_t image) {
+  for (int k = 0; k < 5; ++k) {
+    if (row[k] < 0 || static_cast<uint64_t>(row[k]) > image) out_of_order("a field");
+  }
+  const Place found = {size_t(row[0]), size_t(row[1]), size_t(row[2]), size_t(row[3]), row[4] == 1};
+  if (found.count > 0 && found.offset + (found.count - 1) * found.stride + 4 * found.width > image) {
+    out_of_order("a field lies beyond the image");
+  }
+  return found;
+}
+
+const char* const kKinds[] = {"names/body", "names/asset", "names/collider", "names/frame", "names/mesh"};
+
+}  // namespace
+
+Scene::Scene(const std::string& folder)
+    : archive((std::filesystem::path(folder) / "world.tsw").string()),
+      axes(archive.rows<double>("host_axes", 3).count == 9 ? archive.get<double>("host_axes").data
+                                                            : (out_of_order("axes"), nullptr)),
+      folder_(folder) {
+  for (int kind = 0; kind < 5; ++kind) names_[kind] = archive.texts(kKinds[kind]);
+  const auto flags = archive.get<int32_t>("world/flags"), counts = archive.get<int32_t>("world/counts");
+  const auto stable = archive.get<double>("world/stable"), limits = archive.get<double>("world/limits");
+  const auto floors = archive.get<double>("world/floor");
+  const auto assets_of = archive.get<int32_t>("slots/asset"), begins = archive.get<int32_t>("slots/begin");
+  if (flags.count != 2 || counts.count != 3 || stable.count != 2 || limits.count != 5) out_of_order("numbers");
+  has_contact = flags[0] != 0;
+  sleeps = flags[1] != 0;
+  slot_count = counts[0], particle_count = counts[1], threads = counts[2];
+  stable_share = stable[0], stable_step = stable[1];
+  has_floor = floors.count == 1;
+  floor = has_floor ? floors[0] : 0.0;
+  position_limit = limits[0], velocity_limit = limits[1], spin_limit = limits[2];
+  impulse_limit = limits[3], push_limit = limits[4];
+  asset_of_slot.assign(assets_of.begin(), assets_of.end());
+  begin_of_slot.assign(begins.begin(), begins.end());
+  if (slot_count < 1 || size_t(slot_count) != asset_of_slot.size() || size_t(slot_count) != begin_of_slot.size() ||
+      size_t(slot_count) != names_[TS_BODY].size() || particle_count < 1 || threads < 1) {
+    out_of_order("slots");
+  }
+  read_fields();
+  read_assets();
+  read_meshes();
+  // Taichi ends the process where its files are damaged, so they are looked at here.
+  const std::filesystem::path kernels = std::filesystem::path(folder) / "kernels";
+  const auto files = archive.texts("kernels/files");
+  const auto sums = archive.rows<int64_t>("kernels/sums", 2);
+  if (sums.count != 2 * files.size()) out_of_order("kernels");
+  for (size_t i = 0; i < files.size(); ++i) {
+    const std::vector<char> bytes = read_file((kernels / files[i]).string());
+    if (int64_t(bytes.size()) != sums[2 * i] || int64_t(checksum(bytes.data(), bytes.size())) != sums[2 * i + 1]) {
+      fail(TS_ERROR_FILE, "the world file is damaged: kernels/%s is not what was exported. Export it again",
+           files[i].c_str());
+    }
+  }
+  code = checksum(reinterpret_cast<const char*>(sums.data), sums.count * sizeof(int64_t)) ^
+         checksum(reinterpret_cast<const char*>(archive.get<int64_t>("fields/carried").data),
+                  archive.get<int64_t>("fields/carried").count * sizeof(int64_t));
+  give_back(std::make_unique<Machine>(*this, kernels.string()));
+}
+
+void Scene::read_fields() {
+  field_names_ = archive.texts("fields/names");
+  const auto rows = archive.rows<int64_t>("fields/places", 5);
+  const size_t image = archive.get<unsigned char>("fields/image").count;
+  if (rows.count != 5 * field_names_.size()) out_of_order("fields");
+  for (size_t i = 0; i < field_names_.size(); ++i) places_.push_back(place_from(rows.data + 5 * i, image));
+  const auto kept = archive.rows<int64_t>("fields/carried", 6);
+  carried_words = 0;
+  for (size_t i = 0; i + 6 <= kept.count; i += 6) {
+    Carried each = {place_from(kept.data + i, image), size_t(kept[i + 5])};
+    if (kept[i + 5] < 0 || each.count > each.place.count) out_of_order("what snapshots have");
+    carried_words += each.count * each.place.width;
+    carried.push_back(each);
+  }
+}
+
+void Scene::read_assets() {
+  for (size_t i = 0; i < names_[TS_ASSET].size(); ++i) {
+    const std::string prefix = "asset" + std::to_string(i) + "/";
+    Asset asset = {archive.rows<float>(prefix + "rest_rows", 8),
+                   archive.rows<double>(prefix + "vertices", 3),
+                   archive.get<double>(prefix + "masses"),
+                   {},
+                   archive.get<int32_t>(prefix + "pinned"),
+                   archive.get<int32_t>(prefix + "outer"),
+                   archive.get<int32_t>(prefix + "rank"),
+                   0.0,
+                   0};
+    const auto center = archive.get<double>(prefix + "center"), skin = archive.get<double>(prefix + "thickness");
+    const size_t n = asset.vertex_count();
+    if (asset.rest_rows.count != 8 * n || asset.vertices.count != 3 * n || asset.rank.count != n || center.count != 3 ||
+        skin.count != 1 || !are_below(asset.pinned, n) || !are_below(asset.outer, n) || !are_below(asset.rank, n)) {
+      out_of_order("an asset");
+    }
+    asset.center = {center[0], center[1], center[2]};
+    asset.thickness = skin[0];
+    assets.push_back(asset);
+  }
+  for (int32_t slot = 0; slot < slot_count; ++slot) {
+    const int32_t asset = asset_of_slot[slot], begin = begin_of_slot[slot];
+    if (asset < 0 || size_t(asset) >= assets.size() || begin < 0 ||
+        size_t(begin) + assets[asset].vertex_count() > size_t(particle_count)) {
+      out_of_order("a slot");
+    }
+    ++assets[asset].slot_count;
+  }
+}
+
+void Scene::read_meshes() {
+  for (size_t i = 0; i < names_[TS_MESH].size(); ++i) {
+    const std::string prefix = "mesh" + std::to_string(i) + "/";
+    const auto kind = archive.get<int32_t>(prefix + "kind");
+    if (kind.count != 4 || kind[0] < 0 || size_t(kind[0]) >= assets.size() || kind[3] < 0) out_of_order("a mesh");
+    Mesh mesh = {kind[0],
+                 kind[1] != 0,
+                 kind[2] != 0,
+                 size_t(kind[3]),
+                 archive.rows<int32_t>(prefix + "triangles", 3),
+                 archive.get<int32_t>(prefix + "ints"),
+                 archive.get<float>(prefix + "floats"),
+                 archive.get<float>(prefix + "uv")};
+    const bool has_uv = mesh.uv.count != 0;
+    if (!are_below(mesh.triangles, mesh.vertex_count) || (has_uv && mesh.uv.count != 2 * mesh.vertex_count)) {
+      out_of_order("a mesh");
+    }
+    meshes.push_back(mesh);
+  }
+}
+
+const std::vector<std::string>& Scene::names(int32_t kind) const {
+  if (kind < 0 || kind > 4) fail(TS_ERROR_ARGUMENT, "kind is %d: give TS_BODY to TS_MESH", kind);
+  return names_[kind];
+}
+
+bool Scene::has_place(const std::string& field) const {
+  for (const std::string& name : field_names_) {
+    if (name == field) return true;
+  }
+  return false;
+}
+
+Place Scene::place(const std::string& field) const {
+  for (size_t i = 0; i < field_names_.size(); ++i) {
+    if (field_names_[i] == field) return places_[i];
+  }
+  out_of_order(("there is no field " + field).c_str());
+}
+
+std::unique_ptr<Machine> Scene::take_machine() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!idle_.empty()) {
+      std::unique_ptr<Machine> found = std::move(idle_.back());
+      idle_.pop_back();
+      return found;
+    }
+  }
+  return std::make_unique<Machine>(*this, (std::filesystem::path(folder_) / "kernels").string());
+}
+
+void Scene::give_back(std::unique_ptr<Machine> machine) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  idle_.push_back(std::move(machine));
+}
+
+}  // namespace taichi_soft

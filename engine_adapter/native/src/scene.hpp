@@ -1,0 +1,85 @@
+// A world file in memory: all that the worlds made of it share.
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "archive.hpp"
+#include "axes.hpp"
+#include "machine.hpp"
+
+namespace taichi_soft {
+
+// Where a field lies: element i begins `stride` i bytes behind `offset`, and has `width` numbers of 4 bytes.
+struct Place {
+  size_t offset, stride, count, width;
+  bool is_whole;
+};
+
+struct Carried {  // a field that snapshots have, and how many of its elements
+  Place place;
+  size_t count;
+};
+
+struct Asset {
+  Archive::View<float> rest_rows;  // (n, 8) position, velocity, inverse mass, mass of each vertex
+  Archive::View<double> vertices;  // (n, 3)
+  Archive::View<double> masses;
+  Vector center;
+  Archive::View<int32_t> pinned, outer, rank;
+  double thickness;
+  int32_t slot_count;
+  size_t vertex_count() const { return masses.count; }
+};
+
+struct Mesh {
+  int32_t asset;
+  bool is_skin, is_serial;
+  size_t vertex_count;
+  Archive::View<int32_t> triangles, ints;
+  Archive::View<float> floats, uv;
+};
+
+class Scene {
+ public:
+  explicit Scene(const std::string& folder);
+
+  const std::vector<std::string>& names(int32_t kind) const;  // of TS_BODY and so on
+  Place place(const std::string& field) const;
+  bool has_place(const std::string& field) const;
+
+  // One that no world uses, or a new one.
+  std::unique_ptr<Machine> take_machine();
+  void give_back(std::unique_ptr<Machine> machine);
+
+  Archive archive;
+  Axes axes;
+  bool has_contact, sleeps;
+  int32_t slot_count, particle_count, threads;
+  double stable_share, stable_step;       // see `Substeps.rule`
+  bool has_floor;
+  double floor;
+  double position_limit, velocity_limit, spin_limit, impulse_limit, push_limit;
+  std::vector<Asset> assets;
+  std::vector<int32_t> asset_of_slot, begin_of_slot;
+  std::vector<Mesh> meshes;
+  std::vector<Carried> carried;
+  size_t carried_words;
+  uint32_t code;  // of the file: what its snapshots begin with
+
+ private:
+  void read_assets();
+  void read_meshes();
+  void read_fields();
+
+  std::string folder_;
+  std::vector<std::string> names_[5];
+  std::vector<std::string> field_names_;
+  std::vector<Place> places_;
+  std::mutex mutex_;
+  std::vector<std::unique_ptr<Machine>> idle_;
+};
+
+}  // namespace taichi_soft

@@ -1,0 +1,139 @@
+// An instance of a scene that moves: what a step is, and what a game does between two.
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "colliders.hpp"
+#include "scene.hpp"
+#include "taichi_soft.h"
+
+namespace taichi_soft {
+
+// Numbers of a field in memory.
+template <typename Number>
+class Field {
+ public:
+  Field() = default;
+  Field(char* root, const Place& place) : first_(root + place.offset), stride_(place.stride) {}
+  Number& operator()(size_t i, size_t k = 0) const {
+    return reinterpret_cast<Number*>(first_ + i * stride_)[k];
+  }
+
+ private:
+  char* first_ = nullptr;
+  size_t stride_ = 0;
+};
+
+struct Vertices {  // a list of a body's vertices; none given stands for all
+  const int32_t* numbers;
+  size_t count;
+};
+
+class World {
+ public:
+  explicit World(std::shared_ptr<Scene> scene);
+  ~World();
+  World(const World&) = delete;
+  World& operator=(const World&) = delete;
+
+  const Scene& scene() const { return *scene_; }
+  std::mutex turn;  // of the thread that is in a call
+
+  // Steps.
+  void set_fixed_step(double dt, int32_t substeps, int32_t max_steps);
+  void on_step(ts_before_step function, void* user) { before_step_ = function, user_ = user; }
+  int32_t stable_substeps(double dt) const;
+  void step(double dt, int32_t substeps);
+  int32_t steps_due(double seconds);  // puts in the time of a frame
+  void step_in_time() { step(dt_, substeps_); }
+  ts_before_step before_step() const { return before_step_; }
+  void* user() const { return user_; }
+  void write_clock(ts_clock* clock, int32_t steps_made) const;
+  double alpha() const;
+
+  // Bodies.
+  ts_body body_in(int32_t slot) const;
+  int32_t slot_of(ts_body body) const;  // fails for one that is not there
+  const Asset& asset_of(int32_t slot) const { return scene_->assets[scene_->asset_of_slot[slot]]; }
+  int32_t status_of(int32_t slot) const { return body_status_(slot); }
+  ts_body spawn(int32_t asset, const Vector& place, const Quaternion& turn, const Vector& drift, const Vector& spin);
+  void despawn(int32_t slot);
+  void read_positions(int32_t slot, double alpha, float* rows);
+  void read_mesh(int32_t slot, int32_t mesh, float* positions, float* normals);
+  Vector center_of(int32_t slot) const;
+  void set_velocity(int32_t slot, const Vector& linear, const Vector& spin);
+  void teleport(int32_t slot, const Vector& center, const Quaternion& turn, bool keeps_velocity);
+  void apply_impulse(int32_t slot, const Vector& impulse, Vertices which);
+  void apply_force(int32_t slot, const Vector& force, Vertices which);
+  void impulse_at(int32_t slot, const Vector& impulse, const Vector& point, double radius);
+  void set_gravity_scale(int32_t slot, double scale);
+  void set_damping(int32_t slot, double rate);
+  void set_sheltered(int32_t slot, bool is_sheltered);
+  void pin(int32_t slot, Vertices which);
+  void unpin(int32_t slot, Vertices which);
+  void set_targets(int32_t slot, Vertices which, const float* targets);
+
+  // All of them.
+  void wake();
+  void set_wind(const Vector& velocity, double density, double drag);
+  void radial_impulse(const Vector& center, double impulse, double radius);
+
+  // Colliders and frames.
+  Collider& collider(int32_t number);
+  void move_collider(int32_t number, const Pose& pose);
+  void set_collider_velocity(int32_t number, const Vector& linear, const Vector& spin);
+  void teleport_collider(int32_t number, const Pose& pose);
+  void collider_impulse(int32_t number, Vector* impulse, Vector* moment);
+  void move_frame(int32_t number, const Pose& pose);
+
+  // States.
+  uint64_t hash() const;
+  size_t snapshot_size() const;
+  void snapshot(char* bytes) const;
+  void restore(const char* bytes, size_t size);
+
+ private:
+  void bind();
+  bool aim_pins(double dt);
+  bool prepare_colliders(double dt);
+  void launch_step(int32_t substeps, double h);
+  void rouse(int32_t slot);  // -1 for all
+  void wake_slot(int32_t slot);
+  void wake_near(const Box& box);
+  Box box_of(int32_t slot) const;
+  std::vector<int32_t> checked(int32_t slot, Vertices which, bool may_be_all) const;  // ascending
+  void give_rows(int32_t slot, const std::vector<int32_t>& vertices);
+  void require_unattached(int32_t slot, const std::vector<int32_t>& vertices) const;
+  double mass_of(int32_t slot, const std::vector<int32_t>& vertices) const;
+  size_t begin_of(int32_t slot) const { return size_t(scene_->begin_of_slot[slot]); }
+  size_t particle(int32_t slot, size_t vertex) const {
+    return begin_of(slot) + size_t(asset_of(slot).rank[vertex]);
+  }
+  std::vector<float> place_rows(const Asset& asset, const Vector& place, const Quaternion& turn, const Vector& drift,
+                                const Vector& spin) const;
+
+  std::shared_ptr<Scene> scene_;
+  std::unique_ptr<Machine> machine_;
+  Colliders colliders_;
+  std::vector<ColliderMotion> motion_;
+  std::vector<float> frames_;  // at the end of the coming step: rotation row by row and place, (f, 12)
+  std::vector<uint32_t> generations_;
+
+  int64_t steps_ = 0;
+  double time_ = 0.0, last_dt_ = 0.0;
+  double dt_ = 1.0 / 60.0, remainder_ = 0.0, dropped_ = 0.0;
+  int32_t substeps_ = 0, max_steps_ = 8;
+  ts_before_step before_step_ = nullptr;
+  void* user_ = nullptr;
+  bool has_work_ = true;    // some pinned particle has somewhere to go, or has just arrived
+  bool is_still_ = false;   // none was awake after the last step, and nothing was changed since
+  double rows_at_ = -1.0;   // alpha of what was read of all bodies; below 0 once they have moved on
+
+  Field<int32_t> body_status_, body_drives_, particle_aim_, is_awake_, failed_, island_count_;
+  Field<float> position_, velocity_, mass_, inv_mass_, lag_, gravity_scale_, damping_, wind_;
+  Field<float> collider_[7];
+};
+
+}  // namespace taichi_soft

@@ -1,0 +1,260 @@
+/* Plays a recorded game on a world file: play FOLDER < GAME.
+ *
+ * A game is a list of calls, one a line, as tests/native/games.py writes them. Each step prints the hash of the
+ * state, and each reading a hash of what was read; so do the players in other languages.
+ */
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "taichi_soft.h"
+
+#define MOST 65536
+
+static char line[1 << 20];
+static const char* at;
+
+static void check(ts_result result) {
+  if (result != TS_OK) {
+    fprintf(stderr, "%s: error %d: %s\n", line, (int)result, ts_last_error());
+    exit(1);
+  }
+}
+
+static double number(void) {
+  char* end;
+  const double found = strtod(at, &end);
+  if (end == at) {
+    fprintf(stderr, "a number is missing: %s\n", line);
+    exit(2);
+  }
+  at = end;
+  return found;
+}
+
+static int32_t whole(void) { return (int32_t)number(); }
+
+static void numbers(double* into, int count) {
+  for (int i = 0; i < count; ++i) into[i] = number();
+}
+
+static size_t list(int32_t* into) {
+  const size_t count = (size_t)number();
+  for (size_t i = 0; i < count && i < MOST; ++i) into[i] = whole();
+  return count;
+}
+
+/* FNV-1a over words of 4 bytes. */
+static uint64_t hash_of(const float* rows, size_t count) {
+  uint64_t code = 14695981039346656037u;
+  for (size_t i = 0; i < count; ++i) {
+    uint32_t word;
+    memcpy(&word, rows + i, 4);
+    code = (code ^ word) * 1099511628211u;
+  }
+  return code;
+}
+
+static ts_scene scene;
+static ts_world world;
+
+static ts_body body(void) {
+  ts_body found = 0;
+  check(ts_world_get_body(world, whole(), &found));
+  return found;
+}
+
+static ts_pose pose(void) {
+  ts_pose found;
+  numbers(found.position, 3);
+  numbers(found.rotation, 4);
+  return found;
+}
+
+static float rows[3 * MOST], normals[3 * MOST];
+static int32_t vertices[MOST];
+static char* kept;
+static size_t kept_size;
+
+static void play(const char* call) {
+  double a[8];
+#define CALL(name) else if (strcmp(call, name) == 0)
+  if (strcmp(call, "step") == 0) {
+    const double dt = number();
+    uint64_t hash = 0;
+    check(ts_world_step(world, dt, whole()));
+    check(ts_world_hash(world, &hash));
+    printf("%016" PRIx64 "\n", hash);
+  }
+  CALL("impulse") {
+    const ts_body who = body();
+    numbers(a, 3);
+    const size_t count = list(vertices);
+    check(ts_body_apply_impulse(world, who, a, vertices, count));
+  }
+  CALL("force") {
+    const ts_body who = body();
+    numbers(a, 3);
+    const size_t count = list(vertices);
+    check(ts_body_apply_force(world, who, a, vertices, count));
+  }
+  CALL("impulse_at") {
+    const ts_body who = body();
+    numbers(a, 6);
+    check(ts_body_impulse_at(world, who, a, a + 3, number()));
+  }
+  CALL("radial_impulse") {
+    numbers(a, 4);
+    check(ts_world_radial_impulse(world, a, a[3], number()));
+  }
+  CALL("velocity") {
+    const ts_body who = body();
+    numbers(a, 6);
+    check(ts_body_set_velocity(world, who, a, a + 3));
+  }
+  CALL("teleport") {
+    const ts_body who = body();
+    numbers(a, 7);
+    check(ts_body_teleport(world, who, a, a + 3, whole()));
+  }
+  CALL("gravity_scale") {
+    const ts_body who = body();
+    check(ts_body_set_gravity_scale(world, who, number()));
+  }
+  CALL("damping") {
+    const ts_body who = body();
+    check(ts_body_set_damping(world, who, number()));
+  }
+  CALL("sheltered") {
+    const ts_body who = body();
+    check(ts_body_set_sheltered(world, who, whole()));
+  }
+  CALL("pin") {
+    const ts_body who = body();
+    const size_t count = list(vertices);
+    check(ts_body_pin(world, who, vertices, count));
+  }
+  CALL("unpin") {
+    const ts_body who = body();
+    const size_t count = list(vertices);
+    check(ts_body_unpin(world, who, vertices, count));
+  }
+  CALL("targets") {
+    const ts_body who = body();
+    const size_t count = list(vertices);
+    for (size_t i = 0; i < 3 * count; ++i) rows[i] = (float)number();
+    check(ts_body_set_targets(world, who, vertices, count, rows));
+  }
+  CALL("wind") {
+    numbers(a, 5);
+    check(ts_world_set_wind(world, a, a[3], a[4]));
+  }
+  CALL("wake") check(ts_world_wake(world));
+  CALL("spawn") {
+    ts_placement place;
+    ts_body found = 0;
+    memset(&place, 0, sizeof place);
+    place.struct_size = sizeof place;
+    const int32_t asset = whole();
+    numbers(place.position, 3);
+    numbers(place.rotation, 4);
+    numbers(place.velocity, 3);
+    numbers(place.spin, 3);
+    check(ts_world_spawn(world, asset, &place, &found));
+  }
+  CALL("despawn") check(ts_world_despawn(world, body()));
+  CALL("move_collider") {
+    const int32_t which = whole();
+    const ts_pose where = pose();
+    check(ts_collider_move_to(world, which, &where));
+  }
+  CALL("drive_collider") {
+    const int32_t which = whole();
+    numbers(a, 6);
+    check(ts_collider_set_velocity(world, which, a, a + 3));
+  }
+  CALL("teleport_collider") {
+    const int32_t which = whole();
+    const ts_pose where = pose();
+    check(ts_collider_teleport(world, which, &where));
+  }
+  CALL("move_frame") {
+    const int32_t which = whole();
+    const ts_pose where = pose();
+    check(ts_frame_move_to(world, which, &where));
+  }
+  CALL("snapshot") {
+    check(ts_world_snapshot(world, NULL, 0, &kept_size));
+    free(kept);
+    kept = malloc(kept_size);
+    check(ts_world_snapshot(world, kept, kept_size, &kept_size));
+  }
+  CALL("restore") check(ts_world_restore(world, kept, kept_size));
+  CALL("positions") {
+    ts_asset_info info = {sizeof info, 0, 0, 0};
+    const ts_body who = body();
+    int32_t asset = 0;
+    check(ts_body_get_asset(world, who, &asset));
+    check(ts_asset_get_info(scene, asset, &info));
+    const size_t count = 3 * (size_t)info.vertex_count;
+    check(ts_body_positions(world, who, number(), rows, count));
+    printf("%016" PRIx64 "\n", hash_of(rows, count));
+  }
+  CALL("mesh") {
+    ts_mesh_info info = {sizeof info, 0, 0, 0, 0};
+    const ts_body who = body();
+    const int32_t mesh = whole();
+    check(ts_mesh_get_info(scene, mesh, &info));
+    const size_t count = 3 * (size_t)info.vertex_count;
+    check(ts_body_mesh(world, who, mesh, rows, normals, count));
+    printf("%016" PRIx64 " %016" PRIx64 "\n", hash_of(rows, count), hash_of(normals, count));
+  }
+  CALL("collider_impulse") {
+    check(ts_collider_get_impulse(world, whole(), a, a + 3));
+    for (int i = 0; i < 6; ++i) rows[i] = (float)a[i];
+    printf("%016" PRIx64 "\n", hash_of(rows, 6));
+  }
+  CALL("collider_pose") {
+    ts_pose where;
+    check(ts_collider_get_pose(world, whole(), &where));
+    for (int i = 0; i < 3; ++i) rows[i] = (float)where.position[i];
+    for (int i = 0; i < 4; ++i) rows[3 + i] = (float)where.rotation[i];
+    printf("%016" PRIx64 "\n", hash_of(rows, 7));
+  }
+  CALL("status") {
+    int32_t status = 0;
+    check(ts_body_get_status(world, body(), &status));
+    printf("%d\n", (int)status);
+  }
+  CALL("stable_substeps") {
+    int32_t count = 0;
+    check(ts_world_stable_substeps(world, number(), &count));
+    printf("%d\n", (int)count);
+  }
+  else {
+    fprintf(stderr, "unknown call: %s\n", line);
+    exit(2);
+  }
+}
+
+int main(int count, char** arguments) {
+  if (count != 2) {
+    fprintf(stderr, "usage: play FOLDER < GAME\n");
+    return 2;
+  }
+  check(ts_scene_load(arguments[1], &scene));
+  check(ts_world_create(scene, &world));
+  while (fgets(line, sizeof line, stdin) != NULL) {
+    char call[32];
+    int length = 0;
+    line[strcspn(line, "\n")] = 0;
+    if (sscanf(line, "%31s%n", call, &length) != 1) continue;
+    at = line + length;
+    play(call);
+  }
+  check(ts_world_destroy(world));
+  check(ts_scene_unload(scene));
+  free(kept);
+  return 0;
+}

@@ -1,0 +1,162 @@
+"""Games as lists of calls, one a line, that players in several languages play: here on a `World` of Python."""
+
+import numpy as np
+
+from taichi_soft.persistence.kernels.packing import hash_bodies
+
+MASK = (1 << 64) - 1
+
+
+def hash_of(rows):
+    """FNV-1a over words of 4 bytes, as `engine_adapter/native/tests/play.c` prints it."""
+    code = 14695981039346656037
+    for word in np.ascontiguousarray(rows, dtype=np.float32).reshape(-1).view(np.uint32).tolist():
+        code = ((code ^ word) * 1099511628211) & MASK
+    return f"{code:016x}"
+
+
+def line(call, *arguments):
+    """One call of a game. Lists of vertices begin with their length."""
+    return " ".join([call, *(repr(float(each)) for each in np.concatenate([np.ravel(a) for a in arguments]))])
+
+
+class Player:
+    """Plays games on a world of Python, and notes what the other players print."""
+
+    def __init__(self, world, meshes=()):
+        """Args: meshes: of each mesh of the world file, a function (body) -> render mesh."""
+        self.world, self.meshes, self.lines = world, meshes, []
+        self.assets = list(dict.fromkeys(world._context.slots.assets))
+        self.kept = b""
+
+    def play(self, game):
+        """Play a game; returns all that was printed."""
+        for text in game:
+            call, *rest = text.split()
+            self.numbers = [float(each) for each in rest]
+            getattr(self, call)()
+        return self.lines
+
+    def take(self, count):
+        found, self.numbers = self.numbers[:count], self.numbers[count:]
+        return found
+
+    def whole(self):
+        return int(self.take(1)[0])
+
+    def list(self):
+        return [int(each) for each in self.take(self.whole())] or None
+
+    def body(self):
+        return self.world._context.slots.slots[self.whole()]
+
+    def collider(self):
+        return self.world._context.colliders.all_handles[self.whole()]
+
+    def say(self, text):
+        self.lines.append(text)
+
+    def step(self):
+        dt, substeps = self.take(2)
+        self.world.step(dt, int(substeps) or None)
+        built = self.world._built
+        self.say(f"{hash_bodies(built.state, self.world.slot_count) & MASK:016x}")
+
+    def impulse(self):
+        self.body().apply_impulse(self.take(3), self.list())
+
+    def force(self):
+        self.body().apply_force(self.take(3), self.list())
+
+    def impulse_at(self):
+        self.body().apply_impulse_at_point(self.take(3), self.take(3), *self.take(1))
+
+    def radial_impulse(self):
+        center, (impulse, radius) = self.take(3), self.take(2)
+        self.world.apply_radial_impulse(center, impulse, radius)
+
+    def velocity(self):
+        self.body().set_velocity(self.take(3), self.take(3))
+
+    def teleport(self):
+        body, center, turn = self.body(), self.take(3), self.take(4)
+        body.teleport(center, turn, keep_velocity=bool(self.whole()))
+
+    def gravity_scale(self):
+        self.body().set_gravity_scale(*self.take(1))
+
+    def damping(self):
+        self.body().set_linear_damping(*self.take(1))
+
+    def sheltered(self):
+        self.body().set_sheltered(bool(self.whole()))
+
+    def pin(self):
+        self.body().pin(self.list())
+
+    def unpin(self):
+        self.body().unpin(self.list())
+
+    def targets(self):
+        body, vertices = self.body(), self.list()
+        body.set_targets(vertices, np.reshape(self.numbers, (-1, 3)))
+
+    def wind(self):
+        velocity, (density, drag) = self.take(3), self.take(2)
+        self.world.set_wind(velocity, density=density, drag=drag)
+
+    def wake(self):
+        self.world.wake()
+
+    def spawn(self):
+        asset = self.assets[self.whole()]
+        place = dict(
+            position=self.take(3), rotation=self.take(4), velocity=self.take(3), angular_velocity=self.take(3)
+        )
+        self.world.spawn(asset, **place)
+
+    def despawn(self):
+        self.world.despawn(self.body())
+
+    def move_collider(self):
+        self.collider().move_to(self.take(3), self.take(4))
+
+    def drive_collider(self):
+        self.collider().set_velocity(self.take(3), self.take(3))
+
+    def teleport_collider(self):
+        self.collider().teleport(self.take(3), self.take(4))
+
+    def move_frame(self):
+        from taichi_soft.control.frames import Frames
+
+        self.world._context.of(Frames).rows[self.whole()].move_to(self.take(3), self.take(4))
+
+    def snapshot(self):
+        self.kept = self.world.snapshot()
+
+    def restore(self):
+        self.world.restore(self.kept)
+
+    def positions(self):
+        body, (alpha,) = self.body(), self.take(1)
+        self.say(hash_of(self.world.read_positions(body, alpha)))
+
+    def mesh(self):
+        body, number = self.body(), self.whole()
+        rows, normals = self.world.read_render_mesh(self.meshes[number](body), 0.0)
+        self.say(f"{hash_of(rows)} {hash_of(normals)}")
+
+    def collider_impulse(self):
+        collider = self.collider()
+        self.say(hash_of(np.concatenate([collider.impulse, collider.angular_impulse])))
+
+    def collider_pose(self):
+        row = self.collider()._row
+        self.say(hash_of(np.concatenate([row.position, row.rotation])))
+
+    def status(self):
+        self.say(str(int(self.world._built.state.body_status[self.body().index])))
+
+    def stable_substeps(self):
+        self.say(str(self.world.stable_substeps(*self.take(1))))
