@@ -1,4 +1,4 @@
-"""Games as lists of calls, one a line, that players in several languages play: here on a `World` of Python."""
+"""Games as lists of calls, one a line, that players in several languages play: here on a World of Python."""
 
 import numpy as np
 
@@ -16,8 +16,11 @@ def hash_of(rows):
 
 
 def line(call, *arguments):
-    """One call of a game. Lists of vertices begin with their length."""
-    return " ".join([call, *(repr(float(each)) for each in np.concatenate([np.ravel(a) for a in arguments]))])
+    """One call of a game: numbers and tuples as they are, lists with their length in front."""
+    numbers = []
+    for each in arguments:
+        numbers += [len(each), *each] if isinstance(each, list) else np.ravel(each).tolist()
+    return " ".join([call, *(repr(float(number)) for number in numbers)])
 
 
 class Player:

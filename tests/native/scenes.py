@@ -1,0 +1,215 @@
+"""Worlds that are exported, each with a game that does in it what it is for: `GAMES` by name."""
+
+import numpy as np
+from games import line
+
+from taichi_soft import (
+    LAWS,
+    BoxShape,
+    Contact,
+    Material,
+    PlaneShape,
+    Plasticity,
+    SoftBodyAsset,
+    SphereShape,
+    SpringMaterial,
+    World,
+    box,
+    cloth,
+    cloth_constants,
+    sphere,
+)
+
+DT = 1 / 64
+STEPS = 600
+RUBBER = Material(young=6e4, poisson=0.4, density=1000, damping_ratio=0.1)
+UPRIGHT = (0.0, 0.0, 0.0, 1.0)
+
+
+def turn(axis, angle):
+    """A unit quaternion."""
+    axis = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
+    return (*(np.sin(angle / 2) * axis), np.cos(angle / 2))
+
+
+def heap():
+    """Soft contact, sleep, pools, colliders that move: what a game is made of most often."""
+    world = World(soft_contact=True, sleep_speed=0.08, collider_room=1)
+    ball = SoftBodyAsset(sphere(radius=0.25, resolution=3), RUBBER, contact=Contact(thickness=0.005))
+    brick = SoftBodyAsset(box((0.5, 0.4, 0.3), (3, 2, 2)), RUBBER)
+    for asset, count in ((ball, 5), (brick, 4)):
+        world.reserve(asset, count)
+    for i in range(3):
+        world.spawn(ball, position=(0.05 * i, 0.03 * i, 0.9 + 0.6 * i))
+        world.spawn(brick, position=(1.2, 0.02 * i, 0.3 + 0.4 * i))
+    world.add_collider(BoxShape((1.0, 1.0, 0.3)), position=(0.0, 0.0, 0.2))
+    world.add_collider(SphereShape(0.2), position=(3.0, 0.0, 0.5))
+    world.add_collider(PlaneShape((-1.0, 0.0, 0.2)), position=(2.5, 0.0, 0.0))
+    world.build()
+    return world
+
+
+def heap_game():
+    """Colliders: 0 the lift, 1 a ball, 2 a wall, 3 the floor. Slots: 0 to 4 balls, 5 to 8 bricks."""
+    rng = np.random.default_rng(7)
+    for i in range(STEPS):
+        if i < 250:
+            height = 0.2 + 0.15 * np.sin(0.05 * i)
+            yield line("move_collider", 0, (0.1 * np.cos(0.03 * i), 0.0, height), turn((0, 0, 1), 0.01 * i))
+        if i == 260:
+            yield line("drive_collider", 1, (-1.0, 0.0, 0.0), (0.0, 2.0, 1.0))
+        if i == 380:
+            yield line("teleport_collider", 1, (1.2, 0.0, 1.4), turn((1, 2, 3), 0.4))
+            yield line("drive_collider", 1, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+        if i == 100:
+            yield line("spawn", 0, (0.3, 0.1, 2.0), turn((1, 0, 1), 0.7), (0.5, 0.0, -1.0), (1.0, 2.0, 3.0))
+            yield line("spawn", 1, (1.2, 0.1, 2.2), turn((0, 1, 1), 1.2), (0.0, 0.0, 0.0), (0.0, 4.0, 0.0))
+        if i == 200:
+            yield line("despawn", 0)
+        if i == 220:
+            yield line("spawn", 0, (0.0, 0.0, 2.5), UPRIGHT, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+            yield line("snapshot")
+        if i in (150, 290, 480):
+            yield line("radial_impulse", rng.uniform(0, 1, 3), 40.0, 1.5)
+        if i in (170, 310):
+            yield line("impulse", 1, (5.0, 0.0, 20.0), [])
+            yield line("impulse", 5, (0.0, 3.0, 10.0), [3, 0, 1, 2])
+            yield line("force", 2, (0.0, 0.0, 400.0), [])
+        if i == 320:
+            yield line("teleport", 6, (1.3, 0.0, 1.5), turn((0, 0, 1), 1.0), 1)
+            yield line("velocity", 2, (0.0, 0.5, 1.0), (0.0, 0.0, 3.0))
+        if i == 340:
+            yield line("restore")
+        yield line("step", DT, 0)
+        if i % 50 == 0:
+            for collider in range(4):
+                yield line("collider_impulse", collider)
+                yield line("collider_pose", collider)
+            for slot in (1, 5):
+                yield line("status", slot)
+                yield line("positions", slot, 1.0)
+                yield line("positions", slot, 0.25)
+                yield line("mesh", slot, int(slot == 5))
+    yield line("stable_substeps", DT)
+
+
+def free():
+    """Bodies that touch nothing but the floor: frames, pins, forces and wind."""
+    world = World(floor=0.0, retries=2)
+    beams = []
+    for i in range(4):
+        held = () if i else (0, 1, 2, 3)
+        bar = box((1.0, 0.2, 0.2), (6, 1, 1))
+        beams.append(world.add_body(bar, RUBBER, position=(0.0, 0.5 * i, 1.0), pinned=held))
+    world.add_body(
+        sphere(radius=0.3, resolution=4), RUBBER, position=(3.0, 0.0, 1.0), velocity=(0.0, 0.0, 2.0)
+    )
+    world.build()
+    hand = world.add_frame((0.0, 0.5, 1.0))
+    beams[1].attach([0, 1, 2, 3], hand, two_way=True)
+    return world
+
+
+def free_game():
+    """Slots: 0 is pinned, 1 hangs from the frame, 2 and 3 are free, 4 is a ball."""
+    for i in range(STEPS):
+        yield line(
+            "move_frame", 0, (0.2 * np.sin(0.04 * i), 0.5, 1.0), turn((0, 1, 0), 0.3 * np.sin(0.06 * i))
+        )
+        if i == 50:
+            yield line("pin", 2, [7, 5, 6, 4])
+        if 60 <= i < 120:
+            rows = tuple((0.17 * k, 1.0, 0.6 + 0.004 * i) for k in range(3))
+            yield line("targets", 2, [6, 4, 5], rows)
+        if i == 130:
+            yield line("unpin", 2, [5])
+        if i == 180:
+            yield line("unpin", 2, [])
+        if i == 70:
+            yield line("wind", (3.0, 1.0, 0.0), 1.2, 1.5)
+            yield line("sheltered", 3, 1)
+        if i == 250:
+            yield line("sheltered", 3, 0)
+            yield line("gravity_scale", 3, -0.2)
+            yield line("damping", 4, 0.7)
+        if i in (80, 90, 300):
+            yield line("force", 3, (30.0, 0.0, 100.0), [])
+            yield line("impulse_at", 4, (1.0, 2.0, 6.0), (3.0, 0.1, 0.7), 2.0)
+        if i == 350:
+            yield line("wind", (0.0, 0.0, 0.0), 0.0, 0.0)
+            yield line("velocity", 3, (0.0, 1.0, 0.0), (4.0, 0.0, 0.0))
+            yield line("teleport", 4, (3.0, 1.0, 2.0), turn((1, 1, 0), 2.0), 0)
+        yield line("step", DT, 0 if i % 3 else 12)
+        if i % 60 == 0:
+            for slot in range(5):
+                yield line("positions", slot, 0.5)
+                yield line("status", slot)
+
+
+def drape():
+    """Cloth under implicit Euler falls over a ball that moves."""
+    world = World(integrator="implicit_euler", collider_room=1)
+    mesh = cloth((1.2, 1.2), (8, 8), 0.3)
+    constants = cloth_constants(mesh, (8, 8), tensile=400.0, shear=100.0, bend=1.0)
+    world.add_body(mesh, SpringMaterial(constants, damping=0.05), position=(-0.6, -0.6, 1.0))
+    world.add_collider(SphereShape(0.3), position=(0.0, 0.0, 0.5))
+    world.build()
+    return world
+
+
+def drape_game():
+    for i in range(STEPS):
+        yield line("move_collider", 0, (0.2 * np.sin(0.05 * i), 0.0, 0.5), UPRIGHT)
+        if i == 100:
+            yield line("pin", 0, [0, 8])
+        yield line("step", DT, 0)
+        if i % 100 == 0:
+            yield line("collider_impulse", 0)
+            yield line("mesh", 0, 0)
+
+
+def held():
+    """Bodies that are bent for good, joined to each other, and pulled by a grab."""
+    world = World(soft_contact=True)
+    tin = Plasticity(yield_stress=2e3, creep=20.0)
+    block = world.add_body(box((0.6, 0.3, 0.3), (4, 2, 2)), RUBBER, position=(0, 0, 0.5), plasticity=tin)
+    other = world.add_body(box((0.3, 0.3, 0.3), (2, 2, 2)), RUBBER, position=(0.46, 0, 0.5))
+    ball = world.add_body(sphere(radius=0.2, resolution=3), RUBBER, position=(0.1, 0, 1.2))
+    world.build()
+    ends = np.flatnonzero(other.mesh.vertices[:, 0] < other.mesh.vertices[:, 0].min() + 1e-6)
+    other.attach_to(block, ends)
+    ball.grab(0).move((0.5, 0.2, 1.4))
+    return world
+
+
+def held_game():
+    for i in range(STEPS):
+        if i in (100, 200):
+            yield line("impulse", 1, (0.0, 10.0, 30.0), [])
+        yield line("step", DT, 0)
+
+
+def laws():
+    """A body under every law, each with a floor below it."""
+    world = World(floor=0.0)
+    for number, law in enumerate(LAWS):
+        place = (1.2 * number, 0.0, 0.7)
+        world.add_body(
+            sphere(radius=0.3, resolution=3), RUBBER, law=law, position=place, velocity=(0, 0, -1.0)
+        )
+    world.build()
+    return world
+
+
+def laws_game():
+    for _ in range(STEPS):
+        yield line("step", DT, 0)
+
+
+GAMES = {
+    "heap": (heap, heap_game),
+    "free": (free, free_game),
+    "drape": (drape, drape_game),
+    "held": (held, held_game),
+    "laws": (laws, laws_game),
+}
