@@ -15,6 +15,7 @@ from taichi_soft.contact.collider import FASTEST_SPIN, ColliderRow, row_of
 from taichi_soft.control.drives import LARGEST_PUSH
 from taichi_soft.control.frames import Frames
 from taichi_soft.control.impulses import LARGEST_IMPULSE
+from taichi_soft.core.checks import LONGEST_STEP, SHORTEST_STEP
 from taichi_soft.core.constants import POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.core.runtime import device
 from taichi_soft.export.archive import words
@@ -57,7 +58,10 @@ def _of_world(context: WorldContext) -> Arrays:
         "world/counts": _ints([len(context.slots.slots), context.layout.particle_count, device().threads]),
         "world/stable": _floats([share, longest]),
         "world/limits": _floats(
-            [POSITION_LIMIT, VELOCITY_LIMIT, FASTEST_SPIN, LARGEST_IMPULSE, LARGEST_PUSH]
+            [
+                *(POSITION_LIMIT, VELOCITY_LIMIT, FASTEST_SPIN, LARGEST_IMPULSE, LARGEST_PUSH),
+                *(SHORTEST_STEP, LONGEST_STEP),
+            ]
         ),
         "world/floor": _floats([] if settings.floor is None else [settings.floor]),
         "world/steps": np.array([context.clock.steps], dtype=np.int64),

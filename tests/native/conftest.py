@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
-sys.path.insert(0, str(Path(__file__).parent))  # what the tests of this folder share
+HERE = Path(__file__).parent
+ROOT = HERE.parents[1]
+sys.path.insert(0, str(HERE))  # what the tests of this folder share
 
 
 def build(folder, *options):
@@ -36,3 +37,21 @@ def native(tmp_path_factory):
 def play(native):
     """The program that plays recorded games."""
     return native / "play"
+
+
+@pytest.fixture(scope="session")
+def export(tmp_path_factory):
+    """A function that exports a scene in a process of its own, once, and returns its folder."""
+    made = {}
+
+    def exported(name, *options):
+        key = (name, *options)
+        if key not in made:
+            folder = tmp_path_factory.mktemp("worlds") / f"{name}.softworld"
+            command = ["-m", "taichi_soft", "export", f"{HERE / 'scenes.py'}:{name}", "--out", str(folder)]
+            done = subprocess.run([sys.executable, *command, *options], capture_output=True, text=True)
+            assert done.returncode == 0, done.stderr
+            made[key] = folder
+        return made[key]
+
+    return exported

@@ -1,34 +1,12 @@
 """The native library plays recorded games as Python does, bit for bit."""
 
 import subprocess
-import sys
-from pathlib import Path
 
 import pytest
 from games import Player
 from scenes import GAMES
 
 from taichi_soft.export.meshes import CREASE
-
-HERE = Path(__file__).parent
-
-
-@pytest.fixture(scope="module")
-def export(tmp_path_factory):
-    """A function that exports a scene in a process of its own, once, and returns its folder."""
-    made = {}
-
-    def exported(name, *options):
-        key = (name, *options)
-        if key not in made:
-            folder = tmp_path_factory.mktemp("worlds") / f"{name}.softworld"
-            command = ["-m", "taichi_soft", "export", f"{HERE / 'scenes.py'}:{name}", "--out", str(folder)]
-            done = subprocess.run([sys.executable, *command, *options], capture_output=True, text=True)
-            assert done.returncode == 0, done.stderr
-            made[key] = folder
-        return made[key]
-
-    return exported
 
 
 def native_lines(play, folder, game, *prefix):

@@ -44,7 +44,7 @@ Scene::Scene(const std::string& folder)
   const auto stable = archive.get<double>("world/stable"), limits = archive.get<double>("world/limits");
   const auto floors = archive.get<double>("world/floor");
   const auto assets_of = archive.get<int32_t>("slots/asset"), begins = archive.get<int32_t>("slots/begin");
-  if (flags.count != 2 || counts.count != 3 || stable.count != 2 || limits.count != 5) out_of_order("numbers");
+  if (flags.count != 2 || counts.count != 3 || stable.count != 2 || limits.count != 7) out_of_order("numbers");
   has_contact = flags[0] != 0;
   sleeps = flags[1] != 0;
   slot_count = counts[0], particle_count = counts[1], threads = counts[2];
@@ -53,6 +53,7 @@ Scene::Scene(const std::string& folder)
   floor = has_floor ? floors[0] : 0.0;
   position_limit = limits[0], velocity_limit = limits[1], spin_limit = limits[2];
   impulse_limit = limits[3], push_limit = limits[4];
+  shortest_step = limits[5], longest_step = limits[6];
   asset_of_slot.assign(assets_of.begin(), assets_of.end());
   begin_of_slot.assign(begins.begin(), begins.end());
   if (slot_count < 1 || size_t(slot_count) != asset_of_slot.size() || size_t(slot_count) != begin_of_slot.size() ||

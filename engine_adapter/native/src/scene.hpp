@@ -61,7 +61,7 @@ class Scene {
   double stable_share, stable_step;       // see `Substeps.rule`
   bool has_floor;
   double floor;
-  double position_limit, velocity_limit, spin_limit, impulse_limit, push_limit;
+  double position_limit, velocity_limit, spin_limit, impulse_limit, push_limit, shortest_step, longest_step;
   std::vector<Asset> assets;
   std::vector<int32_t> asset_of_slot, begin_of_slot;
   std::vector<Mesh> meshes;

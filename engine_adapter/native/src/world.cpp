@@ -79,8 +79,14 @@ void World::bind() {
 
 // ---- steps ----
 
+void World::require_step(double dt) const {
+  if (!(dt >= scene_->shortest_step && dt <= scene_->longest_step)) {
+    fail(TS_ERROR_ARGUMENT, "dt is %g s: give %g to %g", dt, scene_->shortest_step, scene_->longest_step);
+  }
+}
+
 void World::set_fixed_step(double dt, int32_t substeps, int32_t max_steps) {
-  if (!(dt > 0.0 && dt < 1e9)) fail(TS_ERROR_ARGUMENT, "dt is %g: give a number above 0 s", dt);
+  require_step(dt);
   if (substeps < 0) fail(TS_ERROR_ARGUMENT, "substeps is %d: give 1 or more, or 0 for what is stable", substeps);
   if (max_steps < 1) fail(TS_ERROR_ARGUMENT, "max_steps is %d: give 1 or more", max_steps);
   dt_ = dt, substeps_ = substeps, max_steps_ = max_steps;
@@ -88,7 +94,7 @@ void World::set_fixed_step(double dt, int32_t substeps, int32_t max_steps) {
 }
 
 int32_t World::stable_substeps(double dt) const {
-  if (!(dt > 0.0 && dt < 1e9)) fail(TS_ERROR_ARGUMENT, "dt is %g: give a number above 0 s", dt);
+  require_step(dt);
   const double count = std::ceil(scene_->stable_share * dt / scene_->stable_step);
   if (count > 1e6) fail(TS_ERROR_ARGUMENT, "dt is %g s, which takes %g substeps: give less", dt, count);
   return std::max(1, static_cast<int32_t>(count));
@@ -746,7 +752,8 @@ void World::snapshot(char* bytes) const {
     row = each;
     put(&at, &row, 1);
   }
-  head.sum = checksum(bytes + sizeof head, size_t(at - bytes) - sizeof head);
+  std::memcpy(bytes, &head, sizeof head);
+  head.sum = checksum(bytes, head.size);  // with a sum of 0 in its place
   std::memcpy(bytes, &head, sizeof head);
 }
 
@@ -757,7 +764,11 @@ void World::restore(const char* bytes, size_t size) {
   if (head.mark != kSnapshotMark) fail(TS_ERROR_SNAPSHOT, "these bytes are no snapshot");
   if (head.scene != scene_->code) fail(TS_ERROR_SNAPSHOT, "this snapshot is of another world file");
   if (head.size != size || size != snapshot_size()) fail(TS_ERROR_SNAPSHOT, "this snapshot is cut off");
-  if (head.sum != checksum(bytes + sizeof head, size - sizeof head)) {
+  std::vector<char> whole(bytes, bytes + size);
+  const uint32_t sum = head.sum;
+  head.sum = 0;
+  std::memcpy(whole.data(), &head, sizeof head);
+  if (sum != checksum(whole.data(), size)) {
     fail(TS_ERROR_SNAPSHOT, "this snapshot is damaged: its checksum is wrong");
   }
   const char* at = bytes + sizeof head;

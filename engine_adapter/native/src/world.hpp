@@ -96,6 +96,7 @@ class World {
 
  private:
   void bind();
+  void require_step(double dt) const;
   bool aim_pins(double dt);
   bool prepare_colliders(double dt);
   void launch_step(int32_t substeps, double h);

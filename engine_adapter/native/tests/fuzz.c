@@ -1,0 +1,240 @@
+/* Calls of the library with bad and good arguments at random: fuzz FOLDER SECONDS SEED.
+ *
+ * It ends with 0 where every call returned TS_OK or an error with a text, and where no refused call changed the
+ * state of the world.
+ */
+#include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "taichi_soft.h"
+
+#define WORLDS 2
+#define ROOM 100000
+
+static uint64_t state;
+
+static uint64_t next(void) { /* xorshift64* of Vigna 2016 */
+  state ^= state >> 12;
+  state ^= state << 25;
+  state ^= state >> 27;
+  return state * 2685821657736338717u;
+}
+
+static uint32_t below(uint32_t limit) { return (uint32_t)((next() >> 33) % limit); }
+
+static int one_in(uint32_t count) { return below(count) == 0; }
+
+static double number(void) {
+  static const double odd[] = {0.0, -0.0, 1.0, -1.0, 1e-300, 1e30, -1e30, 1e300, 1e9, 1e-9};
+  if (one_in(12)) return NAN;
+  if (one_in(12)) return one_in(2) ? INFINITY : -INFINITY;
+  if (one_in(6)) return odd[below(10)];
+  return 4.0 * ((double)(next() >> 11) / 9007199254740992.0) - 1.0;
+}
+
+static double* numbers(int count) {
+  static double pool[8][16];
+  static int which;
+  double* found = pool[which = (which + 1) % 8];
+  if (one_in(25)) return NULL;
+  for (int i = 0; i < count; ++i) found[i] = number();
+  if (count == 4 && !one_in(4)) {
+    const double length = sqrt(found[0] * found[0] + found[1] * found[1] + found[2] * found[2] + found[3] * found[3]);
+    for (int i = 0; i < 4 && length > 0.0; ++i) found[i] /= length;
+  }
+  return found;
+}
+
+static int32_t whole(int32_t limit) {
+  if (one_in(10)) return (int32_t)next();
+  return (int32_t)below((uint32_t)limit + 2) - 1;
+}
+
+static ts_scene scene;
+static ts_world worlds[WORLDS];
+
+static ts_world any_world(void) {
+  if (one_in(20)) return next();
+  return worlds[below(WORLDS)];
+}
+
+static ts_body any_body(ts_world world) {
+  ts_body found = 0;
+  if (one_in(15)) return next();
+  ts_world_get_body(world, whole(9), &found);
+  return found;
+}
+
+static float rows[ROOM], normals[ROOM];
+static int32_t vertices[64];
+
+static const int32_t* list(size_t* count) {
+  *count = below(20);
+  for (int i = 0; i < 20; ++i) vertices[i] = whole(27);
+  if (one_in(20)) *count = (size_t)next();
+  return *count > 20 || one_in(20) ? NULL : vertices;
+}
+
+static ts_pose* pose(void) {
+  static ts_pose found;
+  const double* turn = numbers(4);
+  if (one_in(25)) return NULL;
+  for (int i = 0; i < 3; ++i) found.position[i] = number();
+  for (int i = 0; i < 4; ++i) found.rotation[i] = turn == NULL ? number() : turn[i];
+  return &found;
+}
+
+static uint32_t size_of(size_t size) { return one_in(10) ? (uint32_t)next() : (uint32_t)size; }
+
+static ts_result one_call(ts_world world) {
+  const ts_body body = any_body(world);
+  size_t count = 0;
+  const int32_t* which = list(&count);
+  switch (below(36)) {
+    case 0: case 1: case 2: return ts_world_step(world, one_in(8) ? number() : 0.01, one_in(8) ? whole(50) : 4);
+    case 3: {
+      ts_clock clock = {size_of(sizeof clock), 0, 0, 0, 0, 0};
+      return ts_world_advance(world, one_in(4) ? number() : 0.02, one_in(4) ? NULL : &clock);
+    }
+    case 4: return ts_body_apply_impulse(world, body, numbers(3), which, count);
+    case 5: return ts_body_apply_force(world, body, numbers(3), which, count);
+    case 6: return ts_body_impulse_at(world, body, numbers(3), numbers(3), number());
+    case 7: return ts_body_set_velocity(world, body, numbers(3), numbers(3));
+    case 8: return ts_body_teleport(world, body, numbers(3), numbers(4), whole(2));
+    case 9: return ts_body_set_gravity_scale(world, body, number());
+    case 10: return ts_body_set_damping(world, body, number());
+    case 11: return ts_body_set_sheltered(world, body, whole(2));
+    case 12: return ts_body_pin(world, body, which, count);
+    case 13: return ts_body_unpin(world, body, which, count);
+    case 14: {
+      for (int i = 0; i < 60; ++i) rows[i] = (float)number();
+      return ts_body_set_targets(world, body, which, count, one_in(20) ? NULL : rows);
+    }
+    case 15: return ts_world_set_wind(world, numbers(3), number(), number());
+    case 16: return ts_world_radial_impulse(world, numbers(3), number(), number());
+    case 17: return ts_world_wake(world);
+    case 18: case 19: {
+      ts_placement place;
+      ts_body made = 0;
+      const double *turn = numbers(4);
+      memset(&place, 0, sizeof place);
+      place.struct_size = size_of(sizeof place);
+      for (int i = 0; i < 3; ++i) place.position[i] = number(), place.velocity[i] = number(), place.spin[i] = number();
+      for (int i = 0; i < 4; ++i) place.rotation[i] = turn == NULL ? number() : turn[i];
+      return ts_world_spawn(world, whole(2), one_in(20) ? NULL : &place, one_in(20) ? NULL : &made);
+    }
+    case 20: return ts_world_despawn(world, body);
+    case 21: return ts_collider_move_to(world, whole(4), pose());
+    case 22: return ts_collider_set_velocity(world, whole(4), numbers(3), numbers(3));
+    case 23: return ts_collider_teleport(world, whole(4), pose());
+    case 24: return ts_collider_get_pose(world, whole(4), pose());
+    case 25: return ts_collider_get_impulse(world, whole(4), numbers(3), numbers(3));
+    case 26: return ts_frame_move_to(world, whole(2), pose());
+    case 27: return ts_body_positions(world, body, number(), one_in(10) ? NULL : rows, below(8) ? 3 * below(200) : ROOM);
+    case 28: return ts_body_mesh(world, body, whole(3), rows, one_in(10) ? NULL : normals, 3 * below(400));
+    case 29: {
+      /* Not so short, or so many, that a frame takes minutes. */
+      ts_fixed_step step = {size_of(sizeof step), whole(9), (int32_t)below(9) - 2, number()};
+      if (step.dt > 0.0 && step.dt < 1e-3) step.dt = 1e-3;
+      return ts_world_set_fixed_step(world, one_in(20) ? NULL : &step);
+    }
+    case 30: {
+      ts_mesh_info info = {size_of(sizeof info), 0, 0, 0, 0};
+      return ts_mesh_get_info(one_in(10) ? next() : scene, whole(3), &info);
+    }
+    case 31: return ts_mesh_get_triangles(scene, whole(3), (uint32_t*)(void*)rows, 3 * below(300));
+    case 32: {
+      char name[8];
+      return ts_scene_get_name(scene, whole(6), whole(9), one_in(10) ? NULL : name, below(9));
+    }
+    case 33: {
+      int32_t found = 0;
+      return ts_scene_find(scene, whole(6), one_in(10) ? NULL : "floor", one_in(10) ? NULL : &found);
+    }
+    case 34: {
+      int32_t found = 0;
+      return ts_world_stable_substeps(world, number(), one_in(10) ? NULL : &found);
+    }
+    default: {
+      double center[3];
+      return ts_body_center(world, body, one_in(10) ? NULL : center);
+    }
+  }
+}
+
+static void broken(const char* what) {
+  fprintf(stderr, "%s (last error: %s)\n", what, ts_last_error());
+  exit(1);
+}
+
+/* A snapshot that was taken goes back; one that is damaged is refused. */
+static void try_snapshots(ts_world world) {
+  size_t size = 0;
+  uint64_t before = 0, after = 0;
+  if (ts_world_snapshot(world, NULL, 0, &size) != TS_OK) return;
+  char* bytes = malloc(size);
+  if (ts_world_snapshot(world, bytes, size - 1, &size) != TS_ERROR_SIZE) broken("a small buffer was taken");
+  if (ts_world_snapshot(world, bytes, size, &size) != TS_OK) broken("no snapshot");
+  ts_world_hash(world, &before);
+  if (ts_world_step(world, 0.01, 4) != TS_OK) broken("no step");
+  char* other = malloc(size);
+  memcpy(other, bytes, size);
+  other[below((uint32_t)size)] ^= (char)(1u << below(8));
+  if (ts_world_restore(world, other, size) == TS_OK) broken("a damaged snapshot was taken");
+  if (ts_world_restore(world, bytes, below((uint32_t)size)) == TS_OK) broken("a snapshot that is cut off was taken");
+  if (ts_world_restore(world, bytes, size) != TS_OK) broken("a snapshot was refused");
+  ts_world_hash(world, &after);
+  if (before != after) broken("a snapshot did not bring the state back");
+  free(bytes);
+  free(other);
+}
+
+int main(int count, char** arguments) {
+  if (count != 4) return 2;
+  state = strtoull(arguments[3], NULL, 10) * 2654435761u + 1;
+  if (ts_scene_load("", &scene) == TS_OK || ts_scene_load(NULL, &scene) == TS_OK) broken("no scene was loaded");
+  if (ts_scene_load(arguments[1], NULL) == TS_OK) broken("null was taken");
+  if (ts_scene_load(arguments[1], &scene) != TS_OK) broken("the scene was refused");
+  for (int i = 0; i < WORLDS; ++i) {
+    if (ts_world_create(scene, &worlds[i]) != TS_OK) broken("no world");
+  }
+  const time_t end = time(NULL) + atoi(arguments[2]);
+  uint64_t calls = 0, refused = 0;
+  while (time(NULL) < end) {
+    const int which = (int)below(WORLDS);
+    const ts_world world = any_world();
+    uint64_t before = 0, after = 0;
+    ts_clock clock = {sizeof clock, 0, 0, 0, 0, 0}, later = {sizeof later, 0, 0, 0, 0, 0};
+    const ts_result is_there = ts_world_hash(world, &before);
+    ts_world_get_clock(world, &clock);
+    const ts_result result = one_call(world);
+    ++calls;
+    if (result > 0 || result < TS_ERROR_RUNTIME) broken("no code of ours");
+    if (result == TS_ERROR_RUNTIME) broken("the runtime has failed");
+    if (result != TS_OK) {
+      ++refused;
+      if (ts_last_error()[0] == 0) broken("an error without a text");
+      if (is_there == TS_OK) {
+        ts_world_hash(world, &after);
+        ts_world_get_clock(world, &later);
+        if (before != after || clock.time != later.time) broken("a refused call has changed the world");
+      }
+    }
+    if (one_in(300)) try_snapshots(worlds[which]);
+    if (one_in(400)) {
+      const ts_world gone = worlds[which];
+      if (ts_world_destroy(gone) != TS_OK) broken("a world was not destroyed");
+      if (ts_world_destroy(gone) != TS_ERROR_HANDLE) broken("a world was destroyed twice");
+      if (ts_world_step(gone, 0.01, 1) != TS_ERROR_HANDLE) broken("a world moves that was destroyed");
+      if (ts_world_create(scene, &worlds[which]) != TS_OK) broken("no world");
+    }
+  }
+  for (int i = 0; i < WORLDS; ++i) ts_world_destroy(worlds[i]);
+  if (ts_scene_unload(scene) != TS_OK || ts_scene_unload(scene) != TS_ERROR_HANDLE) broken("unloading");
+  printf("%" PRIu64 " calls, %" PRIu64 " refused\n", calls, refused);
+  return 0;
+}
