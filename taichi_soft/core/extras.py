@@ -22,6 +22,7 @@ EXTRAS = {
         "skfem": "scikit-fem",
     },
     "cluster": {"distributed": "distributed"},
+    "panda3d": {"panda3d": "panda3d"},
     "tetgen": {"tetgen": "tetgen"},
     "ftetwild": {"pytetwild": "pytetwild"},
 }

@@ -1,0 +1,166 @@
+"""Rigid bodies of Bullet and soft bodies that push each other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from panda3d import bullet, core
+
+from engine_adapter.panda3d.node_colliders import NodeCollider, add_colliders
+from engine_adapter.panda3d.shapes import pose_of
+from taichi_soft import OptionError, World
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class BulletState:
+    """Where rigid bodies were and how they moved. Made by `BulletCoupling.snapshot`."""
+
+    rows: tuple[tuple[Any, ...], ...]
+
+
+class _Rigid:
+    """One rigid body, with the colliders of its shapes."""
+
+    def __init__(self, path: Any, colliders: tuple[NodeCollider, ...]) -> None:
+        self.path, self.colliders = path, colliders
+        self.last: Floats = np.zeros((2, 3))  # impulse [N s] and angular impulse [N m s] of the last step
+
+    @property
+    def is_pushed(self) -> bool:
+        node = self.path.node()
+        return bool(node.get_mass() > 0.0 and not node.is_kinematic())
+
+    def push(self) -> None:
+        """Give Bullet's body what soft bodies gave its colliders in the last step."""
+        now = self._impulses()
+        if self.is_pushed:
+            # Bullet feels an impulse one step late. Half of it more, taken back in the next step, is about
+            # what it will get in the coming one: without it soft and rigid bodies would gain energy.
+            linear, angular = 1.5 * now - 0.5 * self.last
+            node = self.path.node()
+            if linear.any() or angular.any():
+                node.set_active(True)  # a sleeping one would take no notice
+                node.apply_central_impulse(core.LVector3(*linear))
+                node.apply_torque_impulse(core.LVector3(*angular))
+        self.last = now
+
+    def _impulses(self) -> Floats:
+        """Sums over its colliders, about the body's own origin, (2, 3)."""
+        total = np.zeros((2, 3))
+        for each in self.colliders:
+            collider = each.collider
+            impulse = collider.impulse
+            arm = collider.position - pose_of(self.path)[0]
+            total += np.array([impulse, collider.angular_impulse + np.cross(arm, impulse)])
+        return total
+
+
+class BulletCoupling:
+    """Steps a world of Bullet together with a soft one: their bodies push each other.
+
+        coupling = BulletCoupling(world, bullet_world)
+        coupling.add(crate)
+        world.build()
+        step = FixedStep(dt=1 / 60)
+        adapter = EngineAdapter(world, step, before_step=lambda world: coupling.step(step.dt))
+
+    A rigid body has to be heavier than the soft vertices that it touches: docs/coupling.md has a table.
+
+    Args:
+        world: of soft bodies.
+        bullet_world: BulletWorld. Nothing else may step it.
+    Raises: OptionError for other things.
+    """
+
+    def __init__(self, world: World, bullet_world: Any) -> None:
+        if not isinstance(world, World):
+            raise OptionError(f"world must be a taichi_soft.World, got {type(world).__name__}")
+        if not isinstance(bullet_world, bullet.BulletWorld):
+            raise OptionError(f"bullet_world must be a BulletWorld, got {type(bullet_world).__name__}")
+        self._world, self._bullet = world, bullet_world
+        self._rigid: list[_Rigid] = []
+
+    def add(
+        self,
+        path: Any,
+        *,
+        friction: float | None = None,
+        restitution: float | None = None,
+        thickness: float = 0.0,
+    ) -> tuple[NodeCollider, ...]:
+        """Let soft bodies and a rigid body push each other. One without mass, or kinematic, only pushes.
+
+        Args:
+            path: NodePath of a BulletRigidBodyNode that is attached to the Bullet world.
+            friction, restitution, thickness: as in `add_colliders`.
+        Returns: the colliders of its shapes.
+        Raises: as `add_colliders`; OptionError for another node or one that was added before.
+        """
+        node = path.node()
+        if not isinstance(node, bullet.BulletRigidBodyNode):
+            raise OptionError(f"node {node.name!r} must be a BulletRigidBodyNode, got {type(node).__name__}")
+        if any(each.path == path for each in self._rigid):
+            raise OptionError(f"node {node.name!r} was added before")
+        colliders = add_colliders(
+            self._world, path, friction=friction, restitution=restitution, thickness=thickness
+        )
+        self._rigid.append(_Rigid(path, colliders))
+        return colliders
+
+    def remove(self, path: Any) -> None:
+        """Remove the colliders of a rigid body. Raises: OptionError for one that was not added."""
+        for each in self._rigid:
+            if each.path == path:
+                for one in each.colliders:
+                    one.collider.remove()
+                self._rigid.remove(each)
+                return
+        raise OptionError(f"node {path.get_name()!r} was not added")
+
+    def step(self, dt: float) -> None:
+        """One step of Bullet of `dt` [s], to call in `before_step`.
+
+        Rigid bodies first get what soft ones gave them in the last step. Colliders then go where Bullet took
+        their bodies.
+        """
+        for each in self._rigid:
+            each.push()
+        # No substeps: with them Bullet shows its bodies one step late, and what is pushed late gains energy.
+        self._bullet.do_physics(dt, 0)
+        for each in self._rigid:
+            for one in each.colliders:
+                one.follow()
+
+    def snapshot(self) -> BulletState:
+        """Where the rigid bodies are and how they move. Take it together with `World.snapshot`.
+
+        What Bullet remembers of its own contacts is not in it: what follows is the same to the eye, not to
+        the bit.
+        """
+        rows = []
+        for each in self._rigid:
+            node = each.path.node()
+            motion = (core.LVector3(node.get_linear_velocity()), core.LVector3(node.get_angular_velocity()))
+            rows.append((each.path, each.path.get_transform(), *motion, each.last.copy()))
+        return BulletState(tuple(rows))
+
+    def restore(self, state: BulletState) -> None:
+        """Put the rigid bodies back, after `World.restore` has put their colliders back.
+
+        Raises: OptionError where others were added or removed since, with nothing changed.
+        """
+        if [row[0] for row in state.rows] != [each.path for each in self._rigid]:
+            raise OptionError("the coupling has other rigid bodies than at its snapshot: add or remove them")
+        for each, (path, transform, linear, angular, last) in zip(self._rigid, state.rows, strict=True):
+            node = path.node()
+            path.set_transform(transform)
+            node.clear_forces()
+            node.set_linear_velocity(linear)
+            node.set_angular_velocity(angular)
+            node.set_active(True)
+            each.last = last.copy()

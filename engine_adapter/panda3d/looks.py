@@ -1,0 +1,72 @@
+"""How an artist's mesh looks in Panda3D: its texture and its colour, from trimesh's `visual`."""
+
+from __future__ import annotations
+
+import weakref
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from panda3d import core
+
+_UNSAID = np.full(3, 102 / 255)
+"""The grey that trimesh gives a material without a colour."""
+
+_textures: dict[int, tuple[weakref.ref[Any], Any]] = {}  # by material: bodies of one asset share them
+
+
+def texture_places(visual: Any, count: int) -> NDArray[np.float32] | None:
+    """Where each of `count` vertices lies on the texture, float32 (count, 2) from 0 to 1, v upwards.
+
+    None where there is no texture. trimesh and Panda3D both count v from the lowest row.
+    """
+    if getattr(visual, "kind", None) != "texture" or _picture(visual.material) is None:
+        return None
+    if visual.uv is None or len(visual.uv) != count:
+        return None
+    return np.ascontiguousarray(visual.uv, dtype=np.float32)
+
+
+def render_state(visual: Any, is_textured: bool) -> Any:
+    """Panda3D's RenderState with the texture and the colour of a mesh; an empty one where it says nothing.
+
+    What a game sets on the node stands above the colour, as above that of a loaded model with priority 1.
+    """
+    state = core.RenderState.make_empty()
+    if getattr(visual, "kind", None) != "texture":
+        return state
+    factor = getattr(visual.material, "baseColorFactor", None)
+    if factor is not None:
+        scale = 255.0 if np.asarray(factor).dtype.kind in "iu" else 1.0
+        color = np.ones(4)
+        color[: len(factor)] = np.asarray(factor, dtype=np.float64) / scale
+        if is_textured or not np.allclose(color[:3], _UNSAID):
+            state = state.set_attrib(core.ColorAttrib.make_flat(core.LColor(*color)))
+    elif is_textured:
+        state = state.set_attrib(core.ColorAttrib.make_flat(core.LColor(1, 1, 1, 1)))
+    if is_textured:
+        state = state.set_attrib(core.TextureAttrib.make(_texture(visual.material)))
+    return state
+
+
+def _picture(material: Any) -> Any:
+    """Pillow's image of a material, or None."""
+    found = getattr(material, "baseColorTexture", None)
+    return getattr(material, "image", None) if found is None else found
+
+
+def _texture(material: Any) -> Any:
+    """Its core.Texture, made once for each material that lives."""
+    kept = _textures.get(id(material))
+    if kept is not None and kept[0]() is material:
+        return kept[1]
+    pixels = np.asarray(_picture(material).convert("RGBA"), dtype=np.uint8)
+    texture = core.Texture("skin")
+    texture.setup_2d_texture(
+        pixels.shape[1], pixels.shape[0], core.Texture.T_unsigned_byte, core.Texture.F_rgba
+    )
+    texture.set_ram_image_as(pixels[::-1].tobytes(), "RGBA")  # Panda3D's first row is the lowest
+    texture.set_minfilter(core.SamplerState.FT_linear_mipmap_linear)
+    number = id(material)
+    _textures[number] = weakref.ref(material, lambda _: _textures.pop(number, None)), texture
+    return texture

@@ -1,0 +1,123 @@
+"""A hand at the end of the mouse: it takes hold of soft bodies and pulls them about."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from panda3d import core
+
+from taichi_soft import Body, Grab, OptionError, World
+
+Floats = NDArray[np.float64]
+
+_GRAZING = 1e-3
+"""Cosine to the plane's normal from which on a ray meets the plane too far away to follow it."""
+
+
+class MouseGrab:
+    """Takes hold of the body under the mouse while a button is down.
+
+    The point that was picked follows the mouse in the plane through it that faces the camera.
+
+    Args:
+        base: the game's ShowBase.
+        world: built.
+        button: event of the mouse button; None binds none, and the game calls `press`, `move` and `release`.
+        bodies: that can be taken hold of; None for all.
+        frequency, max_force: of the pull, see `World.grab`.
+        sort: of the task that follows the mouse: before that of the world's step.
+    Raises: OptionError for what is no world.
+    """
+
+    def __init__(
+        self,
+        base: Any,
+        world: World,
+        *,
+        button: str | None = "mouse1",
+        bodies: Iterable[Body] | None = None,
+        frequency: float = 5.0,
+        max_force: float | None = None,
+        sort: int = 5,
+    ) -> None:
+        if not isinstance(world, World):
+            raise OptionError(f"world must be a taichi_soft.World, got {type(world).__name__}")
+        self._base, self._world = base, world
+        self._bodies = None if bodies is None else tuple(bodies)
+        self._frequency, self._max_force = frequency, max_force
+        self._grab: Grab | None = None
+        self._plane = (np.zeros(3), np.zeros(3))  # a point and the normal
+        if button is not None:
+            base.accept(button, self._press_at_mouse)
+            base.accept(f"{button}-up", self.release)
+            base.task_mgr.add(self._follow, "soft body mouse", sort=sort)
+
+    @property
+    def grab(self) -> Grab | None:
+        """The hold it has on a body; None where it has none, or the body is gone."""
+        if self._grab is not None and not self._grab.is_held:
+            self._grab = None
+        return self._grab
+
+    def press(self, x: float, y: float) -> bool:
+        """Take hold of what is seen at a point of the window, -1 to 1 from left to right and from below.
+
+        Returns: whether there was a body.
+        Raises: as `World.grab`.
+        """
+        self.release()
+        near, far = self.ray(x, y)
+        self._grab = self._world.grab(
+            near,
+            far - near,
+            max_distance=float(np.linalg.norm(far - near)),
+            bodies=self._bodies,
+            frequency=self._frequency,
+            max_force=self._max_force,
+        )
+        if self._grab is not None:
+            forward = self._base.render.get_relative_vector(self._base.cam, core.LVector3.forward())
+            self._plane = self._grab.point, np.array(forward, dtype=np.float64)
+        return self._grab is not None
+
+    def move(self, x: float, y: float) -> None:
+        """Pull to where the ray through a point of the window meets the plane; nothing where it does not."""
+        if self.grab is None:
+            return
+        near, far = self.ray(x, y)
+        point, normal = self._plane
+        along = (far - near) / np.linalg.norm(far - near)
+        closing = float(along @ normal)
+        if abs(closing) > _GRAZING and (distance := float((point - near) @ normal) / closing) > 0.0:
+            self.grab.move(near + distance * along)
+
+    def release(self) -> None:
+        """Let go, if anything is held."""
+        if self.grab is not None:
+            self.grab.release()
+        self._grab = None
+
+    def ray(self, x: float, y: float) -> tuple[Floats, Floats]:
+        """Where the line of sight through a point of the window begins and ends, (3,) [m] each.
+
+        Raises: OptionError where the camera's lens knows no such line.
+        """
+        ends = core.LPoint3(), core.LPoint3()
+        if not self._base.camLens.extrude(core.LPoint2(x, y), *ends):
+            raise OptionError(f"the lens of the camera sees nothing at ({x}, {y})")
+        near, far = (self._base.render.get_relative_point(self._base.cam, end) for end in ends)
+        return np.array(near, dtype=np.float64), np.array(far, dtype=np.float64)
+
+    def _press_at_mouse(self) -> None:
+        watcher = self._base.mouseWatcherNode
+        if watcher.has_mouse():
+            self.press(watcher.get_mouse_x(), watcher.get_mouse_y())
+
+    def _follow(self, task: Any) -> Any:
+        watcher = self._base.mouseWatcherNode
+        if watcher is not None and watcher.has_mouse():
+            self.move(watcher.get_mouse_x(), watcher.get_mouse_y())
+        return task.cont

@@ -1,0 +1,194 @@
+"""Collision solids of Panda3D and shapes of Bullet as shapes of taichi-soft."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from panda3d import bullet, core
+
+from taichi_soft import BoxShape, CapsuleShape, OptionError, PlaneShape, Shape, SphereShape
+
+Floats = NDArray[np.float64]
+
+_ROUGHLY = 1e-3
+"""Part by which scales along the axes may differ and still count as one: a game's float32 sums do."""
+
+_WAY_OUT = "build it of those, or give the world a shape by World.add_collider"
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedShape:
+    """A shape in the coordinates of the node that carries it, without the node's scale.
+
+    Args:
+        shape: of taichi-soft, scaled.
+        position: of its origin, (3,) [m].
+        rotation: its axes as columns, (3, 3).
+    """
+
+    shape: Shape
+    position: Floats
+    rotation: Floats
+
+    def pose(self, path: Any) -> tuple[Floats, Floats]:
+        """Where it is in the world: position (3,) [m] and rotation (3, 3), with its NodePath where that is."""
+        place, turn = pose_of(path)
+        return place + turn @ self.position, turn @ self.rotation
+
+
+def shapes_of(path: Any) -> tuple[PlacedShape, ...]:
+    """Shapes of one node, a CollisionNode or a node of Bullet, in their order.
+
+    Taken are CollisionSphere, CollisionBox, CollisionCapsule and CollisionPlane, under any uniform scale, and
+    BulletSphereShape, BulletBoxShape, BulletCapsuleShape and BulletPlaneShape, unscaled.
+    Args:
+        path: NodePath to the node.
+    Raises: OptionError that names what cannot be taken: another kind of solid or node, a scale that is not
+        the same along all axes, a shear, or a scaled node of Bullet.
+    """
+    node = path.node()
+    if isinstance(node, core.CollisionNode):
+        scale = _scale(path)
+        return tuple(_of_solid(solid, scale, node) for solid in node.get_solids())
+    if isinstance(node, bullet.BulletBodyNode):
+        if abs(_scale(path) - 1.0) > _ROUGHLY:
+            raise OptionError(f"node {node.name!r} of Bullet is scaled: scale its shapes in its place")
+        return tuple(_of_bullet(node, number) for number in range(node.get_num_shapes()))
+    raise OptionError(
+        f"node {node.name!r} must be a CollisionNode or a node of Bullet, got {type(node).__name__}"
+    )
+
+
+def pose_of(path: Any) -> tuple[Floats, Floats]:
+    """Position (3,) [m] and rotation (3, 3) of a node in the coordinates of the top of its scene graph."""
+    transform = path.get_net_transform()
+    return np.array(transform.get_pos(), dtype=np.float64), _matrix(transform.get_norm_quat())
+
+
+def _matrix(quaternion: Any) -> Floats:
+    """Axes as columns, (3, 3). Panda3D multiplies rows by matrices."""
+    rows = core.LMatrix3()
+    quaternion.extract_to_matrix(rows)
+    turn: Floats = np.array([list(row) for row in rows.rows], dtype=np.float64).T
+    return turn
+
+
+def _scale(path: Any) -> float:
+    """The node's uniform scale. Raises: OptionError for any other."""
+    transform = path.get_net_transform()
+    scale = np.array(transform.get_scale(), dtype=np.float64)
+    spread = float(np.ptp(scale))
+    shear = float(np.abs(np.array(transform.get_shear())).max())
+    if scale.min() <= 0.0 or max(spread, shear) > _ROUGHLY * scale.max():
+        raise OptionError(
+            f"node {path.node().name!r} must have one scale above 0 along all axes and no shear, got scale "
+            f"{scale.tolist()} and shear {list(transform.get_shear())}"
+        )
+    return float(scale.mean())
+
+
+def _of_solid(solid: Any, scale: float, node: Any) -> PlacedShape:
+    make = _SOLIDS.get(type(solid))
+    if make is None:
+        raise _refused(solid, node, _SOLIDS)
+    return make(solid, scale)
+
+
+def _of_bullet(node: Any, number: int) -> PlacedShape:
+    shape, place = node.get_shape(number), node.get_shape_transform(number)
+    make = _BULLET.get(type(shape))
+    if make is None:
+        raise _refused(shape, node, _BULLET)
+    made = make(shape)
+    turn = _matrix(place.get_norm_quat())
+    position = np.array(place.get_pos(), dtype=np.float64) + turn @ made.position
+    return PlacedShape(made.shape, position, turn @ made.rotation)
+
+
+def _refused(shape: Any, node: Any, known: dict[Any, Any]) -> OptionError:
+    kinds = ", ".join(kind.__name__ for kind in known)
+    return OptionError(f"{type(shape).__name__} of node {node.name!r} is none of {kinds}: {_WAY_OUT}")
+
+
+def _at(shape: Shape, position: Any, rotation: Floats | None = None) -> PlacedShape:
+    return PlacedShape(
+        shape, np.array(position, dtype=np.float64), np.eye(3) if rotation is None else rotation
+    )
+
+
+def _onto(axis: Floats) -> Floats:
+    """A rotation (3, 3) that turns z onto a direction (3,) of length 1."""
+    across = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
+    across /= np.linalg.norm(across)
+    turn: Floats = np.array([across, np.cross(axis, across), axis]).T
+    return turn
+
+
+def _sphere(solid: Any, scale: float) -> PlacedShape:
+    return _at(SphereShape(scale * solid.get_radius()), scale * np.array(solid.get_center()))
+
+
+def _box(solid: Any, scale: float) -> PlacedShape:
+    lower, upper = np.array(solid.get_min(), dtype=np.float64), np.array(solid.get_max(), dtype=np.float64)
+    return _at(BoxShape(scale * (upper - lower)), scale * (lower + upper) / 2)
+
+
+def _capsule(solid: Any, scale: float) -> PlacedShape:
+    ends = np.array([list(solid.get_point_a()), list(solid.get_point_b())], dtype=np.float64)
+    way = ends[1] - ends[0]
+    length = float(np.linalg.norm(way))
+    rotation = _onto(way / length) if length > 0.0 else None
+    shape = CapsuleShape(scale * solid.get_radius(), scale * length)
+    return _at(shape, scale * ends.mean(axis=0), rotation)
+
+
+def _plane(solid: Any, scale: float) -> PlacedShape:
+    normal = np.array(solid.get_plane().get_normal(), dtype=np.float64)
+    length = float(np.linalg.norm(normal))
+    offset = solid.get_plane()[3] / length  # of n x + offset = 0
+    return _at(PlaneShape(normal), -scale * offset * normal / length)
+
+
+def _bullet_sphere(shape: Any) -> PlacedShape:
+    return _at(SphereShape(shape.get_radius()), (0, 0, 0))
+
+
+def _bullet_box(shape: Any) -> PlacedShape:
+    return _at(BoxShape(2 * np.array(shape.get_half_extents_with_margin(), dtype=np.float64)), (0, 0, 0))
+
+
+def _bullet_capsule(shape: Any) -> PlacedShape:
+    """Panda3D does not tell along which axis it lies: it turns most easily about that one."""
+    probe = bullet.BulletRigidBodyNode()
+    probe.add_shape(shape)
+    probe.set_mass(1.0)
+    axis = np.eye(3)[int(np.argmin(list(probe.get_inertia())))]
+    length = 2 * shape.get_half_height()
+    return _at(CapsuleShape(shape.get_radius(), length), (0, 0, 0), _onto(axis))
+
+
+def _bullet_plane(shape: Any) -> PlacedShape:
+    normal = np.array(shape.get_plane_normal(), dtype=np.float64)
+    normal /= math.sqrt(float(normal @ normal))
+    return _at(PlaneShape(normal), shape.get_plane_constant() * normal)
+
+
+_SOLIDS: dict[Any, Callable[[Any, float], PlacedShape]] = {
+    core.CollisionSphere: _sphere,
+    core.CollisionBox: _box,
+    core.CollisionCapsule: _capsule,
+    core.CollisionPlane: _plane,
+}
+"""By the very class: CollisionPolygon is a CollisionPlane to Python, and hollow things are spheres."""
+
+_BULLET: dict[Any, Callable[[Any], PlacedShape]] = {
+    bullet.BulletSphereShape: _bullet_sphere,
+    bullet.BulletBoxShape: _bullet_box,
+    bullet.BulletCapsuleShape: _bullet_capsule,
+    bullet.BulletPlaneShape: _bullet_plane,
+}

@@ -1,0 +1,120 @@
+"""A node of the scene graph that draws one soft body."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from panda3d import core
+
+from engine_adapter.adapter import EngineAdapter
+from engine_adapter.panda3d.looks import render_state, texture_places
+from taichi_soft import Body, OptionError, RenderMesh
+
+_POSITIONS, _NORMALS, _PLACES = range(3)
+"""Arrays of a vertex buffer. One for each column: a kernel fills the first two where they lie."""
+
+
+class SoftBodyNode(core.NodePath):  # type: ignore[misc]
+    """A NodePath to a GeomNode that draws one body, in the coordinates of its parent.
+
+        node = SoftBodyNode(adapter, body)
+        node.reparent_to(base.render)
+        ...  # each frame, after adapter.advance; or let a SoftBodyTask do it
+        node.draw()
+
+    A body with skins is drawn as the artist's meshes, with their textures and texture coordinates; any other
+    one as its surface. The kernel writes positions and normals into Panda3D's own vertex buffers. A body that
+    was cut, torn, restored or given another level of detail gets new buffers by itself. One that was removed
+    is not drawn, and drawn again if `World.restore` brings it back.
+
+    Args:
+        adapter: that steps the body's world.
+        body: of that world.
+        crease: angle beyond which an edge of a surface is sharp [degrees], see `Body.render_mesh`. Skins have
+            their artist's normals.
+    Raises: OptionError for what is no adapter and no body, and as `Body.render_mesh`.
+    """
+
+    def __init__(self, adapter: EngineAdapter, body: Body, *, crease: float | None = 60.0) -> None:
+        if not isinstance(adapter, EngineAdapter):
+            raise OptionError(f"adapter must be an EngineAdapter, got {type(adapter).__name__}")
+        if not isinstance(body, Body):
+            raise OptionError(f"body must be a taichi_soft.Body, got {type(body).__name__}")
+        super().__init__(core.GeomNode(f"soft body {body.index}"))
+        self._adapter, self._body, self._crease = adapter, body, crease
+        self._meshes: tuple[RenderMesh, ...] = ()
+        self._make()
+        self.draw()
+
+    @property
+    def body(self) -> Body:
+        """Which it draws."""
+        return self._body
+
+    @property
+    def meshes(self) -> tuple[RenderMesh, ...]:
+        """What it draws of the body now, in the order of its Geoms; none where the body was removed."""
+        return self._meshes
+
+    def draw(self) -> None:
+        """Bring the buffers up to date: positions between the last two steps, as `EngineAdapter.alpha` says.
+
+        Raises: as `EngineAdapter.render_mesh`.
+        """
+        if not self._body.is_alive:
+            self._meshes = ()
+            self.node().remove_all_geoms()
+            return
+        if not self._meshes or any(mesh.is_outdated for mesh in self._meshes):
+            self._make()
+        for number, mesh in enumerate(self._meshes):
+            # By way of the node each time: so Panda3D notes that the bounds to cull by are others.
+            data = self.node().modify_geom(number).modify_vertex_data()
+            self._adapter.render_mesh(mesh, rows_in(data, _POSITIONS, 3), rows_in(data, _NORMALS, 3))
+
+    def _make(self) -> None:
+        """Buffers for the body as it is now."""
+        skins: tuple[RenderMesh, ...] = self._body.render_meshes
+        self._meshes = skins or (self._body.render_mesh(crease=self._crease),)
+        self.node().remove_all_geoms()
+        for mesh in self._meshes:
+            visual = getattr(mesh, "visual", None)
+            places = texture_places(visual, mesh.vertex_count)
+            self.node().add_geom(_geom(mesh, places), render_state(visual, places is not None))
+
+
+def rows_in(data: Any, array: int, width: int) -> NDArray[np.float32]:
+    """An array of a GeomVertexData as NumPy sees it where it lies, float32 (n, width). Keep it for no longer
+    than it takes to write: Panda3D may move the array between frames."""
+    view = memoryview(data.modify_array(array)).cast("B")
+    return np.frombuffer(view, dtype=np.float32).reshape(-1, width)
+
+
+def _geom(mesh: RenderMesh, places: NDArray[np.float32] | None) -> Any:
+    """Buffers for a mesh, with its triangles and its places on a texture (k, 2)."""
+    data = core.GeomVertexData("soft body", _vertex_format(places is not None), core.Geom.UH_dynamic)
+    data.set_num_rows(mesh.vertex_count)
+    if places is not None:
+        rows_in(data, _PLACES, 2)[:] = places
+    triangles = core.GeomTriangles(core.Geom.UH_static)
+    triangles.set_index_type(core.Geom.NT_uint32)
+    corners = triangles.modify_vertices()
+    corners.unclean_set_num_rows(mesh.triangles.size)
+    np.frombuffer(memoryview(corners).cast("B"), dtype=np.uint32)[:] = mesh.triangles.ravel()
+    geom = core.Geom(data)
+    geom.add_primitive(triangles)
+    return geom
+
+
+def _vertex_format(is_textured: bool) -> Any:
+    columns = [
+        (core.InternalName.get_vertex(), 3, core.Geom.C_point),
+        (core.InternalName.get_normal(), 3, core.Geom.C_normal),
+        (core.InternalName.get_texcoord(), 2, core.Geom.C_texcoord),
+    ]
+    form = core.GeomVertexFormat()
+    for name, width, contents in columns[: 3 if is_textured else 2]:
+        form.add_array(core.GeomVertexArrayFormat(name, width, core.Geom.NT_float32, contents))
+    return core.GeomVertexFormat.register_format(form)
