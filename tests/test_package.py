@@ -91,6 +91,22 @@ def test_a_missing_package_is_one_line_with_the_way_to_get_it(monkeypatch, capsy
     )
 
 
+def test_an_adapter_of_an_engine_that_is_not_installed_names_its_extra():
+    code = """
+import sys
+sys.modules["panda3d"] = None
+try:
+    import engine_adapter.panda3d
+except ImportError as error:
+    print(type(error).__name__, error)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.stdout.splitlines()[-1] == (
+        "MissingExtraError engine_adapter.panda3d needs panda3d, not installed here: "
+        "run pip install 'taichi-soft[panda3d]'"
+    ), done.stderr
+
+
 def test_the_changelog_begins_with_this_version():
     heading = re.search(r"^## (\S+)", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.MULTILINE)
     assert heading.group(1) == version("taichi-soft").partition(".dev")[0]

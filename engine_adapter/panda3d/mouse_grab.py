@@ -113,7 +113,7 @@ class MouseGrab:
 
     def _press_at_mouse(self) -> None:
         watcher = self._base.mouseWatcherNode
-        if watcher.has_mouse():
+        if watcher is not None and watcher.has_mouse():
             self.press(watcher.get_mouse_x(), watcher.get_mouse_y())
 
     def _follow(self, task: Any) -> Any:

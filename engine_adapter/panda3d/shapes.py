@@ -36,7 +36,7 @@ class PlacedShape:
     rotation: Floats
 
     def pose(self, path: Any) -> tuple[Floats, Floats]:
-        """Where it is in the world: position (3,) [m] and rotation (3, 3), with its NodePath where that is."""
+        """Position (3,) [m] and rotation (3, 3) in the world, with its node where its NodePath is."""
         place, turn = pose_of(path)
         return place + turn @ self.position, turn @ self.rotation
 
