@@ -62,6 +62,7 @@ SECONDS = {
     "solver/": (50, 1275),
     "elements/": (75, 130),
     "fracture/": (19, 90),
+    "engine_adapter/test_panda3d": (20, 0),
     "engine_adapter/": (7, 0),
     "render/": (20, 0),
     "bake/test_formats": (1, 0),
@@ -166,6 +167,8 @@ NEEDS = {
     "lab/experiments/": "report",
     "lab/report/": "report",
     "lab/sweep/test_cluster": "cluster",
+    "docs/test_pages.py::test_the_code_of_a_page_runs_from_top_to_bottom[panda3d": "panda3d",
+    "docs/test_pages.py::test_code_of_a_page_imports_public_names_only[panda3d": "panda3d",
 }
 """Extras that tests need beyond those of the extra `test`, by the beginnings of files."""
 

@@ -9,7 +9,7 @@ import pytest
 
 from taichi_soft.core.package_data import DEMOS
 
-pytest.importorskip("panda3d", reason="needs panda3d: pip install panda3d")
+pytest.importorskip("panda3d", reason="needs panda3d: pip install 'taichi-soft[panda3d]'")
 
 
 def test_crates_lie_on_the_block_that_they_dent(tmp_path):

@@ -1,6 +1,8 @@
 """Panda3D, off screen: what is drawn, what drives it, and who pushes whom."""
 
+import re
 from itertools import combinations
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,6 +15,7 @@ from direct.showbase.ShowBase import ShowBase
 from panda3d import bullet, core
 from PIL import Image
 
+import engine_adapter.panda3d
 from engine_adapter import EngineAdapter, FixedStep
 from engine_adapter.panda3d import (
     BulletCoupling,
@@ -123,6 +126,14 @@ def bullet_world(gravity=WEIGHT):
     rigid = bullet.BulletWorld()
     rigid.set_gravity(core.LVector3(0, 0, -gravity))
     return rigid
+
+
+def test_every_public_name_is_on_the_page_of_the_reference_once():
+    page = Path(__file__).parents[2] / "docs" / "reference" / "panda3d.md"
+    listed = re.findall(
+        r"^::: engine_adapter\.panda3d\.(\w+)$", page.read_text(encoding="utf-8"), re.MULTILINE
+    )
+    assert sorted(listed) == sorted(engine_adapter.panda3d.__all__)
 
 
 # What is drawn.

@@ -1,0 +1,73 @@
+"""The game in Panda3D plays by itself, off screen: what its pictures show."""
+
+import subprocess
+import sys
+
+import cv2
+import numpy as np
+import pytest
+
+from taichi_soft.core.package_data import DEMOS
+
+pytest.importorskip("panda3d", reason="needs panda3d: pip install 'taichi-soft[panda3d]'")
+
+
+def picture(path):
+    """Red, green and blue, each int (height, width)."""
+    return np.moveaxis(cv2.imread(str(path)).astype(int)[:, :, ::-1], 2, 0)
+
+
+def is_platform(red, green, blue):
+    return (blue > 1.7 * red) & (blue > 1.5 * green) & (blue > 100)
+
+
+def is_block(red, green, blue):
+    return (red > 140) & (red > 3 * green) & (red > 3 * blue)
+
+
+def is_crate(red, green, blue):
+    return (red > 1.3 * green) & (green > 1.3 * blue) & (red < 200) & ~is_block(red, green, blue)
+
+
+def is_level(red, green, blue):
+    """Ground, sky and platform: what is left in the half of the toys are toys."""
+    ground = (abs(red - 113) < 8) & (abs(green - 138) < 8) & (abs(blue - 113) < 8)
+    sky = (abs(red - 204) < 3) & (abs(green - 217) < 3) & (abs(blue - 230) < 3)
+    return ground | sky | is_platform(red, green, blue)
+
+
+def test_toys_ride_and_are_lifted_crates_lie_on_the_block_and_debug_lines_show(tmp_path):
+    paths = [tmp_path / f"{number}.png" for number in range(3)]
+    command = [sys.executable, str(DEMOS / "panda3d_game.py"), "--headless", *map(str, paths)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=500)
+    assert done.returncode == 0, done.stderr
+    first, lifted, lined = map(picture, paths)
+    for one, other in ((first, lifted), (lifted, lined)):
+        assert (abs(one - other).max(axis=0) > 20).mean() > 0.01  # pixels moved
+    middles = [np.nonzero(is_platform(*each))[1].mean() for each in (first, lined)]
+    assert abs(middles[1] - middles[0]) > 15  # so did the platform
+
+    tops = []
+    for each in (first, lifted):
+        is_toy = ~is_level(*each)[:550, :420]  # above the line with the keys, left of the block
+        assert 0.01 < is_toy.mean() < 0.1
+        tops.append(np.nonzero(is_toy)[0].min())
+    assert tops[1] < tops[0] - 60
+    red, green, blue = lifted
+    pink = (red > 120) & (red > green + 20) & (abs(green - blue) < 40)
+    assert pink[:400, :420].sum() > 100  # ears and soles, from the texture of the one in hand
+    on_platform = np.nonzero(is_platform(*first))[0].min()
+    assert tops[0] < on_platform
+
+    for each in (first, lifted):
+        block, crates = np.nonzero(is_block(*each)), np.nonzero(is_crate(*each))
+        assert 0.06 < len(block[0]) / each[0].size < 0.2
+        assert 0.03 < len(crates[0]) / each[0].size < 0.15
+        assert block[1].min() < crates[1].min()
+        assert crates[1].max() < block[1].max()
+        assert crates[0].max() < block[0].max() - 60  # they lie on it
+        assert crates[0].max() > block[0].min() + 20  # and do not float
+
+    white = [(each.min(axis=0) > 250).sum() for each in (first, lifted, lined)]
+    assert max(white[:2]) < 50
+    assert white[2] > 2000
