@@ -354,7 +354,7 @@ def test_a_rigid_crate_lies_on_a_soft_block_sinks_in_and_presses_with_its_weight
     weight = MASS * WEIGHT * DT
     np.testing.assert_allclose(np.mean(presses[-120:], axis=0), (0, 0, weight), atol=0.03 * weight)
     assert 0.5 - 0.08 < crate.get_z() - EDGE / 2 < 0.5 - 0.01
-    assert np.abs(list(crate.get_hpr())[1:]).max() < 2.0  # degrees
+    assert np.abs(list(crate.get_hpr())[1:]).max() < 5.0  # degrees
     coupling.remove(crate)
     assert not any(each.collider.is_alive for each in colliders)
 
@@ -409,6 +409,23 @@ def test_weight_times_time_is_what_crate_and_block_and_floor_exchange(base, play
     weight = (block.masses.sum() + MASS) * WEIGHT * steps * DT
     assert weight > 1e4
     assert grown == pytest.approx(floor - weight, abs=1.6 * MASS * WEIGHT * DT)
+
+
+def test_a_rigid_body_gets_half_of_an_impulse_in_advance_and_gives_it_back_a_step_later(base, play):
+    """As docs/coupling.md says; in sum it gets what the soft body gave."""
+    rigid = bullet_world()
+    crate = make_crate(base, rigid, (0.02, 0, 0.5 + EDGE / 2 + 0.05))
+    coupling = BulletCoupling(play, rigid)
+    (one,) = coupling.add(crate)
+    speeds, impulses = [0.0], [0.0]
+    for _ in range(40):
+        coupling.step(DT)
+        play.step(DT)
+        speeds.append(crate.node().get_linear_velocity()[2])
+        impulses.append(one.collider.impulse[2])
+    given = 1.5 * np.array(impulses[1:-1]) - 0.5 * np.array(impulses[:-2])
+    assert np.ptp(given) > MASS * WEIGHT * DT
+    np.testing.assert_allclose(np.diff(speeds)[1:], given / MASS - WEIGHT * DT, atol=1e-5)
 
 
 def test_what_was_put_back_with_the_world_moves_on_as_before(base, play):
