@@ -27,25 +27,31 @@ def texture_places(visual: Any, count: int) -> NDArray[np.float32] | None:
     return np.ascontiguousarray(visual.uv, dtype=np.float32)
 
 
-def render_state(visual: Any, is_textured: bool) -> Any:
-    """Panda3D's RenderState with the texture and the colour of a mesh; an empty one where it says nothing.
+def vertex_colors(visual: Any, count: int) -> NDArray[np.float32] | None:
+    """Colour of each of `count` vertices, float32 (count, 4) from 0 to 1; None where the mesh has none."""
+    if getattr(visual, "kind", None) not in ("vertex", "face") or len(visual.vertex_colors) != count:
+        return None
+    return np.asarray(np.asarray(visual.vertex_colors) / 255.0, dtype=np.float32)
 
-    What a game sets on the node stands above the colour, as above that of a loaded model with priority 1.
+
+def render_state(visual: Any, is_textured: bool) -> Any:
+    """Panda3D's RenderState with the texture and the colour of a material, empty where there is neither.
+
+    A game that wants another colour gives it a priority: `node.set_color(red, 1)`.
     """
     state = core.RenderState.make_empty()
     if getattr(visual, "kind", None) != "texture":
         return state
     factor = getattr(visual.material, "baseColorFactor", None)
+    if is_textured:
+        state = state.set_attrib(core.TextureAttrib.make(_texture(visual.material)))
+        state = state.set_attrib(core.ColorAttrib.make_flat(core.LColor(1, 1, 1, 1)))
     if factor is not None:
         scale = 255.0 if np.asarray(factor).dtype.kind in "iu" else 1.0
         color = np.ones(4)
         color[: len(factor)] = np.asarray(factor, dtype=np.float64) / scale
         if is_textured or not np.allclose(color[:3], _UNSAID):
             state = state.set_attrib(core.ColorAttrib.make_flat(core.LColor(*color)))
-    elif is_textured:
-        state = state.set_attrib(core.ColorAttrib.make_flat(core.LColor(1, 1, 1, 1)))
-    if is_textured:
-        state = state.set_attrib(core.TextureAttrib.make(_texture(visual.material)))
     return state
 
 

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from panda3d import core
 
 from engine_adapter.adapter import EngineAdapter
-from engine_adapter.panda3d.looks import render_state, texture_places
+from engine_adapter.panda3d.looks import render_state, texture_places, vertex_colors
 from taichi_soft import Body, OptionError, RenderMesh
 
-_POSITIONS, _NORMALS, _PLACES = range(3)
+_POSITIONS, _NORMALS, _LOOK = range(3)
 """Arrays of a vertex buffer. One for each column: a kernel fills the first two where they lie."""
 
 
@@ -84,7 +84,9 @@ class SoftBodyNode(core.NodePath):  # type: ignore[misc]
         for mesh in self._meshes:
             visual = getattr(mesh, "visual", None)
             places = texture_places(visual, mesh.vertex_count)
-            self.node().add_geom(_geom(mesh, places), render_state(visual, places is not None))
+            colors = vertex_colors(visual, mesh.vertex_count)
+            look = colors if places is None else places
+            self.node().add_geom(_geom(mesh, look), render_state(visual, places is not None))
 
 
 def rows_in(data: Any, array: int, width: int) -> NDArray[np.float32]:
@@ -103,12 +105,13 @@ def _box_round(positions: NDArray[np.float32]) -> Any:
     return core.BoundingBox(*corners)
 
 
-def _geom(mesh: RenderMesh, places: NDArray[np.float32] | None) -> Any:
-    """Buffers for a mesh, with its triangles and its places on a texture (k, 2)."""
-    data = core.GeomVertexData("soft body", _vertex_format(places is not None), core.Geom.UH_dynamic)
+def _geom(mesh: RenderMesh, look: NDArray[np.float32] | None) -> Any:
+    """Buffers for a mesh, with its triangles, and places on a texture (k, 2) or colours (k, 4)."""
+    width = 0 if look is None else look.shape[1]
+    data = core.GeomVertexData("soft body", _vertex_format(width), core.Geom.UH_dynamic)
     data.set_num_rows(mesh.vertex_count)
-    if places is not None:
-        rows_in(data, _PLACES, 2)[:] = places
+    if look is not None:
+        rows_in(data, _LOOK, width)[:] = look
     triangles = core.GeomTriangles(core.Geom.UH_static)
     triangles.set_index_type(core.Geom.NT_uint32)
     corners = triangles.modify_vertices()
@@ -119,13 +122,17 @@ def _geom(mesh: RenderMesh, places: NDArray[np.float32] | None) -> Any:
     return geom
 
 
-def _vertex_format(is_textured: bool) -> Any:
+def _vertex_format(look: int) -> Any:
+    """Positions, normals, and what `look` numbers tell: 2 a place on a texture, 4 a colour, 0 nothing."""
     columns = [
         (core.InternalName.get_vertex(), 3, core.Geom.C_point),
         (core.InternalName.get_normal(), 3, core.Geom.C_normal),
-        (core.InternalName.get_texcoord(), 2, core.Geom.C_texcoord),
     ]
+    if look == 2:
+        columns.append((core.InternalName.get_texcoord(), 2, core.Geom.C_texcoord))
+    elif look == 4:
+        columns.append((core.InternalName.get_color(), 4, core.Geom.C_color))
     form = core.GeomVertexFormat()
-    for name, width, contents in columns[: 3 if is_textured else 2]:
+    for name, width, contents in columns:
         form.add_array(core.GeomVertexArrayFormat(name, width, core.Geom.NT_float32, contents))
     return core.GeomVertexFormat.register_format(form)

@@ -110,6 +110,13 @@ def column(node, geom, array, width):
     return np.frombuffer(memoryview(data).tobytes(), np.float32).reshape(-1, width)
 
 
+def on_screen(base, point):
+    """Where a point of the world is in the window, from -1 to 1."""
+    spot = core.LPoint2()
+    assert base.camLens.project(base.cam.get_relative_point(base.render, core.LPoint3(*point)), spot)
+    return spot.x, spot.y
+
+
 def make_crate(base, rigid, position, *shapes):
     """A rigid body of MASS of Bullet: a cube of EDGE, or what is given as (half edges, place)."""
     crate = base.render.attach_new_node(bullet.BulletRigidBodyNode("crate"))
@@ -232,6 +239,33 @@ def test_the_texture_lies_where_trimesh_has_it(base, play):
             np.testing.assert_allclose(pixels[row, line], expected, atol=12)
             seen += 1
     assert seen >= 12
+
+
+def test_a_mesh_with_colours_of_its_own_is_drawn_in_them(base):
+    """Of its vertices, or of its material; a colour of the node with a priority stands above."""
+    jelly = Material(young=6e4, poisson=0.3, density=1000)
+    one, other = trimesh.creation.box((0.6, 0.6, 0.6)), trimesh.creation.box((0.6, 0.6, 0.6))
+    one.visual.vertex_colors = (250, 100, 0, 255)
+    plain = trimesh.visual.material.PBRMaterial(baseColorFactor=(0, 100, 50, 255))
+    other.visual = trimesh.visual.TextureVisuals(material=plain)
+    world = World(floor=None)
+    for x, mesh in ((-1, one), (1, other)):
+        world.add_body(SoftBodyAsset.from_surface(mesh, jelly, cells=3), position=(x, 0, 0))
+    world.build()
+    nodes = [SoftBodyNode(EngineAdapter(world), body) for body in world.bodies]
+    for node in nodes:
+        node.reparent_to(base.render)
+    base.camera.set_pos(0, -5, 0)
+    base.camera.look_at(0, 0, 0)
+    base.render.clear_light()
+    pixels = picture(base)
+    left, right = (round((on_screen(base, (x, -0.3, 0))[0] + 1) * 160) for x in (-1, 1))
+    np.testing.assert_allclose(pixels[120, left], (250, 100, 0), atol=3)
+    np.testing.assert_allclose(pixels[120, right], (0, 100, 50), atol=3)
+    nodes[1].set_color(1, 0, 0, 1, 1)
+    np.testing.assert_allclose(picture(base)[120, right], (255, 0, 0), atol=3)
+    for node in nodes:
+        node.remove_node()
 
 
 def test_a_cut_body_gets_buffers_for_its_new_vertices(play):
@@ -454,6 +488,24 @@ def test_what_was_put_back_with_the_world_moves_on_as_before(base, play):
         coupling.restore(kept[1])
 
 
+def test_the_same_game_comes_out_the_same_to_the_bit(base, play):
+    ends = []
+    for _ in range(2):
+        play.restore(play.at_rest)
+        rigid = bullet_world()
+        crate = make_crate(base, rigid, (0.1, 0, 0.5 + EDGE / 2 + 0.1))
+        coupling = BulletCoupling(play, rigid)
+        (one,) = coupling.add(crate)
+        adapter = EngineAdapter(play, FixedStep(dt=DT), before_step=lambda _, c=coupling: c.step(DT))
+        for frame_dt in (0.5 * DT, 2.7 * DT, DT) * 10:
+            adapter.advance(frame_dt)
+        assert abs(one.collider.impulse[2]) > 0.0
+        ends.append([row.tobytes() for body in play.bodies for row in (body.positions(), body.velocities())])
+        coupling.remove(crate)
+        crate.remove_node()
+    assert ends[0] == ends[1]
+
+
 def test_what_pushes_only_is_not_pushed(base, play):
     """A body of Bullet without mass, and one that its game moves."""
     rigid = bullet_world()
@@ -487,13 +539,6 @@ def test_a_node_is_coupled_once_and_only_rigid_bodies_are(base, play):
 
 
 # The mouse.
-
-
-def on_screen(base, point):
-    """Where a point of the world is in the window, from -1 to 1."""
-    spot = core.LPoint2()
-    assert base.camLens.project(base.cam.get_relative_point(base.render, core.LPoint3(*point)), spot)
-    return spot.x, spot.y
 
 
 def test_a_body_in_hand_follows_the_line_of_sight_through_the_mouse(base, play):
