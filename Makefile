@@ -2,7 +2,7 @@
 # make test: set everything up, run the tests that take minutes; make test-all: those that take an hour, too
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-fast test-all test-bounds lint profile docs clean
+.PHONY: help setup demo test test-fast test-all test-bounds native test-native lint profile docs clean
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -13,6 +13,8 @@ help:
 	@echo "make test-fast  set up, run tests without worlds: for the inner loop"
 	@echo "make test-all set up with every extra, run every test: an hour"
 	@echo "make test-bounds  set up, run kernels with every index checked: takes minutes"
+	@echo "make native   set up, build the library for engines without Python and its sample, into out/native"
+	@echo "make test-native  set up, build it, play games in it and in Python"
 	@echo "make profile  set up, measure what a frame costs here"
 	@echo "make docs     set up, build the documentation into out/docs"
 	@echo "make lint     set up with every extra, check style and types"
@@ -40,6 +42,17 @@ test-all: $(VENV)/.dev
 
 test-bounds: $(VENV)/.test
 	@TAICHI_SOFT_DEBUG=1 $(BIN)/python -m pytest tests/bounds
+
+native: $(VENV)/.demo
+	@for tool in cmake g++; do command -v $$tool > /dev/null || { echo "make native needs $$tool: install it first"; exit 1; }; done
+	@mkdir -p out
+	@cmake -S engine_adapter/native -B out/native -DTAICHI_DIR="$$($(BIN)/python -c 'import importlib.util as u; print(u.find_spec("taichi").submodule_search_locations[0])')" > out/native.log || { cat out/native.log; exit 1; }
+	@cmake --build out/native
+	@$(BIN)/taichi-soft export engine_adapter/native/sample/game.py --out out/game.softworld
+	@echo "try it: out/native/game out/game.softworld"
+
+test-native: $(VENV)/.test
+	@$(BIN)/python -m pytest tests/native
 
 profile: $(VENV)/.demo
 	@$(BIN)/taichi-soft profile

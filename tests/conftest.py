@@ -67,6 +67,7 @@ SECONDS = {
     "render/": (20, 0),
     "bake/test_formats": (1, 0),
     "bake/": (20, 20),
+    "native/": (0, 330),
     "test_readme": (1, 10),
     "test_package": (5, 60),
     "": (21, 0),
@@ -78,7 +79,7 @@ NUMPY = ("meshing/", "cages/", "elements/materials/", "bake/test_formats", "test
 KERNEL = ("elements/", "contact/distances/", "contact/shapes/", "core/math/")
 WORLD = ("elements/laws/test_energy_laws", "cages/test_thin.py::test_a_table_on")
 SOAK = (
-    *("lab/", "demos/", "cli/"),
+    *("lab/", "demos/", "cli/", "native/"),
     "feel/test_material_from_feel.py::test_random_wishes",
     "feel/test_material_from_feel.py::test_what_cannot",
     *(

@@ -1,6 +1,5 @@
 """The native library, built once for all tests."""
 
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -8,23 +7,9 @@ from pathlib import Path
 import pytest
 
 HERE = Path(__file__).parent
-ROOT = HERE.parents[1]
 sys.path.insert(0, str(HERE))  # what the tests of this folder share
 
-
-def build(folder, *options):
-    """Build the library and the programs of its tests. Returns: the folder."""
-    missing = [tool for tool in ("cmake", "g++") if shutil.which(tool) is None]
-    if missing:
-        pytest.skip(f"needs {' and '.join(missing)}, to build the native library")
-    import taichi
-
-    source = ROOT / "engine_adapter" / "native"
-    settings = [f"-DTAICHI_DIR={taichi.__path__[0]}", "-DTAICHI_SOFT_TESTS=ON", *options]
-    for command in (["-S", str(source), "-B", str(folder), *settings], ["--build", str(folder), "-j2"]):
-        done = subprocess.run(["cmake", *command], capture_output=True, text=True)
-        assert done.returncode == 0, done.stdout + done.stderr
-    return folder
+from native_build import build  # noqa: E402
 
 
 @pytest.fixture(scope="session")

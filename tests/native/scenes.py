@@ -19,6 +19,7 @@ from taichi_soft import (
     cloth_constants,
     sphere,
 )
+from taichi_soft.core.package_data import ASSETS
 
 DT = 1 / 64
 STEPS = 600
@@ -206,7 +207,28 @@ def laws_game():
         yield line("step", DT, 0)
 
 
+def toys():
+    """An artist's textured mesh on cages, which a kernel draws in every frame."""
+    world = World(soft_contact=True)
+    cloth_of_toys = Material(young=3e4, poisson=0.4, density=200, damping_ratio=0.08)
+    toy = SoftBodyAsset.from_surface(ASSETS / "elephant.glb", cloth_of_toys, cells=5, up="y")
+    world.reserve(toy, 3)
+    world.spawn(toy, position=(0.0, 0.0, 0.4), angular_velocity=(1.0, 0.0, 0.0))
+    world.build()
+    return world
+
+
+def toys_game():
+    for i in range(STEPS):
+        if i in (60, 120):
+            yield line("spawn", 0, (0.02, 0.0, 1.2), turn((0, 0, 1), i), (0.0, 0.0, 0.0), (0.0, 2.0, 0.0))
+        yield line("step", DT, 0)
+        if i % 100 == 0:
+            yield line("mesh", 0, 0)
+
+
 GAMES = {
+    "toys": (toys, toys_game),
     "heap": (heap, heap_game),
     "free": (free, free_game),
     "drape": (drape, drape_game),

@@ -7,8 +7,8 @@ import subprocess
 
 import numpy as np
 import pytest
-from conftest import build
 from library import FILE, HANDLE, VERSION, in_process
+from native_build import build
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,218 @@
+// taichi_soft.h for C++17: handles that end by themselves, and errors as exceptions. All of it is here.
+//
+//     auto scene = taichi_soft::Scene("game.softworld");
+//     auto world = scene.create();
+//     world.advance(1.0 / 60.0);
+//     world.mesh(body, mesh, positions, normals);
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "taichi_soft.h"
+
+namespace taichi_soft {
+
+using Vector = std::array<double, 3>;
+using Quaternion = std::array<double, 4>;  // x, y, z, w
+
+class Error : public std::runtime_error {
+ public:
+  explicit Error(ts_result code) : std::runtime_error(ts_last_error()), code(code) {}
+  ts_result code;
+};
+
+inline void check(ts_result result) {
+  if (result != TS_OK) throw Error(result);
+}
+
+struct Pose {
+  Vector position{};
+  Quaternion rotation{0.0, 0.0, 0.0, 1.0};
+
+  ts_pose plain() const {
+    ts_pose found;
+    for (int i = 0; i < 3; ++i) found.position[i] = position[i];
+    for (int i = 0; i < 4; ++i) found.rotation[i] = rotation[i];
+    return found;
+  }
+};
+
+// A body of a world; a small number, to copy as you like. One that was taken out is refused.
+struct Body {
+  ts_body handle = 0;
+  explicit operator bool() const { return handle != 0; }
+};
+
+// An instance of a scene. Moves, but has no copies.
+class World {
+ public:
+  explicit World(ts_scene scene) { check(ts_world_create(scene, &handle_)); }
+  World(World&& other) noexcept { swap(other); }
+  World& operator=(World&& other) noexcept {
+    swap(other);
+    return *this;
+  }
+  World(const World&) = delete;
+  World& operator=(const World&) = delete;
+  ~World() {
+    if (handle_ != 0) ts_world_destroy(handle_);
+  }
+
+  ts_world handle() const { return handle_; }
+
+  void step(double dt, int32_t substeps = 0) { check(ts_world_step(handle_, dt, substeps)); }
+  ts_clock advance(double seconds) {
+    ts_clock clock{sizeof(ts_clock), 0, 0, 0.0, 0.0, 0.0};
+    check(ts_world_advance(handle_, seconds, &clock));
+    return clock;
+  }
+  void set_fixed_step(double dt, int32_t substeps = 0, int32_t max_steps = 8) {
+    const ts_fixed_step step{sizeof(ts_fixed_step), substeps, max_steps, dt};
+    check(ts_world_set_fixed_step(handle_, &step));
+  }
+  // Called before each step of `advance`. It must not throw.
+  void on_step(std::function<void()> function) {
+    before_ = std::make_unique<std::function<void()>>(std::move(function));
+    check(ts_world_on_step(
+        handle_, [](ts_world, void* user) { (*static_cast<std::function<void()>*>(user))(); }, before_.get()));
+  }
+  uint64_t hash() const {
+    uint64_t found = 0;
+    check(ts_world_hash(handle_, &found));
+    return found;
+  }
+  std::vector<char> snapshot() const {
+    size_t size = 0;
+    check(ts_world_snapshot(handle_, nullptr, 0, &size));
+    std::vector<char> bytes(size);
+    check(ts_world_snapshot(handle_, bytes.data(), bytes.size(), &size));
+    return bytes;
+  }
+  void restore(const std::vector<char>& bytes) { check(ts_world_restore(handle_, bytes.data(), bytes.size())); }
+
+  Body body(int32_t slot) const {
+    Body found;
+    check(ts_world_get_body(handle_, slot, &found.handle));
+    return found;
+  }
+  Body spawn(int32_t asset, const Pose& pose, const Vector& velocity = {}, const Vector& spin = {}) {
+    ts_placement place{};
+    place.struct_size = sizeof place;
+    for (int i = 0; i < 3; ++i) {
+      place.position[i] = pose.position[i];
+      place.velocity[i] = velocity[i];
+      place.spin[i] = spin[i];
+    }
+    for (int i = 0; i < 4; ++i) place.rotation[i] = pose.rotation[i];
+    Body found;
+    check(ts_world_spawn(handle_, asset, &place, &found.handle));
+    return found;
+  }
+  void despawn(Body body) { check(ts_world_despawn(handle_, body.handle)); }
+  int32_t status(Body body) const {
+    int32_t found = 0;
+    check(ts_body_get_status(handle_, body.handle, &found));
+    return found;
+  }
+  Vector center(Body body) const {
+    Vector found;
+    check(ts_body_center(handle_, body.handle, found.data()));
+    return found;
+  }
+  // 3 numbers for each vertex.
+  void positions(Body body, std::vector<float>& out, double alpha = 1.0) const {
+    check(ts_body_positions(handle_, body.handle, alpha, out.data(), out.size()));
+  }
+  void mesh(Body body, int32_t mesh, std::vector<float>& positions, std::vector<float>& normals) const {
+    if (positions.size() != normals.size()) throw std::invalid_argument("positions and normals differ in size");
+    check(ts_body_mesh(handle_, body.handle, mesh, positions.data(), normals.data(), positions.size()));
+  }
+  void set_velocity(Body body, const Vector& linear, const Vector& spin = {}) {
+    check(ts_body_set_velocity(handle_, body.handle, linear.data(), spin.data()));
+  }
+  // Of all vertices, or of those in a list.
+  void apply_impulse(Body body, const Vector& impulse, const std::vector<int32_t>& vertices = {}) {
+    check(ts_body_apply_impulse(handle_, body.handle, impulse.data(), vertices.data(), vertices.size()));
+  }
+  void apply_force(Body body, const Vector& force, const std::vector<int32_t>& vertices = {}) {
+    check(ts_body_apply_force(handle_, body.handle, force.data(), vertices.data(), vertices.size()));
+  }
+
+  void move_collider(int32_t collider, const Pose& pose) {
+    const ts_pose plain = pose.plain();
+    check(ts_collider_move_to(handle_, collider, &plain));
+  }
+  // What bodies gave a collider in the last step, and the moment of that about its place.
+  std::pair<Vector, Vector> collider_impulse(int32_t collider) const {
+    std::pair<Vector, Vector> found;
+    check(ts_collider_get_impulse(handle_, collider, found.first.data(), found.second.data()));
+    return found;
+  }
+  void move_frame(int32_t frame, const Pose& pose) {
+    const ts_pose plain = pose.plain();
+    check(ts_frame_move_to(handle_, frame, &plain));
+  }
+
+ private:
+  void swap(World& other) noexcept {
+    std::swap(handle_, other.handle_);
+    std::swap(before_, other.before_);
+  }
+
+  ts_world handle_ = 0;
+  std::unique_ptr<std::function<void()>> before_;  // stays where it is when the world moves
+};
+
+// A world file in memory.
+class Scene {
+ public:
+  explicit Scene(const std::string& folder) { check(ts_scene_load(folder.c_str(), &handle_)); }
+  Scene(Scene&& other) noexcept { std::swap(handle_, other.handle_); }
+  Scene& operator=(Scene&& other) noexcept {
+    std::swap(handle_, other.handle_);
+    return *this;
+  }
+  Scene(const Scene&) = delete;
+  Scene& operator=(const Scene&) = delete;
+  ~Scene() {
+    if (handle_ != 0) ts_scene_unload(handle_);
+  }
+
+  World create() const { return World(handle_); }
+
+  // The number of what is called so; kinds are TS_BODY and so on.
+  int32_t find(int32_t kind, const std::string& name) const {
+    int32_t found = 0;
+    check(ts_scene_find(handle_, kind, name.c_str(), &found));
+    return found;
+  }
+  ts_mesh_info mesh(int32_t number) const {
+    ts_mesh_info info{};
+    info.struct_size = sizeof info;
+    check(ts_mesh_get_info(handle_, number, &info));
+    return info;
+  }
+  std::vector<uint32_t> triangles(int32_t mesh) const {
+    std::vector<uint32_t> found(3 * size_t(this->mesh(mesh).triangle_count));
+    check(ts_mesh_get_triangles(handle_, mesh, found.data(), found.size()));
+    return found;
+  }
+  std::vector<float> uv(int32_t mesh) const {
+    const ts_mesh_info info = this->mesh(mesh);
+    std::vector<float> found(info.has_uv != 0 ? 2 * size_t(info.vertex_count) : 0);
+    if (!found.empty()) check(ts_mesh_get_uv(handle_, mesh, found.data(), found.size()));
+    return found;
+  }
+
+ private:
+  ts_scene handle_ = 0;
+};
+
+}  // namespace taichi_soft

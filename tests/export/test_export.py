@@ -1,0 +1,122 @@
+"""What is refused before it is exported, by name, and that a refused export leaves nothing behind."""
+
+import numpy as np
+import pytest
+
+from taichi_soft import Contact, Event, Material, OptionError, SoftBodyAsset, StateError, World, box, sphere
+from taichi_soft.export import AXES, export_world
+from taichi_soft.export.archive import written
+
+JELLY = Material(young=5e4, poisson=0.4, density=1000, damping_ratio=0.1)
+BALL = SoftBodyAsset(sphere(radius=0.3, resolution=2), JELLY)
+
+
+def cut():
+    world = World()
+    world.add_body(box((1, 1, 1), (2, 2, 2)), JELLY, spare_vertices=20, position=(0, 0, 1))
+    return world
+
+
+def with_levels():
+    world = World()
+    fine = SoftBodyAsset(sphere(radius=0.3, resolution=4), JELLY)
+    world.add_body(fine.with_coarser(sphere(radius=0.3, resolution=2)), position=(0, 0, 1))
+    return world
+
+
+def with_hull():
+    world = World()
+    hull = sphere(radius=0.3, resolution=3)
+    body = SoftBodyAsset(hull, JELLY, hull=(hull.vertices, hull.surface), contact=Contact(thickness=0.01))
+    world.add_body(body, position=(0, 0, 1))
+    return world
+
+
+def plain():
+    world = World()
+    world.add_body(BALL, position=(0, 0, 1))
+    return world
+
+
+def recording():
+    world = plain()
+    world.build()
+    world.record_events([Event])
+    return world
+
+
+def forced():
+    world = plain()
+    world.build()
+    world.set_force_field(lambda positions, time: np.zeros_like(positions))
+    return world
+
+
+def changed():
+    world = plain()
+    world.build()
+    world.bodies[0].set_material(Material(young=1e4, poisson=0.4, density=1000, damping_ratio=0.1))
+    return world
+
+
+def flat():
+    world = World(schedule="flat")
+    world.add_body(BALL, position=(0, 0, 1))
+    return world
+
+
+@pytest.mark.parametrize(
+    ("make", "reason"),
+    [
+        (cut, "asset 0 is cut or tears"),
+        (with_levels, "asset 0 has levels of detail"),
+        (with_hull, "asset 0 touches by a hull"),
+        (recording, "it records events"),
+        (forced, "it has a force field"),
+        (changed, "body 0 was given another material"),
+        (flat, "schedule 'flat'"),
+    ],
+)
+def test_what_the_library_does_not_run_is_refused_by_name(make, reason, tmp_path):
+    world = make()
+    if not world.is_built:
+        world.build()
+    with pytest.raises(OptionError, match=reason):
+        export_world(world, tmp_path / "game.softworld")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_world_that_is_not_built_wrong_axes_and_a_path_that_is_taken_are_refused(tmp_path):
+    with pytest.raises(StateError, match="not built"):
+        export_world(plain(), tmp_path / "a")
+    world = plain()
+    world.build()
+    with pytest.raises(OptionError, match="axes must be one of"):
+        export_world(world, tmp_path / "a", axes="left")
+    (tmp_path / "a").mkdir()
+    (tmp_path / "a" / "letter.txt").write_text("keep me")
+    with pytest.raises(OptionError, match="no world file"):
+        export_world(world, tmp_path / "a")
+    (tmp_path / "file").write_text("keep me")
+    with pytest.raises(OptionError, match="cannot write"):
+        export_world(world, tmp_path / "file" / "b")
+    assert (tmp_path / "a" / "letter.txt").read_text() == "keep me"
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["a", "file"]
+
+
+def test_axes_of_engines_turn_up_to_where_it_is_there():
+    ups = {name: np.array(rows) @ (0, 0, 1) for name, rows in AXES.items()}
+    np.testing.assert_array_equal(
+        [ups[name] for name in ("z-up", "y-up", "unity", "unreal")],
+        [(0, 0, 1), (0, 1, 0), (0, 1, 0), (0, 0, 100)],
+    )
+    signs = {name: np.sign(np.linalg.det(rows)) for name, rows in AXES.items()}
+    assert signs == {"z-up": 1, "y-up": 1, "unity": -1, "unreal": -1}  # left-handed ones turn the other way
+
+
+def test_entries_lie_at_multiples_of_8_bytes_so_that_they_are_read_where_they_lie():
+    rows = np.arange(6, dtype=np.float64).reshape(2, 3)
+    whole = written({"a": np.array([1, 2, 3], dtype=np.int32), "longer name": rows})
+    assert whole[:8] == b"TSOFTWLD"
+    assert len(whole) % 8 == 0
+    assert whole.index(rows.tobytes()) % 8 == 0
