@@ -1,6 +1,6 @@
 """A built world as a folder that the native library runs without Python: see `engine_adapter/native`."""
 
 from taichi_soft.export.axes import AXES
-from taichi_soft.export.exporting import export_world
+from taichi_soft.export.exporting import ExportReport, export_world
 
-__all__ = ["AXES", "export_world"]
+__all__ = ["AXES", "ExportReport", "export_world"]

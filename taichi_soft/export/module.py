@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from inspect import signature
 from typing import Any
 
 from taichi_soft.bodies.kernels.readout import read_positions
@@ -63,8 +64,8 @@ def kernels_of(context: WorldContext, meshes: Sequence[ExportedMesh]) -> Kernels
 def _example(kernel: Any, **templates: Any) -> tuple[Any, dict[str, Any]]:
     """A kernel with its template arguments, and an array like each of those that it takes."""
     arguments = dict(templates)
-    for argument in kernel._primal.arguments:
-        if isinstance(argument.annotation, ti.types.ndarray_type.NdarrayType):
-            kind = argument.annotation
-            arguments[argument.name] = ti.ndarray(kind.dtype, (1,) * kind.ndim)
+    for name, parameter in signature(kernel).parameters.items():
+        kind = parameter.annotation
+        if isinstance(kind, ti.types.ndarray_type.NdarrayType):
+            arguments[name] = ti.ndarray(kind.dtype, (1,) * kind.ndim)
     return kernel, arguments
