@@ -1,0 +1,223 @@
+// Plays a recorded game on a world file: Play FOLDER < GAME. It prints what ../tests/play.c prints.
+using System;
+using System.Collections.Generic;
+using System.Globalization;
+using System.IO;
+
+namespace TaichiSoft
+{
+    internal static class Play
+    {
+        private static Scene scene;
+        private static World world;
+        private static string[] words;
+        private static int at;
+        private static byte[] kept;
+        private static TextWriter output;
+
+        private static double Number()
+        {
+            return double.Parse(words[at++], NumberStyles.Float, CultureInfo.InvariantCulture);
+        }
+
+        private static int Whole()
+        {
+            return (int)Number();
+        }
+
+        private static Vector3d Vector()
+        {
+            double x = Number(), y = Number(), z = Number();
+            return new Vector3d(x, y, z);
+        }
+
+        private static Quaterniond Turn()
+        {
+            double x = Number(), y = Number(), z = Number(), w = Number();
+            return new Quaterniond(x, y, z, w);
+        }
+
+        private static Pose Place()
+        {
+            Vector3d position = Vector();
+            return new Pose(position, Turn());
+        }
+
+        private static int[] List()
+        {
+            var found = new int[Whole()];
+            for (int i = 0; i < found.Length; ++i) found[i] = Whole();
+            return found.Length == 0 ? null : found;
+        }
+
+        private static Body Who()
+        {
+            return world.GetBody(Whole());
+        }
+
+        private static void Say(string text)
+        {
+            output.Write(text + "\n");
+        }
+
+        private static string Hex(ulong number)
+        {
+            return number.ToString("x16", CultureInfo.InvariantCulture);
+        }
+
+        // FNV-1a over words of 4 bytes.
+        private static string HashOf(params float[] rows)
+        {
+            ulong code = 14695981039346656037;
+            foreach (float row in rows)
+            {
+                uint word = BitConverter.ToUInt32(BitConverter.GetBytes(row), 0);
+                code = unchecked((code ^ word) * 1099511628211);
+            }
+            return Hex(code);
+        }
+
+        private static readonly Dictionary<string, Action> calls = new Dictionary<string, Action>
+        {
+            { "step", Step },
+            { "impulse", () => { Body who = Who(); Vector3d by = Vector(); who.ApplyImpulse(by, List()); } },
+            { "force", () => { Body who = Who(); Vector3d by = Vector(); who.ApplyForce(by, List()); } },
+            {
+                "impulse_at",
+                () => { Body who = Who(); Vector3d by = Vector(), point = Vector(); who.ImpulseAt(by, point, Number()); }
+            },
+            {
+                "radial_impulse",
+                () => { Vector3d center = Vector(); double by = Number(); world.RadialImpulse(center, by, Number()); }
+            },
+            { "velocity", () => { Body who = Who(); Vector3d linear = Vector(); who.SetVelocity(linear, Vector()); } },
+            {
+                "teleport",
+                () => { Body who = Who(); Pose to = Place(); who.Teleport(to.Position, to.Rotation, Whole() != 0); }
+            },
+            { "gravity_scale", () => { Body who = Who(); who.SetGravityScale(Number()); } },
+            { "damping", () => { Body who = Who(); who.SetDamping(Number()); } },
+            { "sheltered", () => { Body who = Who(); who.SetSheltered(Whole() != 0); } },
+            { "pin", () => { Body who = Who(); who.Pin(List()); } },
+            { "unpin", () => { Body who = Who(); who.Unpin(List()); } },
+            { "targets", Targets },
+            { "wind", () => { Vector3d wind = Vector(); double density = Number(); world.SetWind(wind, density, Number()); } },
+            { "wake", () => world.Wake() },
+            { "spawn", Spawn },
+            { "despawn", () => Who().Despawn() },
+            { "move_collider", () => { int which = Whole(); world.MoveCollider(which, Place()); } },
+            {
+                "drive_collider",
+                () => { int which = Whole(); Vector3d by = Vector(); world.SetColliderVelocity(which, by, Vector()); }
+            },
+            { "teleport_collider", () => { int which = Whole(); world.TeleportCollider(which, Place()); } },
+            { "move_frame", () => { int which = Whole(); world.MoveFrame(which, Place()); } },
+            { "snapshot", () => kept = world.Snapshot() },
+            { "restore", () => world.Restore(kept) },
+            { "positions", Positions },
+            { "mesh", Mesh },
+            { "collider_impulse", ColliderImpulse },
+            { "collider_pose", ColliderPose },
+            { "status", () => Say(((int)Who().GetStatus()).ToString(CultureInfo.InvariantCulture)) },
+            {
+                "stable_substeps",
+                () => Say(world.StableSubsteps(Number()).ToString(CultureInfo.InvariantCulture))
+            },
+        };
+
+        private static void Step()
+        {
+            double dt = Number();
+            world.Step(dt, Whole());
+            Say(Hex(world.Hash()));
+        }
+
+        private static void Targets()
+        {
+            Body who = Who();
+            int[] vertices = List();
+            var targets = new float[3 * vertices.Length];
+            for (int i = 0; i < targets.Length; ++i) targets[i] = (float)Number();
+            who.SetTargets(vertices, targets);
+        }
+
+        private static void Spawn()
+        {
+            int asset = Whole();
+            Vector3d position = Vector();
+            var place = new Placement(position, Turn());
+            place.Velocity = Vector();
+            place.Spin = Vector();
+            world.Spawn(asset, place);
+        }
+
+        private static void Positions()
+        {
+            Body who = Who();
+            var rows = new float[3 * scene.GetAssetInfo(who.GetAsset()).VertexCount];
+            who.ReadPositions(Number(), rows);
+            Say(HashOf(rows));
+        }
+
+        private static void Mesh()
+        {
+            Body who = Who();
+            int mesh = Whole(), count = 3 * scene.GetMeshInfo(mesh).VertexCount;
+            float[] rows = new float[count], normals = new float[count];
+            who.ReadMesh(mesh, rows, normals);
+            Say(HashOf(rows) + " " + HashOf(normals));
+        }
+
+        private static void ColliderImpulse()
+        {
+            Vector3d by, moment;
+            world.GetColliderImpulse(Whole(), out by, out moment);
+            Say(HashOf((float)by.X, (float)by.Y, (float)by.Z, (float)moment.X, (float)moment.Y, (float)moment.Z));
+        }
+
+        private static void ColliderPose()
+        {
+            Pose pose = world.GetColliderPose(Whole());
+            Vector3d p = pose.Position;
+            Quaterniond r = pose.Rotation;
+            Say(HashOf((float)p.X, (float)p.Y, (float)p.Z, (float)r.X, (float)r.Y, (float)r.Z, (float)r.W));
+        }
+
+        private static int Main(string[] arguments)
+        {
+            if (arguments.Length != 1)
+            {
+                Console.Error.WriteLine("usage: Play FOLDER < GAME");
+                return 2;
+            }
+            output = new StreamWriter(Console.OpenStandardOutput());
+            using (output)
+            using (scene = new Scene(arguments[0]))
+            using (world = new World(scene))
+            {
+                for (string line = Console.In.ReadLine(); line != null; line = Console.In.ReadLine())
+                {
+                    words = line.Split(new[] { ' ' }, StringSplitOptions.RemoveEmptyEntries);
+                    if (words.Length == 0) continue;
+                    Action call;
+                    if (!calls.TryGetValue(words[0], out call))
+                    {
+                        Console.Error.WriteLine("unknown call: " + line);
+                        return 2;
+                    }
+                    at = 1;
+                    try
+                    {
+                        call();
+                    }
+                    catch (SoftException exception)
+                    {
+                        Console.Error.WriteLine(line + ": error " + (int)exception.Code + ": " + exception.Message);
+                        return 1;
+                    }
+                }
+            }
+            return 0;
+        }
+    }
+}
