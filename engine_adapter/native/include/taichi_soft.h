@@ -124,7 +124,8 @@ typedef struct ts_clock {
 /* Called before each step of ts_world_advance: the place to move colliders and frames, and to push. */
 typedef void (*ts_before_step)(ts_world world, void* user);
 
-/* A world as it was exported. The first of a scene takes as long as loading, later ones little. */
+/* A world as it was exported: at once where it is the first or follows one that was destroyed. One beside others
+ * compiles kernels of its own: takes as long as loading. */
 TS_API ts_result ts_world_create(ts_scene scene, ts_world* world);
 TS_API ts_result ts_world_destroy(ts_world world);
 TS_API ts_result ts_world_set_fixed_step(ts_world world, const ts_fixed_step* step);
