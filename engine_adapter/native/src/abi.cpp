@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 #include <new>
+#include <utility>
 
 #include "handles.hpp"
 #include "scene.hpp"
@@ -232,6 +233,8 @@ ts_result ts_mesh_get_triangles(ts_scene scene, int32_t mesh, uint32_t* indices,
     const Mesh& row = mesh_of(*found, mesh);
     require_size(count, row.triangles.count, "indices");
     std::copy(row.triangles.begin(), row.triangles.end(), indices);
+    if (!found->axes.are_left_handed()) return;
+    for (size_t i = 0; i + 3 <= count; i += 3) std::swap(indices[i + 1], indices[i + 2]);  // our faces are mirrored
   });
 }
 

@@ -25,6 +25,7 @@ class Axes {
   }
   double length_in(double host) const { return host / scale_; }
   double scale() const { return scale_; }
+  bool are_left_handed() const { return handedness_ < 0; }
   // Many places or normals, from our rows of 3 numbers to the engine's; the two may be the same.
   void rows_out(const float* ours, size_t count, bool are_places, float* host) const;
   void rows_in(const float* host, size_t count, float* ours) const;
