@@ -347,7 +347,7 @@ namespace TaichiSoft
         private bool isDisposed;
         private ExceptionDispatchInfo thrown;
 
-        /// <summary>A world as it was exported. The first of a scene takes as long as loading, later ones little.</summary>
+        /// <summary>A world as it was exported: at once, but one beside others takes as long as loading.</summary>
         public World(Scene scene)
         {
             Native.Check(Native.ts_world_create(scene.Handle, out handle), scene);

@@ -1,0 +1,273 @@
+// What tests/native/test_csharp.py asks of the wrapper: Checks FOLDER WHAT. It prints what it finds, or throws.
+using System;
+using System.Diagnostics;
+using System.Runtime.CompilerServices;
+using System.Threading;
+
+namespace TaichiSoft
+{
+    internal static class Checks
+    {
+        private const double Frame = 1.0 / 64;
+
+        private static void Require(bool isTrue, string text)
+        {
+            if (!isTrue) throw new Exception(text);
+        }
+
+        // Prints the code and text of what a call throws.
+        private static void Refused(string what, Action call)
+        {
+            try
+            {
+                call();
+            }
+            catch (SoftException exception)
+            {
+                Console.WriteLine("{0}: {1}: {2}", what, exception.Code, exception.Message);
+                return;
+            }
+            throw new Exception(what + " is not refused");
+        }
+
+        private static void Errors(string folder)
+        {
+            Refused("no folder", () => new Scene(folder + "-not-there"));
+            Refused("null folder", () => new Scene(null));
+            var scene = new Scene(folder);
+            var world = new World(scene);
+            Body ball = world.GetBody(0);
+            float[] room = new float[3 * scene.GetAssetInfo(ball.GetAsset()).VertexCount], small = new float[5];
+            var pose = new Pose(new Vector3d(0, 0, 1), Quaterniond.Identity);
+            Refused("small buffer", () => ball.ReadPositions(1, small));
+            Refused("null buffer", () => ball.ReadPositions(1, null));
+            Refused("small normals", () => ball.ReadMesh(0, room, small));
+            Refused("small buffer of a mesh", () => ball.ReadMesh(0, small, small));
+            Refused("nan", () => world.MoveCollider(0, new Pose(new Vector3d(double.NaN, 0, 0), Quaterniond.Identity)));
+            Refused("no turn", () => world.MoveCollider(0, new Pose()));
+            Refused("no collider", () => world.MoveCollider(99, pose));
+            Refused("negative time", () => world.Advance(-1));
+            Refused("name", () => scene.Find(NameKind.Body, "nobody"));
+            Refused("zero in a name", () => scene.Find(NameKind.Body, "a\0b"));
+            Refused("empty list", () => ball.ApplyImpulse(new Vector3d(0, 0, 1), new int[0]));
+            Refused("targets", () => ball.SetTargets(new[] { 0, 1 }, new float[3]));
+            Refused("not pinned", () => ball.SetTargets(new[] { 0 }, new float[3]));
+            Refused("snapshot", () => world.Restore(new byte[100]));
+            Refused("room for a snapshot", () => world.Snapshot(new byte[3]));
+            Refused("body of no world", () => default(Body).GetAsset());
+
+            world.BeforeStep = each => { throw new InvalidOperationException("from BeforeStep"); };
+            try
+            {
+                world.Advance(2 * Frame);
+                Require(false, "what BeforeStep throws is lost");
+            }
+            catch (InvalidOperationException exception)
+            {
+                Console.WriteLine("callback: " + exception.Message);
+            }
+            world.BeforeStep = null;
+            world.Advance(Frame); // goes on
+
+            world.BeforeStep = each =>
+            {
+                world.BeforeStep = null;
+                world.Dispose();
+            };
+            Refused("world destroyed in a step", () => world.Advance(2 * Frame));
+            Refused("world after Dispose", () => world.Step(Frame));
+            Refused("body after Dispose", () => ball.GetCenter());
+            world.Dispose(); // a second one is harmless
+            scene.Dispose();
+            scene.Dispose();
+            Refused("scene after Dispose", () => new World(scene));
+        }
+
+        private static void Frames(string folder)
+        {
+            using (var scene = new Scene(folder))
+            using (var world = new World(scene))
+            {
+                Body ball = world.GetBody(0);
+                int count = 3 * scene.GetMeshInfo(0).VertexCount;
+                float[] vertices = new float[count], normals = new float[count];
+                var positions = new float[3 * scene.GetAssetInfo(ball.GetAsset()).VertexCount];
+                var some = new[] { 0, 1, 2 };
+                var state = new byte[world.SnapshotSize()];
+                int calls = 0, frame = 0;
+                var none = new Vector3d();
+                world.SetFixedStep(Frame);
+                world.BeforeStep = each =>
+                {
+                    ++calls;
+                    double height = 0.2 + 0.1 * Math.Sin(0.05 * frame);
+                    each.MoveCollider(0, new Pose(new Vector3d(0, 0, height), Quaterniond.Identity));
+                };
+                Vector3d impulse, moment;
+                Action one = () =>
+                {
+                    ++frame;
+                    Clock clock = world.Advance(Frame);
+                    Require(clock.StepsMade == 1, "one frame is not one step");
+                    Body found = world.GetBody(0);
+                    found.ReadMesh(0, vertices, normals);
+                    found.ReadPositions(clock.Alpha, positions);
+                    found.ApplyImpulse(new Vector3d(0, 0, 0.1), some);
+                    found.GetCenter();
+                    found.GetStatus();
+                    world.SetColliderVelocity(1, none, none);
+                    world.GetColliderPose(0);
+                    world.GetColliderImpulse(0, out impulse, out moment);
+                    world.Hash();
+                    world.Snapshot(state);
+                };
+                for (int i = 0; i < 100; ++i) one();
+                long before = GC.GetAllocatedBytesForCurrentThread();
+                int collections = GC.CollectionCount(0);
+                for (int i = 0; i < 1000; ++i) one();
+                long allocated = GC.GetAllocatedBytesForCurrentThread() - before;
+                Console.WriteLine("calls of BeforeStep: {0}", calls);
+                Console.WriteLine("collections: {0}", GC.CollectionCount(0) - collections);
+                Console.WriteLine("allocated: {0}", allocated);
+                before = GC.GetAllocatedBytesForCurrentThread();
+                for (int i = 0; i < 1000; ++i) GC.KeepAlive(new object()); // that it counts at all
+                Console.WriteLine("allocated by 1000 objects: {0}", GC.GetAllocatedBytesForCurrentThread() - before);
+            }
+        }
+
+        [MethodImpl(MethodImplOptions.NoInlining)]
+        private static ulong Forgotten(Scene scene)
+        {
+            var world = new World(scene);
+            world.BeforeStep = each => { };
+            world.Advance(Frame);
+            return world.Hash();
+        }
+
+        [MethodImpl(MethodImplOptions.NoInlining)]
+        private static WeakReference ForgottenScene(string folder)
+        {
+            return new WeakReference(new Scene(folder));
+        }
+
+        // Stack from before does not count as a reference.
+        private static void Collect()
+        {
+            for (int i = 0; i < 3; ++i)
+            {
+                GC.Collect();
+                GC.WaitForPendingFinalizers();
+            }
+        }
+
+        private static void Lifetimes(string folder)
+        {
+            using (var scene = new Scene(folder))
+            {
+                // Each in a thread of its own, whose stack ends with it: Mono takes what looks like a reference
+                // for one.
+                ulong first = 0;
+                for (int i = 0; i < 20; ++i)
+                {
+                    ulong hash = 0;
+                    var thread = new Thread(() => hash = Forgotten(scene));
+                    thread.Start();
+                    thread.Join();
+                    Collect();
+                    if (i == 0) first = hash;
+                    Require(hash == first, "worlds of one scene differ");
+                }
+                var clock = Stopwatch.StartNew();
+                var world = new World(scene);
+                Console.WriteLine("a world after another [s]: {0:f3}", clock.Elapsed.TotalSeconds);
+                clock = Stopwatch.StartNew();
+                var second = new World(scene);
+                Console.WriteLine("a world beside another [s]: {0:f3}", clock.Elapsed.TotalSeconds);
+                second.Advance(Frame);
+                Require(second.Hash() == first, "a world beside another differs");
+                scene.Dispose();
+                world.Advance(Frame); // goes on without its scene
+                Require(world.Hash() == first, "a world without its scene differs");
+            }
+            var forgetting = new Thread(() => ForgottenScene(folder));
+            forgetting.Start();
+            forgetting.Join();
+            Collect();
+            Console.WriteLine("done"); // and worlds that nobody has disposed of end with the process
+        }
+
+        private static void Threads(string folder)
+        {
+            using (var scene = new Scene(folder))
+            using (var world = new World(scene))
+            {
+                bool isOver = false;
+                int refused = 0;
+                var other = new Thread(() =>
+                {
+                    while (!Volatile.Read(ref isOver))
+                    {
+                        try
+                        {
+                            world.GetClock();
+                        }
+                        catch (SoftException exception)
+                        {
+                            if (exception.Code == ErrorCode.Busy) Interlocked.Increment(ref refused);
+                        }
+                    }
+                });
+                other.Start();
+                int made = 0;
+                while (made < 200)
+                {
+                    try
+                    {
+                        world.Step(Frame);
+                        ++made;
+                    }
+                    catch (SoftException exception)
+                    {
+                        Require(exception.Code == ErrorCode.Busy, exception.Message);
+                    }
+                }
+                Volatile.Write(ref isOver, true);
+                other.Join();
+                Require(world.GetClock().Steps == 200, "steps are lost");
+                Console.WriteLine("refused: {0}", refused > 0);
+            }
+        }
+
+        private static void Names(string folder)
+        {
+            using (var scene = new Scene(folder))
+            {
+                SceneInfo info = scene.GetInfo();
+                int[] counts = { info.SlotCount, info.AssetCount, info.ColliderCount, info.FrameCount, info.MeshCount };
+                foreach (NameKind kind in Enum.GetValues(typeof(NameKind)))
+                {
+                    for (int i = 0; i < counts[(int)kind]; ++i)
+                    {
+                        string name = scene.GetName(kind, i);
+                        Require(scene.Find(kind, name) == i, name);
+                        Console.WriteLine("{0} {1} {2}", kind, i, name);
+                    }
+                }
+            }
+        }
+
+        private static int Main(string[] arguments)
+        {
+            switch (arguments[1])
+            {
+                case "errors": Errors(arguments[0]); break;
+                case "frames": Frames(arguments[0]); break;
+                case "lifetimes": Lifetimes(arguments[0]); break;
+                case "threads": Threads(arguments[0]); break;
+                case "names": Names(arguments[0]); break;
+                default: return 2;
+            }
+            return 0;
+        }
+    }
+}

@@ -1,0 +1,153 @@
+// Runs SoftWorldBehaviour and SoftBodyBehaviour on the stubs in the order in which Unity would: BehaviourChecks
+// FOLDER, a world with axes for Unity. A test of what they do, and none of Unity.
+using System;
+using System.IO;
+using System.Reflection;
+using UnityEngine;
+
+namespace TaichiSoft
+{
+    internal static class BehaviourChecks
+    {
+        private const float Step = 1f / 50;
+
+        private static void Require(bool isTrue, string text)
+        {
+            if (!isTrue) throw new Exception(text);
+        }
+
+        private static Action Message(object component, string name)
+        {
+            MethodInfo method = component.GetType().GetMethod(name, BindingFlags.Instance | BindingFlags.NonPublic);
+            return (Action)Delegate.CreateDelegate(typeof(Action), component, method);
+        }
+
+        // As the inspector does.
+        private static void Set(object component, string name, object value)
+        {
+            FieldInfo field = component.GetType().GetField(name, BindingFlags.Instance | BindingFlags.NonPublic);
+            Require(Attribute.IsDefined(field, typeof(SerializeField)), name + " is not in the inspector");
+            field.SetValue(component, value);
+        }
+
+        private static Vector3 At(float x, float y, float z)
+        {
+            return new Vector3 { x = x, y = y, z = z };
+        }
+
+        private static double Dot(Vector3 a, Vector3 b)
+        {
+            return (double)a.x * b.x + (double)a.y * b.y + (double)a.z * b.z;
+        }
+
+        private static Vector3 Minus(Vector3 a, Vector3 b)
+        {
+            return At(a.x - b.x, a.y - b.y, a.z - b.z);
+        }
+
+        private static Vector3 Cross(Vector3 a, Vector3 b)
+        {
+            return At(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
+        }
+
+        private static int Main(string[] arguments)
+        {
+            Application.streamingAssetsPath = Path.GetDirectoryName(arguments[0]);
+            Time.fixedDeltaTime = Step;
+            var lift = new Transform { rotation = Quaternion.identity };
+            var world = new SoftWorldBehaviour();
+            Set(world, "folder", Path.GetFileName(arguments[0]));
+            Set(
+                world, "colliders",
+                new[] { new SoftWorldBehaviour.Follower { name = "collider0", target = lift } });
+            var filter = new MeshFilter();
+            var body = new SoftBodyBehaviour { transform = new Transform(), other = filter };
+            Set(body, "world", world);
+            Set(body, "body", "body1");
+            Message(world, "Awake")();
+            Message(body, "Start")();
+            Mesh drawn = filter.sharedMesh;
+
+            Action fixedUpdate = Message(world, "FixedUpdate"), update = Message(world, "Update");
+            Action lateUpdate = Message(body, "LateUpdate");
+            var times = new Random(1);
+            double time = 0;
+            int steps = 0;
+            Action frame = () =>
+            {
+                time += 0.002 + 0.03 * times.NextDouble(); // less than a step, or more
+                while ((steps + 1) * (double)Step <= time)
+                {
+                    ++steps;
+                    Time.fixedTime = steps * Step;
+                    lift.position = At(0, 0.2f + 0.1f * (float)Math.Sin(0.05 * steps), 0);
+                    fixedUpdate();
+                }
+                Time.time = (float)time;
+                update();
+                lateUpdate();
+            };
+
+            for (int i = 0; i < 100; ++i) frame();
+            long before = GC.GetAllocatedBytesForCurrentThread();
+            for (int i = 0; i < 1000; ++i)
+            {
+                frame();
+                Require(world.Clock.Steps == steps, "a FixedUpdate is not one step");
+                double part = Math.Max(0, Math.Min((double)Time.time - Time.fixedTime, 0.999 * Step)) / Step;
+                Require(Math.Abs(world.Clock.Alpha - part) < 1e-6, "alpha is not where the frame is");
+            }
+            Console.WriteLine("allocated: {0}", GC.GetAllocatedBytesForCurrentThread() - before);
+
+            // The same steps without components.
+            var scene = new Scene(arguments[0]);
+            var plain = new World(scene);
+            int asset = plain.GetBody(1).GetAsset();
+            var expected = new float[3 * drawn.vertices.Length];
+            for (int i = 1; i <= steps; ++i)
+            {
+                double height = 0.2f + 0.1f * (float)Math.Sin(0.05 * i);
+                plain.MoveCollider(0, new Pose(new Vector3d(0, height, 0), Quaterniond.Identity));
+                plain.Step(Step);
+            }
+            Require(plain.Hash() == world.World.Hash(), "the world went another way");
+            plain.SetFixedStep(Step);
+            plain.Advance(world.Clock.Alpha * Step);
+            plain.GetBody(1).ReadMesh(0, expected, null);
+            double apart = 0, lowest = 1;
+            for (int i = 0; i < drawn.vertices.Length; ++i)
+            {
+                Vector3 there = At(expected[3 * i], expected[3 * i + 1], expected[3 * i + 2]);
+                Vector3 difference = Minus(drawn.vertices[i], there);
+                apart = Math.Max(apart, Math.Sqrt(Dot(difference, difference)));
+                lowest = Math.Min(lowest, there.y);
+            }
+            Require(apart < 1e-5, "the mesh is elsewhere");
+            Require(lowest > -0.05, "y does not point up");
+
+            // In Unity a face is seen from where its vertices go round clockwise, and Cross follows the left hand.
+            int[] triangles = drawn.triangles;
+            for (int i = 0; i < triangles.Length; i += 3)
+            {
+                Vector3 a = drawn.vertices[triangles[i]], b = drawn.vertices[triangles[i + 1]];
+                Vector3 face = Cross(Minus(b, a), Minus(drawn.vertices[triangles[i + 2]], a));
+                Require(Dot(face, drawn.normals[triangles[i]]) > 0, "a face looks inwards");
+            }
+
+            world.World.GetBody(1).Despawn();
+            frame();
+            Require(Dot(drawn.vertices[5], drawn.vertices[5]) == 0, "nobody is drawn");
+            frame();
+            world.World.Spawn(asset, new Placement(new Vector3d(0, 2, 0), Quaterniond.Identity));
+            frame();
+            Require(Dot(drawn.vertices[5], drawn.vertices[5]) > 1, "who came is not drawn");
+            Message(world, "OnDestroy")();
+            lateUpdate(); // Unity destroys in any order
+            Message(body, "OnDestroy")();
+            plain.Dispose();
+            scene.Dispose();
+            Console.WriteLine("steps: {0}", steps);
+            return 0;
+        }
+    }
+}
