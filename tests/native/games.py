@@ -1,5 +1,7 @@
 """Games as lists of calls, one a line, that players in several languages play: here on a World of Python."""
 
+import subprocess
+
 import numpy as np
 
 from taichi_soft.persistence.kernels.packing import hash_bodies
@@ -21,6 +23,15 @@ def line(call, *arguments):
     for each in arguments:
         numbers += [len(each), *each] if isinstance(each, list) else np.ravel(each).tolist()
     return " ".join([call, *(repr(float(number)) for number in numbers)])
+
+
+def lines_of(command, game, **options):
+    """What a player without Python prints: `command` is the program and the folder of the world."""
+    done = subprocess.run(
+        [str(each) for each in command], input="\n".join(game), capture_output=True, text=True, **options
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout.splitlines()
 
 
 class Player:

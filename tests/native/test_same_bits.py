@@ -4,19 +4,11 @@ import subprocess
 import sys
 
 import pytest
-from games import Player
+from games import Player, lines_of
 from native_build import ROOT
 from scenes import GAMES
 
 from taichi_soft.export.meshes import CREASE
-
-
-def native_lines(play, folder, game, *prefix):
-    done = subprocess.run(
-        [*prefix, str(play), str(folder)], input="\n".join(game), capture_output=True, text=True
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout.splitlines()
 
 
 def drawn(world):
@@ -32,7 +24,7 @@ def drawn(world):
 def test_a_game_without_python_has_the_same_bits(name, export, play):
     make, game = GAMES[name]
     calls = list(game())
-    found = native_lines(play, export(name), calls)
+    found = lines_of([play, export(name)], calls)
     world = make()
     expected = Player(world, drawn(world)).play(calls)
     assert len(set(expected)) > 400  # something moves
@@ -44,7 +36,7 @@ def test_a_game_without_python_has_the_same_bits(name, export, play):
 def test_a_game_has_the_same_bits_on_one_core(name, export, play):
     calls = list(GAMES[name][1]())
     folder = export(name)
-    assert native_lines(play, folder, calls, "taskset", "-c", "0") == native_lines(play, folder, calls)
+    assert lines_of(["taskset", "-c", "0", play, folder], calls) == lines_of([play, folder], calls)
 
 
 def test_the_sample_finds_what_its_script_named_and_plays_alike_every_time(native, tmp_path):
