@@ -193,7 +193,7 @@ namespace TaichiSoft
             forgetting.Start();
             forgetting.Join();
             Collect();
-            Console.WriteLine("done"); // and worlds that nobody has disposed of end with the process
+            Console.WriteLine("done: yes"); // and worlds that nobody has disposed of end with the process
         }
 
         private static void Threads(string folder)

@@ -30,24 +30,14 @@ namespace TaichiSoft
             field.SetValue(component, value);
         }
 
-        private static Vector3 At(float x, float y, float z)
-        {
-            return new Vector3 { x = x, y = y, z = z };
-        }
-
         private static double Dot(Vector3 a, Vector3 b)
         {
             return (double)a.x * b.x + (double)a.y * b.y + (double)a.z * b.z;
         }
 
-        private static Vector3 Minus(Vector3 a, Vector3 b)
-        {
-            return At(a.x - b.x, a.y - b.y, a.z - b.z);
-        }
-
         private static Vector3 Cross(Vector3 a, Vector3 b)
         {
-            return At(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
+            return new Vector3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
         }
 
         private static int Main(string[] arguments)
@@ -80,7 +70,7 @@ namespace TaichiSoft
                 {
                     ++steps;
                     Time.fixedTime = steps * Step;
-                    lift.position = At(0, 0.2f + 0.1f * (float)Math.Sin(0.05 * steps), 0);
+                    lift.position = new Vector3(0, 0.2f + 0.1f * (float)Math.Sin(0.05 * steps), 0);
                     fixedUpdate();
                 }
                 Time.time = (float)time;
@@ -117,8 +107,8 @@ namespace TaichiSoft
             double apart = 0, lowest = 1;
             for (int i = 0; i < drawn.vertices.Length; ++i)
             {
-                Vector3 there = At(expected[3 * i], expected[3 * i + 1], expected[3 * i + 2]);
-                Vector3 difference = Minus(drawn.vertices[i], there);
+                Vector3 there = new Vector3(expected[3 * i], expected[3 * i + 1], expected[3 * i + 2]);
+                Vector3 difference = drawn.vertices[i] - there;
                 apart = Math.Max(apart, Math.Sqrt(Dot(difference, difference)));
                 lowest = Math.Min(lowest, there.y);
             }
@@ -130,7 +120,7 @@ namespace TaichiSoft
             for (int i = 0; i < triangles.Length; i += 3)
             {
                 Vector3 a = drawn.vertices[triangles[i]], b = drawn.vertices[triangles[i + 1]];
-                Vector3 face = Cross(Minus(b, a), Minus(drawn.vertices[triangles[i + 2]], a));
+                Vector3 face = Cross(b - a, drawn.vertices[triangles[i + 2]] - a);
                 Require(Dot(face, drawn.normals[triangles[i]]) > 0, "a face looks inwards");
             }
 

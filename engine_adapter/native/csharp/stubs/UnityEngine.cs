@@ -1,4 +1,4 @@
-// The few types of Unity that SoftBodyBehaviour.cs names, so that a compiler without Unity can read it and a test
+// The few types of Unity that the components and docs/unity.md name, so that a compiler without Unity can read it and a test
 // can run it. Members are those of Unity's reference; what they do here is the least that the test needs.
 using System;
 
@@ -47,6 +47,23 @@ namespace UnityEngine
     public struct Vector3
     {
         public float x, y, z;
+
+        public Vector3(float x, float y, float z)
+        {
+            this.x = x;
+            this.y = y;
+            this.z = z;
+        }
+
+        public static Vector3 operator -(Vector3 a, Vector3 b)
+        {
+            return new Vector3(a.x - b.x, a.y - b.y, a.z - b.z);
+        }
+
+        public static Vector3 operator *(float factor, Vector3 a)
+        {
+            return new Vector3(factor * a.x, factor * a.y, factor * a.z);
+        }
 
         public static Vector3 zero
         {
@@ -134,6 +151,22 @@ namespace UnityEngine
     public class MeshFilter : Component
     {
         public Mesh sharedMesh { get; set; }
+    }
+
+    public enum ForceMode
+    {
+        Impulse
+    }
+
+    public class Rigidbody : Component
+    {
+        public void AddForce(Vector3 force, ForceMode mode)
+        {
+        }
+
+        public void AddTorque(Vector3 torque, ForceMode mode)
+        {
+        }
     }
 
     public static class Time

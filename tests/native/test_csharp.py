@@ -1,0 +1,197 @@
+"""The C# wrapper: it plays games as C does, refuses what the library refuses, allocates nothing in a frame.
+
+Mono compiles and runs it here. Unity's components run on stubs of Unity's types.
+"""
+
+import os
+import re
+import shutil
+import subprocess
+
+import pytest
+from conftest import ROOT
+from games import lines_of
+from scenes import GAMES
+
+SOURCE = ROOT / "engine_adapter" / "native" / "csharp"
+HEADER = SOURCE.parent / "include" / "taichi_soft.h"
+COMPONENTS = ("TaichiSoft.cs", "SoftWorldBehaviour.cs", "SoftBodyBehaviour.cs")
+
+
+@pytest.fixture(scope="module")
+def compiled(tmp_path_factory):
+    """A function that compiles files to a program, once, with warnings as errors, and returns its path."""
+    if shutil.which("mcs") is None or shutil.which("mono") is None:
+        pytest.skip("needs mcs and mono: apt-get install mono-mcs mono-runtime")
+    folder = tmp_path_factory.mktemp("csharp")
+
+    def program(name, *files):
+        path = folder / f"{name}.exe"
+        if not path.exists():
+            options = ["-langversion:7", "-warn:4", "-warnaserror+", f"-out:{path}"]
+            done = subprocess.run(
+                ["mcs", *options, *(str(SOURCE / file) for file in files)], capture_output=True, text=True
+            )
+            assert done.returncode == 0, done.stdout + done.stderr
+        return path
+
+    return program
+
+
+@pytest.fixture
+def run(native, compiled):
+    """A function that runs a program by its name on the library; returns the lines that it prints."""
+
+    def lines(program, folder, *arguments, game=()):
+        environment = {**os.environ, "LD_LIBRARY_PATH": str(native)}
+        return lines_of(["mono", "--debug", program, folder, *arguments], game, env=environment)
+
+    return lines
+
+
+@pytest.fixture
+def checks(compiled):
+    return compiled("Checks", "TaichiSoft.cs", "Checks.cs")
+
+
+@pytest.mark.parametrize("name", ["heap", "free"])
+def test_a_game_in_csharp_has_the_same_bits(name, export, play, compiled, run):
+    calls = list(GAMES[name][1]())
+    folder = export(name)
+    found = run(compiled("Play", "TaichiSoft.cs", "Play.cs"), folder, game=calls)
+    assert len(set(found)) > 400
+    assert found == lines_of([play, folder], calls)
+
+
+REFUSED = {
+    "no folder": "File: cannot read .*export",
+    "null folder": "Argument: folder is null",
+    "small buffer": "Size: positions has room for 5 numbers: give room for 441",
+    "null buffer": "Size: positions has room for 0 numbers",
+    "small normals": "Size: normals has room for 5 numbers: give room for 441",
+    "small buffer of a mesh": "Size: positions has room for 5 numbers: give room for 276",
+    "nan": "Argument: position has -?nan in it",
+    "no turn": "Argument: rotation is a quaternion of length 0: normalise it",
+    "no collider": "Argument: there is no collider 99: there are 4, from 0",
+    "negative time": "Argument: seconds is -1",
+    "name": "Argument: nothing of that kind is called nobody",
+    "zero in a name": "Argument: a zero is in a name",
+    "empty list": "Argument: no vertex is named: give null for all",
+    "targets": "Size: targets has 3 numbers: give 6",
+    "not pinned": "State: vertex 0 is not pinned: call ts_body_pin first",
+    "snapshot": "Snapshot: these bytes are no snapshot",
+    "room for a snapshot": r"Size: buffer has 3 bytes: give \d+",
+    "body of no world": "Handle: this body is of no world",
+    "callback": "from BeforeStep",
+    "world destroyed in a step": r"Handle: there is no world \d+, or no more",
+    "world after Dispose": r"Handle: there is no world \d+, or no more",
+    "body after Dispose": r"Handle: there is no world \d+, or no more",
+    "scene after Dispose": r"Handle: there is no scene \d+, or no more",
+}
+
+
+def test_errors_are_exceptions_with_code_and_text(export, checks, run):
+    found = dict(line.split(": ", 1) for line in run(checks, export("heap"), "errors"))
+    assert found.keys() == REFUSED.keys()
+    for what, text in found.items():
+        assert re.match(REFUSED[what], text), what
+
+
+def test_a_thousand_frames_allocate_nothing(export, checks, run):
+    found = dict(line.split(": ") for line in run(checks, export("heap"), "frames"))
+    assert int(found["allocated by 1000 objects"]) >= 8000  # the counter counts
+    assert found["allocated"] == "0"
+    assert found["collections"] == "0"
+    assert found["calls of BeforeStep"] == "1100"
+
+
+def test_worlds_that_are_forgotten_are_given_back(export, checks, run):
+    found = dict(line.split(": ") for line in run(checks, export("heap"), "lifetimes"))
+    after, beside = (float(found[f"a world {which} another [s]"]) for which in ("after", "beside"))
+    assert after < beside / 3  # as it took over what they had
+    assert "done" in found
+
+
+def test_a_second_thread_in_a_world_is_refused(export, checks, run):
+    assert run(checks, export("heap"), "threads") == ["refused: True"]
+
+
+def test_names_are_found_in_a_folder_with_a_name_beyond_ascii(export, checks, run, tmp_path):
+    folder = tmp_path / "größe-球.softworld"
+    folder.symlink_to(export("free"))
+    found = run(checks, folder, "names")
+    assert "Frame 0 frame0" in found
+    assert len(found) == 5 + 5 + 1 + 5  # bodies, assets, a frame, meshes
+
+
+def test_components_draw_a_body_in_unitys_axes(export, compiled, run):
+    program = compiled("Components", *COMPONENTS, "stubs/UnityEngine.cs", "stubs/BehaviourChecks.cs")
+    found = dict(line.split(": ") for line in run(program, export("heap", "--axes", "unity")))
+    assert found["allocated"] == "0"
+    assert int(found["steps"]) > 500
+
+
+def test_the_code_of_the_page_compiles(compiled, tmp_path):
+    text = (ROOT / "docs" / "unity.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"^```csharp\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
+    assert len(blocks) == 2
+    for number, block in enumerate(blocks):
+        (tmp_path / f"{number}.cs").write_text(
+            f"#pragma warning disable 649 // set in the inspector\n{block}"
+        )
+    main = tmp_path / "main.cs"
+    main.write_text("class Program { static void Main() { } }")
+    files = [*COMPONENTS, "stubs/UnityEngine.cs", *sorted(tmp_path.iterdir())]
+    compiled("Page", *files)
+
+
+def arguments(text):
+    return [" ".join(each.split()) for each in text.split(",") if each.strip() not in ("", "void")]
+
+
+def test_every_function_of_the_header_is_declared():
+    text = re.sub(r"/\*.*?\*/", "", HEADER.read_text(encoding="utf-8"), flags=re.DOTALL)
+    functions = re.findall(r"TS_API [\w *]+?(ts_\w+)\(([^)]*)\);", text)
+    assert len(functions) == text.count("TS_API ") - text.count("#define TS_API ")
+    source = (SOURCE / "TaichiSoft.cs").read_text(encoding="utf-8")
+    declared = re.findall(r"static extern \w+ (ts_\w+)\(([^)]*)\);", source)
+    assert {name for name, _ in declared} == {name for name, _ in functions}
+    wanted = dict(functions)
+    for name, given in declared:
+        assert [kind_of_csharp(each) for each in arguments(given)] == [
+            kind_of_c(each) for each in arguments(wanted[name])
+        ], name
+
+
+def kind_of_c(argument):
+    """Name and type of an argument, in words that both languages have."""
+    kind, name = re.fullmatch(r"(.*?)(\w+(?:\[\d\])?)", argument.replace("const ", "")).groups()
+    kind, name = kind.strip(), re.sub(r"\[\d\]", "", name)
+    if kind.endswith("*") or "[" in argument or name in ("user", "function"):
+        return name, "pointer"
+    if kind in ("ts_scene", "ts_world", "ts_body"):
+        return name, "u64"
+    return name, {"int32_t": "i32", "double": "f64", "size_t": "size"}[kind]
+
+
+def kind_of_csharp(argument):
+    kind, name = argument.rsplit(" ", 1)
+    if kind.startswith(("ref ", "out ")) or kind.endswith("[]") or kind in ("IntPtr", "BeforeStep"):
+        return name, "pointer"
+    return name, {"ulong": "u64", "int": "i32", "double": "f64", "UIntPtr": "size"}[kind]
+
+
+def test_codes_and_kinds_have_the_numbers_of_the_header():
+    header, source = (path.read_text(encoding="utf-8") for path in (HEADER, SOURCE / "TaichiSoft.cs"))
+    for kind, prefix, count in (
+        ("ErrorCode", "TS_ERROR_", 9),
+        ("NameKind", "TS_", 5),
+        ("BodyStatus", "TS_", 3),
+    ):
+        body = re.search(rf"enum {kind}\s*{{(.*?)}}", source, re.DOTALL).group(1)
+        rows = re.findall(r"^ +(\w+) = (-?\d+)", body, re.MULTILINE)
+        assert len(rows) == count
+        for name, number in rows:
+            assert f"{prefix}{name.upper()} = {number}" in header, name
+    (version,) = re.findall(r"const uint Version = (\d+);", source)
+    assert f"#define TS_VERSION {version}\n" in header
