@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from taichi_soft.bodies.asset import SoftBodyAsset
 from taichi_soft.bodies.description import outer_vertices
 from taichi_soft.contact.collider import FASTEST_SPIN, ColliderRow, row_of
+from taichi_soft.contact.shapes.shape import SEAM
 from taichi_soft.control.drives import LARGEST_PUSH
 from taichi_soft.control.frames import Frames
 from taichi_soft.control.impulses import LARGEST_IMPULSE
@@ -120,6 +121,11 @@ def _of_colliders(rows: Sequence[ColliderRow]) -> Arrays:
         "colliders/target": _floats([_target_of(row) for row in rows]),
         "colliders/bounds": _floats([row.shape.bounds.ravel() for row in rows]),
         "colliders/skin": _floats([row.skin for row in rows]),
+        "colliders/kind": _ints([row.shape.kind for row in rows]),
+        "colliders/parameters": np.array([row.shape.parameters for row in rows]).astype(np.float32),
+        "colliders/surface": _floats([(row.friction, row.restitution) for row in rows]),
+        "colliders/filter": _ints([(row.group, row.mask) for row in rows]),
+        "colliders/seam": _floats([SEAM]),
     }
 
 

@@ -4,6 +4,7 @@ import subprocess
 
 import numpy as np
 
+from taichi_soft import BoxShape, CapsuleShape, PlaneShape, SphereShape
 from taichi_soft.persistence.kernels.packing import hash_bodies
 
 MASK = (1 << 64) - 1
@@ -131,6 +132,25 @@ class Player:
 
     def despawn(self):
         self.world.despawn(self.body())
+
+    def add_collider(self):
+        kind, (x, y, z) = self.whole(), self.take(3)
+        shapes = PlaneShape, lambda: SphereShape(x), lambda: BoxShape((x, y, z)), lambda: CapsuleShape(x, y)
+        friction, restitution, thickness, group, mask = self.take(5)
+        made = self.world.add_collider(
+            shapes[kind](),
+            friction=friction,
+            restitution=None if restitution < 0 else restitution,
+            thickness=thickness,
+            group=int(group),
+            mask=int(mask),
+            position=self.take(3),
+            rotation=self.take(4),
+        )
+        self.say(str(made.index))
+
+    def remove_collider(self):
+        self.collider().remove()
 
     def move_collider(self):
         self.collider().move_to(self.take(3), self.take(4))

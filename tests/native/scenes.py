@@ -35,7 +35,7 @@ def turn(axis, angle):
 
 def heap():
     """Soft contact, sleep, pools, colliders that move: what a game is made of most often."""
-    world = World(soft_contact=True, sleep_speed=0.08, collider_room=1)
+    world = World(soft_contact=True, sleep_speed=0.08, collider_room=10)
     ball = SoftBodyAsset(sphere(radius=0.25, resolution=3), RUBBER, contact=Contact(thickness=0.005))
     brick = SoftBodyAsset(box((0.5, 0.4, 0.3), (3, 2, 2)), RUBBER)
     for asset, count in ((ball, 5), (brick, 4)):
@@ -76,6 +76,14 @@ def heap_game():
             yield line("impulse", 1, (5.0, 0.0, 20.0), [])
             yield line("impulse", 5, (0.0, 3.0, 10.0), [3, 0, 1, 2])
             yield line("force", 2, (0.0, 0.0, 400.0), [])
+        if i in (130, 360):
+            for kind, size in enumerate(((1, 1, 1), (0.2, 0, 0), (0.4, 0.3, 0.2), (0.1, 0.5, 0))):
+                surface = (0.4, 0.3 if kind else -1.0, 0.01 * kind, 1, 15)
+                place = (1.2, 0.4 * kind, -0.3), turn((1, 0, 0), 0.2 * kind)
+                yield line("add_collider", kind, size, *surface, *place)
+        if i == 160:
+            yield line("remove_collider", 5)
+            yield line("drive_collider", 6, (0.0, -0.3, 0.3), (0.0, 0.0, 2.0))
         if i == 320:
             yield line("teleport", 6, (1.3, 0.0, 1.5), turn((0, 0, 1), 1.0), 1)
             yield line("velocity", 2, (0.0, 0.5, 1.0), (0.0, 0.0, 3.0))

@@ -9,8 +9,8 @@ import shutil
 import subprocess
 
 import pytest
-from conftest import ROOT
 from games import lines_of
+from native_build import ROOT
 from scenes import GAMES
 
 SOURCE = ROOT / "engine_adapter" / "native" / "csharp"

@@ -55,6 +55,15 @@ namespace TaichiSoft
             return world.GetBody(Whole());
         }
 
+        private static void AddCollider()
+        {
+            var shape = new Shape((ShapeKind)Whole(), Vector())
+            {
+                Friction = Number(), Restitution = Number(), Thickness = Number(), Group = Whole(), Mask = Whole()
+            };
+            Say(world.AddCollider(shape, Place()).ToString(CultureInfo.InvariantCulture));
+        }
+
         private static void Say(string text)
         {
             output.Write(text + "\n");
@@ -105,6 +114,8 @@ namespace TaichiSoft
             { "wake", () => world.Wake() },
             { "spawn", Spawn },
             { "despawn", () => Who().Despawn() },
+            { "add_collider", AddCollider },
+            { "remove_collider", () => world.RemoveCollider(Whole()) },
             { "move_collider", () => { int which = Whole(); world.MoveCollider(which, Place()); } },
             {
                 "drive_collider",

@@ -163,6 +163,51 @@ namespace TaichiSoft
         }
     }
 
+    /// <summary>Kinds of shapes of colliders.</summary>
+    public enum ShapeKind
+    {
+        /// <summary>Solid below a plane.</summary>
+        Plane = 0,
+        /// <summary>Size.X is the radius.</summary>
+        Sphere = 1,
+        /// <summary>Size has the edges.</summary>
+        Box = 2,
+        /// <summary>Along the axis that is up: Size.X is the radius, Size.Y the length between the centres.</summary>
+        Capsule = 3
+    }
+
+    /// <summary>What a collider is made of, and how its surface feels.</summary>
+    [StructLayout(LayoutKind.Sequential)]
+    public struct Shape
+    {
+        internal uint structSize;
+        /// <summary>What Size means.</summary>
+        public ShapeKind Kind;
+        /// <summary>[unit of length]</summary>
+        public Vector3d Size;
+        /// <summary>Coulomb's.</summary>
+        public double Friction;
+        /// <summary>0 to 1; below 0 for the bodies' own.</summary>
+        public double Restitution;
+        /// <summary>How far outside of the shape bodies meet it [unit of length].</summary>
+        public double Thickness;
+        /// <summary>Bits: two touch where each one's mask has a bit of the other's group.</summary>
+        public int Group;
+        /// <summary>See Group.</summary>
+        public int Mask;
+
+        /// <summary>With the surface that most things have.</summary>
+        public Shape(ShapeKind kind, Vector3d size) : this()
+        {
+            Kind = kind;
+            Size = size;
+            Friction = 0.5;
+            Restitution = -1.0;
+            Group = 1;
+            Mask = -1;
+        }
+    }
+
     /// <summary>How much there is in a scene.</summary>
     [StructLayout(LayoutKind.Sequential)]
     public struct SceneInfo
@@ -523,6 +568,21 @@ namespace TaichiSoft
             ulong body;
             Native.Check(Native.ts_world_get_body(handle, slot, out body), this);
             return new Body(this, body);
+        }
+
+        /// <summary>A new one, where the world was made with room for it. Returns its number.</summary>
+        public int AddCollider(Shape shape, Pose pose)
+        {
+            int collider;
+            shape.structSize = Size<Shape>.Bytes;
+            Native.Check(Native.ts_collider_add(handle, ref shape, ref pose, out collider), this);
+            return collider;
+        }
+
+        /// <summary>Take it out of the world.</summary>
+        public void RemoveCollider(int collider)
+        {
+            Native.Check(Native.ts_collider_remove(handle, collider), this);
         }
 
         /// <summary>Be there at the end of the coming step, and push who is in the way.</summary>
@@ -944,6 +1004,12 @@ namespace TaichiSoft
         [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_body_set_targets(ulong world, ulong body, int[] vertices, UIntPtr count,
             float[] targets);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_collider_add(ulong world, ref Shape shape, ref Pose pose, out int collider);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_collider_remove(ulong world, int collider);
 
         [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_collider_move_to(ulong world, int collider, ref Pose pose);

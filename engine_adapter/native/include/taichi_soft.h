@@ -132,7 +132,8 @@ TS_API ts_result ts_world_set_fixed_step(ts_world world, const ts_fixed_step* st
 TS_API ts_result ts_world_on_step(ts_world world, ts_before_step function, void* user);
 /* One step of `dt` [s] in `substeps` equal parts; 0 chooses as many as are stable. */
 TS_API ts_result ts_world_step(ts_world world, double dt, int32_t substeps);
-/* Put in the time of a frame [s] and make the steps that are due. `clock` may be null. */
+/* Put in the time of a frame [s] and make the steps that are due. `clock` may be null. Where a step fails, those
+ * before it were made. */
 TS_API ts_result ts_world_advance(ts_world world, double seconds, ts_clock* clock);
 TS_API ts_result ts_world_get_clock(ts_world world, ts_clock* clock);
 TS_API ts_result ts_world_stable_substeps(ts_world world, double dt, int32_t* substeps);
@@ -172,7 +173,7 @@ TS_API ts_result ts_body_set_velocity(ts_world world, ts_body body, const double
 /* The centre of mass to a place, turned about it, with its velocity (1) or at rest (0). */
 TS_API ts_result ts_body_teleport(ts_world world, ts_body body, const double center[3], const double turn[4],
                                   int32_t keeps_velocity);
-/* Of a list of vertices; a null list with a count of 0 stands for all. */
+/* Of a list of vertices; a count of 0 stands for all. */
 TS_API ts_result ts_body_apply_impulse(ts_world world, ts_body body, const double impulse[3],
                                        const int32_t* vertices, size_t count);
 TS_API ts_result ts_body_apply_force(ts_world world, ts_body body, const double force[3], const int32_t* vertices,
@@ -195,6 +196,23 @@ typedef struct ts_pose {
   double rotation[4];
 } ts_pose;
 
+enum { TS_PLANE = 0, TS_SPHERE = 1, TS_BOX = 2, TS_CAPSULE = 3 }; /* kinds of shapes */
+
+typedef struct ts_shape {
+  uint32_t struct_size;
+  int32_t kind;
+  double size[3];     /* edges of a box; radius of a sphere; radius and length between the centres of a capsule,
+                         which lies along the axis that is up; of a plane, whose solid is below it, nothing */
+  double friction;    /* Coulomb's, 0.5 as a rule */
+  double restitution; /* 0 to 1; below 0 for the bodies' own */
+  double thickness;   /* how far outside of the shape bodies meet it */
+  int32_t group, mask; /* bits: bodies and colliders touch where each one's mask has a bit of the other's group;
+                          1 and -1 as a rule */
+} ts_shape;
+
+/* A new one, where the world was made with `collider_room`. Its number is the lowest that is free. */
+TS_API ts_result ts_collider_add(ts_world world, const ts_shape* shape, const ts_pose* pose, int32_t* collider);
+TS_API ts_result ts_collider_remove(ts_world world, int32_t collider);
 /* Be there at the end of the coming step, and push who is in the way. */
 TS_API ts_result ts_collider_move_to(ts_world world, int32_t collider, const ts_pose* pose);
 TS_API ts_result ts_collider_set_velocity(ts_world world, int32_t collider, const double linear[3],

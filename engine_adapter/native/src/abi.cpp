@@ -117,6 +117,53 @@ Pose pose(const Turn& world, const ts_pose* host) {
   return {place(world, host->position, "position"), turn};
 }
 
+double length(const Turn& world, double host, double least, const char* name) {
+  const double found = world.axes().length_in(host);
+  if (!(found >= least && found <= 1e6)) fail(TS_ERROR_ARGUMENT, "%s is %g: give a length of %g to 1e6 m", name, host, least);
+  return found;
+}
+
+// What a collider is made of, as taichi_soft/contact/shapes has it.
+void fill_shape(const Turn& world, const ts_shape& shape, Collider* row) {
+  constexpr double kShortest = 1e-6;
+  Vector half = {0.0, 0.0, 0.0};
+  switch (shape.kind) {
+    case TS_PLANE:
+      row->parameters[2] = 1.0f;
+      half = {HUGE_VAL, HUGE_VAL, HUGE_VAL};
+      break;
+    case TS_SPHERE:
+      half[0] = half[1] = half[2] = length(world, shape.size[0], kShortest, "radius");
+      row->parameters[0] = float(half[0]);
+      break;
+    case TS_BOX: {
+      for (double each : shape.size) length(world, each, kShortest, "size");
+      const Vector size = world.axes().place_in(shape.size);
+      for (int k = 0; k < 3; ++k) half[k] = std::fabs(size[k]) / 2, row->parameters[k] = float(half[k]);
+      break;
+    }
+    case TS_CAPSULE: {
+      const double radius = length(world, shape.size[0], kShortest, "radius");
+      const double along = length(world, shape.size[1], 0.0, "length") / 2;
+      row->parameters[0] = float(radius);
+      row->parameters[1] = float(along);
+      half = {radius, radius, along + radius};
+      break;
+    }
+    default:
+      fail(TS_ERROR_ARGUMENT, "kind is %d: give TS_PLANE to TS_CAPSULE", shape.kind);
+  }
+  if (!(shape.friction >= 0.0 && shape.friction <= 1e6)) fail(TS_ERROR_ARGUMENT, "friction is %g", shape.friction);
+  if (!(shape.restitution <= 1.0)) fail(TS_ERROR_ARGUMENT, "restitution is %g: give 0 to 1", shape.restitution);
+  row->kind = shape.kind;
+  row->bounds = {{-half[0], -half[1], -half[2]}, half};
+  row->skin = length(world, shape.thickness, 0.0, "thickness") + (shape.kind == TS_BOX ? world->seam() : 0.0);
+  row->friction = shape.friction;
+  row->restitution = shape.restitution < 0.0 ? -1.0 : shape.restitution;
+  row->group = shape.group;
+  row->mask = shape.mask;
+}
+
 Vertices list(const int32_t* vertices, size_t count) {
   if (count > 0) given(vertices, "vertices");
   if (count > 100000000) fail(TS_ERROR_ARGUMENT, "count is %zu: no body has so many vertices", count);
@@ -509,6 +556,23 @@ ts_result ts_body_set_targets(ts_world world, ts_body body, const int32_t* verti
     const Turn turn(world);
     turn->set_targets(turn->slot_of(body), list(vertices, count), given(targets, "targets"));
   });
+}
+
+ts_result ts_collider_add(ts_world world, const ts_shape* shape, const ts_pose* where, int32_t* collider) {
+  return guarded([&] {
+    const Turn turn(world);
+    sized(shape, "shape");
+    given(collider, "collider");
+    Collider row{};
+    row.is_alive = true;
+    row.pose = pose(turn, where);
+    fill_shape(turn, *shape, &row);
+    *collider = turn->add_collider(row);
+  });
+}
+
+ts_result ts_collider_remove(ts_world world, int32_t collider) {
+  return guarded([&] { Turn(world)->remove_collider(collider); });
 }
 
 ts_result ts_collider_move_to(ts_world world, int32_t collider, const ts_pose* where) {

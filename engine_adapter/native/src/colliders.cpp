@@ -60,11 +60,16 @@ Colliders::Colliders(const Archive& archive) {
   const auto alive = archive.get<int32_t>("colliders/alive");
   const auto pose = archive.rows<double>("colliders/pose", 7), motion = archive.rows<double>("colliders/motion", 6);
   const auto target = archive.rows<double>("colliders/target", 8), bounds = archive.rows<double>("colliders/bounds", 6);
-  const auto skin = archive.get<double>("colliders/skin");
+  const auto skin = archive.get<double>("colliders/skin"), seams = archive.get<double>("colliders/seam");
+  const auto kind = archive.get<int32_t>("colliders/kind"), filter = archive.rows<int32_t>("colliders/filter", 2);
+  const auto parameters = archive.rows<float>("colliders/parameters", 8);
+  const auto surface = archive.rows<double>("colliders/surface", 2);
   const size_t n = alive.count;
-  if (pose.count != 7 * n || motion.count != 6 * n || target.count != 8 * n || bounds.count != 6 * n || skin.count != n) {
+  if (kind.count != n || filter.count != 2 * n || parameters.count != 8 * n || surface.count != 2 * n ||
+      seams.count != 1 || pose.count != 7 * n || motion.count != 6 * n || target.count != 8 * n || bounds.count != 6 * n || skin.count != n) {
     fail(TS_ERROR_FILE, "the world file is not in order: colliders. Export it again");
   }
+  seam = seams[0];
   for (size_t i = 0; i < n; ++i) {
     const double *m = motion.data + 6 * i, *b = bounds.data + 6 * i;
     rows.push_back({alive[i] != 0,
@@ -74,8 +79,21 @@ Colliders::Colliders(const Archive& archive) {
                     target[8 * i] != 0.0,
                     pose_from(target.data + 8 * i + 1),
                     {{b[0], b[1], b[2]}, {b[3], b[4], b[5]}},
-                    skin[i]});
+                    skin[i],
+                    kind[i],
+                    {},
+                    surface[2 * i],
+                    surface[2 * i + 1],
+                    filter[2 * i],
+                    filter[2 * i + 1]});
+    std::copy(parameters.data + 8 * i, parameters.data + 8 * i + 8, rows.back().parameters);
   }
+}
+
+int32_t Colliders::free_row() const {
+  size_t row = 0;
+  while (row < rows.size() && rows[row].is_alive) ++row;
+  return int32_t(row);
 }
 
 bool Colliders::prepare(double dt, std::vector<ColliderMotion>* motion) {

@@ -1,6 +1,7 @@
 // Where colliders are and how they move: as taichi_soft/contact/colliders.py has it, number by number.
 #pragma once
 
+#include <cstdint>
 #include <utility>
 #include <vector>
 
@@ -25,7 +26,11 @@ struct Collider {
   bool has_target;
   Pose target;  // at the end of the coming step
   Box bounds;   // in its own frame
-  double skin;
+  double skin;  // its thickness, and what its edges need
+  int32_t kind;  // as in taichi_soft/contact/distances/kinds.py
+  float parameters[8];
+  double friction, restitution;  // the latter -1 for that of the bodies
+  int32_t group, mask;
 
   bool moves() const;
   // Round its way through `dt` [s], and its highest speed [m/s].
@@ -45,7 +50,10 @@ class Colliders {
   bool prepare(double dt, std::vector<ColliderMotion>* motion);
   void finish(double dt);
 
+  int32_t free_row() const;  // for a new collider: it may be one behind the last
+
   std::vector<Collider> rows;
+  double seam = 0.0;  // skin of what has flat faces, beside its thickness [m]
   bool is_dirty = true;  // whether poses or velocities differ from what the fields hold
 };
 

@@ -74,7 +74,13 @@ void World::bind() {
     const Place place = s.place(std::string("contact.collider_") + kColliderFields[i]);
     if (place.count < colliders_.rows.size()) fail(TS_ERROR_FILE, "the world file has no room for its colliders");
     collider_[i] = {root, place};
+    collider_room_ = place.count;
   }
+  collider_parameters_ = {root, s.place("contact.collider_parameters")};
+  collider_surface_ = {root, s.place("contact.collider_surface")};
+  collider_kind_ = {root, s.place("contact.collider_kind")};
+  collider_filter_ = {root, s.place("contact.collider_filter")};
+  collider_count_ = {root, s.place("contact.collider_count")};
 }
 
 // ---- steps ----
@@ -633,6 +639,46 @@ Collider& World::collider(int32_t number) {
   return colliders_.rows[size_t(number)];
 }
 
+int32_t World::add_collider(const Collider& row) {
+  if (!scene_->has_contact) {
+    fail(TS_ERROR_STATE, "this world was made without contact: give it collider_room before exporting");
+  }
+  const int32_t number = colliders_.free_row();
+  if (size_t(number) >= collider_room_) {
+    fail(TS_ERROR_STATE, "there is room for %zu colliders and all are in use: export with a larger collider_room",
+         collider_room_);
+  }
+  if (size_t(number) == colliders_.rows.size()) colliders_.rows.push_back(row);
+  colliders_.rows[size_t(number)] = row;
+  write_colliders();
+  double speed;
+  wake_near(row.way(0.0, &speed));
+  return number;
+}
+
+void World::remove_collider(int32_t number) {
+  Collider& row = collider(number);
+  row.is_alive = false;
+  write_colliders();
+  double speed;
+  wake_near(row.way(0.0, &speed));
+}
+
+void World::write_colliders() {
+  collider_count_(0) = int32_t(colliders_.rows.size());
+  for (size_t c = 0; c < colliders_.rows.size(); ++c) {
+    const Collider& row = colliders_.rows[c];
+    collider_kind_(c) = row.is_alive ? row.kind : -1;
+    for (int k = 0; k < 8; ++k) collider_parameters_(c, k) = row.parameters[k];
+    collider_surface_(c, 0) = as_float(row.friction);
+    collider_surface_(c, 1) = as_float(row.restitution);
+    collider_surface_(c, 2) = as_float(row.skin);
+    collider_filter_(c, 0) = row.group;
+    collider_filter_(c, 1) = row.mask;
+  }
+  colliders_.is_dirty = true;
+}
+
 void World::move_collider(int32_t number, const Pose& pose) {
   Collider& row = collider(number);
   row.target = pose;
@@ -713,6 +759,7 @@ struct SnapshotHead {
   uint64_t mark, size;
   uint32_t scene, sum;
   int64_t steps;
+  uint64_t colliders;
   double time, last_dt, remainder, dropped;
 };
 
@@ -738,6 +785,7 @@ size_t World::snapshot_size() const {
 void World::snapshot(char* bytes) const {
   SnapshotHead head{};
   head.mark = kSnapshotMark, head.size = snapshot_size(), head.scene = scene_->code;
+  head.colliders = colliders_.rows.size();
   head.steps = steps_, head.time = time_, head.last_dt = last_dt_, head.remainder = remainder_, head.dropped = dropped_;
   char* at = bytes + sizeof head;
   for (const Carried& each : scene_->carried) {
@@ -763,7 +811,10 @@ void World::restore(const char* bytes, size_t size) {
   std::memcpy(&head, bytes, sizeof head);
   if (head.mark != kSnapshotMark) fail(TS_ERROR_SNAPSHOT, "these bytes are no snapshot");
   if (head.scene != scene_->code) fail(TS_ERROR_SNAPSHOT, "this snapshot is of another world file");
-  if (head.size != size || size != snapshot_size()) fail(TS_ERROR_SNAPSHOT, "this snapshot is cut off");
+  const size_t others = snapshot_size() - sizeof(Collider) * colliders_.rows.size();
+  if (head.size != size || size != others + sizeof(Collider) * head.colliders || head.colliders > collider_room_) {
+    fail(TS_ERROR_SNAPSHOT, "this snapshot is cut off");
+  }
   std::vector<char> whole(bytes, bytes + size);
   const uint32_t sum = head.sum;
   head.sum = 0;
@@ -778,7 +829,9 @@ void World::restore(const char* bytes, size_t size) {
   }
   take(&at, frames_.data(), frames_.size());
   take(&at, generations_.data(), generations_.size());
+  colliders_.rows.resize(size_t(head.colliders));
   take(&at, colliders_.rows.data(), colliders_.rows.size());
+  if (scene_->has_contact) write_colliders();
   steps_ = head.steps, time_ = head.time, last_dt_ = head.last_dt;
   remainder_ = head.remainder, dropped_ = head.dropped;
   colliders_.is_dirty = has_work_ = true;

@@ -82,6 +82,9 @@ class World {
 
   // Colliders and frames.
   Collider& collider(int32_t number);
+  int32_t add_collider(const Collider& row);
+  void remove_collider(int32_t number);
+  double seam() const { return colliders_.seam; }
   void move_collider(int32_t number, const Pose& pose);
   void set_collider_velocity(int32_t number, const Vector& linear, const Vector& spin);
   void teleport_collider(int32_t number, const Pose& pose);
@@ -97,6 +100,7 @@ class World {
  private:
   void bind();
   void require_step(double dt) const;
+  void write_colliders();
   bool aim_pins(double dt);
   bool prepare_colliders(double dt);
   void launch_step(int32_t substeps, double h);
@@ -134,7 +138,9 @@ class World {
 
   Field<int32_t> body_status_, body_drives_, particle_aim_, is_awake_, failed_, island_count_;
   Field<float> position_, velocity_, mass_, inv_mass_, lag_, gravity_scale_, damping_, wind_;
-  Field<float> collider_[7];
+  Field<float> collider_[7], collider_parameters_, collider_surface_;
+  Field<int32_t> collider_kind_, collider_filter_, collider_count_;
+  size_t collider_room_ = 0;
 };
 
 }  // namespace taichi_soft

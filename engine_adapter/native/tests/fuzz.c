@@ -94,7 +94,7 @@ static ts_result one_call(ts_world world) {
   const ts_body body = any_body(world);
   size_t count = 0;
   const int32_t* which = list(&count);
-  switch (below(36)) {
+  switch (below(39)) {
     case 0: case 1: case 2: return ts_world_step(world, one_in(8) ? number() : 0.01, one_in(8) ? whole(50) : 4);
     case 3: {
       ts_clock clock = {size_of(sizeof clock), 0, 0, 0, 0, 0};
@@ -159,6 +159,18 @@ static ts_result one_call(ts_world world) {
       int32_t found = 0;
       return ts_world_stable_substeps(world, number(), one_in(10) ? NULL : &found);
     }
+    case 35: case 36: {
+      ts_shape shape;
+      int32_t made = 0;
+      memset(&shape, 0, sizeof shape);
+      shape.struct_size = size_of(sizeof shape);
+      shape.kind = whole(4);
+      for (int i = 0; i < 3; ++i) shape.size[i] = number();
+      shape.friction = number(), shape.restitution = number(), shape.thickness = number();
+      shape.group = 1, shape.mask = whole(9);
+      return ts_collider_add(world, one_in(20) ? NULL : &shape, pose(), one_in(20) ? NULL : &made);
+    }
+    case 37: return ts_collider_remove(world, whole(6));
     default: {
       double center[3];
       return ts_body_center(world, body, one_in(10) ? NULL : center);

@@ -164,6 +164,23 @@ static void play(const char* call) {
     check(ts_world_spawn(world, asset, &place, &found));
   }
   CALL("despawn") check(ts_world_despawn(world, body()));
+  CALL("add_collider") {
+    ts_shape shape;
+    int32_t made = 0;
+    memset(&shape, 0, sizeof shape);
+    shape.struct_size = sizeof shape;
+    shape.kind = whole();
+    numbers(shape.size, 3);
+    shape.friction = number();
+    shape.restitution = number();
+    shape.thickness = number();
+    shape.group = whole();
+    shape.mask = whole();
+    const ts_pose where = pose();
+    check(ts_collider_add(world, &shape, &where, &made));
+    printf("%d\n", (int)made);
+  }
+  CALL("remove_collider") check(ts_collider_remove(world, whole()));
   CALL("move_collider") {
     const int32_t which = whole();
     const ts_pose where = pose();
