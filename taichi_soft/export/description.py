@@ -99,6 +99,7 @@ def _of_asset(asset: SoftBodyAsset) -> Arrays:
         "pinned": _ints(asset.description.pinned),
         "outer": _ints(outer_vertices(asset.mesh)),
         "rank": _ints(asset.arrays.rank),
+        "surface": _ints(asset.mesh.surface).reshape(-1, 3),
         "thickness": _floats([asset.surface_row[1]]),
     }
 

@@ -15,6 +15,7 @@ from taichi_soft.control.kernels.rigid_motion import jump, write_rigid_velocity
 from taichi_soft.core.runtime import device, ti
 from taichi_soft.export.kernels.root import read_root
 from taichi_soft.export.meshes import ExportedMesh
+from taichi_soft.queries.kernels import find_closest, find_hits
 from taichi_soft.solver.context import WorldContext
 from taichi_soft.solver.kernels.sleep import wake_body, wake_near
 from taichi_soft.solver.kernels.spawn import despawn_body, spawn_body
@@ -36,6 +37,7 @@ _SERIAL = {
     "free_particles": free_particles,
     "write_targets": write_targets,
     "read_positions": read_positions,
+    "find_closest": find_closest,
     "read_root": read_root,
 }
 """Those that every world has, by name."""
@@ -52,6 +54,7 @@ def kernels_of(context: WorldContext, meshes: Sequence[ExportedMesh]) -> Kernels
         found["step"] = _example(step_in_turn, state=state, program=program)
     else:
         found["step"] = _example(step_per_body, state=state, program=program)
+    found["find_hits"] = _example(find_hits, state=state, is_serial=True)
     if context.built.sleeps:
         found["wake_body"] = _example(wake_body, state=state)
         found["wake_near"] = _example(wake_near, state=state)

@@ -133,6 +133,24 @@ class Player:
     def despawn(self):
         self.world.despawn(self.body())
 
+    def say_hit(self, hit):
+        if hit is None:
+            self.say("nothing")
+            return
+        row = [hit.distance, *hit.barycentrics, *hit.point, *hit.normal]
+        self.say(" ".join(map(str, [hit.body.index, *hit.vertices.tolist(), hash_of(row)])))
+
+    def raycast(self):
+        origin, direction, (reach,) = self.take(3), self.take(3), self.take(1)
+        self.say_hit(self.world.raycast(origin, direction, max_distance=reach, cull_back=True))
+
+    def closest(self):
+        point, (reach,) = self.take(3), self.take(1)
+        found = self.world.closest_point(point, max_distance=reach)
+        self.say_hit(found)
+        if found is not None:
+            self.say(str(int(found.is_inside)))
+
     def add_collider(self):
         kind, (x, y, z) = self.whole(), self.take(3)
         shapes = PlaneShape, lambda: SphereShape(x), lambda: BoxShape((x, y, z)), lambda: CapsuleShape(x, y)

@@ -90,6 +90,14 @@ def heap_game():
         if i == 340:
             yield line("restore")
         yield line("step", DT, 0)
+        if i % 20 == 0:
+            yield line(
+                "raycast",
+                (rng.uniform(-1, 2), -4.0, rng.uniform(0, 1)),
+                (0.0, 1.0, rng.uniform(-0.1, 0.1)),
+                9.0,
+            )
+            yield line("closest", rng.uniform(-1, 2, 3), 1.0)
         if i % 50 == 0:
             for collider in range(4):
                 yield line("collider_impulse", collider)

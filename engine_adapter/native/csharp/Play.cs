@@ -55,6 +55,41 @@ namespace TaichiSoft
             return world.GetBody(Whole());
         }
 
+        private static void Raycast()
+        {
+            Hit hit;
+            Body body;
+            Vector3d origin = Vector(), direction = Vector();
+            SayHit(world.Raycast(origin, direction, Number(), out hit, out body), hit, body);
+        }
+
+        private static void Closest()
+        {
+            Hit hit;
+            Body body;
+            Vector3d point = Vector();
+            bool isThere = world.Closest(point, Number(), out hit, out body);
+            SayHit(isThere, hit, body);
+            if (isThere)
+            {
+                Say(hit.IsInside ? "1" : "0");
+            }
+        }
+
+        private static void SayHit(bool isThere, Hit hit, Body body)
+        {
+            if (!isThere)
+            {
+                Say("nothing");
+                return;
+            }
+            Vector3d w = hit.Weights, x = hit.Point, n = hit.Normal;
+            string row = HashOf((float)hit.Distance, (float)w.X, (float)w.Y, (float)w.Z, (float)x.X, (float)x.Y,
+                (float)x.Z, (float)n.X, (float)n.Y, (float)n.Z);
+            Say(string.Format(CultureInfo.InvariantCulture, "{0} {1} {2} {3} {4}", (body.Id & 0xFFFFFFFF) - 1,
+                hit.Vertex0, hit.Vertex1, hit.Vertex2, row));
+        }
+
         private static void AddCollider()
         {
             var shape = new Shape((ShapeKind)Whole(), Vector())
@@ -114,6 +149,8 @@ namespace TaichiSoft
             { "wake", () => world.Wake() },
             { "spawn", Spawn },
             { "despawn", () => Who().Despawn() },
+            { "raycast", Raycast },
+            { "closest", Closest },
             { "add_collider", AddCollider },
             { "remove_collider", () => world.RemoveCollider(Whole()) },
             { "move_collider", () => { int which = Whole(); world.MoveCollider(which, Place()); } },

@@ -208,6 +208,33 @@ namespace TaichiSoft
         }
     }
 
+    /// <summary>Where a ray meets a surface first, or the point of one that is nearest.</summary>
+    [StructLayout(LayoutKind.Sequential)]
+    public struct Hit
+    {
+        internal uint structSize;
+        /// <summary>Of the body's own surface, not of a mesh that it carries; -1 for a body without any.</summary>
+        public readonly int Triangle;
+        internal readonly ulong body;
+        /// <summary>[unit of length]</summary>
+        public readonly double Distance;
+        /// <summary>Of the three vertices; their sum is 1.</summary>
+        public readonly Vector3d Weights;
+        /// <summary>[unit of length]</summary>
+        public readonly Vector3d Point;
+        /// <summary>Of length 1, outward.</summary>
+        public readonly Vector3d Normal;
+        /// <summary>Corners of the triangle.</summary>
+        public readonly int Vertex0, Vertex1, Vertex2;
+        private readonly int isInside;
+
+        /// <summary>Of the nearest point: whether the point asked for lies in the body.</summary>
+        public bool IsInside
+        {
+            get { return isInside != 0; }
+        }
+    }
+
     /// <summary>How much there is in a scene.</summary>
     [StructLayout(LayoutKind.Sequential)]
     public struct SceneInfo
@@ -568,6 +595,24 @@ namespace TaichiSoft
             ulong body;
             Native.Check(Native.ts_world_get_body(handle, slot, out body), this);
             return new Body(this, body);
+        }
+
+        /// <summary>The first surface on a ray, back faces left out; false where there is none.</summary>
+        public bool Raycast(Vector3d origin, Vector3d direction, double maxDistance, out Hit hit, out Body body)
+        {
+            hit = new Hit { structSize = Size<Hit>.Bytes };
+            Native.Check(Native.ts_world_raycast(handle, ref origin, ref direction, maxDistance, ref hit), this);
+            body = new Body(this, hit.body);
+            return hit.body != 0;
+        }
+
+        /// <summary>The nearest point of all surfaces; false where none is near enough.</summary>
+        public bool Closest(Vector3d point, double maxDistance, out Hit hit, out Body body)
+        {
+            hit = new Hit { structSize = Size<Hit>.Bytes };
+            Native.Check(Native.ts_world_closest(handle, ref point, maxDistance, ref hit), this);
+            body = new Body(this, hit.body);
+            return hit.body != 0;
         }
 
         /// <summary>A new one, where the world was made with room for it. Returns its number.</summary>
@@ -1004,6 +1049,13 @@ namespace TaichiSoft
         [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_body_set_targets(ulong world, ulong body, int[] vertices, UIntPtr count,
             float[] targets);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_world_raycast(ulong world, ref Vector3d origin, ref Vector3d direction,
+            double reach, ref Hit hit);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_world_closest(ulong world, ref Vector3d point, double reach, ref Hit hit);
 
         [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_collider_add(ulong world, ref Shape shape, ref Pose pose, out int collider);

@@ -189,6 +189,25 @@ TS_API ts_result ts_body_unpin(ts_world world, ts_body body, const int32_t* vert
 TS_API ts_result ts_body_set_targets(ts_world world, ts_body body, const int32_t* vertices, size_t count,
                                      const float* targets);
 
+/* ---- questions ---- */
+
+typedef struct ts_hit {
+  uint32_t struct_size;
+  int32_t triangle; /* of the body's own surface, not of a mesh that it carries; -1 for a body without any */
+  ts_body body;     /* 0 where there is nothing; then nothing else is written */
+  double distance;
+  double weights[3]; /* of the three vertices; their sum is 1 */
+  double point[3], normal[3]; /* the latter of unit length, outward */
+  int32_t vertices[3];
+  int32_t is_inside; /* of the nearest point: whether the point asked for lies in the body */
+} ts_hit;
+
+/* The first surface on a ray, back faces left out. `reach`, the farthest distance, may be infinite. */
+TS_API ts_result ts_world_raycast(ts_world world, const double origin[3], const double direction[3],
+                                  double reach, ts_hit* hit);
+/* The nearest point of all surfaces. */
+TS_API ts_result ts_world_closest(ts_world world, const double point[3], double reach, ts_hit* hit);
+
 /* ---- colliders and frames, by their numbers in the scene ---- */
 
 typedef struct ts_pose {

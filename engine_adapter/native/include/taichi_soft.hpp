@@ -7,6 +7,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -143,6 +144,20 @@ class World {
   }
   void apply_force(Body body, const Vector& force, const std::vector<int32_t>& vertices = {}) {
     check(ts_body_apply_force(handle_, body.handle, force.data(), vertices.data(), vertices.size()));
+  }
+
+  // Its body is 0 where nothing is met.
+  ts_hit raycast(const Vector& origin, const Vector& direction, double max_distance = HUGE_VAL) const {
+    ts_hit found{};
+    found.struct_size = sizeof found;
+    check(ts_world_raycast(handle_, origin.data(), direction.data(), max_distance, &found));
+    return found;
+  }
+  ts_hit closest(const Vector& point, double max_distance = HUGE_VAL) const {
+    ts_hit found{};
+    found.struct_size = sizeof found;
+    check(ts_world_closest(handle_, point.data(), max_distance, &found));
+    return found;
   }
 
   void move_collider(int32_t collider, const Pose& pose) {

@@ -184,6 +184,22 @@ void require_size(size_t count, size_t needed, const char* name) {
   if (count != needed) fail(TS_ERROR_SIZE, "%s has room for %zu numbers: give room for %zu", name, count, needed);
 }
 
+double as_reach(const Turn& world, double host) {
+  if (!(host > 0.0)) fail(TS_ERROR_ARGUMENT, "reach is %g: give a length above 0", host);
+  return world.axes().length_in(host);
+}
+
+void write_hit(const Turn& world, const Hit& found, ts_hit* hit) {
+  hit->body = found.slot < 0 ? 0 : world->body_in(found.slot);
+  if (found.slot < 0) return;
+  hit->triangle = found.triangle;
+  hit->is_inside = found.is_inside;
+  hit->distance = found.distance * world.axes().scale();
+  world.axes().place_out(found.point, hit->point);
+  world.axes().normal_out(found.normal, hit->normal);
+  for (int k = 0; k < 3; ++k) hit->weights[k] = found.weights[k], hit->vertices[k] = found.vertices[k];
+}
+
 const Mesh& mesh_of(const Scene& scene, int32_t mesh) {
   if (mesh < 0 || size_t(mesh) >= scene.meshes.size()) {
     fail(TS_ERROR_ARGUMENT, "there is no mesh %d: there are %zu, from 0", mesh, scene.meshes.size());
@@ -555,6 +571,24 @@ ts_result ts_body_set_targets(ts_world world, ts_body body, const int32_t* verti
   return guarded([&] {
     const Turn turn(world);
     turn->set_targets(turn->slot_of(body), list(vertices, count), given(targets, "targets"));
+  });
+}
+
+ts_result ts_world_raycast(ts_world world, const double origin[3], const double direction[3], double reach,
+                           ts_hit* hit) {
+  return guarded([&] {
+    const Turn turn(world);
+    sized(hit, "hit");
+    const Vector way = turn.axes().place_in(finite(direction, 3, "direction"));
+    write_hit(turn, turn->first_hit(place(turn, origin, "origin"), way, as_reach(turn, reach)), hit);
+  });
+}
+
+ts_result ts_world_closest(ts_world world, const double point[3], double reach, ts_hit* hit) {
+  return guarded([&] {
+    const Turn turn(world);
+    sized(hit, "hit");
+    write_hit(turn, turn->closest(place(turn, point, "point"), as_reach(turn, reach)), hit);
   });
 }
 

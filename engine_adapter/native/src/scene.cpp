@@ -107,12 +107,14 @@ void Scene::read_assets() {
                    archive.get<int32_t>(prefix + "pinned"),
                    archive.get<int32_t>(prefix + "outer"),
                    archive.get<int32_t>(prefix + "rank"),
+                   archive.rows<int32_t>(prefix + "surface", 3),
                    0.0,
                    0};
     const auto center = archive.get<double>(prefix + "center"), skin = archive.get<double>(prefix + "thickness");
     const size_t n = asset.vertex_count();
     if (asset.rest_rows.count != 8 * n || asset.vertices.count != 3 * n || asset.rank.count != n || center.count != 3 ||
-        skin.count != 1 || !are_below(asset.pinned, n) || !are_below(asset.outer, n) || !are_below(asset.rank, n)) {
+        skin.count != 1 || !are_below(asset.pinned, n) || !are_below(asset.outer, n) || !are_below(asset.rank, n) ||
+        !are_below(asset.surface, n)) {
       out_of_order("an asset");
     }
     asset.center = {center[0], center[1], center[2]};

@@ -28,7 +28,7 @@ struct Asset {
   Archive::View<double> vertices;  // (n, 3)
   Archive::View<double> masses;
   Vector center;
-  Archive::View<int32_t> pinned, outer, rank;
+  Archive::View<int32_t> pinned, outer, rank, surface;
   double thickness;
   int32_t slot_count;
   size_t vertex_count() const { return masses.count; }

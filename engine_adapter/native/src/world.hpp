@@ -31,6 +31,17 @@ struct Vertices {  // a list of a body's vertices; none given stands for all
   size_t count;
 };
 
+// Where a ray meets a surface, or the point of one that is nearest.
+struct Hit {
+  int32_t slot = -1;  // of the body; -1 for none
+  int32_t triangle;
+  int32_t vertices[3];
+  double distance;
+  double weights[3];
+  Vector point, normal;
+  bool is_inside = false;
+};
+
 class World {
  public:
   explicit World(std::shared_ptr<Scene> scene);
@@ -80,6 +91,9 @@ class World {
   void set_wind(const Vector& velocity, double density, double drag);
   void radial_impulse(const Vector& center, double impulse, double radius);
 
+  Hit first_hit(const Vector& origin, const Vector& direction, double farthest);
+  Hit closest(const Vector& point, double farthest);
+
   // Colliders and frames.
   Collider& collider(int32_t number);
   int32_t add_collider(const Collider& row);
@@ -99,6 +113,8 @@ class World {
 
  private:
   void bind();
+  uint32_t give_living();
+  Hit hit_from(const float* row) const;
   void require_step(double dt) const;
   void write_colliders();
   bool aim_pins(double dt);

@@ -94,7 +94,7 @@ static ts_result one_call(ts_world world) {
   const ts_body body = any_body(world);
   size_t count = 0;
   const int32_t* which = list(&count);
-  switch (below(39)) {
+  switch (below(41)) {
     case 0: case 1: case 2: return ts_world_step(world, one_in(8) ? number() : 0.01, one_in(8) ? whole(50) : 4);
     case 3: {
       ts_clock clock = {size_of(sizeof clock), 0, 0, 0, 0, 0};
@@ -171,6 +171,13 @@ static ts_result one_call(ts_world world) {
       return ts_collider_add(world, one_in(20) ? NULL : &shape, pose(), one_in(20) ? NULL : &made);
     }
     case 37: return ts_collider_remove(world, whole(6));
+    case 38: case 39: {
+      ts_hit hit;
+      memset(&hit, 0, sizeof hit);
+      hit.struct_size = size_of(sizeof hit);
+      if (one_in(2)) return ts_world_closest(world, numbers(3), number(), one_in(20) ? NULL : &hit);
+      return ts_world_raycast(world, numbers(3), numbers(3), number(), one_in(20) ? NULL : &hit);
+    }
     default: {
       double center[3];
       return ts_body_center(world, body, one_in(10) ? NULL : center);

@@ -72,6 +72,22 @@ static ts_pose pose(void) {
   return found;
 }
 
+static void print_hit(const ts_hit* hit) {
+  float row[10];
+  if (hit->body == 0) {
+    printf("nothing\n");
+    return;
+  }
+  row[0] = (float)hit->distance;
+  for (int i = 0; i < 3; ++i) {
+    row[1 + i] = (float)hit->weights[i];
+    row[4 + i] = (float)hit->point[i];
+    row[7 + i] = (float)hit->normal[i];
+  }
+  printf("%d %d %d %d %016" PRIx64 "\n", (int)(hit->body & 0xFFFFFFFFu) - 1, (int)hit->vertices[0],
+         (int)hit->vertices[1], (int)hit->vertices[2], hash_of(row, 10));
+}
+
 static float rows[3 * MOST], normals[3 * MOST];
 static int32_t vertices[MOST];
 static char* kept;
@@ -164,6 +180,21 @@ static void play(const char* call) {
     check(ts_world_spawn(world, asset, &place, &found));
   }
   CALL("despawn") check(ts_world_despawn(world, body()));
+  CALL("raycast") {
+    ts_hit hit;
+    hit.struct_size = sizeof hit;
+    numbers(a, 6);
+    check(ts_world_raycast(world, a, a + 3, number(), &hit));
+    print_hit(&hit);
+  }
+  CALL("closest") {
+    ts_hit hit;
+    hit.struct_size = sizeof hit;
+    numbers(a, 3);
+    check(ts_world_closest(world, a, number(), &hit));
+    print_hit(&hit);
+    if (hit.body != 0) printf("%d\n", (int)hit.is_inside);
+  }
   CALL("add_collider") {
     ts_shape shape;
     int32_t made = 0;
