@@ -22,7 +22,7 @@ from taichi_soft.core.runtime import device
 from taichi_soft.export.archive import words
 from taichi_soft.export.layout import FLOAT, WHOLE, image_of, place_of, places_of
 from taichi_soft.export.meshes import ExportedMesh
-from taichi_soft.persistence.kernels.packing import carried, owners
+from taichi_soft.persistence.kernels.packing import OWNERS, carried, owners
 from taichi_soft.persistence.snapshot import carried_rows
 from taichi_soft.solver.context import WorldContext
 
@@ -32,7 +32,7 @@ Arrays = dict[str, NDArray[Any]]
 def description_of(
     context: WorldContext, meshes: Sequence[ExportedMesh], names: Mapping[str, Sequence[str]], axes: Any
 ) -> Arrays:
-    """Arrays by name: see `engine_adapter/native/src/world_file.cpp`, which reads them."""
+    """Arrays by name: see `engine_adapter/native/src/scene.cpp`, which reads them."""
     arrays: Arrays = {
         "package": words([version("taichi-soft"), version("taichi")]),
         "host_axes": np.asarray(axes, dtype=np.float64),
@@ -76,11 +76,18 @@ def _of_fields(context: WorldContext) -> Arrays:
     state = context.built.state
     places = places_of(state)
     rows = carried_rows(context)
-    kept = [(place_of(f), rows[owner]) for owner in owners(state) for f, _, _ in carried(state, owner)]
+    # What no call of the library changes, and kernels find their way by.
+    slices = [name for name, groups in state.carried.items() for _ in groups]
+    fixed = [False] * len(OWNERS) + [name != "colliders" for name in slices]
+    kept = [
+        (place_of(field), rows[owner], fixed[owner])
+        for owner in owners(state)
+        for field, _, _ in carried(state, owner)
+    ]
     return {
         "fields/names": words(list(places)),
         "fields/places": np.array([_plain(each) for each in places.values()], dtype=np.int64),
-        "fields/carried": np.array([(*_plain(each), count) for each, count in kept], dtype=np.int64),
+        "fields/carried": np.array([(*_plain(each), *more) for each, *more in kept], dtype=np.int64),
         "fields/image": image_of(state),
     }
 

@@ -72,6 +72,14 @@ def export_world(
         part.remove()
 
 
+def _told_apart(names: list[str]) -> list[str]:
+    """Names of which none is there twice: later ones get their number behind them."""
+    found: list[str] = []
+    for i, name in enumerate(names):
+        found.append(f"{name}#{i}" if name in found else name)
+    return found
+
+
 def _written(
     context: WorldContext, path: Path, part: PartFolder, matrix: Any, given: dict[Any, str]
 ) -> ExportReport:
@@ -90,6 +98,7 @@ def _written(
     }
     meshes = [mesh for i, asset in enumerate(assets) for mesh in meshes_of(i, asset, names["asset"][i])]
     names["mesh"] = [mesh.name for mesh in meshes]
+    names = {kind: _told_apart(each) for kind, each in names.items()}
     arrays = description_of(context, meshes, names, matrix)
     kernels = kernels_of(context, meshes)
     new = part.path / path.name
@@ -105,5 +114,9 @@ def _written(
     (new / WORLD).write_bytes(whole)
     if path.exists():
         path.rename(part.path / "before")
-    new.rename(path)
+    try:
+        new.rename(path)
+    except OSError:
+        (part.path / "before").rename(path)
+        raise
     return ExportReport(path, len(whole) + sum(map(len, contents)), len(kernels), names)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from taichi_soft.bodies.soft_body import present_asset, record_of
+from taichi_soft.bodies.status import SKIPPING
 from taichi_soft.core.errors import OptionError
 from taichi_soft.core.runtime import device
 from taichi_soft.core.types import Schedule
@@ -40,8 +41,14 @@ def _of_assets(context: WorldContext) -> list[str]:
 
 
 def _of_bodies(context: WorldContext) -> list[str]:
-    return [
+    found = [
         f"body {body.index} was given another material: make its asset of that"
         for body in context.slots.living
         if record_of(body).description is not present_asset(body).description
+    ]
+    status = context.built.state.body_status.to_numpy()
+    return found + [
+        f"body {body.index} skips the coming step: make a step before"
+        for body in context.slots.living
+        if status[body.index] == SKIPPING
     ]

@@ -196,7 +196,7 @@ class Player:
 
     def mesh(self):
         body, number = self.body(), self.whole()
-        rows, normals = self.world.read_render_mesh(self.meshes[number](body), 0.0)
+        rows, normals = self.world.read_render_mesh(self.meshes[number](body), 1.0)
         self.say(f"{hash_of(rows)} {hash_of(normals)}")
 
     def collider_impulse(self):

@@ -5,18 +5,10 @@ import json
 import os
 import subprocess
 import sys
-from ctypes import (
-    byref,
-    c_char_p,
-    c_double,
-    c_float,
-    c_int32,
-    c_size_t,
-    c_uint32,
-    c_uint64,
-)
+from ctypes import byref, c_char_p, c_double, c_float, c_int32, c_size_t, c_uint32, c_uint64
 from pathlib import Path
 
+c_int64 = ctypes.c_int64
 OK, ARGUMENT, HANDLE, BUSY, FILE, VERSION, SIZE, STATE, SNAPSHOT, RUNTIME = range(0, -10, -1)
 
 
@@ -120,6 +112,6 @@ def in_process(native, code, *arguments):
 
 __all__ = [
     *("ARGUMENT", "BUSY", "FILE", "HANDLE", "OK", "RUNTIME", "SIZE", "SNAPSHOT", "STATE", "VERSION"),
-    *("Library", "Placement", "Pose", "RefusedError", "byref", "c_double", "c_float", "c_int32"),
+    *("Library", "Placement", "Pose", "RefusedError", "byref", "c_double", "c_float", "c_int32", "c_int64"),
     *("c_size_t", "c_uint32", "c_uint64", "in_process", "vector"),
 ]

@@ -107,6 +107,8 @@ def heap_game():
                 yield line("positions", slot, 1.0)
                 yield line("positions", slot, 0.25)
                 yield line("mesh", slot, int(slot == 5))
+        if i in (420, 430):
+            yield line("unpin", 1, [])  # nobody is pinned, and yet it wakes who sleeps
     yield line("stable_substeps", DT)
 
 
@@ -145,6 +147,10 @@ def free_game():
         if i == 70:
             yield line("wind", (3.0, 1.0, 0.0), 1.2, 1.5)
             yield line("sheltered", 3, 1)
+        if i == 400:
+            yield line("despawn", 1)  # what hung from the frame
+        if i == 420:
+            yield line("spawn", 1, (0.0, 0.5, 1.0), UPRIGHT, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
         if i == 250:
             yield line("sheltered", 3, 0)
             yield line("gravity_scale", 3, -0.2)
@@ -158,7 +164,7 @@ def free_game():
             yield line("teleport", 4, (3.0, 1.0, 2.0), turn((1, 1, 0), 2.0), 0)
         yield line("step", DT, 0 if i % 3 else 12)
         if i % 60 == 0:
-            for slot in range(5):
+            for slot in range(5) if i != 420 else ():
                 yield line("positions", slot, 0.5)
                 yield line("status", slot)
 

@@ -250,6 +250,8 @@ def test_the_runtime_is_found_beside_the_library_wherever_both_lie(native, heap,
         command, input="step 0.01 4\n", capture_output=True, text=True, env=environment, cwd="/"
     )
     assert done.returncode == 0, done.stderr
+    linked = subprocess.run(["ldd", tmp_path / "libtaichi_soft.so"], capture_output=True, text=True).stdout
+    assert f"libtaichi_c_api.so => {tmp_path}" in linked
     (tmp_path / "runtime_x64.bc").unlink()
     done = subprocess.run(command, input="", capture_output=True, text=True, env=environment, cwd="/")
     assert done.returncode == 1

@@ -6,16 +6,17 @@
  *     ts_world_create(scene, &world);
  *     for (;;) {
  *         ts_world_advance(world, seconds_since_last_frame, NULL);
- *         ts_body_mesh(world, body, mesh, vertices, normals, vertex_count);
+ *         ts_body_mesh(world, body, mesh, vertices, normals, 3 * vertex_count);
  *     }
  *
  * Every function returns TS_OK, or an error below 0 with a text in ts_last_error(); then nothing was changed.
  * A handle is a number; one that was destroyed, or never was, is refused. A world takes calls of one thread at
  * a time and refuses others with TS_ERROR_BUSY; several worlds may be used by several threads at once.
  *
- * Places, turns and impulses are in the axes and the unit of length of the engine for which the world was
- * exported; masses in kg, times in s, angles in rad. Turns are unit quaternions x, y, z, w. Buffers are the
- * caller's, of as many numbers as are said; nothing is kept of them.
+ * All is in the axes and the unit of length of the engine for which the world was exported: places, and lengths in
+ * velocities, forces, impulses, radii. In Unreal an impulse is in kg cm/s and a moment in kg cm^2/s. Masses are in kg,
+ * times in s, angles in rad; the density of air is in kg/m^3 everywhere. Turns are unit quaternions x, y, z, w.
+ * Buffers are the caller's, of as many numbers as are said; nothing is kept of them. Texts are UTF-8.
  */
 #ifndef TAICHI_SOFT_H
 #define TAICHI_SOFT_H
@@ -56,9 +57,11 @@ enum {
 
 typedef uint64_t ts_scene; /* a world file in memory; 0 is none */
 typedef uint64_t ts_world; /* an instance of it that moves */
-typedef uint64_t ts_body;  /* who lives in a slot: another one that comes later has another number */
+typedef uint64_t ts_body;  /* who lives in a slot: another one that comes later has another number. After
+                            * ts_world_restore numbers are as they were, and the same calls give the same again */
 
-enum { TS_BODY = 0, TS_ASSET = 1, TS_COLLIDER = 2, TS_FRAME = 3, TS_MESH = 4 }; /* kinds of names */
+/* Kinds of names. The number of a TS_BODY is its slot. */
+enum { TS_BODY = 0, TS_ASSET = 1, TS_COLLIDER = 2, TS_FRAME = 3, TS_MESH = 4 };
 
 enum { TS_ACTIVE = 0, TS_FROZEN = 1, TS_ASLEEP = 2 }; /* status of a body */
 
@@ -142,7 +145,8 @@ TS_API ts_result ts_world_set_wind(ts_world world, const double velocity[3], dou
 TS_API ts_result ts_world_radial_impulse(ts_world world, const double center[3], double impulse, double radius);
 /* A number that tells states apart: that of Python's world in the same state. */
 TS_API ts_result ts_world_hash(ts_world world, uint64_t* hash);
-/* With a null buffer only the size [bytes] is given. */
+/* The state between two steps. With a null buffer only the size [bytes] is given. What the picture is ahead of the last
+ * step, and what was dropped, is not in it. */
 TS_API ts_result ts_world_snapshot(ts_world world, void* buffer, size_t capacity, size_t* size);
 TS_API ts_result ts_world_restore(ts_world world, const void* bytes, size_t size);
 
@@ -165,12 +169,13 @@ TS_API ts_result ts_body_get_asset(ts_world world, ts_body body, int32_t* asset)
 TS_API ts_result ts_body_get_status(ts_world world, ts_body body, int32_t* status);
 /* Of its vertices, 3 numbers each: after the last step, or with alpha below 1 on the way from the one before. */
 TS_API ts_result ts_body_positions(ts_world world, ts_body body, double alpha, float* positions, size_t count);
-/* What is drawn, alpha of ts_clock on the way: places and normals of unit length, 3 numbers a vertex each. */
+/* What is drawn: places and normals of unit length, 3 numbers a vertex each. After ts_world_advance `alpha` of ts_clock
+ * on the way from the step before, after ts_world_step as the last step left it. `normals` may be null. */
 TS_API ts_result ts_body_mesh(ts_world world, ts_body body, int32_t mesh, float* positions, float* normals,
                               size_t count);
 TS_API ts_result ts_body_center(ts_world world, ts_body body, double center[3]);
 TS_API ts_result ts_body_set_velocity(ts_world world, ts_body body, const double linear[3], const double spin[3]);
-/* The centre of mass to a place, turned about it, with its velocity (1) or at rest (0). */
+/* The centre of mass to a place, with its velocity (1) or at rest (0). `turn` is added to how the body lies now. */
 TS_API ts_result ts_body_teleport(ts_world world, ts_body body, const double center[3], const double turn[4],
                                   int32_t keeps_velocity);
 /* Of a list of vertices; a count of 0 stands for all. */
@@ -231,6 +236,7 @@ typedef struct ts_shape {
 
 /* A new one, where the world was made with `collider_room`. Its number is the lowest that is free. */
 TS_API ts_result ts_collider_add(ts_world world, const ts_shape* shape, const ts_pose* pose, int32_t* collider);
+/* A later one may get its number. */
 TS_API ts_result ts_collider_remove(ts_world world, int32_t collider);
 /* Be there at the end of the coming step, and push who is in the way. */
 TS_API ts_result ts_collider_move_to(ts_world world, int32_t collider, const ts_pose* pose);

@@ -1,4 +1,5 @@
-// taichi_soft.h for C++17: handles that end by themselves, and errors as exceptions. All of it is here.
+// taichi_soft.h for C++17: handles that end by themselves, and errors as exceptions. What is not here is called in C, with
+// `handle()`.
 //
 //     auto scene = taichi_soft::Scene("game.softworld");
 //     auto world = scene.create();
@@ -78,11 +79,12 @@ class World {
     const ts_fixed_step step{sizeof(ts_fixed_step), substeps, max_steps, dt};
     check(ts_world_set_fixed_step(handle_, &step));
   }
-  // Called before each step of `advance`. It must not throw.
+  // Called before each step of `advance`. It must not throw, nor call this.
   void on_step(std::function<void()> function) {
-    before_ = std::make_unique<std::function<void()>>(std::move(function));
-    check(ts_world_on_step(
-        handle_, [](ts_world, void* user) { (*static_cast<std::function<void()>*>(user))(); }, before_.get()));
+    auto next = std::make_unique<std::function<void()>>(std::move(function));
+    const ts_before_step call = [](ts_world, void* user) { (*static_cast<std::function<void()>*>(user))(); };
+    check(ts_world_on_step(handle_, *next ? call : nullptr, next.get()));
+    before_ = std::move(next);  // now that the library knows the other one no more
   }
   uint64_t hash() const {
     uint64_t found = 0;
@@ -200,6 +202,7 @@ class Scene {
     if (handle_ != 0) ts_scene_unload(handle_);
   }
 
+  ts_scene handle() const { return handle_; }
   World create() const { return World(handle_); }
 
   // The number of what is called so; kinds are TS_BODY and so on.

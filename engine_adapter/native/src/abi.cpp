@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 #include <new>
+#include <thread>
 #include <utility>
 
 #include "handles.hpp"
@@ -14,12 +15,12 @@ using namespace taichi_soft;
 namespace {
 
 Handles<Scene>& scenes() {
-  static auto* found = new Handles<Scene>("scene");  // never destroyed: threads may outlive main
+  static auto* found = new Handles<Scene>("scene", 1);  // never destroyed: threads may outlive main
   return *found;
 }
 
 Handles<World>& worlds() {
-  static auto* found = new Handles<World>("world");
+  static auto* found = new Handles<World>("world", 2);
   return *found;
 }
 
@@ -52,7 +53,9 @@ ts_result guarded(Function function) noexcept {
 class Turn {
  public:
   explicit Turn(ts_world handle) : world_(worlds().find(handle)), lock_(world_->turn, std::try_to_lock) {
-    if (!lock_.owns_lock()) fail(TS_ERROR_BUSY, "another thread is in a call of this world");
+    const bool is_free = lock_.owns_lock() && (world_->advancing == std::thread::id() ||
+                                                world_->advancing == std::this_thread::get_id());
+    if (!is_free) fail(TS_ERROR_BUSY, "another thread is in a call of this world");
   }
   World* operator->() const { return world_.get(); }
   World& operator*() const { return *world_; }
@@ -61,6 +64,47 @@ class Turn {
  private:
   std::shared_ptr<World> world_;  // before the lock, which is given back first
   std::unique_lock<std::mutex> lock_;
+};
+
+// The steps of one frame. Between them the world is free for its own thread, whose function moves colliders, and
+// for no other. The time of steps that are not made, because one failed, is dropped.
+class Frame {
+ public:
+  Frame(ts_world handle, double seconds) : handle_(handle), world_(worlds().find(handle)) {
+    const Turn turn(handle);
+    if (world_->advancing != std::thread::id()) fail(TS_ERROR_STATE, "ts_world_advance was called within itself");
+    due = left = world_->steps_due(seconds);
+    world_->advancing = std::this_thread::get_id();
+  }
+  ~Frame() { end(); }
+  Frame(const Frame&) = delete;
+  Frame& operator=(const Frame&) = delete;
+
+  void before_step() {
+    ts_before_step function = nullptr;
+    void* user = nullptr;
+    {
+      const Turn turn(handle_);
+      function = turn->before_step();
+      user = turn->user();
+    }
+    if (function != nullptr) function(handle_, user);
+  }
+
+  void end() noexcept {
+    if (is_over_) return;
+    const std::lock_guard<std::mutex> lock(world_->turn);
+    world_->end_frame(left);
+    world_->advancing = std::thread::id();
+    is_over_ = true;
+  }
+
+  int32_t due = 0, left = 0;
+
+ private:
+  ts_world handle_;
+  std::shared_ptr<World> world_;
+  bool is_over_ = false;
 };
 
 template <typename Pointer>
@@ -344,19 +388,14 @@ ts_result ts_world_step(ts_world world, double dt, int32_t substeps) {
 ts_result ts_world_advance(ts_world world, double seconds, ts_clock* clock) {
   return guarded([&] {
     if (clock != nullptr) sized(clock, "clock");
-    const int32_t due = Turn(world)->steps_due(seconds);
-    for (int32_t i = 0; i < due; ++i) {
-      ts_before_step before = nullptr;
-      void* user = nullptr;
-      {
-        const Turn turn(world);
-        before = turn->before_step();
-        user = turn->user();
-      }
-      if (before != nullptr) before(world, user);  // which calls functions of this world
+    Frame frame(world, seconds);
+    while (frame.left > 0) {
+      frame.before_step();
       Turn(world)->step_in_time();
+      --frame.left;
     }
-    if (clock != nullptr) Turn(world)->write_clock(clock, due);
+    frame.end();
+    if (clock != nullptr) Turn(world)->write_clock(clock, frame.due);
   });
 }
 

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 
 #include "error.hpp"
@@ -65,7 +66,7 @@ class Reader {
 }  // namespace
 
 std::vector<char> read_file(const std::string& path) {
-  std::ifstream file(path, std::ios::binary | std::ios::ate);
+  std::ifstream file(std::filesystem::u8path(path), std::ios::binary | std::ios::ate);
   const std::streamoff size = file ? static_cast<std::streamoff>(file.tellg()) : -1;
   if (size < 0 || size > (std::streamoff(1) << 40)) {
     fail(TS_ERROR_FILE, "cannot read %s: give a folder that `taichi-soft export` wrote", path.c_str());
@@ -128,7 +129,9 @@ Archive::Archive(const std::string& path) : bytes_(read_file(path)) {
 
 const Archive::Entry& Archive::entry(const std::string& name, uint32_t type) const {
   const auto found = entries_.find(name);
-  if (found == entries_.end() || found->second.type != type) damaged("there is no " + name + " in it");
+  if (found == entries_.end() || found->second.type != type) {
+    fail(TS_ERROR_VERSION, "the world file has no %s: it is of another version. Export it again", name.c_str());
+  }
   return found->second;
 }
 
@@ -159,6 +162,7 @@ std::vector<std::string> Archive::texts(const std::string& name) const {
       text.push_back(static_cast<char>(letter));
     }
   }
+  if (!text.empty()) damaged(name + " has no end");
   return found;
 }
 

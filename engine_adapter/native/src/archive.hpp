@@ -32,7 +32,6 @@ class Archive {
   template <typename Number>
   View<Number> rows(const std::string& name, size_t width) const;
   std::vector<std::string> texts(const std::string& name) const;
-  bool has(const std::string& name) const { return entries_.count(name) != 0; }
 
  private:
   struct Entry {

@@ -17,9 +17,11 @@ struct Error : std::runtime_error {
 };
 
 #if defined(__GNUC__)
-__attribute__((format(printf, 2, 3)))
+[[noreturn]] __attribute__((format(printf, 2, 3)))
+#else
+[[noreturn]]
 #endif
-[[noreturn]] inline void fail(ts_result code, const char* format, ...) {
+inline void fail(ts_result code, const char* format, ...) {
   char text[512];
   va_list values;
   va_start(values, format);

@@ -13,7 +13,8 @@ namespace taichi_soft {
 template <typename Thing>
 class Handles {
  public:
-  explicit Handles(const char* name) : name_(name) {}
+  // Each kind has a number of its own, so that one is not taken for another.
+  Handles(const char* name, uint64_t kind) : name_(name), kind_(kind << 56) {}
 
   uint64_t add(std::shared_ptr<Thing> thing) {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -21,7 +22,8 @@ class Handles {
     while (row < rows_.size() && rows_[row].thing) ++row;
     if (row == rows_.size()) rows_.push_back({});
     rows_[row].thing = std::move(thing);
-    return uint64_t(++rows_[row].generation) << 32 | (row + 1);
+    rows_[row].generation = (rows_[row].generation + 1) & kGenerations;
+    return kind_ | uint64_t(rows_[row].generation) << 32 | (row + 1);
   }
 
   // It lives for as long as the caller keeps what is returned.
@@ -44,13 +46,17 @@ class Handles {
 
   Row& row_of(uint64_t handle) {
     const uint64_t row = (handle & 0xFFFFFFFFu) - 1;
-    if (handle == 0 || row >= rows_.size() || !rows_[row].thing || rows_[row].generation != handle >> 32) {
+    if (handle == 0 || row >= rows_.size() || !rows_[row].thing ||
+        (kind_ | uint64_t(rows_[row].generation) << 32) != (handle & ~uint64_t(0xFFFFFFFFu))) {
       fail(TS_ERROR_HANDLE, "there is no %s %llu, or no more", name_, static_cast<unsigned long long>(handle));
     }
     return rows_[row];
   }
 
+  static constexpr uint32_t kGenerations = 0xFFFFFF;
+
   const char* name_;
+  uint64_t kind_;
   std::mutex mutex_;
   std::vector<Row> rows_;
 };

@@ -44,7 +44,6 @@ class Machine {
   static TiArgument real(double value);
   static TiArgument array(TiMemory memory, TiDataType type, uint32_t rows, uint32_t width = 0);
   void launch(const char* kernel, const std::vector<TiArgument>& arguments);
-  bool has(const char* kernel) const { return kernels_.count(kernel) != 0; }
 
   TiMemory ints_of(size_t mesh) const { return ints_[mesh]; }
   TiMemory floats_of(size_t mesh) const { return floats_[mesh]; }

@@ -30,12 +30,56 @@ Place place_from(const int64_t* row, size_t image) {
   return found;
 }
 
+// Whether the kernel reads within the table of a surface: see `render_table` in taichi_soft/bodies/render_mesh.py.
+bool is_surface_whole(const Mesh& mesh, size_t body_vertices) {
+  constexpr size_t kLanes = 8, kStride = 10 * kLanes;
+  const size_t k = mesh.vertex_count, blocks = (k + kLanes - 1) / kLanes, head = blocks * kStride + k;
+  if (k == 0 || mesh.ints.count < head + blocks + 1) return false;
+  for (size_t i = 0; i < head; ++i) {
+    const size_t limit = i < blocks * kStride ? k : body_vertices;
+    if (mesh.ints[i] < 0 || size_t(mesh.ints[i]) >= limit) return false;
+  }
+  size_t before = head + blocks + 1;
+  for (size_t block = 0; block <= blocks; ++block) {
+    const int32_t begin = mesh.ints[head + block];
+    if (begin < 0 || size_t(begin) < before || size_t(begin) > mesh.ints.count) return false;
+    before = size_t(begin);
+  }
+  for (size_t i = head + blocks + 1; i + 3 <= mesh.ints.count; i += 3) {
+    const int32_t* row = mesh.ints.data + i;
+    if (row[0] < 0 || row[0] >= int32_t(kLanes) || row[1] < 0 || size_t(row[1]) >= k || row[2] < 0 ||
+        size_t(row[2]) >= k) {
+      return false;
+    }
+  }
+  return true;
+}
+
+// The same of a skin: see `write_skin` in taichi_soft/bodies/kernels/skin.py.
+bool is_skin_whole(const Mesh& mesh, size_t n) {
+  constexpr size_t kLanes = 16, kRow = 10;
+  const size_t blocks = (mesh.vertex_count + kLanes - 1) / kLanes;
+  if (mesh.vertex_count == 0 || mesh.ints.count < n + 1 || mesh.ints[n] < 0) return false;
+  const size_t edges = size_t(mesh.ints[n]);
+  if (mesh.ints.count != n + 1 + edges + 4 * kLanes * blocks) return false;
+  if (mesh.floats.count != 3 * (edges + n) + kRow * kLanes * blocks) return false;
+  int32_t before = 0;
+  for (size_t v = 0; v <= n; ++v) {
+    if (mesh.ints[v] < before || size_t(mesh.ints[v]) > edges) return false;
+    before = mesh.ints[v];
+  }
+  for (size_t i = n + 1; i < mesh.ints.count; ++i) {
+    if (mesh.ints[i] < 0 || size_t(mesh.ints[i]) >= n) return false;
+  }
+  return true;
+}
+
 const char* const kKinds[] = {"names/body", "names/asset", "names/collider", "names/frame", "names/mesh"};
 
 }  // namespace
 
 Scene::Scene(const std::string& folder)
-    : archive((std::filesystem::path(folder) / "world.tsw").string()),
+    : archive((std::filesystem::u8path(folder) / "world.tsw").u8string()),
       axes(archive.rows<double>("host_axes", 3).count == 9 ? archive.get<double>("host_axes").data
                                                             : (out_of_order("axes"), nullptr)),
       folder_(folder) {
@@ -57,28 +101,33 @@ Scene::Scene(const std::string& folder)
   asset_of_slot.assign(assets_of.begin(), assets_of.end());
   begin_of_slot.assign(begins.begin(), begins.end());
   if (slot_count < 1 || size_t(slot_count) != asset_of_slot.size() || size_t(slot_count) != begin_of_slot.size() ||
-      size_t(slot_count) != names_[TS_BODY].size() || particle_count < 1 || threads < 1) {
+      size_t(slot_count) != names_[TS_BODY].size() || particle_count < 1 || threads < 1 || particle_count > (1 << 28)) {
     out_of_order("slots");
   }
   read_fields();
   read_assets();
   read_meshes();
   // Taichi ends the process where its files are damaged, so they are looked at here.
-  const std::filesystem::path kernels = std::filesystem::path(folder) / "kernels";
+  const std::filesystem::path kernels = std::filesystem::u8path(folder) / "kernels";
   const auto files = archive.texts("kernels/files");
   const auto sums = archive.rows<int64_t>("kernels/sums", 2);
   if (sums.count != 2 * files.size()) out_of_order("kernels");
   for (size_t i = 0; i < files.size(); ++i) {
-    const std::vector<char> bytes = read_file((kernels / files[i]).string());
+    const std::vector<char> bytes = read_file((kernels / files[i]).u8string());
     if (int64_t(bytes.size()) != sums[2 * i] || int64_t(checksum(bytes.data(), bytes.size())) != sums[2 * i + 1]) {
       fail(TS_ERROR_FILE, "the world file is damaged: kernels/%s is not what was exported. Export it again",
            files[i].c_str());
     }
   }
-  code = checksum(reinterpret_cast<const char*>(sums.data), sums.count * sizeof(int64_t)) ^
-         checksum(reinterpret_cast<const char*>(archive.get<int64_t>("fields/carried").data),
-                  archive.get<int64_t>("fields/carried").count * sizeof(int64_t));
-  give_back(std::make_unique<Machine>(*this, kernels.string()));
+  // A level that is exported anew as it was takes the snapshots of before.
+  for (const char* name : {"fields/carried", "fields/places"}) {
+    const auto rows = archive.get<int64_t>(name);
+    code = code * 31 + checksum(reinterpret_cast<const char*>(rows.data), rows.count * sizeof(int64_t));
+  }
+  for (const Asset& asset : assets) {
+    code = code * 31 + checksum(reinterpret_cast<const char*>(asset.rest_rows.data), asset.rest_rows.count * sizeof(float));
+  }
+  give_back(std::make_unique<Machine>(*this, kernels.u8string()));
 }
 
 void Scene::read_fields() {
@@ -87,10 +136,10 @@ void Scene::read_fields() {
   const size_t image = archive.get<unsigned char>("fields/image").count;
   if (rows.count != 5 * field_names_.size()) out_of_order("fields");
   for (size_t i = 0; i < field_names_.size(); ++i) places_.push_back(place_from(rows.data + 5 * i, image));
-  const auto kept = archive.rows<int64_t>("fields/carried", 6);
+  const auto kept = archive.rows<int64_t>("fields/carried", 7);
   carried_words = 0;
-  for (size_t i = 0; i + 6 <= kept.count; i += 6) {
-    Carried each = {place_from(kept.data + i, image), size_t(kept[i + 5])};
+  for (size_t i = 0; i + 7 <= kept.count; i += 7) {
+    Carried each = {place_from(kept.data + i, image), size_t(kept[i + 5]), kept[i + 6] != 0};
     if (kept[i + 5] < 0 || each.count > each.place.count) out_of_order("what snapshots have");
     carried_words += each.count * each.place.width;
     carried.push_back(each);
@@ -145,7 +194,9 @@ void Scene::read_meshes() {
                  archive.get<float>(prefix + "floats"),
                  archive.get<float>(prefix + "uv")};
     const bool has_uv = mesh.uv.count != 0;
-    if (!are_below(mesh.triangles, mesh.vertex_count) || (has_uv && mesh.uv.count != 2 * mesh.vertex_count)) {
+    if (!are_below(mesh.triangles, mesh.vertex_count) || (has_uv && mesh.uv.count != 2 * mesh.vertex_count) ||
+        !(mesh.is_skin ? is_skin_whole(mesh, assets[size_t(mesh.asset)].vertex_count())
+                       : is_surface_whole(mesh, assets[size_t(mesh.asset)].vertex_count()))) {
       out_of_order("a mesh");
     }
     meshes.push_back(mesh);
@@ -157,18 +208,13 @@ const std::vector<std::string>& Scene::names(int32_t kind) const {
   return names_[kind];
 }
 
-bool Scene::has_place(const std::string& field) const {
-  for (const std::string& name : field_names_) {
-    if (name == field) return true;
-  }
-  return false;
-}
-
-Place Scene::place(const std::string& field) const {
+Place Scene::place(const std::string& field, size_t count, size_t width) const {
   for (size_t i = 0; i < field_names_.size(); ++i) {
-    if (field_names_[i] == field) return places_[i];
+    if (field_names_[i] != field) continue;
+    if (places_[i].count < count || places_[i].width < width) break;
+    return places_[i];
   }
-  out_of_order(("there is no field " + field).c_str());
+  out_of_order(("the field " + field + " is missing, or too short").c_str());
 }
 
 std::unique_ptr<Machine> Scene::take_machine() {
@@ -180,7 +226,7 @@ std::unique_ptr<Machine> Scene::take_machine() {
       return found;
     }
   }
-  return std::make_unique<Machine>(*this, (std::filesystem::path(folder_) / "kernels").string());
+  return std::make_unique<Machine>(*this, (std::filesystem::u8path(folder_) / "kernels").u8string());
 }
 
 void Scene::give_back(std::unique_ptr<Machine> machine) {

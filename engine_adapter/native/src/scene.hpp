@@ -21,6 +21,7 @@ struct Place {
 struct Carried {  // a field that snapshots have, and how many of its elements
   Place place;
   size_t count;
+  bool is_fixed;  // no call changes its whole numbers
 };
 
 struct Asset {
@@ -47,8 +48,8 @@ class Scene {
   explicit Scene(const std::string& folder);
 
   const std::vector<std::string>& names(int32_t kind) const;  // of TS_BODY and so on
-  Place place(const std::string& field) const;
-  bool has_place(const std::string& field) const;
+  // Fails where the field is missing, or has fewer elements or numbers in each.
+  Place place(const std::string& field, size_t count = 0, size_t width = 1) const;
 
   // One that no world uses, or a new one.
   std::unique_ptr<Machine> take_machine();
@@ -67,7 +68,7 @@ class Scene {
   std::vector<Mesh> meshes;
   std::vector<Carried> carried;
   size_t carried_words;
-  uint32_t code;  // of the file: what its snapshots begin with
+  uint32_t code = 0;  // of what a snapshot fits into
 
  private:
   void read_assets();

@@ -15,6 +15,8 @@ enum Status { kActive, kFrozen, kAsleep, kSkipping, kAbsent };
 enum Drives { kMovesPins = 1, kDamped = 8, kSheltered = 16, kGrabbed = 32, kJoined = 64 };
 constexpr int32_t kWithFrame = 3;
 
+constexpr ts_body kBody = uint64_t(3) << 56;  // what a body's handle begins with, and no other handle
+
 constexpr double kRoundOff = 1e-9;  // of a step, as in engine_adapter/fixed_step.py
 constexpr int32_t kAll = std::numeric_limits<int32_t>::max();
 
@@ -37,8 +39,10 @@ World::World(std::shared_ptr<Scene> scene) : scene_(std::move(scene)), machine_(
   const auto clock = archive.get<double>("world/clock");
   const auto steps = archive.get<int64_t>("world/steps");
   const auto poses = archive.get<float>("frames/poses");
-  const size_t frames = poses.count / 24;
-  if (clock.count != 2 || steps.count != 1 || poses.count != 24 * frames || frames == 0) {
+  const size_t frames = poses.count / 24, named = scene_->names(TS_FRAME).size();
+  const auto alive = archive.get<int32_t>("frames/alive");
+  if (clock.count != 2 || steps.count != 1 || poses.count != 24 * frames || frames == 0 || named > frames ||
+      alive.count != named) {
     fail(TS_ERROR_FILE, "the world file is not in order: clock or frames. Export it again");
   }
   steps_ = steps[0], time_ = clock[0], last_dt_ = clock[1];
@@ -55,32 +59,35 @@ World::~World() {
 void World::bind() {
   char* root = machine_->root();
   const Scene& s = *scene_;
-  body_status_ = {root, s.place("body_status")};
-  body_drives_ = {root, s.place("body_drives")};
-  particle_aim_ = {root, s.place("particle_aim")};
-  is_awake_ = {root, s.place("progress.is_awake")};
-  failed_ = {root, s.place("progress.failed")};
-  position_ = {root, s.place("particle_position")};
-  velocity_ = {root, s.place("particle_velocity")};
-  mass_ = {root, s.place("particle_mass")};
-  inv_mass_ = {root, s.place("particle_inv_mass")};
-  lag_ = {root, s.place("body_velocity_lag")};
-  gravity_scale_ = {root, s.place("body_gravity_scale")};
-  damping_ = {root, s.place("body_damping")};
-  wind_ = {root, s.place("wind")};
+  const size_t bodies = size_t(s.slot_count), particles = size_t(s.particle_count);
+  body_status_ = {root, s.place("body_status", bodies, 1)};
+  body_drives_ = {root, s.place("body_drives", bodies, 1)};
+  particle_aim_ = {root, s.place("particle_aim", particles, 1)};
+  is_awake_ = {root, s.place("progress.is_awake", bodies, 1)};
+  failed_ = {root, s.place("progress.failed", bodies, 1)};
+  is_driven_ = {root, s.place("motors.is_driven", bodies, 1)};
+  position_ = {root, s.place("particle_position", particles, 3)};
+  velocity_ = {root, s.place("particle_velocity", particles, 3)};
+  mass_ = {root, s.place("particle_mass", particles, 1)};
+  inv_mass_ = {root, s.place("particle_inv_mass", particles, 1)};
+  lag_ = {root, s.place("body_velocity_lag", bodies, 1)};
+  gravity_scale_ = {root, s.place("body_gravity_scale", bodies, 1)};
+  damping_ = {root, s.place("body_damping", bodies, 1)};
+  wind_ = {root, s.place("wind", 1, 4)};
   if (!s.has_contact) return;
-  island_count_ = {root, s.place("contact.island_count")};
+  island_count_ = {root, s.place("contact.island_count", 1, 1)};
+  const size_t rows = colliders_.rows.size();
   for (int i = 0; i < 7; ++i) {
-    const Place place = s.place(std::string("contact.collider_") + kColliderFields[i]);
-    if (place.count < colliders_.rows.size()) fail(TS_ERROR_FILE, "the world file has no room for its colliders");
-    collider_[i] = {root, place};
-    collider_room_ = place.count;
+    const size_t width = i == 1 ? 4 : i == 6 ? 1 : 3;
+    collider_[i] = {root, s.place(std::string("contact.collider_") + kColliderFields[i], rows, width)};
   }
-  collider_parameters_ = {root, s.place("contact.collider_parameters")};
-  collider_surface_ = {root, s.place("contact.collider_surface")};
-  collider_kind_ = {root, s.place("contact.collider_kind")};
-  collider_filter_ = {root, s.place("contact.collider_filter")};
-  collider_count_ = {root, s.place("contact.collider_count")};
+  collider_kind_ = {root, s.place("contact.collider_kind", rows, 1)};
+  collider_room_ = s.place("contact.collider_kind", rows, 1).count;
+  for (const char* name : kColliderFields) collider_room_ = std::min(collider_room_, s.place(std::string("contact.collider_") + name, rows, 1).count);
+  collider_parameters_ = {root, s.place("contact.collider_parameters", collider_room_, 8)};
+  collider_surface_ = {root, s.place("contact.collider_surface", collider_room_, 3)};
+  collider_filter_ = {root, s.place("contact.collider_filter", collider_room_, 2)};
+  collider_count_ = {root, s.place("contact.collider_count", 1, 1)};
 }
 
 // ---- steps ----
@@ -93,10 +100,19 @@ void World::require_step(double dt) const {
 
 void World::set_fixed_step(double dt, int32_t substeps, int32_t max_steps) {
   require_step(dt);
-  if (substeps < 0) fail(TS_ERROR_ARGUMENT, "substeps is %d: give 1 or more, or 0 for what is stable", substeps);
-  if (max_steps < 1) fail(TS_ERROR_ARGUMENT, "max_steps is %d: give 1 or more", max_steps);
+  if (max_steps < 1 || max_steps > 1000000) fail(TS_ERROR_ARGUMENT, "max_steps is %d: give 1 to 1,000,000", max_steps);
+  require_substeps(dt, substeps);
   dt_ = dt, substeps_ = substeps, max_steps_ = max_steps;
   remainder_ = 0.0;
+  picture_ = 1.0;
+}
+
+int32_t World::require_substeps(double dt, int32_t substeps) const {
+  if (substeps < 0 || substeps > 1000000) {
+    fail(TS_ERROR_ARGUMENT, "substeps is %d: give 1 to 1,000,000, or 0 for what is stable", substeps);
+  }
+  const int32_t stable = stable_substeps(dt);
+  return substeps == 0 ? stable : substeps;
 }
 
 int32_t World::stable_substeps(double dt) const {
@@ -138,11 +154,8 @@ bool World::prepare_colliders(double dt) {
 }
 
 void World::step(double dt, int32_t substeps) {
-  if (substeps < 0 || substeps > 1000000) {
-    fail(TS_ERROR_ARGUMENT, "substeps is %d: give 1 to 1,000,000, or 0 for what is stable", substeps);
-  }
-  const int32_t stable = stable_substeps(dt);
-  const int32_t count = substeps == 0 ? stable : substeps;
+  require_step(dt);
+  const int32_t count = require_substeps(dt, substeps);
   bool goes_on = !is_still_;
   goes_on = aim_pins(dt) || goes_on;
   goes_on = prepare_colliders(dt) || goes_on;
@@ -154,6 +167,7 @@ void World::step(double dt, int32_t substeps) {
   steps_ += 1;
   time_ += dt;
   last_dt_ = dt;
+  picture_ = 1.0;
 }
 
 void World::launch_step(int32_t substeps, double h) {
@@ -177,7 +191,7 @@ int32_t World::steps_due(double seconds) {
   }
   const double waiting = remainder_ + seconds;
   const double due = waiting / dt_ + kRoundOff;
-  if (due >= max_steps_ + 1) {
+  if (due >= double(max_steps_) + 1.0) {
     remainder_ = 0.0;
     dropped_ += waiting - max_steps_ * dt_;
     return max_steps_;
@@ -188,6 +202,11 @@ int32_t World::steps_due(double seconds) {
 }
 
 double World::alpha() const { return std::max(remainder_ / dt_, 0.0); }
+
+void World::end_frame(int32_t steps_left) {
+  dropped_ += steps_left * dt_;
+  picture_ = alpha();
+}
 
 void World::write_clock(ts_clock* clock, int32_t steps_made) const {
   clock->steps_made = steps_made;
@@ -243,12 +262,12 @@ ts_body World::body_in(int32_t slot) const {
   if (slot < 0 || slot >= scene_->slot_count) {
     fail(TS_ERROR_ARGUMENT, "slot is %d: there are %d, from 0", slot, scene_->slot_count);
   }
-  return body_status_(slot) == kAbsent ? 0 : ts_body(generations_[slot]) << 32 | uint32_t(slot + 1);
+  return body_status_(slot) == kAbsent ? 0 : kBody | ts_body(generations_[slot]) << 32 | uint32_t(slot + 1);
 }
 
 int32_t World::slot_of(ts_body body) const {
   const int64_t slot = int64_t(body & 0xFFFFFFFFu) - 1;
-  if (slot < 0 || slot >= scene_->slot_count || body_status_(slot) == kAbsent || generations_[slot] != body >> 32) {
+  if (slot < 0 || slot >= scene_->slot_count || body_in(int32_t(slot)) != body) {
     fail(TS_ERROR_HANDLE, "body %llu is not in this world, or was taken out", static_cast<unsigned long long>(body));
   }
   return static_cast<int32_t>(slot);
@@ -317,18 +336,19 @@ ts_body World::spawn(int32_t asset, const Vector& place, const Quaternion& turn,
   std::copy(rows.begin(), rows.end(), machine_->rows.room<float>(machine_->runtime(), rows.size()));
   machine_->launch("spawn_body", {Machine::whole(slot), Machine::array(machine_->rows.memory(), TI_DATA_TYPE_F32,
                                                                        uint32_t(rows.size() / 8), 8)});
-  ++generations_[slot];
+  generations_[slot] = (generations_[slot] + 1) & 0xFFFFFF;
   is_still_ = false;
   rows_at_ = -1.0;
   return body_in(slot);
 }
 
 void World::despawn(int32_t slot) {
-  if ((body_drives_(slot) & (kGrabbed | kJoined)) != 0) {
-    fail(TS_ERROR_STATE, "the body in slot %d is grabbed or joined to another: it cannot be taken out", slot);
+  if ((body_drives_(slot) & (kGrabbed | kJoined)) != 0 || is_driven_(slot) != 0) {
+    fail(TS_ERROR_STATE, "the body in slot %d is grabbed, joined to another or driven: it cannot be taken out", slot);
   }
   wake_near(box_of(slot));
   is_still_ = false;
+  body_drives_(slot) &= ~kMovesPins;  // or what hung from a frame would be aimed for ever
   machine_->launch("despawn_body", {Machine::whole(slot)});
 }
 
@@ -368,11 +388,11 @@ void World::read_mesh(int32_t slot, int32_t number, float* positions, float* nor
     machine_->rows.room<float>(runtime, 12 * vertices);
     machine_->launch(
         kernel.c_str(),
-        {Machine::whole(slot), Machine::whole(int32_t(vertices)), Machine::real(alpha()), ints,
+        {Machine::whole(slot), Machine::whole(int32_t(vertices)), Machine::real(picture_), ints,
          Machine::array(machine_->floats_of(number), TI_DATA_TYPE_F32, uint32_t(mesh.floats.count)),
          Machine::array(machine_->rows.memory(), TI_DATA_TYPE_F32, 12 * vertices), x_out, n_out});
   } else {
-    machine_->launch(kernel.c_str(), {Machine::whole(slot), Machine::real(alpha()), ints, x_out, n_out});
+    machine_->launch(kernel.c_str(), {Machine::whole(slot), Machine::real(picture_), ints, x_out, n_out});
   }
   scene_->axes.rows_out(x, count, true, positions);
   if (normals != nullptr) scene_->axes.rows_out(n, count, false, normals);
@@ -554,7 +574,7 @@ void World::unpin(int32_t slot, Vertices which) {
       return inv_mass_(p) != 0.0f || particle_aim_(p) >= kWithFrame;
     };
     vertices.erase(std::remove_if(vertices.begin(), vertices.end(), stays), vertices.end());
-    if (vertices.empty()) return;
+    if (vertices.empty()) return rouse(slot);
   } else {
     require_unattached(slot, vertices);
   }
@@ -792,7 +812,8 @@ void World::collider_impulse(int32_t number, Vector* impulse, Vector* moment) {
 }
 
 void World::move_frame(int32_t number, const Pose& pose) {
-  if (number < 0 || size_t(number) >= scene_->names(TS_FRAME).size()) {
+  const auto alive = scene_->archive.get<int32_t>("frames/alive");
+  if (number < 0 || size_t(number) >= alive.count || alive[size_t(number)] == 0) {
     fail(TS_ERROR_ARGUMENT, "there is no frame %d: there are %zu, from 0", number, scene_->names(TS_FRAME).size());
   }
   const Matrix turn = matrix_of(pose.rotation);
@@ -834,7 +855,7 @@ struct SnapshotHead {
   uint32_t scene, sum;
   int64_t steps;
   uint64_t colliders;
-  double time, last_dt, remainder, dropped;
+  double time, last_dt;
 };
 
 template <typename Part>
@@ -860,7 +881,7 @@ void World::snapshot(char* bytes) const {
   SnapshotHead head{};
   head.mark = kSnapshotMark, head.size = snapshot_size(), head.scene = scene_->code;
   head.colliders = colliders_.rows.size();
-  head.steps = steps_, head.time = time_, head.last_dt = last_dt_, head.remainder = remainder_, head.dropped = dropped_;
+  head.steps = steps_, head.time = time_, head.last_dt = last_dt_;
   char* at = bytes + sizeof head;
   for (const Carried& each : scene_->carried) {
     const char* row = machine_->root() + each.place.offset;
@@ -877,6 +898,53 @@ void World::snapshot(char* bytes) const {
   std::memcpy(bytes, &head, sizeof head);
   head.sum = checksum(bytes, head.size);  // with a sum of 0 in its place
   std::memcpy(bytes, &head, sizeof head);
+}
+
+// Fails where a step would read beyond its fields, or begin with what is not finite.
+void World::require_rows(const char* at, size_t colliders) const {
+  const auto refuse = [] { fail(TS_ERROR_SNAPSHOT, "this snapshot is not in order: it names what there is not"); };
+  const Scene& s = *scene_;
+  const size_t status = s.place("body_status").offset, aim = s.place("particle_aim").offset;
+  const int64_t aims = kWithFrame + int64_t(frames_.size() / 12);
+  for (const Carried& each : s.carried) {
+    for (size_t i = 0; i < each.count * each.place.width; ++i) {
+      if (each.place.is_whole) {
+        int32_t number;
+        take(&at, &number, 1);
+        if (each.place.offset == status && (number < 0 || number > kAbsent)) refuse();
+        if (each.place.offset == aim && (number < 0 || number >= aims)) refuse();
+        if (each.is_fixed) {
+          const size_t row = i / each.place.width, column = i % each.place.width;
+          const char* now = machine_->root() + each.place.offset + row * each.place.stride + 4 * column;
+          if (std::memcmp(now, &number, 4) != 0) refuse();
+        }
+      } else {
+        float number;
+        take(&at, &number, 1);
+        const bool may_be_endless = std::isinf(number) && each.place.offset != s.place("particle_position").offset;
+        if (std::isnan(number) || (std::isinf(number) && !may_be_endless)) refuse();
+      }
+    }
+  }
+  for (size_t i = 0; i < frames_.size(); ++i) {
+    float number;
+    take(&at, &number, 1);
+    if (!(std::fabs(number) <= s.position_limit)) refuse();
+  }
+  at += sizeof(uint32_t) * generations_.size();
+  for (size_t i = 0; i < colliders; ++i) {
+    unsigned char flags[2];
+    std::memcpy(flags, at + offsetof(Collider, is_alive), 1);
+    std::memcpy(flags + 1, at + offsetof(Collider, has_target), 1);
+    if (flags[0] > 1 || flags[1] > 1) refuse();
+    Collider row;
+    take(&at, &row, 1);
+    // Those with a grid were there when the world was exported.
+    const bool is_known = row.kind >= 0 && (row.kind <= 3 || (i < s.names(TS_COLLIDER).size() && row.kind <= 5));
+    if (!is_known || !(length_of(row.pose.position) <= 1e9) || !(std::fabs(length_of(row.pose.rotation) - 1.0) <= 1e-3)) {
+      refuse();
+    }
+  }
 }
 
 void World::restore(const char* bytes, size_t size) {
@@ -896,6 +964,7 @@ void World::restore(const char* bytes, size_t size) {
   if (sum != checksum(whole.data(), size)) {
     fail(TS_ERROR_SNAPSHOT, "this snapshot is damaged: its checksum is wrong");
   }
+  require_rows(bytes + sizeof head, head.colliders);
   const char* at = bytes + sizeof head;
   for (const Carried& each : scene_->carried) {
     char* row = machine_->root() + each.place.offset;
@@ -907,7 +976,6 @@ void World::restore(const char* bytes, size_t size) {
   take(&at, colliders_.rows.data(), colliders_.rows.size());
   if (scene_->has_contact) write_colliders();
   steps_ = head.steps, time_ = head.time, last_dt_ = head.last_dt;
-  remainder_ = head.remainder, dropped_ = head.dropped;
   colliders_.is_dirty = has_work_ = true;
   is_still_ = false;
   rows_at_ = -1.0;

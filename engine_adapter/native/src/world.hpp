@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <mutex>
+#include <thread>
 #include <vector>
 
 #include "colliders.hpp"
@@ -50,7 +51,8 @@ class World {
   World& operator=(const World&) = delete;
 
   const Scene& scene() const { return *scene_; }
-  std::mutex turn;  // of the thread that is in a call
+  std::mutex turn;            // of the thread that is in a call
+  std::thread::id advancing;  // which makes the steps of a frame, and lets go of its turn between them
 
   // Steps.
   void set_fixed_step(double dt, int32_t substeps, int32_t max_steps);
@@ -58,6 +60,7 @@ class World {
   int32_t stable_substeps(double dt) const;
   void step(double dt, int32_t substeps);
   int32_t steps_due(double seconds);  // puts in the time of a frame
+  void end_frame(int32_t steps_left);  // that were due and not made: their time is dropped
   void step_in_time() { step(dt_, substeps_); }
   ts_before_step before_step() const { return before_step_; }
   void* user() const { return user_; }
@@ -116,6 +119,8 @@ class World {
   uint32_t give_living();
   Hit hit_from(const float* row) const;
   void require_step(double dt) const;
+  int32_t require_substeps(double dt, int32_t substeps) const;
+  void require_rows(const char* at, size_t colliders) const;
   void write_colliders();
   bool aim_pins(double dt);
   bool prepare_colliders(double dt);
@@ -145,6 +150,7 @@ class World {
   int64_t steps_ = 0;
   double time_ = 0.0, last_dt_ = 0.0;
   double dt_ = 1.0 / 60.0, remainder_ = 0.0, dropped_ = 0.0;
+  double picture_ = 1.0;  // how far what is drawn is from the previous step to the last one
   int32_t substeps_ = 0, max_steps_ = 8;
   ts_before_step before_step_ = nullptr;
   void* user_ = nullptr;
@@ -152,7 +158,7 @@ class World {
   bool is_still_ = false;   // none was awake after the last step, and nothing was changed since
   double rows_at_ = -1.0;   // alpha of what was read of all bodies; below 0 once they have moved on
 
-  Field<int32_t> body_status_, body_drives_, particle_aim_, is_awake_, failed_, island_count_;
+  Field<int32_t> body_status_, body_drives_, particle_aim_, is_awake_, failed_, is_driven_, island_count_;
   Field<float> position_, velocity_, mass_, inv_mass_, lag_, gravity_scale_, damping_, wind_;
   Field<float> collider_[7], collider_parameters_, collider_surface_;
   Field<int32_t> collider_kind_, collider_filter_, collider_count_;
