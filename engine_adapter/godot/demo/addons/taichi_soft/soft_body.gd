@@ -1,0 +1,90 @@
+# Draws a soft body of a SoftWorld. Godot has a node SoftBody already, so this one is called TaichiSoftBody.
+#
+# Vertices are places in the scene, so this node leaves its parent's transform. Set its look by material_override.
+class_name TaichiSoftBody
+extends MeshInstance
+
+# The SoftWorld; empty for the nearest one above this node.
+export var world_path := NodePath()
+# As the script of the world called it; empty where `body` is set, to what SoftWorld.spawn returned.
+export var body_name := ""
+# Empty for the first mesh of the body's asset.
+export var mesh_name := ""
+
+var body := 0 setget set_body
+
+var _world: Node
+var _mesh := -1
+var _arrays := []
+
+
+func _ready() -> void:
+    set_as_toplevel(true)
+    global_transform = Transform()
+    mesh = ArrayMesh.new()
+    _world = get_node_or_null(world_path) if world_path else get_parent()
+    while _world != null and not _world.has_method("state_hash"):
+        _world = null if world_path else _world.get_parent()
+    if _world == null:
+        push_error("%s: no SoftWorld is above it or at world_path" % name)
+    else:
+        _world.connect("started", self, "_on_started")
+        if _world.native != null:
+            _on_started()
+    set_process(_world != null)
+
+
+# Draw another body; 0 for none.
+func set_body(value: int) -> void:
+    body = value
+    _mesh = -1
+    if _world != null and _world.native != null and value != 0:
+        _find_mesh()
+
+
+func _process(_delta: float) -> void:
+    draw()
+
+
+# Read the body from the world into the mesh; called in each frame.
+func draw() -> void:
+    if _mesh < 0 or _world.native == null:
+        return
+    var read = _world.native.mesh(body, _mesh)
+    if read == null:  # it was taken out of the world
+        set_body(0)
+        mesh = ArrayMesh.new()
+        return
+    _arrays[Mesh.ARRAY_VERTEX] = read[0]
+    _arrays[Mesh.ARRAY_NORMAL] = read[1]
+    # Of a kept mesh, as that keeps the instance's material.
+    if mesh.get_surface_count() > 0:
+        mesh.surface_remove(0)
+    mesh.add_surface_from_arrays(Mesh.PRIMITIVE_TRIANGLES, _arrays, [], 0)
+
+
+func _on_started() -> void:
+    set_body(_world.body(body_name) if body_name != "" else body)
+
+
+func _find_mesh() -> void:
+    var native: Reference = _world.native
+    var asset = native.asset_of(body)
+    if asset == null:
+        return
+    if mesh_name != "":
+        var found = native.find(_world.Kind.MESH, mesh_name)
+        _mesh = -1 if found == null else found
+    else:
+        for number in native.count(_world.Kind.MESH):
+            if native.mesh_info(number)[0] == asset:
+                _mesh = number
+                break
+    if _mesh < 0:
+        push_error("%s: the body has no mesh of that name" % name)
+        return
+    var uvs: PoolVector2Array = native.uvs(_mesh)
+    _arrays = []
+    _arrays.resize(Mesh.ARRAY_MAX)
+    _arrays[Mesh.ARRAY_INDEX] = native.triangles(_mesh)
+    _arrays[Mesh.ARRAY_TEX_UV] = uvs if uvs.size() > 0 else null

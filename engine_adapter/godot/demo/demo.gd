@@ -1,0 +1,62 @@
+# Looks of the demo, and an elephant more at each press of space.
+extends Spatial
+
+const ELEPHANT := "res://elephant.glb"  # a copy of assets/elephant.glb; without it elephants are grey
+
+var _plush := _colored(Color(0.72, 0.72, 0.78))
+
+
+func _ready() -> void:
+    var file := File.new()
+    if file.file_exists(ELEPHANT):
+        _plush = _colored(Color.white)
+        _plush.albedo_texture = _texture_of(ELEPHANT)
+    $World/Rider.material_override = _plush
+    $World/Block.material_override = _colored(Color(0.95, 0.55, 0.35))
+    $World/Crate/Mesh.material_override = _colored(Color(0.55, 0.38, 0.22))
+    $World/Platform/Mesh.material_override = _colored(Color(0.35, 0.5, 0.6))
+    $World/Ground/Mesh.material_override = _colored(Color(0.85, 0.85, 0.8))
+
+
+func _unhandled_key_input(event: InputEventKey) -> void:
+    if event.pressed and not event.echo and event.scancode == KEY_SPACE:
+        drop(Transform(Basis(), Vector3(rand_range(-0.3, 0.3), 2.0, 0.2)))
+
+
+# One elephant more, while there is room; returns what draws it, or null.
+func drop(place: Transform) -> TaichiSoftBody:
+    var body: int = $World.spawn("elephant", place)
+    if body == 0:
+        return null
+    var drawn := TaichiSoftBody.new()
+    drawn.body = body
+    drawn.material_override = _plush
+    $World.add_child(drawn)
+    return drawn
+
+
+func _colored(color: Color) -> SpatialMaterial:
+    var material := SpatialMaterial.new()
+    material.albedo_color = color
+    return material
+
+
+# The first picture in a .glb: that has a head of 12 bytes, a part in JSON, and one with the bytes.
+func _texture_of(path: String) -> ImageTexture:
+    var file := File.new()
+    file.open(path, File.READ)
+    file.seek(12)
+    var length := file.get_32()
+    file.get_32()
+    var head: Dictionary = parse_json(file.get_buffer(length).get_string_from_utf8())
+    var view: Dictionary = head.bufferViews[head.images[0].bufferView]
+    file.seek(12 + 8 + length + 8 + int(view.get("byteOffset", 0)))
+    var bytes := file.get_buffer(int(view.byteLength))
+    var image := Image.new()
+    if head.images[0].mimeType == "image/png":
+        image.load_png_from_buffer(bytes)
+    else:
+        image.load_jpg_from_buffer(bytes)
+    var texture := ImageTexture.new()
+    texture.create_from_image(image)
+    return texture

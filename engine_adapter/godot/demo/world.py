@@ -1,0 +1,20 @@
+"""The world of the demo for Godot: toy elephants, and a soft block under a crate.
+
+taichi-soft export engine_adapter/godot/demo/world.py --axes y-up --out engine_adapter/godot/demo/demo.softworld
+
+Here z is up, as always in Python; in Godot it is y, and Python's y is -z. Ground, platform and crate are Godot's.
+"""
+
+from taichi_soft import Contact, Material, SoftBodyAsset, World, box
+from taichi_soft.core.package_data import ASSETS
+
+world = World(soft_contact=True, floor=None, sleep_speed=0.05, collider_room=8)
+plush = Material(young=3e4, poisson=0.4, density=200, damping_ratio=0.1)
+elephant = SoftBodyAsset.from_surface(
+    ASSETS / "elephant.glb", plush, cells=5, up="y", contact=Contact(friction=0.9, thickness=0.005)
+)
+world.reserve(elephant, 3)
+rider = world.spawn(elephant, position=(-1.5, 0.0, 0.61))
+cushion = Material(young=3e5, poisson=0.3, density=1000, damping_ratio=0.2)
+block = world.add_body(box((1, 1, 0.5), (4, 4, 2)), cushion, position=(1.5, 0.0, 0.26))
+world.build()

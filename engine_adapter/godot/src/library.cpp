@@ -1,0 +1,59 @@
+// What Godot calls when it loads the library: the class SoftWorldNative is told to it.
+#include <exception>
+
+#include "world_native.hpp"
+
+using taichi_soft_godot::api;
+using taichi_soft_godot::Arguments;
+using taichi_soft_godot::Method;
+using taichi_soft_godot::WorldNative;
+
+#define EXPORTED extern "C" __attribute__((visibility("default")))
+
+namespace {
+
+const godot_gdnative_ext_nativescript_api_struct* scripts = nullptr;
+const char* const kClass = "SoftWorldNative";
+
+void* create(godot_object*, void*) { return new WorldNative; }
+
+void destroy(godot_object*, void*, void* data) { delete static_cast<WorldNative*>(data); }
+
+// A refused call returns null, shows its text among Godot's errors, and keeps it for `last_error`.
+godot_variant call(godot_object*, void* which, void* data, int count, godot_variant** values) {
+  const Method& method = *static_cast<const Method*>(which);
+  WorldNative& self = *static_cast<WorldNative*>(data);
+  try {
+    if (count != method.argument_count) {
+      throw taichi_soft_godot::Refused("takes " + std::to_string(method.argument_count) + " arguments, and got " +
+                                       std::to_string(count));
+    }
+    return method.call(self, Arguments(count, values));
+  } catch (const std::exception& error) {
+    self.last_error = error.what();
+    api->godot_print_error(error.what(), method.name, kClass, 0);
+  }
+  return taichi_soft_godot::nothing();
+}
+
+}  // namespace
+
+EXPORTED void godot_gdnative_init(godot_gdnative_init_options* options) {
+  api = options->api_struct;
+  for (unsigned i = 0; i < api->num_extensions; ++i) {
+    if (api->extensions[i]->type == GDNATIVE_EXT_NATIVESCRIPT) {
+      scripts = reinterpret_cast<const godot_gdnative_ext_nativescript_api_struct*>(api->extensions[i]);
+    }
+  }
+}
+
+EXPORTED void godot_gdnative_terminate(godot_gdnative_terminate_options*) { api = nullptr, scripts = nullptr; }
+
+EXPORTED void godot_nativescript_init(void* handle) {
+  scripts->godot_nativescript_register_class(handle, kClass, "Reference", {create, nullptr, nullptr},
+                                             {destroy, nullptr, nullptr});
+  for (const Method& method : taichi_soft_godot::methods) {
+    scripts->godot_nativescript_register_method(handle, kClass, method.name, {GODOT_METHOD_RPC_MODE_DISABLED},
+                                                {call, const_cast<Method*>(&method), nullptr});
+  }
+}

@@ -1,0 +1,330 @@
+#include "world_native.hpp"
+
+#include <cstdio>
+#include <cstring>
+
+#include "taichi_soft.hpp"
+
+namespace taichi_soft_godot {
+
+using taichi_soft::check;
+
+void WorldNative::clear() {
+  if (world != 0) ts_world_destroy(world);
+  if (scene != 0) ts_scene_unload(scene);
+  scene = 0, world = 0;
+  statuses.clear();
+}
+
+namespace {
+
+using Self = WorldNative&;
+using In = const Arguments&;
+
+ts_body body_of(In in) { return ts_body(in.whole(0)); }
+
+ts_scene_info info_of(Self self) {
+  ts_scene_info info{};
+  info.struct_size = sizeof info;
+  check(ts_scene_get_info(self.scene, &info));
+  return info;
+}
+
+ts_mesh_info mesh_of(Self self, int32_t mesh) {
+  ts_mesh_info info{};
+  info.struct_size = sizeof info;
+  check(ts_mesh_get_info(self.scene, mesh, &info));
+  return info;
+}
+
+// ---- the world file ----
+
+godot_variant load(Self self, In in) {
+  self.clear();
+  check(ts_scene_load(in.text(0).c_str(), &self.scene));
+  const ts_result created = ts_world_create(self.scene, &self.world);
+  if (created != TS_OK) {
+    const taichi_soft::Error error(created);  // before `clear`, which makes calls of its own
+    self.clear();
+    throw error;
+  }
+  return of(true);
+}
+
+godot_variant unload(Self self, In) {
+  self.clear();
+  return of(true);
+}
+
+godot_variant count(Self self, In in) {
+  const ts_scene_info info = info_of(self);
+  const int32_t kind = in.small(0);
+  const int32_t counts[] = {info.slot_count, info.asset_count, info.collider_count, info.frame_count, info.mesh_count};
+  if (kind < 0 || kind > TS_MESH) throw Refused("argument 1 is " + std::to_string(kind) + ": kinds are 0 to 4");
+  return of(int64_t(counts[kind]));
+}
+
+godot_variant find(Self self, In in) {
+  int32_t number = 0;
+  check(ts_scene_find(self.scene, in.small(0), in.text(1).c_str(), &number));
+  return of(int64_t(number));
+}
+
+godot_variant name_of(Self self, In in) {
+  char name[256] = "";
+  check(ts_scene_get_name(self.scene, in.small(0), in.small(1), name, sizeof name));
+  return of(std::string(name));
+}
+
+godot_variant mesh_info(Self self, In in) {
+  const ts_mesh_info info = mesh_of(self, in.small(0));
+  return of_whole_numbers({info.asset, info.vertex_count, info.triangle_count, info.has_uv});
+}
+
+godot_variant triangles(Self self, In in) {
+  std::vector<uint32_t> found(3 * size_t(mesh_of(self, in.small(0)).triangle_count));
+  check(ts_mesh_get_triangles(self.scene, in.small(0), found.data(), found.size()));
+  // Godot's fronts are clockwise.
+  std::vector<int32_t> clockwise(found.size());
+  for (size_t i = 0; i + 2 < found.size(); i += 3) {
+    clockwise[i] = int32_t(found[i]), clockwise[i + 1] = int32_t(found[i + 2]), clockwise[i + 2] = int32_t(found[i + 1]);
+  }
+  return of_whole_numbers(clockwise);
+}
+
+godot_variant uvs(Self self, In in) {
+  const ts_mesh_info info = mesh_of(self, in.small(0));
+  std::vector<float> found(info.has_uv != 0 ? 2 * size_t(info.vertex_count) : 0);
+  if (!found.empty()) check(ts_mesh_get_uv(self.scene, in.small(0), found.data(), found.size()));
+  for (size_t i = 1; i < found.size(); i += 2) found[i] = 1.0f - found[i];  // Godot's v goes down
+  return of_pairs(found);
+}
+
+// ---- time ----
+
+godot_variant set_fixed_step(Self self, In in) {
+  const ts_fixed_step step{sizeof(ts_fixed_step), in.small(1), in.small(2), in.real(0)};
+  check(ts_world_set_fixed_step(self.world, &step));
+  return of(true);
+}
+
+godot_variant advance(Self self, In in) {
+  ts_clock clock{};
+  clock.struct_size = sizeof clock;
+  check(ts_world_advance(self.world, in.real(0), &clock));
+  return of(int64_t(clock.steps_made));
+}
+
+godot_variant step(Self self, In in) {
+  check(ts_world_step(self.world, in.real(0), in.small(1)));
+  return of(true);
+}
+
+godot_variant hash(Self self, In) {
+  uint64_t found = 0;
+  check(ts_world_hash(self.world, &found));
+  char text[17];
+  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(found));
+  return of(std::string(text));
+}
+
+godot_variant snapshot(Self self, In) {
+  size_t size = 0;
+  check(ts_world_snapshot(self.world, nullptr, 0, &size));
+  std::vector<uint8_t> bytes(size);
+  check(ts_world_snapshot(self.world, bytes.data(), bytes.size(), &size));
+  return of_bytes(bytes);
+}
+
+godot_variant restore(Self self, In in) {
+  const std::vector<uint8_t> bytes = in.bytes(0);
+  check(ts_world_restore(self.world, bytes.data(), bytes.size()));
+  return of(true);
+}
+
+godot_variant wake(Self self, In) {
+  check(ts_world_wake(self.world));
+  return of(true);
+}
+
+// ---- bodies ----
+
+godot_variant spawn(Self self, In in) {
+  const ts_pose pose = in.pose(1);
+  ts_placement place{};
+  place.struct_size = sizeof place;
+  std::memcpy(place.position, pose.position, sizeof place.position);
+  std::memcpy(place.rotation, pose.rotation, sizeof place.rotation);
+  in.vector(2, place.velocity);
+  in.vector(3, place.spin);
+  ts_body body = 0;
+  check(ts_world_spawn(self.world, in.small(0), &place, &body));
+  return of(int64_t(body));
+}
+
+godot_variant despawn(Self self, In in) {
+  check(ts_world_despawn(self.world, body_of(in)));
+  return of(true);
+}
+
+godot_variant body(Self self, In in) {
+  ts_body found = 0;
+  check(ts_world_get_body(self.world, in.small(0), &found));
+  return of(int64_t(found));
+}
+
+godot_variant asset_of(Self self, In in) {
+  int32_t asset = 0;
+  check(ts_body_get_asset(self.world, body_of(in), &asset));
+  return of(int64_t(asset));
+}
+
+godot_variant status(Self self, In in) {
+  int32_t found = 0;
+  check(ts_body_get_status(self.world, body_of(in), &found));
+  return of(int64_t(found));
+}
+
+godot_variant center(Self self, In in) {
+  double found[3];
+  check(ts_body_center(self.world, body_of(in), found));
+  return of_vector(found);
+}
+
+godot_variant set_velocity(Self self, In in) {
+  double linear[3], spin[3];
+  in.vector(1, linear);
+  in.vector(2, spin);
+  check(ts_body_set_velocity(self.world, body_of(in), linear, spin));
+  return of(true);
+}
+
+godot_variant apply_impulse(Self self, In in) {
+  double impulse[3];
+  in.vector(1, impulse);
+  check(ts_body_apply_impulse(self.world, body_of(in), impulse, nullptr, 0));
+  return of(true);
+}
+
+godot_variant mesh(Self self, In in) {
+  const size_t count = 3 * size_t(mesh_of(self, in.small(1)).vertex_count);
+  self.positions.resize(count);
+  self.normals.resize(count);
+  check(ts_body_mesh(self.world, body_of(in), in.small(1), self.positions.data(), self.normals.data(), count));
+  return of_list({of_triples(self.positions), of_triples(self.normals)});
+}
+
+// Whose status is another than at the last call: body, status before, status now, of each in a row.
+godot_variant changes(Self self, In) {
+  const int32_t slots = info_of(self).slot_count;
+  self.statuses.resize(size_t(slots), {0, TS_ACTIVE});
+  std::vector<godot_variant> found;
+  for (int32_t slot = 0; slot < slots; ++slot) {
+    auto& [body, before] = self.statuses[size_t(slot)];
+    ts_body now = 0;
+    int32_t status = TS_ACTIVE;
+    check(ts_world_get_body(self.world, slot, &now));
+    if (now != 0) check(ts_body_get_status(self.world, now, &status));
+    if (now != body) before = TS_ACTIVE;  // a new one was awake when it came
+    if (now != 0 && status != before) {
+      for (const int64_t number : {int64_t(now), int64_t(before), int64_t(status)}) found.push_back(of(number));
+    }
+    body = now, before = status;
+  }
+  return of_list(found);
+}
+
+// ---- colliders and frames ----
+
+godot_variant add_collider(Self self, In in) {
+  ts_shape shape{};
+  shape.struct_size = sizeof shape;
+  shape.kind = in.small(0);
+  in.vector(1, shape.size);
+  const ts_pose pose = in.pose(2);
+  shape.friction = in.real(3);
+  shape.restitution = in.real(4);
+  shape.thickness = in.real(5);
+  shape.group = in.small(6);
+  shape.mask = in.small(7);
+  int32_t number = 0;
+  check(ts_collider_add(self.world, &shape, &pose, &number));
+  return of(int64_t(number));
+}
+
+godot_variant remove_collider(Self self, In in) {
+  check(ts_collider_remove(self.world, in.small(0)));
+  return of(true);
+}
+
+godot_variant move_collider(Self self, In in) {
+  const ts_pose pose = in.pose(1);
+  check(ts_collider_move_to(self.world, in.small(0), &pose));
+  return of(true);
+}
+
+godot_variant teleport_collider(Self self, In in) {
+  const ts_pose pose = in.pose(1);
+  check(ts_collider_teleport(self.world, in.small(0), &pose));
+  return of(true);
+}
+
+godot_variant collider_impulse(Self self, In in) {
+  double impulse[3], moment[3];
+  check(ts_collider_get_impulse(self.world, in.small(0), impulse, moment));
+  return of_list({of_vector(impulse), of_vector(moment)});
+}
+
+godot_variant collider_position(Self self, In in) {
+  ts_pose pose;
+  check(ts_collider_get_pose(self.world, in.small(0), &pose));
+  return of_vector(pose.position);
+}
+
+godot_variant move_frame(Self self, In in) {
+  const ts_pose pose = in.pose(1);
+  check(ts_frame_move_to(self.world, in.small(0), &pose));
+  return of(true);
+}
+
+godot_variant last_error(Self self, In) { return of(self.last_error); }
+
+}  // namespace
+
+const std::vector<Method> methods = {
+    {"load", 1, load},
+    {"unload", 0, unload},
+    {"count", 1, count},
+    {"find", 2, find},
+    {"name_of", 2, name_of},
+    {"mesh_info", 1, mesh_info},
+    {"triangles", 1, triangles},
+    {"uvs", 1, uvs},
+    {"set_fixed_step", 3, set_fixed_step},
+    {"advance", 1, advance},
+    {"step", 2, step},
+    {"state_hash", 0, hash},
+    {"snapshot", 0, snapshot},
+    {"restore", 1, restore},
+    {"wake", 0, wake},
+    {"spawn", 4, spawn},
+    {"despawn", 1, despawn},
+    {"body", 1, body},
+    {"asset_of", 1, asset_of},
+    {"status", 1, status},
+    {"center", 1, center},
+    {"set_velocity", 3, set_velocity},
+    {"apply_impulse", 2, apply_impulse},
+    {"mesh", 2, mesh},
+    {"changes", 0, changes},
+    {"add_collider", 8, add_collider},
+    {"remove_collider", 1, remove_collider},
+    {"move_collider", 2, move_collider},
+    {"teleport_collider", 2, teleport_collider},
+    {"collider_impulse", 1, collider_impulse},
+    {"collider_position", 1, collider_position},
+    {"move_frame", 2, move_frame},
+    {"last_error", 0, last_error},
+};
+
+}  // namespace taichi_soft_godot

@@ -1,0 +1,34 @@
+// The class SoftWorldNative of scripts: a world file and one world of it.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "variants.hpp"
+
+namespace taichi_soft_godot {
+
+struct WorldNative {
+  ts_scene scene = 0;  // 0 until `load`
+  ts_world world = 0;
+  std::string last_error;
+  std::vector<std::pair<ts_body, int32_t>> statuses;  // of each slot, as `changes` saw them last
+  std::vector<float> positions, normals;              // kept, so that a frame allocates less
+
+  WorldNative() = default;
+  WorldNative(const WorldNative&) = delete;
+  WorldNative& operator=(const WorldNative&) = delete;
+  ~WorldNative() { clear(); }
+  void clear();
+};
+
+struct Method {
+  const char* name;
+  int argument_count;
+  godot_variant (*call)(WorldNative& self, const Arguments& arguments);
+};
+
+extern const std::vector<Method> methods;
+
+}  // namespace taichi_soft_godot
