@@ -1,0 +1,222 @@
+"""Godot 3 plays the demo without a window: a platform carries, a crate lies on a block, bits are those of C."""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from games import line, lines_of
+from native_build import ROOT
+
+GODOT = ROOT / "engine_adapter" / "godot"
+SCRIPTS = ROOT / "tests" / "native" / "godot"
+UPRIGHT, HALF_TURN = (0.0, 0.0, 0.0, 1.0), (0.0, 1.0, 0.0, 0.0)  # both are exact in Godot's Transform
+DT = 1 / 64
+
+
+@pytest.fixture(scope="module")
+def engine():
+    """The program: Godot without a window."""
+    for name in ("godot3-server", "godot3-runner"):
+        if shutil.which(name) is not None:
+            return name
+    pytest.skip("needs godot3-server: apt-get install godot3-server")
+
+
+@pytest.fixture(scope="module")
+def libraries(native, tmp_path_factory):
+    """Folder of the GDNative library."""
+    folder = tmp_path_factory.mktemp("godot")
+    settings = [f"-DTAICHI_SOFT_DIR={native}"]
+    if "GODOT_HEADERS" in os.environ:
+        settings.append(f"-DGODOT_HEADERS={os.environ['GODOT_HEADERS']}")
+    done = subprocess.run(
+        ["cmake", "-S", str(GODOT), "-B", str(folder), *settings], capture_output=True, text=True
+    )
+    if "Godot's headers cannot be fetched" in " ".join(done.stderr.split()):
+        pytest.skip("needs Godot's headers, from static.crates.io or in the folder $GODOT_HEADERS")
+    assert done.returncode == 0, done.stderr
+    done = subprocess.run(["cmake", "--build", str(folder)], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "warning" not in done.stdout + done.stderr
+    return folder / "bin"
+
+
+@pytest.fixture(scope="module")
+def world(tmp_path_factory):
+    """The demo's world, exported."""
+    folder = tmp_path_factory.mktemp("worlds") / "demo.softworld"
+    command = ["export", str(GODOT / "demo" / "world.py"), "--axes", "y-up", "--out", str(folder)]
+    done = subprocess.run([sys.executable, "-m", "taichi_soft", *command], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+@pytest.fixture(scope="module")
+def project(engine, libraries, world, tmp_path_factory):
+    """The demo as a reader has it after the steps of docs/godot.md, and the scripts of this test."""
+    folder = tmp_path_factory.mktemp("project") / "demo"
+    shutil.copytree(
+        GODOT / "demo", folder, ignore=shutil.ignore_patterns("bin", "*.softworld", "elephant.glb")
+    )
+    shutil.copytree(libraries, folder / "addons" / "taichi_soft" / "bin")
+    shutil.copytree(world, folder / "demo.softworld")
+    for script in SCRIPTS.glob("*.gd"):
+        shutil.copy(script, folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def run(engine, project):
+    """A function that runs a script in Godot; returns all it printed."""
+
+    def printed(script):
+        command = [engine, "--path", str(project), "--fixed-fps", "60", "-s", script]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+        assert done.returncode == 0, done.stdout + done.stderr
+        assert "SCRIPT ERROR" not in done.stdout + done.stderr, done.stderr
+        return done.stdout
+
+    return printed
+
+
+def told(text):
+    """What a script printed as JSON, by name."""
+    rows = [json.loads(row[5:]) for row in text.splitlines() if row.startswith("JSON ")]
+    return {row["name"]: row["value"] for row in rows}
+
+
+@pytest.fixture(scope="module")
+def scene(run):
+    return told(run("scene.gd"))
+
+
+@pytest.fixture(scope="module")
+def rows(scene):
+    """What happened in each frame of the scene."""
+    _, *found = scene["scene"]["rows"]
+    return {name: np.array([row[name] for row in found]) for name in found[0]}
+
+
+def test_a_platform_carries_a_body(rows):
+    """It moves by 0.6 m, and what stands on it moves along."""
+    moved = np.ptp(rows["platform"][:, 2])
+    assert moved == pytest.approx(0.6, abs=0.01)
+    on_it = rows["rider"][120:] - rows["platform"][120:]
+    assert np.ptp(on_it[:, 2]) < 0.15 * moved
+    assert (on_it[:, 1] > 0.1).all()  # its surface; the elephant's middle is some 0.2 m higher
+
+
+def test_a_rigid_crate_lies_on_a_soft_block_and_sinks_in(scene, rows):
+    crate = rows["crate"][240:]
+    assert np.ptp(crate, axis=0).max() < 0.02  # it lies still: neither gains energy from the other
+    bottom, top = crate[:, 1].mean() - 0.2, scene["meshes"]["Block"]["top"]
+    assert 0.002 < top - bottom < 0.05
+
+
+def test_the_block_bears_the_weight_of_the_crate(rows):
+    """Mean force of the soft block over three seconds is 100 kg times gravity."""
+    force = rows["push"][240:, 1].mean() * 60
+    assert force == pytest.approx(100 * 9.8, rel=0.03)
+
+
+def test_a_capsule_lies_along_z_as_in_godot(rows):
+    """What falls beside its middle, but over its end, hits it."""
+    assert rows["capsule"].max() > 1.0
+
+
+def test_drawn_meshes_are_those_of_the_library(scene):
+    meshes = scene["meshes"]
+    assert [mesh["equal"] for mesh in meshes.values()] == [True, True]
+    assert meshes["Rider"]["uvs"] == meshes["Rider"]["vertices"] > 8000
+    assert meshes["Block"]["volume"] == pytest.approx(0.5, rel=0.02)  # fronts are outside
+    assert meshes["Rider"]["volume"] > 0.0
+    assert meshes["Block"]["center"] == pytest.approx([1.5, 0.25, 0.0], abs=0.02)
+
+
+def test_a_snapshot_rewinds(scene):
+    rewind = scene["rewind"]
+    before, after, again, after_again = rewind["hashes"]
+    assert rewind["taken"]
+    assert (before, after) == (again, after_again)
+    assert before != after
+
+
+def test_signals_arrive(scene):
+    assert scene["sleep"] == {"slept": True, "woke": True}
+    assert scene["scene"]["froze"] > 0
+
+
+def game():
+    """Calls in numbers that Godot's 32 bits hold exactly."""
+    yield line("add_collider", 0, (0, 0, 0), 0.5, -1.0, 0.0, 1, -1, (0.0, 0.0, 0.0), UPRIGHT)
+    yield line("add_collider", 2, (2.0, 0.25, 2.0), 0.875, -1.0, 0.0, 1, -1, (-1.5, 0.25, 0.0), UPRIGHT)
+    for i in range(240):
+        if i < 160:
+            yield line("move_collider", 1, (-1.5 + i / 512, 0.25 + (i % 32) / 1024, 0.0), UPRIGHT)
+        if i == 40:
+            yield line("spawn", 0, (1.5, 0.75, 0.125), HALF_TURN, (0.0, -1.0, 0.25), (0.0, 2.0, 0.0))
+            yield line("velocity", 3, (0.5, 1.0, 0.0), (0.0, 0.0, 1.0))
+        if i == 100:
+            yield line("snapshot")
+        if i == 130:
+            yield line("restore")
+        if i == 200:
+            yield line("despawn", 1)
+        yield line("step", DT, 0)
+        if i % 60 == 59:
+            yield line("status", 3)
+            yield line("mesh", 0, 0)
+            yield line("mesh", 3, 1)
+
+
+def test_a_game_in_godot_has_the_same_bits(run, project, world, play):
+    calls = list(game())
+    (project / "game.txt").write_text("\n".join(calls), encoding="utf-8")
+    found = [row[5:] for row in run("play.gd").splitlines() if row.startswith("PLAY ")]
+    assert len(set(found)) > 240
+    assert found == lines_of([play, world], calls)
+
+
+REFUSED = [
+    "cannot read no/such/folder/world.tsw",
+    "there is no world 0",
+    "body 12345 is not in this world",
+    "argument 1 is no whole number",
+    "takes 2 arguments, and got 1",
+    "seconds is -1",
+    "seconds is -?nan",
+    "asset is 99: there are 2",
+    "position has -?nan in it",
+    "argument 2 is a Transform that mirrors",
+    "argument 2 is a Transform without size",
+    "there is no frame 7",
+    "nothing of that kind is called nobody",
+    "argument 1 is 9: kinds are 0 to 4",
+    "there is no mesh 77: there are 2",
+    "3 bytes are no snapshot",
+    "bytes is null",
+    "body 1099511627776 is not in this world",
+    "argument 1 is 1099511627776: too large",
+]
+
+
+def test_bad_arguments_are_errors_and_no_crash(run):
+    found = told(run("refused.gd"))
+    answers = sorted(found["native"].items(), key=lambda item: int(item[0].split()[0]))
+    assert len(answers) == len(REFUSED)
+    for (call, (is_null, text)), expected in zip(answers, REFUSED, strict=True):
+        assert is_null, call
+        assert re.match(expected, text), call
+    node = found["node"]
+    assert node["made"] == [*range(8), -1, 3]  # as many as there is room for; then one more
+    not_started, started = node["answers"][:4], node["answers"][4:]
+    assert not_started == [False, 0, "", False]
+    assert started == [
+        *(True, 0, 0, False, False, -1, -1, -1, False, False),
+        *("(0, 0, 0)", True, False, True),
+    ]
