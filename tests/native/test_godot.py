@@ -1,4 +1,4 @@
-"""Godot 3 plays the demo without a window: a platform carries, a crate lies on a block, bits are those of C."""
+"""Godot 3 plays the demo without a window: what moves, what is drawn, bits as in C, errors."""
 
 import json
 import os
@@ -113,7 +113,7 @@ def test_a_platform_carries_a_body(rows):
 
 def test_a_rigid_crate_lies_on_a_soft_block_and_sinks_in(scene, rows):
     crate = rows["crate"][240:]
-    assert np.ptp(crate, axis=0).max() < 0.02  # it lies still: neither gains energy from the other
+    assert np.ptp(crate, axis=0).max() < 0.005  # it lies still: neither gains energy from the other
     bottom, top = crate[:, 1].mean() - 0.2, scene["meshes"]["Block"]["top"]
     assert 0.002 < top - bottom < 0.05
 
@@ -121,7 +121,7 @@ def test_a_rigid_crate_lies_on_a_soft_block_and_sinks_in(scene, rows):
 def test_the_block_bears_the_weight_of_the_crate(rows):
     """Mean force of the soft block over three seconds is 100 kg times gravity."""
     force = rows["push"][240:, 1].mean() * 60
-    assert force == pytest.approx(100 * 9.8, rel=0.03)
+    assert force == pytest.approx(100 * 9.8, rel=0.01)
 
 
 def test_a_capsule_lies_along_z_as_in_godot(rows):
@@ -148,7 +148,7 @@ def test_a_snapshot_rewinds(scene):
 
 def test_signals_arrive(scene):
     assert scene["sleep"] == {"slept": True, "woke": True}
-    assert scene["scene"]["froze"] > 0
+    assert scene["scene"]["froze"] == 1
 
 
 def game():

@@ -1,8 +1,9 @@
-"""The world of the demo for Godot: toy elephants, and a soft block under a crate.
+"""The world of the demo for Godot: toy elephants, and a soft block under a crate. See docs/godot.md.
 
-taichi-soft export engine_adapter/godot/demo/world.py --axes y-up --out engine_adapter/godot/demo/demo.softworld
+    taichi-soft export world.py --axes y-up --out demo.softworld
 
-Here z is up, as always in Python; in Godot it is y, and Python's y is -z. Ground, platform and crate are Godot's.
+Here z is up, as always in Python; in Godot it is y, and Python's y is -z. Ground, platform and crate are
+Godot's.
 """
 
 from taichi_soft import Contact, Material, SoftBodyAsset, World, box

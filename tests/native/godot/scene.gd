@@ -80,18 +80,18 @@ func _look_at_meshes() -> void:
         var arrays: Array = drawn.mesh.surface_get_arrays(0)
         var read: Array = _world.native.mesh(drawn.body, drawn._mesh)
         var middle := Vector3()
-        var outward := 0.0
+        var volume := 0.0
         var vertices: PoolVector3Array = arrays[Mesh.ARRAY_VERTEX]
         for vertex in vertices:
             middle += vertex / vertices.size()
         var indices: PoolIntArray = arrays[Mesh.ARRAY_INDEX]
         for i in range(0, indices.size(), 3):
             var a := vertices[indices[i]]
-            outward += a.dot((vertices[indices[i + 2]] - a).cross(vertices[indices[i + 1]] - a)) / 6
+            volume += a.dot((vertices[indices[i + 2]] - a).cross(vertices[indices[i + 1]] - a)) / 6
         found[name] = {
             "vertices": vertices.size(),
             "equal": vertices == read[0] and arrays[Mesh.ARRAY_NORMAL] == read[1],
-            "volume": outward,  # above 0 where fronts are clockwise, as in Godot
+            "volume": volume,  # above 0 where fronts are clockwise, as in Godot
             "center": _list(middle),
             "top": drawn.mesh.get_aabb().end.y,
             "uvs": arrays[Mesh.ARRAY_TEX_UV].size() if arrays[Mesh.ARRAY_TEX_UV] != null else 0
@@ -122,11 +122,9 @@ func _sleep_and_wake() -> void:
     _say("sleep", {"slept": body in _slept, "woke": body in _woke})
 
 
-# A step that is far too long for one substep.
+# Spun far faster than steps of this length can follow.
 func _freeze() -> void:
     _world.substeps = 1
-    _world.native.apply_impulse(_world.body("block"), Vector3(300, 3000, 0))
-    for _i in 60:
-        if _froze:
-            break
-        _world.step(1.0 / 5)
+    _world.native.set_velocity(_world.body("block"), Vector3(), Vector3(2000, 0, 2000))
+    for _i in 20:
+        _world.step(1.0 / 10)
