@@ -182,6 +182,17 @@ def test_a_game_in_godot_has_the_same_bits(run, project, world, play):
     assert found == lines_of([play, world], calls)
 
 
+def test_the_script_of_the_page_runs(run, project):
+    """Its elephant falls, and is drawn."""
+    text = (ROOT / "docs" / "godot.md").read_text(encoding="utf-8")
+    (script,) = re.findall(r"^```gdscript\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
+    (project / "page.gd").write_text(f"extends Spatial\n\n{script}", encoding="utf-8")
+    found = told(run("page_check.gd"))["page"]
+    assert found["nodes"] == 1
+    assert found["vertices"] > 8000
+    assert 0.3 < found["height"] < 2.1
+
+
 REFUSED = [
     "cannot read no/such/folder/world.tsw",
     "there is no world 0",

@@ -9,13 +9,13 @@ var _plush := _colored(Color(0.72, 0.72, 0.78))
 func _ready() -> void:
     var file := File.new()
     if file.file_exists(ELEPHANT):
-        _plush = _colored(Color.white)
+        _plush = _colored(Color(0.8, 0.8, 0.8))
         _plush.albedo_texture = _texture_of(ELEPHANT)
     $World/Rider.material_override = _plush
-    $World/Block.material_override = _colored(Color(0.95, 0.55, 0.35))
+    $World/Block.material_override = _colored(Color(0.85, 0.4, 0.25))
     $World/Crate/Mesh.material_override = _colored(Color(0.55, 0.38, 0.22))
-    $World/Platform/Mesh.material_override = _colored(Color(0.35, 0.5, 0.6))
-    $World/Ground/Mesh.material_override = _colored(Color(0.85, 0.85, 0.8))
+    $World/Platform/Mesh.material_override = _colored(Color(0.25, 0.4, 0.5))
+    $World/Ground/Mesh.material_override = _colored(Color(0.5, 0.55, 0.45))
 
 
 func _unhandled_key_input(event: InputEventKey) -> void:
