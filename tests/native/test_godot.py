@@ -47,26 +47,17 @@ def libraries(native, tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def world(tmp_path_factory):
-    """The demo's world, exported."""
-    folder = tmp_path_factory.mktemp("worlds") / "demo.softworld"
-    command = ["export", str(GODOT / "demo" / "world.py"), "--axes", "y-up", "--out", str(folder)]
-    done = subprocess.run([sys.executable, "-m", "taichi_soft", *command], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    return folder
-
-
-@pytest.fixture(scope="module")
-def project(engine, libraries, world, tmp_path_factory):
+def project(engine, libraries, tmp_path_factory):
     """The demo as a reader has it after the steps of docs/godot.md, and the scripts of this test."""
     folder = tmp_path_factory.mktemp("project") / "demo"
-    shutil.copytree(
-        GODOT / "demo", folder, ignore=shutil.ignore_patterns("bin", "*.softworld", "elephant.glb")
-    )
+    shutil.copytree(GODOT / "demo", folder)
+    shutil.copy(ROOT / "assets" / "elephant.glb", folder)
     shutil.copytree(libraries, folder / "addons" / "taichi_soft" / "bin")
-    shutil.copytree(world, folder / "demo.softworld")
     for script in SCRIPTS.glob("*.gd"):
         shutil.copy(script, folder)
+    command = ["export", str(folder / "world.py"), "--axes", "y-up", "--out", str(folder / "demo.softworld")]
+    done = subprocess.run([sys.executable, "-m", "taichi_soft", *command], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
     return folder
 
 
@@ -174,12 +165,12 @@ def game():
             yield line("mesh", 3, 1)
 
 
-def test_a_game_in_godot_has_the_same_bits(run, project, world, play):
+def test_a_game_in_godot_has_the_same_bits(run, project, play):
     calls = list(game())
     (project / "game.txt").write_text("\n".join(calls), encoding="utf-8")
     found = [row[5:] for row in run("play.gd").splitlines() if row.startswith("PLAY ")]
     assert len(set(found)) > 240
-    assert found == lines_of([play, world], calls)
+    assert found == lines_of([play, project / "demo.softworld"], calls)
 
 
 def test_the_script_of_the_page_runs(run, project):

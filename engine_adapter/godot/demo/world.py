@@ -6,13 +6,16 @@ Here z is up, as always in Python; in Godot it is y, and Python's y is -z. Groun
 Godot's.
 """
 
+from pathlib import Path
+
 from taichi_soft import Contact, Material, SoftBodyAsset, World, box
-from taichi_soft.core.package_data import ASSETS
+
+TOY = Path(__file__).with_name("elephant.glb")  # a copy of assets/elephant.glb
 
 world = World(soft_contact=True, floor=None, sleep_speed=0.05, collider_room=8)
 plush = Material(young=3e4, poisson=0.4, density=200, damping_ratio=0.1)
 elephant = SoftBodyAsset.from_surface(
-    ASSETS / "elephant.glb", plush, cells=5, up="y", contact=Contact(friction=0.9, thickness=0.005)
+    TOY, plush, cells=5, up="y", contact=Contact(friction=0.9, thickness=0.005)
 )
 world.reserve(elephant, 3)
 rider = world.spawn(elephant, position=(-1.5, 0.0, 0.61))
