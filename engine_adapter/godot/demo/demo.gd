@@ -1,7 +1,7 @@
 # Looks of the demo, and an elephant more at each press of space.
 extends Spatial
 
-const ELEPHANT := "res://elephant.glb"  # a copy of assets/elephant.glb; without it elephants are grey
+const ELEPHANT := "res://elephant.glb"  # a copy of assets/elephant.glb, from which world.py makes bodies
 
 var _plush := _colored(Color(0.72, 0.72, 0.78))
 
