@@ -77,13 +77,13 @@ void World::bind() {
   if (!s.has_contact) return;
   island_count_ = {root, s.place("contact.island_count", 1, 1)};
   const size_t rows = colliders_.rows.size();
+  const Place kind = s.place("contact.collider_kind", rows, 1);
+  collider_kind_ = {root, kind};
+  collider_room_ = kind.count;
   for (int i = 0; i < 7; ++i) {
     const size_t width = i == 1 ? 4 : i == 6 ? 1 : 3;
-    collider_[i] = {root, s.place(std::string("contact.collider_") + kColliderFields[i], rows, width)};
+    collider_[i] = {root, s.place(std::string("contact.collider_") + kColliderFields[i], collider_room_, width)};
   }
-  collider_kind_ = {root, s.place("contact.collider_kind", rows, 1)};
-  collider_room_ = s.place("contact.collider_kind", rows, 1).count;
-  for (const char* name : kColliderFields) collider_room_ = std::min(collider_room_, s.place(std::string("contact.collider_") + name, rows, 1).count);
   collider_parameters_ = {root, s.place("contact.collider_parameters", collider_room_, 8)};
   collider_surface_ = {root, s.place("contact.collider_surface", collider_room_, 3)};
   collider_filter_ = {root, s.place("contact.collider_filter", collider_room_, 2)};
