@@ -2,7 +2,7 @@
 # make test: set everything up, run the tests that take minutes; make test-all: those that take an hour, too
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-fast test-all test-bounds native test-native lint profile docs clean
+.PHONY: help setup demo test test-fast test-all test-bounds native test-native dist-native lint profile docs clean
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -15,6 +15,7 @@ help:
 	@echo "make test-bounds  set up, run kernels with every index checked: takes minutes"
 	@echo "make native   set up, build the library for engines without Python and its sample, into out/native"
 	@echo "make test-native  set up, build it, play games in it and in Python"
+	@echo "make dist-native  build it, pack it with headers, wrappers and sample into dist"
 	@echo "make profile  set up, measure what a frame costs here"
 	@echo "make docs     set up, build the documentation into out/docs"
 	@echo "make lint     set up with every extra, check style and types"
@@ -53,6 +54,11 @@ native: $(VENV)/.demo
 
 test-native: $(VENV)/.test
 	@$(BIN)/python -m pytest tests/native
+
+dist-native: native
+	@mkdir -p dist
+	@cd out/native && cpack -B $(CURDIR)/dist > cpack.log || { cat cpack.log; exit 1; }
+	@ls -l dist/taichi-soft-native-*.zip
 
 profile: $(VENV)/.demo
 	@$(BIN)/taichi-soft profile
