@@ -23,7 +23,7 @@ from taichi_soft.export.archive import words
 from taichi_soft.export.layout import FLOAT, WHOLE, image_of, place_of, places_of
 from taichi_soft.export.meshes import ExportedMesh
 from taichi_soft.persistence.kernels.packing import OWNERS, carried, owners
-from taichi_soft.persistence.snapshot import carried_rows
+from taichi_soft.persistence.snapshot import carried_rows, steering
 from taichi_soft.solver.context import WorldContext
 
 Arrays = dict[str, NDArray[Any]]
@@ -76,11 +76,12 @@ def _of_fields(context: WorldContext) -> Arrays:
     state = context.built.state
     places = places_of(state)
     rows = carried_rows(context)
-    # What no call of the library changes, and kernels find their way by.
+    # By what no call of the library changes kernels find their way; what moves bodies must be finite.
     slices = [name for name, groups in state.carried.items() for _ in groups]
     fixed = [False] * len(OWNERS) + [name != "colliders" for name in slices]
+    moving = [state.particle_position, state.particle_velocity, *(field for _, field in steering(state))]
     kept = [
-        (place_of(field), rows[owner], fixed[owner])
+        (place_of(field), rows[owner], fixed[owner], any(field is each for each in moving))
         for owner in owners(state)
         for field, _, _ in carried(state, owner)
     ]

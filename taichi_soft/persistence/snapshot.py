@@ -148,7 +148,7 @@ def _require_words(context: WorldContext, manifest: Manifest, table: Words, word
         values = _rows(table, words, state, PARTICLE, field).view(np.float32)
         if not np.abs(values).max() <= highest:
             raise SnapshotError("this snapshot is not in order: particles are out of reach, or not finite")
-    for owner, field in _steering(state):
+    for owner, field in steering(state):
         if not np.isfinite(_rows(table, words, state, owner, field).view(np.float32)).all():
             raise SnapshotError("this snapshot is not in order: what moves its bodies is not finite")
     for each in context.slices:
@@ -161,7 +161,7 @@ def _require_words(context: WorldContext, manifest: Manifest, table: Words, word
         raise SnapshotError("this snapshot is not in order: it is not sure who lives")
 
 
-def _steering(state: State) -> list[tuple[int, Any]]:
+def steering(state: State) -> list[tuple[int, Any]]:
     """Fields of real numbers that the next step begins with, beside positions and velocities."""
     particle = [state.prev_position, state.prev_velocity, state.particle_mass, state.particle_inv_mass]
     particle += [state.particle_target, state.particle_push]

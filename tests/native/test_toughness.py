@@ -143,7 +143,7 @@ print(json.dumps([sorted(set(codes)), made, soft.hash(world) == soft.hash(other)
 def test_a_world_in_use_refuses_other_threads_and_makes_whole_steps(native, heap):
     codes, made, is_same = in_process(native, BUSY_WORLD, heap)
     assert codes in ([-3, 0], [0])
-    assert made >= 300
+    assert 0 < made <= 900
     assert is_same
 
 

@@ -136,10 +136,10 @@ void Scene::read_fields() {
   const size_t image = archive.get<unsigned char>("fields/image").count;
   if (rows.count != 5 * field_names_.size()) out_of_order("fields");
   for (size_t i = 0; i < field_names_.size(); ++i) places_.push_back(place_from(rows.data + 5 * i, image));
-  const auto kept = archive.rows<int64_t>("fields/carried", 7);
+  const auto kept = archive.rows<int64_t>("fields/carried", 8);
   carried_words = 0;
-  for (size_t i = 0; i + 7 <= kept.count; i += 7) {
-    Carried each = {place_from(kept.data + i, image), size_t(kept[i + 5]), kept[i + 6] != 0};
+  for (size_t i = 0; i + 8 <= kept.count; i += 8) {
+    Carried each = {place_from(kept.data + i, image), size_t(kept[i + 5]), kept[i + 6] != 0, kept[i + 7] != 0};
     if (kept[i + 5] < 0 || each.count > each.place.count) out_of_order("what snapshots have");
     carried_words += each.count * each.place.width;
     carried.push_back(each);

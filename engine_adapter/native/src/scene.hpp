@@ -21,7 +21,8 @@ struct Place {
 struct Carried {  // a field that snapshots have, and how many of its elements
   Place place;
   size_t count;
-  bool is_fixed;  // no call changes its whole numbers
+  bool is_fixed;   // no call changes its whole numbers
+  bool is_finite;  // it moves bodies
 };
 
 struct Asset {

@@ -921,8 +921,7 @@ void World::require_rows(const char* at, size_t colliders) const {
       } else {
         float number;
         take(&at, &number, 1);
-        const bool may_be_endless = std::isinf(number) && each.place.offset != s.place("particle_position").offset;
-        if (std::isnan(number) || (std::isinf(number) && !may_be_endless)) refuse();
+        if (each.is_finite && !std::isfinite(number)) refuse();
       }
     }
   }
