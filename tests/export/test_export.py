@@ -59,6 +59,13 @@ def changed():
     return world
 
 
+def skipping():
+    world = plain()
+    world.build()
+    world.skip_step([world.bodies[0]])
+    return world
+
+
 def flat():
     world = World(schedule="flat")
     world.add_body(BALL, position=(0, 0, 1))
@@ -74,6 +81,7 @@ def flat():
         (recording, "it records events"),
         (forced, "it has a force field"),
         (changed, "body 0 was given another material"),
+        (skipping, "body 0 skips the coming step"),
         (flat, "schedule 'flat'"),
     ],
 )
