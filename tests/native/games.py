@@ -5,7 +5,10 @@ import subprocess
 import numpy as np
 
 from taichi_soft import BoxShape, CapsuleShape, PlaneShape, SphereShape
+from taichi_soft.contact.collider import row_of
+from taichi_soft.control.frames import Frames
 from taichi_soft.persistence.kernels.packing import hash_bodies
+from taichi_soft.world.world import context_of_world
 
 MASK = (1 << 64) - 1
 
@@ -41,7 +44,7 @@ class Player:
     def __init__(self, world, meshes=()):
         """Args: meshes: of each mesh of the world file, a function (body) -> render mesh."""
         self.world, self.meshes, self.lines = world, meshes, []
-        self.assets = list(dict.fromkeys(world._context.slots.assets))
+        self.assets = list(dict.fromkeys(context_of_world(world).slots.assets))
         self.kept = b""
 
     def play(self, game):
@@ -63,10 +66,10 @@ class Player:
         return [int(each) for each in self.take(self.whole())] or None
 
     def body(self):
-        return self.world._context.slots.slots[self.whole()]
+        return context_of_world(self.world).slots.slots[self.whole()]
 
     def collider(self):
-        return self.world._context.colliders.all_handles[self.whole()]
+        return context_of_world(self.world).colliders.all_handles[self.whole()]
 
     def say(self, text):
         self.lines.append(text)
@@ -74,7 +77,7 @@ class Player:
     def step(self):
         dt, substeps = self.take(2)
         self.world.step(dt, int(substeps) or None)
-        built = self.world._built
+        built = context_of_world(self.world).built
         self.say(f"{hash_bodies(built.state, self.world.slot_count) & MASK:016x}")
 
     def impulse(self):
@@ -180,9 +183,7 @@ class Player:
         self.collider().teleport(self.take(3), self.take(4))
 
     def move_frame(self):
-        from taichi_soft.control.frames import Frames
-
-        self.world._context.of(Frames).rows[self.whole()].move_to(self.take(3), self.take(4))
+        context_of_world(self.world).of(Frames).rows[self.whole()].move_to(self.take(3), self.take(4))
 
     def snapshot(self):
         self.kept = self.world.snapshot()
@@ -204,11 +205,11 @@ class Player:
         self.say(hash_of(np.concatenate([collider.impulse, collider.angular_impulse])))
 
     def collider_pose(self):
-        row = self.collider()._row
+        row = row_of(self.collider())
         self.say(hash_of(np.concatenate([row.position, row.rotation])))
 
     def status(self):
-        self.say(str(int(self.world._built.state.body_status[self.body().index])))
+        self.say(str(int(context_of_world(self.world).built.state.body_status[self.body().index])))
 
     def stable_substeps(self):
         self.say(str(self.world.stable_substeps(*self.take(1))))

@@ -17,6 +17,7 @@ from taichi_soft import (
     box,
     cloth,
     cloth_constants,
+    load_mesh,
     sphere,
 )
 from taichi_soft.core.package_data import ASSETS
@@ -247,6 +248,15 @@ def toys_game():
         yield line("step", DT, 0)
         if i % 100 == 0:
             yield line("mesh", 0, 0)
+
+
+def thesis_sphere():
+    """What docs/native.md measures a step of."""
+    world = World(floor=0.0)
+    material = Material(young=2e5, poisson=0.3, density=1000, damping=200.0)
+    world.add_body(load_mesh(ASSETS / "sphere.npz"), material, position=(0.0, 0.0, 3.0))
+    world.build()
+    return world
 
 
 GAMES = {

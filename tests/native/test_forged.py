@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from library import in_process
+from library import VERSION, in_process
 from native_build import ROOT
 
 from taichi_soft.bodies import status
@@ -123,6 +123,14 @@ def test_a_world_file_whose_numbers_are_not_in_order_is_refused(what, native, ex
     FORGERIES[what](arrays)
     (folder / "world.tsw").write_bytes(written(arrays))
     assert in_process(native, LOADED, folder) == -4
+
+
+def test_a_world_file_of_another_taichi_is_refused(native, export, tmp_path):
+    folder = shutil.copytree(export("heap"), tmp_path / "forged")
+    arrays = read(folder / "world.tsw")
+    arrays["package"] = np.frombuffer(b"0.2.0\01.8.0\0", dtype=np.uint8)
+    (folder / "world.tsw").write_bytes(written(arrays))
+    assert in_process(native, LOADED, folder) == VERSION
 
 
 def test_the_library_knows_the_numbers_of_status_drives_and_aims():

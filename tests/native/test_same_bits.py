@@ -9,12 +9,13 @@ from native_build import ROOT
 from scenes import GAMES
 
 from taichi_soft.export.meshes import CREASE
+from taichi_soft.world.world import context_of_world
 
 
 def drawn(world):
     """How Python draws what the world file's meshes are: of each asset its skins, or its surface."""
     found = []
-    for asset in dict.fromkeys(world._context.slots.assets):
+    for asset in dict.fromkeys(context_of_world(world).slots.assets):
         found += [lambda body, i=i: body.render_meshes[i] for i in range(len(asset.skins))]
         found += [] if asset.skins else [lambda body: body.render_mesh(crease=CREASE)]
     return found

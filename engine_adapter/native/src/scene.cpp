@@ -1,5 +1,6 @@
 #include "scene.hpp"
 
+#include <cstdio>
 #include <filesystem>
 
 #include "error.hpp"
@@ -83,6 +84,14 @@ Scene::Scene(const std::string& folder)
       axes(archive.rows<double>("host_axes", 3).count == 9 ? archive.get<double>("host_axes").data
                                                             : (out_of_order("axes"), nullptr)),
       folder_(folder) {
+  // Kernels of another Taichi would be given arguments that they do not know.
+  const std::vector<std::string> package = archive.texts("package");  // of taichi-soft and of Taichi
+  unsigned major = 0, minor = 0;
+  const bool is_told = package.size() == 2 && std::sscanf(package[1].c_str(), "%u.%u", &major, &minor) == 2;
+  if (!is_told || ti_get_version() / 1000 != major * 1000 + minor) {
+    fail(TS_ERROR_VERSION, "the world file was exported with Taichi %s, and the library runs %u.%u: export it again",
+         is_told ? package[1].c_str() : "of no version", ti_get_version() / 1000000, ti_get_version() / 1000 % 1000);
+  }
   for (int kind = 0; kind < 5; ++kind) names_[kind] = archive.texts(kKinds[kind]);
   const auto flags = archive.get<int32_t>("world/flags"), counts = archive.get<int32_t>("world/counts");
   const auto stable = archive.get<double>("world/stable"), limits = archive.get<double>("world/limits");
