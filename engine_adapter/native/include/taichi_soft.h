@@ -59,6 +59,7 @@ typedef uint64_t ts_scene; /* a world file in memory; 0 is none */
 typedef uint64_t ts_world; /* an instance of it that moves */
 typedef uint64_t ts_body;  /* who lives in a slot: another one that comes later has another number. After
                             * ts_world_restore numbers are as they were, and the same calls give the same again */
+typedef uint64_t ts_grab;  /* a hand on a body, likewise */
 
 /* Kinds of names. The number of a TS_BODY is its slot. */
 enum { TS_BODY = 0, TS_ASSET = 1, TS_COLLIDER = 2, TS_FRAME = 3, TS_MESH = 4 };
@@ -150,6 +151,38 @@ TS_API ts_result ts_world_hash(ts_world world, uint64_t* hash);
 TS_API ts_result ts_world_snapshot(ts_world world, void* buffer, size_t capacity, size_t* size);
 TS_API ts_result ts_world_restore(ts_world world, const void* bytes, size_t size);
 
+/* ---- what happened ---- */
+
+enum { /* bits of ts_world_record_events, and kinds of a ts_event; those of one step come in this order */
+  TS_CONTACT_BEGAN = 1, /* a body touches a collider (the floor may be one) or another body */
+  TS_CONTACT_ENDED = 2, /* they have not touched for 0.05 s, or one of them was taken out */
+  TS_FELL_ASLEEP = 4,
+  TS_WOKE = 8,
+  TS_FROZE = 16, /* it could not be computed any further, and was put back to where it was before the step */
+  TS_ALL_EVENTS = 31
+};
+
+typedef struct ts_event {
+  int32_t kind;
+  int32_t collider; /* that it touches; -1 for another body */
+  int64_t step;     /* of the world, counted from 0 */
+  double time;      /* at the end of that step [s] */
+  ts_body body;
+  ts_body other;     /* that it touches, the one in the higher slot; 0 for a collider. Both may be gone */
+  double impulse[3]; /* that `body` gave: in that step, or from the beginning of the contact to its end */
+  double duration;   /* of a contact that ended [s] */
+} ts_event;
+
+/* Record events of these kinds, and no others, from the next step on; 0 for none. What touches already counts as a
+ * contact that begins in that step. Contacts are seen in worlds with soft contact or colliders. */
+TS_API ts_result ts_world_record_events(ts_world world, int32_t kinds);
+/* The oldest that wait, at most `capacity`; they do not wait any longer. `event_size` is sizeof(ts_event). */
+TS_API ts_result ts_world_drain_events(ts_world world, ts_event* events, size_t event_size, size_t capacity,
+                                       size_t* count);
+/* How many were dropped so far: more than 10,000 waited, and the oldest went; or more pairs of bodies touched in a step
+ * than there is room for, which counts once. */
+TS_API ts_result ts_world_dropped_events(ts_world world, int64_t* count);
+
 /* ---- bodies ---- */
 
 typedef struct ts_placement {
@@ -193,8 +226,39 @@ TS_API ts_result ts_body_unpin(ts_world world, ts_body body, const int32_t* vert
 /* Where pinned vertices are after the coming step, 3 numbers each. */
 TS_API ts_result ts_body_set_targets(ts_world world, ts_body body, const int32_t* vertices, size_t count,
                                      const float* targets);
+/* Let vertices go with a frame, from where both are now. `feels` of 1: ts_body_get_load is asked later. */
+TS_API ts_result ts_body_attach(ts_world world, ts_body body, const int32_t* vertices, size_t count, int32_t frame,
+                                int32_t feels);
+/* Let vertices go that hang from a frame, with the velocity that they had; a count of 0 stands for all that do. */
+TS_API ts_result ts_body_detach(ts_world world, ts_body body, const int32_t* vertices, size_t count);
+/* What it pulled a frame with that it hangs from, mean over the last step [N], and the torque of that about the frame's
+ * origin. Either may be null. */
+TS_API ts_result ts_body_get_load(ts_world world, ts_body body, int32_t frame, double force[3], double torque[3]);
+
+typedef struct ts_pull {
+  uint32_t struct_size;
+  int32_t triangle;  /* of the body's own surface: that of a ts_hit */
+  double weights[3]; /* of its vertices; 0 or more, their sum is 1 */
+  double point[3];   /* to which it is pulled at first */
+  double frequency;  /* of the spring [Hz]: 5 is a hand */
+  double max_force;  /* [N]; below 0 for ten times the body's weight on Earth */
+} ts_pull;
+
+/* Take hold of a body's surface. There can be 16 grabs at a time. */
+TS_API ts_result ts_body_grab(ts_world world, ts_body body, const ts_pull* pull, ts_grab* grab);
+/* That with a number from 0 to 15; 0 for none. Grabs of the exported world are there, too. */
+TS_API ts_result ts_world_get_grab(ts_world world, int32_t number, ts_grab* grab);
+TS_API ts_result ts_grab_move(ts_world world, ts_grab grab, const double point[3]);
+TS_API ts_result ts_grab_release(ts_world world, ts_grab grab);
+/* With what it pulls, in the last substep [N]. */
+TS_API ts_result ts_grab_get_force(ts_world world, ts_grab grab, double force[3]);
 
 /* ---- questions ---- */
+
+typedef struct ts_pose {
+  double position[3];
+  double rotation[4];
+} ts_pose;
 
 typedef struct ts_hit {
   uint32_t struct_size;
@@ -212,13 +276,14 @@ TS_API ts_result ts_world_raycast(ts_world world, const double origin[3], const 
                                   double reach, ts_hit* hit);
 /* The nearest point of all surfaces. */
 TS_API ts_result ts_world_closest(ts_world world, const double point[3], double reach, ts_hit* hit);
+/* Bodies that touch a sphere, or enclose it, by slot. `capacity` as many as there are slots is always enough. */
+TS_API ts_result ts_world_overlap_sphere(ts_world world, const double center[3], double radius, ts_body* bodies,
+                                         size_t capacity, size_t* count);
+/* The same for a box with edges of `size`. */
+TS_API ts_result ts_world_overlap_box(ts_world world, const ts_pose* pose, const double size[3], ts_body* bodies,
+                                      size_t capacity, size_t* count);
 
 /* ---- colliders and frames, by their numbers in the scene ---- */
-
-typedef struct ts_pose {
-  double position[3];
-  double rotation[4];
-} ts_pose;
 
 enum { TS_PLANE = 0, TS_SPHERE = 1, TS_BOX = 2, TS_CAPSULE = 3 }; /* kinds of shapes */
 
@@ -246,7 +311,13 @@ TS_API ts_result ts_collider_teleport(ts_world world, int32_t collider, const ts
 TS_API ts_result ts_collider_get_pose(ts_world world, int32_t collider, ts_pose* pose);
 /* What bodies gave it in the last step, and the moment of that about its place. Either may be null. */
 TS_API ts_result ts_collider_get_impulse(ts_world world, int32_t collider, double impulse[3], double moment[3]);
+/* A place that moves as the game says: a bone, a vehicle, a hand. Its number is the lowest that is free. */
+TS_API ts_result ts_frame_add(ts_world world, const ts_pose* pose, int32_t* frame);
+/* What hangs from it is let go. A later one may get its number. */
+TS_API ts_result ts_frame_remove(ts_world world, int32_t frame);
+/* Be there at the end of the coming step, with what hangs from it. */
 TS_API ts_result ts_frame_move_to(ts_world world, int32_t frame, const ts_pose* pose);
+TS_API ts_result ts_frame_get_pose(ts_world world, int32_t frame, ts_pose* pose);
 
 #ifdef __cplusplus
 }
