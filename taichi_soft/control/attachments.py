@@ -15,6 +15,7 @@ from taichi_soft.control.kernels.pins import attach_particles, free_particles, r
 from taichi_soft.core.checks import as_flag
 from taichi_soft.core.errors import StateError
 from taichi_soft.core.handles import Handle, recorded, serial_of
+from taichi_soft.core.math.rotations import turned
 from taichi_soft.core.serialisation import below, indices_below
 
 
@@ -173,7 +174,7 @@ def attach(body: SoftBody, particles: ArrayLike, frame: Any, two_way: bool) -> A
     if feels:
         require_substeps(context, "forces on frames (two_way=True)")
     offsets = body.positions()[vertices].astype(np.float64) - frame.position
-    local = (offsets @ frame.rotation).astype(np.float32)
+    local = turned(offsets, frame.rotation.T.astype(np.float64)).astype(np.float32)
     change(body, attach_particles, body.index, number, int(feels), rows, local)
     frames.has_work = True
     attachment = Attachment(frames, body, vertices, frame, two_way=feels)

@@ -1,7 +1,11 @@
-"""The part of a body that a hand takes hold of, and how strongly that may be pulled: numpy only."""
+"""The part of a body that a hand takes hold of, and how strongly that may be pulled: numpy only.
+
+Each sum of a patch is written out in its order: the native library gets the same bits.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,6 +14,7 @@ from numpy.typing import NDArray
 
 from taichi_soft.bodies.description import BodyDescription
 from taichi_soft.control.kernels.grabs import PATCH_ROWS
+from taichi_soft.core.math.rotations import length_of
 from taichi_soft.elements.materials import SpringMaterial
 
 PATCH_SIZE = 0.25
@@ -32,38 +37,83 @@ class Patch:
 
 def patch_round(body: BodyDescription, corners: NDArray[np.int32], weights: NDArray[np.float64]) -> Patch:
     """The patch round a point at rest, given in barycentric coordinates of three or four vertices."""
-    mesh = body.mesh
-    distance = np.linalg.norm(mesh.vertices - weights @ mesh.vertices[corners], axis=1)
-    radius = max(
-        PATCH_SIZE * float(np.linalg.norm(np.ptp(mesh.vertices, axis=0))), 1.2 * distance[corners].max()
-    )
+    x = body.mesh.vertices
+    distance = _lengths(x - point_between(x[corners], weights))
+    radius = max(PATCH_SIZE * length_of(np.ptp(x, axis=0)), 1.2 * float(distance[corners].max()))
     if (distance < radius).sum() > PATCH_ROWS:
         radius = float(np.partition(distance, PATCH_ROWS)[PATCH_ROWS])
-    falloff = np.maximum(1 - (distance / radius) ** 2, 0) ** 2
+    part = distance / radius
+    falloff = np.maximum(1 - part * part, 0)
+    falloff = falloff * falloff
     falloff[falloff < 1e-6] = 0
     vertices = np.flatnonzero(falloff).astype(np.int32)
     shares = (falloff * body.masses)[vertices]
     strength = FARTHEST_PULL * radius * _stiffness(body, falloff)
-    return Patch(vertices, shares / shares.sum(), strength)
+    return Patch(vertices, shares / _sum(shares), strength)
+
+
+def point_between(corners: NDArray[Any], weights: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The point with barycentric coordinates (k,) among corners (k, 3), in float64."""
+    point = np.zeros(3)
+    for corner, weight in zip(corners.astype(np.float64), weights.tolist(), strict=True):
+        point += weight * corner
+    return point
+
+
+def elements_of(body: BodyDescription) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    """What holds a patch back: vertices of each element, and its stiffness.
+
+    Returns: springs (e, 2) and k / 3 [N/m], as a third of them lies along any direction; or tetrahedra (m, 4)
+    and V mu [N m].
+    """
+    mesh: Any = body.mesh
+    if isinstance(body.material, SpringMaterial):
+        assert body.bonds is not None
+        return mesh.edges, body.bonds.constants[:, 1] / 3
+    return mesh.tets, mesh.volumes * _shear_moduli(body)
 
 
 def _stiffness(body: BodyDescription, falloff: NDArray[np.float64]) -> float:
     """Force per distance [N/m] by which particles moved each by its `falloff` w are held back, at least.
 
     Twice the energy of that shape per distance squared: sum V mu |grad w|^2 in tetrahedra; in springs
-    sum k (w_i - w_j)^2 / 3, as a third of them lies along any direction.
+    sum k (w_i - w_j)^2 / 3.
     """
-    mesh: Any = body.mesh
-    if isinstance(body.material, SpringMaterial):
-        assert body.bonds is not None
-        step = falloff[mesh.edges]
-        return float(body.bonds.constants[:, 1] @ (step[:, 1] - step[:, 0]) ** 2 / 3)
-    corner = falloff[mesh.tets]
-    near = np.flatnonzero(corner.any(axis=1))
-    ends = mesh.vertices[mesh.tets[near]]
-    rise = (corner[near, 1:] - corner[near, :1])[..., None]
-    slope = np.linalg.solve(ends[:, 1:] - ends[:, :1], rise)[..., 0]
-    return float((mesh.volumes[near] * _shear_moduli(body)[near]) @ (slope**2).sum(axis=1))
+    elements, stiffness = elements_of(body)
+    near = np.flatnonzero(falloff[elements].any(axis=1))
+    elements, stiffness = elements[near], stiffness[near]
+    corner = falloff[elements]
+    rise = [corner[:, i] - corner[:, 0] for i in range(1, elements.shape[1])]
+    if len(rise) == 1:
+        return _sum(stiffness * (rise[0] * rise[0]))
+    ends = body.mesh.vertices[elements]
+    a, b, c = (ends[:, i] - ends[:, 0] for i in range(1, 4))
+    across = _cross(b, c), _cross(c, a), _cross(a, b)
+    volume = _sum_of_three(a.T, across[0])
+    slope = [_sum_of_three(rise, [each[k] for each in across]) / volume for k in range(3)]
+    return _sum(stiffness * _sum_of_three(slope, slope))
+
+
+def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    """Components of the products of rows (n, 3)."""
+    x, y, z = (a[:, k] for k in range(3))
+    u, v, w = (b[:, k] for k in range(3))
+    return [y * w - z * v, z * u - x * w, x * v - y * u]
+
+
+def _sum_of_three(a: Sequence[Any], b: Sequence[Any]) -> Any:
+    """Of products, one after the other."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _lengths(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    columns = rows.T
+    return np.asarray(np.sqrt(_sum_of_three(columns, columns)))
+
+
+def _sum(numbers: NDArray[np.float64]) -> float:
+    """One after the other."""
+    return float(np.cumsum(numbers)[-1])
 
 
 def _shear_moduli(body: BodyDescription) -> NDArray[np.float64]:

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies.soft_body import RowsOf, SoftBody, context_of, record_of
-from taichi_soft.control.change import change, numbers, require_substeps, rows_of
-from taichi_soft.control.grab_patch import Patch, patch_round
+from taichi_soft.control.change import change, mass_of, numbers, require_substeps, rows_of
+from taichi_soft.control.grab_patch import Patch, patch_round, point_between
 from taichi_soft.control.kernels.grabs import (
     CORNERS,
     FORCE,
@@ -179,17 +179,17 @@ def grab_at(
         raise OptionError(f"barycentrics must be 0 or more and add up to 1, got {weights.tolist()}")
     weights = np.maximum(weights, 0) / np.maximum(weights, 0).sum()
     hertz, limit = as_pull(frequency, max_force)
-    omega, mass = 2 * np.pi * hertz, float(body.masses.sum())
+    omega, mass = 2 * np.pi * hertz, mass_of(body, np.arange(body.vertex_count, dtype=np.int32))
     strongest = WEIGHTS * GRAVITY_EARTH * mass if limit is None else limit
     require_substeps(context_of(body), "grabs")
     corners = body.surface[number]
-    target = weights @ body.positions()[corners].astype(np.float64)
+    target = point_between(body.positions()[corners], weights)
     if point is not None:
         target = as_vector(point, "point", "m")
     grabs = context_of(body).of(Grabs).by_number
     free = context_of(body).of(Grabs).free_number()
     patch = patch_round(record_of(body).description, corners, weights)
-    spring = (mass * omega**2, 2 * mass * omega, 2 * HIGHEST_SPEED / omega)
+    spring = (mass * (omega * omega), 2 * mass * omega, 2 * HIGHEST_SPEED / omega)
     limits = (min(strongest, patch.strength), strongest, 1 / mass)
     row = numbers(weights, 0.0, target, *spring, limits, np.zeros(3))
     _write(body, free, np.append(corners, corners[0]), row, patch)

@@ -13,7 +13,7 @@ from taichi_soft.bodies.soft_body import SoftBody, record_of
 from taichi_soft.bodies.status import ACTIVE, ASLEEP
 from taichi_soft.contact.collider import Collider
 from taichi_soft.contact.colliders import Colliders
-from taichi_soft.contact.fields import PAIR_ROWS
+from taichi_soft.contact.fields import PAIR_ROWS, ContactCapacity
 from taichi_soft.contact.kernels.touches import OF_BODY, read_touches
 from taichi_soft.events.contacts import Contacts, Key
 from taichi_soft.events.event_state import Known, Memory
@@ -29,6 +29,11 @@ from taichi_soft.events.kinds import (
     Woke,
 )
 from taichi_soft.events.stress import StressWatches
+
+
+def touch_rows(room: ContactCapacity, bodies: int) -> int:
+    """How many pairs can touch in a step."""
+    return bodies * (room.colliders + (PAIR_ROWS if room.soft else 0)) + 1
 
 
 class Observer:
@@ -51,11 +56,10 @@ class Observer:
         self._frozen: list[SoftBody] = []
         self.stress = StressWatches(state, program, scene)
         room = state.capacity.contact
-        rows = len(slots) * (room.colliders + (PAIR_ROWS if room.soft else 0)) + 1
-        self._status = np.zeros(len(slots) + 1, dtype=np.int32)
+        rows = touch_rows(room, len(slots))
+        self._status = np.zeros(len(slots) + 2, dtype=np.int32)  # see `read_touches`
         self._who = np.zeros((rows, 3), dtype=np.int32)
         self._impulses = np.zeros((rows, 3), dtype=np.float32)
-        self._count = 0
         self.lost_touches = False  # whether in the last step more pairs of bodies touched than have room
 
     @property
@@ -91,11 +95,12 @@ class Observer:
         else:
             self.lost_touches = False
         if kinds & CONTACT_KINDS:
-            moving = set(np.flatnonzero(self._status[:-1] == ACTIVE).tolist())
+            moving = set(np.flatnonzero(self._status[:-2] == ACTIVE).tolist())
+            count = self._status[-1]
             touches = dict(
                 zip(
-                    map(tuple, self._who[: self._count].tolist()),
-                    map(tuple, self._impulses[: self._count].tolist()),
+                    map(tuple, self._who[:count].tolist()),
+                    map(tuple, self._impulses[:count].tolist()),
                     strict=True,
                 )
             )
@@ -119,7 +124,7 @@ class Observer:
     def remember(self, kinds: frozenset[type[Event]]) -> Memory:
         """What events of some kinds depend on."""
         return Memory(
-            self._status[:-1].copy() if kinds & (CONTACT_KINDS | SLEEP_KINDS) else None,
+            self._status[:-2].copy() if kinds & (CONTACT_KINDS | SLEEP_KINDS) else None,
             self._contacts.rows if kinds & CONTACT_KINDS else None,
             self.stress.notes if kinds & STRESS_KINDS else [],
         )
@@ -132,7 +137,7 @@ class Observer:
         else:
             self._contacts = Contacts()
         if memory.status is not None:
-            self._status[:-1] = memory.status
+            self._status[:-2] = memory.status
             # Who came after the last step took the slot of one who may have slept in it.
             asleep = self._sleeping().items()
             self._sleepers = {slot: body for slot, body in asleep if record_of(body).first_step < step}
@@ -143,8 +148,8 @@ class Observer:
 
     def _look(self) -> None:
         """Read who touched whom in the last step, and who sleeps."""
-        self._count = read_touches(self._state, len(self._slots), self._status, self._who, self._impulses)
-        self.lost_touches = bool(self._status[-1])
+        read_touches(self._state, len(self._slots), self._status, self._who, self._impulses)
+        self.lost_touches = bool(self._status[-2])
 
     def _handles(self, key: Key) -> tuple[SoftBody, Collider | SoftBody]:
         a, kind, b = key
@@ -157,5 +162,5 @@ class Observer:
 
     def _sleeping(self) -> dict[int, SoftBody]:
         """Sleeping bodies by their slots, ascending."""
-        slots = np.flatnonzero(self._status[:-1] == ASLEEP).tolist()
+        slots = np.flatnonzero(self._status[:-2] == ASLEEP).tolist()
         return {slot: body for slot in slots if (body := self._slots[slot]) is not None}

@@ -113,19 +113,19 @@ def find_closest(
 
 
 @ti.func
-def shape_contains(size, is_box: ti.template(), x):
+def shape_contains(size, is_box, x):
     """Whether a point, as seen from a shape's centre along its axes, lies in it or on its surface."""
-    gap = ti.abs(x) - 0.5 * size
-    if ti.static(not is_box):
-        gap = ti.Vector([x.dot(x) - size.x * size.x, 0.0, 0.0])
-    return gap.max() <= 0.0
+    beyond = (ti.abs(x) - 0.5 * size).max()
+    if is_box == 0:
+        beyond = x.dot(x) - size.x * size.x
+    return beyond <= 0.0
 
 
 @ti.func
-def shape_touches(size, is_box: ti.template(), a, b, c):
+def shape_touches(size, is_box, a, b, c):
     """Whether a triangle, as seen from a shape's centre along its axes, touches it."""
     touches = False
-    if ti.static(is_box):
+    if is_box != 0:
         touches = triangle_touches_box(a, b, c, 0.5 * size)
     else:
         w = closest_point_on_triangle(a * 0.0, a, b, c)
@@ -137,7 +137,7 @@ def shape_touches(size, is_box: ti.template(), a, b, c):
 @ti.kernel
 def find_overlaps(
     state: ti.template(),
-    is_box: ti.template(),
+    is_box: ti.i32,
     bodies: ti.types.ndarray(dtype=ti.i32, ndim=1),
     shape: ti.types.ndarray(dtype=ti.f32, ndim=2),
     first_vertex: ti.types.ndarray(dtype=ti.i32, ndim=1),
@@ -157,7 +157,7 @@ def find_overlaps(
         center = ti.Vector([shape[0, k] for k in range(3)])
         axes = ti.Matrix([[shape[1 + j, k] for k in range(3)] for j in range(3)])
         size = ti.Vector([shape[4, k] for k in range(3)])
-        reach = ti.abs(axes.transpose()) @ (ti.select(is_box, 0.5, 1.0) * size)
+        reach = ti.abs(axes.transpose()) @ (ti.select(is_box != 0, 0.5, 1.0) * size)
         lower, upper = box_around(state, body)
         is_near = ti.min(upper - center + reach, reach - lower + center).min() >= 0.0
         touches = 0

@@ -75,7 +75,7 @@ def _overlaps(
     inside = np.zeros(state.capacity.particles, dtype=np.int32)
     chosen = as_chosen(bodies, handles)
     if len(chosen):
-        find_overlaps(state, is_box, chosen, shape, first_vertex, inside)
+        find_overlaps(state, int(is_box), chosen, shape, first_vertex, inside)
     overlaps = []
     for index in np.flatnonzero(first_vertex >= 0).tolist():
         begin, body = first_vertex[index], handles[index]

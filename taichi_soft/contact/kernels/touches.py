@@ -77,17 +77,15 @@ def read_touches(
     status: ti.types.ndarray(dtype=ti.i32, ndim=1),
     who: ti.types.ndarray(dtype=ti.i32, ndim=2),
     impulses: ti.types.ndarray(dtype=ti.f32, ndim=2),
-) -> ti.i32:
+):
     """Status of all bodies; and which pairs touched in the last step, in no particular but a fixed order.
 
     Args:
-        status: (bodies + 1,), as of the last call, or 0; the last one is not 0 where the table had no room
-            for all pairs.
+        status: (bodies + 2,), as of the last call, or 0; then not 0 where the table had no room for all
+            pairs, and how many rows were written.
         who: (rows, 3): a body, `OF_COLLIDER` or `OF_BODY`, and that collider or body.
         impulses: (rows, 3) that the first gave the second [N s].
-    Returns: how many rows were written.
     """
-    written = 0
     ti.loop_config(serialize=True)
     for _ in range(1):
         count = 0
@@ -114,5 +112,4 @@ def read_touches(
                     state.soft.pair_impulse[row] = ti.Vector.zero(ti.f32, 3)
             status[body_count] = state.soft.pairs_lost[None]
             state.soft.pairs_lost[None] = 0
-        written += count
-    return written
+        status[body_count + 1] = count
