@@ -15,10 +15,16 @@ from taichi_soft.contact.collider import FASTEST_SPIN, ColliderRow, row_of
 from taichi_soft.contact.shapes.shape import SEAM
 from taichi_soft.control.drives import LARGEST_PUSH
 from taichi_soft.control.frames import Frames
+from taichi_soft.control.grab_patch import FARTHEST_PULL, PATCH_SIZE, elements_of
+from taichi_soft.control.grabs import HIGHEST_SPEED, WEIGHTS, Grabs
 from taichi_soft.control.impulses import LARGEST_IMPULSE
+from taichi_soft.control.kernels.grabs import PATCH_ROWS
 from taichi_soft.core.checks import LONGEST_STEP, SHORTEST_STEP
-from taichi_soft.core.constants import POSITION_LIMIT, VELOCITY_LIMIT
+from taichi_soft.core.constants import GRAVITY_EARTH, POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.core.runtime import device
+from taichi_soft.events.contacts import CONTACT_PAUSE
+from taichi_soft.events.log import MOST_EVENTS
+from taichi_soft.events.observer import touch_rows
 from taichi_soft.export.archive import words
 from taichi_soft.export.layout import FLOAT, WHOLE, image_of, place_of, places_of
 from taichi_soft.export.meshes import ExportedMesh
@@ -53,9 +59,11 @@ def description_of(
 def _of_world(context: WorldContext) -> Arrays:
     settings, built = context.settings, context.built
     share, longest = context.substeps.rule
-    kinds = list(context.slots.kinds)
+    kinds, room = list(context.slots.kinds), built.state.capacity.contact
     return {
-        "world/flags": _ints([built.program.has_contact, built.sleeps]),
+        "world/flags": _ints(
+            [built.program.has_contact, built.sleeps, room.soft, built.state.capacity.implicit]
+        ),
         "world/counts": _ints([len(context.slots.slots), context.layout.particle_count, device().threads]),
         "world/stable": _floats([share, longest]),
         "world/limits": _floats(
@@ -67,6 +75,10 @@ def _of_world(context: WorldContext) -> Arrays:
         "world/floor": _floats([] if settings.floor is None else [settings.floor]),
         "world/steps": np.array([context.clock.steps], dtype=np.int64),
         "world/clock": _floats([context.clock.time, context.clock.last_dt]),
+        "events/limits": _floats([CONTACT_PAUSE, MOST_EVENTS, touch_rows(room, len(context.slots.slots))]),
+        "grabs/limits": _floats(
+            [PATCH_SIZE, FARTHEST_PULL, WEIGHTS * GRAVITY_EARTH, HIGHEST_SPEED, PATCH_ROWS]
+        ),
         "slots/asset": _ints([kinds.index(asset) for asset in context.slots.assets]),
         "slots/begin": _ints([each.particles[0] for each in context.layout.ranges]),
     }
@@ -78,8 +90,14 @@ def _of_fields(context: WorldContext) -> Arrays:
     rows = carried_rows(context)
     # By what no call of the library changes kernels find their way; what moves bodies must be finite.
     slices = [name for name, groups in state.carried.items() for _ in groups]
-    fixed = [False] * len(OWNERS) + [name != "colliders" for name in slices]
+    fixed = [False] * len(OWNERS) + [name not in ("colliders", Grabs.name) for name in slices]
+    grabs = state.grabs
     moving = [state.particle_position, state.particle_velocity, *(field for _, field in steering(state))]
+    moving += [grabs.weights, grabs.target, grabs.spring, grabs.limits, grabs.share]
+    # Of grabs all rows: the game takes hold of more.
+    begin = len(OWNERS) + slices.index(Grabs.name)
+    for owner in range(begin, begin + slices.count(Grabs.name)):
+        rows[owner] = int(np.prod(carried(state, owner)[0][0].shape))
     kept = [
         (place_of(field), rows[owner], fixed[owner], any(field is each for each in moving))
         for owner in owners(state)
@@ -99,6 +117,7 @@ def _plain(place: Any) -> tuple[int, ...]:
 
 
 def _of_asset(asset: SoftBodyAsset) -> Arrays:
+    elements, stiffness = elements_of(asset.description)
     return {
         "rest_rows": asset.rest_rows,
         "vertices": _floats(asset.mesh.vertices),
@@ -108,6 +127,8 @@ def _of_asset(asset: SoftBodyAsset) -> Arrays:
         "outer": _ints(outer_vertices(asset.mesh)),
         "rank": _ints(asset.arrays.rank),
         "surface": _ints(asset.mesh.surface).reshape(-1, 3),
+        "elements": _ints(elements),
+        "element_stiffness": _floats(stiffness),
         "thickness": _floats([asset.surface_row[1]]),
     }
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from taichi_soft.bodies.kernels.readout import read_positions
 from taichi_soft.contact.kernels.collider_rows import sum_collider_impulses
+from taichi_soft.contact.kernels.touches import read_touches
 from taichi_soft.control.kernels.drives import add_push
 from taichi_soft.control.kernels.impulses import add_impulse_near, add_radial_impulse, add_velocity
 from taichi_soft.control.kernels.pins import aim_pinned, free_particles, pin_particles, write_targets
@@ -15,7 +16,7 @@ from taichi_soft.control.kernels.rigid_motion import jump, write_rigid_velocity
 from taichi_soft.core.runtime import device, ti
 from taichi_soft.export.kernels.root import read_root
 from taichi_soft.export.meshes import ExportedMesh
-from taichi_soft.queries.kernels import find_closest, find_hits
+from taichi_soft.queries.kernels import find_closest, find_hits, find_overlaps
 from taichi_soft.solver.context import WorldContext
 from taichi_soft.solver.kernels.sleep import wake_body, wake_near
 from taichi_soft.solver.kernels.spawn import despawn_body, spawn_body
@@ -38,6 +39,8 @@ _SERIAL = {
     "write_targets": write_targets,
     "read_positions": read_positions,
     "find_closest": find_closest,
+    "find_overlaps": find_overlaps,
+    "read_touches": read_touches,
     "read_root": read_root,
 }
 """Those that every world has, by name."""

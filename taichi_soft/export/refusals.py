@@ -24,7 +24,7 @@ def _of_world(context: WorldContext) -> list[str]:
     if context.settings.schedule is Schedule.FLAT:
         found.append("schedule 'flat': make it with schedule='per_body'")
     if context.built.events.is_recording:
-        found.append("it records events: leave record_events, on and watches out")
+        found.append("it records events: leave record_events, on and watches out; the game records its own")
     return found
 
 

@@ -11,6 +11,19 @@ sys.path.insert(0, str(HERE))  # what the tests of this folder share
 
 from native_build import build  # noqa: E402
 
+from taichi_soft.bodies.capacity import LEAST  # noqa: E402
+
+OWN = dict(LEAST)  # before tests share theirs
+
+
+@pytest.fixture(autouse=True)
+def own_room():
+    """Worlds have the room that their exports have: kernels for another one may round otherwise."""
+    kept = dict(LEAST)
+    LEAST.update(OWN)
+    yield
+    LEAST.update(kept)
+
 
 @pytest.fixture(scope="session")
 def native(tmp_path_factory):

@@ -4,13 +4,26 @@ import subprocess
 
 import numpy as np
 
-from taichi_soft import BoxShape, CapsuleShape, PlaneShape, SphereShape
+from taichi_soft import (
+    BoxShape,
+    CapsuleShape,
+    ContactBegan,
+    ContactEnded,
+    FellAsleep,
+    Froze,
+    PlaneShape,
+    SphereShape,
+    Woke,
+)
 from taichi_soft.contact.collider import row_of
 from taichi_soft.control.frames import Frames
+from taichi_soft.control.grabs import Grabs
+from taichi_soft.core.math.rotations import quaternion_of
 from taichi_soft.persistence.kernels.packing import hash_bodies
 from taichi_soft.world.world import context_of_world
 
 MASK = (1 << 64) - 1
+KINDS = {ContactBegan: 1, ContactEnded: 2, FellAsleep: 4, Woke: 8, Froze: 16}
 
 
 def hash_of(rows):
@@ -154,6 +167,83 @@ class Player:
         if found is not None:
             self.say(str(int(found.is_inside)))
 
+    def say_bodies(self, overlaps):
+        self.say(" ".join(str(each.body.index) for each in overlaps) or "nothing")
+
+    def overlap_sphere(self):
+        self.say_bodies(self.world.overlap_sphere(self.take(3), *self.take(1)))
+
+    def overlap_box(self):
+        position, rotation, size = self.take(3), self.take(4), self.take(3)
+        self.say_bodies(self.world.overlap_box(position, size, rotation=rotation))
+
+    def record_events(self):
+        bits = self.whole()
+        self.world.record_events([kind for kind, bit in KINDS.items() if bits & bit])
+
+    def drain(self):
+        events = self.world.drain_events()
+        self.say(f"events {len(events)}")
+        for event in events:
+            is_contact = isinstance(event, (ContactBegan, ContactEnded))
+            body, other = (event.a, event.b) if is_contact else (event.body, None)
+            is_body = hasattr(other, "positions")
+            row = [
+                event.time,
+                *(event.impulse if is_contact else (0, 0, 0)),
+                getattr(event, "duration", 0.0),
+            ]
+            collider = -1 if is_body or not is_contact else other.index
+            who = [body.index, other.index if is_body else -1]
+            self.say(" ".join(map(str, [KINDS[type(event)], collider, event.step, *who, hash_of(row)])))
+
+    def frame(self):
+        return context_of_world(self.world).of(Frames).rows[self.whole()]
+
+    def attach(self):
+        body, vertices = self.body(), self.list()
+        body.attach(vertices, self.frame(), two_way=bool(self.whole()))
+
+    def detach(self):
+        body, vertices = self.body(), self.list()
+        for held in body.attachments:
+            if vertices is None or held.particles.tolist() == sorted(vertices):
+                held.release()
+
+    def load(self):
+        body, frame = self.body(), self.frame()
+        (held,) = [each for each in body.attachments if each.frame is frame]
+        self.say(hash_of([*held.force, *held.torque]))
+
+    def grab_of(self):
+        return context_of_world(self.world).of(Grabs).by_number[self.whole()]
+
+    def grab(self):
+        body, triangle = self.body(), self.whole()
+        weights, point, (frequency, most) = self.take(3), self.take(3), self.take(2)
+        held = body.grab(triangle, weights, frequency=frequency, max_force=None if most < 0 else most)
+        held.move(point)
+
+    def move_grab(self):
+        self.grab_of().move(self.take(3))
+
+    def release_grab(self):
+        self.grab_of().release()
+
+    def grab_force(self):
+        self.say(hash_of(self.grab_of().force))
+
+    def add_frame(self):
+        frame = self.world.add_frame(self.take(3), self.take(4))
+        self.say(str(context_of_world(self.world).of(Frames).number_of(frame)))
+
+    def remove_frame(self):
+        self.frame().remove()
+
+    def frame_pose(self):
+        frame = self.frame()
+        self.say(hash_of([*frame.position, *quaternion_of(frame.rotation.astype(float))]))
+
     def add_collider(self):
         kind, (x, y, z) = self.whole(), self.take(3)
         shapes = PlaneShape, lambda: SphereShape(x), lambda: BoxShape((x, y, z)), lambda: CapsuleShape(x, y)
@@ -183,7 +273,7 @@ class Player:
         self.collider().teleport(self.take(3), self.take(4))
 
     def move_frame(self):
-        context_of_world(self.world).of(Frames).rows[self.whole()].move_to(self.take(3), self.take(4))
+        self.frame().move_to(self.take(3), self.take(4))
 
     def snapshot(self):
         self.kept = self.world.snapshot()

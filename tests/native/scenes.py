@@ -55,6 +55,10 @@ def heap_game():
     """Colliders: 0 the lift, 1 a ball, 2 a wall, 3 the floor. Slots: 0 to 4 balls, 5 to 8 bricks."""
     rng = np.random.default_rng(7)
     for i in range(STEPS):
+        if i in (0, 450, 470, 490):
+            yield line("record_events", {0: 31, 450: 3, 470: 0, 490: 31}[i])
+        if i in (210, 330):
+            yield line("drain")
         if i < 250:
             height = 0.2 + 0.15 * np.sin(0.05 * i)
             yield line("move_collider", 0, (0.1 * np.cos(0.03 * i), 0.0, height), turn((0, 0, 1), 0.01 * i))
@@ -108,6 +112,9 @@ def heap_game():
                 yield line("positions", slot, 1.0)
                 yield line("positions", slot, 0.25)
                 yield line("mesh", slot, int(slot == 5))
+            yield line("drain")
+            yield line("overlap_sphere", rng.uniform(0, 1.2, 3), 0.5)
+            yield line("overlap_box", rng.uniform(0, 1.2, 3), turn((1, 2, 0), i), (0.8, 0.5, 0.3))
         if i in (420, 430):
             yield line("unpin", 1, [])  # nobody is pinned, and yet it wakes who sleeps
     yield line("stable_substeps", DT)
@@ -207,9 +214,41 @@ def held():
 
 
 def held_game():
+    """Slots: 0 and 1 are joined, 2 is the ball, which is grabbed already."""
     for i in range(STEPS):
         if i in (100, 200):
             yield line("impulse", 1, (0.0, 10.0, 30.0), [])
+        if i == 60:
+            yield line("move_grab", 0, (0.9, 0.4, 1.0))
+            yield line("grab", 1, 3, (0.2, 0.5, 0.3), (0.8, 0.3, 0.9), 4.0, -1.0)
+            yield line("grab", 1, 5, (1.0, 0.0, 0.0), (0.6, -0.3, 0.9), 7.0, 150.0)
+            yield line("snapshot")
+        if 150 <= i < 200:
+            yield line("move_grab", 1, (0.8 + 0.01 * (i - 150), 0.3, 0.9))
+        if i == 220:
+            yield line("release_grab", 0)
+        if i == 240:
+            yield line("release_grab", 1)
+            yield line("add_frame", (-0.3, 0.0, 0.4), turn((1, 1, 0), 0.5))
+            yield line("add_frame", (0.0, 0.0, 1.0), turn((1, 1, 3), 0.9))
+            yield line("attach", 0, [1, 0, 3], 0, 1)
+            yield line("attach", 2, [4, 2], 1, 0)
+        if 250 <= i < 380:
+            yield line("move_frame", 0, (-0.3, 0.0, 0.4 + 0.004 * (i - 250)), turn((1, 1, 0), 0.01 * i))
+        if i in (251, 300, 350):
+            yield line("load", 0, 0)
+            yield line("frame_pose", 0)
+            yield line("grab_force", 2)
+        if i == 320:
+            yield line("remove_frame", 1)
+            yield line("add_frame", (0.0, 0.5, 1.0), UPRIGHT)
+        if i == 400:
+            yield line("release_grab", 2)
+            yield line("detach", 0, [])
+        if i == 420:
+            yield line("restore")
+        if i == 500:
+            yield line("despawn", 2)  # with the hand on it
         yield line("step", DT, 0)
 
 

@@ -161,6 +161,11 @@ Pose pose(const Turn& world, const ts_pose* host) {
   return {place(world, host->position, "position"), turn};
 }
 
+Pose frame_pose(const Turn& world, const ts_pose* host) {
+  given(host, "pose");
+  return {place(world, host->position, "position"), rotation(world, host->rotation, "rotation")};
+}
+
 double length(const Turn& world, double host, double least, const char* name) {
   const double found = world.axes().length_in(host);
   if (!(found >= least && found <= 1e6)) fail(TS_ERROR_ARGUMENT, "%s is %g: give a length of %g to 1e6 m", name, host, least);
@@ -242,6 +247,16 @@ void write_hit(const Turn& world, const Hit& found, ts_hit* hit) {
   world.axes().place_out(found.point, hit->point);
   world.axes().normal_out(found.normal, hit->normal);
   for (int k = 0; k < 3; ++k) hit->weights[k] = found.weights[k], hit->vertices[k] = found.vertices[k];
+}
+
+void write_overlaps(const Turn& world, const std::vector<int32_t>& slots, ts_body* bodies, size_t capacity,
+                    size_t* count) {
+  if (slots.size() > capacity) {
+    fail(TS_ERROR_SIZE, "bodies has room for %zu: give room for %zu", capacity, slots.size());
+  }
+  if (!slots.empty()) given(bodies, "bodies");
+  for (size_t i = 0; i < slots.size(); ++i) bodies[i] = world->body_in(slots[i]);
+  *count = slots.size();
 }
 
 const Mesh& mesh_of(const Scene& scene, int32_t mesh) {
@@ -458,6 +473,32 @@ ts_result ts_world_restore(ts_world world, const void* bytes, size_t size) {
   });
 }
 
+ts_result ts_world_record_events(ts_world world, int32_t kinds) {
+  return guarded([&] { Turn(world)->record_events(kinds); });
+}
+
+ts_result ts_world_drain_events(ts_world world, ts_event* events, size_t event_size, size_t capacity, size_t* count) {
+  return guarded([&] {
+    const Turn turn(world);
+    given(count, "count");
+    if (event_size != sizeof(ts_event)) {
+      fail(TS_ERROR_VERSION, "event_size is %zu: an event has %zu bytes in this version", event_size, sizeof(ts_event));
+    }
+    if (capacity > 0) given(events, "events");
+    *count = turn->events().drain(events, capacity);
+    for (size_t i = 0; i < *count; ++i) {
+      turn.axes().place_out({events[i].impulse[0], events[i].impulse[1], events[i].impulse[2]}, events[i].impulse);
+    }
+  });
+}
+
+ts_result ts_world_dropped_events(ts_world world, int64_t* count) {
+  return guarded([&] {
+    const Turn turn(world);
+    *given(count, "count") = turn->events().dropped();
+  });
+}
+
 ts_result ts_world_spawn(ts_world world, int32_t asset, const ts_placement* where, ts_body* body) {
   return guarded([&] {
     const Turn turn(world);
@@ -613,6 +654,68 @@ ts_result ts_body_set_targets(ts_world world, ts_body body, const int32_t* verti
   });
 }
 
+ts_result ts_body_attach(ts_world world, ts_body body, const int32_t* vertices, size_t count, int32_t frame,
+                         int32_t feels) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn->attach(turn->slot_of(body), list(vertices, count), frame, feels != 0);
+  });
+}
+
+ts_result ts_body_detach(ts_world world, ts_body body, const int32_t* vertices, size_t count) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn->detach(turn->slot_of(body), list(vertices, count));
+  });
+}
+
+ts_result ts_body_get_load(ts_world world, ts_body body, int32_t frame, double force[3], double torque[3]) {
+  return guarded([&] {
+    const Turn turn(world);
+    Vector pull, moment;
+    turn->load(turn->slot_of(body), frame, &pull, &moment);
+    if (force != nullptr) turn.axes().place_out(pull, force);
+    if (torque != nullptr) turn.axes().moment_out(moment, torque);
+  });
+}
+
+ts_result ts_body_grab(ts_world world, ts_body body, const ts_pull* pull, ts_grab* grab) {
+  return guarded([&] {
+    const Turn turn(world);
+    sized(pull, "pull");
+    given(grab, "grab");
+    if (std::isnan(pull->max_force)) fail(TS_ERROR_ARGUMENT, "max_force is not a number");
+    *grab = turn->grab(turn->slot_of(body), pull->triangle, finite(pull->weights, 3, "weights"),
+                       place(turn, pull->point, "point"), pull->frequency,
+                       pull->max_force < 0.0 ? pull->max_force : turn.axes().length_in(pull->max_force));
+  });
+}
+
+ts_result ts_world_get_grab(ts_world world, int32_t number, ts_grab* grab) {
+  return guarded([&] {
+    const Turn turn(world);
+    *given(grab, "grab") = turn->grab_at(number);
+  });
+}
+
+ts_result ts_grab_move(ts_world world, ts_grab grab, const double point[3]) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn->move_grab(grab, place(turn, point, "point"));
+  });
+}
+
+ts_result ts_grab_release(ts_world world, ts_grab grab) {
+  return guarded([&] { Turn(world)->release(grab); });
+}
+
+ts_result ts_grab_get_force(ts_world world, ts_grab grab, double force[3]) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn.axes().place_out(turn->grab_force(grab), given(force, "force"));
+  });
+}
+
 ts_result ts_world_raycast(ts_world world, const double origin[3], const double direction[3], double reach,
                            ts_hit* hit) {
   return guarded([&] {
@@ -628,6 +731,31 @@ ts_result ts_world_closest(ts_world world, const double point[3], double reach, 
     const Turn turn(world);
     sized(hit, "hit");
     write_hit(turn, turn->closest(place(turn, point, "point"), as_reach(turn, reach)), hit);
+  });
+}
+
+ts_result ts_world_overlap_sphere(ts_world world, const double center[3], double radius, ts_body* bodies,
+                                  size_t capacity, size_t* count) {
+  return guarded([&] {
+    const Turn turn(world);
+    given(count, "count");
+    const double size = length(turn, radius, 1e-9, "radius");
+    const Pose around = {place(turn, center, "center"), {0.0, 0.0, 0.0, 1.0}};
+    write_overlaps(turn, turn->overlaps(false, around, {size, size, size}), bodies, capacity, count);
+  });
+}
+
+ts_result ts_world_overlap_box(ts_world world, const ts_pose* where, const double size[3], ts_body* bodies,
+                               size_t capacity, size_t* count) {
+  return guarded([&] {
+    const Turn turn(world);
+    given(count, "count");
+    Vector edges = turn.axes().place_in(finite(size, 3, "size"));
+    for (int k = 0; k < 3; ++k) {
+      length(turn, size[k], 1e-9, "size");
+      edges[k] = std::fabs(edges[k]);
+    }
+    write_overlaps(turn, turn->overlaps(true, frame_pose(turn, where), edges), bodies, capacity, count);
   });
 }
 
@@ -690,11 +818,32 @@ ts_result ts_collider_get_impulse(ts_world world, int32_t collider, double impul
   });
 }
 
+ts_result ts_frame_add(ts_world world, const ts_pose* where, int32_t* frame) {
+  return guarded([&] {
+    const Turn turn(world);
+    given(frame, "frame");
+    *frame = turn->add_frame(frame_pose(turn, where));
+  });
+}
+
+ts_result ts_frame_remove(ts_world world, int32_t frame) {
+  return guarded([&] { Turn(world)->remove_frame(frame); });
+}
+
 ts_result ts_frame_move_to(ts_world world, int32_t frame, const ts_pose* where) {
   return guarded([&] {
     const Turn turn(world);
+    turn->move_frame(frame, frame_pose(turn, where));
+  });
+}
+
+ts_result ts_frame_get_pose(ts_world world, int32_t frame, ts_pose* where) {
+  return guarded([&] {
+    const Turn turn(world);
     given(where, "pose");
-    turn->move_frame(frame, {place(turn, where->position, "position"), rotation(turn, where->rotation, "rotation")});
+    const Pose found = turn->frame_pose(frame);
+    turn.axes().place_out(found.position, where->position);
+    turn.axes().rotation_out(found.rotation, where->rotation);
   });
 }
 

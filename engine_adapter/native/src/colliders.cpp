@@ -85,7 +85,8 @@ Colliders::Colliders(const Archive& archive) {
                     surface[2 * i],
                     surface[2 * i + 1],
                     filter[2 * i],
-                    filter[2 * i + 1]});
+                    filter[2 * i + 1],
+                    1});
     std::copy(parameters.data + 8 * i, parameters.data + 8 * i + 8, rows.back().parameters);
   }
 }

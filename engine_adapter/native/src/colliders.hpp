@@ -31,6 +31,7 @@ struct Collider {
   float parameters[8];
   double friction, restitution;  // the latter -1 for that of the bodies
   int32_t group, mask;
+  uint32_t serial;  // who comes into the row later has another
 
   bool moves() const;
   // Round its way through `dt` [s], and its highest speed [m/s].

@@ -97,9 +97,14 @@ Scene::Scene(const std::string& folder)
   const auto stable = archive.get<double>("world/stable"), limits = archive.get<double>("world/limits");
   const auto floors = archive.get<double>("world/floor");
   const auto assets_of = archive.get<int32_t>("slots/asset"), begins = archive.get<int32_t>("slots/begin");
-  if (flags.count != 2 || counts.count != 3 || stable.count != 2 || limits.count != 7) out_of_order("numbers");
+  const auto grabs = archive.get<double>("grabs/limits");
+  if (flags.count != 4 || grabs.count != 5 || counts.count != 3 || stable.count != 2 || limits.count != 7) out_of_order("numbers");
   has_contact = flags[0] != 0;
   sleeps = flags[1] != 0;
+  has_soft_contact = flags[2] != 0;
+  is_implicit = flags[3] != 0;
+  patch_size = grabs[0], farthest_pull = grabs[1], pull_in_weights = grabs[2], highest_pull_speed = grabs[3];
+  patch_rows = grabs[4] >= 1.0 && grabs[4] <= 1e6 ? size_t(grabs[4]) : 0;
   slot_count = counts[0], particle_count = counts[1], threads = counts[2];
   stable_share = stable[0], stable_step = stable[1];
   has_floor = floors.count == 1;
@@ -166,13 +171,21 @@ void Scene::read_assets() {
                    archive.get<int32_t>(prefix + "outer"),
                    archive.get<int32_t>(prefix + "rank"),
                    archive.rows<int32_t>(prefix + "surface", 3),
+                   archive.get<int32_t>(prefix + "elements"),
+                   archive.get<double>(prefix + "element_stiffness"),
+                   0,
                    0.0,
                    0};
     const auto center = archive.get<double>(prefix + "center"), skin = archive.get<double>(prefix + "thickness");
     const size_t n = asset.vertex_count();
     if (asset.rest_rows.count != 8 * n || asset.vertices.count != 3 * n || asset.rank.count != n || center.count != 3 ||
-        skin.count != 1 || !are_below(asset.pinned, n) || !are_below(asset.outer, n) || !are_below(asset.rank, n) ||
+        skin.count != 1 || asset.elements.sizes.size() != 2 || !are_below(asset.elements, n) || !are_below(asset.pinned, n) || !are_below(asset.outer, n) || !are_below(asset.rank, n) ||
         !are_below(asset.surface, n)) {
+      out_of_order("an asset");
+    }
+    asset.element_width = asset.elements.sizes[1];
+    if ((asset.element_width != 2 && asset.element_width != 4) ||
+        asset.elements.sizes[0] != asset.element_stiffness.count) {
       out_of_order("an asset");
     }
     asset.center = {center[0], center[1], center[2]};

@@ -31,6 +31,9 @@ struct Asset {
   Archive::View<double> masses;
   Vector center;
   Archive::View<int32_t> pinned, outer, rank, surface;
+  Archive::View<int32_t> elements;  // vertices of each: 2 of springs, 4 of tetrahedra
+  Archive::View<double> element_stiffness;
+  size_t element_width;
   double thickness;
   int32_t slot_count;
   size_t vertex_count() const { return masses.count; }
@@ -58,12 +61,14 @@ class Scene {
 
   Archive archive;
   Axes axes;
-  bool has_contact, sleeps;
+  bool has_contact, sleeps, has_soft_contact, is_implicit;
   int32_t slot_count, particle_count, threads;
   double stable_share, stable_step;       // see `Substeps.rule`
   bool has_floor;
   double floor;
   double position_limit, velocity_limit, spin_limit, impulse_limit, push_limit, shortest_step, longest_step;
+  double patch_size, farthest_pull, pull_in_weights, highest_pull_speed;  // of grabs; the third in N/kg
+  size_t patch_rows;
   std::vector<Asset> assets;
   std::vector<int32_t> asset_of_slot, begin_of_slot;
   std::vector<Mesh> meshes;

@@ -7,10 +7,23 @@
 #include <vector>
 
 #include "colliders.hpp"
+#include "events.hpp"
 #include "scene.hpp"
 #include "taichi_soft.h"
 
 namespace taichi_soft {
+
+// As taichi_soft/bodies/status.py has them.
+enum Status { kActive, kFrozen, kAsleep, kSkipping, kAbsent };
+enum Drives { kMovesPins = 1, kFeelsReaction = 2, kDamped = 8, kSheltered = 16, kGrabbed = 32, kJoined = 64 };
+enum Aims { kStill = 0, kWithFrame = 3 };  // as taichi_soft/control/kernels/pins.py has them
+
+// As taichi_soft/control/kernels/grabs.py has them; fields of other sizes are refused.
+constexpr size_t kMostGrabs = 16, kPatchRows = 128, kGrabCorners = 4;
+
+constexpr size_t kMostFrames = 100000;
+
+inline float as_float(double number) { return static_cast<float>(number); }
 
 // Numbers of a field in memory.
 template <typename Number>
@@ -42,6 +55,8 @@ struct Hit {
   Vector point, normal;
   bool is_inside = false;
 };
+
+struct SnapshotHead;
 
 class World {
  public:
@@ -89,15 +104,28 @@ class World {
   void unpin(int32_t slot, Vertices which);
   void set_targets(int32_t slot, Vertices which, const float* targets);
 
+  // Grabs.
+  ts_grab grab_at(int32_t number) const;
+  ts_grab grab(int32_t slot, int32_t triangle, const double weights[3], const Vector& point, double frequency,
+               double max_force);
+  void move_grab(ts_grab grab, const Vector& point);
+  void release(ts_grab grab);
+  Vector grab_force(ts_grab grab) const;
+
   // All of them.
   void wake();
   void set_wind(const Vector& velocity, double density, double drag);
   void radial_impulse(const Vector& center, double impulse, double radius);
 
+  void record_events(int32_t kinds);
+  Events& events() { return events_; }
+
   Hit first_hit(const Vector& origin, const Vector& direction, double farthest);
   Hit closest(const Vector& point, double farthest);
+  // Slots of bodies that touch a box with edges of `size`, or a sphere whose radius is each of `size`.
+  std::vector<int32_t> overlaps(bool is_box, const Pose& pose, const Vector& size);
 
-  // Colliders and frames.
+  // Colliders.
   Collider& collider(int32_t number);
   int32_t add_collider(const Collider& row);
   void remove_collider(int32_t number);
@@ -106,7 +134,15 @@ class World {
   void set_collider_velocity(int32_t number, const Vector& linear, const Vector& spin);
   void teleport_collider(int32_t number, const Pose& pose);
   void collider_impulse(int32_t number, Vector* impulse, Vector* moment);
+
+  // Frames and what hangs from them.
+  int32_t add_frame(const Pose& pose);
+  void remove_frame(int32_t number);
   void move_frame(int32_t number, const Pose& pose);
+  Pose frame_pose(int32_t number) const;
+  void attach(int32_t slot, Vertices which, int32_t frame, bool feels);
+  void detach(int32_t slot, Vertices which);
+  void load(int32_t slot, int32_t frame, Vector* force, Vector* torque) const;
 
   // States.
   uint64_t hash() const;
@@ -120,7 +156,16 @@ class World {
   Hit hit_from(const float* row) const;
   void require_step(double dt) const;
   int32_t require_substeps(double dt, int32_t substeps) const;
-  void require_rows(const char* at, size_t colliders) const;
+  void require_rows(const char* at, const SnapshotHead& head) const;
+  bool is_in_order(const Contact& contact, size_t colliders) const;
+  Present present() const;
+  std::map<Pair, std::array<float, 3>> look();
+  void take_down(double dt, const std::vector<int32_t>& frozen);
+  size_t frame(int32_t number) const;  // its row
+  std::vector<int32_t> hanging(int32_t slot, int32_t frame) const;
+  void let_go(int32_t slot, const std::vector<int32_t>& vertices);
+  size_t grab_of(ts_grab grab) const;  // its number
+  void end_grab(size_t number);
   void write_colliders();
   bool aim_pins(double dt);
   bool prepare_colliders(double dt);
@@ -144,8 +189,11 @@ class World {
   std::unique_ptr<Machine> machine_;
   Colliders colliders_;
   std::vector<ColliderMotion> motion_;
-  std::vector<float> frames_;  // at the end of the coming step: rotation row by row and place, (f, 12)
-  std::vector<uint32_t> generations_;
+  Events events_;
+  std::vector<float> present_, coming_;  // of frames, after the last step and the coming one: rotation row by row
+                                         // and place, (f, 12)
+  std::vector<unsigned char> frame_alive_;
+  std::vector<uint32_t> generations_, grab_generations_;
 
   int64_t steps_ = 0;
   double time_ = 0.0, last_dt_ = 0.0;
@@ -159,7 +207,10 @@ class World {
   double rows_at_ = -1.0;   // alpha of what was read of all bodies; below 0 once they have moved on
 
   Field<int32_t> body_status_, body_drives_, particle_aim_, is_awake_, failed_, is_driven_, island_count_;
-  Field<float> position_, velocity_, mass_, inv_mass_, lag_, gravity_scale_, damping_, wind_;
+  Field<float> position_, velocity_, mass_, inv_mass_, lag_, gravity_scale_, damping_, wind_, target_, reaction_;
+  Field<int32_t> particle_contact_, records_touches_;
+  Field<int32_t> grab_body_, grab_corners_, grab_count_, grab_particle_;
+  Field<float> grab_weights_, grab_target_, grab_spring_, grab_limits_, grab_force_, grab_share_;
   Field<float> collider_[7], collider_parameters_, collider_surface_;
   Field<int32_t> collider_kind_, collider_filter_, collider_count_;
   size_t collider_room_ = 0;

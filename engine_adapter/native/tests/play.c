@@ -93,6 +93,22 @@ static int32_t vertices[MOST];
 static char* kept;
 static size_t kept_size;
 
+static ts_grab grab(void) {
+  ts_grab found = 0;
+  check(ts_world_get_grab(world, whole(), &found));
+  return found;
+}
+
+static int slot_of(ts_body who) { return (int)(who & 0xFFFFFFFFu) - 1; }
+
+static void print_slots(const ts_body* found, size_t count) {
+  if (count == 0) printf("nothing\n");
+  for (size_t i = 0; i < count; ++i) printf(i + 1 < count ? "%d " : "%d\n", slot_of(found[i]));
+}
+
+static ts_event events[MOST];
+static ts_body found_bodies[MOST];
+
 static void play(const char* call) {
   double a[8];
 #define CALL(name) else if (strcmp(call, name) == 0)
@@ -194,6 +210,88 @@ static void play(const char* call) {
     check(ts_world_closest(world, a, number(), &hit));
     print_hit(&hit);
     if (hit.body != 0) printf("%d\n", (int)hit.is_inside);
+  }
+  CALL("overlap_sphere") {
+    size_t count = 0;
+    numbers(a, 3);
+    check(ts_world_overlap_sphere(world, a, number(), found_bodies, MOST, &count));
+    print_slots(found_bodies, count);
+  }
+  CALL("overlap_box") {
+    size_t count = 0;
+    const ts_pose where = pose();
+    numbers(a, 3);
+    check(ts_world_overlap_box(world, &where, a, found_bodies, MOST, &count));
+    print_slots(found_bodies, count);
+  }
+  CALL("record_events") check(ts_world_record_events(world, whole()));
+  CALL("drain") {
+    size_t count = 0;
+    check(ts_world_drain_events(world, events, sizeof(ts_event), MOST, &count));
+    printf("events %d\n", (int)count);
+    for (size_t i = 0; i < count; ++i) {
+      const ts_event* each = events + i;
+      rows[0] = (float)each->time;
+      for (int k = 0; k < 3; ++k) rows[1 + k] = (float)each->impulse[k];
+      rows[4] = (float)each->duration;
+      printf("%d %d %d %d %d %016" PRIx64 "\n", (int)each->kind, (int)each->collider, (int)each->step,
+             slot_of(each->body), slot_of(each->other), hash_of(rows, 5));
+    }
+  }
+  CALL("attach") {
+    const ts_body who = body();
+    const size_t count = list(vertices);
+    const int32_t frame = whole();
+    check(ts_body_attach(world, who, vertices, count, frame, whole()));
+  }
+  CALL("detach") {
+    const ts_body who = body();
+    const size_t count = list(vertices);
+    check(ts_body_detach(world, who, vertices, count));
+  }
+  CALL("load") {
+    const ts_body who = body();
+    check(ts_body_get_load(world, who, whole(), a, a + 3));
+    for (int i = 0; i < 6; ++i) rows[i] = (float)a[i];
+    printf("%016" PRIx64 "\n", hash_of(rows, 6));
+  }
+  CALL("grab") {
+    ts_pull pull;
+    ts_grab made = 0;
+    const ts_body who = body();
+    memset(&pull, 0, sizeof pull);
+    pull.struct_size = sizeof pull;
+    pull.triangle = whole();
+    numbers(pull.weights, 3);
+    numbers(pull.point, 3);
+    pull.frequency = number();
+    pull.max_force = number();
+    check(ts_body_grab(world, who, &pull, &made));
+  }
+  CALL("move_grab") {
+    const ts_grab which = grab();
+    numbers(a, 3);
+    check(ts_grab_move(world, which, a));
+  }
+  CALL("release_grab") check(ts_grab_release(world, grab()));
+  CALL("grab_force") {
+    check(ts_grab_get_force(world, grab(), a));
+    for (int i = 0; i < 3; ++i) rows[i] = (float)a[i];
+    printf("%016" PRIx64 "\n", hash_of(rows, 3));
+  }
+  CALL("add_frame") {
+    int32_t made = 0;
+    const ts_pose where = pose();
+    check(ts_frame_add(world, &where, &made));
+    printf("%d\n", (int)made);
+  }
+  CALL("remove_frame") check(ts_frame_remove(world, whole()));
+  CALL("frame_pose") {
+    ts_pose where;
+    check(ts_frame_get_pose(world, whole(), &where));
+    for (int i = 0; i < 3; ++i) rows[i] = (float)where.position[i];
+    for (int i = 0; i < 4; ++i) rows[3 + i] = (float)where.rotation[i];
+    printf("%016" PRIx64 "\n", hash_of(rows, 7));
   }
   CALL("add_collider") {
     ts_shape shape;

@@ -1,0 +1,81 @@
+// What happened in steps, for who wants to hear of it: as taichi_soft/events has it, number by number.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <vector>
+
+#include "archive.hpp"
+#include "taichi_soft.h"
+
+namespace taichi_soft {
+
+using Pair = std::array<int32_t, 3>;  // a slot, what the other one is, and its slot or number
+enum { kOfCollider = 0, kOfBody = 1 };
+
+struct Contact {  // that goes on
+  ts_body a, b;   // the latter 0 for a collider
+  uint32_t serial;  // of that collider
+  int32_t slot, kind, other;
+  double began, touched, pause;  // [s]: start of its first step, end of its last, since when nothing was given
+  double impulse[3];
+};
+
+// Who is there after a step.
+struct Present {
+  std::vector<ts_body> bodies;       // in each slot, 0 for nobody
+  std::vector<uint32_t> colliders;   // serial numbers, 0 for none
+};
+
+class Events {
+ public:
+  Events() = default;
+  Events(const Archive& archive, size_t slots);
+
+  int32_t kinds() const { return kinds_; }
+  bool looks() const { return looks_for(kinds_); }
+  static bool looks_for(int32_t kinds) {
+    return (kinds & (TS_CONTACT_BEGAN | TS_CONTACT_ENDED | TS_FELL_ASLEEP | TS_WOKE)) != 0;
+  }
+  // From now on, as it is now: `status` has been read where `looks_for(kinds)`.
+  void record(int32_t kinds, const Present& present);
+  void take_down(const std::map<Pair, std::array<float, 3>>& touches, const Present& present,
+                 const std::vector<int32_t>& frozen, int64_t step, double time, double dt);
+  void lose(int64_t count) { dropped_ += count; }
+  size_t drain(ts_event* events, size_t capacity);
+  int64_t dropped() const { return dropped_; }
+
+  // What the events of coming steps depend on.
+  struct Memory {
+    int32_t kinds;
+    std::vector<int32_t> status;
+    std::vector<ts_body> sleepers;
+    std::vector<Contact> contacts;
+  };
+  Memory memory() const;
+  // The world was put back to a state of that step count: what waits of later steps never happened.
+  void recall(const Memory& memory, int64_t steps, const Present& present);
+  size_t contact_count() const { return (kinds_ & kContacts) != 0 ? going_on_.size() : 0; }
+
+  std::vector<int32_t> status;  // of each slot after the last step, and two numbers: see `read_touches`
+  size_t touch_rows = 0;        // pairs that can touch in a step
+
+ private:
+  static constexpr int32_t kContacts = TS_CONTACT_BEGAN | TS_CONTACT_ENDED, kSleep = TS_FELL_ASLEEP | TS_WOKE;
+  void follow(const std::map<Pair, std::array<float, 3>>& touches, const Present& present, int64_t step, double time,
+              double dt);
+  std::vector<ts_body> sleeping(const Present& present) const;
+  void tell(ts_event event);
+
+  int32_t kinds_ = 0;
+  double pause_ = 0.0;
+  size_t most_ = 0;
+  std::map<Pair, Contact> going_on_;
+  std::vector<ts_body> sleepers_;  // in each slot, 0 where nobody sleeps
+  std::deque<ts_event> waiting_;
+  int64_t dropped_ = 0;
+};
+
+}  // namespace taichi_soft

@@ -1,0 +1,411 @@
+#include "world.hpp"
+
+#include <algorithm>
+#include <limits>
+
+#include "error.hpp"
+
+namespace taichi_soft {
+
+namespace {
+
+constexpr ts_body kBody = uint64_t(3) << 56;  // what a body's handle begins with, and no other handle
+
+}  // namespace
+
+ts_body World::body_in(int32_t slot) const {
+  if (slot < 0 || slot >= scene_->slot_count) {
+    fail(TS_ERROR_ARGUMENT, "slot is %d: there are %d, from 0", slot, scene_->slot_count);
+  }
+  return body_status_(slot) == kAbsent ? 0 : kBody | ts_body(generations_[slot]) << 32 | uint32_t(slot + 1);
+}
+
+int32_t World::slot_of(ts_body body) const {
+  const int64_t slot = int64_t(body & 0xFFFFFFFFu) - 1;
+  if (slot < 0 || slot >= scene_->slot_count || body_in(int32_t(slot)) != body) {
+    fail(TS_ERROR_HANDLE, "body %llu is not in this world, or was taken out", static_cast<unsigned long long>(body));
+  }
+  return static_cast<int32_t>(slot);
+}
+
+std::vector<float> World::place_rows(const Asset& asset, const Vector& place, const Quaternion& turn,
+                                     const Vector& drift, const Vector& spin) const {
+  const Matrix rows = matrix_of(turn);
+  std::vector<float> found(asset.rest_rows.begin(), asset.rest_rows.end());
+  std::vector<Vector> x(asset.vertex_count());
+  double farthest = 0.0, highest = -std::numeric_limits<double>::infinity();
+  for (size_t v = 0; v < x.size(); ++v) {
+    const double* rest = asset.vertices.data + 3 * v;
+    x[v] = turned({rest[0], rest[1], rest[2]}, rows);
+    for (int k = 0; k < 3; ++k) {
+      x[v][k] = x[v][k] + place[k];
+      farthest = std::max(farthest, std::fabs(x[v][k]));
+      found[8 * v + k] = as_float(x[v][k]);
+      found[8 * v + 3 + k] = as_float(drift[k]);
+    }
+    highest = std::max(highest, x[v][2]);
+  }
+  if (!(farthest < scene_->position_limit)) {
+    fail(TS_ERROR_ARGUMENT, "position puts the body beyond %g m: stay nearer the origin", scene_->position_limit);
+  }
+  double lowest = std::numeric_limits<double>::infinity();
+  for (int32_t v : asset.outer) lowest = std::min(lowest, x[v][2]);
+  if (scene_->has_floor && lowest < scene_->floor - 1e-3 * (highest - lowest)) {
+    fail(TS_ERROR_ARGUMENT, "the body would begin %.4g m below the floor: raise it", scene_->floor - lowest);
+  }
+  if (spin[0] != 0.0 || spin[1] != 0.0 || spin[2] != 0.0) {
+    Vector center = turned(asset.center, rows);
+    for (int k = 0; k < 3; ++k) center[k] = center[k] + place[k];
+    const double a = spin[0], b = spin[1], c = spin[2];
+    const Matrix turning = {{{0, -c, b}, {c, 0, -a}, {-b, a, 0}}};
+    double fastest = 0.0;
+    for (size_t v = 0; v < x.size(); ++v) {
+      const Vector arm = {x[v][0] - center[0], x[v][1] - center[1], x[v][2] - center[2]};
+      const Vector more = turned(arm, turning);
+      for (int k = 0; k < 3; ++k) {
+        float& speed = found[8 * v + 3 + k];
+        speed = as_float(double(speed) + more[k]);
+        fastest = std::max(fastest, double(std::fabs(speed)));
+      }
+    }
+    if (!(fastest < scene_->velocity_limit)) {
+      fail(TS_ERROR_ARGUMENT, "spin makes a vertex %.4g m/s fast: stay below %g", fastest, scene_->velocity_limit);
+    }
+  }
+  for (int32_t v : asset.pinned) found[8 * v + 3] = found[8 * v + 4] = found[8 * v + 5] = 0.0f;
+  return found;
+}
+
+ts_body World::spawn(int32_t asset, const Vector& place, const Quaternion& turn, const Vector& drift,
+                     const Vector& spin) {
+  if (asset < 0 || size_t(asset) >= scene_->assets.size()) {
+    fail(TS_ERROR_ARGUMENT, "asset is %d: there are %zu, from 0", asset, scene_->assets.size());
+  }
+  int32_t slot = 0;
+  while (slot < scene_->slot_count && (scene_->asset_of_slot[slot] != asset || body_status_(slot) != kAbsent)) ++slot;
+  if (slot == scene_->slot_count) {
+    fail(TS_ERROR_STATE, "all %d bodies of asset %d live: reserve more before exporting, or despawn one",
+         scene_->assets[asset].slot_count, asset);
+  }
+  const std::vector<float> rows = place_rows(scene_->assets[asset], place, turn, drift, spin);
+  std::copy(rows.begin(), rows.end(), machine_->rows.room<float>(machine_->runtime(), rows.size()));
+  machine_->launch("spawn_body", {Machine::whole(slot), Machine::array(machine_->rows.memory(), TI_DATA_TYPE_F32,
+                                                                       uint32_t(rows.size() / 8), 8)});
+  generations_[slot] = (generations_[slot] + 1) & 0xFFFFFF;
+  is_still_ = false;
+  rows_at_ = -1.0;
+  return body_in(slot);
+}
+
+void World::despawn(int32_t slot) {
+  if ((body_drives_(slot) & kJoined) != 0 || is_driven_(slot) != 0) {
+    fail(TS_ERROR_STATE, "the body in slot %d is joined to another or driven: it cannot be taken out", slot);
+  }
+  for (size_t g = 0; g < kMostGrabs; ++g) {
+    if (grab_body_(g) == slot + 1) end_grab(g);
+  }
+  wake_near(box_of(slot));
+  is_still_ = false;
+  body_drives_(slot) &= ~kMovesPins;  // or what hung from a frame would be aimed for ever
+  machine_->launch("despawn_body", {Machine::whole(slot)});
+}
+
+void World::read_positions(int32_t slot, double alpha, float* rows) {
+  if (!(alpha >= 0.0 && alpha <= 1.0)) fail(TS_ERROR_ARGUMENT, "alpha is %g: give a number from 0 to 1", alpha);
+  const size_t n = asset_of(slot).vertex_count();
+  if (alpha == 1.0) {
+    for (size_t v = 0; v < n; ++v) {
+      for (int k = 0; k < 3; ++k) rows[3 * v + k] = position_(particle(slot, v), k);
+    }
+  } else {
+    const uint32_t count = uint32_t(scene_->particle_count);
+    const float* all = machine_->positions.room<float>(machine_->runtime(), 3 * count);
+    if (rows_at_ != alpha) {
+      machine_->launch("read_positions", {Machine::real(alpha), Machine::array(machine_->positions.memory(),
+                                                                               TI_DATA_TYPE_F32, count, 3)});
+      rows_at_ = alpha;
+    }
+    std::copy(all + 3 * begin_of(slot), all + 3 * (begin_of(slot) + n), rows);
+  }
+  scene_->axes.rows_out(rows, n, true, rows);
+}
+
+void World::read_mesh(int32_t slot, int32_t number, float* positions, float* normals) {
+  const Mesh& mesh = scene_->meshes[number];
+  const uint32_t count = uint32_t(mesh.vertex_count);
+  const TiRuntime runtime = machine_->runtime();
+  const float* x = machine_->vertices.room<float>(runtime, 3 * count);
+  const float* n = machine_->normals.room<float>(runtime, 3 * count);
+  std::string kernel = mesh.is_skin ? "write_skin" : "write_render_mesh";
+  if (!mesh.is_serial) kernel += "_shared";
+  const TiArgument ints = Machine::array(machine_->ints_of(number), TI_DATA_TYPE_I32, uint32_t(mesh.ints.count));
+  const TiArgument x_out = Machine::array(machine_->vertices.memory(), TI_DATA_TYPE_F32, 3 * count);
+  const TiArgument n_out = Machine::array(machine_->normals.memory(), TI_DATA_TYPE_F32, 3 * count);
+  if (mesh.is_skin) {
+    const uint32_t vertices = uint32_t(asset_of(slot).vertex_count());
+    machine_->rows.room<float>(runtime, 12 * vertices);
+    machine_->launch(
+        kernel.c_str(),
+        {Machine::whole(slot), Machine::whole(int32_t(vertices)), Machine::real(picture_), ints,
+         Machine::array(machine_->floats_of(number), TI_DATA_TYPE_F32, uint32_t(mesh.floats.count)),
+         Machine::array(machine_->rows.memory(), TI_DATA_TYPE_F32, 12 * vertices), x_out, n_out});
+  } else {
+    machine_->launch(kernel.c_str(), {Machine::whole(slot), Machine::real(picture_), ints, x_out, n_out});
+  }
+  scene_->axes.rows_out(x, count, true, positions);
+  if (normals != nullptr) scene_->axes.rows_out(n, count, false, normals);
+}
+
+Vector World::center_of(int32_t slot) const {
+  const Asset& asset = asset_of(slot);
+  Vector moment = {0.0, 0.0, 0.0};
+  double mass = 0.0;
+  for (size_t v = 0; v < asset.vertex_count(); ++v) {
+    mass += asset.masses[v];
+    for (int k = 0; k < 3; ++k) moment[k] += asset.masses[v] * position_(particle(slot, v), k);
+  }
+  for (double& each : moment) each /= mass;
+  return moment;
+}
+
+std::vector<int32_t> World::checked(int32_t slot, Vertices which, bool may_be_all) const {
+  const size_t n = asset_of(slot).vertex_count();
+  std::vector<int32_t> found;
+  if (which.count == 0) {
+    if (!may_be_all) fail(TS_ERROR_ARGUMENT, "no vertex is named: name at least one, from 0 to %zu", n - 1);
+    for (size_t v = 0; v < n; ++v) found.push_back(int32_t(v));
+    return found;
+  }
+  found.assign(which.numbers, which.numbers + which.count);
+  for (int32_t vertex : found) {
+    if (vertex < 0 || size_t(vertex) >= n) fail(TS_ERROR_ARGUMENT, "there is no vertex %d: there are %zu", vertex, n);
+  }
+  std::sort(found.begin(), found.end());
+  found.erase(std::unique(found.begin(), found.end()), found.end());
+  return found;
+}
+
+void World::give_rows(int32_t slot, const std::vector<int32_t>& vertices) {
+  int32_t* rows = machine_->rows.room<int32_t>(machine_->runtime(), vertices.size());
+  for (size_t i = 0; i < vertices.size(); ++i) rows[i] = int32_t(particle(slot, size_t(vertices[i])));
+}
+
+void World::require_unattached(int32_t slot, const std::vector<int32_t>& vertices) const {
+  for (int32_t vertex : vertices) {
+    if (particle_aim_(particle(slot, size_t(vertex))) >= kWithFrame) {
+      fail(TS_ERROR_STATE, "vertex %d of the body in slot %d is attached to a frame", vertex, slot);
+    }
+  }
+}
+
+double World::mass_of(int32_t slot, const std::vector<int32_t>& vertices) const {
+  double total = 0.0;
+  for (int32_t vertex : vertices) total += asset_of(slot).masses[vertex];
+  return total;
+}
+
+void World::set_velocity(int32_t slot, const Vector& linear, const Vector& spin) {
+  float* motion = machine_->numbers.room<float>(machine_->runtime(), 6);
+  for (int k = 0; k < 3; ++k) motion[k] = as_float(linear[k]), motion[3 + k] = as_float(spin[k]);
+  const float* fastest = machine_->found.room<float>(machine_->runtime(), 1);
+  machine_->launch("write_rigid_velocity",
+                   {Machine::whole(slot), Machine::array(machine_->numbers.memory(), TI_DATA_TYPE_F32, 6),
+                    Machine::array(machine_->found.memory(), TI_DATA_TYPE_F32, 1)});
+  if (!(*fastest < scene_->velocity_limit)) {
+    fail(TS_ERROR_ARGUMENT, "some vertices would be %.4g m/s fast: keep below %g", double(*fastest),
+         scene_->velocity_limit);
+  }
+  rouse(slot);
+}
+
+void World::teleport(int32_t slot, const Vector& center, const Quaternion& turn, bool keeps_velocity) {
+  require_unattached(slot, checked(slot, {nullptr, 0}, true));
+  const Box left = box_of(slot);
+  const double lowest = scene_->has_floor ? scene_->floor : -std::numeric_limits<double>::infinity();
+  const Matrix rows = matrix_of(turn);
+  double* place = machine_->numbers.room<double>(machine_->runtime(), 5);
+  double* matrix = machine_->rows.room<double>(machine_->runtime(), 9);
+  const double* found = machine_->found.room<double>(machine_->runtime(), 3);
+  std::copy(center.begin(), center.end(), place);
+  place[3] = lowest, place[4] = keeps_velocity ? 1.0 : 0.0;
+  for (int i = 0; i < 9; ++i) matrix[i] = rows[i / 3][i % 3];
+  machine_->launch("jump", {Machine::whole(slot), Machine::array(machine_->numbers.memory(), TI_DATA_TYPE_F64, 5),
+                            Machine::array(machine_->rows.memory(), TI_DATA_TYPE_F64, 3, 3),
+                            Machine::array(machine_->found.memory(), TI_DATA_TYPE_F64, 3)});
+  if (!(found[2] < scene_->position_limit)) {
+    fail(TS_ERROR_ARGUMENT, "center puts the body beyond %g m: stay nearer the origin", scene_->position_limit);
+  }
+  if (found[0] < lowest - 1e-3 * (found[1] - found[0])) {
+    fail(TS_ERROR_ARGUMENT, "center puts the body %.4g m below the floor: raise it", lowest - found[0]);
+  }
+  rouse(slot);
+  wake_near(left);
+}
+
+void World::apply_impulse(int32_t slot, const Vector& impulse, Vertices which) {
+  const std::vector<int32_t> vertices = checked(slot, which, true);
+  const double mass = mass_of(slot, vertices);
+  const Vector change = {impulse[0] / mass, impulse[1] / mass, impulse[2] / mass};
+  if (!(length_of(change) < scene_->velocity_limit)) {
+    fail(TS_ERROR_ARGUMENT, "impulse would change velocities by %.4g m/s: keep below %g", length_of(change),
+         scene_->velocity_limit);
+  }
+  give_rows(slot, vertices);
+  float* numbers = machine_->numbers.room<float>(machine_->runtime(), 3);
+  for (int k = 0; k < 3; ++k) numbers[k] = as_float(change[k]);
+  machine_->launch("add_velocity",
+                   {Machine::array(machine_->rows.memory(), TI_DATA_TYPE_I32, uint32_t(vertices.size())),
+                    Machine::array(machine_->numbers.memory(), TI_DATA_TYPE_F32, 3)});
+  rouse(slot);
+}
+
+void World::apply_force(int32_t slot, const Vector& force, Vertices which) {
+  const std::vector<int32_t> vertices = checked(slot, which, true);
+  const double mass = mass_of(slot, vertices);
+  float* numbers = machine_->numbers.room<float>(machine_->runtime(), 3);
+  for (int k = 0; k < 3; ++k) {
+    const double acceleration = force[k] / mass;
+    if (!(std::fabs(acceleration) < scene_->push_limit)) {
+      fail(TS_ERROR_ARGUMENT, "force would accelerate vertices by %.4g m/s^2: keep below %g", acceleration,
+           scene_->push_limit);
+    }
+    numbers[k] = as_float(acceleration);
+  }
+  give_rows(slot, vertices);
+  machine_->launch("add_push", {Machine::whole(slot),
+                                Machine::array(machine_->rows.memory(), TI_DATA_TYPE_I32, uint32_t(vertices.size())),
+                                Machine::array(machine_->numbers.memory(), TI_DATA_TYPE_F32, 3)});
+  rouse(slot);
+}
+
+void World::impulse_at(int32_t slot, const Vector& impulse, const Vector& point, double radius) {
+  if (!(radius >= 1e-9 && radius <= 1e9)) fail(TS_ERROR_ARGUMENT, "radius is %g m: give 1e-9 to 1e9", radius);
+  float* place = machine_->numbers.room<float>(machine_->runtime(), 7);
+  for (int k = 0; k < 3; ++k) place[k] = as_float(point[k]), place[4 + k] = as_float(impulse[k]);
+  place[3] = as_float(radius);
+  const double* found = machine_->found.room<double>(machine_->runtime(), 2);
+  machine_->launch("add_impulse_near",
+                   {Machine::whole(slot), Machine::array(machine_->numbers.memory(), TI_DATA_TYPE_F32, 7),
+                    Machine::array(machine_->found.memory(), TI_DATA_TYPE_F64, 2)});
+  if (!(found[1] < scene_->velocity_limit)) {
+    fail(TS_ERROR_ARGUMENT, "impulse would change velocities by %.4g m/s: keep below %g", found[1],
+         scene_->velocity_limit);
+  }
+  if (found[0] >= radius) {
+    fail(TS_ERROR_ARGUMENT, "point is %.4g m from the nearest vertex, beyond radius: aim at the body", found[0]);
+  }
+  rouse(slot);
+}
+
+void World::set_gravity_scale(int32_t slot, double scale) {
+  if (!(std::fabs(scale) <= 1e3)) fail(TS_ERROR_ARGUMENT, "scale is %g: give -1000 to 1000", scale);
+  gravity_scale_(slot) = as_float(scale);
+  rouse(slot);
+}
+
+void World::set_damping(int32_t slot, double rate) {
+  if (!(rate >= 0.0 && rate <= 1e6)) fail(TS_ERROR_ARGUMENT, "rate is %g: give 0 to 1e6 per second", rate);
+  damping_(slot) = as_float(rate);
+  body_drives_(slot) = (body_drives_(slot) & ~kDamped) | (as_float(rate) > 0.0f ? kDamped : 0);
+  rouse(slot);
+}
+
+void World::set_sheltered(int32_t slot, bool is_sheltered) {
+  body_drives_(slot) = (body_drives_(slot) & ~kSheltered) | (is_sheltered ? kSheltered : 0);
+  rouse(slot);
+}
+
+void World::pin(int32_t slot, Vertices which) {
+  const std::vector<int32_t> vertices = checked(slot, which, false);
+  require_unattached(slot, vertices);
+  give_rows(slot, vertices);
+  machine_->launch("pin_particles",
+                   {Machine::array(machine_->rows.memory(), TI_DATA_TYPE_I32, uint32_t(vertices.size()))});
+  rouse(slot);
+}
+
+void World::unpin(int32_t slot, Vertices which) {
+  std::vector<int32_t> vertices = checked(slot, which, true);
+  if (which.count == 0) {
+    const auto stays = [&](int32_t v) {
+      const size_t p = particle(slot, size_t(v));
+      return inv_mass_(p) != 0.0f || particle_aim_(p) >= kWithFrame;
+    };
+    vertices.erase(std::remove_if(vertices.begin(), vertices.end(), stays), vertices.end());
+    if (vertices.empty()) return rouse(slot);
+  } else {
+    require_unattached(slot, vertices);
+  }
+  give_rows(slot, vertices);
+  machine_->launch("free_particles",
+                   {Machine::array(machine_->rows.memory(), TI_DATA_TYPE_I32, uint32_t(vertices.size()))});
+  rouse(slot);
+}
+
+void World::set_targets(int32_t slot, Vertices which, const float* targets) {
+  const std::vector<int32_t> vertices = checked(slot, which, false);
+  if (vertices.size() != which.count) fail(TS_ERROR_ARGUMENT, "a vertex is named twice: name each once");
+  std::vector<float> rows(3 * which.count);
+  scene_->axes.rows_in(targets, which.count, rows.data());
+  for (float each : rows) {
+    if (!(std::fabs(each) < scene_->position_limit)) {
+      fail(TS_ERROR_ARGUMENT, "a target is beyond %g m, or not finite", scene_->position_limit);
+    }
+  }
+  require_unattached(slot, vertices);
+  float* ordered = machine_->vertices.room<float>(machine_->runtime(), rows.size());
+  for (size_t i = 0; i < which.count; ++i) {
+    const size_t place =
+        size_t(std::lower_bound(vertices.begin(), vertices.end(), which.numbers[i]) - vertices.begin());
+    std::copy(rows.begin() + 3 * i, rows.begin() + 3 * i + 3, ordered + 3 * place);
+  }
+  give_rows(slot, vertices);
+  const int32_t* loose = machine_->found.room<int32_t>(machine_->runtime(), 1);
+  const uint32_t count = uint32_t(vertices.size());
+  machine_->launch("write_targets", {Machine::array(machine_->rows.memory(), TI_DATA_TYPE_I32, count),
+                                     Machine::array(machine_->vertices.memory(), TI_DATA_TYPE_F32, count, 3),
+                                     Machine::array(machine_->found.memory(), TI_DATA_TYPE_I32, 1)});
+  if (*loose >= 0) fail(TS_ERROR_STATE, "vertex %d is not pinned: call ts_body_pin first", vertices[size_t(*loose)]);
+  rouse(slot);
+  has_work_ = true;
+}
+
+// ---- all of them ----
+
+void World::set_wind(const Vector& velocity, double density, double drag) {
+  for (double each : velocity) {
+    if (!(std::fabs(each) < scene_->velocity_limit)) fail(TS_ERROR_ARGUMENT, "velocity is %g m/s, too fast", each);
+  }
+  if (!(density >= 0.0 && density <= 1e5)) fail(TS_ERROR_ARGUMENT, "density is %g: give 0 to 100,000 kg/m^3", density);
+  if (!(drag >= 0.0 && drag <= 1e3)) fail(TS_ERROR_ARGUMENT, "drag is %g: give 0 to 1,000", drag);
+  const float given[4] = {as_float(velocity[0]), as_float(velocity[1]), as_float(velocity[2]),
+                          as_float(density * drag)};
+  bool differs = false;
+  for (int k = 0; k < 4; ++k) differs = differs || given[k] != wind_(0, k);
+  if (!differs) return;
+  for (int k = 0; k < 4; ++k) wind_(0, k) = given[k];
+  rouse(-1);
+}
+
+void World::radial_impulse(const Vector& center, double impulse, double radius) {
+  if (!(radius >= 1e-9 && radius <= 1e9)) fail(TS_ERROR_ARGUMENT, "radius is %g m: give 1e-9 to 1e9", radius);
+  if (!(std::fabs(impulse) <= scene_->impulse_limit)) fail(TS_ERROR_ARGUMENT, "impulse is %g N s, too much", impulse);
+  float* place = machine_->numbers.room<float>(machine_->runtime(), 5);
+  for (int k = 0; k < 3; ++k) place[k] = as_float(center[k]);
+  place[3] = as_float(radius), place[4] = as_float(impulse);
+  const float* highest = machine_->found.room<float>(machine_->runtime(), 1);
+  machine_->launch("add_radial_impulse", {Machine::whole(scene_->slot_count),
+                                          Machine::array(machine_->numbers.memory(), TI_DATA_TYPE_F32, 5),
+                                          Machine::array(machine_->found.memory(), TI_DATA_TYPE_F32, 1)});
+  if (!(*highest < scene_->velocity_limit)) {
+    fail(TS_ERROR_ARGUMENT, "impulse would change velocities by %.4g m/s: keep below %g", double(*highest),
+         scene_->velocity_limit);
+  }
+  is_still_ = false;
+  rows_at_ = -1.0;
+  Box box;
+  for (int k = 0; k < 3; ++k) box.lower[k] = center[k] - radius, box.upper[k] = center[k] + radius;
+  wake_near(box);
+}
+
+}  // namespace taichi_soft

@@ -1,0 +1,94 @@
+#include "world.hpp"
+
+#include "error.hpp"
+
+namespace taichi_soft {
+
+Collider& World::collider(int32_t number) {
+  if (number < 0 || size_t(number) >= colliders_.rows.size() || !colliders_.rows[size_t(number)].is_alive) {
+    fail(TS_ERROR_ARGUMENT, "there is no collider %d: there are %zu, from 0", number, colliders_.rows.size());
+  }
+  return colliders_.rows[size_t(number)];
+}
+
+int32_t World::add_collider(const Collider& row) {
+  if (!scene_->has_contact) {
+    fail(TS_ERROR_STATE, "this world was made without contact: give it collider_room before exporting");
+  }
+  const int32_t number = colliders_.free_row();
+  if (size_t(number) >= collider_room_) {
+    fail(TS_ERROR_STATE, "there is room for %zu colliders and all are in use: export with a larger collider_room",
+         collider_room_);
+  }
+  if (size_t(number) == colliders_.rows.size()) colliders_.rows.push_back(Collider{});
+  const uint32_t serial = colliders_.rows[size_t(number)].serial + 1;
+  colliders_.rows[size_t(number)] = row;
+  colliders_.rows[size_t(number)].serial = serial;
+  write_colliders();
+  double speed;
+  wake_near(row.way(0.0, &speed));
+  return number;
+}
+
+void World::remove_collider(int32_t number) {
+  Collider& row = collider(number);
+  row.is_alive = false;
+  write_colliders();
+  double speed;
+  wake_near(row.way(0.0, &speed));
+}
+
+void World::write_colliders() {
+  collider_count_(0) = int32_t(colliders_.rows.size());
+  for (size_t c = 0; c < colliders_.rows.size(); ++c) {
+    const Collider& row = colliders_.rows[c];
+    collider_kind_(c) = row.is_alive ? row.kind : -1;
+    for (int k = 0; k < 8; ++k) collider_parameters_(c, k) = row.parameters[k];
+    collider_surface_(c, 0) = as_float(row.friction);
+    collider_surface_(c, 1) = as_float(row.restitution);
+    collider_surface_(c, 2) = as_float(row.skin);
+    collider_filter_(c, 0) = row.group;
+    collider_filter_(c, 1) = row.mask;
+  }
+  colliders_.is_dirty = true;
+}
+
+void World::move_collider(int32_t number, const Pose& pose) {
+  Collider& row = collider(number);
+  row.target = pose;
+  row.has_target = true;
+  colliders_.is_dirty = true;
+}
+
+void World::set_collider_velocity(int32_t number, const Vector& linear, const Vector& spin) {
+  Collider& row = collider(number);
+  for (int k = 0; k < 3; ++k) {
+    if (!(std::fabs(linear[k]) < scene_->velocity_limit) || !(std::fabs(spin[k]) < scene_->spin_limit)) {
+      fail(TS_ERROR_ARGUMENT, "a velocity of %g m/s or %g rad/s is too fast", linear[k], spin[k]);
+    }
+  }
+  row.velocity = linear, row.spin = spin, row.has_target = false;
+  colliders_.is_dirty = true;
+}
+
+void World::teleport_collider(int32_t number, const Pose& pose) {
+  Collider& row = collider(number);
+  double speed;
+  wake_near(row.way(0.0, &speed));
+  row.pose = pose;
+  row.has_target = false;
+  colliders_.is_dirty = true;
+  wake_near(row.way(0.0, &speed));
+}
+
+void World::collider_impulse(int32_t number, Vector* impulse, Vector* moment) {
+  collider(number);
+  const uint32_t count = uint32_t(colliders_.rows.size());
+  const float* rows = machine_->rows.room<float>(machine_->runtime(), 6 * count);
+  machine_->launch("sum_collider_impulses",
+                   {Machine::whole(scene_->slot_count),
+                    Machine::array(machine_->rows.memory(), TI_DATA_TYPE_F32, count, 6)});
+  for (int k = 0; k < 3; ++k) (*impulse)[k] = rows[6 * number + k], (*moment)[k] = rows[6 * number + 3 + k];
+}
+
+}  // namespace taichi_soft

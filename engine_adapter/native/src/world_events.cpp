@@ -1,0 +1,63 @@
+// What happened: what is read of the fields for it.
+
+#include <algorithm>
+
+#include "error.hpp"
+#include "world.hpp"
+
+namespace taichi_soft {
+
+Present World::present() const {
+  Present found;
+  for (int32_t slot = 0; slot < scene_->slot_count; ++slot) found.bodies.push_back(body_in(slot));
+  for (const Collider& row : colliders_.rows) found.colliders.push_back(row.is_alive ? row.serial : 0);
+  return found;
+}
+
+// Who touched whom in the last step, which is forgotten, and who sleeps.
+std::map<Pair, std::array<float, 3>> World::look() {
+  const uint32_t numbers = uint32_t(events_.status.size()), rows = uint32_t(events_.touch_rows);
+  const TiRuntime runtime = machine_->runtime();
+  int32_t* status = machine_->numbers.room<int32_t>(runtime, numbers);
+  const int32_t* who = machine_->rows.room<int32_t>(runtime, 3 * rows);
+  const float* impulses = machine_->found.room<float>(runtime, 3 * rows);
+  std::copy(events_.status.begin(), events_.status.end(), status);
+  machine_->launch("read_touches", {Machine::whole(scene_->slot_count),
+                                    Machine::array(machine_->numbers.memory(), TI_DATA_TYPE_I32, numbers),
+                                    Machine::array(machine_->rows.memory(), TI_DATA_TYPE_I32, rows, 3),
+                                    Machine::array(machine_->found.memory(), TI_DATA_TYPE_F32, rows, 3)});
+  std::copy(status, status + numbers, events_.status.begin());
+  std::map<Pair, std::array<float, 3>> touches;
+  for (int32_t i = 0; i < status[numbers - 1]; ++i) {
+    touches[{who[3 * i], who[3 * i + 1], who[3 * i + 2]}] = {impulses[3 * i], impulses[3 * i + 1], impulses[3 * i + 2]};
+  }
+  return touches;
+}
+
+void World::record_events(int32_t kinds) {
+  constexpr int32_t kContacts = TS_CONTACT_BEGAN | TS_CONTACT_ENDED;
+  if ((kinds & ~TS_ALL_EVENTS) != 0) {
+    fail(TS_ERROR_ARGUMENT, "kinds is %d: give bits of TS_CONTACT_BEGAN to TS_FROZE", kinds);
+  }
+  if (!scene_->has_contact) {
+    if (kinds != 0 && (kinds & ~kContacts) == 0) {
+      fail(TS_ERROR_STATE, "contacts are not seen in a world without colliders and soft contact: export it with them");
+    }
+    kinds &= ~kContacts;
+  }
+  if (scene_->has_soft_contact) records_touches_(0) = (kinds & kContacts) != 0 ? 1 : 0;
+  if (Events::looks_for(kinds)) look();
+  events_.record(kinds, present());
+}
+
+void World::take_down(double dt, const std::vector<int32_t>& frozen) {
+  if (events_.kinds() == 0) return;
+  std::map<Pair, std::array<float, 3>> touches;
+  if (events_.looks()) {
+    touches = look();
+    if (events_.status[events_.status.size() - 2] != 0) events_.lose(1);
+  }
+  events_.take_down(touches, present(), frozen, steps_ - 1, time_, dt);
+}
+
+}  // namespace taichi_soft

@@ -1,0 +1,135 @@
+// Frames, and what hangs from them: as taichi_soft/control/frames.py and attachments.py have it.
+
+#include <algorithm>
+
+#include "error.hpp"
+#include "world.hpp"
+
+namespace taichi_soft {
+
+namespace {
+
+void write_pose(const Pose& pose, float* row) {
+  const Matrix turn = matrix_of(pose.rotation);
+  for (int i = 0; i < 9; ++i) row[i] = as_float(turn[i / 3][i % 3]);
+  for (int k = 0; k < 3; ++k) row[9 + k] = as_float(pose.position[k]);
+}
+
+}  // namespace
+
+size_t World::frame(int32_t number) const {
+  if (number < 0 || size_t(number) >= frame_alive_.size() || frame_alive_[size_t(number)] == 0) {
+    fail(TS_ERROR_ARGUMENT, "there is no frame %d, or no more", number);
+  }
+  return size_t(number);
+}
+
+int32_t World::add_frame(const Pose& pose) {
+  size_t row = 0;
+  while (row < frame_alive_.size() && frame_alive_[row] != 0) ++row;
+  if (row >= kMostFrames) fail(TS_ERROR_STATE, "there are %zu frames: take one out first", row);
+  if (row == frame_alive_.size()) {
+    frame_alive_.push_back(0);
+    present_.resize(12 * frame_alive_.size());
+    coming_.resize(12 * frame_alive_.size());
+  }
+  frame_alive_[row] = 1;
+  write_pose(pose, present_.data() + 12 * row);
+  write_pose(pose, coming_.data() + 12 * row);
+  return int32_t(row);
+}
+
+void World::remove_frame(int32_t number) {
+  const size_t row = frame(number);
+  for (int32_t slot = 0; slot < scene_->slot_count; ++slot) {
+    if (body_status_(slot) != kAbsent) let_go(slot, hanging(slot, number));
+  }
+  frame_alive_[row] = 0;
+}
+
+void World::move_frame(int32_t number, const Pose& pose) { write_pose(pose, coming_.data() + 12 * frame(number)); }
+
+Pose World::frame_pose(int32_t number) const {
+  const float* row = present_.data() + 12 * frame(number);
+  Matrix turn;
+  for (int i = 0; i < 9; ++i) turn[i / 3][i % 3] = double(row[i]);
+  return {{row[9], row[10], row[11]}, quaternion_of(turn)};
+}
+
+// Vertices that hang from a frame, or from any for -1.
+std::vector<int32_t> World::hanging(int32_t slot, int32_t number) const {
+  std::vector<int32_t> found;
+  for (size_t v = 0; v < asset_of(slot).vertex_count(); ++v) {
+    const int32_t aim = particle_aim_(particle(slot, v)) - kWithFrame;
+    if (number < 0 ? aim >= 0 : aim == number) found.push_back(int32_t(v));
+  }
+  return found;
+}
+
+void World::attach(int32_t slot, Vertices which, int32_t number, bool feels) {
+  const std::vector<int32_t> vertices = checked(slot, which, false);
+  const float* row = present_.data() + 12 * frame(number);
+  require_unattached(slot, vertices);
+  for (int32_t vertex : vertices) {
+    const size_t p = particle(slot, size_t(vertex));
+    double offset[3];
+    for (int k = 0; k < 3; ++k) offset[k] = double(position_(p, k)) - double(row[9 + k]);
+    for (int k = 0; k < 3; ++k) {
+      target_(p, k) = as_float(double(row[k]) * offset[0] + double(row[3 + k]) * offset[1] + double(row[6 + k]) * offset[2]);
+      reaction_(p, k) = 0.0f;
+    }
+    inv_mass_(p) = 0.0f;
+    particle_aim_(p) = kWithFrame + number;
+    if (scene_->is_implicit) particle_contact_(p) = 0;
+  }
+  body_drives_(slot) |= kMovesPins | (feels ? kFeelsReaction : 0);
+  rouse(slot);
+  has_work_ = true;
+}
+
+void World::detach(int32_t slot, Vertices which) {
+  std::vector<int32_t> vertices = checked(slot, which, true);
+  const std::vector<int32_t> held = hanging(slot, -1);
+  if (which.count == 0) vertices = held;
+  for (int32_t vertex : vertices) {
+    if (!std::binary_search(held.begin(), held.end(), vertex)) {
+      fail(TS_ERROR_STATE, "vertex %d of the body in slot %d hangs from no frame", vertex, slot);
+    }
+  }
+  let_go(slot, vertices);
+}
+
+void World::let_go(int32_t slot, const std::vector<int32_t>& vertices) {
+  if (vertices.empty()) return;
+  for (int32_t vertex : vertices) {
+    const size_t p = particle(slot, size_t(vertex));
+    inv_mass_(p) = 1.0f / mass_(p);
+    particle_aim_(p) = kStill;
+  }
+  if (hanging(slot, -1).empty()) body_drives_(slot) &= ~kFeelsReaction;
+  rouse(slot);
+}
+
+void World::load(int32_t slot, int32_t number, Vector* force, Vector* torque) const {
+  const float* origin = present_.data() + 12 * frame(number) + 9;
+  const std::vector<int32_t> vertices = hanging(slot, number);
+  if (vertices.empty()) fail(TS_ERROR_STATE, "the body in slot %d does not hang from frame %d", slot, number);
+  if ((body_drives_(slot) & kFeelsReaction) == 0) {
+    fail(TS_ERROR_STATE, "what the body in slot %d pulls with is not felt: attach it with feels of 1", slot);
+  }
+  Vector impulse = {0.0, 0.0, 0.0}, moment = {0.0, 0.0, 0.0};
+  for (int32_t vertex : vertices) {
+    const size_t p = particle(slot, size_t(vertex));
+    Vector part, arm;
+    for (int k = 0; k < 3; ++k) part[k] = reaction_(p, k), arm[k] = position_(p, k) - origin[k];
+    for (int k = 0; k < 3; ++k) {
+      const int i = (k + 1) % 3, j = (k + 2) % 3;
+      impulse[k] += part[k];
+      moment[k] += arm[i] * part[j] - arm[j] * part[i];
+    }
+  }
+  const double dt = std::max(last_dt_, 1e-30);
+  for (int k = 0; k < 3; ++k) (*force)[k] = impulse[k] / dt, (*torque)[k] = moment[k] / dt;
+}
+
+}  // namespace taichi_soft

@@ -1,0 +1,112 @@
+// Hands on bodies: as taichi_soft/control/grabs.py has it.
+
+#include <algorithm>
+#include <cmath>
+
+#include "error.hpp"
+#include "patch.hpp"
+#include "world.hpp"
+
+namespace taichi_soft {
+
+namespace {
+
+constexpr ts_grab kGrab = uint64_t(4) << 56;  // what a grab's handle begins with, and no other handle
+constexpr double kTwoPi = 6.283185307179586;
+
+}  // namespace
+
+ts_grab World::grab_at(int32_t number) const {
+  if (number < 0 || size_t(number) >= kMostGrabs) {
+    fail(TS_ERROR_ARGUMENT, "number is %d: give 0 to %zu", number, kMostGrabs - 1);
+  }
+  if (grab_body_(size_t(number)) == 0) return 0;
+  return kGrab | ts_grab(grab_generations_[size_t(number)]) << 32 | uint32_t(number + 1);
+}
+
+size_t World::grab_of(ts_grab grab) const {
+  const int64_t number = int64_t(grab & 0xFFFFFFFFu) - 1;
+  if (number < 0 || number >= int64_t(kMostGrabs) || grab_at(int32_t(number)) != grab) {
+    fail(TS_ERROR_HANDLE, "grab %llu is not in this world, or was released", static_cast<unsigned long long>(grab));
+  }
+  return size_t(number);
+}
+
+ts_grab World::grab(int32_t slot, int32_t triangle, const double given[3], const Vector& point, double frequency,
+                    double max_force) {
+  const Asset& asset = asset_of(slot);
+  if (asset.surface.count == 0) fail(TS_ERROR_STATE, "the body in slot %d has no surface to take hold of", slot);
+  if (triangle < 0 || size_t(triangle) >= asset.surface.count / 3) {
+    fail(TS_ERROR_ARGUMENT, "triangle is %d: there are %zu, from 0", triangle, asset.surface.count / 3);
+  }
+  double sum = 0.0, weights[3];
+  for (int i = 0; i < 3; ++i) sum = sum + given[i];
+  if (!(std::min({given[0], given[1], given[2]}) >= -1e-3) || !(std::fabs(sum - 1.0) <= 1e-3)) {
+    fail(TS_ERROR_ARGUMENT, "weights must be 0 or more and add up to 1, and they are %g, %g and %g", given[0], given[1],
+         given[2]);
+  }
+  if (!(frequency >= 1e-3 && frequency <= 1e3)) {
+    fail(TS_ERROR_ARGUMENT, "frequency is %g Hz: give 0.001 to 1000", frequency);
+  }
+  if (!(max_force <= 1e20)) fail(TS_ERROR_ARGUMENT, "max_force is %g N, too much", max_force);
+  size_t g = 0;
+  while (g < kMostGrabs && grab_body_(g) != 0) ++g;
+  if (g == kMostGrabs) fail(TS_ERROR_STATE, "all %zu grabs of this world are in use: release one first", kMostGrabs);
+
+  for (int i = 0; i < 3; ++i) weights[i] = std::max(given[i], 0.0);
+  sum = weights[0] + weights[1] + weights[2];
+  for (double& each : weights) each = each / sum;
+  const double omega = kTwoPi * frequency;
+  double mass = 0.0;
+  for (double each : asset.masses) mass += each;
+  const double strongest = max_force < 0.0 ? scene_->pull_in_weights * mass : max_force;
+  const int32_t* corners = asset.surface.data + 3 * triangle;
+  const Patch patch = patch_round(*scene_, asset, corners, weights);
+
+  grab_body_(g) = slot + 1;
+  for (size_t i = 0; i < kGrabCorners; ++i) {
+    grab_corners_(g, i) = int32_t(particle(slot, size_t(corners[i < 3 ? i : 0])));
+    grab_weights_(g, i) = i < 3 ? as_float(weights[i]) : 0.0f;
+  }
+  const double spring[3] = {mass * (omega * omega), 2 * mass * omega, 2 * scene_->highest_pull_speed / omega};
+  const double limits[3] = {std::min(strongest, patch.strength), strongest, 1 / mass};
+  for (int k = 0; k < 3; ++k) {
+    grab_target_(g, k) = as_float(point[k]);
+    grab_spring_(g, k) = as_float(spring[k]);
+    grab_limits_(g, k) = as_float(limits[k]);
+    grab_force_(g, k) = 0.0f;
+  }
+  grab_count_(g) = int32_t(patch.vertices.size());
+  for (size_t i = 0; i < patch.vertices.size(); ++i) {
+    grab_particle_(g * kPatchRows + i) = int32_t(particle(slot, size_t(patch.vertices[i])));
+    grab_share_(g * kPatchRows + i) = as_float(patch.shares[i]);
+  }
+  body_drives_(slot) |= kGrabbed;
+  grab_generations_[g] = (grab_generations_[g] + 1) & 0xFFFFFF;
+  rouse(slot);
+  return grab_at(int32_t(g));
+}
+
+void World::move_grab(ts_grab grab, const Vector& point) {
+  const size_t g = grab_of(grab);
+  for (int k = 0; k < 3; ++k) grab_target_(g, k) = as_float(point[k]);
+  rouse(grab_body_(g) - 1);
+}
+
+void World::release(ts_grab grab) { end_grab(grab_of(grab)); }
+
+void World::end_grab(size_t g) {
+  const int32_t body = grab_body_(g);
+  grab_body_(g) = 0;
+  bool is_held = false;
+  for (size_t each = 0; each < kMostGrabs; ++each) is_held = is_held || grab_body_(each) == body;
+  if (!is_held) body_drives_(body - 1) &= ~kGrabbed;
+  rouse(body - 1);
+}
+
+Vector World::grab_force(ts_grab grab) const {
+  const size_t g = grab_of(grab);
+  return {grab_force_(g, 0), grab_force_(g, 1), grab_force_(g, 2)};
+}
+
+}  // namespace taichi_soft

@@ -1,0 +1,245 @@
+#include "world.hpp"
+
+#include <cstddef>
+#include <cstring>
+
+#include "error.hpp"
+
+namespace taichi_soft {
+
+namespace {
+
+uint32_t bits_of(float number) {
+  uint32_t bits;
+  std::memcpy(&bits, &number, sizeof bits);
+  return bits;
+}
+
+}  // namespace
+
+uint64_t World::hash() const {
+  // As `hash_bodies` in taichi_soft/persistence/kernels/packing.py.
+  uint64_t code = 1469598103934665603u;
+  const auto mix = [&code](uint64_t word) {
+    code = (code ^ word) * 1099511628211u;
+    code ^= code >> 29;
+  };
+  const auto mix_two = [&mix](uint32_t x, uint32_t y) { mix(uint64_t(x) | uint64_t(y) << 32); };
+  for (int32_t body = 0; body < scene_->slot_count; ++body) {
+    mix(uint32_t(body_status_(body)));
+    if (body_status_(body) == kAbsent) continue;
+    mix_two(bits_of(lag_(body)), uint32_t(body_drives_(body)));
+    mix_two(bits_of(gravity_scale_(body)), bits_of(damping_(body)));
+    const size_t begin = begin_of(body), end = begin + asset_of(body).vertex_count();
+    for (size_t p = begin; p < end; ++p) {
+      for (int k = 0; k < 3; ++k) mix_two(bits_of(position_(p, k)), bits_of(velocity_(p, k)));
+      mix_two(bits_of(inv_mass_(p)), uint32_t(particle_aim_(p)));
+    }
+  }
+  return code;
+}
+
+constexpr uint64_t kSnapshotMark = 0x3250414E53534354u;
+
+// What a snapshot begins with. Behind it lie, in this order: the fields that are carried; frames; numbers that tell
+// handles apart; colliders; what events depend on.
+struct SnapshotHead {
+  uint64_t mark, size;
+  uint32_t scene, sum;
+  int64_t steps;
+  uint64_t frames, colliders, contacts;
+  int64_t kinds;  // of events that are recorded
+  double time, last_dt;
+};
+
+namespace {
+
+template <typename Part>
+void put(char** at, const Part* data, size_t count) {
+  std::memcpy(*at, data, count * sizeof(Part));
+  *at += count * sizeof(Part);
+}
+
+template <typename Part>
+void take(const char** at, Part* data, size_t count) {
+  std::memcpy(data, *at, count * sizeof(Part));
+  *at += count * sizeof(Part);
+}
+
+template <typename Part>
+void put_all(char** at, const std::vector<Part>& parts) {
+  put(at, parts.data(), parts.size());
+}
+
+template <typename Part>
+void take_all(const char** at, std::vector<Part>* parts) {
+  take(at, parts->data(), parts->size());
+}
+
+constexpr size_t kFrameSize = 24 * sizeof(float) + 1;
+
+// Of all behind the fields.
+size_t size_of_rest(const SnapshotHead& head, size_t slots) {
+  return kFrameSize * head.frames + sizeof(uint32_t) * (slots + kMostGrabs) + sizeof(Collider) * head.colliders +
+         sizeof(int32_t) * (slots + 2) + sizeof(ts_body) * slots + sizeof(Contact) * head.contacts;
+}
+
+}  // namespace
+
+size_t World::snapshot_size() const {
+  SnapshotHead head{};
+  head.frames = frame_alive_.size(), head.colliders = colliders_.rows.size();
+  head.contacts = events_.contact_count();
+  return sizeof head + 4 * scene_->carried_words + size_of_rest(head, size_t(scene_->slot_count));
+}
+
+void World::snapshot(char* bytes) const {
+  const Events::Memory memory = events_.memory();
+  SnapshotHead head{};
+  head.mark = kSnapshotMark, head.size = snapshot_size(), head.scene = scene_->code;
+  head.frames = frame_alive_.size(), head.colliders = colliders_.rows.size();
+  head.contacts = memory.contacts.size(), head.kinds = memory.kinds;
+  head.steps = steps_, head.time = time_, head.last_dt = last_dt_;
+  char* at = bytes + sizeof head;
+  for (const Carried& each : scene_->carried) {
+    const char* row = machine_->root() + each.place.offset;
+    for (size_t i = 0; i < each.count; ++i, row += each.place.stride) put(&at, row, 4 * each.place.width);
+  }
+  put_all(&at, present_);
+  put_all(&at, coming_);
+  put_all(&at, frame_alive_);
+  put_all(&at, generations_);
+  put_all(&at, grab_generations_);
+  for (const Collider& each : colliders_.rows) {
+    Collider row;
+    std::memset(static_cast<void*>(&row), 0, sizeof row);  // what lies between its parts is the same every time
+    row = each;
+    put(&at, &row, 1);
+  }
+  put_all(&at, memory.status);
+  put_all(&at, memory.sleepers);
+  put_all(&at, memory.contacts);
+  std::memcpy(bytes, &head, sizeof head);
+  head.sum = checksum(bytes, head.size);  // with a sum of 0 in its place
+  std::memcpy(bytes, &head, sizeof head);
+}
+
+bool World::is_in_order(const Contact& contact, size_t colliders) const {
+  const auto is_below = [](int32_t number, size_t limit) { return number >= 0 && size_t(number) < limit; };
+  const size_t slots = size_t(scene_->slot_count);
+  for (double each : {contact.began, contact.touched, contact.pause, contact.impulse[0], contact.impulse[1],
+                      contact.impulse[2]}) {
+    if (!std::isfinite(each)) return false;
+  }
+  return is_below(contact.slot, slots) && (contact.kind == kOfBody || contact.kind == kOfCollider) &&
+         is_below(contact.other, contact.kind == kOfBody ? slots : colliders);
+}
+
+// Fails where a step would read beyond its fields, or begin with what is not finite.
+void World::require_rows(const char* at, const SnapshotHead& head) const {
+  const auto refuse = [] { fail(TS_ERROR_SNAPSHOT, "this snapshot is not in order: it names what there is not"); };
+  const Scene& s = *scene_;
+  const std::pair<size_t, int64_t> limits[] = {  // of whole numbers, by where their field lies
+      {s.place("body_status").offset, kAbsent + 1},
+      {s.place("particle_aim").offset, kWithFrame + int64_t(head.frames)},
+      {s.place("grabs.body").offset, s.slot_count + 1},
+      {s.place("grabs.corners").offset, s.particle_count},
+      {s.place("grabs.count").offset, int64_t(kPatchRows) + 1},
+      {s.place("grabs.particle").offset, s.particle_count}};
+  for (const Carried& each : s.carried) {
+    int64_t limit = int64_t(1) << 32;
+    for (const auto& [offset, most] : limits) limit = each.place.offset == offset ? most : limit;
+    const bool is_limited = limit < int64_t(1) << 32;
+    for (size_t i = 0; i < each.count * each.place.width; ++i) {
+      if (each.place.is_whole) {
+        int32_t number;
+        take(&at, &number, 1);
+        if (is_limited && (number < 0 || number >= limit)) refuse();
+        if (each.is_fixed) {
+          const size_t row = i / each.place.width, column = i % each.place.width;
+          const char* now = machine_->root() + each.place.offset + row * each.place.stride + 4 * column;
+          if (std::memcmp(now, &number, 4) != 0) refuse();
+        }
+      } else {
+        float number;
+        take(&at, &number, 1);
+        if (each.is_finite && !std::isfinite(number)) refuse();
+      }
+    }
+  }
+  for (size_t i = 0; i < 24 * head.frames; ++i) {
+    float number;
+    take(&at, &number, 1);
+    if (!(std::fabs(number) <= s.position_limit)) refuse();
+  }
+  at += head.frames + sizeof(uint32_t) * (generations_.size() + grab_generations_.size());
+  for (size_t i = 0; i < head.colliders; ++i) {
+    unsigned char flags[2];
+    std::memcpy(flags, at + offsetof(Collider, is_alive), 1);
+    std::memcpy(flags + 1, at + offsetof(Collider, has_target), 1);
+    if (flags[0] > 1 || flags[1] > 1) refuse();
+    Collider row;
+    take(&at, &row, 1);
+    // Those with a grid were there when the world was exported.
+    const bool is_known = row.kind >= 0 && (row.kind <= 3 || (i < s.names(TS_COLLIDER).size() && row.kind <= 5));
+    if (!is_known || !(length_of(row.pose.position) <= 1e9) || !(std::fabs(length_of(row.pose.rotation) - 1.0) <= 1e-3)) {
+      refuse();
+    }
+  }
+  at += sizeof(int32_t) * events_.status.size() + sizeof(ts_body) * generations_.size();
+  for (size_t i = 0; i < head.contacts; ++i) {
+    Contact contact;
+    take(&at, &contact, 1);
+    if (!is_in_order(contact, size_t(head.colliders))) refuse();
+  }
+}
+
+void World::restore(const char* bytes, size_t size) {
+  SnapshotHead head;
+  if (size < sizeof head) fail(TS_ERROR_SNAPSHOT, "%zu bytes are no snapshot", size);
+  std::memcpy(&head, bytes, sizeof head);
+  if (head.mark != kSnapshotMark) fail(TS_ERROR_SNAPSHOT, "these bytes are no snapshot");
+  if (head.scene != scene_->code) fail(TS_ERROR_SNAPSHOT, "this snapshot is of another world file");
+  const size_t slots = size_t(scene_->slot_count), fields = sizeof head + 4 * scene_->carried_words;
+  if (head.size != size || head.frames == 0 || head.frames > kMostFrames || head.colliders > collider_room_ ||
+      head.contacts > slots * events_.touch_rows || size != fields + size_of_rest(head, slots) ||
+      (head.kinds & ~int64_t(TS_ALL_EVENTS)) != 0) {
+    fail(TS_ERROR_SNAPSHOT, "this snapshot is cut off");
+  }
+  std::vector<char> whole(bytes, bytes + size);
+  const uint32_t sum = head.sum;
+  head.sum = 0;
+  std::memcpy(whole.data(), &head, sizeof head);
+  if (sum != checksum(whole.data(), size)) {
+    fail(TS_ERROR_SNAPSHOT, "this snapshot is damaged: its checksum is wrong");
+  }
+  require_rows(bytes + sizeof head, head);
+  const char* at = bytes + sizeof head;
+  for (const Carried& each : scene_->carried) {
+    char* row = machine_->root() + each.place.offset;
+    for (size_t i = 0; i < each.count; ++i, row += each.place.stride) take(&at, row, 4 * each.place.width);
+  }
+  const size_t frames = size_t(head.frames);
+  present_.resize(12 * frames), coming_.resize(12 * frames), frame_alive_.resize(frames);
+  take_all(&at, &present_);
+  take_all(&at, &coming_);
+  take_all(&at, &frame_alive_);
+  take_all(&at, &generations_);
+  take_all(&at, &grab_generations_);
+  colliders_.rows.resize(size_t(head.colliders));
+  take_all(&at, &colliders_.rows);
+  Events::Memory memory = {int32_t(head.kinds), std::vector<int32_t>(slots + 2), std::vector<ts_body>(slots),
+                           std::vector<Contact>(size_t(head.contacts))};
+  take_all(&at, &memory.status);
+  take_all(&at, &memory.sleepers);
+  take_all(&at, &memory.contacts);
+  if (scene_->has_contact) write_colliders();
+  steps_ = head.steps, time_ = head.time, last_dt_ = head.last_dt;
+  colliders_.is_dirty = has_work_ = true;
+  is_still_ = false;
+  rows_at_ = -1.0;
+  if (events_.looks() && !Events::looks_for(memory.kinds)) look();
+  events_.recall(memory, steps_, present());
+}
+
+}  // namespace taichi_soft
