@@ -36,7 +36,7 @@ def turn(axis, angle):
 
 def heap():
     """Soft contact, sleep, pools, colliders that move: what a game is made of most often."""
-    world = World(soft_contact=True, sleep_speed=0.08, collider_room=10)
+    world = World(soft_contact=True, sleep_speed=0.4, collider_room=10)
     ball = SoftBodyAsset(sphere(radius=0.25, resolution=3), RUBBER, contact=Contact(thickness=0.005))
     brick = SoftBodyAsset(box((0.5, 0.4, 0.3), (3, 2, 2)), RUBBER)
     for asset, count in ((ball, 5), (brick, 4)):
@@ -170,6 +170,13 @@ def free_game():
             yield line("wind", (0.0, 0.0, 0.0), 0.0, 0.0)
             yield line("velocity", 3, (0.0, 1.0, 0.0), (4.0, 0.0, 0.0))
             yield line("teleport", 4, (3.0, 1.0, 2.0), turn((1, 1, 0), 2.0), 0)
+        if i == 560:  # beyond where anything can be: it freezes
+            yield line("record_events", 28)
+            yield line("teleport", 3, (9.9999e6, 0.0, 5.0), UPRIGHT, 0)
+            yield line("velocity", 3, (1.9e4, 0.0, 0.0), (0.0, 0.0, 0.0))
+        if i == 570:
+            yield line("drain")
+            yield line("status", 3)
         yield line("step", DT, 0 if i % 3 else 12)
         if i % 60 == 0:
             for slot in range(5) if i != 420 else ():

@@ -33,6 +33,13 @@ def test_a_game_without_python_has_the_same_bits(name, export, play):
     assert differing == []
 
 
+def test_events_of_every_kind_happen_in_these_games(export, play):
+    told = [
+        text.split() for name in ("heap", "free") for text in lines_of([play, export(name)], GAMES[name][1]())
+    ]
+    assert {each[0] for each in told if len(each) == 6} == {"1", "2", "4", "8", "16"}
+
+
 @pytest.mark.parametrize("name", ["heap", "free"])
 def test_a_game_has_the_same_bits_on_one_core(name, export, play):
     calls = list(GAMES[name][1]())
