@@ -1,7 +1,8 @@
 // Values of Godot to those of the library and back. What does not fit is thrown as an error with a text.
+//
+// This is all that world_native.cpp knows of Godot. The type Variant and the functions below the line are written
+// once for each engine: src/godot3 and src/godot4.
 #pragma once
-
-#include <gdnative_api_struct.gen.h>
 
 #include <cstdint>
 #include <stdexcept>
@@ -9,22 +10,24 @@
 #include <vector>
 
 #include "taichi_soft.h"
+#include "variant.hpp"
 
 namespace taichi_soft_godot {
-
-extern const godot_gdnative_core_api_struct* api;  // Godot's functions, from when the library is loaded
 
 class Refused : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
+const char* const kClass = "SoftWorldNative";  // its name in scripts
+
+enum class Type { whole, real, text, vector, transform, bytes, other };
+
 // The arguments of a call from a script.
 class Arguments {
  public:
-  Arguments(int count, godot_variant** values) : count_(count), values_(values) {}
+  explicit Arguments(const Variant* const* values) : values_(values) {}
 
-  int count() const { return count_; }
   int64_t whole(int which) const;
   int32_t small(int which) const;  // a whole number of 32 bits
   double real(int which) const;
@@ -34,22 +37,35 @@ class Arguments {
   std::vector<uint8_t> bytes(int which) const;
 
  private:
-  const godot_variant* typed(int which, godot_variant_type type, const char* name) const;
+  const Variant& typed(int which, Type type) const;
 
-  int count_;
-  godot_variant** values_;
+  const Variant* const* values_;
 };
 
-godot_variant nothing();
-godot_variant of(bool value);
-godot_variant of(int64_t value);
-godot_variant of(double value);
-godot_variant of(const std::string& value);
-godot_variant of_vector(const double vector[3]);
-godot_variant of_bytes(const std::vector<uint8_t>& bytes);
-godot_variant of_whole_numbers(const std::vector<int32_t>& numbers);
-godot_variant of_pairs(const std::vector<float>& numbers);    // PoolVector2Array
-godot_variant of_triples(const std::vector<float>& numbers);  // PoolVector3Array
-godot_variant of_list(std::vector<godot_variant> values);     // Array; takes the values over
+// ---- of each engine ----
+
+Type type_of(const Variant& value);
+const char* type_name(Type type);  // as its scripts call it
+
+// Of a value whose type was looked at before.
+int64_t whole_of(const Variant& value);
+double real_of(const Variant& value);
+std::string text_of(const Variant& value);
+void read_vector(const Variant& value, float out[3]);
+void read_transform(const Variant& value, float out[12]);  // three rows of the basis, then the origin
+std::vector<uint8_t> bytes_of(const Variant& value);
+
+Variant nothing();
+Variant of(bool value);
+Variant of(int64_t value);
+Variant of(const std::string& value);
+Variant of_vector(const double vector[3]);
+Variant of_bytes(const std::vector<uint8_t>& bytes);
+Variant of_whole_numbers(const std::vector<int32_t>& numbers);
+Variant of_pairs(const std::vector<float>& numbers);    // an array of Vector2
+Variant of_triples(const std::vector<float>& numbers);  // an array of Vector3
+Variant of_list(std::vector<Variant> values);           // an Array; takes the values over
+
+void show_error(const char* text, const char* method);  // among the engine's errors
 
 }  // namespace taichi_soft_godot

@@ -39,7 +39,7 @@ ts_mesh_info mesh_of(Self self, int32_t mesh) {
 
 // ---- the world file ----
 
-godot_variant load(Self self, In in) {
+Variant load(Self self, In in) {
   self.clear();
   check(ts_scene_load(in.text(0).c_str(), &self.scene));
   const ts_result created = ts_world_create(self.scene, &self.world);
@@ -51,12 +51,12 @@ godot_variant load(Self self, In in) {
   return of(true);
 }
 
-godot_variant unload(Self self, In) {
+Variant unload(Self self, In) {
   self.clear();
   return of(true);
 }
 
-godot_variant count(Self self, In in) {
+Variant count(Self self, In in) {
   const ts_scene_info info = info_of(self);
   const int32_t kind = in.small(0);
   const int32_t counts[] = {info.slot_count, info.asset_count, info.collider_count, info.frame_count, info.mesh_count};
@@ -64,24 +64,24 @@ godot_variant count(Self self, In in) {
   return of(int64_t(counts[kind]));
 }
 
-godot_variant find(Self self, In in) {
+Variant find(Self self, In in) {
   int32_t number = 0;
   check(ts_scene_find(self.scene, in.small(0), in.text(1).c_str(), &number));
   return of(int64_t(number));
 }
 
-godot_variant name_of(Self self, In in) {
+Variant name_of(Self self, In in) {
   char name[256] = "";
   check(ts_scene_get_name(self.scene, in.small(0), in.small(1), name, sizeof name));
   return of(std::string(name));
 }
 
-godot_variant mesh_info(Self self, In in) {
+Variant mesh_info(Self self, In in) {
   const ts_mesh_info info = mesh_of(self, in.small(0));
   return of_whole_numbers({info.asset, info.vertex_count, info.triangle_count, info.has_uv});
 }
 
-godot_variant triangles(Self self, In in) {
+Variant triangles(Self self, In in) {
   std::vector<uint32_t> found(3 * size_t(mesh_of(self, in.small(0)).triangle_count));
   check(ts_mesh_get_triangles(self.scene, in.small(0), found.data(), found.size()));
   // Godot's fronts are clockwise.
@@ -92,7 +92,7 @@ godot_variant triangles(Self self, In in) {
   return of_whole_numbers(clockwise);
 }
 
-godot_variant uvs(Self self, In in) {
+Variant uvs(Self self, In in) {
   const ts_mesh_info info = mesh_of(self, in.small(0));
   std::vector<float> found(info.has_uv != 0 ? 2 * size_t(info.vertex_count) : 0);
   if (!found.empty()) check(ts_mesh_get_uv(self.scene, in.small(0), found.data(), found.size()));
@@ -102,25 +102,25 @@ godot_variant uvs(Self self, In in) {
 
 // ---- time ----
 
-godot_variant set_fixed_step(Self self, In in) {
+Variant set_fixed_step(Self self, In in) {
   const ts_fixed_step step{sizeof(ts_fixed_step), in.small(1), in.small(2), in.real(0)};
   check(ts_world_set_fixed_step(self.world, &step));
   return of(true);
 }
 
-godot_variant advance(Self self, In in) {
+Variant advance(Self self, In in) {
   ts_clock clock{};
   clock.struct_size = sizeof clock;
   check(ts_world_advance(self.world, in.real(0), &clock));
   return of(int64_t(clock.steps_made));
 }
 
-godot_variant step(Self self, In in) {
+Variant step(Self self, In in) {
   check(ts_world_step(self.world, in.real(0), in.small(1)));
   return of(true);
 }
 
-godot_variant hash(Self self, In) {
+Variant hash(Self self, In) {
   uint64_t found = 0;
   check(ts_world_hash(self.world, &found));
   char text[17];
@@ -128,7 +128,7 @@ godot_variant hash(Self self, In) {
   return of(std::string(text));
 }
 
-godot_variant snapshot(Self self, In) {
+Variant snapshot(Self self, In) {
   size_t size = 0;
   check(ts_world_snapshot(self.world, nullptr, 0, &size));
   std::vector<uint8_t> bytes(size);
@@ -136,20 +136,20 @@ godot_variant snapshot(Self self, In) {
   return of_bytes(bytes);
 }
 
-godot_variant restore(Self self, In in) {
+Variant restore(Self self, In in) {
   const std::vector<uint8_t> bytes = in.bytes(0);
   check(ts_world_restore(self.world, bytes.data(), bytes.size()));
   return of(true);
 }
 
-godot_variant wake(Self self, In) {
+Variant wake(Self self, In) {
   check(ts_world_wake(self.world));
   return of(true);
 }
 
 // ---- bodies ----
 
-godot_variant spawn(Self self, In in) {
+Variant spawn(Self self, In in) {
   const ts_pose pose = in.pose(1);
   ts_placement place{};
   place.struct_size = sizeof place;
@@ -162,36 +162,36 @@ godot_variant spawn(Self self, In in) {
   return of(int64_t(body));
 }
 
-godot_variant despawn(Self self, In in) {
+Variant despawn(Self self, In in) {
   check(ts_world_despawn(self.world, body_of(in)));
   return of(true);
 }
 
-godot_variant body(Self self, In in) {
+Variant body(Self self, In in) {
   ts_body found = 0;
   check(ts_world_get_body(self.world, in.small(0), &found));
   return of(int64_t(found));
 }
 
-godot_variant asset_of(Self self, In in) {
+Variant asset_of(Self self, In in) {
   int32_t asset = 0;
   check(ts_body_get_asset(self.world, body_of(in), &asset));
   return of(int64_t(asset));
 }
 
-godot_variant status(Self self, In in) {
+Variant status(Self self, In in) {
   int32_t found = 0;
   check(ts_body_get_status(self.world, body_of(in), &found));
   return of(int64_t(found));
 }
 
-godot_variant center(Self self, In in) {
+Variant center(Self self, In in) {
   double found[3];
   check(ts_body_center(self.world, body_of(in), found));
   return of_vector(found);
 }
 
-godot_variant set_velocity(Self self, In in) {
+Variant set_velocity(Self self, In in) {
   double linear[3], spin[3];
   in.vector(1, linear);
   in.vector(2, spin);
@@ -199,14 +199,14 @@ godot_variant set_velocity(Self self, In in) {
   return of(true);
 }
 
-godot_variant apply_impulse(Self self, In in) {
+Variant apply_impulse(Self self, In in) {
   double impulse[3];
   in.vector(1, impulse);
   check(ts_body_apply_impulse(self.world, body_of(in), impulse, nullptr, 0));
   return of(true);
 }
 
-godot_variant mesh(Self self, In in) {
+Variant mesh(Self self, In in) {
   const size_t count = 3 * size_t(mesh_of(self, in.small(1)).vertex_count);
   self.positions.resize(count);
   self.normals.resize(count);
@@ -215,10 +215,10 @@ godot_variant mesh(Self self, In in) {
 }
 
 // Whose status is another than at the last call: body, status before, status now, of each in a row.
-godot_variant changes(Self self, In) {
+Variant changes(Self self, In) {
   const int32_t slots = info_of(self).slot_count;
   self.statuses.resize(size_t(slots), {0, TS_ACTIVE});
-  std::vector<godot_variant> found;
+  std::vector<Variant> found;
   for (int32_t slot = 0; slot < slots; ++slot) {
     auto& [body, before] = self.statuses[size_t(slot)];
     ts_body now = 0;
@@ -236,7 +236,7 @@ godot_variant changes(Self self, In) {
 
 // ---- colliders and frames ----
 
-godot_variant add_collider(Self self, In in) {
+Variant add_collider(Self self, In in) {
   ts_shape shape{};
   shape.struct_size = sizeof shape;
   shape.kind = in.small(0);
@@ -252,42 +252,42 @@ godot_variant add_collider(Self self, In in) {
   return of(int64_t(number));
 }
 
-godot_variant remove_collider(Self self, In in) {
+Variant remove_collider(Self self, In in) {
   check(ts_collider_remove(self.world, in.small(0)));
   return of(true);
 }
 
-godot_variant move_collider(Self self, In in) {
+Variant move_collider(Self self, In in) {
   const ts_pose pose = in.pose(1);
   check(ts_collider_move_to(self.world, in.small(0), &pose));
   return of(true);
 }
 
-godot_variant teleport_collider(Self self, In in) {
+Variant teleport_collider(Self self, In in) {
   const ts_pose pose = in.pose(1);
   check(ts_collider_teleport(self.world, in.small(0), &pose));
   return of(true);
 }
 
-godot_variant collider_impulse(Self self, In in) {
+Variant collider_impulse(Self self, In in) {
   double impulse[3], moment[3];
   check(ts_collider_get_impulse(self.world, in.small(0), impulse, moment));
   return of_list({of_vector(impulse), of_vector(moment)});
 }
 
-godot_variant collider_position(Self self, In in) {
+Variant collider_position(Self self, In in) {
   ts_pose pose;
   check(ts_collider_get_pose(self.world, in.small(0), &pose));
   return of_vector(pose.position);
 }
 
-godot_variant move_frame(Self self, In in) {
+Variant move_frame(Self self, In in) {
   const ts_pose pose = in.pose(1);
   check(ts_frame_move_to(self.world, in.small(0), &pose));
   return of(true);
 }
 
-godot_variant last_error(Self self, In) { return of(self.last_error); }
+Variant last_error(Self self, In) { return of(self.last_error); }
 
 }  // namespace
 
@@ -326,5 +326,18 @@ const std::vector<Method> methods = {
     {"move_frame", 2, move_frame},
     {"last_error", 0, last_error},
 };
+
+Variant call(WorldNative& self, const Method& method, int count, const Variant* const* values) {
+  try {
+    if (count != method.argument_count) {
+      throw Refused("takes " + std::to_string(method.argument_count) + " arguments, and got " + std::to_string(count));
+    }
+    return method.call(self, Arguments(values));
+  } catch (const std::exception& error) {
+    self.last_error = error.what();
+    show_error(error.what(), method.name);
+  }
+  return nothing();
+}
 
 }  // namespace taichi_soft_godot

@@ -26,9 +26,12 @@ struct WorldNative {
 struct Method {
   const char* name;
   int argument_count;
-  godot_variant (*call)(WorldNative& self, const Arguments& arguments);
+  Variant (*call)(WorldNative& self, const Arguments& arguments);
 };
 
 extern const std::vector<Method> methods;
+
+// A refused call returns null, shows its text among Godot's errors, and keeps it for `last_error`.
+Variant call(WorldNative& self, const Method& method, int count, const Variant* const* values);
 
 }  // namespace taichi_soft_godot

@@ -1,10 +1,8 @@
-// What Godot calls when it loads the library: the class SoftWorldNative is told to it.
-#include <exception>
-
-#include "world_native.hpp"
+// What Godot 3 calls when it loads the library: the class SoftWorldNative is told to it.
+#include "../world_native.hpp"
 
 using taichi_soft_godot::api;
-using taichi_soft_godot::Arguments;
+using taichi_soft_godot::kClass;
 using taichi_soft_godot::Method;
 using taichi_soft_godot::WorldNative;
 
@@ -13,27 +11,13 @@ using taichi_soft_godot::WorldNative;
 namespace {
 
 const godot_gdnative_ext_nativescript_api_struct* scripts = nullptr;
-const char* const kClass = "SoftWorldNative";
 
 void* create(godot_object*, void*) { return new WorldNative; }
 
 void destroy(godot_object*, void*, void* data) { delete static_cast<WorldNative*>(data); }
 
-// A refused call returns null, shows its text among Godot's errors, and keeps it for `last_error`.
 godot_variant call(godot_object*, void* which, void* data, int count, godot_variant** values) {
-  const Method& method = *static_cast<const Method*>(which);
-  WorldNative& self = *static_cast<WorldNative*>(data);
-  try {
-    if (count != method.argument_count) {
-      throw taichi_soft_godot::Refused("takes " + std::to_string(method.argument_count) + " arguments, and got " +
-                                       std::to_string(count));
-    }
-    return method.call(self, Arguments(count, values));
-  } catch (const std::exception& error) {
-    self.last_error = error.what();
-    api->godot_print_error(error.what(), method.name, kClass, 0);
-  }
-  return taichi_soft_godot::nothing();
+  return taichi_soft_godot::call(*static_cast<WorldNative*>(data), *static_cast<const Method*>(which), count, values);
 }
 
 }  // namespace
