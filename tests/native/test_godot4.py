@@ -1,0 +1,493 @@
+"""The library for Godot 4, by Godot's own header, under a stand-in for Godot 4: no Godot 4 was there to run it."""
+
+import json
+import os
+import re
+import subprocess
+
+import numpy as np
+import pytest
+from games import hash_of, line, lines_of
+from native_build import ROOT
+
+GODOT = ROOT / "engine_adapter" / "godot"
+ADDON = GODOT / "demo4" / "addons" / "taichi_soft"
+LIBRARY = "libtaichi_soft_godot4.so"
+VERSIONS = ("4.1", "4.2", "4.3", "4.4")
+DT = 1 / 64
+
+
+@pytest.fixture(scope="module")
+def built(native, tmp_path_factory):
+    """Folder in which cmake has built the library and the stand-in."""
+    folder = tmp_path_factory.mktemp("godot4")
+    settings = ["-DTAICHI_SOFT_GODOT=4", "-DTAICHI_SOFT_TESTS=ON", f"-DTAICHI_SOFT_DIR={native}"]
+    if "GODOT4_HEADERS" in os.environ:
+        settings.append(f"-DGODOT4_HEADERS={os.environ['GODOT4_HEADERS']}")
+    done = subprocess.run(
+        ["cmake", "-S", str(GODOT), "-B", str(folder), *settings], capture_output=True, text=True
+    )
+    if "Godot's headers cannot be fetched" in " ".join(done.stderr.split()):
+        pytest.skip("needs Godot's headers, from static.crates.io or in the folder $GODOT4_HEADERS")
+    assert done.returncode == 0, done.stderr
+    done = subprocess.run(["cmake", "--build", str(folder)], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "warning" not in done.stdout + done.stderr
+    return folder
+
+
+@pytest.fixture(scope="module")
+def interfaces(built):
+    """Folders of Godot's header and of its extension_api.json, by version."""
+    found = {version: built / "gdextension-api-0.2.2" / "versions" / version / "res" for version in VERSIONS}
+    if not all(folder.exists() for folder in found.values()):
+        pytest.skip("needs Godot's headers of each version, from static.crates.io")
+    return found
+
+
+@pytest.fixture(scope="module")
+def api(interfaces):
+    """What Godot tells extensions of itself, by version."""
+    return {
+        version: json.loads((folder / "extension_api.json").read_text(encoding="utf-8"))
+        for version, folder in interfaces.items()
+    }
+
+
+@pytest.fixture(scope="module")
+def world(export):
+    return export("heap", "--axes", "y-up")
+
+
+class Transform(tuple):
+    """Twelve numbers: the rows of the basis, then the origin."""
+
+
+class Name(str):
+    """A StringName."""
+
+
+def transform(origin=(0, 0, 0), diagonal=(1, 1, 1)):
+    x, y, z = diagonal
+    return Transform((x, 0, 0, 0, y, 0, 0, 0, z, *origin))
+
+
+def written(value):
+    """A value as the stand-in reads it."""
+    if isinstance(value, bool):
+        return f"b{int(value)}"
+    if isinstance(value, Transform | tuple):
+        kind = "t" if isinstance(value, Transform) else "v"
+        return kind + ",".join(repr(float(number)) for number in value)
+    if isinstance(value, str):
+        return ("n" if isinstance(value, Name) else "s") + value.encode().hex()
+    if isinstance(value, bytes):
+        return f"y{value.hex()}"
+    return "-" if value is None else f"{'i' if isinstance(value, int) else 'f'}{value!r}"
+
+
+def read(words):
+    """A value as the stand-in writes it; takes its words from the list."""
+    word = words.pop(0)
+    kind, rest = word[0], word[1:]
+    if kind == "[":
+        items = []
+        while words[0] != "]":
+            items.append(read(words))
+        words.pop(0)
+        return items
+    rows = {"I": (np.int32, -1), "2": (np.float32, (-1, 2)), "3": (np.float32, (-1, 3))}
+    if kind in rows:
+        number, shape = rows[kind]
+        return np.frombuffer(bytes.fromhex(rest), dtype=number).reshape(shape)
+    return {
+        "-": lambda: None,
+        "b": lambda: rest == "1",
+        "i": lambda: int(rest),
+        "s": lambda: bytes.fromhex(rest).decode(),
+        "v": lambda: tuple(float.fromhex(each) for each in rest.split(",")),
+        "y": lambda: bytes.fromhex(rest),
+    }[kind]()
+
+
+class Host:
+    """A stand-in for Godot that has loaded the library; `started` are the lines that it printed by then."""
+
+    def __init__(self, folder, *options):
+        command = [str(folder / "bin" / "fake_host"), str(folder / "bin" / LIBRARY), *options]
+        self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        self.errors, self.started = [], []
+        while not self.started or not self.started[-1].startswith("ready"):
+            self.started.append(self.line())
+
+    def line(self):
+        found = self.process.stdout.readline().rstrip("\n")
+        assert found, "the stand-in has ended"
+        assert not found.startswith("FAULT"), found
+        return found
+
+    def tell(self, *words):
+        self.process.stdin.write(" ".join(map(str, words)) + "\n")
+        self.process.stdin.flush()
+
+    def ask(self, *words):
+        """Returns: the answer; what was printed as an error is in `errors`."""
+        self.tell(*words)
+        while (found := self.line()).startswith("!"):
+            self.errors.append(found[2:])
+        return read(found.split(" ")[1:])
+
+    def new(self):
+        return Instance(self, self.ask("new"))
+
+    def end(self):
+        """Take the library out. Returns: the last lines."""
+        self.tell("end")
+        found = [self.line(), self.line()]
+        assert self.process.wait(timeout=60) == 0
+        return found
+
+
+class Instance:
+    """An object of the class SoftWorldNative: its methods are called as scripts call them."""
+
+    def __init__(self, host, number):
+        self.host, self.number = host, number
+
+    def __getattr__(self, name):
+        return lambda *values: self.host.ask("call", self.number, name, *map(written, values))
+
+    def by_pointers(self, name, *values):
+        return self.host.ask("ptrcall", self.number, name, *map(written, values))
+
+    def free(self):
+        self.host.ask("free", self.number)
+
+
+@pytest.fixture
+def host(built):
+    """Nothing of Godot's is left when the library was taken out."""
+    host = Host(built)
+    yield host
+    assert host.end() == ["unregistered at 2", "left 0"]
+
+
+@pytest.fixture
+def native_world(host, world):
+    """An instance with a world."""
+    instance = host.new()
+    assert instance.load(str(world)) is True
+    yield instance
+    instance.free()
+
+
+def registered(host):
+    """Methods of the class, and how many arguments they take."""
+    rows = [row.split() for row in host.started if row.startswith("method ")]
+    return {row[1]: int(row[2]) for row in rows}
+
+
+def test_a_class_is_registered_with_the_scene_and_taken_out_again(host):
+    assert host.started[:2] == ["started at 2", "class SoftWorldNative RefCounted at 2"]
+    assert host.started[-1] == "ready, left 0"
+    source = (GODOT / "src" / "world_native.cpp").read_text(encoding="utf-8")
+    table = re.findall(r'^    \{"(\w+)", (\d+), \w+\},$', source, re.MULTILINE)
+    assert len(table) > 30
+    assert registered(host) == {name: int(count) for name, count in table}
+    assert len(host.started) == len(table) + 3  # none of them twice
+    for row in host.started:
+        if row.startswith("method "):
+            _, _, count, flags, has_result, *names = row.split()
+            assert (flags, has_result) == ("1", "1")
+            assert names == [f"argument_{i + 1}" for i in range(int(count))]
+
+
+def test_no_method_hides_one_of_godot(host, api):
+    for version in VERSIONS:
+        classes = {each["name"]: each for each in api[version]["classes"]}
+        theirs = {method["name"] for name in ("Object", "RefCounted") for method in classes[name]["methods"]}
+        assert not theirs & set(registered(host))
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_it_compiles_against_the_header_of_every_version(interfaces, version):
+    for source in sorted((GODOT / "src" / "godot4").glob("*.cpp")):
+        folders = ["-I", source.parent, "-I", ROOT / "engine_adapter/native/include"]
+        command = ["g++", "-std=c++17", "-Wall", "-Wextra", "-Werror", "-fsyntax-only", *folders]
+        command += ["-isystem", interfaces[version], source]
+        done = subprocess.run([str(each) for each in command], capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+
+
+def test_sizes_hashes_and_constructors_are_those_of_every_version(api):
+    """As src/godot4/variant.cpp has them."""
+    sizes = {"Variant": 24, "Vector3": 12, "Transform3D": 48, "int": 8, "float": 8, "bool": 1}
+    sizes |= {"String": 8, "StringName": 8, "Array": 8}
+    arrays = ("PackedByteArray", "PackedInt32Array", "PackedVector2Array", "PackedVector3Array")
+    sizes |= dict.fromkeys(arrays, 16)
+    for told in api.values():
+        (single,) = (
+            each for each in told["builtin_class_sizes"] if each["build_configuration"] == "float_64"
+        )
+        assert sizes.items() <= {each["name"]: each["size"] for each in single["sizes"]}.items()
+        types = {each["name"]: each for each in told["builtin_classes"]}
+        for name in ("Array", *arrays):
+            methods = {method["name"]: method for method in types[name]["methods"]}
+            assert (methods["resize"]["hash"], methods["size"]["hash"]) == (848867239, 3173160232)
+            assert "arguments" not in types[name]["constructors"][0]
+        for name, which, taken in (
+            ("String", 2, ["StringName"]),
+            ("StringName", 2, ["String"]),
+            ("Vector3", 3, ["float"] * 3),
+        ):
+            found = types[name]["constructors"][which]
+            assert found["index"] == which
+            assert [each["type"] for each in found["arguments"]] == taken
+        (usage,) = (each for each in told["global_enums"] if each["name"] == "PropertyUsageFlags")
+        flags = {each["name"]: each["value"] for each in usage["values"]}
+        assert flags["PROPERTY_USAGE_DEFAULT"] == 6
+        assert flags["PROPERTY_USAGE_NIL_IS_VARIANT"] == 131072
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--without", "variant_get_type"], "this Godot has no function variant_get_type, which 4.1"),
+        (
+            ["--without", "classdb_register_extension_class"],
+            "this Godot has no function classdb_register_extension_class",
+        ),
+        (["--without", "print_error"], "this Godot has no function print_error"),
+        (["--without", "resize"], "this Godot has no resize of type 28"),
+        (["--double"], "this Godot is built with double precision"),
+        (["--old"], "this is Godot 4.0: 4.1 or later is needed"),
+    ],
+)
+def test_a_godot_that_lacks_something_is_refused_in_one_line(built, options, said):
+    command = [built / "bin" / "fake_host", built / "bin" / LIBRARY, *options]
+    done = subprocess.run([str(each) for each in command], input="", capture_output=True, text=True)
+    assert done.returncode == 0
+    printed = done.stdout.splitlines() + done.stderr.splitlines()
+    assert "refused, left 0" in printed
+    (text,) = (row for row in printed if not row.startswith("refused"))
+    assert "taichi_soft_godot_init" in text
+    assert said in text
+
+
+UPRIGHT, HALF_TURN = (0.0, 0.0, 0.0, 1.0), (0.0, 1.0, 0.0, 0.0)  # about y: both are exact in a Transform3D
+
+
+def game():
+    """Calls in numbers that Godot's 32 bits hold exactly. Slots: 0 to 4 balls, 5 to 8 bricks."""
+    yield line("add_collider", 2, (2.0, 0.25, 2.0), 0.875, -1.0, 0.0, 1, -1, (0.0, 0.25, -1.5), UPRIGHT)
+    for i in range(240):
+        if i < 160:
+            yield line("move_collider", 0, (i / 512, 0.25 + (i % 32) / 1024, 0.0), UPRIGHT)
+        if i == 40:
+            yield line("spawn", 0, (0.25, 2.0, 0.125), HALF_TURN, (0.0, -1.0, 0.25), (0.0, 2.0, 0.0))
+            yield line("velocity", 5, (0.5, 1.0, 0.0), (0.0, 0.0, 1.0))
+        if i == 100:
+            yield line("snapshot")
+        if i == 130:
+            yield line("restore")
+        if i == 200:
+            yield line("despawn", 1)
+        yield line("step", DT, 0)
+        if i % 60 == 59:
+            yield line("status", 3)
+            yield line("mesh", 0, 0)
+            yield line("mesh", 5, 1)
+
+
+class Player:
+    """Plays a game by the methods of an instance, and notes what engine_adapter/native/tests/play.c prints."""
+
+    def __init__(self, instance):
+        self.instance, self.lines, self.kept = instance, [], b""
+
+    def play(self, game):
+        for text in game:
+            call, *rest = text.split()
+            self.numbers = [float(each) for each in rest]
+            getattr(self, call)()
+        return self.lines
+
+    def take(self, count):
+        found, self.numbers = self.numbers[:count], self.numbers[count:]
+        return tuple(found)
+
+    def whole(self):
+        return int(self.take(1)[0])
+
+    def place(self):
+        origin, turn = self.take(3), self.take(4)
+        return transform(origin, {UPRIGHT: (1, 1, 1), HALF_TURN: (-1, 1, -1)}[turn])
+
+    def body(self):
+        return self.instance.body(self.whole())
+
+    def say(self, text):
+        self.lines.append(str(text))
+
+    def step(self):
+        assert self.instance.step(*self.take(1), self.whole()) is True
+        self.say(self.instance.state_hash())
+
+    def add_collider(self):
+        kind, size = self.whole(), self.take(3)
+        friction, restitution, thickness, group, mask = self.take(5)
+        surface = friction, restitution, thickness, int(group), int(mask)
+        self.say(self.instance.add_collider(kind, size, self.place(), *surface))
+
+    def move_collider(self):
+        assert self.instance.move_collider(self.whole(), self.place()) is True
+
+    def spawn(self):
+        asset, place = self.whole(), self.place()
+        assert self.instance.spawn(asset, place, self.take(3), self.take(3)) > 0
+
+    def despawn(self):
+        assert self.instance.despawn(self.body()) is True
+
+    def velocity(self):
+        body = self.body()
+        assert self.instance.set_velocity(body, self.take(3), self.take(3)) is True
+
+    def snapshot(self):
+        self.kept = self.instance.snapshot()
+
+    def restore(self):
+        assert self.instance.restore(self.kept) is True
+
+    def status(self):
+        self.say(self.instance.status(self.body()))
+
+    def mesh(self):
+        body = self.body()
+        positions, normals = self.instance.mesh(body, self.whole())
+        self.say(f"{hash_of(positions)} {hash_of(normals)}")
+
+
+def test_a_game_has_the_same_bits_as_in_c(native_world, world, play):
+    calls = list(game())
+    found = Player(native_world).play(calls)
+    assert len(set(found)) > 200
+    assert found == lines_of([play, world], calls)
+    assert native_world.host.errors == []
+
+
+def test_what_is_read_is_what_the_library_has(native_world):
+    """Of each kind of value that goes out."""
+    native = native_world
+    assert [native.count(kind) for kind in range(5)] == [9, 2, 4, 0, 2]
+    brick = native.name_of(1, 1)
+    assert native.find(1, brick) == native.find(1, Name(brick)) == 1
+    asset, vertices, triangles, has_uv = native.mesh_info(0)
+    assert (asset, has_uv) == (0, 0)
+    assert native.uvs(0).shape == (0, 2)
+    body = native.body(0)
+    positions, normals = native.mesh(body, 0)
+    assert positions.shape == normals.shape == (vertices, 3)
+    assert np.linalg.norm(normals, axis=1) == pytest.approx(1.0, abs=1e-5)
+    corners = positions[native.triangles(0).reshape(-1, 3)].astype(float)
+    assert len(corners) == triangles
+    volume = np.einsum("ni,ni->n", corners[:, 0], np.cross(corners[:, 2], corners[:, 1])).sum() / 6
+    assert volume == pytest.approx(4 / 3 * np.pi * 0.25**3, rel=0.2)  # fronts are clockwise, as in Godot
+    assert native.center(body) == pytest.approx((0.0, 0.9, 0.0), abs=0.02)  # y is up
+    assert native.changes() == []
+    native.apply_impulse(body, (0.0, 5.0, 0.0))
+    assert native.set_fixed_step(DT, 0, 4) is True
+    assert native.advance(2.5 * DT) == 2
+    impulse, moment = native.collider_impulse(3)
+    assert len(impulse) == len(moment) == 3
+    assert native.by_pointers("center", body) == native.center(body)
+    assert native.by_pointers("state_hash") == native.state_hash()
+    assert native.by_pointers("status", 12345) is None
+    (error,) = native.host.errors
+    assert error.startswith("status body 12345 is not in this world")
+
+
+def test_who_falls_asleep_and_who_wakes_is_told_once(native_world):
+    native = native_world
+    asleep = set()
+    for _ in range(900):
+        assert native.step(DT, 0) is True
+        changes = native.changes()
+        for body, before, after in zip(changes[::3], changes[1::3], changes[2::3], strict=True):
+            assert (before, after) == (0, 2)
+            assert native.status(body) == 2
+            assert body not in asleep
+            asleep.add(body)
+        if len(asleep) >= 3:
+            break
+    assert len(asleep) >= 3
+    native.wake()
+    woken = native.changes()
+    assert set(woken[::3]) == asleep
+    assert (woken[1::3], woken[2::3]) == ([2] * len(asleep), [0] * len(asleep))
+    assert native.changes() == []
+
+
+def test_bad_arguments_are_errors_and_no_crash(host, world):
+    native, upright = host.new(), transform()
+    still = (0.0, 0.0, 0.0)
+    nan = float("nan")
+    refused = [
+        ("load", ["no/such/folder"], "cannot read no/such/folder/world.tsw"),
+        ("load", [7], "argument 1 is no String"),
+        ("state_hash", [], "there is no world 0"),
+        ("mesh_info", [0], "there is no scene 0"),
+        ("load", [str(world)], None),
+        ("status", [12345], "body 12345 is not in this world"),
+        ("despawn", ["rider"], "argument 1 is no whole number"),
+        ("despawn", [None], "argument 1 is no whole number"),
+        ("step", [DT], "takes 2 arguments, and got 1"),
+        ("step", [DT, 0, 0], "takes 2 arguments, and got 3"),
+        ("step", [], "takes 2 arguments, and got 0"),
+        ("step", ["soon", 0], "argument 1 is no number"),
+        ("advance", [-1.0], "seconds is -1"),
+        ("advance", [nan], "seconds is -?nan"),
+        ("spawn", [99, upright, still, still], "asset is 99: there are 2"),
+        ("spawn", [0, transform((nan, 0, 0)), still, still], "position has -?nan in it"),
+        ("spawn", [0, still, still, still], "argument 2 is no Transform3D"),
+        ("spawn", [0, upright, 1.0, still], "argument 3 is no Vector3"),
+        ("move_collider", [0, transform(diagonal=(1, 1, -1))], "argument 2 is a Transform3D that mirrors"),
+        ("teleport_collider", [0, transform(diagonal=(0, 0, 0))], "argument 2 is a Transform3D without size"),
+        ("move_frame", [7, upright], "there is no frame 7"),
+        ("find", [0, "nobody"], "nothing of that kind is called nobody"),
+        ("find", [0, Name("nobody")], "nothing of that kind is called nobody"),
+        ("count", [9], "argument 1 is 9: kinds are 0 to 4"),
+        ("count", [True], "argument 1 is no whole number"),
+        ("restore", [b"abc"], "3 bytes are no snapshot"),
+        ("restore", [b""], "bytes is null"),
+        ("restore", ["abc"], "argument 1 is no PackedByteArray"),
+        ("body", [1 << 40], "argument 1 is 1099511627776: too large"),
+    ]
+    for name, arguments, said in refused:
+        answer = getattr(native, name)(*arguments)
+        if said is None:
+            assert answer is True
+            continue
+        assert answer is None, name
+        assert re.match(said, native.last_error()), name
+        assert re.match(f"{name} {said}", host.errors.pop()), name
+        assert host.errors == []
+    assert native.load("no/such/folder") is None  # and what was loaded is given back
+    assert native.state_hash() is None
+    native.free()
+
+
+def test_instances_are_apart_and_may_be_freed_with_their_world(host, world):
+    first, second = host.new(), host.new()
+    for instance in (first, second):
+        assert instance.load(str(world)) is True
+    before = first.state_hash()
+    assert second.state_hash() == before
+    second.step(DT, 0)
+    assert second.state_hash() != before
+    assert first.state_hash() == before
+    first.free()
+    assert second.step(DT, 0) is True
+    assert second.unload() is True
+    assert second.step(DT, 0) is None
+    second.free()
