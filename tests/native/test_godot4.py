@@ -1,4 +1,4 @@
-"""The library for Godot 4, by Godot's own header, under a stand-in for Godot 4: no Godot 4 was there to run it."""
+"""The library for Godot 4, built by Godot's own header and run by a stand-in: no Godot 4 was at hand."""
 
 import json
 import os
@@ -300,7 +300,7 @@ def game():
 
 
 class Player:
-    """Plays a game by the methods of an instance, and notes what engine_adapter/native/tests/play.c prints."""
+    """Plays a game by the methods of an instance, and notes what play.c prints."""
 
     def __init__(self, instance):
         self.instance, self.lines, self.kept = instance, [], b""

@@ -77,6 +77,7 @@ struct Shared {
 };
 
 int alive = 0;
+auto& dead = *new std::vector<Shared*>;  // kept to the end, so that a later use is seen
 
 Shared* made(Type type) {
   ++alive;
@@ -94,8 +95,9 @@ void end(Value& value);
 void let_go(Shared* shared, Type type) {
   if (--looked_at(shared, type)->holders > 0) return;
   for (Value& item : shared->items) end(item);
-  shared->state = kDead;  // and kept, so that a later use is seen
+  shared->state = kDead;
   shared->bytes = {}, shared->items = {}, shared->text = {};
+  dead.push_back(shared);
   --alive;
 }
 

@@ -81,7 +81,7 @@ class Held {
   Address address() const { return Address(memory_); }
 
  private:
-  alignas(8) unsigned char memory_[16];  // enough for strings and arrays
+  alignas(8) unsigned char memory_[16] = {};  // enough for strings and arrays
 };
 
 class String : public Held<GDEXTENSION_VARIANT_TYPE_STRING> {
