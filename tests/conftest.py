@@ -67,7 +67,7 @@ SECONDS = {
     "render/": (20, 0),
     "bake/test_formats": (1, 0),
     "bake/": (20, 20),
-    "native/": (0, 610),
+    "native/": (0, 660),
     "test_readme": (1, 10),
     "test_package": (5, 60),
     "": (21, 0),

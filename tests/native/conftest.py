@@ -1,5 +1,7 @@
-"""The native library, built once for all tests."""
+"""The native library, and that for Godot 4, built once for all tests."""
 
+import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -9,6 +11,7 @@ import pytest
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))  # what the tests of this folder share
 
+from godot4_host import GODOT, VERSIONS, Host  # noqa: E402
 from native_build import build  # noqa: E402
 
 from taichi_soft.bodies.capacity import LEAST  # noqa: E402
@@ -53,3 +56,48 @@ def export(tmp_path_factory):
         return made[key]
 
     return exported
+
+
+@pytest.fixture(scope="session")
+def godot4(native, tmp_path_factory):
+    """Folder in which cmake has built the library and the stand-in."""
+    folder = tmp_path_factory.mktemp("godot4")
+    settings = ["-DTAICHI_SOFT_GODOT=4", "-DTAICHI_SOFT_TESTS=ON", f"-DTAICHI_SOFT_DIR={native}"]
+    if "GODOT4_HEADERS" in os.environ:
+        settings.append(f"-DGODOT4_HEADERS={os.environ['GODOT4_HEADERS']}")
+    done = subprocess.run(
+        ["cmake", "-S", str(GODOT), "-B", str(folder), *settings], capture_output=True, text=True
+    )
+    if "Godot's headers cannot be fetched" in " ".join(done.stderr.split()):
+        pytest.skip("needs Godot's headers, from static.crates.io or in the folder $GODOT4_HEADERS")
+    assert done.returncode == 0, done.stderr
+    done = subprocess.run(["cmake", "--build", str(folder)], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "warning" not in done.stdout + done.stderr
+    return folder
+
+
+@pytest.fixture(scope="module")
+def interfaces(godot4):
+    """Folders of Godot's header and of its extension_api.json, by version."""
+    found = {version: godot4 / "gdextension-api-0.2.2" / "versions" / version / "res" for version in VERSIONS}
+    if not all(folder.exists() for folder in found.values()):
+        pytest.skip("needs Godot's headers of each version, from static.crates.io")
+    return found
+
+
+@pytest.fixture(scope="module")
+def api(interfaces):
+    """What Godot tells extensions of itself, by version."""
+    return {
+        version: json.loads((folder / "extension_api.json").read_text(encoding="utf-8"))
+        for version, folder in interfaces.items()
+    }
+
+
+@pytest.fixture
+def host(godot4):
+    """Nothing of Godot's is left when the library was taken out."""
+    host = Host(godot4)
+    yield host
+    assert host.end() == ["unregistered at 2", "left 0"]

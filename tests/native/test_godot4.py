@@ -1,175 +1,20 @@
 """The library for Godot 4, built by Godot's own header and run by a stand-in: no Godot 4 was at hand."""
 
-import json
-import os
 import re
 import subprocess
 
 import numpy as np
 import pytest
 from games import hash_of, line, lines_of
+from godot4_host import GODOT, LIBRARY, VERSIONS, Name, registered, transform
 from native_build import ROOT
 
-GODOT = ROOT / "engine_adapter" / "godot"
-ADDON = GODOT / "demo4" / "addons" / "taichi_soft"
-LIBRARY = "libtaichi_soft_godot4.so"
-VERSIONS = ("4.1", "4.2", "4.3", "4.4")
 DT = 1 / 64
-
-
-@pytest.fixture(scope="module")
-def built(native, tmp_path_factory):
-    """Folder in which cmake has built the library and the stand-in."""
-    folder = tmp_path_factory.mktemp("godot4")
-    settings = ["-DTAICHI_SOFT_GODOT=4", "-DTAICHI_SOFT_TESTS=ON", f"-DTAICHI_SOFT_DIR={native}"]
-    if "GODOT4_HEADERS" in os.environ:
-        settings.append(f"-DGODOT4_HEADERS={os.environ['GODOT4_HEADERS']}")
-    done = subprocess.run(
-        ["cmake", "-S", str(GODOT), "-B", str(folder), *settings], capture_output=True, text=True
-    )
-    if "Godot's headers cannot be fetched" in " ".join(done.stderr.split()):
-        pytest.skip("needs Godot's headers, from static.crates.io or in the folder $GODOT4_HEADERS")
-    assert done.returncode == 0, done.stderr
-    done = subprocess.run(["cmake", "--build", str(folder)], capture_output=True, text=True)
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert "warning" not in done.stdout + done.stderr
-    return folder
-
-
-@pytest.fixture(scope="module")
-def interfaces(built):
-    """Folders of Godot's header and of its extension_api.json, by version."""
-    found = {version: built / "gdextension-api-0.2.2" / "versions" / version / "res" for version in VERSIONS}
-    if not all(folder.exists() for folder in found.values()):
-        pytest.skip("needs Godot's headers of each version, from static.crates.io")
-    return found
-
-
-@pytest.fixture(scope="module")
-def api(interfaces):
-    """What Godot tells extensions of itself, by version."""
-    return {
-        version: json.loads((folder / "extension_api.json").read_text(encoding="utf-8"))
-        for version, folder in interfaces.items()
-    }
 
 
 @pytest.fixture(scope="module")
 def world(export):
     return export("heap", "--axes", "y-up")
-
-
-class Transform(tuple):
-    """Twelve numbers: the rows of the basis, then the origin."""
-
-
-class Name(str):
-    """A StringName."""
-
-
-def transform(origin=(0, 0, 0), diagonal=(1, 1, 1)):
-    x, y, z = diagonal
-    return Transform((x, 0, 0, 0, y, 0, 0, 0, z, *origin))
-
-
-def written(value):
-    """A value as the stand-in reads it."""
-    if isinstance(value, bool):
-        return f"b{int(value)}"
-    if isinstance(value, Transform | tuple):
-        kind = "t" if isinstance(value, Transform) else "v"
-        return kind + ",".join(repr(float(number)) for number in value)
-    if isinstance(value, str):
-        return ("n" if isinstance(value, Name) else "s") + value.encode().hex()
-    if isinstance(value, bytes):
-        return f"y{value.hex()}"
-    return "-" if value is None else f"{'i' if isinstance(value, int) else 'f'}{value!r}"
-
-
-def read(words):
-    """A value as the stand-in writes it; takes its words from the list."""
-    word = words.pop(0)
-    kind, rest = word[0], word[1:]
-    if kind == "[":
-        items = []
-        while words[0] != "]":
-            items.append(read(words))
-        words.pop(0)
-        return items
-    rows = {"I": (np.int32, -1), "2": (np.float32, (-1, 2)), "3": (np.float32, (-1, 3))}
-    if kind in rows:
-        number, shape = rows[kind]
-        return np.frombuffer(bytes.fromhex(rest), dtype=number).reshape(shape)
-    return {
-        "-": lambda: None,
-        "b": lambda: rest == "1",
-        "i": lambda: int(rest),
-        "s": lambda: bytes.fromhex(rest).decode(),
-        "v": lambda: tuple(float.fromhex(each) for each in rest.split(",")),
-        "y": lambda: bytes.fromhex(rest),
-    }[kind]()
-
-
-class Host:
-    """A stand-in for Godot that has loaded the library; `started` are the lines that it printed by then."""
-
-    def __init__(self, folder, *options):
-        command = [str(folder / "bin" / "fake_host"), str(folder / "bin" / LIBRARY), *options]
-        self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-        self.errors, self.started = [], []
-        while not self.started or not self.started[-1].startswith("ready"):
-            self.started.append(self.line())
-
-    def line(self):
-        found = self.process.stdout.readline().rstrip("\n")
-        assert found, "the stand-in has ended"
-        assert not found.startswith("FAULT"), found
-        return found
-
-    def tell(self, *words):
-        self.process.stdin.write(" ".join(map(str, words)) + "\n")
-        self.process.stdin.flush()
-
-    def ask(self, *words):
-        """Returns: the answer; what was printed as an error is in `errors`."""
-        self.tell(*words)
-        while (found := self.line()).startswith("!"):
-            self.errors.append(found[2:])
-        return read(found.split(" ")[1:])
-
-    def new(self):
-        return Instance(self, self.ask("new"))
-
-    def end(self):
-        """Take the library out. Returns: the last lines."""
-        self.tell("end")
-        found = [self.line(), self.line()]
-        assert self.process.wait(timeout=60) == 0
-        return found
-
-
-class Instance:
-    """An object of the class SoftWorldNative: its methods are called as scripts call them."""
-
-    def __init__(self, host, number):
-        self.host, self.number = host, number
-
-    def __getattr__(self, name):
-        return lambda *values: self.host.ask("call", self.number, name, *map(written, values))
-
-    def by_pointers(self, name, *values):
-        return self.host.ask("ptrcall", self.number, name, *map(written, values))
-
-    def free(self):
-        self.host.ask("free", self.number)
-
-
-@pytest.fixture
-def host(built):
-    """Nothing of Godot's is left when the library was taken out."""
-    host = Host(built)
-    yield host
-    assert host.end() == ["unregistered at 2", "left 0"]
 
 
 @pytest.fixture
@@ -179,12 +24,6 @@ def native_world(host, world):
     assert instance.load(str(world)) is True
     yield instance
     instance.free()
-
-
-def registered(host):
-    """Methods of the class, and how many arguments they take."""
-    rows = [row.split() for row in host.started if row.startswith("method ")]
-    return {row[1]: int(row[2]) for row in rows}
 
 
 def test_a_class_is_registered_with_the_scene_and_taken_out_again(host):
@@ -263,8 +102,8 @@ def test_sizes_hashes_and_constructors_are_those_of_every_version(api):
         (["--old"], "this is Godot 4.0: 4.1 or later is needed"),
     ],
 )
-def test_a_godot_that_lacks_something_is_refused_in_one_line(built, options, said):
-    command = [built / "bin" / "fake_host", built / "bin" / LIBRARY, *options]
+def test_a_godot_that_lacks_something_is_refused_in_one_line(godot4, options, said):
+    command = [godot4 / "bin" / "fake_host", godot4 / "bin" / LIBRARY, *options]
     done = subprocess.run([str(each) for each in command], input="", capture_output=True, text=True)
     assert done.returncode == 0
     printed = done.stdout.splitlines() + done.stderr.splitlines()

@@ -1,0 +1,96 @@
+# Draws a soft body of a SoftWorld. For Godot 4.
+#
+# Vertices are places in the scene, so this node leaves its parent's transform. Set its look by material_override.
+class_name TaichiSoftBody
+extends MeshInstance3D
+
+## The SoftWorld; empty for the nearest one above this node.
+@export var world_path := NodePath()
+## As the script of the world called it; empty where `body` is set, to what SoftWorld.spawn returned.
+@export var body_name := ""
+## Empty for the first mesh of the body's asset.
+@export var mesh_name := ""
+
+var body := 0:
+    set = set_body
+
+var _world: SoftWorld = null
+var _drawn := ArrayMesh.new()
+var _mesh := -1
+var _arrays := []
+
+
+func _ready() -> void:
+    top_level = true
+    global_transform = Transform3D()
+    mesh = _drawn
+    _world = _find_world()
+    if _world == null:
+        push_error("%s: no SoftWorld is above it or at world_path" % name)
+    else:
+        _world.started.connect(_on_started)
+        if _world.native != null:
+            _on_started()
+    set_process(_world != null)
+
+
+## Draw another body; 0 for none.
+func set_body(value: int) -> void:
+    body = value
+    _mesh = -1
+    if _world != null and _world.native != null and value != 0:
+        _find_mesh()
+
+
+func _process(_delta: float) -> void:
+    draw()
+
+
+## Read the body from the world into the mesh; called in each frame.
+func draw() -> void:
+    if _mesh < 0 or _world.native == null:
+        return
+    var read = _world.native.mesh(body, _mesh)
+    _drawn.clear_surfaces()
+    if read == null:  # it was taken out of the world
+        set_body(0)
+        return
+    _arrays[Mesh.ARRAY_VERTEX] = read[0]
+    _arrays[Mesh.ARRAY_NORMAL] = read[1]
+    _drawn.add_surface_from_arrays(Mesh.PRIMITIVE_TRIANGLES, _arrays)
+
+
+func _find_world() -> SoftWorld:
+    if not world_path.is_empty():
+        return get_node_or_null(world_path) as SoftWorld
+    var node := get_parent()
+    while node != null and not node is SoftWorld:
+        node = node.get_parent()
+    return node as SoftWorld
+
+
+func _on_started() -> void:
+    set_body(_world.body(body_name) if body_name != "" else body)
+
+
+func _find_mesh() -> void:
+    var native := _world.native
+    var asset = native.asset_of(body)
+    if asset == null:
+        return
+    if mesh_name != "":
+        var found = native.find(SoftWorld.Kind.MESH, mesh_name)
+        _mesh = -1 if found == null else found
+    else:
+        for number in native.count(SoftWorld.Kind.MESH):
+            if native.mesh_info(number)[0] == asset:
+                _mesh = number
+                break
+    if _mesh < 0:
+        push_error("%s: the body has no mesh of that name" % name)
+        return
+    var uvs: PackedVector2Array = native.uvs(_mesh)
+    _arrays = []
+    _arrays.resize(Mesh.ARRAY_MAX)
+    _arrays[Mesh.ARRAY_INDEX] = native.triangles(_mesh)
+    _arrays[Mesh.ARRAY_TEX_UV] = uvs if uvs.size() > 0 else null

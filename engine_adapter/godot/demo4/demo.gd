@@ -1,0 +1,59 @@
+# Looks of the demo, and an elephant more at each press of space.
+extends Node3D
+
+const ELEPHANT := "res://elephant.glb"  # a copy of assets/elephant.glb, from which world.py makes bodies
+
+var _plush := _colored(Color(0.72, 0.72, 0.78))
+
+
+func _ready() -> void:
+    if FileAccess.file_exists(ELEPHANT):
+        _plush = _colored(Color(0.8, 0.8, 0.8))
+        _plush.albedo_texture = _texture_of(ELEPHANT)
+    $World/Rider.material_override = _plush
+    $World/Block.material_override = _colored(Color(0.85, 0.4, 0.25))
+    $World/Crate/Mesh.material_override = _colored(Color(0.55, 0.38, 0.22))
+    $World/Platform/Mesh.material_override = _colored(Color(0.25, 0.4, 0.5))
+    $World/Ground/Mesh.material_override = _colored(Color(0.5, 0.55, 0.45))
+
+
+func _unhandled_key_input(event: InputEvent) -> void:
+    var key := event as InputEventKey
+    if key != null and key.pressed and not key.echo and key.keycode == KEY_SPACE:
+        drop(Transform3D(Basis(), Vector3(randf_range(-0.3, 0.3), 2.0, 0.2)))
+
+
+# One elephant more, while there is room; returns what draws it, or null.
+func drop(place: Transform3D) -> TaichiSoftBody:
+    var body: int = $World.spawn("elephant", place)
+    if body == 0:
+        return null
+    var drawn := TaichiSoftBody.new()
+    drawn.body = body
+    drawn.material_override = _plush
+    $World.add_child(drawn)
+    return drawn
+
+
+func _colored(color: Color) -> StandardMaterial3D:
+    var material := StandardMaterial3D.new()
+    material.albedo_color = color
+    return material
+
+
+# The first picture in a .glb: that has a head of 12 bytes, a part in JSON, and one with the bytes.
+func _texture_of(path: String) -> ImageTexture:
+    var file := FileAccess.open(path, FileAccess.READ)
+    file.seek(12)
+    var length := file.get_32()
+    file.get_32()
+    var head: Dictionary = JSON.parse_string(file.get_buffer(length).get_string_from_utf8())
+    var view: Dictionary = head.bufferViews[int(head.images[0].bufferView)]
+    file.seek(12 + 8 + length + 8 + int(view.get("byteOffset", 0)))
+    var bytes := file.get_buffer(int(view.byteLength))
+    var image := Image.new()
+    if head.images[0].mimeType == "image/png":
+        image.load_png_from_buffer(bytes)
+    else:
+        image.load_jpg_from_buffer(bytes)
+    return ImageTexture.create_from_image(image)
