@@ -12,20 +12,25 @@ from library import VERSION, in_process
 from native_build import ROOT
 
 from taichi_soft.bodies import status
-from taichi_soft.control.kernels.pins import WITH_FRAME
+from taichi_soft.contact.kernels.touches import OF_BODY, OF_COLLIDER
+from taichi_soft.control.kernels.grabs import CORNERS, MOST_GRABS, PATCH_ROWS
+from taichi_soft.control.kernels.pins import STILL, WITH_FRAME
 from taichi_soft.export.archive import TYPES, written
+
+HEADERS = Path(ROOT) / "engine_adapter" / "native" / "src"
 
 FORGED = """
 import random, struct, zlib
 scene = soft.load(arguments[0])
 world = soft.create(scene)
-for _ in range(30):
+soft.call("ts_world_record_events", world, c_int32(31))
+for _ in range(60):
     soft.step(world)
 whole, rng, codes = soft.snapshot(world), random.Random(5), []
 odd = [struct.pack("<i", 3 + 2**28), struct.pack("<i", -7), struct.pack("<f", float("nan")), b"\\xff" * 4]
 for trial in range(400):
     data = bytearray(whole)
-    at = 56 + 4 * rng.randrange((len(data) - 60) // 4)
+    at = 24 + 4 * rng.randrange((len(data) - 28) // 4)  # all but what says what it is, and its sum
     data[at : at + 4] = odd[trial % 4]
     data[20:24] = bytes(4)
     data[20:24] = struct.pack("<I", zlib.crc32(data))
@@ -133,16 +138,24 @@ def test_a_world_file_of_another_taichi_is_refused(native, export, tmp_path):
     assert in_process(native, LOADED, folder) == VERSION
 
 
-def test_the_library_knows_the_numbers_of_status_drives_and_aims():
-    source = (Path(ROOT) / "engine_adapter" / "native" / "src" / "world.cpp").read_text()
+def test_the_library_knows_the_numbers_of_status_drives_aims_and_grabs():
+    source = (HEADERS / "world.hpp").read_text()
     names = re.search(r"enum Status {(.*?)}", source).group(1).replace(" ", "").split(",")
     wanted = {"kActive": "ACTIVE", "kFrozen": "FROZEN", "kAsleep": "ASLEEP", "kSkipping": "SKIPPING"}
     assert {name: names.index(name) for name in wanted} == {a: getattr(status, b) for a, b in wanted.items()}
     assert names.index("kAbsent") == status.ABSENT
     drives = dict(re.findall(r"(k\w+) = (\d+)", re.search(r"enum Drives {(.*?)}", source).group(1)))
     wanted = {"kMovesPins": "MOVES_PINS", "kDamped": "DAMPED", "kSheltered": "SHELTERED"}
-    wanted |= {"kGrabbed": "GRABBED", "kJoined": "JOINED"}
+    wanted |= {"kGrabbed": "GRABBED", "kJoined": "JOINED", "kFeelsReaction": "FEELS_REACTION"}
     assert {name: int(bit) for name, bit in drives.items()} == {
         a: getattr(status, b) for a, b in wanted.items()
     }
-    assert int(re.search(r"kWithFrame = (\d+)", source).group(1)) == WITH_FRAME
+    assert (
+        re.search(r"enum Aims {(.*?)}", source).group(1) == f" kStill = {STILL}, kWithFrame = {WITH_FRAME} "
+    )
+    grabs = re.search(r"kMostGrabs = (\d+), kPatchRows = (\d+), kGrabCorners = (\d+);", source).groups()
+    assert tuple(map(int, grabs)) == (MOST_GRABS, PATCH_ROWS, CORNERS)
+    kinds = re.search(r"kOfCollider = (\d+), kOfBody = (\d+)", (HEADERS / "events.hpp").read_text()).groups()
+    assert tuple(map(int, kinds)) == (OF_COLLIDER, OF_BODY)
+    known = (HEADERS / "events.cpp").read_text()
+    assert f"kActive = {status.ACTIVE}, kAsleep = {status.ASLEEP};" in known

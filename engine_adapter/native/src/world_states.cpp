@@ -56,12 +56,14 @@ namespace {
 
 template <typename Part>
 void put(char** at, const Part* data, size_t count) {
+  if (count == 0) return;  // memcpy takes no null pointer
   std::memcpy(*at, data, count * sizeof(Part));
   *at += count * sizeof(Part);
 }
 
 template <typename Part>
 void take(const char** at, Part* data, size_t count) {
+  if (count == 0) return;
   std::memcpy(data, *at, count * sizeof(Part));
   *at += count * sizeof(Part);
 }
@@ -203,7 +205,8 @@ void World::restore(const char* bytes, size_t size) {
   const size_t slots = size_t(scene_->slot_count), fields = sizeof head + 4 * scene_->carried_words;
   if (head.size != size || head.frames == 0 || head.frames > kMostFrames || head.colliders > collider_room_ ||
       head.contacts > slots * events_.touch_rows || size != fields + size_of_rest(head, slots) ||
-      (head.kinds & ~int64_t(TS_ALL_EVENTS)) != 0) {
+      (head.kinds & ~int64_t(TS_ALL_EVENTS)) != 0 || head.steps < 0 || !std::isfinite(head.time) ||
+      !std::isfinite(head.last_dt)) {
     fail(TS_ERROR_SNAPSHOT, "this snapshot is cut off");
   }
   std::vector<char> whole(bytes, bytes + size);
