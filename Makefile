@@ -15,7 +15,7 @@ help:
 	@echo "make test-bounds  set up, run kernels with every index checked: takes minutes"
 	@echo "make native   set up, build the library for engines without Python and its sample, into out/native"
 	@echo "make test-native  set up, build it, play games in it and in Python"
-	@echo "make dist-native  build it, pack it with headers, wrappers and sample into dist"
+	@echo "make dist-native  build it, pack it with headers, wrappers and sample into dist; and a project for Godot 3"
 	@echo "make profile  set up, measure what a frame costs here"
 	@echo "make docs     set up, build the documentation into out/docs"
 	@echo "make lint     set up with every extra, check style and types"
@@ -55,10 +55,21 @@ native: $(VENV)/.demo
 test-native: $(VENV)/.test
 	@$(BIN)/python -m pytest tests/native
 
+# Two of them: for C, C++ and C#, and a project for Godot 3. GODOT_HEADERS= names a folder of Godot's headers, where
+# they cannot be fetched.
 dist-native: native
-	@mkdir -p dist
+	@mkdir -p dist out/godot3
 	@cd out/native && cpack -B $(CURDIR)/dist > cpack.log || { cat cpack.log; exit 1; }
-	@ls -l dist/taichi-soft-native-*.zip
+	@cmake -S engine_adapter/godot -B out/godot3 -DTAICHI_SOFT_DIR=$(CURDIR)/out/native -DGODOT_HEADERS="$(GODOT_HEADERS)" \
+	    -DTAICHI_SOFT_GODOT_WORLD=$(CURDIR)/out/godot3/demo.softworld > out/godot3/cmake.log 2>&1 \
+	    || { if grep -q "headers cannot be fetched" out/godot3/cmake.log; \
+	         then echo "no .zip for Godot: its headers cannot be fetched; name a folder of them: make dist-native GODOT_HEADERS="; \
+	         else cat out/godot3/cmake.log; fi; exit 1; }
+	@cmake --build out/godot3
+	@cp engine_adapter/godot/demo/world.py assets/elephant.glb out/godot3
+	@$(BIN)/taichi-soft export out/godot3/world.py --axes y-up --threads 2 --out out/godot3/demo.softworld
+	@cd out/godot3 && cpack -B $(CURDIR)/dist > cpack.log || { cat cpack.log; exit 1; }
+	@ls -l dist/taichi-soft-*.zip
 
 profile: $(VENV)/.demo
 	@$(BIN)/taichi-soft profile
