@@ -1,7 +1,8 @@
-"""The native library, and that for Godot 4, built once for all tests."""
+"""The native library, and what Godot takes of it, built once for all tests."""
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -11,8 +12,9 @@ import pytest
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))  # what the tests of this folder share
 
+import godot_build  # noqa: E402
 from godot4_host import GODOT, VERSIONS, Host  # noqa: E402
-from native_build import build  # noqa: E402
+from native_build import ROOT, build  # noqa: E402
 
 from taichi_soft.bodies.capacity import LEAST  # noqa: E402
 
@@ -101,3 +103,30 @@ def host(godot4):
     host = Host(godot4)
     yield host
     assert host.end() == ["unregistered at 2", "left 0"]
+
+
+@pytest.fixture(scope="session")
+def engine():
+    """The program: Godot without a window."""
+    for name in ("godot3-server", "godot3-runner"):
+        if shutil.which(name) is not None:
+            return shutil.which(name)
+    pytest.skip("needs godot3-server: apt-get install godot3-server")
+
+
+@pytest.fixture(scope="session")
+def demo_world(tmp_path_factory):
+    """The world file of the demo for Godot."""
+    folder = tmp_path_factory.mktemp("demo_world")
+    for path in (godot_build.GODOT / "demo" / "world.py", ROOT / "assets" / "elephant.glb"):
+        shutil.copy(path, folder)
+    command = ["export", str(folder / "world.py"), "--axes", "y-up", "--out", str(folder / "demo.softworld")]
+    done = subprocess.run([sys.executable, "-m", "taichi_soft", *command], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return folder / "demo.softworld"
+
+
+@pytest.fixture(scope="session")
+def libraries(native, demo_world, tmp_path_factory):
+    """Folder of the GDNative library, within that of its build."""
+    return godot_build.build(tmp_path_factory.mktemp("godot"), native, demo_world)

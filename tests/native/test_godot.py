@@ -1,53 +1,21 @@
 """Godot 3 plays the demo without a window: what moves, what is drawn, bits as in C, errors."""
 
-import json
-import os
 import re
 import shutil
 import subprocess
-import sys
 
 import numpy as np
 import pytest
 from games import line, lines_of
+from godot_build import GODOT, SCRIPTS, told
 from native_build import ROOT
 
-GODOT = ROOT / "engine_adapter" / "godot"
-SCRIPTS = ROOT / "tests" / "native" / "godot"
 UPRIGHT, HALF_TURN = (0.0, 0.0, 0.0, 1.0), (0.0, 1.0, 0.0, 0.0)  # both are exact in Godot's Transform
 DT = 1 / 64
 
 
 @pytest.fixture(scope="module")
-def engine():
-    """The program: Godot without a window."""
-    for name in ("godot3-server", "godot3-runner"):
-        if shutil.which(name) is not None:
-            return name
-    pytest.skip("needs godot3-server: apt-get install godot3-server")
-
-
-@pytest.fixture(scope="module")
-def libraries(native, tmp_path_factory):
-    """Folder of the GDNative library."""
-    folder = tmp_path_factory.mktemp("godot")
-    settings = [f"-DTAICHI_SOFT_DIR={native}"]
-    if "GODOT_HEADERS" in os.environ:
-        settings.append(f"-DGODOT_HEADERS={os.environ['GODOT_HEADERS']}")
-    done = subprocess.run(
-        ["cmake", "-S", str(GODOT), "-B", str(folder), *settings], capture_output=True, text=True
-    )
-    if "Godot's headers cannot be fetched" in " ".join(done.stderr.split()):
-        pytest.skip("needs Godot's headers, from static.crates.io or in the folder $GODOT_HEADERS")
-    assert done.returncode == 0, done.stderr
-    done = subprocess.run(["cmake", "--build", str(folder)], capture_output=True, text=True)
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert "warning" not in done.stdout + done.stderr
-    return folder / "bin"
-
-
-@pytest.fixture(scope="module")
-def project(engine, libraries, tmp_path_factory):
+def project(engine, libraries, demo_world, tmp_path_factory):
     """The demo as a reader has it after the steps of docs/godot.md, and the scripts of this test."""
     folder = tmp_path_factory.mktemp("project") / "demo"
     shutil.copytree(GODOT / "demo", folder)
@@ -55,9 +23,7 @@ def project(engine, libraries, tmp_path_factory):
     shutil.copytree(libraries, folder / "addons" / "taichi_soft" / "bin")
     for script in SCRIPTS.glob("*.gd"):
         shutil.copy(script, folder)
-    command = ["export", str(folder / "world.py"), "--axes", "y-up", "--out", str(folder / "demo.softworld")]
-    done = subprocess.run([sys.executable, "-m", "taichi_soft", *command], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+    shutil.copytree(demo_world, folder / "demo.softworld")
     return folder
 
 
@@ -73,12 +39,6 @@ def run(engine, project):
         return done.stdout
 
     return printed
-
-
-def told(text):
-    """What a script printed as JSON, by name."""
-    rows = [json.loads(row[5:]) for row in text.splitlines() if row.startswith("JSON ")]
-    return {row["name"]: row["value"] for row in rows}
 
 
 @pytest.fixture(scope="module")
@@ -176,7 +136,8 @@ def test_a_game_in_godot_has_the_same_bits(run, project, play):
 def test_the_script_of_the_page_runs(run, project):
     """Its elephant falls, and is drawn."""
     text = (ROOT / "docs" / "godot.md").read_text(encoding="utf-8")
-    (script,) = re.findall(r"^```gdscript\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
+    section = text.split("\n## From a script\n")[1]
+    script = re.search(r"^```gdscript\n(.*?)^```", section, re.DOTALL | re.MULTILINE).group(1)
     (project / "page.gd").write_text(f"extends Spatial\n\n{script}", encoding="utf-8")
     found = told(run("page_check.gd"))["page"]
     assert found["nodes"] == 1
