@@ -4,6 +4,7 @@ extends Spatial
 const ELEPHANT := "res://elephant.glb"  # a copy of assets/elephant.glb, from which world.py makes bodies
 
 var _plush := _colored(Color(0.72, 0.72, 0.78))
+var _dropped := 0
 
 
 func _ready() -> void:
@@ -20,7 +21,9 @@ func _ready() -> void:
 
 func _unhandled_key_input(event: InputEventKey) -> void:
     if event.pressed and not event.echo and event.scancode == KEY_SPACE:
-        drop(Transform(Basis(), Vector3(rand_range(-0.3, 0.3), 2.0, 0.2)))
+        # Beside the one before: it may still be there.
+        if drop(Transform(Basis(), Vector3(0.55 * _dropped - 0.45, 2.0, 0.2))) != null:
+            _dropped += 1
 
 
 # One elephant more, while there is room; returns what draws it, or null.
