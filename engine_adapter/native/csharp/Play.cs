@@ -13,6 +13,8 @@ namespace TaichiSoft
         private static string[] words;
         private static int at;
         private static byte[] kept;
+        private static Body[] bodies;
+        private static readonly SoftEvent[] events = new SoftEvent[10000]; // as many as the library keeps
         private static TextWriter output;
 
         private static double Number()
@@ -86,8 +88,67 @@ namespace TaichiSoft
             Vector3d w = hit.Weights, x = hit.Point, n = hit.Normal;
             string row = HashOf((float)hit.Distance, (float)w.X, (float)w.Y, (float)w.Z, (float)x.X, (float)x.Y,
                 (float)x.Z, (float)n.X, (float)n.Y, (float)n.Z);
-            Say(string.Format(CultureInfo.InvariantCulture, "{0} {1} {2} {3} {4}", (body.Id & 0xFFFFFFFF) - 1,
-                hit.Vertex0, hit.Vertex1, hit.Vertex2, row));
+            Say(string.Format(CultureInfo.InvariantCulture, "{0} {1} {2} {3} {4}", SlotOf(body), hit.Vertex0,
+                hit.Vertex1, hit.Vertex2, row));
+        }
+
+        private static long SlotOf(Body body)
+        {
+            return (long)(body.Id & 0xFFFFFFFF) - 1;
+        }
+
+        private static void Drain()
+        {
+            int count = world.DrainEvents(events);
+            Say("events " + count.ToString(CultureInfo.InvariantCulture));
+            for (int i = 0; i < count; ++i)
+            {
+                SoftEvent e = events[i];
+                string row = HashOf((float)e.Time, (float)e.Impulse.X, (float)e.Impulse.Y, (float)e.Impulse.Z,
+                    (float)e.Duration);
+                Say(string.Format(CultureInfo.InvariantCulture, "{0} {1} {2} {3} {4} {5}", (int)e.Kind, e.Collider,
+                    e.Step, SlotOf(e.Body), SlotOf(e.Other), row));
+            }
+        }
+
+        private static void SayBodies(int count)
+        {
+            var slots = new string[count];
+            for (int i = 0; i < count; ++i) slots[i] = SlotOf(bodies[i]).ToString(CultureInfo.InvariantCulture);
+            Say(count == 0 ? "nothing" : string.Join(" ", slots));
+        }
+
+        private static void Load()
+        {
+            Vector3d f, torque;
+            Body who = Who();
+            who.GetLoad(Whole(), out f, out torque);
+            Say(HashOf((float)f.X, (float)f.Y, (float)f.Z, (float)torque.X, (float)torque.Y, (float)torque.Z));
+        }
+
+        private static void Hold()
+        {
+            Body who = Who();
+            int triangle = Whole();
+            Vector3d weights = Vector();
+            who.Grab(new Pull(triangle, weights, Vector()) { Frequency = Number(), MaxForce = Number() });
+        }
+
+        private static Grab Held()
+        {
+            return world.GetGrab(Whole());
+        }
+
+        private static void SayForce(Vector3d force)
+        {
+            Say(HashOf((float)force.X, (float)force.Y, (float)force.Z));
+        }
+
+        private static void SayPose(Pose pose)
+        {
+            Vector3d p = pose.Position;
+            Quaterniond r = pose.Rotation;
+            Say(HashOf((float)p.X, (float)p.Y, (float)p.Z, (float)r.X, (float)r.Y, (float)r.Z, (float)r.W));
         }
 
         private static void AddCollider()
@@ -165,7 +226,27 @@ namespace TaichiSoft
             { "positions", Positions },
             { "mesh", Mesh },
             { "collider_impulse", ColliderImpulse },
-            { "collider_pose", ColliderPose },
+            { "collider_pose", () => SayPose(world.GetColliderPose(Whole())) },
+            { "record_events", () => world.RecordEvents((EventKinds)Whole()) },
+            { "drain", Drain },
+            {
+                "overlap_sphere",
+                () => { Vector3d center = Vector(); SayBodies(world.OverlapSphere(center, Number(), bodies)); }
+            },
+            { "overlap_box", () => { Pose where = Place(); SayBodies(world.OverlapBox(where, Vector(), bodies)); } },
+            {
+                "attach",
+                () => { Body who = Who(); int[] list = List(); int to = Whole(); who.Attach(list, to, Whole() != 0); }
+            },
+            { "detach", () => { Body who = Who(); who.Detach(List()); } },
+            { "load", Load },
+            { "grab", Hold },
+            { "move_grab", () => { Grab held = Held(); held.Move(Vector()); } },
+            { "release_grab", () => Held().Release() },
+            { "grab_force", () => SayForce(Held().GetForce()) },
+            { "add_frame", () => Say(world.AddFrame(Place()).ToString(CultureInfo.InvariantCulture)) },
+            { "remove_frame", () => world.RemoveFrame(Whole()) },
+            { "frame_pose", () => SayPose(world.GetFramePose(Whole())) },
             { "status", () => Say(((int)Who().GetStatus()).ToString(CultureInfo.InvariantCulture)) },
             {
                 "stable_substeps",
@@ -223,14 +304,6 @@ namespace TaichiSoft
             Say(HashOf((float)by.X, (float)by.Y, (float)by.Z, (float)moment.X, (float)moment.Y, (float)moment.Z));
         }
 
-        private static void ColliderPose()
-        {
-            Pose pose = world.GetColliderPose(Whole());
-            Vector3d p = pose.Position;
-            Quaterniond r = pose.Rotation;
-            Say(HashOf((float)p.X, (float)p.Y, (float)p.Z, (float)r.X, (float)r.Y, (float)r.Z, (float)r.W));
-        }
-
         private static int Main(string[] arguments)
         {
             if (arguments.Length != 1)
@@ -243,6 +316,7 @@ namespace TaichiSoft
             using (scene = new Scene(arguments[0]))
             using (world = new World(scene))
             {
+                bodies = new Body[scene.GetInfo().SlotCount];
                 for (string line = Console.In.ReadLine(); line != null; line = Console.In.ReadLine())
                 {
                     words = line.Split(new[] { ' ' }, StringSplitOptions.RemoveEmptyEntries);

@@ -235,6 +235,102 @@ namespace TaichiSoft
         }
     }
 
+    /// <summary>How a body is held: where, with what spring, and where to.</summary>
+    [StructLayout(LayoutKind.Sequential)]
+    public struct Pull
+    {
+        internal uint structSize;
+        /// <summary>Of the body's own surface: that of a Hit.</summary>
+        public int Triangle;
+        /// <summary>Of its vertices; 0 or more, their sum is 1.</summary>
+        public Vector3d Weights;
+        /// <summary>To which it is pulled at first [unit of length].</summary>
+        public Vector3d Point;
+        /// <summary>Of the spring [Hz]: 5 is a hand.</summary>
+        public double Frequency;
+        /// <summary>Below 0 for ten times the body's weight on Earth.</summary>
+        public double MaxForce;
+
+        /// <summary>As a hand does, at a point of a triangle.</summary>
+        public Pull(int triangle, Vector3d weights, Vector3d point) : this()
+        {
+            Triangle = triangle;
+            Weights = weights;
+            Point = point;
+            Frequency = 5.0;
+            MaxForce = -1.0;
+        }
+
+        /// <summary>As a hand does, where a ray has hit.</summary>
+        public Pull(Hit hit) : this(hit.Triangle, hit.Weights, hit.Point)
+        {
+        }
+    }
+
+    /// <summary>What can happen; bits, to say several at once.</summary>
+    [Flags]
+    public enum EventKinds
+    {
+        /// <summary>A body touches a collider or another body.</summary>
+        ContactBegan = 1,
+        /// <summary>They have not touched for 0.05 s, or one of them was taken out.</summary>
+        ContactEnded = 2,
+        /// <summary>A body lies still from now on.</summary>
+        FellAsleep = 4,
+        /// <summary>It moves again.</summary>
+        Woke = 8,
+        /// <summary>It could not be computed any further, and stays where it was.</summary>
+        Froze = 16,
+        /// <summary>All of them.</summary>
+        All = ContactBegan | ContactEnded | FellAsleep | Woke | Froze
+    }
+
+    /// <summary>Something that happened in a step.</summary>
+    public struct SoftEvent
+    {
+        /// <summary>One of the kinds.</summary>
+        public readonly EventKinds Kind;
+        /// <summary>That the body touches; -1 where it touches a body, or nothing.</summary>
+        public readonly int Collider;
+        /// <summary>Of the world, counted from 0.</summary>
+        public readonly long Step;
+        /// <summary>At the end of that step [s].</summary>
+        public readonly double Time;
+        /// <summary>To whom. It may be gone by now: then what is asked of it is refused.</summary>
+        public readonly Body Body;
+        /// <summary>That it touches, the one in the higher slot; IsSomebody is false where there is none.</summary>
+        public readonly Body Other;
+        /// <summary>That Body gave: in that step, or from the beginning of the contact to its end.</summary>
+        public readonly Vector3d Impulse;
+        /// <summary>Of a contact that ended [s].</summary>
+        public readonly double Duration;
+
+        internal SoftEvent(World world, ref PlainEvent plain)
+        {
+            Kind = plain.Kind;
+            Collider = plain.Collider;
+            Step = plain.Step;
+            Time = plain.Time;
+            Body = new Body(world, plain.Body);
+            Other = new Body(world, plain.Other);
+            Impulse = plain.Impulse;
+            Duration = plain.Duration;
+        }
+    }
+
+    // As the library writes it.
+    [StructLayout(LayoutKind.Sequential)]
+    internal struct PlainEvent
+    {
+        internal readonly EventKinds Kind;
+        internal readonly int Collider;
+        internal readonly long Step;
+        internal readonly double Time;
+        internal readonly ulong Body, Other;
+        internal readonly Vector3d Impulse;
+        internal readonly double Duration;
+    }
+
     /// <summary>How much there is in a scene.</summary>
     [StructLayout(LayoutKind.Sequential)]
     public struct SceneInfo
@@ -415,6 +511,8 @@ namespace TaichiSoft
         private static readonly Native.BeforeStep onStep = OnStep;
 
         private readonly ulong handle;
+        private readonly PlainEvent[] drained = new PlainEvent[64];
+        private readonly ulong[] found; // room for all bodies
         private GCHandle self;
         private bool isDisposed;
         private ExceptionDispatchInfo thrown;
@@ -422,6 +520,7 @@ namespace TaichiSoft
         /// <summary>A world as it was exported: at once, but one beside others takes as long as loading.</summary>
         public World(Scene scene)
         {
+            found = new ulong[scene.GetInfo().SlotCount];
             Native.Check(Native.ts_world_create(scene.Handle, out handle), scene);
             self = GCHandle.Alloc(this, GCHandleType.Weak);
             Native.Check(Native.ts_world_on_step(handle, onStep, GCHandle.ToIntPtr(self)), this);
@@ -580,6 +679,42 @@ namespace TaichiSoft
             Native.Check(Native.ts_world_restore(handle, buffer, new UIntPtr((uint)size)), this);
         }
 
+        /// <summary>Record events of these kinds, and no others, from the next step on; 0 for none.</summary>
+        /// <remarks>What touches already counts as a contact that begins in that step.</remarks>
+        public void RecordEvents(EventKinds kinds)
+        {
+            Native.Check(Native.ts_world_record_events(handle, (int)kinds), this);
+        }
+
+        /// <summary>Take the oldest that wait, as many as there is room for. Returns: how many.</summary>
+        public int DrainEvents(SoftEvent[] events)
+        {
+            if (events == null) throw new ArgumentNullException("events");
+            int made = 0;
+            while (made < events.Length)
+            {
+                UIntPtr size;
+                int room = Math.Min(drained.Length, events.Length - made);
+                Native.Check(
+                    Native.ts_world_drain_events(
+                        handle, drained, new UIntPtr(Size<PlainEvent>.Bytes), new UIntPtr((uint)room), out size),
+                    this);
+                int count = (int)size.ToUInt64();
+                for (int i = 0; i < count; ++i) events[made + i] = new SoftEvent(this, ref drained[i]);
+                made += count;
+                if (count < room) break;
+            }
+            return made;
+        }
+
+        /// <summary>How many were dropped so far, as too many waited.</summary>
+        public long DroppedEvents()
+        {
+            long count;
+            Native.Check(Native.ts_world_dropped_events(handle, out count), this);
+            return count;
+        }
+
         /// <summary>Put a body into a free slot of its asset.</summary>
         public Body Spawn(int asset, Placement place)
         {
@@ -613,6 +748,47 @@ namespace TaichiSoft
             Native.Check(Native.ts_world_closest(handle, ref point, maxDistance, ref hit), this);
             body = new Body(this, hit.body);
             return hit.body != 0;
+        }
+
+        /// <summary>Bodies that touch a sphere, or enclose it, by slot. Returns: how many.</summary>
+        /// <remarks>Room for as many bodies as there are slots is always enough.</remarks>
+        public int OverlapSphere(Vector3d center, double radius, Body[] bodies)
+        {
+            UIntPtr count;
+            Native.Check(
+                Native.ts_world_overlap_sphere(handle, ref center, radius, found, RoomOf(bodies), out count), this);
+            return Copy(count, bodies);
+        }
+
+        /// <summary>The same for a box with edges of a size.</summary>
+        public int OverlapBox(Pose pose, Vector3d size, Body[] bodies)
+        {
+            UIntPtr count;
+            Native.Check(
+                Native.ts_world_overlap_box(handle, ref pose, ref size, found, RoomOf(bodies), out count), this);
+            return Copy(count, bodies);
+        }
+
+        private UIntPtr RoomOf(Body[] bodies)
+        {
+            if (bodies == null) throw new ArgumentNullException("bodies");
+            return new UIntPtr((uint)Math.Min(bodies.Length, found.Length));
+        }
+
+        private int Copy(UIntPtr size, Body[] bodies)
+        {
+            int count = (int)size.ToUInt64();
+            for (int i = 0; i < count; ++i) bodies[i] = new Body(this, found[i]);
+            return count;
+        }
+
+        /// <summary>The grab with a number from 0 to 15; one that is not there, for none.</summary>
+        /// <remarks>Grabs of the exported world are there, too.</remarks>
+        public Grab GetGrab(int number)
+        {
+            ulong grab;
+            Native.Check(Native.ts_world_get_grab(handle, number, out grab), this);
+            return new Grab(this, grab);
         }
 
         /// <summary>A new one, where the world was made with room for it. Returns its number.</summary>
@@ -660,6 +836,28 @@ namespace TaichiSoft
         public void GetColliderImpulse(int collider, out Vector3d impulse, out Vector3d moment)
         {
             Native.Check(Native.ts_collider_get_impulse(handle, collider, out impulse, out moment), this);
+        }
+
+        /// <summary>A place that moves as the game says: a bone, a vehicle, a hand. Returns its number.</summary>
+        public int AddFrame(Pose pose)
+        {
+            int frame;
+            Native.Check(Native.ts_frame_add(handle, ref pose, out frame), this);
+            return frame;
+        }
+
+        /// <summary>Take it out of the world. What hangs from it is let go.</summary>
+        public void RemoveFrame(int frame)
+        {
+            Native.Check(Native.ts_frame_remove(handle, frame), this);
+        }
+
+        /// <summary>Where a frame is.</summary>
+        public Pose GetFramePose(int frame)
+        {
+            Pose pose;
+            Native.Check(Native.ts_frame_get_pose(handle, frame, out pose), this);
+            return pose;
         }
 
         /// <summary>Be there at the end of the coming step, with what is attached.</summary>
@@ -837,6 +1035,90 @@ namespace TaichiSoft
             }
             Check(Native.ts_body_set_targets(World.Handle, Id, vertices, Native.Count(vertices), targets));
         }
+
+        /// <summary>Let vertices go with a frame, from where both are now.</summary>
+        /// <remarks>`feels`: GetLoad is asked later.</remarks>
+        public void Attach(int[] vertices, int frame, bool feels = false)
+        {
+            Check(Native.ts_body_attach(World.Handle, Id, vertices, Native.Count(vertices), frame, feels ? 1 : 0));
+        }
+
+        /// <summary>Let vertices go that hang from a frame, with their velocity; null stands for all that do.</summary>
+        public void Detach(int[] vertices = null)
+        {
+            Check(Native.ts_body_detach(World.Handle, Id, vertices, Native.Count(vertices)));
+        }
+
+        /// <summary>What it pulled a frame with, mean over the last step, and the torque about its origin.</summary>
+        public void GetLoad(int frame, out Vector3d force, out Vector3d torque)
+        {
+            Check(Native.ts_body_get_load(World.Handle, Id, frame, out force, out torque));
+        }
+
+        /// <summary>Take hold of its surface. There can be 16 grabs at a time.</summary>
+        public Grab Grab(Pull pull)
+        {
+            ulong grab;
+            pull.structSize = Size<Pull>.Bytes;
+            Check(Native.ts_body_grab(World.Handle, Id, ref pull, out grab));
+            return new Grab(World, grab);
+        }
+    }
+
+    /// <summary>A hand on a body. Another one that comes later is another Grab.</summary>
+    public struct Grab
+    {
+        private readonly World world;
+
+        /// <summary>The library's number; 0 is none.</summary>
+        public readonly ulong Id;
+
+        internal Grab(World world, ulong id)
+        {
+            this.world = world;
+            Id = id;
+        }
+
+        /// <summary>Whether there was any at that number.</summary>
+        public bool IsThere
+        {
+            get { return Id != 0; }
+        }
+
+        /// <summary>Where it is.</summary>
+        public World World
+        {
+            get
+            {
+                if (world == null) throw new SoftException(ErrorCode.Handle, "this grab is of no world");
+                return world;
+            }
+        }
+
+        private void Check(int result)
+        {
+            Native.Check(result, world);
+        }
+
+        /// <summary>Pull to another place from the coming step on.</summary>
+        public void Move(Vector3d point)
+        {
+            Check(Native.ts_grab_move(World.Handle, Id, ref point));
+        }
+
+        /// <summary>Let go.</summary>
+        public void Release()
+        {
+            Check(Native.ts_grab_release(World.Handle, Id));
+        }
+
+        /// <summary>With what it pulls, in the last substep.</summary>
+        public Vector3d GetForce()
+        {
+            Vector3d force;
+            Check(Native.ts_grab_get_force(World.Handle, Id, out force));
+            return force;
+        }
     }
 
     // Unity's IL2CPP looks for an attribute of this name; it need not be Unity's own.
@@ -982,6 +1264,16 @@ namespace TaichiSoft
         internal static extern int ts_world_restore(ulong world, byte[] bytes, UIntPtr size);
 
         [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_world_record_events(ulong world, int kinds);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_world_drain_events(ulong world, PlainEvent[] events, UIntPtr event_size,
+            UIntPtr capacity, out UIntPtr count);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_world_dropped_events(ulong world, out long count);
+
+        [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_world_spawn(ulong world, int asset, ref Placement place, out ulong body);
 
         [DllImport(Library, CallingConvention = C)]
@@ -1051,11 +1343,45 @@ namespace TaichiSoft
             float[] targets);
 
         [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_body_attach(ulong world, ulong body, int[] vertices, UIntPtr count, int frame,
+            int feels);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_body_detach(ulong world, ulong body, int[] vertices, UIntPtr count);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_body_get_load(ulong world, ulong body, int frame, out Vector3d force,
+            out Vector3d torque);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_body_grab(ulong world, ulong body, ref Pull pull, out ulong grab);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_world_get_grab(ulong world, int number, out ulong grab);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_grab_move(ulong world, ulong grab, ref Vector3d point);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_grab_release(ulong world, ulong grab);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_grab_get_force(ulong world, ulong grab, out Vector3d force);
+
+        [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_world_raycast(ulong world, ref Vector3d origin, ref Vector3d direction,
             double reach, ref Hit hit);
 
         [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_world_closest(ulong world, ref Vector3d point, double reach, ref Hit hit);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_world_overlap_sphere(ulong world, ref Vector3d center, double radius,
+            ulong[] bodies, UIntPtr capacity, out UIntPtr count);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_world_overlap_box(ulong world, ref Pose pose, ref Vector3d size, ulong[] bodies,
+            UIntPtr capacity, out UIntPtr count);
 
         [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_collider_add(ulong world, ref Shape shape, ref Pose pose, out int collider);
@@ -1081,6 +1407,15 @@ namespace TaichiSoft
             out Vector3d moment);
 
         [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_frame_add(ulong world, ref Pose pose, out int frame);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_frame_remove(ulong world, int frame);
+
+        [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_frame_move_to(ulong world, int frame, ref Pose pose);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_frame_get_pose(ulong world, int frame, out Pose pose);
     }
 }
