@@ -31,6 +31,9 @@ namespace TaichiSoft
         [SerializeField, Tooltip("Frames that follow game objects")]
         private Follower[] frames = new Follower[0];
 
+        private readonly SoftEvent[] events = new SoftEvent[64]; // those from `toldCount` on are not told yet
+        private EventKinds recorded;
+        private int eventCount, toldCount;
         private int[] colliderNumbers, frameNumbers;
         private float fixedStep;
         private double ahead; // of the last step, put in by Update [s]
@@ -43,6 +46,22 @@ namespace TaichiSoft
 
         /// <summary>Its time after the last call.</summary>
         public Clock Clock { get; private set; }
+
+        /// <summary>A body touches a collider or another body. Told in Update, as all events are.</summary>
+        /// <remarks>Kinds to which nobody listens are not recorded: listen in Start, before the first step.</remarks>
+        public event Action<SoftEvent> ContactBegan;
+
+        /// <summary>They touch no longer. Impulse is that of the whole contact, Duration how long it was.</summary>
+        public event Action<SoftEvent> ContactEnded;
+
+        /// <summary>A body lies still, and costs nothing.</summary>
+        public event Action<SoftEvent> FellAsleep;
+
+        /// <summary>It moves again.</summary>
+        public event Action<SoftEvent> Woke;
+
+        /// <summary>It could not be computed any further, and stays where it was.</summary>
+        public event Action<SoftEvent> Froze;
 
         private void Awake()
         {
@@ -69,6 +88,7 @@ namespace TaichiSoft
                 World.SetFixedStep(fixedStep); // forgets what Update has put in
                 ahead = 0;
             }
+            Record();
             for (int i = 0; i < colliderNumbers.Length; ++i)
             {
                 World.MoveCollider(colliderNumbers[i], PoseOf(colliders[i].target));
@@ -85,9 +105,55 @@ namespace TaichiSoft
         {
             if (fixedStep == 0) return; // no step yet
             double now = Math.Min((double)Time.time - Time.fixedTime, 0.999 * fixedStep);
-            if (now <= ahead) return;
-            Clock = World.Advance(now - ahead);
-            ahead = now;
+            if (now > ahead)
+            {
+                Clock = World.Advance(now - ahead);
+                ahead = now;
+            }
+            TellEvents();
+        }
+
+        private void Record()
+        {
+            EventKinds wanted = 0;
+            if (ContactBegan != null) wanted |= EventKinds.ContactBegan;
+            if (ContactEnded != null) wanted |= EventKinds.ContactEnded;
+            if (FellAsleep != null) wanted |= EventKinds.FellAsleep;
+            if (Woke != null) wanted |= EventKinds.Woke;
+            if (Froze != null) wanted |= EventKinds.Froze;
+            if (wanted == recorded) return;
+            World.RecordEvents(wanted);
+            recorded = wanted;
+        }
+
+        // A listener may throw: then the rest is told in the next frame.
+        private void TellEvents()
+        {
+            while (World != null) // a listener may end it
+            {
+                if (toldCount == eventCount)
+                {
+                    toldCount = 0;
+                    eventCount = 0; // if the next line throws
+                    eventCount = World.DrainEvents(events);
+                    if (eventCount == 0) return;
+                }
+                SoftEvent next = events[toldCount++];
+                Action<SoftEvent> listeners = ListenersTo(next.Kind);
+                if (listeners != null) listeners(next);
+            }
+        }
+
+        private Action<SoftEvent> ListenersTo(EventKinds kind)
+        {
+            switch (kind)
+            {
+                case EventKinds.ContactBegan: return ContactBegan;
+                case EventKinds.ContactEnded: return ContactEnded;
+                case EventKinds.FellAsleep: return FellAsleep;
+                case EventKinds.Woke: return Woke;
+                default: return Froze;
+            }
         }
 
         private void OnDestroy()

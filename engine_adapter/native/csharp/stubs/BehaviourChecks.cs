@@ -63,6 +63,23 @@ namespace TaichiSoft
             var times = new Random(1);
             double time = 0;
             int steps = 0;
+            var told = new int[(int)EventKinds.All];
+            bool isFirst = true;
+            Action<SoftEvent> count = happened =>
+            {
+                Require(happened.Step < steps && happened.Body.World == world.World, "an event of elsewhere");
+                ++told[(int)happened.Kind];
+            };
+            world.ContactBegan += count;
+            world.ContactEnded += count;
+            world.FellAsleep += count;
+            world.Woke += count;
+            world.ContactBegan += happened =>
+            {
+                bool throws = isFirst;
+                isFirst = false;
+                if (throws) throw new InvalidOperationException();
+            };
             Action frame = () =>
             {
                 time += 0.002 + 0.03 * times.NextDouble(); // less than a step, or more
@@ -78,7 +95,19 @@ namespace TaichiSoft
                 lateUpdate();
             };
 
-            for (int i = 0; i < 100; ++i) frame();
+            int thrown = 0;
+            for (int i = 0; i < 100; ++i)
+            {
+                try
+                {
+                    frame();
+                }
+                catch (InvalidOperationException)
+                {
+                    ++thrown; // Unity goes on with the next frame, too
+                }
+            }
+            Require(thrown == 1, "what a listener throws is lost");
             long before = GC.GetAllocatedBytesForCurrentThread();
             for (int i = 0; i < 1000; ++i)
             {
@@ -94,11 +123,22 @@ namespace TaichiSoft
             var plain = new World(scene);
             int asset = plain.GetBody(1).GetAsset();
             var expected = new float[3 * drawn.vertices.Length];
+            var events = new SoftEvent[3]; // fewer than some steps have
+            var happenedThere = new int[told.Length];
+            plain.RecordEvents(EventKinds.All & ~EventKinds.Froze);
             for (int i = 1; i <= steps; ++i)
             {
                 double height = 0.2f + 0.1f * (float)Math.Sin(0.05 * i);
                 plain.MoveCollider(0, new Pose(new Vector3d(0, height, 0), Quaterniond.Identity));
                 plain.Step(Step);
+                for (int made = plain.DrainEvents(events); made > 0; made = plain.DrainEvents(events))
+                {
+                    for (int k = 0; k < made; ++k) ++happenedThere[(int)events[k].Kind];
+                }
+            }
+            for (int kind = 0; kind < told.Length; ++kind)
+            {
+                Require(told[kind] == happenedThere[kind], "events are not those of the world");
             }
             Require(plain.Hash() == world.World.Hash(), "the world went another way");
             plain.SetFixedStep(Step);
@@ -137,6 +177,7 @@ namespace TaichiSoft
             plain.Dispose();
             scene.Dispose();
             Console.WriteLine("steps: {0}", steps);
+            Console.WriteLine("contacts: {0}", told[(int)EventKinds.ContactBegan]);
             return 0;
         }
     }
