@@ -9,6 +9,7 @@
 
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -44,6 +45,12 @@ struct Pose {
     for (int i = 0; i < 4; ++i) found.rotation[i] = rotation[i];
     return found;
   }
+  static Pose of(const ts_pose& plain) {
+    Pose found;
+    for (int i = 0; i < 3; ++i) found.position[i] = plain.position[i];
+    for (int i = 0; i < 4; ++i) found.rotation[i] = plain.rotation[i];
+    return found;
+  }
 };
 
 // A body of a world; a small number, to copy as you like. One that was taken out is refused.
@@ -52,10 +59,59 @@ struct Body {
   explicit operator bool() const { return handle != 0; }
 };
 
+// A hand on a body, from `World::grab`; it lets go when it ends. Moves, but has no copies.
+class Grab {
+ public:
+  Grab() = default;
+  // Takes over a grab that is there, as of `ts_world_get_grab`.
+  Grab(ts_world world, ts_grab handle) : world_(world), handle_(handle) {}
+  Grab(Grab&& other) noexcept { swap(other); }
+  Grab& operator=(Grab&& other) noexcept {
+    swap(other);
+    return *this;
+  }
+  Grab(const Grab&) = delete;
+  Grab& operator=(const Grab&) = delete;
+  ~Grab() {
+    if (handle_ != 0) ts_grab_release(world_, handle_);  // refused where the world or the body is gone: it is let go
+  }
+
+  ts_grab handle() const { return handle_; }
+  explicit operator bool() const { return handle_ != 0; }
+
+  void move(const Vector& point) { check(ts_grab_move(world_, handle_, point.data())); }
+  // With what it pulls, in the last substep [N].
+  Vector force() const {
+    Vector found;
+    check(ts_grab_get_force(world_, handle_, found.data()));
+    return found;
+  }
+  // Let go now.
+  void release() {
+    check(ts_grab_release(world_, handle_));
+    handle_ = 0;
+  }
+
+ private:
+  void swap(Grab& other) noexcept {
+    std::swap(world_, other.world_);
+    std::swap(handle_, other.handle_);
+  }
+
+  ts_world world_ = 0;
+  ts_grab handle_ = 0;
+};
+
 // An instance of a scene. Moves, but has no copies.
 class World {
  public:
-  explicit World(ts_scene scene) { check(ts_world_create(scene, &handle_)); }
+  explicit World(ts_scene scene) {
+    ts_scene_info info{};
+    info.struct_size = sizeof info;
+    check(ts_scene_get_info(scene, &info));
+    slot_count_ = info.slot_count;
+    check(ts_world_create(scene, &handle_));
+  }
   World(World&& other) noexcept { swap(other); }
   World& operator=(World&& other) noexcept {
     swap(other);
@@ -99,6 +155,24 @@ class World {
     return bytes;
   }
   void restore(const std::vector<char>& bytes) { check(ts_world_restore(handle_, bytes.data(), bytes.size())); }
+
+  // Of these kinds, bits such as TS_CONTACT_BEGAN, from the next step on; 0 for none.
+  void record_events(int32_t kinds) { check(ts_world_record_events(handle_, kinds)); }
+  // All that wait, instead of what was in `events`. Keep that from frame to frame, and nothing is allocated.
+  void drain_events(std::vector<ts_event>& events) {
+    std::array<ts_event, 64> some;
+    size_t count = some.size();
+    events.clear();
+    while (count == some.size()) {
+      check(ts_world_drain_events(handle_, some.data(), sizeof(ts_event), some.size(), &count));
+      events.insert(events.end(), some.begin(), some.begin() + static_cast<std::ptrdiff_t>(count));
+    }
+  }
+  int64_t dropped_events() const {
+    int64_t found = 0;
+    check(ts_world_dropped_events(handle_, &found));
+    return found;
+  }
 
   Body body(int32_t slot) const {
     Body found;
@@ -148,6 +222,36 @@ class World {
     check(ts_body_apply_force(handle_, body.handle, force.data(), vertices.data(), vertices.size()));
   }
 
+  // Let vertices go with a frame; `feels` where `load` is asked later.
+  void attach(Body body, const std::vector<int32_t>& vertices, int32_t frame, bool feels = false) {
+    check(ts_body_attach(handle_, body.handle, vertices.data(), vertices.size(), frame, feels ? 1 : 0));
+  }
+  // All that hang from a frame, or those in a list.
+  void detach(Body body, const std::vector<int32_t>& vertices = {}) {
+    check(ts_body_detach(handle_, body.handle, vertices.data(), vertices.size()));
+  }
+  // Force with which it pulled a frame, mean over the last step [N], and torque about the frame's origin.
+  std::pair<Vector, Vector> load(Body body, int32_t frame) const {
+    std::pair<Vector, Vector> found;
+    check(ts_body_get_load(handle_, body.handle, frame, found.first.data(), found.second.data()));
+    return found;
+  }
+  // Take hold of a body where a ray has hit it. A `max_force` below 0 is ten times its weight on Earth.
+  Grab grab(const ts_hit& hit, double frequency = 5.0, double max_force = -1.0) {
+    ts_pull pull{};
+    pull.struct_size = sizeof pull;
+    pull.triangle = hit.triangle;
+    for (int i = 0; i < 3; ++i) {
+      pull.weights[i] = hit.weights[i];
+      pull.point[i] = hit.point[i];
+    }
+    pull.frequency = frequency;
+    pull.max_force = max_force;
+    ts_grab found = 0;
+    check(ts_body_grab(handle_, hit.body, &pull, &found));
+    return Grab(handle_, found);
+  }
+
   // Its body is 0 where nothing is met.
   ts_hit raycast(const Vector& origin, const Vector& direction, double max_distance = HUGE_VAL) const {
     ts_hit found{};
@@ -162,6 +266,19 @@ class World {
     return found;
   }
 
+  // Bodies that touch a sphere or a box with edges of `size`, or enclose it, by slot.
+  std::vector<Body> overlap_sphere(const Vector& center, double radius) const {
+    return overlap([&](ts_body* bodies, size_t capacity, size_t* count) {
+      return ts_world_overlap_sphere(handle_, center.data(), radius, bodies, capacity, count);
+    });
+  }
+  std::vector<Body> overlap_box(const Pose& pose, const Vector& size) const {
+    const ts_pose plain = pose.plain();
+    return overlap([&](ts_body* bodies, size_t capacity, size_t* count) {
+      return ts_world_overlap_box(handle_, &plain, size.data(), bodies, capacity, count);
+    });
+  }
+
   void move_collider(int32_t collider, const Pose& pose) {
     const ts_pose plain = pose.plain();
     check(ts_collider_move_to(handle_, collider, &plain));
@@ -172,6 +289,20 @@ class World {
     check(ts_collider_get_impulse(handle_, collider, found.first.data(), found.second.data()));
     return found;
   }
+  // A place that moves as the game says. Returns its number.
+  int32_t add_frame(const Pose& pose) {
+    const ts_pose plain = pose.plain();
+    int32_t found = 0;
+    check(ts_frame_add(handle_, &plain, &found));
+    return found;
+  }
+  // What hangs from it is let go.
+  void remove_frame(int32_t frame) { check(ts_frame_remove(handle_, frame)); }
+  Pose frame_pose(int32_t frame) const {
+    ts_pose plain{};
+    check(ts_frame_get_pose(handle_, frame, &plain));
+    return Pose::of(plain);
+  }
   void move_frame(int32_t frame, const Pose& pose) {
     const ts_pose plain = pose.plain();
     check(ts_frame_move_to(handle_, frame, &plain));
@@ -181,9 +312,20 @@ class World {
   void swap(World& other) noexcept {
     std::swap(handle_, other.handle_);
     std::swap(before_, other.before_);
+    std::swap(slot_count_, other.slot_count_);
+  }
+  template <typename Call>
+  std::vector<Body> overlap(Call call) const {
+    std::vector<ts_body> bodies(static_cast<size_t>(slot_count_));
+    size_t count = 0;
+    check(call(bodies.data(), bodies.size(), &count));
+    std::vector<Body> found;
+    for (size_t i = 0; i < count; ++i) found.push_back(Body{bodies[i]});
+    return found;
   }
 
   ts_world handle_ = 0;
+  int32_t slot_count_ = 0;
   std::unique_ptr<std::function<void()>> before_;  // stays where it is when the world moves
 };
 
