@@ -69,6 +69,15 @@ static ts_body any_body(ts_world world) {
   return found;
 }
 
+static ts_grab any_grab(ts_world world) { /* or one that was, or one of another world */
+  static ts_grab known[16];
+  ts_grab found = 0;
+  if (one_in(15)) return next();
+  if (one_in(6)) return known[below(16)];
+  ts_world_get_grab(world, (int32_t)below(one_in(2) ? 3 : 18) - 1, &found);
+  return known[below(16)] = found;
+}
+
 static float rows[ROOM], normals[ROOM];
 static int32_t vertices[64];
 
@@ -90,11 +99,99 @@ static ts_pose* pose(void) {
 
 static uint32_t size_of(size_t size) { return one_in(10) ? (uint32_t)next() : (uint32_t)size; }
 
+static void broken(const char* what) {
+  fprintf(stderr, "%s (last error: %s)\n", what, ts_last_error());
+  exit(1);
+}
+
+static ts_pull* pull(void) {
+  static ts_pull found;
+  double* weights = found.weights;
+  memset(&found, 0, sizeof found);
+  found.struct_size = size_of(sizeof found);
+  found.triangle = whole(40);
+  for (int i = 0; i < 3; ++i) weights[i] = one_in(20) ? number() : 0.1 + below(100), found.point[i] = number();
+  const double sum = weights[0] + weights[1] + weights[2];
+  for (int i = 0; i < 3 && !one_in(30); ++i) weights[i] /= sum;
+  found.frequency = one_in(4) ? number() : 5.0;
+  found.max_force = number();
+  return one_in(20) ? NULL : &found;
+}
+
+/* They wait no longer, and say who, where and when. */
+static ts_result drain(ts_world world) {
+  static ts_event events[100];
+  const int has_room = !one_in(10);
+  const size_t capacity = has_room ? (one_in(4) ? below(3) : below(101)) : one_in(3) ? 0 : (size_t)next();
+  size_t count = 0, left = 0;
+  const ts_result result =
+      ts_world_drain_events(world, has_room ? events : NULL, one_in(10) ? (size_t)next() : sizeof(ts_event), capacity,
+                            one_in(10) ? NULL : &count);
+  if (result != TS_OK) return result;
+  if (count > capacity) broken("more events than there is room for");
+  for (size_t i = 0; i < count; ++i) {
+    const ts_event* e = events + i;
+    const int is_contact = e->kind == TS_CONTACT_BEGAN || e->kind == TS_CONTACT_ENDED;
+    if (e->kind <= 0 || (e->kind & ~TS_ALL_EVENTS) != 0 || (e->kind & (e->kind - 1)) != 0) broken("an event of no kind");
+    if (e->body == 0 || e->step < 0 || e->collider < -1) broken("an event of nobody, or never");
+    if ((e->collider >= 0) + (e->other != 0) != is_contact) broken("an event with one too many, or too few");
+    if (!isfinite(e->time) || !isfinite(e->impulse[0] + e->impulse[1] + e->impulse[2]) || !(e->duration >= 0.0)) {
+      broken("an event that is not finite");
+    }
+  }
+  if (count < capacity && (ts_world_drain_events(world, events, sizeof(ts_event), 100, &left) != TS_OK || left != 0)) {
+    broken("events are left");
+  }
+  return result;
+}
+
+static ts_result overlap(ts_world world) {
+  static ts_body bodies[16];
+  const int has_room = !one_in(10);
+  const size_t capacity = has_room ? (one_in(2) ? 16 : below(16)) : one_in(3) ? 0 : (size_t)next();
+  size_t count = 0;
+  ts_body* into = has_room ? bodies : NULL;
+  size_t* size = one_in(10) ? NULL : &count;
+  const ts_result result = one_in(2) ? ts_world_overlap_sphere(world, numbers(3), number(), into, capacity, size)
+                                     : ts_world_overlap_box(world, pose(), numbers(3), into, capacity, size);
+  if (result != TS_OK) return result;
+  if (count > capacity) broken("more bodies than there is room for");
+  for (size_t i = 0; i < count; ++i) {
+    const int32_t slot = (int32_t)(bodies[i] & 0xFFFFFFFFu) - 1;
+    ts_body there = 0;
+    if (ts_world_get_body(world, slot, &there) != TS_OK || there != bodies[i]) broken("a body that is not there");
+    if (i > 0 && (bodies[i - 1] & 0xFFFFFFFFu) - 1 >= (uint32_t)slot) broken("bodies are not in the order of slots");
+  }
+  return result;
+}
+
+static ts_result take_hold(ts_world world, ts_body body) {
+  ts_grab made = 0, there = 0;
+  ts_grab* grab = one_in(20) ? NULL : &made;
+  const ts_result result = ts_body_grab(world, body, pull(), grab);
+  if (result != TS_OK) return result;
+  for (int32_t i = 0; i < 16 && there != made; ++i) {
+    if (ts_world_get_grab(world, i, &there) != TS_OK) broken("no number of a grab");
+  }
+  if (made == 0 || there != made) broken("a grab that is not there");
+  return result;
+}
+
+static ts_result add_frame(ts_world world) {
+  int32_t made = -1;
+  ts_pose there;
+  const ts_result result = ts_frame_add(world, pose(), one_in(20) ? NULL : &made);
+  if (result == TS_OK && (ts_frame_get_pose(world, made, &there) != TS_OK || !isfinite(there.position[0]))) {
+    broken("a frame that is not there");
+  }
+  return result;
+}
+
 static ts_result one_call(ts_world world) {
   const ts_body body = any_body(world);
   size_t count = 0;
   const int32_t* which = list(&count);
-  switch (below(41)) {
+  switch (below(57)) {
     case 0: case 1: case 2: return ts_world_step(world, one_in(8) ? number() : 0.01, one_in(8) ? whole(50) : 4);
     case 3: {
       ts_clock clock = {size_of(sizeof clock), 0, 0, 0, 0, 0};
@@ -184,6 +281,26 @@ static ts_result one_call(ts_world world) {
       if (one_in(2)) return ts_world_closest(world, numbers(3), number(), one_in(20) ? NULL : &hit);
       return ts_world_raycast(world, numbers(3), numbers(3), number(), one_in(20) ? NULL : &hit);
     }
+    case 40: return ts_world_record_events(world, one_in(4) ? whole(40) : TS_ALL_EVENTS);
+    case 41: case 42: return drain(world);
+    case 43: {
+      int64_t dropped = 0;
+      return ts_world_dropped_events(world, one_in(10) ? NULL : &dropped);
+    }
+    case 44: case 45: return overlap(world);
+    case 46: return ts_body_attach(world, body, which, count, whole(3), whole(2));
+    case 47: return ts_body_detach(world, body, which, count);
+    case 48: return ts_body_get_load(world, body, whole(3), numbers(3), numbers(3));
+    case 49: return take_hold(world, body);
+    case 50: {
+      ts_grab found = 0;
+      return ts_world_get_grab(world, whole(16), one_in(10) ? NULL : &found);
+    }
+    case 51: return ts_grab_move(world, any_grab(world), numbers(3));
+    case 52: return ts_grab_release(world, any_grab(world));
+    case 53: return ts_grab_get_force(world, any_grab(world), numbers(3));
+    case 54: return add_frame(world);
+    case 55: return one_in(2) ? ts_frame_remove(world, whole(8)) : ts_frame_get_pose(world, whole(3), pose());
     default: {
       double center[3];
       return ts_body_center(world, body, one_in(10) ? NULL : center);
@@ -191,20 +308,26 @@ static ts_result one_call(ts_world world) {
   }
 }
 
-static void broken(const char* what) {
-  fprintf(stderr, "%s (last error: %s)\n", what, ts_last_error());
-  exit(1);
+/* Numbers of all bodies and grabs. */
+static void look(ts_world world, uint64_t found[32]) {
+  for (int32_t i = 0; i < 32; ++i) {
+    found[i] = 0;
+    if (i < 16) ts_world_get_grab(world, i, found + i);
+    if (i >= 16) ts_world_get_body(world, i - 16, found + i);
+  }
 }
 
 /* A snapshot that was taken goes back; one that is damaged is refused. */
 static void try_snapshots(ts_world world) {
   size_t size = 0;
-  uint64_t before = 0, after = 0;
+  uint64_t before = 0, after = 0, there[32], again[32];
   if (ts_world_snapshot(world, NULL, 0, &size) != TS_OK) return;
   char* bytes = malloc(size);
   if (ts_world_snapshot(world, bytes, size - 1, &size) != TS_ERROR_SIZE) broken("a small buffer was taken");
   if (ts_world_snapshot(world, bytes, size, &size) != TS_OK) broken("no snapshot");
   ts_world_hash(world, &before);
+  look(world, there);
+  for (uint32_t i = below(10); i > 0; --i) one_call(world);
   if (ts_world_step(world, 0.01, 4) != TS_OK) broken("no step");
   char* other = malloc(size);
   memcpy(other, bytes, size);
@@ -214,6 +337,8 @@ static void try_snapshots(ts_world world) {
   if (ts_world_restore(world, bytes, size) != TS_OK) broken("a snapshot was refused");
   ts_world_hash(world, &after);
   if (before != after) broken("a snapshot did not bring the state back");
+  look(world, again);
+  if (memcmp(there, again, sizeof there) != 0) broken("a snapshot did not bring the numbers back");
   free(bytes);
   free(other);
 }
