@@ -82,6 +82,20 @@ REFUSED = {
     "snapshot": "Snapshot: these bytes are no snapshot",
     "room for a snapshot": r"Size: buffer has 3 bytes: give \d+",
     "body of no world": "Handle: this body is of no world",
+    "kinds": "Argument: ",
+    "small overlap": "Size: bodies has room for 1",
+    "radius": "Argument: radius is -1",
+    "box": "Argument: size has -?nan in it",
+    "no frame": "Argument: there is no frame 99",
+    "nothing to attach": "Argument: no vertex is named: give null for all",
+    "no load": "Argument: there is no frame 99",
+    "pose of no frame": "Argument: there is no frame 99",
+    "removed frame": "Argument: there is no frame 0",
+    "weights": "Argument: weights",
+    "no triangle": "Argument: there is no triangle 9999",
+    "no grab": "Argument: number is 16",
+    "grab of no world": "Handle: this grab is of no world",
+    "grab that was released": r"Handle: there is no grab \d+, or no more",
     "callback": "from BeforeStep",
     "world destroyed in a step": r"Handle: there is no world \d+, or no more",
     "world after Dispose": r"Handle: there is no world \d+, or no more",
@@ -129,12 +143,13 @@ def test_components_draw_a_body_in_unitys_axes(export, compiled, run):
     found = dict(line.split(": ") for line in run(program, export("heap", "--axes", "unity")))
     assert found["allocated"] == "0"
     assert int(found["steps"]) > 500
+    assert int(found["contacts"]) > 10
 
 
 def test_the_code_of_the_page_compiles(compiled, tmp_path):
     text = (ROOT / "docs" / "unity.md").read_text(encoding="utf-8")
     blocks = re.findall(r"^```csharp\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
-    assert len(blocks) == 2
+    assert len(blocks) == 4
     for number, block in enumerate(blocks):
         (tmp_path / f"{number}.cs").write_text(
             f"#pragma warning disable 649 // set in the inspector\n{block}"
@@ -169,7 +184,7 @@ def kind_of_c(argument):
     kind, name = kind.strip(), re.sub(r"\[\d\]", "", name)
     if kind.endswith("*") or "[" in argument or name in ("user", "function"):
         return name, "pointer"
-    if kind in ("ts_scene", "ts_world", "ts_body"):
+    if kind in ("ts_scene", "ts_world", "ts_body", "ts_grab"):
         return name, "u64"
     return name, {"int32_t": "i32", "double": "f64", "size_t": "size"}[kind]
 
@@ -187,11 +202,14 @@ def test_codes_and_kinds_have_the_numbers_of_the_header():
         ("ErrorCode", "TS_ERROR_", 9),
         ("NameKind", "TS_", 5),
         ("BodyStatus", "TS_", 3),
+        ("ShapeKind", "TS_", 4),
+        ("EventKinds", "TS_", 5),
     ):
         body = re.search(rf"enum {kind}\s*{{(.*?)}}", source, re.DOTALL).group(1)
         rows = re.findall(r"^ +(\w+) = (-?\d+)", body, re.MULTILINE)
         assert len(rows) == count
         for name, number in rows:
-            assert f"{prefix}{name.upper()} = {number}" in header, name
+            words = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).upper()
+            assert f"{prefix}{words} = {number}" in header, name
     (version,) = re.findall(r"const uint Version = (\d+);", source)
     assert f"#define TS_VERSION {version}\n" in header

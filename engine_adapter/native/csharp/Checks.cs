@@ -55,6 +55,31 @@ namespace TaichiSoft
             Refused("snapshot", () => world.Restore(new byte[100]));
             Refused("room for a snapshot", () => world.Snapshot(new byte[3]));
             Refused("body of no world", () => default(Body).GetAsset());
+            var some = new[] { 0, 1, 2 };
+            var corner = new Pull(0, new Vector3d(1, 0, 0), new Vector3d(0, 0, 1));
+            Vector3d force, torque;
+            Refused("kinds", () => world.RecordEvents((EventKinds)32));
+            Refused("small overlap", () => world.OverlapSphere(new Vector3d(0, 0, 1), 9, new Body[1]));
+            Refused("radius", () => world.OverlapSphere(new Vector3d(0, 0, 1), -1, new Body[9]));
+            Refused("box", () => world.OverlapBox(pose, new Vector3d(1, double.NaN, 1), new Body[9]));
+            Refused("no frame", () => ball.Attach(some, 99));
+            Refused("nothing to attach", () => ball.Attach(new int[0], 0));
+            Refused("no load", () => ball.GetLoad(99, out force, out torque));
+            Refused("pose of no frame", () => world.GetFramePose(99));
+            Refused("removed frame", () => { world.RemoveFrame(world.AddFrame(pose)); world.RemoveFrame(0); });
+            Refused("weights", () => ball.Grab(new Pull(0, new Vector3d(1, 1, 1), new Vector3d(0, 0, 1))));
+            Refused("no triangle", () => ball.Grab(new Pull(9999, corner.Weights, corner.Point)));
+            Refused("no grab", () => world.GetGrab(16));
+            Refused("grab of no world", () => default(Grab).Release());
+            Grab held = ball.Grab(corner);
+            Require(world.GetGrab(0).Id == held.Id && !world.GetGrab(1).IsThere, "a grab has no number");
+            held.Release();
+            Refused("grab that was released", () => held.Move(corner.Point));
+
+            Body brick = world.GetBody(5), nobody = world.GetBody(4);
+            Require(brick.IsAlive && !nobody.IsAlive, "a body does not live that does, or the other way");
+            brick.Despawn();
+            Require(!brick.IsAlive && brick.IsSomebody, "a body lives that was taken out");
 
             world.BeforeStep = each => { throw new InvalidOperationException("from BeforeStep"); };
             try
@@ -93,6 +118,14 @@ namespace TaichiSoft
                 float[] vertices = new float[count], normals = new float[count];
                 var positions = new float[3 * scene.GetAssetInfo(ball.GetAsset()).VertexCount];
                 var some = new[] { 0, 1, 2 };
+                var events = new SoftEvent[200];
+                var bodies = new Body[scene.GetInfo().SlotCount];
+                var origin = new Vector3d(0, 0, 0.9);
+                int hand = world.AddFrame(new Pose(new Vector3d(3, 0, 3), Quaterniond.Identity));
+                int hit = 0, happened = 0;
+                Grab held = world.GetBody(1).Grab(new Pull(0, new Vector3d(1, 0, 0), origin));
+                world.GetBody(5).Attach(some, hand, feels: true);
+                world.RecordEvents(EventKinds.All);
                 var state = new byte[world.SnapshotSize()];
                 int calls = 0, frame = 0;
                 var none = new Vector3d();
@@ -120,12 +153,21 @@ namespace TaichiSoft
                     world.GetColliderImpulse(0, out impulse, out moment);
                     world.Hash();
                     world.Snapshot(state);
+                    happened += world.DrainEvents(events);
+                    hit += world.OverlapSphere(origin, 0.5, bodies);
+                    hit += world.OverlapBox(world.GetColliderPose(0), new Vector3d(2, 2, 1), bodies);
+                    held.Move(new Vector3d(0.3 * Math.Sin(0.1 * frame), 0, 0.9));
+                    held.GetForce();
+                    world.GetBody(5).GetLoad(hand, out impulse, out moment);
+                    world.MoveFrame(hand, world.GetFramePose(hand));
                 };
                 for (int i = 0; i < 100; ++i) one();
                 long before = GC.GetAllocatedBytesForCurrentThread();
                 int collections = GC.CollectionCount(0);
                 for (int i = 0; i < 1000; ++i) one();
                 long allocated = GC.GetAllocatedBytesForCurrentThread() - before;
+                Require(happened > 20 && hit > 1000, "nothing happens");
+                Require(world.DroppedEvents() == 0, "events are dropped");
                 Console.WriteLine("calls of BeforeStep: {0}", calls);
                 Console.WriteLine("collections: {0}", GC.CollectionCount(0) - collections);
                 Console.WriteLine("allocated: {0}", allocated);

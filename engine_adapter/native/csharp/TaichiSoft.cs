@@ -296,7 +296,7 @@ namespace TaichiSoft
         public readonly long Step;
         /// <summary>At the end of that step [s].</summary>
         public readonly double Time;
-        /// <summary>To whom. It may be gone by now: then what is asked of it is refused.</summary>
+        /// <summary>To whom. It may be gone by now: ask IsAlive.</summary>
         public readonly Body Body;
         /// <summary>That it touches, the one in the higher slot; IsSomebody is false where there is none.</summary>
         public readonly Body Other;
@@ -890,6 +890,20 @@ namespace TaichiSoft
         public bool IsSomebody
         {
             get { return Id != 0; }
+        }
+
+        /// <summary>Whether it is in the world still.</summary>
+        public bool IsAlive
+        {
+            get
+            {
+                int status;
+                if (Id == 0) return false;
+                int result = Native.ts_body_get_status(World.Handle, Id, out status);
+                if (result == (int)ErrorCode.Handle) return false;
+                Check(result);
+                return true;
+            }
         }
 
         /// <summary>Where it lives.</summary>

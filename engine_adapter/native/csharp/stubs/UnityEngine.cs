@@ -123,6 +123,7 @@ namespace UnityEngine
     {
         public Vector3 position { get; set; }
         public Quaternion rotation { get; set; }
+        public Vector3 forward { get; set; }
 
         public void SetPositionAndRotation(Vector3 position, Quaternion rotation)
         {
