@@ -122,8 +122,8 @@ namespace TaichiSoft
             if (Woke != null) wanted |= EventKinds.Woke;
             if (Froze != null) wanted |= EventKinds.Froze;
             if (wanted == recorded) return;
+            recorded = wanted; // what throws here does so once, and the world goes on
             World.RecordEvents(wanted);
-            recorded = wanted;
         }
 
         // A listener may throw: then the rest is told in the next frame.
