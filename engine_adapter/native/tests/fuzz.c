@@ -28,11 +28,15 @@ static uint32_t below(uint32_t limit) { return (uint32_t)((next() >> 33) % limit
 
 static int one_in(uint32_t count) { return below(count) == 0; }
 
+static int is_tame; /* the arguments of this call could be right: else hardly any would be */
+
+static int bad(uint32_t count) { return !is_tame && one_in(count); }
+
 static double number(void) {
   static const double odd[] = {0.0, -0.0, 1.0, -1.0, 1e-300, 1e30, -1e30, 1e300, 1e9, 1e-9};
-  if (one_in(12)) return NAN;
-  if (one_in(12)) return one_in(2) ? INFINITY : -INFINITY;
-  if (one_in(6)) return odd[below(10)];
+  if (bad(12)) return NAN;
+  if (bad(12)) return one_in(2) ? INFINITY : -INFINITY;
+  if (bad(6)) return odd[below(10)];
   return 4.0 * ((double)(next() >> 11) / 9007199254740992.0) - 1.0;
 }
 
@@ -40,9 +44,9 @@ static double* numbers(int count) {
   static double pool[8][16];
   static int which;
   double* found = pool[which = (which + 1) % 8];
-  if (one_in(25)) return NULL;
+  if (bad(25)) return NULL;
   for (int i = 0; i < count; ++i) found[i] = number();
-  if (count == 4 && !one_in(4)) {
+  if (count == 4 && !bad(4)) {
     const double length = sqrt(found[0] * found[0] + found[1] * found[1] + found[2] * found[2] + found[3] * found[3]);
     for (int i = 0; i < 4 && length > 0.0; ++i) found[i] /= length;
   }
@@ -50,21 +54,21 @@ static double* numbers(int count) {
 }
 
 static int32_t whole(int32_t limit) {
-  if (one_in(10)) return (int32_t)next();
-  return (int32_t)below((uint32_t)limit + 2) - 1;
+  if (bad(10)) return (int32_t)next();
+  return is_tame ? (int32_t)below((uint32_t)limit) : (int32_t)below((uint32_t)limit + 2) - 1;
 }
 
 static ts_scene scene;
 static ts_world worlds[WORLDS];
 
 static ts_world any_world(void) {
-  if (one_in(20)) return next();
+  if (bad(20)) return next();
   return worlds[below(WORLDS)];
 }
 
 static ts_body any_body(ts_world world) {
   ts_body found = 0;
-  if (one_in(15)) return next();
+  if (bad(15)) return next();
   ts_world_get_body(world, whole(9), &found);
   return found;
 }
@@ -72,9 +76,9 @@ static ts_body any_body(ts_world world) {
 static ts_grab any_grab(ts_world world) { /* or one that was, or one of another world */
   static ts_grab known[16];
   ts_grab found = 0;
-  if (one_in(15)) return next();
-  if (one_in(6)) return known[below(16)];
-  ts_world_get_grab(world, (int32_t)below(one_in(2) ? 3 : 18) - 1, &found);
+  if (bad(15)) return next();
+  if (bad(6)) return known[below(16)];
+  ts_world_get_grab(world, bad(4) ? whole(16) : (int32_t)below(2), &found);
   return known[below(16)] = found;
 }
 
@@ -82,22 +86,23 @@ static float rows[ROOM], normals[ROOM];
 static int32_t vertices[64];
 
 static const int32_t* list(size_t* count) {
+  const uint32_t first = below(27);
   *count = below(20);
-  for (int i = 0; i < 20; ++i) vertices[i] = whole(27);
-  if (one_in(20)) *count = (size_t)next();
-  return *count > 20 || one_in(20) ? NULL : vertices;
+  for (int i = 0; i < 20; ++i) vertices[i] = is_tame ? (int32_t)((first + (uint32_t)i) % 27) : whole(27);
+  if (bad(20)) *count = (size_t)next();
+  return *count > 20 || bad(20) ? NULL : vertices;
 }
 
 static ts_pose* pose(void) {
   static ts_pose found;
   const double* turn = numbers(4);
-  if (one_in(25)) return NULL;
+  if (bad(25)) return NULL;
   for (int i = 0; i < 3; ++i) found.position[i] = number();
   for (int i = 0; i < 4; ++i) found.rotation[i] = turn == NULL ? number() : turn[i];
   return &found;
 }
 
-static uint32_t size_of(size_t size) { return one_in(10) ? (uint32_t)next() : (uint32_t)size; }
+static uint32_t size_of(size_t size) { return bad(10) ? (uint32_t)next() : (uint32_t)size; }
 
 static void broken(const char* what) {
   fprintf(stderr, "%s (last error: %s)\n", what, ts_last_error());
@@ -110,29 +115,29 @@ static ts_pull* pull(void) {
   memset(&found, 0, sizeof found);
   found.struct_size = size_of(sizeof found);
   found.triangle = whole(40);
-  for (int i = 0; i < 3; ++i) weights[i] = one_in(20) ? number() : 0.1 + below(100), found.point[i] = number();
+  for (int i = 0; i < 3; ++i) weights[i] = bad(20) ? number() : 0.1 + below(100), found.point[i] = number();
   const double sum = weights[0] + weights[1] + weights[2];
-  for (int i = 0; i < 3 && !one_in(30); ++i) weights[i] /= sum;
-  found.frequency = one_in(4) ? number() : 5.0;
+  for (int i = 0; i < 3 && !bad(30); ++i) weights[i] /= sum;
+  found.frequency = bad(4) ? number() : 5.0;
   found.max_force = number();
-  return one_in(20) ? NULL : &found;
+  return bad(20) ? NULL : &found;
 }
 
 /* They wait no longer, and say who, where and when. */
 static ts_result drain(ts_world world) {
   static ts_event events[100];
-  const int has_room = !one_in(10);
-  const size_t capacity = has_room ? (one_in(4) ? below(3) : below(101)) : one_in(3) ? 0 : (size_t)next();
+  const int has_room = !bad(10);
+  const size_t capacity = has_room ? (one_in(4) ? below(3) : below(101)) : bad(3) ? 0 : (size_t)next();
   size_t count = 0, left = 0;
   const ts_result result =
-      ts_world_drain_events(world, has_room ? events : NULL, one_in(10) ? (size_t)next() : sizeof(ts_event), capacity,
-                            one_in(10) ? NULL : &count);
+      ts_world_drain_events(world, has_room ? events : NULL, bad(10) ? (size_t)next() : sizeof(ts_event), capacity,
+                            bad(10) ? NULL : &count);
   if (result != TS_OK) return result;
   if (count > capacity) broken("more events than there is room for");
   for (size_t i = 0; i < count; ++i) {
     const ts_event* e = events + i;
     const int is_contact = e->kind == TS_CONTACT_BEGAN || e->kind == TS_CONTACT_ENDED;
-    if (e->kind <= 0 || (e->kind & ~TS_ALL_EVENTS) != 0 || (e->kind & (e->kind - 1)) != 0) broken("an event of no kind");
+    if (e->kind <= 0 || e->kind > TS_FROZE || (e->kind & (e->kind - 1)) != 0) broken("an event of no kind");
     if (e->body == 0 || e->step < 0 || e->collider < -1) broken("an event of nobody, or never");
     if ((e->collider >= 0) + (e->other != 0) != is_contact) broken("an event with one too many, or too few");
     if (!isfinite(e->time) || !isfinite(e->impulse[0] + e->impulse[1] + e->impulse[2]) || !(e->duration >= 0.0)) {
@@ -147,11 +152,11 @@ static ts_result drain(ts_world world) {
 
 static ts_result overlap(ts_world world) {
   static ts_body bodies[16];
-  const int has_room = !one_in(10);
-  const size_t capacity = has_room ? (one_in(2) ? 16 : below(16)) : one_in(3) ? 0 : (size_t)next();
+  const int has_room = !bad(10);
+  const size_t capacity = has_room ? (one_in(2) ? 16 : below(16)) : bad(3) ? 0 : (size_t)next();
   size_t count = 0;
   ts_body* into = has_room ? bodies : NULL;
-  size_t* size = one_in(10) ? NULL : &count;
+  size_t* size = bad(10) ? NULL : &count;
   const ts_result result = one_in(2) ? ts_world_overlap_sphere(world, numbers(3), number(), into, capacity, size)
                                      : ts_world_overlap_box(world, pose(), numbers(3), into, capacity, size);
   if (result != TS_OK) return result;
@@ -167,7 +172,7 @@ static ts_result overlap(ts_world world) {
 
 static ts_result take_hold(ts_world world, ts_body body) {
   ts_grab made = 0, there = 0;
-  ts_grab* grab = one_in(20) ? NULL : &made;
+  ts_grab* grab = bad(20) ? NULL : &made;
   const ts_result result = ts_body_grab(world, body, pull(), grab);
   if (result != TS_OK) return result;
   for (int32_t i = 0; i < 16 && there != made; ++i) {
@@ -177,10 +182,23 @@ static ts_result take_hold(ts_world world, ts_body body) {
   return result;
 }
 
+/* Which one is asked for its load, most often: one that hangs there. */
+static ts_body hanging;
+static int32_t its_frame;
+
+static ts_result attach(ts_world world, ts_body body) {
+  size_t count = 0;
+  const int32_t* which = list(&count);
+  const int32_t frame = whole(3);
+  const ts_result result = ts_body_attach(world, body, which, count, frame, whole(2));
+  if (result == TS_OK) hanging = body, its_frame = frame;
+  return result;
+}
+
 static ts_result add_frame(ts_world world) {
   int32_t made = -1;
   ts_pose there;
-  const ts_result result = ts_frame_add(world, pose(), one_in(20) ? NULL : &made);
+  const ts_result result = ts_frame_add(world, pose(), bad(20) ? NULL : &made);
   if (result == TS_OK && (ts_frame_get_pose(world, made, &there) != TS_OK || !isfinite(there.position[0]))) {
     broken("a frame that is not there");
   }
@@ -192,10 +210,10 @@ static ts_result one_call(ts_world world) {
   size_t count = 0;
   const int32_t* which = list(&count);
   switch (below(57)) {
-    case 0: case 1: case 2: return ts_world_step(world, one_in(8) ? number() : 0.01, one_in(8) ? whole(50) : 4);
+    case 0: case 1: case 2: return ts_world_step(world, bad(8) ? number() : 0.01, bad(8) ? whole(50) : 4);
     case 3: {
       ts_clock clock = {size_of(sizeof clock), 0, 0, 0, 0, 0};
-      return ts_world_advance(world, one_in(4) ? number() : 0.02, one_in(4) ? NULL : &clock);
+      return ts_world_advance(world, bad(4) ? number() : 0.02, one_in(4) ? NULL : &clock);
     }
     case 4: return ts_body_apply_impulse(world, body, numbers(3), which, count);
     case 5: return ts_body_apply_force(world, body, numbers(3), which, count);
@@ -209,7 +227,7 @@ static ts_result one_call(ts_world world) {
     case 13: return ts_body_unpin(world, body, which, count);
     case 14: {
       for (int i = 0; i < 60; ++i) rows[i] = (float)number();
-      return ts_body_set_targets(world, body, which, count, one_in(20) ? NULL : rows);
+      return ts_body_set_targets(world, body, which, count, bad(20) ? NULL : rows);
     }
     case 15: return ts_world_set_wind(world, numbers(3), number(), number());
     case 16: return ts_world_radial_impulse(world, numbers(3), number(), number());
@@ -222,7 +240,7 @@ static ts_result one_call(ts_world world) {
       place.struct_size = size_of(sizeof place);
       for (int i = 0; i < 3; ++i) place.position[i] = number(), place.velocity[i] = number(), place.spin[i] = number();
       for (int i = 0; i < 4; ++i) place.rotation[i] = turn == NULL ? number() : turn[i];
-      return ts_world_spawn(world, whole(2), one_in(20) ? NULL : &place, one_in(20) ? NULL : &made);
+      return ts_world_spawn(world, whole(2), bad(20) ? NULL : &place, bad(20) ? NULL : &made);
     }
     case 20: return ts_world_despawn(world, body);
     case 21: return ts_collider_move_to(world, whole(4), pose());
@@ -231,36 +249,43 @@ static ts_result one_call(ts_world world) {
     case 24: return ts_collider_get_pose(world, whole(4), pose());
     case 25: return ts_collider_get_impulse(world, whole(4), numbers(3), numbers(3));
     case 26: return ts_frame_move_to(world, whole(2), pose());
-    case 27: return ts_body_positions(world, body, number(), one_in(10) ? NULL : rows, below(8) ? 3 * below(200) : ROOM);
+    case 27: {
+      ts_asset_info info = {sizeof info, 0, 0, 0};
+      int32_t asset = 0;
+      ts_body_get_asset(world, body, &asset);
+      ts_asset_get_info(scene, asset, &info);
+      return ts_body_positions(world, body, is_tame ? 0.5 : number(), bad(10) ? NULL : rows,
+                               bad(3) ? below(ROOM) : 3 * (size_t)info.vertex_count);
+    }
     case 28: {
       ts_mesh_info info = {sizeof info, 0, 0, 0, 0};
       const int32_t mesh = whole(3);
       ts_mesh_get_info(scene, mesh, &info);
       return ts_body_mesh(world, body, mesh, rows, one_in(10) ? NULL : normals,
-                          3 * (size_t)(one_in(3) ? below(400) : (uint32_t)info.vertex_count));
+                          3 * (size_t)(bad(3) ? below(400) : (uint32_t)info.vertex_count));
     }
     case 29: {
       /* Not so short, or so many, that a frame takes minutes. */
       ts_fixed_step step = {size_of(sizeof step), whole(9), (int32_t)below(9) - 2, number()};
       if (step.dt > 0.0 && step.dt < 1e-3) step.dt = 1e-3;
-      return ts_world_set_fixed_step(world, one_in(20) ? NULL : &step);
+      return ts_world_set_fixed_step(world, bad(20) ? NULL : &step);
     }
     case 30: {
       ts_mesh_info info = {size_of(sizeof info), 0, 0, 0, 0};
-      return ts_mesh_get_info(one_in(10) ? next() : scene, whole(3), &info);
+      return ts_mesh_get_info(bad(10) ? next() : scene, whole(3), &info);
     }
     case 31: return ts_mesh_get_triangles(scene, whole(3), (uint32_t*)(void*)rows, 3 * below(300));
     case 32: {
       char name[8];
-      return ts_scene_get_name(scene, whole(6), whole(9), one_in(10) ? NULL : name, below(9));
+      return ts_scene_get_name(scene, whole(6), whole(9), bad(10) ? NULL : name, below(9));
     }
     case 33: {
       int32_t found = 0;
-      return ts_scene_find(scene, whole(6), one_in(10) ? NULL : "floor", one_in(10) ? NULL : &found);
+      return ts_scene_find(scene, whole(6), bad(10) ? NULL : "floor", bad(10) ? NULL : &found);
     }
     case 34: {
       int32_t found = 0;
-      return ts_world_stable_substeps(world, number(), one_in(10) ? NULL : &found);
+      return ts_world_stable_substeps(world, number(), bad(10) ? NULL : &found);
     }
     case 35: case 36: {
       ts_shape shape;
@@ -271,30 +296,33 @@ static ts_result one_call(ts_world world) {
       for (int i = 0; i < 3; ++i) shape.size[i] = number();
       shape.friction = number(), shape.restitution = number(), shape.thickness = number();
       shape.group = 1, shape.mask = whole(9);
-      return ts_collider_add(world, one_in(20) ? NULL : &shape, pose(), one_in(20) ? NULL : &made);
+      return ts_collider_add(world, bad(20) ? NULL : &shape, pose(), bad(20) ? NULL : &made);
     }
     case 37: return ts_collider_remove(world, whole(6));
     case 38: case 39: {
       ts_hit hit;
       memset(&hit, 0, sizeof hit);
       hit.struct_size = size_of(sizeof hit);
-      if (one_in(2)) return ts_world_closest(world, numbers(3), number(), one_in(20) ? NULL : &hit);
-      return ts_world_raycast(world, numbers(3), numbers(3), number(), one_in(20) ? NULL : &hit);
+      if (one_in(2)) return ts_world_closest(world, numbers(3), number(), bad(20) ? NULL : &hit);
+      return ts_world_raycast(world, numbers(3), numbers(3), number(), bad(20) ? NULL : &hit);
     }
     case 40: return ts_world_record_events(world, one_in(4) ? whole(40) : TS_ALL_EVENTS);
     case 41: case 42: return drain(world);
     case 43: {
       int64_t dropped = 0;
-      return ts_world_dropped_events(world, one_in(10) ? NULL : &dropped);
+      return ts_world_dropped_events(world, bad(10) ? NULL : &dropped);
     }
     case 44: case 45: return overlap(world);
-    case 46: return ts_body_attach(world, body, which, count, whole(3), whole(2));
+    case 46: return attach(world, body);
     case 47: return ts_body_detach(world, body, which, count);
-    case 48: return ts_body_get_load(world, body, whole(3), numbers(3), numbers(3));
+    case 48: {
+      const int is_any = one_in(3);
+      return ts_body_get_load(world, is_any ? body : hanging, is_any ? whole(3) : its_frame, numbers(3), numbers(3));
+    }
     case 49: return take_hold(world, body);
     case 50: {
       ts_grab found = 0;
-      return ts_world_get_grab(world, whole(16), one_in(10) ? NULL : &found);
+      return ts_world_get_grab(world, whole(16), bad(10) ? NULL : &found);
     }
     case 51: return ts_grab_move(world, any_grab(world), numbers(3));
     case 52: return ts_grab_release(world, any_grab(world));
@@ -303,7 +331,7 @@ static ts_result one_call(ts_world world) {
     case 55: return one_in(2) ? ts_frame_remove(world, whole(8)) : ts_frame_get_pose(world, whole(3), pose());
     default: {
       double center[3];
-      return ts_body_center(world, body, one_in(10) ? NULL : center);
+      return ts_body_center(world, body, bad(10) ? NULL : center);
     }
   }
 }
@@ -356,6 +384,7 @@ int main(int count, char** arguments) {
   uint64_t calls = 0, refused = 0;
   while (time(NULL) < end) {
     const int which = (int)below(WORLDS);
+    is_tame = one_in(2);
     const ts_world world = any_world();
     uint64_t before = 0, after = 0;
     ts_clock clock = {sizeof clock, 0, 0, 0, 0, 0}, later = {sizeof later, 0, 0, 0, 0, 0};
