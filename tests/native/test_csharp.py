@@ -95,7 +95,7 @@ REFUSED = {
     "no triangle": "Argument: there is no triangle 9999",
     "no grab": "Argument: number is 16",
     "grab of no world": "Handle: this grab is of no world",
-    "grab that was released": r"Handle: there is no grab \d+, or no more",
+    "grab that was released": r"Handle: grab \d+ is not in this world, or was released",
     "callback": "from BeforeStep",
     "world destroyed in a step": r"Handle: there is no world \d+, or no more",
     "world after Dispose": r"Handle: there is no world \d+, or no more",

@@ -126,7 +126,7 @@ namespace TaichiSoft
                 Grab held = world.GetBody(1).Grab(new Pull(0, new Vector3d(1, 0, 0), origin));
                 world.GetBody(5).Attach(some, hand, feels: true);
                 world.RecordEvents(EventKinds.All);
-                var state = new byte[world.SnapshotSize()];
+                var state = new byte[world.SnapshotSize() + 10000]; // contacts that are recorded take room
                 int calls = 0, frame = 0;
                 var none = new Vector3d();
                 world.SetFixedStep(Frame);

@@ -641,7 +641,7 @@ namespace TaichiSoft
             return hash;
         }
 
-        /// <summary>Bytes that Snapshot needs.</summary>
+        /// <summary>Bytes that Snapshot needs now; more with contacts that are recorded, grabs, and what hangs.</summary>
         public int SnapshotSize()
         {
             UIntPtr size;
