@@ -92,7 +92,7 @@ REFUSED = {
     "pose of no frame": "Argument: there is no frame 99",
     "removed frame": "Argument: there is no frame 0",
     "weights": "Argument: weights",
-    "no triangle": "Argument: there is no triangle 9999",
+    "no triangle": r"Argument: triangle is 9999: there are \d+",
     "no grab": "Argument: number is 16",
     "grab of no world": "Handle: this grab is of no world",
     "grab that was released": r"Handle: grab \d+ is not in this world, or was released",
