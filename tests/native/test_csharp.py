@@ -54,7 +54,7 @@ def checks(compiled):
     return compiled("Checks", "TaichiSoft.cs", "Checks.cs")
 
 
-@pytest.mark.parametrize("name", ["heap", "free"])
+@pytest.mark.parametrize("name", ["heap", "free", "held"])
 def test_a_game_in_csharp_has_the_same_bits(name, export, play, compiled, run):
     calls = list(GAMES[name][1]())
     folder = export(name)
