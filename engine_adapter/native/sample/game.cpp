@@ -19,6 +19,9 @@ int main(int count, char** arguments) {
     const std::vector<uint32_t> index_buffer = scene.triangles(skin);
     std::vector<float> vertices(3 * size_t(scene.mesh(skin).vertex_count)), normals(vertices.size());
 
+    world.record_events(TS_CONTACT_BEGAN);
+    std::vector<ts_event> events;
+    int touches = 0;
     int64_t step = 0;
     std::vector<Body> balls = {world.body(scene.find(TS_BODY, "first"))};
     world.on_step([&] {  // at the same moments whatever the frame rate
@@ -31,10 +34,13 @@ int main(int count, char** arguments) {
     for (int i = 0; i * frame < seconds; ++i) {
       const ts_clock clock = world.advance(frame);
       for (Body each : balls) world.mesh(each, skin, vertices, normals);  // draw them with index_buffer
+      world.drain_events(events);
+      for (const ts_event& each : events) touches += each.collider == lift;  // a sound, as loud as each.impulse
       if (i % 50 != 0) continue;
       const auto [impulse, moment] = world.collider_impulse(lift);
-      std::printf("%.2f s: %zu balls of %zu triangles, the first at %.3f m; the lift feels %.1f N\n", clock.time,
-                  balls.size(), index_buffer.size() / 3, world.center(balls[0])[2], impulse[2] * -60.0 + 0.0);
+      std::printf("%.2f s: %zu balls of %zu triangles, the first at %.3f m; the lift feels %.1f N, touched %d times\n",
+                  clock.time, balls.size(), index_buffer.size() / 3, world.center(balls[0])[2],
+                  impulse[2] * -60.0 + 0.0, touches);
     }
     std::printf("state %016llx\n", static_cast<unsigned long long>(world.hash()));
   } catch (const std::exception& error) {

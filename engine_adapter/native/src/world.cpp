@@ -168,7 +168,8 @@ void World::step(double dt, int32_t substeps) {
   if (goes_on) {
     rows_at_ = -1.0;
     std::vector<int32_t> others;
-    for (int32_t slot = 0; slot < scene_->slot_count; ++slot) {
+    const int32_t watched = (events_.kinds() & TS_FROZE) != 0 ? scene_->slot_count : 0;
+    for (int32_t slot = 0; slot < watched; ++slot) {
       if (body_status_(slot) != kFrozen) others.push_back(slot);
     }
     launch_step(count, dt / count);
