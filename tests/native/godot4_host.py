@@ -32,6 +32,8 @@ def written(value):
         return kind + ",".join(repr(float(number)) for number in value)
     if isinstance(value, str):
         return ("n" if isinstance(value, Name) else "s") + value.encode().hex()
+    if isinstance(value, list):
+        return f"I{np.array(value, dtype=np.int32).tobytes().hex()}"
     if isinstance(value, bytes):
         return f"y{value.hex()}"
     return "-" if value is None else f"{'i' if isinstance(value, int) else 'f'}{value!r}"
@@ -55,8 +57,10 @@ def read(words):
         "-": lambda: None,
         "b": lambda: rest == "1",
         "i": lambda: int(rest),
+        "f": lambda: float.fromhex(rest),
         "s": lambda: bytes.fromhex(rest).decode(),
         "v": lambda: tuple(float.fromhex(each) for each in rest.split(",")),
+        "t": lambda: Transform(float.fromhex(each) for each in rest.split(",")),
         "y": lambda: bytes.fromhex(rest),
     }[kind]()
 

@@ -102,11 +102,124 @@ def test_signals_arrive(scene):
     assert scene["scene"]["froze"] == 1
 
 
+@pytest.fixture(scope="module")
+def hands(run):
+    """What an elephant and a block tell of themselves, while they are lifted, asked for and hung up."""
+    return told(run("hands.gd"))
+
+
+def kinds(events, who):
+    return [event[0] for event in events if event[1] == who]
+
+
+def test_a_contact_tells_the_node_and_the_impulse(hands):
+    events = hands["fallen"]["told"]
+    assert kinds(events, "block") == ["began", "slept"]
+    assert kinds(events, "rider")[:2] == ["began", "ended"]  # it jumps before it lies
+    for kind, _, *rest in events:
+        if kind == "began":
+            collider, node, impulse = rest
+            assert (collider, node) == (0, "Ground")
+            assert impulse[1] < 0.0  # it pushes down
+
+
+def test_a_contact_ends_when_a_body_is_lifted(hands):
+    """The impulse over the whole contact is the weight times its duration."""
+    lift = hands["lift"]
+    ended = [event for event in lift["told"] if event[0] == "ended"]
+    ((_, who, _, node, impulse, duration),) = ended
+    assert (who, node) == ("rider", "Ground")
+    assert -impulse[1] == pytest.approx(lift["mass"] * 9.81 * duration, rel=0.05)
+
+
+def test_a_grabbed_body_follows_the_hand(hands):
+    """To 2 cm, with its weight as the force; the other body lies where it lay."""
+    lift = hands["lift"]
+    assert lift["is_rider"]
+    assert lift["from_point"] < 1e-5
+    assert abs(lift["height"]) < 1e-5
+    assert lift["from_hand"] < 0.02
+    assert lift["block_moved"] == 0.0
+    assert lift["force"] == pytest.approx([0.0, lift["mass"] * 9.81, 0.0], abs=0.01 * lift["mass"] * 9.81)
+    assert lift["released"] == [True, False, False]
+    assert kinds(lift["after"], "rider")[:2] == ["woke", "began"]
+
+
+def test_overlaps_find_bodies_where_they_are(hands):
+    found = hands["overlaps"]
+    assert found["sphere"] == [["rider"], ["block"]]
+    assert found["all"] == ["rider", "block"]
+    assert found["none"] == []
+    assert found["box"] == [["block"], [], []]
+    assert (found["ray"], found["up"]) == (0, 0)  # too far, and away from it
+
+
+def test_who_sleeps_and_wakes_is_told(hands):
+    assert hands["sleep"] == {"woke": [["woke", "block"]], "slept": [["slept", "block"]]}
+
+
+def test_a_body_follows_a_frame_until_it_is_let_go(hands):
+    hang = hands["hang"]
+    assert hang["attached"]
+    assert hang["pose"] == pytest.approx([0.0, 0.6, -0.3], abs=1e-5)
+    assert hang["moved"] == pytest.approx(hang["pose"], abs=0.02)
+    weight = hands["lift"]["mass"] * 9.81
+    assert hang["load"] == pytest.approx([0.0, -weight, 0.0], abs=0.01 * weight)
+    assert "ended" in kinds(hang["told"], "rider")
+    assert hang["removed"] == [True, False]
+    assert abs(hang["fell"]) < 0.05
+    assert "began" in kinds(hang["after"], "rider")
+    assert hang["held"] == pytest.approx(0.2, abs=0.03)
+    assert hang["detached"] == [True, False]
+    assert abs(hang["fell_again"]) < 0.05
+
+
+def test_soft_bodies_that_meet_are_told(hands):
+    meet = hands["meet"]
+    met = [event[:3] for event in meet["met"] if event[0] == "met"]
+    assert met[0] == ["met", "other", "block"]
+    ((kind, *who, impulse, duration),) = meet["parted"]  # when one is taken out
+    assert [kind, *who] == ["parted", "other", "block"]
+    assert impulse[1] < 0.0 < duration
+
+
+def test_a_contact_that_ends_tells_the_node_that_there_was(hands):
+    """Its collider's number belongs to another one already, which has no node."""
+    taken = hands["taken"]
+    assert (taken["removed"], taken["number"]) == (True, 0)
+    assert {(kind, who, number, node) for kind, who, number, node, *_ in taken["told"]} == {
+        ("ended", "rider", 0, "Ground"),
+        ("ended", "block", 0, "Ground"),
+    }
+    assert taken["later"][0][:4] == ["began", "block", 0, ""]
+
+
+def test_only_what_is_listened_to_is_recorded(hands):
+    assert hands["unheard"] == {"recorded": 0, "events": 0}
+    assert hands["heard"] == {"recorded": 2 | 8}
+
+
+HELD = {  # by step
+    10: [
+        line("add_frame", (0.5, 1.0, 0.25), UPRIGHT),
+        line("grab", 3, 5, (0.5, 0.25, 0.25), (1.5, 1.5, 0.0), 4.0, -1.0),
+    ],
+    50: [line("move_grab", 0, (1.25, 1.25, 0.5)), line("attach", 0, [3, 1, 12], 0, 1)],
+    70: [line("grab_force", 0), line("load", 0, 0), line("release_grab", 0)],
+    80: [line("move_frame", 0, (0.5, 1.125, 0.25), UPRIGHT)],
+    150: [line("detach", 0, [1]), line("grab", 0, 7, (0.0, 1.0, 0.0), (-1.5, 2.0, 0.0), 8.0, 64.0)],
+    210: [line("add_frame", (0.0, 1.0, 0.0), UPRIGHT), line("remove_frame", 1), line("detach", 0, [])],
+}
+
+
 def game():
     """Calls in numbers that Godot's 32 bits hold exactly."""
     yield line("add_collider", 0, (0, 0, 0), 0.5, -1.0, 0.0, 1, -1, (0.0, 0.0, 0.0), UPRIGHT)
     yield line("add_collider", 2, (2.0, 0.25, 2.0), 0.875, -1.0, 0.0, 1, -1, (-1.5, 0.25, 0.0), UPRIGHT)
+    yield line("record_events", 31)
     for i in range(240):
+        if i in HELD:
+            yield from HELD[i]
         if i < 160:
             yield line("move_collider", 1, (-1.5 + i / 512, 0.25 + (i % 32) / 1024, 0.0), UPRIGHT)
         if i == 40:
@@ -123,6 +236,9 @@ def game():
             yield line("status", 3)
             yield line("mesh", 0, 0)
             yield line("mesh", 3, 1)
+            yield line("drain")
+            yield line("overlap_sphere", (1.5, 0.25, 0.0), 0.25)
+            yield line("overlap_box", (-1.5, 0.5, 0.0), HALF_TURN, (0.5, 0.25, 4.0))
 
 
 def test_a_game_in_godot_has_the_same_bits(run, project, play):
@@ -165,6 +281,18 @@ REFUSED = [
     "bytes is null",
     "body 1099511627776 is not in this world",
     "argument 1 is 1099511627776: too large",
+    "kinds is -1",
+    "direction has zero length",
+    "radius is -1",
+    "argument 1 is no Transform",
+    "weights must be 0 or more and add up to 1",
+    "grab 7 is not in this world, or was released",
+    "argument 1 is a Transform without size",
+    "argument 2 is no PoolIntArray",
+    "there is no frame 0",
+    "there is no vertex 1073741824",
+    "there is no frame 0",
+    "body 0 is not in this world",
 ]
 
 
@@ -182,4 +310,6 @@ def test_bad_arguments_are_errors_and_no_crash(run):
     assert started == [
         *(True, 0, 0, False, False, -1, -1, -1, False, False),
         *("(0, 0, 0)", True, False, True),
+        *(0, False, False, "(0, 0, 0)", False, False, False),
+        *(True, "(0, 0, 0)", [], "[]", {}),
     ]

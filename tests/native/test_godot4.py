@@ -6,7 +6,7 @@ import subprocess
 import numpy as np
 import pytest
 from games import hash_of, line, lines_of
-from godot4_host import GODOT, LIBRARY, VERSIONS, Name, registered, transform
+from godot4_host import GODOT, LIBRARY, VERSIONS, Name, Transform, registered, transform
 from native_build import ROOT
 
 DT = 1 / 64
@@ -116,12 +116,28 @@ def test_a_godot_that_lacks_something_is_refused_in_one_line(godot4, options, sa
 UPRIGHT, HALF_TURN = (0.0, 0.0, 0.0, 1.0), (0.0, 1.0, 0.0, 0.0)  # about y: both are exact in a Transform3D
 
 
+HELD = {  # by step
+    0: [line("record_events", 31)],
+    10: [
+        line("add_frame", (0.5, 1.0, 0.25), UPRIGHT),
+        line("grab", 5, 5, (0.5, 0.25, 0.25), (1.5, 1.5, 0.0), 4.0, -1.0),
+    ],
+    50: [line("move_grab", 0, (1.25, 1.25, 0.5)), line("attach", 0, [3, 1, 12], 0, 1)],
+    70: [line("grab_force", 0), line("load", 0, 0), line("release_grab", 0)],
+    80: [line("move_frame", 0, (0.5, 1.125, 0.25), UPRIGHT)],
+    150: [line("detach", 0, [1]), line("grab", 0, 7, (0.0, 1.0, 0.0), (-1.5, 2.0, 0.0), 8.0, 64.0)],
+    210: [line("add_frame", (0.0, 1.0, 0.0), UPRIGHT), line("remove_frame", 1), line("detach", 0, [])],
+}
+
+
 def game():
     """Calls in numbers that Godot's 32 bits hold exactly. Slots: 0 to 4 balls, 5 to 8 bricks."""
     yield line("add_collider", 2, (2.0, 0.25, 2.0), 0.875, -1.0, 0.0, 1, -1, (0.0, 0.25, -1.5), UPRIGHT)
     for i in range(240):
         if i < 160:
             yield line("move_collider", 0, (i / 512, 0.25 + (i % 32) / 1024, 0.0), UPRIGHT)
+        if i in HELD:
+            yield from HELD[i]
         if i == 40:
             yield line("spawn", 0, (0.25, 2.0, 0.125), HALF_TURN, (0.0, -1.0, 0.25), (0.0, 2.0, 0.0))
             yield line("velocity", 5, (0.5, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -136,6 +152,14 @@ def game():
             yield line("status", 3)
             yield line("mesh", 0, 0)
             yield line("mesh", 5, 1)
+            yield line("drain")
+            yield line("overlap_sphere", (1.25, 0.25, 0.0), 0.25)
+            yield line("overlap_box", (0.0, 0.5, 0.0), HALF_TURN, (0.5, 1.0, 4.0))
+            yield line("raycast", (1.25, 4.0, 0.0), (0.0, -1.0, 0.0), 8.0)
+
+
+def slot(body):
+    return (body & 0xFFFFFFFF) - 1
 
 
 class Player:
@@ -157,6 +181,9 @@ class Player:
 
     def whole(self):
         return int(self.take(1)[0])
+
+    def list(self):
+        return [int(each) for each in self.take(self.whole())]
 
     def place(self):
         origin, turn = self.take(3), self.take(4)
@@ -191,6 +218,70 @@ class Player:
     def velocity(self):
         body = self.body()
         assert self.instance.set_velocity(body, self.take(3), self.take(3)) is True
+
+    def record_events(self):
+        assert self.instance.record_events(self.whole()) is True
+
+    def drain(self):
+        found = self.instance.drain_events()
+        self.say(f"events {len(found) // 8}")
+        for i in range(0, len(found), 8):
+            kind, body, other, collider, impulse, duration, step, time = found[i : i + 8]
+            row = hash_of([time, *impulse, duration])
+            self.say(f"{kind} {collider} {step} {slot(body)} {slot(other)} {row}")
+
+    def say_bodies(self, found):
+        self.say(" ".join(str(slot(body)) for body in found) or "nothing")
+
+    def overlap_sphere(self):
+        self.say_bodies(self.instance.overlap_sphere(self.take(3), *self.take(1)))
+
+    def overlap_box(self):
+        self.say_bodies(self.instance.overlap_box(self.place(), self.take(3)))
+
+    def raycast(self):
+        found = self.instance.raycast(self.take(3), self.take(3), *self.take(1))
+        if not found:
+            self.say("nothing")
+            return
+        body, _, distance, point, normal, weights, vertices = found
+        row = hash_of([distance, *weights, *point, *normal])
+        self.say(" ".join(map(str, [slot(body), *vertices, row])))
+
+    def grab(self):
+        body, triangle, weights, point = self.body(), self.whole(), self.take(3), self.take(3)
+        assert self.instance.grab(body, triangle, weights, point, *self.take(2)) > 0
+
+    def grab_of(self):
+        return self.instance.grab_of(self.whole())
+
+    def move_grab(self):
+        assert self.instance.move_grab(self.grab_of(), self.take(3)) is True
+
+    def release_grab(self):
+        assert self.instance.release_grab(self.grab_of()) is True
+
+    def grab_force(self):
+        self.say(hash_of(self.instance.grab_force(self.grab_of())))
+
+    def add_frame(self):
+        self.say(self.instance.add_frame(self.place()))
+
+    def remove_frame(self):
+        assert self.instance.remove_frame(self.whole()) is True
+
+    def move_frame(self):
+        assert self.instance.move_frame(self.whole(), self.place()) is True
+
+    def attach(self):
+        assert self.instance.attach(self.body(), self.list(), self.whole(), self.whole()) is True
+
+    def detach(self):
+        assert self.instance.detach(self.body(), self.list()) is True
+
+    def load(self):
+        force, torque = self.instance.frame_load(self.body(), self.whole())
+        self.say(hash_of([*force, *torque]))
 
     def snapshot(self):
         self.kept = self.instance.snapshot()
@@ -233,7 +324,8 @@ def test_what_is_read_is_what_the_library_has(native_world):
     volume = np.einsum("ni,ni->n", corners[:, 0], np.cross(corners[:, 2], corners[:, 1])).sum() / 6
     assert volume == pytest.approx(4 / 3 * np.pi * 0.25**3, rel=0.2)  # fronts are clockwise, as in Godot
     assert native.center(body) == pytest.approx((0.0, 0.9, 0.0), abs=0.02)  # y is up
-    assert native.changes() == []
+    assert len(native.positions(body)) >= len(np.unique(native.triangles(0)))
+    assert native.positions(body).mean(axis=0) == pytest.approx((0.0, 0.9, 0.0), abs=0.02)
     native.apply_impulse(body, (0.0, 5.0, 0.0))
     assert native.set_fixed_step(DT, 0, 4) is True
     assert native.advance(2.5 * DT) == 2
@@ -248,12 +340,15 @@ def test_what_is_read_is_what_the_library_has(native_world):
 
 def test_who_falls_asleep_and_who_wakes_is_told_once(native_world):
     native = native_world
+    assert native.record_events(4 | 8) is True
     asleep = set()
-    for _ in range(900):
+    for i in range(900):
         assert native.step(DT, 0) is True
-        changes = native.changes()
-        for body, before, after in zip(changes[::3], changes[1::3], changes[2::3], strict=True):
-            assert (before, after) == (0, 2)
+        events = native.drain_events()
+        for event in range(0, len(events), 8):
+            kind, body, *rest, time = events[event : event + 8]
+            assert (kind, rest) == (4, [0, -1, (0.0, 0.0, 0.0), 0.0, i])
+            assert time == pytest.approx((i + 1) * DT)
             assert native.status(body) == 2
             assert body not in asleep
             asleep.add(body)
@@ -261,10 +356,73 @@ def test_who_falls_asleep_and_who_wakes_is_told_once(native_world):
             break
     assert len(asleep) >= 3
     native.wake()
-    woken = native.changes()
-    assert set(woken[::3]) == asleep
-    assert (woken[1::3], woken[2::3]) == ([2] * len(asleep), [0] * len(asleep))
-    assert native.changes() == []
+    assert native.drain_events() == []
+    native.step(DT, 0)
+    events = native.drain_events()
+    assert events[::8] == [8] * len(asleep)
+    assert set(events[1::8]) == asleep
+    assert native.drain_events() == []
+    assert native.dropped_events() == 0
+
+
+def test_more_events_than_fit_at_once_are_drained(native_world):
+    """They are taken from the library in portions of 256."""
+    native = native_world
+    assert native.record_events(31) is True
+    bodies = [native.body(slot) for slot in range(9) if native.body(slot) > 0]
+    for i in range(1200):
+        if i % 24 == 0:  # they jump
+            for body in bodies:
+                native.set_velocity(body, (0.0, 1.0, 0.0), (0.0, 0.0, 0.0))
+        native.step(DT, 0)
+    events = native.drain_events()
+    assert len(events) > 300 * 8
+    assert events[6::8] == sorted(events[6::8])
+    assert {type(each) for each in events[::8] + events[1::8] + events[6::8]} == {int}
+    assert native.drain_events() == []
+
+
+def test_a_frame_is_where_it_was_put(native_world):
+    """With a turn about a slanted axis, through the library's quaternion and back."""
+    axis, angle = np.array([0.6, 0.0, 0.8]), 2.0
+    cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    turn = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+    place = Transform([*turn.ravel().tolist(), 0.25, -3.0, 0.5])
+    frame = native_world.add_frame(place)
+    assert native_world.frame_pose(frame) == pytest.approx(place, abs=1e-6)
+
+
+def test_a_hand_and_a_frame_hold_a_body(native_world):
+    native = native_world
+    ball = native.body(1)
+    body, triangle, distance, point, normal, weights, vertices = native.raycast(
+        (0.05, 9.0, -0.03), (0.0, -2.0, 0.0), float("inf")
+    )
+    top = native.body(2)
+    assert (body, normal[1] > 0.9) == (top, True)
+    assert point == pytest.approx((0.05, 9.0 - distance, -0.03), abs=1e-5)
+    corners = native.positions(body)[vertices]
+    assert np.array(weights) @ corners == pytest.approx(np.array(point), abs=1e-5)
+    assert native.raycast((0.0, 9.0, 0.0), (0.0, 1.0, 0.0), 5.0) == []
+    grab = native.grab(body, triangle, weights, (0.0, 3.0, 0.0), 5.0, -1.0)
+    assert grab == native.grab_of(0) > 0
+    assert native.grab_of(1) == 0
+    frame = native.add_frame(transform())
+    assert native.attach(ball, [0, 1, 2], frame, 1) is True
+    assert native.move_frame(frame, transform((0.0, 0.0, -1.0))) is True
+    for _ in range(120):
+        assert native.step(DT, 0) is True
+    assert native.center(top)[1] > 2.5
+    assert native.overlap_sphere(native.center(top), 0.1) == [top]
+    assert native.overlap_box(transform(native.center(ball)), (0.1, 0.1, 0.1)) == [ball]
+    force, torque = native.frame_load(ball, frame)
+    assert force[1] < 0.0
+    assert len(torque) == 3
+    assert native.grab_force(grab)[1] > 0.0
+    assert native.release_grab(grab) is True
+    assert native.detach(ball, [0]) is True
+    assert native.remove_frame(frame) is True
+    assert native.host.errors == []
 
 
 def test_bad_arguments_are_errors_and_no_crash(host, world):
@@ -295,6 +453,26 @@ def test_bad_arguments_are_errors_and_no_crash(host, world):
         ("move_frame", [7, upright], "there is no frame 7"),
         ("find", [0, "nobody"], "nothing of that kind is called nobody"),
         ("find", [0, Name("nobody")], "nothing of that kind is called nobody"),
+        ("record_events", [64], "kinds is 64"),
+        ("raycast", [still, still, 1.0], "direction has zero length"),
+        ("raycast", [still, (nan, 0.0, 0.0), 1.0], "direction has -?nan in it"),
+        ("overlap_sphere", [still, -1.0], "radius is -1"),
+        ("overlap_sphere", [upright, 1.0], "argument 1 is no Vector3"),
+        ("overlap_box", [transform(diagonal=(1, 0, 1)), still], "argument 1 is a Transform3D without size"),
+        ("overlap_box", [upright, still], "size"),
+        ("grab", [12345, 0, (1.0, 0.0, 0.0), still, 5.0, -1.0], "body 12345 is not in this world"),
+        ("grab_of", [16], "number is 16: give 0 to 15"),
+        ("move_grab", [7, still], "grab 7 is not in this world, or was released"),
+        ("release_grab", [0], "grab 0 is not in this world, or was released"),
+        ("grab_force", [-1], "grab 18446744073709551615 is not in this world"),
+        ("add_frame", [still], "argument 1 is no Transform3D"),
+        ("remove_frame", [3], "there is no frame 3"),
+        ("frame_pose", [-1], "there is no frame -1"),
+        ("attach", [12345, [0], 0, 0], "body 12345 is not in this world"),
+        ("attach", [12345, (0.0, 1.0, 2.0), 0, 0], "argument 2 is no PackedInt32Array"),
+        ("detach", [12345, []], "body 12345 is not in this world"),
+        ("frame_load", [12345, 0], "body 12345 is not in this world"),
+        ("positions", [12345], "body 12345 is not in this world"),
         ("count", [9], "argument 1 is 9: kinds are 0 to 4"),
         ("count", [True], "argument 1 is no whole number"),
         ("restore", [b"abc"], "3 bytes are no snapshot"),

@@ -38,6 +38,10 @@ void Arguments::vector(int which, double out[3]) const {
 
 std::vector<uint8_t> Arguments::bytes(int which) const { return bytes_of(typed(which, Type::bytes)); }
 
+std::vector<int32_t> Arguments::whole_numbers(int which) const {
+  return whole_numbers_of(typed(which, Type::whole_numbers));
+}
+
 ts_pose Arguments::pose(int which) const {
   float numbers[12];
   read_transform(typed(which, Type::transform), numbers);

@@ -21,7 +21,7 @@ class Refused : public std::runtime_error {
 
 const char* const kClass = "SoftWorldNative";  // its name in scripts
 
-enum class Type { whole, real, text, vector, transform, bytes, other };
+enum class Type { whole, real, text, vector, transform, bytes, whole_numbers, other };
 
 // The arguments of a call from a script.
 class Arguments {
@@ -35,6 +35,7 @@ class Arguments {
   void vector(int which, double out[3]) const;
   ts_pose pose(int which) const;  // of a Transform; its scale is left out
   std::vector<uint8_t> bytes(int which) const;
+  std::vector<int32_t> whole_numbers(int which) const;
 
  private:
   const Variant& typed(int which, Type type) const;
@@ -54,12 +55,15 @@ std::string text_of(const Variant& value);
 void read_vector(const Variant& value, float out[3]);
 void read_transform(const Variant& value, float out[12]);  // three rows of the basis, then the origin
 std::vector<uint8_t> bytes_of(const Variant& value);
+std::vector<int32_t> whole_numbers_of(const Variant& value);
 
 Variant nothing();
 Variant of(bool value);
 Variant of(int64_t value);
+Variant of(double value);
 Variant of(const std::string& value);
 Variant of_vector(const double vector[3]);
+Variant of_transform(const float numbers[12]);  // as read_transform has them
 Variant of_bytes(const std::vector<uint8_t>& bytes);
 Variant of_whole_numbers(const std::vector<int32_t>& numbers);
 Variant of_pairs(const std::vector<float>& numbers);    // an array of Vector2

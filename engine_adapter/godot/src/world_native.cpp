@@ -1,5 +1,6 @@
 #include "world_native.hpp"
 
+#include <algorithm>
 #include <cstdio>
 #include <cstring>
 
@@ -13,7 +14,6 @@ void WorldNative::clear() {
   if (world != 0) ts_world_destroy(world);
   if (scene != 0) ts_scene_unload(scene);
   scene = 0, world = 0;
-  statuses.clear();
 }
 
 namespace {
@@ -214,24 +214,135 @@ Variant mesh(Self self, In in) {
   return of_list({of_triples(self.positions), of_triples(self.normals)});
 }
 
-// Whose status is another than at the last call: body, status before, status now, of each in a row.
-Variant changes(Self self, In) {
-  const int32_t slots = info_of(self).slot_count;
-  self.statuses.resize(size_t(slots), {0, TS_ACTIVE});
+Variant positions(Self self, In in) {
+  int32_t asset = 0;
+  ts_asset_info info{};
+  info.struct_size = sizeof info;
+  check(ts_body_get_asset(self.world, body_of(in), &asset));
+  check(ts_asset_get_info(self.scene, asset, &info));
+  self.positions.resize(3 * size_t(info.vertex_count));
+  check(ts_body_positions(self.world, body_of(in), 1.0, self.positions.data(), self.positions.size()));
+  return of_triples(self.positions);
+}
+
+// ---- what happened ----
+
+Variant record_events(Self self, In in) {
+  check(ts_world_record_events(self.world, in.small(0)));
+  return of(true);
+}
+
+// All that wait, eight values each in a row: kind, body, other body, collider, impulse, duration, step, time.
+Variant drain_events(Self self, In) {
+  constexpr size_t kAtOnce = 256;
+  size_t count = 0, got = kAtOnce;
+  while (got == kAtOnce) {
+    self.events.resize(std::max(self.events.size(), count + kAtOnce));
+    check(ts_world_drain_events(self.world, self.events.data() + count, sizeof(ts_event), kAtOnce, &got));
+    count += got;
+  }
   std::vector<Variant> found;
-  for (int32_t slot = 0; slot < slots; ++slot) {
-    auto& [body, before] = self.statuses[size_t(slot)];
-    ts_body now = 0;
-    int32_t status = TS_ACTIVE;
-    check(ts_world_get_body(self.world, slot, &now));
-    if (now != 0) check(ts_body_get_status(self.world, now, &status));
-    if (now != body) before = TS_ACTIVE;  // a new one was awake when it came
-    if (now != 0 && status != before) {
-      for (const int64_t number : {int64_t(now), int64_t(before), int64_t(status)}) found.push_back(of(number));
+  found.reserve(8 * count);
+  for (size_t i = 0; i < count; ++i) {
+    const ts_event& each = self.events[i];
+    for (const int64_t number : {int64_t(each.kind), int64_t(each.body), int64_t(each.other), int64_t(each.collider)}) {
+      found.push_back(of(number));
     }
-    body = now, before = status;
+    found.push_back(of_vector(each.impulse));
+    found.push_back(of(each.duration));
+    found.push_back(of(each.step));
+    found.push_back(of(each.time));
   }
   return of_list(found);
+}
+
+Variant dropped_events(Self self, In) {
+  int64_t found = 0;
+  check(ts_world_dropped_events(self.world, &found));
+  return of(found);
+}
+
+// ---- questions ----
+
+// Body, triangle, distance, point, normal, weights and vertices of the triangle; an empty Array where there is nothing.
+Variant raycast(Self self, In in) {
+  double origin[3], direction[3];
+  in.vector(0, origin);
+  in.vector(1, direction);
+  ts_hit hit{};
+  hit.struct_size = sizeof hit;
+  check(ts_world_raycast(self.world, origin, direction, in.real(2), &hit));
+  if (hit.body == 0) return of_list({});
+  return of_list({of(int64_t(hit.body)), of(int64_t(hit.triangle)), of(hit.distance), of_vector(hit.point),
+                  of_vector(hit.normal), of_vector(hit.weights),
+                  of_whole_numbers({hit.vertices[0], hit.vertices[1], hit.vertices[2]})});
+}
+
+Variant of_bodies(const std::vector<ts_body>& bodies, size_t count) {
+  std::vector<Variant> found;
+  for (size_t i = 0; i < count; ++i) found.push_back(of(int64_t(bodies[i])));
+  return of_list(found);
+}
+
+Variant overlap_sphere(Self self, In in) {
+  double center[3];
+  in.vector(0, center);
+  std::vector<ts_body> bodies(size_t(info_of(self).slot_count));
+  size_t count = 0;
+  check(ts_world_overlap_sphere(self.world, center, in.real(1), bodies.data(), bodies.size(), &count));
+  return of_bodies(bodies, count);
+}
+
+Variant overlap_box(Self self, In in) {
+  const ts_pose pose = in.pose(0);
+  double size[3];
+  in.vector(1, size);
+  std::vector<ts_body> bodies(size_t(info_of(self).slot_count));
+  size_t count = 0;
+  check(ts_world_overlap_box(self.world, &pose, size, bodies.data(), bodies.size(), &count));
+  return of_bodies(bodies, count);
+}
+
+// ---- grabs ----
+
+ts_grab grab_in(In in) { return ts_grab(in.whole(0)); }
+
+Variant grab(Self self, In in) {
+  ts_pull pull{};
+  pull.struct_size = sizeof pull;
+  pull.triangle = in.small(1);
+  in.vector(2, pull.weights);
+  in.vector(3, pull.point);
+  pull.frequency = in.real(4);
+  pull.max_force = in.real(5);
+  ts_grab made = 0;
+  check(ts_body_grab(self.world, body_of(in), &pull, &made));
+  return of(int64_t(made));
+}
+
+// That with a number from 0 to 15.
+Variant grab_of(Self self, In in) {
+  ts_grab found = 0;
+  check(ts_world_get_grab(self.world, in.small(0), &found));
+  return of(int64_t(found));
+}
+
+Variant move_grab(Self self, In in) {
+  double point[3];
+  in.vector(1, point);
+  check(ts_grab_move(self.world, grab_in(in), point));
+  return of(true);
+}
+
+Variant release_grab(Self self, In in) {
+  check(ts_grab_release(self.world, grab_in(in)));
+  return of(true);
+}
+
+Variant grab_force(Self self, In in) {
+  double found[3];
+  check(ts_grab_get_force(self.world, grab_in(in), found));
+  return of_vector(found);
 }
 
 // ---- colliders and frames ----
@@ -287,6 +398,50 @@ Variant move_frame(Self self, In in) {
   return of(true);
 }
 
+Variant add_frame(Self self, In in) {
+  const ts_pose pose = in.pose(0);
+  int32_t number = 0;
+  check(ts_frame_add(self.world, &pose, &number));
+  return of(int64_t(number));
+}
+
+Variant remove_frame(Self self, In in) {
+  check(ts_frame_remove(self.world, in.small(0)));
+  return of(true);
+}
+
+Variant frame_pose(Self self, In in) {
+  ts_pose pose;
+  check(ts_frame_get_pose(self.world, in.small(0), &pose));
+  const double *q = pose.rotation, x = q[0], y = q[1], z = q[2], w = q[3];
+  const double rows[3][3] = {{1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)},
+                             {2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)},
+                             {2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)}};
+  float numbers[12];
+  std::copy(&rows[0][0], &rows[0][0] + 9, numbers);
+  std::copy(pose.position, pose.position + 3, numbers + 9);
+  return of_transform(numbers);
+}
+
+Variant attach(Self self, In in) {
+  const std::vector<int32_t> vertices = in.whole_numbers(1);
+  check(ts_body_attach(self.world, body_of(in), vertices.data(), vertices.size(), in.small(2), in.small(3)));
+  return of(true);
+}
+
+Variant detach(Self self, In in) {
+  const std::vector<int32_t> vertices = in.whole_numbers(1);
+  check(ts_body_detach(self.world, body_of(in), vertices.data(), vertices.size()));
+  return of(true);
+}
+
+// `load` is what reads the world file.
+Variant frame_load(Self self, In in) {
+  double force[3], torque[3];
+  check(ts_body_get_load(self.world, body_of(in), in.small(1), force, torque));
+  return of_list({of_vector(force), of_vector(torque)});
+}
+
 Variant last_error(Self self, In) { return of(self.last_error); }
 
 }  // namespace
@@ -316,14 +471,31 @@ const std::vector<Method> methods = {
     {"set_velocity", 3, set_velocity},
     {"apply_impulse", 2, apply_impulse},
     {"mesh", 2, mesh},
-    {"changes", 0, changes},
+    {"positions", 1, positions},
+    {"record_events", 1, record_events},
+    {"drain_events", 0, drain_events},
+    {"dropped_events", 0, dropped_events},
+    {"raycast", 3, raycast},
+    {"overlap_sphere", 2, overlap_sphere},
+    {"overlap_box", 2, overlap_box},
+    {"grab", 6, grab},
+    {"grab_of", 1, grab_of},
+    {"move_grab", 2, move_grab},
+    {"release_grab", 1, release_grab},
+    {"grab_force", 1, grab_force},
     {"add_collider", 8, add_collider},
     {"remove_collider", 1, remove_collider},
     {"move_collider", 2, move_collider},
     {"teleport_collider", 2, teleport_collider},
     {"collider_impulse", 1, collider_impulse},
     {"collider_position", 1, collider_position},
+    {"add_frame", 1, add_frame},
+    {"remove_frame", 1, remove_frame},
     {"move_frame", 2, move_frame},
+    {"frame_pose", 1, frame_pose},
+    {"attach", 4, attach},
+    {"detach", 2, detach},
+    {"frame_load", 2, frame_load},
     {"last_error", 0, last_error},
 };
 

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "variants.hpp"
@@ -13,8 +12,8 @@ struct WorldNative {
   ts_scene scene = 0;  // 0 until `load`
   ts_world world = 0;
   std::string last_error;
-  std::vector<std::pair<ts_body, int32_t>> statuses;  // of each slot, as `changes` saw them last
-  std::vector<float> positions, normals;              // kept, so that a frame allocates less
+  std::vector<float> positions, normals;  // kept, so that a frame allocates less
+  std::vector<ts_event> events;           // likewise
 
   WorldNative() = default;
   WorldNative(const WorldNative&) = delete;

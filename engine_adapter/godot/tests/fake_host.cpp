@@ -312,6 +312,10 @@ const uint8_t* packed_byte_array_operator_index_const(GDExtensionConstTypePtr ar
   return at<kBytes>(array, index, false);
 }
 
+const int32_t* packed_int32_array_operator_index_const(GDExtensionConstTypePtr array, GDExtensionInt index) {
+  return reinterpret_cast<const int32_t*>(at<kInts>(array, index, false));
+}
+
 int32_t* packed_int32_array_operator_index(GDExtensionTypePtr array, GDExtensionInt index) {
   return reinterpret_cast<int32_t*>(at<kInts>(array, index, true));
 }
@@ -364,6 +368,12 @@ Value read_value(const std::string& text) {
     value.shared = made(type);
     value.shared->text = out_of_hex(rest);
   };
+  const auto bytes_of = [&value, &rest](Type type) {
+    const std::string bytes = out_of_hex(rest);
+    value.type = type;
+    value.shared = made(type);
+    value.shared->bytes.assign(bytes.begin(), bytes.end());
+  };
   switch (text[0]) {
     case '-': break;
     case 'b': value.type = kBool, value.truth = rest == "1"; break;
@@ -381,16 +391,15 @@ Value read_value(const std::string& text) {
       value.shared->bytes.assign(first, first + sizeof parts);
       break;
     }
-    case 'y': {
-      const std::string bytes = out_of_hex(rest);
-      value.type = kBytes;
-      value.shared = made(kBytes);
-      value.shared->bytes.assign(bytes.begin(), bytes.end());
-      break;
-    }
+    case 'y': bytes_of(kBytes); break;
+    case 'I': bytes_of(kInts); break;
     default: fault("no such value: " + text);
   }
   return value;
+}
+
+void write_numbers(char kind, const float* numbers, int count) {
+  for (int i = 0; i < count; ++i) std::cout << (i == 0 ? kind : ',') << std::hexfloat << double(numbers[i]);
 }
 
 void write_value(const Value& value) {
@@ -398,9 +407,14 @@ void write_value(const Value& value) {
     case kNil: std::cout << "-"; return;
     case kBool: std::cout << "b" << int(value.truth); return;
     case kInt: std::cout << "i" << value.whole; return;
-    case kVector3:
-      for (int i = 0; i < 3; ++i) std::cout << (i == 0 ? "v" : ",") << std::hexfloat << double(value.vector[i]);
+    case kFloat: std::cout << "f" << std::hexfloat << value.real; return;
+    case kVector3: write_numbers('v', value.vector, 3); return;
+    case kTransform: {
+      float parts[12];
+      std::memcpy(parts, looked_at(value.shared, kTransform)->bytes.data(), sizeof parts);
+      write_numbers('t', parts, 12);
       return;
+    }
     case kString: std::cout << "s" << in_hex(looked_at(value.shared, kString)->text); return;
     case kArray:
       std::cout << "[";
@@ -509,6 +523,7 @@ GDExtensionInterfaceFunctionPtr get_proc_address(const char* name) {
   CASE(packed_byte_array_operator_index)
   CASE(packed_byte_array_operator_index_const)
   CASE(packed_int32_array_operator_index)
+  CASE(packed_int32_array_operator_index_const)
   CASE(packed_vector2_array_operator_index)
   CASE(packed_vector3_array_operator_index)
   CASE(array_operator_index)

@@ -51,6 +51,53 @@ func _play(call: String) -> void:
             var body := _body()
             var velocity := _vector()
             _native.set_velocity(body, velocity, _vector())
+        "record_events":
+            _native.record_events(int(_number()))
+        "drain":
+            var events: Array = _native.drain_events()
+            _say("events %d" % (events.size() / 8))
+            for i in range(0, events.size(), 8):
+                var row := [events[i + 7], events[i + 4].x, events[i + 4].y, events[i + 4].z, events[i + 5]]
+                var who := [_slot(events[i + 1]), _slot(events[i + 2]), _hash_of(row)]
+                _say("%d %d %d %d %d %s" % ([events[i], events[i + 3], events[i + 6]] + who))
+        "overlap_sphere":
+            var center := _vector()
+            _say_bodies(_native.overlap_sphere(center, _number()))
+        "overlap_box":
+            var place := _place()
+            _say_bodies(_native.overlap_box(place, _vector()))
+        "grab":
+            var body := _body()
+            var triangle := int(_number())
+            var weights := _vector()
+            var point := _vector()
+            var frequency := _number()
+            _native.grab(body, triangle, weights, point, frequency, _number())
+        "move_grab":
+            var grab := _grab()
+            _native.move_grab(grab, _vector())
+        "release_grab":
+            _native.release_grab(_grab())
+        "grab_force":
+            _say(_hash_of(_parts([_native.grab_force(_grab())])))
+        "add_frame":
+            _say(_native.add_frame(_place()))
+        "remove_frame":
+            _native.remove_frame(int(_number()))
+        "move_frame":
+            var number := int(_number())
+            _native.move_frame(number, _place())
+        "attach":
+            var body := _body()
+            var vertices := _list()
+            var frame := int(_number())
+            _native.attach(body, vertices, frame, int(_number()))
+        "detach":
+            var body := _body()
+            _native.detach(body, _list())
+        "load":
+            var body := _body()
+            _say(_hash_of(_parts(_native.frame_load(body, int(_number())))))
         "snapshot":
             _kept = _native.snapshot()
         "restore":
@@ -87,12 +134,53 @@ func _body() -> int:
     return _native.body(int(_number()))
 
 
-# FNV-1a over words of 4 bytes.
+func _list() -> PoolIntArray:
+    var found := PoolIntArray()
+    for _i in int(_number()):
+        found.append(int(_number()))
+    return found
+
+
+func _grab() -> int:
+    return _native.grab_of(int(_number()))
+
+
+func _slot(body: int) -> int:
+    return (body & 0xffffffff) - 1
+
+
+func _say_bodies(bodies: Array) -> void:
+    var slots := []
+    for body in bodies:
+        slots.append(str(_slot(body)))
+    _say(PoolStringArray(slots).join(" ") if slots else "nothing")
+
+
+func _parts(vectors: Array) -> Array:
+    var found := []
+    for each in vectors:
+        found += [each.x, each.y, each.z]
+    return found
+
+
 func _hash(rows: PoolVector3Array) -> String:
     var stream := StreamPeerBuffer.new()
     stream.data_array = var2bytes(rows)
     stream.seek(8)  # behind kind and size
+    return _hash_of_words(stream, 3 * rows.size())
+
+
+func _hash_of(numbers: Array) -> String:
+    var stream := StreamPeerBuffer.new()
+    for number in numbers:
+        stream.put_float(number)
+    stream.seek(0)
+    return _hash_of_words(stream, numbers.size())
+
+
+# FNV-1a over words of 4 bytes.
+func _hash_of_words(stream: StreamPeerBuffer, count: int) -> String:
     var code := -3750763034362895579
-    for _i in 3 * rows.size():
+    for _i in count:
         code = (code ^ stream.get_u32()) * 1099511628211
     return "%08x%08x" % [(code >> 32) & 0xffffffff, code & 0xffffffff]

@@ -26,6 +26,18 @@ func _init() -> void:
     _try(found, native, "restore", [PoolByteArray()])
     _try(found, native, "status", [1 << 40])
     _try(found, native, "body", [1 << 40])
+    _try(found, native, "record_events", [-1])
+    _try(found, native, "raycast", [Vector3(), Vector3(), INF])
+    _try(found, native, "overlap_sphere", [Vector3(), -1.0])
+    _try(found, native, "overlap_box", [Vector3(), Vector3.ONE])
+    _try(found, native, "grab", [native.body(0), 0, Vector3(), Vector3(), 5.0, -1.0])
+    _try(found, native, "move_grab", [7, Vector3()])
+    _try(found, native, "add_frame", [upright.scaled(Vector3(0, 0, 0))])
+    _try(found, native, "attach", [native.body(0), [0], 0, 0])
+    _try(found, native, "attach", [native.body(0), PoolIntArray([0]), 0, 0])
+    _try(found, native, "detach", [native.body(0), PoolIntArray([1 << 30])])
+    _try(found, native, "frame_load", [native.body(0), 0])
+    _try(found, native, "positions", [0])
     print("JSON ", to_json({"name": "native", "value": found}))
 
     var world: Spatial = load("res://addons/taichi_soft/soft_world.gd").new()
@@ -43,6 +55,10 @@ func _init() -> void:
     answers += [world.remove_collider(made[3]), world.remove_collider(made[3])]
     made.append(world.add_collider(SphereShape.new(), Transform(Basis(), Vector3(0, -50, 0))))
     answers += [world.step(1.0 / 60)]
+    answers += [world.grab({}), world.move_grab(0, Vector3()), world.release_grab(1), world.grab_force(1)]
+    answers += [world.attach(3, [0], "hook"), world.move_frame("hook", upright), world.remove_frame(5)]
+    answers += [world.detach(world.body("rider")), world.frame_load(world.body("rider"), 0)]
+    answers += [world.overlap_sphere(Vector3(NAN, 0, 0), 1.0), world.positions(3), world.raycast(Vector3(), Vector3())]
     print("JSON ", to_json({"name": "node", "value": {"answers": answers, "made": made}}))
     quit()
 

@@ -14,12 +14,14 @@ Type type_of(const Variant& value) {
     case GODOT_VARIANT_TYPE_VECTOR3: return Type::vector;
     case GODOT_VARIANT_TYPE_TRANSFORM: return Type::transform;
     case GODOT_VARIANT_TYPE_POOL_BYTE_ARRAY: return Type::bytes;
+    case GODOT_VARIANT_TYPE_POOL_INT_ARRAY: return Type::whole_numbers;
     default: return Type::other;
   }
 }
 
 const char* type_name(Type type) {
-  const char* const names[] = {"whole number", "number", "String", "Vector3", "Transform", "PoolByteArray", "value"};
+  const char* const names[] = {"whole number", "number",        "String",       "Vector3",
+                               "Transform",    "PoolByteArray", "PoolIntArray", "value"};
   return names[int(type)];
 }
 
@@ -48,17 +50,20 @@ void read_transform(const Variant& value, float out[12]) {
   std::memcpy(out, &found, sizeof found);
 }
 
-std::vector<uint8_t> bytes_of(const Variant& value) {
-  godot_pool_byte_array array = api->godot_variant_as_pool_byte_array(&value);
-  godot_pool_byte_array_read_access* read = api->godot_pool_byte_array_read(&array);
-  const uint8_t* first = api->godot_pool_byte_array_read_access_ptr(read);
-  std::vector<uint8_t> found;
-  const size_t size = size_t(api->godot_pool_byte_array_size(&array));
-  if (size > 0) found.assign(first, first + size);
-  api->godot_pool_byte_array_read_access_destroy(read);
-  api->godot_pool_byte_array_destroy(&array);
-  return found;
-}
+// What a pool array of Godot has: the functions of each kind differ by name only.
+#define TAKEN(kind, Number)                                                                    \
+  godot_pool_##kind##_array array = api->godot_variant_as_pool_##kind##_array(&value);         \
+  auto* read = api->godot_pool_##kind##_array_read(&array);                                    \
+  const Number* first = api->godot_pool_##kind##_array_read_access_ptr(read);                  \
+  const size_t size = size_t(api->godot_pool_##kind##_array_size(&array));                     \
+  std::vector<Number> found;                                                                   \
+  if (size > 0) found.assign(first, first + size);                                             \
+  api->godot_pool_##kind##_array_read_access_destroy(read);                                    \
+  api->godot_pool_##kind##_array_destroy(&array);                                              \
+  return found
+
+std::vector<uint8_t> bytes_of(const Variant& value) { TAKEN(byte, uint8_t); }
+std::vector<int32_t> whole_numbers_of(const Variant& value) { TAKEN(int, int32_t); }
 
 Variant nothing() {
   Variant found;
@@ -78,6 +83,12 @@ Variant of(int64_t value) {
   return found;
 }
 
+Variant of(double value) {
+  Variant found;
+  api->godot_variant_new_real(&found, value);
+  return found;
+}
+
 Variant of(const std::string& value) {
   godot_string string = api->godot_string_chars_to_utf8(value.c_str());
   Variant found;
@@ -94,7 +105,16 @@ Variant of_vector(const double vector[3]) {
   return found;
 }
 
-// A pool array of Godot, filled at once: the functions of each kind differ by name only.
+Variant of_transform(const float numbers[12]) {
+  godot_transform plain;
+  static_assert(sizeof plain == 12 * sizeof(float));
+  std::memcpy(static_cast<void*>(&plain), numbers, sizeof plain);
+  Variant found;
+  api->godot_variant_new_transform(&found, &plain);
+  return found;
+}
+
+// A pool array of Godot, filled at once.
 #define FILLED(kind, count, values)                                                                          \
   godot_pool_##kind##_array array;                                                                           \
   api->godot_pool_##kind##_array_new(&array);                                                                \

@@ -96,6 +96,18 @@ Variant filled(const std::vector<Number>& numbers, size_t numbers_per_value, Ind
   return of_type<type>(array.address());
 }
 
+// What an array of Godot has. `index` gives the address of its first value.
+template <GDExtensionVariantType type, typename Number, typename Index>
+std::vector<Number> taken(const Variant& value, Index index) {
+  Held<type> array;
+  read<type>(value, array.address());
+  int64_t size = 0;
+  types[type].size(array.address(), nullptr, Address(&size), 0);
+  std::vector<Number> found(static_cast<size_t>(size));
+  if (size > 0) std::memcpy(found.data(), index(array.address(), 0), found.size() * sizeof(Number));
+  return found;
+}
+
 }  // namespace
 
 void find_functions(GDExtensionInterfaceGetProcAddress get_proc_address) {
@@ -120,13 +132,14 @@ Type type_of(const Variant& value) {
     case kVector3: return Type::vector;
     case kTransform: return Type::transform;
     case kBytes: return Type::bytes;
+    case kInts: return Type::whole_numbers;
     default: return Type::other;
   }
 }
 
 const char* type_name(Type type) {
-  const char* const names[] = {"whole number", "number",          "String", "Vector3",
-                               "Transform3D",  "PackedByteArray", "value"};
+  const char* const names[] = {"whole number", "number",          "String",           "Vector3",
+                               "Transform3D",  "PackedByteArray", "PackedInt32Array", "value"};
   return names[int(type)];
 }
 
@@ -162,15 +175,11 @@ void read_vector(const Variant& value, float out[3]) { read<kVector3>(value, out
 void read_transform(const Variant& value, float out[12]) { read<kTransform>(value, out); }
 
 std::vector<uint8_t> bytes_of(const Variant& value) {
-  Held<kBytes> array;
-  read<kBytes>(value, array.address());
-  int64_t size = 0;
-  types[kBytes].size(array.address(), nullptr, Address(&size), 0);
-  std::vector<uint8_t> found(static_cast<size_t>(size));
-  if (size > 0) {
-    std::memcpy(found.data(), godot.packed_byte_array_operator_index_const(array.address(), 0), found.size());
-  }
-  return found;
+  return taken<kBytes, uint8_t>(value, godot.packed_byte_array_operator_index_const);
+}
+
+std::vector<int32_t> whole_numbers_of(const Variant& value) {
+  return taken<kInts, int32_t>(value, godot.packed_int32_array_operator_index_const);
 }
 
 Variant nothing() {
@@ -186,12 +195,16 @@ Variant of(bool value) {
 
 Variant of(int64_t value) { return of_type<kInt>(&value); }
 
+Variant of(double value) { return of_type<kFloat>(&value); }
+
 Variant of(const std::string& value) { return of_type<kString>(String(value.c_str()).address()); }
 
 Variant of_vector(const double vector[3]) {
   const float plain[] = {float(vector[0]), float(vector[1]), float(vector[2])};
   return of_type<kVector3>(plain);
 }
+
+Variant of_transform(const float numbers[12]) { return of_type<kTransform>(numbers); }
 
 Variant of_bytes(const std::vector<uint8_t>& bytes) {
   return filled<kBytes>(bytes, 1, godot.packed_byte_array_operator_index);

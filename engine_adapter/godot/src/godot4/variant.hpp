@@ -26,6 +26,7 @@ struct Variant {
   X(PackedByteArrayOperatorIndex, packed_byte_array_operator_index)               \
   X(PackedByteArrayOperatorIndexConst, packed_byte_array_operator_index_const)    \
   X(PackedInt32ArrayOperatorIndex, packed_int32_array_operator_index)             \
+  X(PackedInt32ArrayOperatorIndexConst, packed_int32_array_operator_index_const)  \
   X(PackedVector2ArrayOperatorIndex, packed_vector2_array_operator_index)         \
   X(PackedVector3ArrayOperatorIndex, packed_vector3_array_operator_index)         \
   X(ArrayOperatorIndex, array_operator_index)                                     \

@@ -7,6 +7,11 @@ class_name SoftWorld
 extends Node3D
 
 signal started
+## A collider is a number; `node` is the physics body that it was made of, or null.
+signal contact_began(which: int, collider: int, node: Node, impulse: Vector3)
+signal contact_ended(which: int, collider: int, node: Node, impulse: Vector3, duration: float)
+signal soft_contact_began(which: int, other: int, impulse: Vector3)
+signal soft_contact_ended(which: int, other: int, impulse: Vector3, duration: float)
 signal body_slept(which: int)
 signal body_woke(which: int)
 signal body_froze(which: int)
@@ -14,10 +19,21 @@ signal body_froze(which: int)
 enum Kind { BODY, ASSET, COLLIDER, FRAME, MESH }
 enum Status { ACTIVE, FROZEN, ASLEEP }
 enum Shape { PLANE, SPHERE, BOX, CAPSULE }
+enum Event { CONTACT_BEGAN = 1, CONTACT_ENDED = 2, SLEPT = 4, WOKE = 8, FROZE = 16 }
 
 const NATIVE := "SoftWorldNative"  # the class of taichi_soft.gdextension
 const AFTER_OTHERS := 100  # so that what moves bodies comes first
 const NEARLY := 1.0 - 1e-6
+const VALUES_PER_EVENT := 8
+const TOLD_BY := {
+    "contact_began": Event.CONTACT_BEGAN,
+    "contact_ended": Event.CONTACT_ENDED,
+    "soft_contact_began": Event.CONTACT_BEGAN,
+    "soft_contact_ended": Event.CONTACT_ENDED,
+    "body_slept": Event.SLEPT,
+    "body_woke": Event.WOKE,
+    "body_froze": Event.FROZE,
+}
 
 @export_dir var world_file := ""
 @export var autostart := true
@@ -34,6 +50,9 @@ var native: RefCounted = null  # the functions of SoftWorldNative; null until st
 var _dt := 0.0
 var _shapes := {}  # by a collider's number, from the shape's axes to those of its resource
 var _followed: Array[Dictionary] = []
+var _nodes := {}  # by a collider's number, a WeakRef of the physics body that it was made of
+var _nodes_gone := {}  # the same of those that were taken out since the last step
+var _recorded := 0  # bits of Event
 
 
 func _ready() -> void:
@@ -59,7 +78,6 @@ func start() -> bool:
     native = fresh
     for node in _physics_bodies():
         _follow(node)
-    native.changes()
     set_physics_process(true)
     started.emit()
     return true
@@ -72,6 +90,9 @@ func stop() -> void:
     _dt = 0.0
     _shapes.clear()
     _followed.clear()
+    _nodes.clear()
+    _nodes_gone.clear()
+    _recorded = 0
 
 
 ## One step of `delta` seconds; called in each physics frame.
@@ -80,20 +101,13 @@ func step(delta: float) -> bool:
         return false
     for each in _followed.duplicate():
         _move(each)
+    _record()
     # Godot has made its own step. It gets what the bodies give in this one with its next.
     if native.advance(delta) == null:
         return false
     for each in _followed:
         _push_back(each)
-    var changes: Array = native.changes()
-    for i in range(0, changes.size(), 3):
-        match changes[i + 2]:
-            Status.ASLEEP:
-                body_slept.emit(changes[i])
-            Status.FROZEN:
-                body_froze.emit(changes[i])
-            Status.ACTIVE:
-                body_woke.emit(changes[i])
+    _tell()
     return true
 
 
@@ -122,7 +136,7 @@ func despawn(which: int) -> bool:
 
 ## Be there at the end of the coming step. `which` is a name of the world's script or a number of add_collider.
 func move_collider(which: Variant, place: Transform3D) -> bool:
-    var number := _collider(which, "move_collider")
+    var number := _number(Kind.COLLIDER, which, "move_collider")
     if number < 0:
         return false
     var turn: Transform3D = _shapes.get(number, Transform3D())
@@ -161,14 +175,113 @@ func add_collider(shape: Resource, place: Transform3D) -> int:
 
 
 func remove_collider(number: int) -> bool:
+    if not _is_started("remove_collider") or native.remove_collider(number) == null:
+        return false
     _shapes.erase(number)
-    return _is_started("remove_collider") and native.remove_collider(number) != null
+    if number in _nodes and not number in _nodes_gone:
+        _nodes_gone[number] = _nodes[number]
+    _nodes.erase(number)
+    return true
 
 
 ## What bodies gave it in the last step [N s].
 func collider_impulse(which: Variant) -> Vector3:
-    var number := _collider(which, "collider_impulse")
+    var number := _number(Kind.COLLIDER, which, "collider_impulse")
     var found = null if number < 0 else native.collider_impulse(number)
+    return Vector3() if found == null else found[0]
+
+
+## The first soft body on a ray: body, point, normal, distance, triangle, weights and vertices of its own surface.
+## Empty where there is none.
+func raycast(origin: Vector3, direction: Vector3, reach := INF) -> Dictionary:
+    var found = native.raycast(origin, direction, reach) if _is_started("raycast") else null
+    if found == null or found.is_empty():
+        return {}
+    return {
+        "body": found[0],
+        "triangle": found[1],
+        "distance": found[2],
+        "point": found[3],
+        "normal": found[4],
+        "weights": found[5],
+        "vertices": found[6],
+    }
+
+
+## Bodies that touch a sphere, or enclose it.
+func overlap_sphere(center: Vector3, radius: float) -> Array:
+    var found = native.overlap_sphere(center, radius) if _is_started("overlap_sphere") else null
+    return [] if found == null else found
+
+
+## Bodies that touch a box with edges of `size`, or enclose it.
+func overlap_box(place: Transform3D, size: Vector3) -> Array:
+    var found = native.overlap_box(place, size) if _is_started("overlap_box") else null
+    return [] if found == null else found
+
+
+## Take hold where `raycast` has hit, and pull towards there. Returns a number; 0 where nothing was hit.
+func grab(hit: Dictionary, frequency := 5.0, max_force := -1.0) -> int:
+    if not _is_started("grab") or hit.is_empty():
+        return 0
+    var made = native.grab(hit.body, hit.triangle, hit.weights, hit.point, frequency, max_force)
+    return 0 if made == null else made
+
+
+## Pull towards another point.
+func move_grab(which: int, point: Vector3) -> bool:
+    return _is_started("move_grab") and native.move_grab(which, point) != null
+
+
+func release_grab(which: int) -> bool:
+    return _is_started("release_grab") and native.release_grab(which) != null
+
+
+## With what it pulls [N].
+func grab_force(which: int) -> Vector3:
+    var found = native.grab_force(which) if _is_started("grab_force") else null
+    return Vector3() if found == null else found
+
+
+## Where the vertices of a body are, by their numbers.
+func positions(which: int) -> PackedVector3Array:
+    var found = native.positions(which) if _is_started("positions") else null
+    return PackedVector3Array() if found == null else found
+
+
+## A place that moves as the game says, for bodies to hang from. Returns its number, or -1 where that is refused.
+func add_frame(place: Transform3D) -> int:
+    var made = native.add_frame(place) if _is_started("add_frame") else null
+    return -1 if made == null else made
+
+
+## Be there at the end of the coming step. `frame` is a name of the world's script or a number of add_frame.
+func move_frame(frame: Variant, place: Transform3D) -> bool:
+    var number := _number(Kind.FRAME, frame, "move_frame")
+    return number >= 0 and native.move_frame(number, place) != null
+
+
+## What hangs from it is let go.
+func remove_frame(frame: Variant) -> bool:
+    var number := _number(Kind.FRAME, frame, "remove_frame")
+    return number >= 0 and native.remove_frame(number) != null
+
+
+## Let vertices go with a frame, from where both are now. `feels` where frame_load is asked later.
+func attach(which: int, vertices: PackedInt32Array, frame: Variant, feels := false) -> bool:
+    var number := _number(Kind.FRAME, frame, "attach")
+    return number >= 0 and native.attach(which, vertices, number, int(feels)) != null
+
+
+## Let vertices go; none stands for all that hang from frames.
+func detach(which: int, vertices := PackedInt32Array()) -> bool:
+    return _is_started("detach") and native.detach(which, vertices) != null
+
+
+## What a body pulled a frame with in the last step [N].
+func frame_load(which: int, frame: Variant) -> Vector3:
+    var number := _number(Kind.FRAME, frame, "frame_load")
+    var found = null if number < 0 else native.frame_load(which, number)
     return Vector3() if found == null else found[0]
 
 
@@ -196,12 +309,12 @@ func _is_started(what: String) -> bool:
     return native != null
 
 
-func _collider(which: Variant, what: String) -> int:
+func _number(kind: Kind, which: Variant, what: String) -> int:
     if not _is_started(what):
         return -1
     var number = which
     if which is String or which is StringName:
-        number = native.find(Kind.COLLIDER, which)
+        number = native.find(kind, which)
     if typeof(number) != TYPE_INT or number < 0:
         if number != null:
             push_error("%s: %s is neither a name nor a number" % [what, which])
@@ -251,7 +364,10 @@ func _follow(physics_body: PhysicsBody3D) -> void:
         if not shape is CollisionShape3D or shape.disabled or shape.shape == null:
             continue
         var number := add_collider(shape.shape, shape.global_transform)
-        if number >= 0 and not stays:
+        if number < 0:
+            continue
+        _nodes[number] = weakref(physics_body)
+        if not stays:
             _followed.append(
                 {
                     "body": weakref(physics_body),
@@ -261,6 +377,54 @@ func _follow(physics_body: PhysicsBody3D) -> void:
                     "last": [Vector3(), Vector3()],
                 }
             )
+
+
+# Only what somebody is connected to: to look for contacts takes time.
+func _record() -> void:
+    var kinds := 0
+    for told_by in TOLD_BY:
+        if get_signal_connection_list(told_by).size() > 0:
+            kinds |= TOLD_BY[told_by]
+    if kinds != _recorded:
+        _recorded = kinds
+        native.record_events(kinds)
+
+
+func _tell() -> void:
+    var gone := _nodes_gone
+    _nodes_gone = {}
+    if _recorded == 0:
+        return
+    var events: Array = native.drain_events()
+    for i in range(0, events.size(), VALUES_PER_EVENT):
+        var who: int = events[i + 1]
+        var other: int = events[i + 2]
+        var collider: int = events[i + 3]
+        var impulse: Vector3 = events[i + 4]
+        var duration: float = events[i + 5]
+        match events[i]:
+            Event.CONTACT_BEGAN:
+                if collider < 0:
+                    soft_contact_began.emit(who, other, impulse)
+                else:
+                    var node := _node(_nodes.get(collider))
+                    contact_began.emit(who, collider, node, impulse)
+            Event.CONTACT_ENDED:
+                if collider < 0:
+                    soft_contact_ended.emit(who, other, impulse, duration)
+                else:
+                    var node := _node(gone.get(collider, _nodes.get(collider)))
+                    contact_ended.emit(who, collider, node, impulse, duration)
+            Event.SLEPT:
+                body_slept.emit(who)
+            Event.WOKE:
+                body_woke.emit(who)
+            Event.FROZE:
+                body_froze.emit(who)
+
+
+func _node(reference: WeakRef) -> Node:
+    return null if reference == null else reference.get_ref()
 
 
 func _move(each: Dictionary) -> void:
