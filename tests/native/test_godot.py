@@ -199,6 +199,15 @@ def test_only_what_is_listened_to_is_recorded(hands):
     assert hands["heard"] == {"recorded": 2 | 8}
 
 
+def test_the_mouse_of_the_demo_pulls_an_elephant(run):
+    found = told(run("mouse.gd"))["mouse"]
+    assert found["hand"]
+    assert found["held"] > found["before"] + 0.5
+    assert found["held"] == pytest.approx(found["place"], abs=0.3)  # it hangs below the hand
+    assert found["after"] == pytest.approx(found["before"], abs=0.1)
+    assert not found["sky"]
+
+
 HELD = {  # by step
     10: [
         line("add_frame", (0.5, 1.0, 0.25), UPRIGHT),

@@ -1,9 +1,12 @@
-# Looks of the demo, and an elephant more at each press of space.
+# Looks of the demo, an elephant more at each press of space, and a hand: the mouse pulls soft bodies about.
 extends Node3D
 
 const ELEPHANT := "res://elephant.glb"  # a copy of assets/elephant.glb, from which world.py makes bodies
 
+var _hand := 0  # a grab
+var _depth := 0.0  # how far in front of the camera it was taken
 var _plush := _colored(Color(0.72, 0.72, 0.78))
+var _dropped := 0
 
 
 func _ready() -> void:
@@ -20,7 +23,39 @@ func _ready() -> void:
 func _unhandled_key_input(event: InputEvent) -> void:
     var key := event as InputEventKey
     if key != null and key.pressed and not key.echo and key.keycode == KEY_SPACE:
-        drop(Transform3D(Basis(), Vector3(randf_range(-0.3, 0.3), 2.0, 0.2)))
+        # Beside the one before: it may still be there.
+        if drop(Transform3D(Basis(), Vector3(0.55 * _dropped - 0.45, 2.0, 0.2))) != null:
+            _dropped += 1
+
+
+func _unhandled_input(event: InputEvent) -> void:
+    var button := event as InputEventMouseButton
+    if button != null and button.button_index == MOUSE_BUTTON_LEFT:
+        if button.pressed:
+            take_hold(button.position)
+        else:
+            let_go()
+    elif event is InputEventMouseMotion and _hand != 0:
+        if not $World.move_grab(_hand, $Camera.project_position(event.position, _depth)):
+            _hand = 0  # the body was taken out
+
+
+# Of the soft body that is seen at a place of the window.
+func take_hold(place: Vector2) -> void:
+    let_go()
+    var camera: Camera3D = $Camera
+    var hit: Dictionary = $World.raycast(
+        camera.project_ray_origin(place), camera.project_ray_normal(place)
+    )
+    if not hit.is_empty():
+        _hand = $World.grab(hit)
+        _depth = -camera.to_local(hit.point).z
+
+
+func let_go() -> void:
+    if _hand != 0:
+        $World.release_grab(_hand)
+    _hand = 0
 
 
 # One elephant more, while there is room; returns what draws it, or null.
