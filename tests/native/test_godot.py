@@ -259,12 +259,19 @@ def test_a_game_in_godot_has_the_same_bits(run, project, play):
 
 
 def test_the_script_of_the_page_runs(run, project):
-    """Its elephant falls, and is drawn."""
+    """Its elephant falls, and is drawn; the mouse takes it, and it is hung up."""
     text = (ROOT / "docs" / "godot.md").read_text(encoding="utf-8")
-    section = text.split("\n## From a script\n")[1]
-    script = re.search(r"^```gdscript\n(.*?)^```", section, re.DOTALL | re.MULTILINE).group(1)
-    (project / "page.gd").write_text(f"extends Spatial\n\n{script}", encoding="utf-8")
-    found = told(run("page_check.gd"))["page"]
+    sections = text.split("\n## From a script\n")[1].split("\n## Rigid bodies\n")[0]
+    scripts = re.findall(r"^```gdscript\n(.*?)^```", sections, re.DOTALL | re.MULTILINE)
+    assert len(scripts) == 3
+    (project / "page.gd").write_text("\n".join(["extends Spatial", *scripts]), encoding="utf-8")
+    printed = run("page_check.gd")
+    assert re.search(r"^an impulse of \d+\.\d\d N s on Ground$", printed, re.MULTILINE)
+    found = told(printed)["page"]
+    assert found["held"]
+    assert found["pulled"] == pytest.approx(found["hand"], abs=0.3)  # it would have fallen
+    assert found["let_go"]
+    assert found["hangs"] == pytest.approx(found["hook"], abs=0.3)
     assert found["nodes"] == 1
     assert found["vertices"] > 8000
     assert 0.3 < found["height"] < 2.1
