@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.bodies.kernels.render_mesh import RING, write_render_mesh
+from taichi_soft.bodies.kernels.render_mesh import RING, SMALL_RING, write_render_mesh
 from taichi_soft.bodies.soft_body import SoftBody, require_alive
 from taichi_soft.core.checks import as_number
 from taichi_soft.core.constants import LANES
@@ -155,20 +155,30 @@ def _write(
 def render_table(vertices: NDArray[np.int64], triangles: NDArray[Any]) -> Ints32:
     """What the kernel walks, in one array, because each argument of a kernel costs as much as some hundred
     vertices: blocks, the body's vertex of each render vertex, where the further triangles of each block begin
-    in the table and behind the last one end, and these triangles.
+    in the table and behind the last one end, how many blocks have small rings only, and these triangles.
 
     A block has `LANES` render vertices, then `RING` rows with the rings round them: triangles (v, a, b) and
     (v, b, c) make the ring a, b, c, and v itself fills it up. A further triangle is the lane of its vertex,
-    and its two others. The last block repeats the last vertex.
+    and its two others. The last block repeats its last vertex, with all that it has.
     """
     count = len(vertices)
     rings, further = _rings(count, triangles)
-    lanes = np.minimum(np.arange(-(-count // LANES) * LANES), count - 1)
+    is_small = (rings[:, SMALL_RING:] == np.arange(count)[:, None]).all(axis=1)
+    order = np.argsort(~is_small, kind="stable")
+    lanes = order[np.minimum(np.arange(-(-count // LANES) * LANES), count - 1)]
     blocks = np.concatenate([lanes[:, None], rings[lanes]], axis=1).reshape(-1, LANES, 1 + RING)
+    further[:, 0] = np.argsort(order)[further[:, 0]]
+    further = further[np.argsort(further[:, 0], kind="stable")]
+    last = further[further[:, 0] == count - 1]
+    beyond = np.arange(count, len(lanes))
+    again = np.tile(last, (len(beyond), 1))
+    again[:, 0] = np.repeat(beyond, len(last))
+    further = np.concatenate([further, again])
     begins = 3 * np.r_[0, np.cumsum(np.bincount(further[:, 0] // LANES, minlength=len(blocks)))]
     further[:, 0] %= LANES
-    begins += blocks.size + count + len(begins)
-    parts = (blocks.swapaxes(1, 2).ravel(), vertices, begins, further.ravel())
+    begins += blocks.size + count + len(begins) + 1
+    small = np.array([is_small[lanes].reshape(-1, LANES).all(axis=1).sum()])
+    parts = (blocks.swapaxes(1, 2).ravel(), vertices, begins, small, further.ravel())
     return np.concatenate(parts).astype(np.int32)
 
 

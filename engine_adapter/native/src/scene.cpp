@@ -35,18 +35,18 @@ Place place_from(const int64_t* row, size_t image) {
 bool is_surface_whole(const Mesh& mesh, size_t body_vertices) {
   constexpr size_t kLanes = 8, kStride = 10 * kLanes;
   const size_t k = mesh.vertex_count, blocks = (k + kLanes - 1) / kLanes, head = blocks * kStride + k;
-  if (k == 0 || mesh.ints.count < head + blocks + 1) return false;
+  if (k == 0 || mesh.ints.count < head + blocks + 2) return false;
   for (size_t i = 0; i < head; ++i) {
     const size_t limit = i < blocks * kStride ? k : body_vertices;
     if (mesh.ints[i] < 0 || size_t(mesh.ints[i]) >= limit) return false;
   }
-  size_t before = head + blocks + 1;
+  size_t before = head + blocks + 2;  // behind how many blocks have small rings, which harms nobody
   for (size_t block = 0; block <= blocks; ++block) {
     const int32_t begin = mesh.ints[head + block];
     if (begin < 0 || size_t(begin) < before || size_t(begin) > mesh.ints.count) return false;
     before = size_t(begin);
   }
-  for (size_t i = head + blocks + 1; i + 3 <= mesh.ints.count; i += 3) {
+  for (size_t i = head + blocks + 2; i + 3 <= mesh.ints.count; i += 3) {
     const int32_t* row = mesh.ints.data + i;
     if (row[0] < 0 || row[0] >= int32_t(kLanes) || row[1] < 0 || size_t(row[1]) >= k || row[2] < 0 ||
         size_t(row[2]) >= k) {

@@ -7,8 +7,9 @@ comes, so the bits are the same for any number of threads.
 from taichi_soft.core.constants import LANES
 from taichi_soft.core.runtime import ti
 
-RING = 9
-"""Vertices in the ring round a render vertex: eight triangles, which is more than most have."""
+RING, SMALL_RING = 9, 7
+"""Vertices in the ring round a render vertex: eight triangles, which is more than most have, and six, which
+most have. Blocks whose rings are all small come first."""
 
 STRIDE = (1 + RING) * LANES
 """Numbers of a block in the table."""
@@ -41,6 +42,19 @@ def _block_count(positions: ti.template()):
     return (positions.shape[0] // 3 + LANES - 1) // LANES
 
 
+@ti.func
+def _sum_of_ring(positions: ti.template(), table: ti.template(), place, length: ti.template()):
+    """Of the triangles in the ring of a render vertex, twice their area times their normal."""
+    a = _row(positions, table[place])
+    one = _row(positions, table[place + LANES]) - a
+    n = ti.Vector.zero(ti.f32, 3)
+    for slot in ti.static(range(2, length + 1)):
+        other = _row(positions, table[place + slot * LANES]) - a
+        n += one.cross(other)
+        one = other
+    return n
+
+
 @ti.kernel
 def write_render_mesh(
     state: ti.template(),
@@ -70,18 +84,18 @@ def write_render_mesh(
     for block in range(_block_count(positions)):
         nx, ny = ti.Vector.zero(ti.f32, LANES), ti.Vector.zero(ti.f32, LANES)
         nz = ti.Vector.zero(ti.f32, LANES)
+        small = table[_block_count(positions) * (STRIDE + 1) + positions.shape[0] // 3 + 1]
         # Reads arrays and writes local ones only, so that LLVM makes one pass over vector registers of it.
-        for lane in range(LANES):
-            j = lane & (LANES - 1)
-            place = (block & BLOCK_BITS) * STRIDE + j
-            a = _row(positions, table[place])
-            one = _row(positions, table[place + LANES]) - a
-            n = ti.Vector.zero(ti.f32, 3)
-            for slot in ti.static(range(2, RING + 1)):
-                other = _row(positions, table[place + slot * LANES]) - a
-                n += one.cross(other)
-                one = other
-            nx[j], ny[j], nz[j] = n.x, n.y, n.z
+        if block < small:
+            for lane in range(LANES):
+                j = lane & (LANES - 1)
+                n = _sum_of_ring(positions, table, (block & BLOCK_BITS) * STRIDE + j, SMALL_RING)
+                nx[j], ny[j], nz[j] = n.x, n.y, n.z
+        else:
+            for lane in range(LANES):
+                j = lane & (LANES - 1)
+                n = _sum_of_ring(positions, table, (block & BLOCK_BITS) * STRIDE + j, RING)
+                nx[j], ny[j], nz[j] = n.x, n.y, n.z
         # The few triangles that no ring has.
         row = _block_count(positions) * STRIDE + positions.shape[0] // 3 + block
         for number in range((table[row + 1] - table[row]) // 3):
