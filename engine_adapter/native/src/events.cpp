@@ -39,7 +39,7 @@ std::vector<ts_body> Events::sleeping(const Present& present) const {
 
 void Events::record(int32_t kinds, const Present& present) {
   if ((kinds_ & kContacts) == 0) going_on_.clear();
-  if ((kinds_ & kSleep) == 0) sleepers_ = sleeping(present);
+  if ((kinds_ & kSleep) == 0 || (kinds & kSleep) == 0) sleepers_ = sleeping(present);
   kinds_ = kinds;
 }
 
@@ -92,7 +92,7 @@ void Events::take_down(const std::map<Pair, std::array<float, 3>>& touches, cons
                        const std::vector<int32_t>& frozen, int64_t step, double time, double dt) {
   if ((kinds_ & kContacts) != 0) follow(touches, present, step, time, dt);
   const auto say = [&](int32_t kind, ts_body body) { tell({kind, -1, step, time, body, 0, {0.0, 0.0, 0.0}, 0.0}); };
-  if ((kinds_ & kSleep) != 0) {
+  if (looks()) {  // also where nobody hears of sleep: it may be asked for after a restore
     const std::vector<ts_body> now = sleeping(present);
     for (size_t slot = 0; slot < now.size(); ++slot) {
       if (now[slot] != 0 && now[slot] != sleepers_[slot]) say(TS_FELL_ASLEEP, now[slot]);
