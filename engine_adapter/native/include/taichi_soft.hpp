@@ -59,7 +59,9 @@ struct Body {
   explicit operator bool() const { return handle != 0; }
 };
 
-// A hand on a body, from `World::grab`; it lets go when it ends. Moves, but has no copies.
+// A hand on a body, from `World::grab`; it lets go when it ends, or another is moved into it. Moves, but has no copies.
+// After `World::restore` to before it took hold it is none; as numbers are given again, let it end, or `forget` it, before
+// others take hold.
 class Grab {
  public:
   Grab() = default;
@@ -67,14 +69,16 @@ class Grab {
   Grab(ts_world world, ts_grab handle) : world_(world), handle_(handle) {}
   Grab(Grab&& other) noexcept { swap(other); }
   Grab& operator=(Grab&& other) noexcept {
+    if (this == &other) return *this;
+    // After a restore the new one may have the number of the old one, and would be let go itself.
+    if (handle_ != other.handle_ || world_ != other.world_) end();
+    forget();
     swap(other);
     return *this;
   }
   Grab(const Grab&) = delete;
   Grab& operator=(const Grab&) = delete;
-  ~Grab() {
-    if (handle_ != 0) ts_grab_release(world_, handle_);  // refused where the world or the body is gone: it is let go
-  }
+  ~Grab() { end(); }
 
   ts_grab handle() const { return handle_; }
   explicit operator bool() const { return handle_ != 0; }
@@ -91,8 +95,13 @@ class Grab {
     check(ts_grab_release(world_, handle_));
     handle_ = 0;
   }
+  // Hold on for good, without this object.
+  void forget() { handle_ = 0; }
 
  private:
+  void end() noexcept {
+    if (handle_ != 0) ts_grab_release(world_, handle_);  // refused where the world or the body is gone: it is let go
+  }
   void swap(Grab& other) noexcept {
     std::swap(world_, other.world_);
     std::swap(handle_, other.handle_);
