@@ -12,6 +12,7 @@ from library import VERSION, in_process
 from native_build import ROOT
 
 from taichi_soft.bodies import status
+from taichi_soft.contact.fields import PAIR_ROWS
 from taichi_soft.contact.kernels.touches import OF_BODY, OF_COLLIDER
 from taichi_soft.control.kernels.grabs import CORNERS, MOST_GRABS, PATCH_ROWS
 from taichi_soft.control.kernels.pins import STILL, WITH_FRAME
@@ -110,6 +111,10 @@ FORGERIES = {
     "no number of limits": changed("world/limits", lambda array: array[:3]),
     "a collider without a pose": changed("colliders/pose", lambda array: array[:-1]),
     "ranks that are none": changed("asset0/rank", first(-1)),
+    "fewer rows than can touch": changed("events/limits", lambda array: np.append(array[:2], 1.0)),
+    "grabs without a size": changed("grabs/limits", first(np.nan)),
+    "grabs with more rows than fields have": changed("grabs/limits", added(0, 0, 0, 0, 1000)),
+    "vertices that are nowhere": changed("asset0/vertices", first(np.nan)),
 }
 
 LOADED = """
@@ -157,5 +162,7 @@ def test_the_library_knows_the_numbers_of_status_drives_aims_and_grabs():
     assert tuple(map(int, grabs)) == (MOST_GRABS, PATCH_ROWS, CORNERS)
     kinds = re.search(r"kOfCollider = (\d+), kOfBody = (\d+)", (HEADERS / "events.hpp").read_text()).groups()
     assert tuple(map(int, kinds)) == (OF_COLLIDER, OF_BODY)
+    rows = re.search(r"kPairRows = (\d+);", (HEADERS / "events.hpp").read_text()).group(1)
+    assert int(rows) == PAIR_ROWS
     known = (HEADERS / "events.cpp").read_text()
     assert f"kActive = {status.ACTIVE}, kAsleep = {status.ASLEEP};" in known

@@ -14,6 +14,7 @@ namespace taichi_soft {
 
 using Pair = std::array<int32_t, 3>;  // a slot, what the other one is, and its slot or number
 enum { kOfCollider = 0, kOfBody = 1 };
+constexpr size_t kPairRows = 32;  // of bodies that touch, for each body: as taichi_soft/contact/fields.py has it
 
 struct Contact {  // that goes on
   ts_body a, b;   // the latter 0 for a collider

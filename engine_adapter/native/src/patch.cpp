@@ -78,7 +78,7 @@ Patch patch_round(const Scene& scene, const Asset& asset, const int32_t corners[
   for (size_t v = 0; v < n; ++v) {
     const double part = distance[v] / radius, left = std::max(1.0 - part * part, 0.0);
     falloff[v] = left * left;
-    if (falloff[v] < 1e-6) falloff[v] = 0.0;
+    if (!(falloff[v] >= 1e-6)) falloff[v] = 0.0;  // nor what is not a number: it would name more vertices than fit
     if (falloff[v] == 0.0) continue;
     found.vertices.push_back(int32_t(v));
     found.shares.push_back(falloff[v] * asset.masses[v]);

@@ -13,6 +13,14 @@ namespace {
   fail(TS_ERROR_FILE, "the world file is not in order: %s. Export it again", what);
 }
 
+// A mesh whose squares can be computed with.
+bool are_places(const Archive::View<double>& numbers) {
+  for (double number : numbers) {
+    if (!(std::fabs(number) <= 1e30)) return false;
+  }
+  return true;
+}
+
 bool are_below(const Archive::View<int32_t>& numbers, size_t limit) {
   for (int32_t number : numbers) {
     if (number < 0 || static_cast<size_t>(number) >= limit) return false;
@@ -104,6 +112,9 @@ Scene::Scene(const std::string& folder)
   has_soft_contact = flags[2] != 0;
   is_implicit = flags[3] != 0;
   patch_size = grabs[0], farthest_pull = grabs[1], pull_in_weights = grabs[2], highest_pull_speed = grabs[3];
+  for (double each : grabs) {
+    if (!(each >= 0.0 && each <= 1e30)) out_of_order("grabs");
+  }
   patch_rows = grabs[4] >= 1.0 && grabs[4] <= 1e6 ? size_t(grabs[4]) : 0;
   slot_count = counts[0], particle_count = counts[1], threads = counts[2];
   stable_share = stable[0], stable_step = stable[1];
@@ -179,7 +190,7 @@ void Scene::read_assets() {
     const auto center = archive.get<double>(prefix + "center"), skin = archive.get<double>(prefix + "thickness");
     const size_t n = asset.vertex_count();
     if (asset.rest_rows.count != 8 * n || asset.vertices.count != 3 * n || asset.rank.count != n || center.count != 3 ||
-        skin.count != 1 || asset.elements.sizes.size() != 2 || !are_below(asset.elements, n) || !are_below(asset.pinned, n) || !are_below(asset.outer, n) || !are_below(asset.rank, n) ||
+        skin.count != 1 || !are_places(asset.vertices) || asset.elements.sizes.size() != 2 || !are_below(asset.elements, n) || !are_below(asset.pinned, n) || !are_below(asset.outer, n) || !are_below(asset.rank, n) ||
         !are_below(asset.surface, n)) {
       out_of_order("an asset");
     }

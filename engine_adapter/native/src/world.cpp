@@ -77,6 +77,7 @@ void World::bind() {
   grab_count_ = {root, s.place("grabs.count", kMostGrabs, 1)};
   grab_particle_ = {root, s.place("grabs.particle", kMostGrabs * kPatchRows, 1)};
   grab_share_ = {root, s.place("grabs.share", kMostGrabs * kPatchRows, 1)};
+  if (s.patch_rows != kPatchRows) fail(TS_ERROR_FILE, "the world file is not in order: grabs. Export it again");
   if (s.has_soft_contact) records_touches_ = {root, s.place("soft.records_touches", 1, 1)};
   if (!s.has_contact) return;
   island_count_ = {root, s.place("contact.island_count", 1, 1)};
@@ -92,6 +93,10 @@ void World::bind() {
   collider_surface_ = {root, s.place("contact.collider_surface", collider_room_, 3)};
   collider_filter_ = {root, s.place("contact.collider_filter", collider_room_, 2)};
   collider_count_ = {root, s.place("contact.collider_count", 1, 1)};
+  // The kernel that reads who touches whom is given so many rows, and asks for no number.
+  if (events_.touch_rows < bodies * (collider_room_ + (s.has_soft_contact ? kPairRows : 0))) {
+    fail(TS_ERROR_FILE, "the world file is not in order: events. Export it again");
+  }
 }
 
 // ---- steps ----
