@@ -169,7 +169,17 @@ def _of_frames(context: WorldContext) -> Arrays:
     return {
         "frames/alive": _ints([each is not None for each in frames.rows]),
         "frames/poses": np.stack([frames.present, frames.coming]).astype(np.float32),
+        "frames/feels": _feeling(context),
     }
+
+
+def _feeling(context: WorldContext) -> NDArray[np.uint8]:
+    """1 for each particle whose frame feels its load."""
+    feels = np.zeros(context.layout.particle_count, dtype=np.uint8)
+    for body, held in context.of(Frames).attachments.items():
+        for each in held:
+            feels[context.built.rows_of(body.index, each.particles)] |= each.two_way
+    return feels
 
 
 def _ints(numbers: Any) -> NDArray[np.int32]:

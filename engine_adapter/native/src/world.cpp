@@ -26,8 +26,9 @@ World::World(std::shared_ptr<Scene> scene) : scene_(std::move(scene)), machine_(
   const auto poses = archive.get<float>("frames/poses");
   const size_t frames = poses.count / 24, named = scene_->names(TS_FRAME).size();
   const auto alive = archive.get<int32_t>("frames/alive");
+  const auto feels = archive.get<unsigned char>("frames/feels");
   if (clock.count != 2 || steps.count != 1 || poses.count != 24 * frames || frames == 0 || named > frames ||
-      alive.count != named) {
+      alive.count != named || feels.count != size_t(scene_->particle_count)) {
     fail(TS_ERROR_FILE, "the world file is not in order: clock or frames. Export it again");
   }
   steps_ = steps[0], time_ = clock[0], last_dt_ = clock[1];
@@ -35,6 +36,7 @@ World::World(std::shared_ptr<Scene> scene) : scene_(std::move(scene)), machine_(
   coming_.assign(poses.data + 12 * frames, poses.data + 24 * frames);
   frame_alive_.assign(frames, 0);  // a row that no frame ever had is there where there is none
   std::copy(alive.begin(), alive.end(), frame_alive_.begin());
+  feels_.assign(feels.begin(), feels.end());
   if (scene_->has_contact) colliders_ = Colliders(archive);
   events_ = Events(archive, size_t(scene_->slot_count));
   generations_.assign(size_t(scene_->slot_count), 1);

@@ -163,6 +163,7 @@ class World {
   void take_down(double dt, const std::vector<int32_t>& frozen);
   size_t frame(int32_t number) const;  // its row
   std::vector<int32_t> hanging(int32_t slot, int32_t frame) const;
+  bool is_felt(int32_t slot, const std::vector<int32_t>& vertices) const;
   void let_go(int32_t slot, const std::vector<int32_t>& vertices);
   size_t grab_of(ts_grab grab) const;  // its number
   void end_grab(size_t number);
@@ -193,6 +194,7 @@ class World {
   std::vector<float> present_, coming_;  // of frames, after the last step and the coming one: rotation row by row
                                          // and place, (f, 12)
   std::vector<unsigned char> frame_alive_;
+  std::vector<unsigned char> feels_;  // of each particle: it hangs from a frame, which is asked for its load
   std::vector<uint32_t> generations_, grab_generations_;
 
   int64_t steps_ = 0;

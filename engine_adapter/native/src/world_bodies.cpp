@@ -106,6 +106,7 @@ void World::despawn(int32_t slot) {
   }
   wake_near(box_of(slot));
   is_still_ = false;
+  std::fill_n(feels_.begin() + std::ptrdiff_t(begin_of(slot)), asset_of(slot).vertex_count(), 0);
   body_drives_(slot) &= ~kMovesPins;  // or what hung from a frame would be aimed for ever
   machine_->launch("despawn_body", {Machine::whole(slot)});
 }

@@ -80,6 +80,7 @@ void World::attach(int32_t slot, Vertices which, int32_t number, bool feels) {
     }
     inv_mass_(p) = 0.0f;
     particle_aim_(p) = kWithFrame + number;
+    feels_[p] = feels ? 1 : 0;
     if (scene_->is_implicit) particle_contact_(p) = 0;
   }
   body_drives_(slot) |= kMovesPins | (feels ? kFeelsReaction : 0);
@@ -105,16 +106,22 @@ void World::let_go(int32_t slot, const std::vector<int32_t>& vertices) {
     const size_t p = particle(slot, size_t(vertex));
     inv_mass_(p) = 1.0f / mass_(p);
     particle_aim_(p) = kStill;
+    feels_[p] = 0;
   }
-  if (hanging(slot, -1).empty()) body_drives_(slot) &= ~kFeelsReaction;
+  if (!is_felt(slot, hanging(slot, -1))) body_drives_(slot) &= ~kFeelsReaction;
   rouse(slot);
+}
+
+bool World::is_felt(int32_t slot, const std::vector<int32_t>& vertices) const {
+  return std::any_of(vertices.begin(), vertices.end(),
+                     [&](int32_t vertex) { return feels_[particle(slot, size_t(vertex))] != 0; });
 }
 
 void World::load(int32_t slot, int32_t number, Vector* force, Vector* torque) const {
   const float* origin = present_.data() + 12 * frame(number) + 9;
   const std::vector<int32_t> vertices = hanging(slot, number);
   if (vertices.empty()) fail(TS_ERROR_STATE, "the body in slot %d does not hang from frame %d", slot, number);
-  if ((body_drives_(slot) & kFeelsReaction) == 0) {
+  if (!is_felt(slot, vertices)) {
     fail(TS_ERROR_STATE, "what the body in slot %d pulls with is not felt: attach it with feels of 1", slot);
   }
   Vector impulse = {0.0, 0.0, 0.0}, moment = {0.0, 0.0, 0.0};

@@ -41,8 +41,8 @@ uint64_t World::hash() const {
 
 constexpr uint64_t kSnapshotMark = 0x3250414E53534354u;
 
-// What a snapshot begins with. Behind it lie, in this order: the fields that are carried; frames; numbers that tell
-// handles apart; colliders; what events depend on.
+// What a snapshot begins with. Behind it lie, in this order: the fields that are carried; frames, and who is felt there; numbers
+// that tell handles apart; colliders; what events depend on.
 struct SnapshotHead {
   uint64_t mark, size;
   uint32_t scene, sum;
@@ -81,8 +81,8 @@ void take_all(const char** at, std::vector<Part>* parts) {
 constexpr size_t kFrameSize = 24 * sizeof(float) + 1;
 
 // Of all behind the fields.
-size_t size_of_rest(const SnapshotHead& head, size_t slots) {
-  return kFrameSize * head.frames + sizeof(uint32_t) * (slots + kMostGrabs) + sizeof(Collider) * head.colliders +
+size_t size_of_rest(const SnapshotHead& head, size_t slots, size_t particles) {
+  return kFrameSize * head.frames + particles + sizeof(uint32_t) * (slots + kMostGrabs) + sizeof(Collider) * head.colliders +
          sizeof(int32_t) * (slots + 2) + sizeof(ts_body) * slots + sizeof(Contact) * head.contacts;
 }
 
@@ -92,7 +92,7 @@ size_t World::snapshot_size() const {
   SnapshotHead head{};
   head.frames = frame_alive_.size(), head.colliders = colliders_.rows.size();
   head.contacts = events_.contact_count();
-  return sizeof head + 4 * scene_->carried_words + size_of_rest(head, size_t(scene_->slot_count));
+  return sizeof head + 4 * scene_->carried_words + size_of_rest(head, size_t(scene_->slot_count), feels_.size());
 }
 
 void World::snapshot(char* bytes) const {
@@ -110,6 +110,7 @@ void World::snapshot(char* bytes) const {
   put_all(&at, present_);
   put_all(&at, coming_);
   put_all(&at, frame_alive_);
+  put_all(&at, feels_);
   put_all(&at, generations_);
   put_all(&at, grab_generations_);
   for (const Collider& each : colliders_.rows) {
@@ -174,7 +175,7 @@ void World::require_rows(const char* at, const SnapshotHead& head) const {
     take(&at, &number, 1);
     if (!(std::fabs(number) <= s.position_limit)) refuse();
   }
-  at += head.frames + sizeof(uint32_t) * (generations_.size() + grab_generations_.size());
+  at += head.frames + feels_.size() + sizeof(uint32_t) * (generations_.size() + grab_generations_.size());
   for (size_t i = 0; i < head.colliders; ++i) {
     unsigned char flags[2];
     std::memcpy(flags, at + offsetof(Collider, is_alive), 1);
@@ -204,7 +205,7 @@ void World::restore(const char* bytes, size_t size) {
   if (head.scene != scene_->code) fail(TS_ERROR_SNAPSHOT, "this snapshot is of another world file");
   const size_t slots = size_t(scene_->slot_count), fields = sizeof head + 4 * scene_->carried_words;
   if (head.size != size || head.frames == 0 || head.frames > kMostFrames || head.colliders > collider_room_ ||
-      head.contacts > slots * events_.touch_rows || size != fields + size_of_rest(head, slots) ||
+      head.contacts > slots * events_.touch_rows || size != fields + size_of_rest(head, slots, feels_.size()) ||
       (head.kinds & ~int64_t(TS_ALL_EVENTS)) != 0 || head.steps < 0 || !std::isfinite(head.time) ||
       !std::isfinite(head.last_dt)) {
     fail(TS_ERROR_SNAPSHOT, "this snapshot is cut off");
@@ -227,6 +228,7 @@ void World::restore(const char* bytes, size_t size) {
   take_all(&at, &present_);
   take_all(&at, &coming_);
   take_all(&at, &frame_alive_);
+  take_all(&at, &feels_);
   take_all(&at, &generations_);
   take_all(&at, &grab_generations_);
   colliders_.rows.resize(size_t(head.colliders));
