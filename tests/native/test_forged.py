@@ -94,6 +94,12 @@ def added(*numbers):
     return lambda array: np.add(array, numbers).astype(array.dtype)
 
 
+def held_by_a_body_that_there_is_not(arrays):
+    names = bytes(arrays["fields/names"]).decode().split("\0")
+    place = arrays["fields/places"][names.index("grabs.body")][0]
+    arrays["fields/image"][place : place + 4] = np.frombuffer(struct.pack("<i", 10**6), dtype=np.uint8)
+
+
 def unnamed(arrays):
     arrays["names/frame"] = np.frombuffer(b"x\0" * 200_000, dtype=np.uint8)
 
@@ -112,6 +118,7 @@ FORGERIES = {
     "a collider without a pose": changed("colliders/pose", lambda array: array[:-1]),
     "ranks that are none": changed("asset0/rank", first(-1)),
     "fewer rows than can touch": changed("events/limits", lambda array: np.append(array[:2], 1.0)),
+    "a grab of a body that there is not": held_by_a_body_that_there_is_not,
     "grabs without a size": changed("grabs/limits", first(np.nan)),
     "grabs with more rows than fields have": changed("grabs/limits", added(0, 0, 0, 0, 1000)),
     "vertices that are nowhere": changed("asset0/vertices", first(np.nan)),

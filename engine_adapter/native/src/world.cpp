@@ -42,6 +42,7 @@ World::World(std::shared_ptr<Scene> scene) : scene_(std::move(scene)), machine_(
   generations_.assign(size_t(scene_->slot_count), 1);
   grab_generations_.assign(kMostGrabs, 1);
   bind();
+  require_image();
 }
 
 World::~World() {

@@ -156,6 +156,7 @@ class World {
   Hit hit_from(const float* row) const;
   void require_step(double dt) const;
   int32_t require_substeps(double dt, int32_t substeps) const;
+  void require_image() const;
   void require_rows(const char* at, const SnapshotHead& head) const;
   bool is_in_order(const Contact& contact, size_t colliders) const;
   Present present() const;

@@ -197,6 +197,19 @@ void World::require_rows(const char* at, const SnapshotHead& head) const {
   }
 }
 
+// The same of the world file, whose image was taken as it is.
+void World::require_image() const {
+  std::vector<char> bytes(snapshot_size());
+  snapshot(bytes.data());
+  SnapshotHead head;
+  std::memcpy(&head, bytes.data(), sizeof head);
+  try {
+    require_rows(bytes.data() + sizeof head, head);
+  } catch (const Error&) {
+    fail(TS_ERROR_FILE, "the world file is not in order: its state names what there is not. Export it again");
+  }
+}
+
 void World::restore(const char* bytes, size_t size) {
   SnapshotHead head;
   if (size < sizeof head) fail(TS_ERROR_SNAPSHOT, "%zu bytes are no snapshot", size);
