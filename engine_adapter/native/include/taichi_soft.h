@@ -146,8 +146,9 @@ TS_API ts_result ts_world_set_wind(ts_world world, const double velocity[3], dou
 TS_API ts_result ts_world_radial_impulse(ts_world world, const double center[3], double impulse, double radius);
 /* A number that tells states apart: that of Python's world in the same state. */
 TS_API ts_result ts_world_hash(ts_world world, uint64_t* hash);
-/* The state between two steps. With a null buffer only the size [bytes] is given. What the picture is ahead of the last
- * step, and what was dropped, is not in it. */
+/* The state between two steps. With a null buffer only the size [bytes] is given, which changes with the events that are
+ * recorded, with frames and with colliders. What the picture is ahead of the last step, and what was dropped, is not in
+ * it. */
 TS_API ts_result ts_world_snapshot(ts_world world, void* buffer, size_t capacity, size_t* size);
 TS_API ts_result ts_world_restore(ts_world world, const void* bytes, size_t size);
 
@@ -174,7 +175,8 @@ typedef struct ts_event {
 } ts_event;
 
 /* Record events of these kinds, and no others, from the next step on; 0 for none. What touches already counts as a
- * contact that begins in that step. Contacts are seen in worlds with soft contact or colliders. */
+ * contact that begins in that step. Contacts are seen in worlds with soft contact or colliders. In another one they are
+ * refused alone, and left out beside other kinds. */
 TS_API ts_result ts_world_record_events(ts_world world, int32_t kinds);
 /* The oldest that wait, at most `capacity`; they do not wait any longer. `event_size` is sizeof(ts_event). */
 TS_API ts_result ts_world_drain_events(ts_world world, ts_event* events, size_t event_size, size_t capacity,
@@ -231,8 +233,8 @@ TS_API ts_result ts_body_attach(ts_world world, ts_body body, const int32_t* ver
                                 int32_t feels);
 /* Let vertices go that hang from a frame, with the velocity that they had; a count of 0 stands for all that do. */
 TS_API ts_result ts_body_detach(ts_world world, ts_body body, const int32_t* vertices, size_t count);
-/* What it pulled a frame with that it hangs from, mean over the last step [N], and the torque of that about the frame's
- * origin. Either may be null. */
+/* What it pulled a frame with that it hangs from, mean over the last step [N, in Unreal kg cm/s^2], and the torque of that
+ * about the frame's origin. Either may be null. */
 TS_API ts_result ts_body_get_load(ts_world world, ts_body body, int32_t frame, double force[3], double torque[3]);
 
 typedef struct ts_pull {
@@ -241,7 +243,7 @@ typedef struct ts_pull {
   double weights[3]; /* of its vertices; 0 or more, their sum is 1 */
   double point[3];   /* to which it is pulled at first */
   double frequency;  /* of the spring [Hz]: 5 is a hand */
-  double max_force;  /* [N]; below 0 for ten times the body's weight on Earth */
+  double max_force;  /* [N, in Unreal kg cm/s^2]; below 0 for ten times the body's weight on Earth */
 } ts_pull;
 
 /* Take hold of a body's surface. There can be 16 grabs at a time. */
@@ -250,7 +252,7 @@ TS_API ts_result ts_body_grab(ts_world world, ts_body body, const ts_pull* pull,
 TS_API ts_result ts_world_get_grab(ts_world world, int32_t number, ts_grab* grab);
 TS_API ts_result ts_grab_move(ts_world world, ts_grab grab, const double point[3]);
 TS_API ts_result ts_grab_release(ts_world world, ts_grab grab);
-/* With what it pulls, in the last substep [N]. */
+/* With what it pulls, in the last substep [N, in Unreal kg cm/s^2]. */
 TS_API ts_result ts_grab_get_force(ts_world world, ts_grab grab, double force[3]);
 
 /* ---- questions ---- */

@@ -53,8 +53,8 @@ ts_result guarded(Function function) noexcept {
 class Turn {
  public:
   explicit Turn(ts_world handle) : world_(worlds().find(handle)), lock_(world_->turn, std::try_to_lock) {
-    const bool is_free = lock_.owns_lock() && (world_->advancing == std::thread::id() ||
-                                                world_->advancing == std::this_thread::get_id());
+    const bool is_free = lock_.owns_lock() &&
+                         (world_->advancing == std::thread::id() || world_->advancing == std::this_thread::get_id());
     if (!is_free) fail(TS_ERROR_BUSY, "another thread is in a call of this world");
   }
   World* operator->() const { return world_.get(); }
@@ -168,7 +168,8 @@ Pose frame_pose(const Turn& world, const ts_pose* host) {
 
 double length(const Turn& world, double host, double least, const char* name) {
   const double found = world.axes().length_in(host);
-  if (!(found >= least && found <= 1e6)) fail(TS_ERROR_ARGUMENT, "%s is %g: give a length of %g to 1e6 m", name, host, least);
+  if (!(found >= least && found <= 1e6))
+    fail(TS_ERROR_ARGUMENT, "%s is %g: give a length of %g to 1e6 m", name, host, least);
   return found;
 }
 
@@ -313,9 +314,11 @@ ts_result ts_scene_get_name(ts_scene scene, int32_t kind, int32_t number, char* 
     const auto found = scenes().find(scene);
     given(name, "name");
     const auto& names = found->names(kind);
-    if (number < 0 || size_t(number) >= names.size()) fail(TS_ERROR_ARGUMENT, "there is no %d: there are %zu", number, names.size());
+    if (number < 0 || size_t(number) >= names.size())
+      fail(TS_ERROR_ARGUMENT, "there is no %d: there are %zu", number, names.size());
     const std::string& text = names[size_t(number)];
-    if (capacity < text.size() + 1) fail(TS_ERROR_SIZE, "name has room for %zu bytes: give %zu", capacity, text.size() + 1);
+    if (capacity < text.size() + 1)
+      fail(TS_ERROR_SIZE, "name has room for %zu bytes: give %zu", capacity, text.size() + 1);
     std::memcpy(name, text.c_str(), text.size() + 1);
   });
 }
@@ -783,8 +786,7 @@ ts_result ts_collider_move_to(ts_world world, int32_t collider, const ts_pose* w
   });
 }
 
-ts_result ts_collider_set_velocity(ts_world world, int32_t collider, const double linear[3],
-                                   const double turning[3]) {
+ts_result ts_collider_set_velocity(ts_world world, int32_t collider, const double linear[3], const double turning[3]) {
   return guarded([&] {
     const Turn turn(world);
     turn->set_collider_velocity(collider, vector(turn, linear, "linear"), spin(turn, turning, "spin"));

@@ -103,8 +103,8 @@ Archive::Archive(const std::string& path) : bytes_(read_file(path)) {
   const uint64_t size = head.number<uint64_t>();
   const uint32_t sum = head.number<uint32_t>();
   if (version != kVersion) {
-    fail(TS_ERROR_VERSION, "the world file has version %u, and this library reads version %u: export it again",
-         version, kVersion);
+    fail(TS_ERROR_VERSION, "the world file has version %u, and this library reads version %u: export it again", version,
+         kVersion);
   }
   if (size != bytes_.size() - kHead) damaged("it has another length than it says");
   if (sum != checksum(bytes_.data() + kHead, size)) damaged("its checksum is wrong");

@@ -66,7 +66,8 @@ Colliders::Colliders(const Archive& archive) {
   const auto surface = archive.rows<double>("colliders/surface", 2);
   const size_t n = alive.count;
   if (kind.count != n || filter.count != 2 * n || parameters.count != 8 * n || surface.count != 2 * n ||
-      seams.count != 1 || pose.count != 7 * n || motion.count != 6 * n || target.count != 8 * n || bounds.count != 6 * n || skin.count != n) {
+      seams.count != 1 || pose.count != 7 * n || motion.count != 6 * n || target.count != 8 * n ||
+      bounds.count != 6 * n || skin.count != n) {
     fail(TS_ERROR_FILE, "the world file is not in order: colliders. Export it again");
   }
   seam = seams[0];

@@ -24,9 +24,9 @@ struct Collider {
   Pose pose;
   Vector velocity, spin;
   bool has_target;
-  Pose target;  // at the end of the coming step
-  Box bounds;   // in its own frame
-  double skin;  // its thickness, and what its edges need
+  Pose target;   // at the end of the coming step
+  Box bounds;    // in its own frame
+  double skin;   // its thickness, and what its edges need
   int32_t kind;  // as in taichi_soft/contact/distances/kinds.py
   float parameters[8];
   double friction, restitution;  // the latter -1 for that of the bodies
@@ -54,7 +54,7 @@ class Colliders {
   int32_t free_row() const;  // for a new collider: it may be one behind the last
 
   std::vector<Collider> rows;
-  double seam = 0.0;  // skin of what has flat faces, beside its thickness [m]
+  double seam = 0.0;     // skin of what has flat faces, beside its thickness [m]
   bool is_dirty = true;  // whether poses or velocities differ from what the fields hold
 };
 

@@ -62,8 +62,14 @@ void Events::follow(const std::map<Pair, std::array<float, 3>>& touches, const P
       }
     }
     if (contact.pause > pause_ - 1e-9 || !are_there(contact, present)) {
-      ts_event event = {TS_CONTACT_ENDED, contact.kind == kOfBody ? -1 : contact.other, step, time, contact.a,
-                        contact.b, {}, contact.touched - contact.began};
+      ts_event event = {TS_CONTACT_ENDED,
+                        contact.kind == kOfBody ? -1 : contact.other,
+                        step,
+                        time,
+                        contact.a,
+                        contact.b,
+                        {},
+                        contact.touched - contact.began};
       std::copy(contact.impulse, contact.impulse + 3, event.impulse);
       ended.push_back(event);
       each = going_on_.erase(each);

@@ -16,8 +16,8 @@ using Pair = std::array<int32_t, 3>;  // a slot, what the other one is, and its 
 enum { kOfCollider = 0, kOfBody = 1 };
 constexpr size_t kPairRows = 32;  // of bodies that touch, for each body: as taichi_soft/contact/fields.py has it
 
-struct Contact {  // that goes on
-  ts_body a, b;   // the latter 0 for a collider
+struct Contact {    // that goes on
+  ts_body a, b;     // the latter 0 for a collider
   uint32_t serial;  // of that collider
   int32_t slot, kind, other;
   double began, touched, pause;  // [s]: start of its first step, end of its last, since when nothing was given
@@ -26,8 +26,8 @@ struct Contact {  // that goes on
 
 // Who is there after a step.
 struct Present {
-  std::vector<ts_body> bodies;       // in each slot, 0 for nobody
-  std::vector<uint32_t> colliders;   // serial numbers, 0 for none
+  std::vector<ts_body> bodies;      // in each slot, 0 for nobody
+  std::vector<uint32_t> colliders;  // serial numbers, 0 for none
 };
 
 class Events {

@@ -79,8 +79,8 @@ inline Vector rotation_vector(const Quaternion& start, const Quaternion& end) {
 inline Quaternion turned_by(const Quaternion& quaternion, const Vector& vector) {
   const double angle = length_of(vector);
   const double share = angle == 0.0 ? 0.5 : std::sin(0.5 * angle) / angle;
-  Quaternion result = multiplied(
-      {vector[0] * share, vector[1] * share, vector[2] * share, std::cos(0.5 * angle)}, quaternion);
+  Quaternion result =
+      multiplied({vector[0] * share, vector[1] * share, vector[2] * share, std::cos(0.5 * angle)}, quaternion);
   const double length = length_of(result);
   for (double& each : result) each = each / length;
   return result;

@@ -90,7 +90,7 @@ const char* const kKinds[] = {"names/body", "names/asset", "names/collider", "na
 Scene::Scene(const std::string& folder)
     : archive((std::filesystem::u8path(folder) / "world.tsw").u8string()),
       axes(archive.rows<double>("host_axes", 3).count == 9 ? archive.get<double>("host_axes").data
-                                                            : (out_of_order("axes"), nullptr)),
+                                                           : (out_of_order("axes"), nullptr)),
       folder_(folder) {
   // Kernels of another Taichi would be given arguments that they do not know.
   const std::vector<std::string> package = archive.texts("package");  // of taichi-soft and of Taichi
@@ -106,7 +106,8 @@ Scene::Scene(const std::string& folder)
   const auto floors = archive.get<double>("world/floor");
   const auto assets_of = archive.get<int32_t>("slots/asset"), begins = archive.get<int32_t>("slots/begin");
   const auto grabs = archive.get<double>("grabs/limits");
-  if (flags.count != 4 || grabs.count != 5 || counts.count != 3 || stable.count != 2 || limits.count != 7) out_of_order("numbers");
+  if (flags.count != 4 || grabs.count != 5 || counts.count != 3 || stable.count != 2 || limits.count != 7)
+    out_of_order("numbers");
   has_contact = flags[0] != 0;
   sleeps = flags[1] != 0;
   has_soft_contact = flags[2] != 0;
@@ -150,7 +151,8 @@ Scene::Scene(const std::string& folder)
     code = code * 31 + checksum(reinterpret_cast<const char*>(rows.data), rows.count * sizeof(int64_t));
   }
   for (const Asset& asset : assets) {
-    code = code * 31 + checksum(reinterpret_cast<const char*>(asset.rest_rows.data), asset.rest_rows.count * sizeof(float));
+    code = code * 31 +
+           checksum(reinterpret_cast<const char*>(asset.rest_rows.data), asset.rest_rows.count * sizeof(float));
   }
   give_back(std::make_unique<Machine>(*this, kernels.u8string()));
 }
@@ -190,8 +192,9 @@ void Scene::read_assets() {
     const auto center = archive.get<double>(prefix + "center"), skin = archive.get<double>(prefix + "thickness");
     const size_t n = asset.vertex_count();
     if (asset.rest_rows.count != 8 * n || asset.vertices.count != 3 * n || asset.rank.count != n || center.count != 3 ||
-        skin.count != 1 || !are_places(asset.vertices) || asset.elements.sizes.size() != 2 || !are_below(asset.elements, n) || !are_below(asset.pinned, n) || !are_below(asset.outer, n) || !are_below(asset.rank, n) ||
-        !are_below(asset.surface, n)) {
+        skin.count != 1 || !are_places(asset.vertices) || asset.elements.sizes.size() != 2 ||
+        !are_below(asset.elements, n) || !are_below(asset.pinned, n) || !are_below(asset.outer, n) ||
+        !are_below(asset.rank, n) || !are_below(asset.surface, n)) {
       out_of_order("an asset");
     }
     asset.element_width = asset.elements.sizes[1];

@@ -63,7 +63,7 @@ class Scene {
   Axes axes;
   bool has_contact, sleeps, has_soft_contact, is_implicit;
   int32_t slot_count, particle_count, threads;
-  double stable_share, stable_step;       // see `Substeps.rule`
+  double stable_share, stable_step;  // see `Substeps.rule`
   bool has_floor;
   double floor;
   double position_limit, velocity_limit, spin_limit, impulse_limit, push_limit, shortest_step, longest_step;

@@ -31,9 +31,7 @@ class Field {
  public:
   Field() = default;
   Field(char* root, const Place& place) : first_(root + place.offset), stride_(place.stride) {}
-  Number& operator()(size_t i, size_t k = 0) const {
-    return reinterpret_cast<Number*>(first_ + i * stride_)[k];
-  }
+  Number& operator()(size_t i, size_t k = 0) const { return reinterpret_cast<Number*>(first_ + i * stride_)[k]; }
 
  private:
   char* first_ = nullptr;
@@ -74,7 +72,7 @@ class World {
   void on_step(ts_before_step function, void* user) { before_step_ = function, user_ = user; }
   int32_t stable_substeps(double dt) const;
   void step(double dt, int32_t substeps);
-  int32_t steps_due(double seconds);  // puts in the time of a frame
+  int32_t steps_due(double seconds);   // puts in the time of a frame
   void end_frame(int32_t steps_left);  // that were due and not made: their time is dropped
   void step_in_time() { step(dt_, substeps_); }
   ts_before_step before_step() const { return before_step_; }
@@ -181,9 +179,7 @@ class World {
   void require_unattached(int32_t slot, const std::vector<int32_t>& vertices) const;
   double mass_of(int32_t slot, const std::vector<int32_t>& vertices) const;
   size_t begin_of(int32_t slot) const { return size_t(scene_->begin_of_slot[slot]); }
-  size_t particle(int32_t slot, size_t vertex) const {
-    return begin_of(slot) + size_t(asset_of(slot).rank[vertex]);
-  }
+  size_t particle(int32_t slot, size_t vertex) const { return begin_of(slot) + size_t(asset_of(slot).rank[vertex]); }
   std::vector<float> place_rows(const Asset& asset, const Vector& place, const Quaternion& turn, const Vector& drift,
                                 const Vector& spin) const;
 
@@ -205,9 +201,9 @@ class World {
   int32_t substeps_ = 0, max_steps_ = 8;
   ts_before_step before_step_ = nullptr;
   void* user_ = nullptr;
-  bool has_work_ = true;    // some pinned particle has somewhere to go, or has just arrived
-  bool is_still_ = false;   // none was awake after the last step, and nothing was changed since
-  double rows_at_ = -1.0;   // alpha of what was read of all bodies; below 0 once they have moved on
+  bool has_work_ = true;   // some pinned particle has somewhere to go, or has just arrived
+  bool is_still_ = false;  // none was awake after the last step, and nothing was changed since
+  double rows_at_ = -1.0;  // alpha of what was read of all bodies; below 0 once they have moved on
 
   Field<int32_t> body_status_, body_drives_, particle_aim_, is_awake_, failed_, is_driven_, island_count_;
   Field<float> position_, velocity_, mass_, inv_mass_, lag_, gravity_scale_, damping_, wind_, target_, reaction_;

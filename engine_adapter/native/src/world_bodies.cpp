@@ -1,9 +1,8 @@
-#include "world.hpp"
-
 #include <algorithm>
 #include <limits>
 
 #include "error.hpp"
+#include "world.hpp"
 
 namespace taichi_soft {
 
@@ -122,8 +121,8 @@ void World::read_positions(int32_t slot, double alpha, float* rows) {
     const uint32_t count = uint32_t(scene_->particle_count);
     const float* all = machine_->positions.room<float>(machine_->runtime(), 3 * count);
     if (rows_at_ != alpha) {
-      machine_->launch("read_positions", {Machine::real(alpha), Machine::array(machine_->positions.memory(),
-                                                                               TI_DATA_TYPE_F32, count, 3)});
+      machine_->launch("read_positions", {Machine::real(alpha),
+                                          Machine::array(machine_->positions.memory(), TI_DATA_TYPE_F32, count, 3)});
       rows_at_ = alpha;
     }
     std::copy(all + 3 * begin_of(slot), all + 3 * (begin_of(slot) + n), rows);
@@ -145,11 +144,10 @@ void World::read_mesh(int32_t slot, int32_t number, float* positions, float* nor
   if (mesh.is_skin) {
     const uint32_t vertices = uint32_t(asset_of(slot).vertex_count());
     machine_->rows.room<float>(runtime, 12 * vertices);
-    machine_->launch(
-        kernel.c_str(),
-        {Machine::whole(slot), Machine::whole(int32_t(vertices)), Machine::real(picture_), ints,
-         Machine::array(machine_->floats_of(number), TI_DATA_TYPE_F32, uint32_t(mesh.floats.count)),
-         Machine::array(machine_->rows.memory(), TI_DATA_TYPE_F32, 12 * vertices), x_out, n_out});
+    machine_->launch(kernel.c_str(),
+                     {Machine::whole(slot), Machine::whole(int32_t(vertices)), Machine::real(picture_), ints,
+                      Machine::array(machine_->floats_of(number), TI_DATA_TYPE_F32, uint32_t(mesh.floats.count)),
+                      Machine::array(machine_->rows.memory(), TI_DATA_TYPE_F32, 12 * vertices), x_out, n_out});
   } else {
     machine_->launch(kernel.c_str(), {Machine::whole(slot), Machine::real(picture_), ints, x_out, n_out});
   }
@@ -395,9 +393,9 @@ void World::radial_impulse(const Vector& center, double impulse, double radius) 
   for (int k = 0; k < 3; ++k) place[k] = as_float(center[k]);
   place[3] = as_float(radius), place[4] = as_float(impulse);
   const float* highest = machine_->found.room<float>(machine_->runtime(), 1);
-  machine_->launch("add_radial_impulse", {Machine::whole(scene_->slot_count),
-                                          Machine::array(machine_->numbers.memory(), TI_DATA_TYPE_F32, 5),
-                                          Machine::array(machine_->found.memory(), TI_DATA_TYPE_F32, 1)});
+  machine_->launch("add_radial_impulse",
+                   {Machine::whole(scene_->slot_count), Machine::array(machine_->numbers.memory(), TI_DATA_TYPE_F32, 5),
+                    Machine::array(machine_->found.memory(), TI_DATA_TYPE_F32, 1)});
   if (!(*highest < scene_->velocity_limit)) {
     fail(TS_ERROR_ARGUMENT, "impulse would change velocities by %.4g m/s: keep below %g", double(*highest),
          scene_->velocity_limit);

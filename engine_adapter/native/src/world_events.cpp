@@ -45,8 +45,8 @@ void World::record_events(int32_t kinds) {
     }
     kinds &= ~kContacts;
   }
-  if (scene_->has_soft_contact) records_touches_(0) = (kinds & kContacts) != 0 ? 1 : 0;
   if (Events::looks_for(kinds)) look();
+  if (scene_->has_soft_contact) records_touches_(0) = (kinds & kContacts) != 0 ? 1 : 0;
   events_.record(kinds, present());
 }
 

@@ -29,9 +29,9 @@ int32_t World::add_frame(const Pose& pose) {
   while (row < frame_alive_.size() && frame_alive_[row] != 0) ++row;
   if (row >= kMostFrames) fail(TS_ERROR_STATE, "there are %zu frames: take one out first", row);
   if (row == frame_alive_.size()) {
+    present_.resize(12 * (row + 1));
+    coming_.resize(12 * (row + 1));
     frame_alive_.push_back(0);
-    present_.resize(12 * frame_alive_.size());
-    coming_.resize(12 * frame_alive_.size());
   }
   frame_alive_[row] = 1;
   write_pose(pose, present_.data() + 12 * row);
@@ -75,7 +75,8 @@ void World::attach(int32_t slot, Vertices which, int32_t number, bool feels) {
     double offset[3];
     for (int k = 0; k < 3; ++k) offset[k] = double(position_(p, k)) - double(row[9 + k]);
     for (int k = 0; k < 3; ++k) {
-      target_(p, k) = as_float(double(row[k]) * offset[0] + double(row[3 + k]) * offset[1] + double(row[6 + k]) * offset[2]);
+      target_(p, k) =
+          as_float(double(row[k]) * offset[0] + double(row[3 + k]) * offset[1] + double(row[6 + k]) * offset[2]);
       reaction_(p, k) = 0.0f;
     }
     inv_mass_(p) = 0.0f;

@@ -1,9 +1,8 @@
-#include "world.hpp"
-
 #include <algorithm>
 #include <limits>
 
 #include "error.hpp"
+#include "world.hpp"
 
 namespace taichi_soft {
 
@@ -96,11 +95,11 @@ std::vector<int32_t> World::overlaps(bool is_box, const Pose& pose, const Vector
   }
   std::fill(first, first + slots, -1);
   if (count > 0) {
-    machine_->launch("find_overlaps", {Machine::whole(is_box ? 1 : 0),
-                                       Machine::array(machine_->rows.memory(), TI_DATA_TYPE_I32, count),
-                                       Machine::array(machine_->numbers.memory(), TI_DATA_TYPE_F32, 5, 3),
-                                       Machine::array(machine_->found.memory(), TI_DATA_TYPE_I32, slots),
-                                       Machine::array(machine_->vertices.memory(), TI_DATA_TYPE_I32, particles)});
+    machine_->launch("find_overlaps",
+                     {Machine::whole(is_box ? 1 : 0), Machine::array(machine_->rows.memory(), TI_DATA_TYPE_I32, count),
+                      Machine::array(machine_->numbers.memory(), TI_DATA_TYPE_F32, 5, 3),
+                      Machine::array(machine_->found.memory(), TI_DATA_TYPE_I32, slots),
+                      Machine::array(machine_->vertices.memory(), TI_DATA_TYPE_I32, particles)});
   }
   std::vector<int32_t> found;
   for (uint32_t slot = 0; slot < slots; ++slot) {

@@ -1,9 +1,8 @@
-#include "world.hpp"
-
 #include <cstddef>
 #include <cstring>
 
 #include "error.hpp"
+#include "world.hpp"
 
 namespace taichi_soft {
 
@@ -41,8 +40,8 @@ uint64_t World::hash() const {
 
 constexpr uint64_t kSnapshotMark = 0x3250414E53534354u;
 
-// What a snapshot begins with. Behind it lie, in this order: the fields that are carried; frames, and who is felt there; numbers
-// that tell handles apart; colliders; what events depend on.
+// What a snapshot begins with. Behind it lie, in this order: the fields that are carried; frames, and who is felt
+// there; numbers that tell handles apart; colliders; what events depend on.
 struct SnapshotHead {
   uint64_t mark, size;
   uint32_t scene, sum;
@@ -78,12 +77,17 @@ void take_all(const char** at, std::vector<Part>* parts) {
   take(at, parts->data(), parts->size());
 }
 
+bool is_place(const Pose& pose) {
+  return length_of(pose.position) <= 1e9 && std::fabs(length_of(pose.rotation) - 1.0) <= 1e-3;
+}
+
 constexpr size_t kFrameSize = 24 * sizeof(float) + 1;
 
 // Of all behind the fields.
 size_t size_of_rest(const SnapshotHead& head, size_t slots, size_t particles) {
-  return kFrameSize * head.frames + particles + sizeof(uint32_t) * (slots + kMostGrabs) + sizeof(Collider) * head.colliders +
-         sizeof(int32_t) * (slots + 2) + sizeof(ts_body) * slots + sizeof(Contact) * head.contacts;
+  return kFrameSize * head.frames + particles + sizeof(uint32_t) * (slots + kMostGrabs) +
+         sizeof(Collider) * head.colliders + sizeof(int32_t) * (slots + 2) + sizeof(ts_body) * slots +
+         sizeof(Contact) * head.contacts;
 }
 
 }  // namespace
@@ -130,8 +134,8 @@ void World::snapshot(char* bytes) const {
 bool World::is_in_order(const Contact& contact, size_t colliders) const {
   const auto is_below = [](int32_t number, size_t limit) { return number >= 0 && size_t(number) < limit; };
   const size_t slots = size_t(scene_->slot_count);
-  for (double each : {contact.began, contact.touched, contact.pause, contact.impulse[0], contact.impulse[1],
-                      contact.impulse[2]}) {
+  for (double each :
+       {contact.began, contact.touched, contact.pause, contact.impulse[0], contact.impulse[1], contact.impulse[2]}) {
     if (!std::isfinite(each)) return false;
   }
   return is_below(contact.slot, slots) && (contact.kind == kOfBody || contact.kind == kOfCollider) &&
@@ -142,13 +146,13 @@ bool World::is_in_order(const Contact& contact, size_t colliders) const {
 void World::require_rows(const char* at, const SnapshotHead& head) const {
   const auto refuse = [] { fail(TS_ERROR_SNAPSHOT, "this snapshot is not in order: it names what there is not"); };
   const Scene& s = *scene_;
-  const std::pair<size_t, int64_t> limits[] = {  // of whole numbers, by where their field lies
-      {s.place("body_status").offset, kAbsent + 1},
-      {s.place("particle_aim").offset, kWithFrame + int64_t(head.frames)},
-      {s.place("grabs.body").offset, s.slot_count + 1},
-      {s.place("grabs.corners").offset, s.particle_count},
-      {s.place("grabs.count").offset, int64_t(kPatchRows) + 1},
-      {s.place("grabs.particle").offset, s.particle_count}};
+  const std::pair<size_t, int64_t> limits[] = {// of whole numbers, by where their field lies
+                                               {s.place("body_status").offset, kAbsent + 1},
+                                               {s.place("particle_aim").offset, kWithFrame + int64_t(head.frames)},
+                                               {s.place("grabs.body").offset, s.slot_count + 1},
+                                               {s.place("grabs.corners").offset, s.particle_count},
+                                               {s.place("grabs.count").offset, int64_t(kPatchRows) + 1},
+                                               {s.place("grabs.particle").offset, s.particle_count}};
   for (const Carried& each : s.carried) {
     int64_t limit = int64_t(1) << 32;
     for (const auto& [offset, most] : limits) limit = each.place.offset == offset ? most : limit;
@@ -185,7 +189,8 @@ void World::require_rows(const char* at, const SnapshotHead& head) const {
     take(&at, &row, 1);
     // Those with a grid were there when the world was exported.
     const bool is_known = row.kind >= 0 && (row.kind <= 3 || (i < s.names(TS_COLLIDER).size() && row.kind <= 5));
-    if (!is_known || !(length_of(row.pose.position) <= 1e9) || !(std::fabs(length_of(row.pose.rotation) - 1.0) <= 1e-3)) {
+    if (!is_known || !is_place(row.pose) || (row.has_target && !is_place(row.target)) ||
+        !std::isfinite(length_of(row.velocity)) || !std::isfinite(length_of(row.spin))) {
       refuse();
     }
   }
@@ -231,12 +236,17 @@ void World::restore(const char* bytes, size_t size) {
     fail(TS_ERROR_SNAPSHOT, "this snapshot is damaged: its checksum is wrong");
   }
   require_rows(bytes + sizeof head, head);
+  // What may find no memory comes before what changes the world.
+  const size_t frames = size_t(head.frames);
+  Events::Memory memory = {int32_t(head.kinds), std::vector<int32_t>(slots + 2), std::vector<ts_body>(slots),
+                           std::vector<Contact>(size_t(head.contacts))};
+  present_.reserve(12 * frames), coming_.reserve(12 * frames), frame_alive_.reserve(frames);
+  colliders_.rows.reserve(size_t(head.colliders));
   const char* at = bytes + sizeof head;
   for (const Carried& each : scene_->carried) {
     char* row = machine_->root() + each.place.offset;
     for (size_t i = 0; i < each.count; ++i, row += each.place.stride) take(&at, row, 4 * each.place.width);
   }
-  const size_t frames = size_t(head.frames);
   present_.resize(12 * frames), coming_.resize(12 * frames), frame_alive_.resize(frames);
   take_all(&at, &present_);
   take_all(&at, &coming_);
@@ -246,8 +256,6 @@ void World::restore(const char* bytes, size_t size) {
   take_all(&at, &grab_generations_);
   colliders_.rows.resize(size_t(head.colliders));
   take_all(&at, &colliders_.rows);
-  Events::Memory memory = {int32_t(head.kinds), std::vector<int32_t>(slots + 2), std::vector<ts_body>(slots),
-                           std::vector<Contact>(size_t(head.contacts))};
   take_all(&at, &memory.status);
   take_all(&at, &memory.sleepers);
   take_all(&at, &memory.contacts);
