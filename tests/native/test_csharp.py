@@ -63,6 +63,15 @@ def test_a_game_in_csharp_has_the_same_bits(name, export, play, compiled, run):
     assert found == lines_of([play, folder], calls)
 
 
+def test_what_calls_cost_is_told_of_a_step_a_mesh_and_a_bare_call(export, compiled, run):
+    told = run(compiled("Cost", "TaichiSoft.cs", "Cost.cs"), export("heap"))
+    assert [text.split(":")[0].split(" ")[:2] for text in told] == [
+        ["a", "step"],
+        ["to", "read"],
+        ["a", "call"],
+    ]
+
+
 REFUSED = {
     "no folder": "File: cannot read .*export",
     "null folder": "Argument: folder is null",
