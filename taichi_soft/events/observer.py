@@ -57,7 +57,8 @@ class Observer:
         self.stress = StressWatches(state, program, scene)
         room = state.capacity.contact
         rows = touch_rows(room, len(slots))
-        self._status = np.zeros(len(slots) + 2, dtype=np.int32)  # see `read_touches`
+        self._read = np.zeros(len(slots) + 2, dtype=np.int32)  # `status` of `read_touches`
+        self._status = self._read[:-2]  # of each slot, after the last step
         self._who = np.zeros((rows, 3), dtype=np.int32)
         self._impulses = np.zeros((rows, 3), dtype=np.float32)
         self.lost_touches = False  # whether in the last step more pairs of bodies touched than have room
@@ -82,7 +83,7 @@ class Observer:
         """Read stress and what touches, and take no note. What touched is forgotten, as where it is read."""
         self.stress.warm_up()
         who, impulses = np.empty_like(self._who), np.empty_like(self._impulses)
-        read_touches(self._state, len(self._slots), self._status.copy(), who, impulses)
+        read_touches(self._state, len(self._slots), self._read.copy(), who, impulses)
 
     def note_frozen(self, body: SoftBody) -> None:
         """The step that is being made has frozen a body."""
@@ -95,8 +96,8 @@ class Observer:
         else:
             self.lost_touches = False
         if kinds & CONTACT_KINDS:
-            moving = set(np.flatnonzero(self._status[:-2] == ACTIVE).tolist())
-            count = self._status[-1]
+            moving = set(np.flatnonzero(self._status == ACTIVE).tolist())
+            count = self._read[-1]
             touches = dict(
                 zip(
                     map(tuple, self._who[:count].tolist()),
@@ -124,7 +125,7 @@ class Observer:
     def remember(self, kinds: frozenset[type[Event]]) -> Memory:
         """What events of some kinds depend on."""
         return Memory(
-            self._status[:-2].copy() if kinds & (CONTACT_KINDS | SLEEP_KINDS) else None,
+            self._status.copy() if kinds & (CONTACT_KINDS | SLEEP_KINDS) else None,
             self._contacts.rows if kinds & CONTACT_KINDS else None,
             self.stress.notes if kinds & STRESS_KINDS else [],
         )
@@ -137,7 +138,7 @@ class Observer:
         else:
             self._contacts = Contacts()
         if memory.status is not None:
-            self._status[:-2] = memory.status
+            self._status[:] = memory.status
             # Who came after the last step took the slot of one who may have slept in it.
             asleep = self._sleeping().items()
             self._sleepers = {slot: body for slot, body in asleep if record_of(body).first_step < step}
@@ -148,8 +149,8 @@ class Observer:
 
     def _look(self) -> None:
         """Read who touched whom in the last step, and who sleeps."""
-        read_touches(self._state, len(self._slots), self._status, self._who, self._impulses)
-        self.lost_touches = bool(self._status[-2])
+        read_touches(self._state, len(self._slots), self._read, self._who, self._impulses)
+        self.lost_touches = bool(self._read[-2])
 
     def _handles(self, key: Key) -> tuple[SoftBody, Collider | SoftBody]:
         a, kind, b = key
@@ -162,5 +163,5 @@ class Observer:
 
     def _sleeping(self) -> dict[int, SoftBody]:
         """Sleeping bodies by their slots, ascending."""
-        slots = np.flatnonzero(self._status[:-2] == ASLEEP).tolist()
+        slots = np.flatnonzero(self._status == ASLEEP).tolist()
         return {slot: body for slot in slots if (body := self._slots[slot]) is not None}
