@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from taichi_soft.core.checks import as_count, as_flag, as_number
+from taichi_soft.core.checks import as_count, as_flag, as_friction, as_number
 from taichi_soft.core.constants import ALL_GROUPS
 from taichi_soft.core.serialisation import serialised
 
@@ -36,7 +36,7 @@ class Contact:
     mask: int = ALL_GROUPS
 
     def __post_init__(self) -> None:
-        as_number(self.friction, "friction", 0.0, 1e6, "a number from 0 to 1,000,000")
+        as_friction(self.friction)
         if self.thickness is not None:
             as_number(self.thickness, "thickness", 0.0, 1e3, "a length of 0 to 1000 m, or None")
         as_flag(self.itself, "itself")

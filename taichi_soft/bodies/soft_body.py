@@ -96,6 +96,9 @@ class Built(Protocol):
     def was_cut(self, body: SoftBody) -> None:
         """Take note that a body has other vertices."""
 
+    def become(self, settings: Settings) -> None:
+        """Have other gravity, or another friction of the floor."""
+
 
 @dataclass(eq=False, kw_only=True)
 class Context:
@@ -119,6 +122,12 @@ class Context:
         if self.fields is None:
             raise StateError("the world is not built: call world.build() after the last add_body")
         return self.fields
+
+    def become(self, settings: Settings) -> None:
+        """Have other gravity, or another friction of the floor; all else in `settings` is as it was."""
+        self.settings = settings
+        if self.fields is not None:
+            self.fields.become(settings)
 
     def of(self, kind: type[SomeSlice]) -> SomeSlice:
         """The slice of a kind."""
@@ -201,6 +210,7 @@ class BodyRecord:
     topology_version: int = 0
     skin_meshes: tuple[Any, ...] | None = None  # once they were asked for
     level: int = 0  # of detail, 0 being the finest
+    friction: float | None = None  # where it was given another than its asset has
     held: NDArray[np.int64] | None = None  # of the finest level: what pins of a coarser one stand for
 
     def become(self, part: CutMesh | None, level: int = 0) -> None:
@@ -262,6 +272,12 @@ class SoftBody(Handle):
     def material(self) -> AnyMaterial:
         """The material, as added or set since."""
         return self._record.description.material
+
+    @property
+    def friction(self) -> float:
+        """Coulomb's coefficient of its surface against other bodies, as its asset has it or as set since."""
+        own = self._record.friction
+        return float(self._asset.contact.friction) if own is None else own
 
     @property
     def vertex_count(self) -> int:

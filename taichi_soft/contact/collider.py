@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.contact.shapes import Shape
-from taichi_soft.core.checks import as_rotation, as_vector
+from taichi_soft.core.checks import as_friction, as_rotation, as_vector
 from taichi_soft.core.constants import VELOCITY_LIMIT
 from taichi_soft.core.errors import StateError
 from taichi_soft.core.handles import Handle, recorded
@@ -92,6 +92,9 @@ class ColliderSet(Protocol):
 
     def write(self, index: int) -> None:
         """Bring the fields up to date after a row was added or removed."""
+
+    def resurfaced(self, index: int) -> None:
+        """Bring fields and settings up to date after a row was given another friction."""
 
 
 class Collider(Handle):
@@ -184,6 +187,17 @@ class Collider(Handle):
     def angular_impulse(self) -> Floats:
         """The same about its position, (3,) [N m s]."""
         return self._colliders().impulses()[self.index, 3:]
+
+    @recorded
+    def set_friction(self, friction: float) -> None:
+        """Change Coulomb's coefficient, from the next step on; bodies that sleep near it wake.
+
+        Raises: OptionError for a number out of range; StateError once it was removed.
+        """
+        colliders, coefficient = self._colliders(), as_friction(friction)
+        if coefficient != self._row.friction:
+            self._row.friction = coefficient
+            colliders.resurfaced(self.index)
 
     @recorded
     def move_to(self, position: ArrayLike, rotation: ArrayLike | None = None) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from taichi_soft.contact.collider import Collider, ColliderRow, row_of
 from taichi_soft.contact.shapes import Shape
-from taichi_soft.core.checks import as_count, as_flag, as_number
+from taichi_soft.core.checks import as_count, as_flag, as_friction, as_number
 from taichi_soft.core.constants import ALL_GROUPS
 from taichi_soft.core.errors import SnapshotError
 from taichi_soft.core.handles import serial_of
@@ -48,7 +48,7 @@ def read_row(entry: list[Any], shapes: dict[str, Shape], room: int) -> ColliderR
         raise ValueError("a rotation is none")
     row = ColliderRow(
         shape,
-        as_number(friction, "friction", 0.0, 1e6),
+        as_friction(friction),
         -1.0 if restitution == -1.0 else as_number(restitution, "restitution", 0.0, 1.0),
         as_number(thickness, "thickness", 0.0, 1e3),
         as_count(group, "group", 0, ALL_GROUPS),

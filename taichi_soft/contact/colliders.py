@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ from taichi_soft.contact.kernels.collider_rows import (
     write_samples,
 )
 from taichi_soft.contact.shapes import Shape, SphereShape
-from taichi_soft.core.checks import as_count, as_number, as_rotation, as_vector
+from taichi_soft.core.checks import as_count, as_friction, as_number, as_rotation, as_vector
 from taichi_soft.core.constants import ALL_GROUPS
 from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.core.math.rotations import quaternion_of, rotation_vector, turned_by
@@ -51,6 +52,7 @@ class Colliders(Slice):
         self._rows: list[ColliderRow] = []
         self.shapes: dict[str, Shape] = {}  # all that there ever were, by their digests
         self._handles: list[Collider] = []
+        self.floor: Collider | None = None  # of a world with colliders, from `World.build` on
         self._contact: ContactFields | None = None
         self._body_count = 0
         self._impulses: Floats | None = None  # of the last step, once asked for
@@ -86,7 +88,7 @@ class Colliders(Slice):
         zero = np.zeros(3)
         row = ColliderRow(
             shape,
-            as_number(friction, "friction", 0.0, 1e6, "a number from 0 to 1,000,000"),
+            as_friction(friction),
             -1.0
             if restitution is None
             else as_number(restitution, "restitution", 0.0, 1.0, "a number from 0 to 1"),
@@ -177,6 +179,15 @@ class Colliders(Slice):
         self._write_constants()
         self._is_dirty = True
         self.on_jump(*row.box)
+
+    def resurfaced(self, index: int) -> None:
+        """Bring fields and settings up to date after row `index` was given another friction."""
+        row = self._rows[index]
+        if self._handles[index] is self.floor:
+            self.context.become(replace(self.context.settings, friction=row.friction))
+        if self._contact is not None:
+            self._write_constants()
+            self.on_jump(*row.box)
 
     def _write_samples(self, row: ColliderRow) -> None:
         if row.is_alive and len(row.shape.samples):

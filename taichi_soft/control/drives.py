@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from taichi_soft.control.kernels.drives import (
     write_shelter,
     write_wind,
 )
-from taichi_soft.core.checks import as_array, as_flag, as_number, as_vector
+from taichi_soft.core.checks import as_array, as_flag, as_gravity, as_number, as_vector
 from taichi_soft.core.constants import VELOCITY_LIMIT
 from taichi_soft.core.errors import OptionError
 
@@ -42,6 +43,15 @@ def apply_force(body: SoftBody, force: ArrayLike, particles: ArrayLike | None) -
         )
     require_substeps(context_of(body), "forces")
     change(body, add_push, body.index, rows_of(body, vertices), numbers(acceleration))
+
+
+def set_gravity(context: Context, gravity: ArrayLike) -> None:
+    """As `World.set_gravity`."""
+    acceleration = as_gravity(gravity)
+    if (acceleration != context.settings.gravity).any():
+        context.become(replace(context.settings, gravity=acceleration))
+        if context.fields is not None:
+            context.fields.rouse(-1)
 
 
 def set_gravity_scale(body: SoftBody, scale: float) -> None:

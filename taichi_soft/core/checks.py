@@ -81,6 +81,18 @@ def as_vector(value: ArrayLike, name: str, unit: str, limit: float = POSITION_LI
     return vector
 
 
+def as_gravity(value: ArrayLike) -> Floats:
+    """`value` as the gravity of a world, (3,) [m/s^2], read-only. Raises: OptionError."""
+    gravity = as_vector(value, "gravity", "m/s^2")
+    gravity.flags.writeable = False
+    return gravity
+
+
+def as_friction(value: Any) -> float:
+    """`value` as a Coulomb coefficient. Raises: OptionError."""
+    return as_number(value, "friction", 0.0, 1e6, "a number from 0 to 1,000,000")
+
+
 def to_array(values: Any, name: str) -> NDArray[Any]:
     """`values` as an array of whatever they hold. Raises: OptionError for rows of unequal lengths."""
     try:

@@ -12,7 +12,10 @@ from taichi_soft.core.types import Integrator, Schedule
 
 @dataclass(frozen=True, eq=False)
 class Settings:
-    """The checked arguments of a world. They stay as they are: its kernels are compiled for them."""
+    """The checked arguments of a world: its kernels are compiled for them.
+
+    `World.set_gravity` and `World.set_friction` give the world others, where nothing else differs.
+    """
 
     gravity: NDArray[np.float64]  # (3,) [m/s^2], read-only
     floor: float | None  # height [m]

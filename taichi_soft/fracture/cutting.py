@@ -24,6 +24,7 @@ from taichi_soft.bodies.status import ABSENT, ACTIVE
 from taichi_soft.bodies.tet_constants import write_tet_constants
 from taichi_soft.contact.hull_fields import touching_rows
 from taichi_soft.control.attachments import share_attachments
+from taichi_soft.control.frictions import give_friction
 from taichi_soft.core.checks import as_array, as_vector
 from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.fracture.kernels.topology import (
@@ -209,6 +210,9 @@ def _settle(context: Context, body: SoftBody, pieces: list[_Piece], slots: list[
         redescribe(each, piece.description, piece.arrays)
         corners, order = piece.description.mesh.tets, piece.arrays.order
         record_of(each).become(CutMesh(vertices[piece.vertices], order, tets[piece.tets], corners))
+    if record_of(body).friction is not None:
+        for each in fallen:
+            give_friction(state, each, body.friction)
     share_attachments(
         body, [(each, piece.vertices) for each, piece in zip((body, *fallen), pieces, strict=True)]
     )

@@ -21,6 +21,7 @@ from taichi_soft.bodies.soft_body import (
     record_of,
     redescribe,
 )
+from taichi_soft.control.frictions import give_friction
 from taichi_soft.control.grabs import Grabs, hold_at, place_of
 from taichi_soft.control.numbered import Numbered
 from taichi_soft.core.checks import as_count, as_flag
@@ -71,6 +72,8 @@ def set_level(body: SoftBody, level: Any, release: Any) -> tuple[Handle, ...]:
     write_surface(context, state, body.index, target)
     record_of(body).become(None, wanted)
     redescribe(body, target.description, arrays)
+    if record_of(body).friction is not None:
+        give_friction(state, body, body.friction)
     let_hold(hanging)
     for grab, place in grabbed:
         hold_at(grab, place)

@@ -13,7 +13,7 @@ from taichi_soft.bodies.description import BodyDescription
 from taichi_soft.bodies.failure import FailedStep
 from taichi_soft.bodies.layout import BodyArrays
 from taichi_soft.bodies.soft_body import SoftBody, present_asset, record_of
-from taichi_soft.core.checks import as_count, as_number
+from taichi_soft.core.checks import as_count, as_friction, as_gravity, as_number
 from taichi_soft.core.errors import SnapshotError, TaichiSoftError
 from taichi_soft.core.handles import serial_of
 from taichi_soft.core.serialisation import as_plain, below, from_plain
@@ -31,6 +31,8 @@ def write_manifest(context: WorldContext) -> dict[str, Any]:
         "steps": context.clock.steps,
         "time": context.clock.time,
         "last_dt": context.clock.last_dt,
+        "gravity": context.settings.gravity.tolist(),
+        "friction": context.settings.friction,
         "handles": context.handles.count,
         "bodies": [None if body is None else _body_entry(body) for body in context.slots.slots],
         "slices": {each.name: each.entries() for each in context.slices},
@@ -49,6 +51,7 @@ def _body_entry(body: SoftBody) -> list[Any]:
         None if part is None else part.note,
         record.level,
         None if record.held is None or record.level == 0 else record.held.tolist(),
+        record.friction,
     ]
 
 
@@ -62,6 +65,7 @@ class BodyEntry:
     part: CutMesh | None
     level: int  # of detail
     held: NDArray[np.int64] | None  # see `BodyRecord`
+    friction: float | None  # where it is not its asset's
     description: BodyDescription
     arrays: BodyArrays | None  # of a part
 
@@ -73,6 +77,8 @@ class Manifest:
     steps: int
     time: float
     last_dt: float
+    gravity: NDArray[np.float64]  # (3,) [m/s^2]
+    friction: float  # of the floor
     handles: int
     bodies: list[BodyEntry | None]
     slices: dict[str, Any]  # what each has read
@@ -115,6 +121,8 @@ def read_manifest(context: WorldContext, plain: dict[str, Any], parts: dict[int,
         as_count(plain["steps"], "steps", 0, _MOST),
         as_number(plain["time"], "time", 0.0, _MOST),
         as_number(plain["last_dt"], "last_dt", 0.0, _MOST),
+        as_gravity(plain["gravity"]),
+        as_friction(plain["friction"]),
         as_count(plain["handles"], "handles", 1, _MOST),
         bodies,
         read,
@@ -134,7 +142,7 @@ def _require_serials(context: WorldContext, plain: dict[str, Any]) -> None:
 def _read_body(context: WorldContext, slot: int, entry: Any, part: CutMesh | None) -> BodyEntry | None:
     if entry is None:
         return None
-    serial, first_step, failed, material, _, number, held = entry
+    serial, first_step, failed, material, _, number, held, friction = entry
     levels, present = context.slots.assets[slot].levels, context.slots.slots[slot]
     level = below(number, len(levels))
     asset, whole = levels[level], levels[level].description
@@ -176,6 +184,7 @@ def _read_body(context: WorldContext, slot: int, entry: Any, part: CutMesh | Non
         part,
         level,
         None if held is None else np.array([below(k, len(levels[0].mesh.vertices)) for k in held], np.int64),
+        None if friction is None else as_friction(friction),
         description,
         arrays,
     )

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from taichi_soft.bodies.cut_mesh import name_of
 from taichi_soft.bodies.description import BodyDescription
 from taichi_soft.bodies.soft_body import SoftBody, present_asset, record_of
+from taichi_soft.control.frictions import give_friction
 from taichi_soft.control.materials import write_constants
 from taichi_soft.core.handles import serial_of
 from taichi_soft.core.serialisation import as_plain
@@ -18,6 +21,9 @@ def put_back(context: WorldContext, manifest: Manifest) -> None:
     """Let time and bodies be as a manifest says, but for what fields and slices hold. Refuses nothing."""
     simulation, clock = context.built, context.clock
     clock.steps, clock.time, clock.last_dt = manifest.steps, manifest.time, manifest.last_dt
+    settings = context.settings
+    if (manifest.gravity != settings.gravity).any() or manifest.friction != settings.friction:
+        context.become(replace(settings, gravity=manifest.gravity, friction=manifest.friction))
     for slot, wanted in enumerate(manifest.bodies):
         _put_back_body(context, simulation.state, slot, wanted)
     simulation.was_restored()
@@ -34,6 +40,7 @@ def _put_back_body(context: WorldContext, state: State, slot: int, wanted: BodyE
         return
     if present is not None and _fills(present) != (name_of(wanted.part), wanted.level):
         refill_slot(context, state, slot, wanted.level, wanted.arrays)
+        record_of(present).friction = None  # of its asset now
     if present is None:
         present = _put_in(context, state, slot, wanted)
     record = record_of(present)
@@ -45,6 +52,8 @@ def _put_back_body(context: WorldContext, state: State, slot: int, wanted: BodyE
     if as_plain(record.description.material) != as_plain(wanted.description.material):
         write_constants(state, present, wanted.description)
     record.description = wanted.description
+    if record.friction != wanted.friction:
+        give_friction(state, present, wanted.friction)
 
 
 def _fills(body: SoftBody) -> tuple[str, int]:
@@ -58,6 +67,8 @@ def _take_out(context: WorldContext, state: State, body: SoftBody) -> None:
     if record.description is not whole and not body.is_cut:
         write_constants(state, body, whole)
         record.description = whole
+    if record.friction is not None:
+        give_friction(state, body, None)
     context.slots.leave(body)
     record.removed_in = context.clock.steps
 
@@ -72,7 +83,7 @@ def _put_in(context: WorldContext, state: State, slot: int, wanted: BodyEntry) -
         body = context.make_body(context, slot, asset)
         context.handles.enlist(body, wanted.serial)
     record = record_of(body)
-    record.removed_in = None
+    record.removed_in, record.friction = None, None
     if _fills(body) != (name_of(wanted.part), wanted.level):
         record.become(wanted.part, wanted.level)
     record.description = _before_material(body, wanted)

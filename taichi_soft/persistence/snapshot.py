@@ -1,8 +1,8 @@
 """The state of a world between two steps, as bytes and back.
 
 A snapshot has four parts. The *structure* is what the world was built of; a world of another structure
-refuses it. The *manifest* is what Python knows: time, who lives in which slot, and what each slice enters
-(colliders, frames, joints ...). The *words* are what the fields hold, bit by bit (see
+refuses it. The *manifest* is what Python knows: time, gravity, who lives in which slot, and what each
+slice enters (colliders, frames, joints ...). The *words* are what the fields hold, bit by bit (see
 `persistence.kernels.packing`), and what cuts have left of meshes (see `bodies.cut_mesh`). The last part is
 what events go on with (see `events.event_state`).
 """
@@ -42,7 +42,7 @@ from taichi_soft.persistence.world_structure import require_structure, structure
 from taichi_soft.solver.context import WorldContext
 from taichi_soft.solver.state import State
 
-MARK, VERSION = b"TSOFTSNP", 10
+MARK, VERSION = b"TSOFTSNP", 11
 
 Words = NDArray[np.int32]
 

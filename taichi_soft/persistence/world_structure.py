@@ -16,7 +16,12 @@ from taichi_soft.solver.context import WorldContext
 
 def structure_of(context: WorldContext) -> bytes:
     """What a snapshot's world must be built of, as JSON."""
-    settings = {name: as_plain(value) for name, value in asdict(context.settings).items()}
+    # Gravity and the floor's friction may be set, and are in the manifest.
+    settings = {
+        name: as_plain(value)
+        for name, value in asdict(context.settings).items()
+        if name not in ("gravity", "friction")
+    }
     capacity = asdict(context.built.state.capacity)
     return to_json(
         {

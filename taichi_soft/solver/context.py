@@ -24,13 +24,17 @@ class WorldContext(Context):
     make_body: Callable[[WorldContext, int, SoftBodyAsset], SoftBody]  # a handle to what is in a slot
     fields: Simulation | None = None
     built_with: list[str] = field(default_factory=list)  # shapes of colliders from before `build`, by digest
-    floor_collider: Collider | None = None  # the floor where there are colliders, from `build` on
     structure: bytes = b""  # what a snapshot's world must be built of, once it was asked for
 
     @property
     def colliders(self) -> Colliders:
         """All of them."""
         return self.of(Colliders)
+
+    @property
+    def floor_collider(self) -> Collider | None:
+        """The floor where there are colliders, from `build` on."""
+        return self.colliders.floor
 
     @property
     def built(self) -> Simulation:

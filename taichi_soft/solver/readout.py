@@ -30,8 +30,8 @@ class Readout:
     def __init__(
         self, settings: Settings, state: State, program: StepProgram, scene: Scene, joints: Joints
     ) -> None:
-        self._settings, self._state, self._program, self._scene = settings, state, program, scene
-        self._joints = joints
+        self.settings = settings
+        self._state, self._program, self._scene, self._joints = state, program, scene, joints
         self._rows: Floats32 = np.empty((scene.particle_count, 3), dtype=np.float32)  # positions of all
         self._alpha: float | None = None  # of what `_rows` holds; None once the world has moved on
 
@@ -62,7 +62,7 @@ class Readout:
 
     def velocities(self, body: SoftBody) -> Floats32:
         """Velocities at the time of the positions, (n, 3) [m/s]."""
-        state, settings = self._state, self._settings
+        state, settings = self._state, self.settings
         rows = np.empty((body.vertex_count, 3), dtype=np.float32)
         read_velocities(state, self._scene.ranges[body.index].particles[0], body.vertex_count, rows)
         lag = float(state.body_velocity_lag[body.index])
@@ -84,7 +84,7 @@ class Readout:
             begin = self._scene.ranges[body.index].particles[0]
             touches = self._state.contact.particle_touches.to_numpy()[begin : begin + body.vertex_count]
             return np.asarray(touches[self._scene.bodies[body.index].rank] == 1)
-        floor = self._settings.floor
+        floor = self.settings.floor
         if floor is None:
             return np.zeros(body.vertex_count, dtype=np.bool_)
         return np.asarray(body.positions()[:, 2] <= floor)

@@ -269,6 +269,11 @@ class Simulation:
         if self.program.has_contact and not self.program.has_soft_contact:
             list_joined_islands(self.state, len(self.pools.slots))
 
+    def become(self, settings: Settings) -> None:
+        """Have other gravity, or another friction of the floor."""
+        self.settings = self.readout.settings = settings
+        self.state.write_surroundings(settings)
+
     def was_cut(self, body: SoftBody) -> None:
         """Take note that a body has other vertices."""
         self.events.renew_watches(body)

@@ -15,6 +15,7 @@ from taichi_soft.control.kernels.grabs import GrabFields
 from taichi_soft.control.kernels.joints import JointFields
 from taichi_soft.control.kernels.motors import MotorFields
 from taichi_soft.core.runtime import holds_fields, ti
+from taichi_soft.core.settings import Settings
 from taichi_soft.solver.step_fields import JobFields, Progress
 
 _NO_CONTACT = ContactCapacity()
@@ -73,6 +74,11 @@ class State(BodyFields):
         if self.capacity.contact.hull:
             groups["colliders"][0] += self.hull.carried()
         return groups
+
+    def write_surroundings(self, settings: Settings) -> None:
+        """Write gravity, and the floor of a world without colliders."""
+        self.gravity[None] = settings.gravity.tolist()
+        self.floor[None] = [settings.floor or 0.0, settings.restitution or 0.0, settings.friction]
 
     def load(self, scene: Scene, models: list[int], kinds: NDArray[np.float64] | None = None) -> None:
         """As `BodyFields.load`."""

@@ -15,6 +15,7 @@ from taichi_soft.control.drives import (
     set_sheltered,
 )
 from taichi_soft.control.frames import Frame
+from taichi_soft.control.frictions import set_friction
 from taichi_soft.control.grabs import Grab, grab_at
 from taichi_soft.control.impulses import apply_impulse, apply_impulse_at_point
 from taichi_soft.control.joints import Joint, Joints
@@ -47,6 +48,16 @@ class BodyControl(SoftBody):
     def set_gravity_scale(self, scale: float) -> None:
         """Multiply the world's gravity for this body, from now on: 0 floats, -1 rises."""
         set_gravity_scale(self, scale)
+
+    @recorded
+    def set_friction(self, friction: float) -> None:
+        """Change the friction of its `Contact`, which counts between bodies, from the next step on.
+
+        What it finds on a floor or another collider is theirs: `World.set_friction`, `Collider.set_friction`.
+        Raises: OptionError for a number out of range; StateError before `build`, and in a world without
+            `soft_contact`, where bodies do not touch each other.
+        """
+        set_friction(self, friction)
 
     @property
     def linear_damping(self) -> float:

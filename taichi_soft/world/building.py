@@ -124,7 +124,7 @@ def _add_floor(context: WorldContext) -> None:
             "without hull"
         )
     if settings.floor is not None:
-        floor = context.floor_collider = context.colliders.add(
+        floor = context.colliders.floor = context.colliders.add(
             PlaneShape(),
             position=(0.0, 0.0, settings.floor),
             rotation=None,
@@ -213,8 +213,7 @@ def _warm_up(context: WorldContext, state: State) -> None:
 
 def _set(settings: Settings, state: State) -> None:
     """Write the numbers that hold for all bodies."""
-    state.gravity[None] = settings.gravity.tolist()
+    state.write_surroundings(settings)
     state.retries[None] = settings.retries
-    state.floor[None] = [settings.floor or 0.0, settings.restitution or 0.0, settings.friction]
     if settings.is_implicit:
         state.solver[None] = [settings.tolerance, settings.most_iterations]

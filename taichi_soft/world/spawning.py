@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from taichi_soft.bodies.asset import Floats32, SoftBodyAsset
 from taichi_soft.bodies.soft_body import lives_in, present_asset, record_of, require_alive
 from taichi_soft.contact.clearance import free_points, require_clear
+from taichi_soft.control.frictions import give_friction
 from taichi_soft.control.materials import set_material
 from taichi_soft.core.checks import as_count
 from taichi_soft.core.errors import OptionError, StateError
@@ -113,12 +114,14 @@ def despawn(context: WorldContext, body: Body) -> None:
 
 
 def _let_go(context: WorldContext, body: Body) -> None:
-    """Give up what is tied to a body, and a material that it was given, before its slot is emptied."""
+    """Give up what is tied to a body, and what its asset does not say, before its slot is emptied."""
     for each in context.slices:
         each.let_go(body)
     present = present_asset(body)
     if record_of(body).description is not present.description and not body.is_cut:
         set_material(body, present.material)
+    if record_of(body).friction is not None:
+        give_friction(context.built.state, body, None)
 
 
 def _require_asset(asset: Any) -> None:

@@ -15,6 +15,7 @@ from taichi_soft.bodies.render_mesh import warm_up as warm_up_render_meshes
 from taichi_soft.bodies.skin_mesh import warm_up as warm_up_skins
 from taichi_soft.bodies.soft_body import record_of
 from taichi_soft.control.drives import push_bodies, set_wind
+from taichi_soft.control.frictions import give_friction
 from taichi_soft.control.impulses import apply_radial_impulse
 from taichi_soft.control.rigid_transform import carry
 from taichi_soft.levels.level_change import bar_to_levels
@@ -106,6 +107,7 @@ def _control(context: WorldContext, body: Body, other: Body | None) -> None:
             body.set_level(other_level)
         record_of(body).topology_version = version  # what was drawn of it is as it was
     body.set_material(body.material)
+    give_friction(context.built.state, body, record_of(body).friction)
     body.pin(free[:1])
     body.set_targets(free[:1], body.positions()[free[:1]])
     context.built.trial_step(SHORTEST)

@@ -13,7 +13,7 @@ from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.contact.colliders import MOST_SAMPLES
 from taichi_soft.control.change import require_substeps
 from taichi_soft.control.drives import ForceField, push_by_field, require_field
-from taichi_soft.core.checks import as_count, as_flag, as_number, as_path, as_vector
+from taichi_soft.core.checks import as_count, as_flag, as_friction, as_gravity, as_number, as_path
 from taichi_soft.core.clock import Clock
 from taichi_soft.core.constants import GRAVITY_EARTH, VELOCITY_LIMIT
 from taichi_soft.core.errors import FrozenBodyWarning, OptionError, StateError
@@ -98,15 +98,13 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
         record: int = 0,
         record_to: str | Path = "frozen.recording",
     ) -> None:
-        downwards = as_vector(gravity, "gravity", "m/s^2")
-        downwards.flags.writeable = False
         settings = Settings(
-            gravity=downwards,
+            gravity=as_gravity(gravity),
             floor=None if floor is None else as_number(floor, "floor", -1e6, 1e6, "a height [m] or None"),
             restitution=None
             if restitution is None
             else as_number(restitution, "restitution", 0.0, 1.0, "a number from 0 to 1, or None"),
-            friction=as_number(friction, "friction", 0.0, 1e6, "a number from 0 to 1,000,000"),
+            friction=as_friction(friction),
             integrator=Integrator.parse(integrator),
             tolerance=as_number(tolerance, "tolerance", 1e-6, 0.5),
             most_iterations=as_count(most_iterations, "most_iterations"),
@@ -159,7 +157,7 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
 
     @property
     def settings(self) -> Settings:
-        """Gravity, floor, integrator and schedule, as they were checked and chosen."""
+        """Gravity, floor, integrator and schedule, as they were checked, chosen, or set since."""
         return self._context.settings
 
     @property

@@ -13,8 +13,9 @@ from taichi_soft.contact.collider import Collider
 from taichi_soft.contact.colliders import Colliders
 from taichi_soft.contact.shapes import Shape
 from taichi_soft.control.attachments import Attachments
-from taichi_soft.control.drives import set_wind
+from taichi_soft.control.drives import set_gravity, set_wind
 from taichi_soft.control.frames import Frame, Frames
+from taichi_soft.control.frictions import set_floor_friction
 from taichi_soft.control.grabs import Grab, Grabs, as_pull
 from taichi_soft.control.impulses import apply_radial_impulse
 from taichi_soft.control.joints import Joint, Joints
@@ -212,6 +213,35 @@ class WorldControl(WorldParts):
         Raises: OptionError for a number out of range; StateError before `build`.
         """
         apply_radial_impulse(self._context, center, impulse, radius)
+
+    @recorded
+    def set_gravity(self, gravity: ArrayLike) -> None:
+        """Change gravity, from the next step on; who sleeps wakes. Before `build` the world is built with it.
+
+        Velocities of leapfrog are half a substep old, and take up the new gravity for that half too. Nothing
+        warns of bodies that are too soft for their weight then.
+        Args:
+            gravity: (3,) [m/s^2].
+        Raises: OptionError for numbers out of range.
+        """
+        set_gravity(self._context, gravity)
+
+    @recorded
+    def set_friction(self, friction: float) -> None:
+        """Change the floor's Coulomb coefficient, from the next step on; who sleeps wakes. Before `build` the
+        world is built with it.
+
+        Other colliders keep theirs, and so do bodies among each other: `Collider.set_friction`,
+        `Body.set_friction`.
+        Args:
+            friction: 0 or more.
+        Raises: OptionError for a number out of range; StateError in a world without a floor.
+        """
+        floor = self._context.floor_collider
+        if floor is None:
+            set_floor_friction(self._context, friction)
+        else:
+            floor.set_friction(friction)
 
     @recorded
     def set_wind(self, velocity: ArrayLike | None, *, density: float = 1.2, drag: float = 1.0) -> None:

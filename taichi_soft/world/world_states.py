@@ -15,10 +15,10 @@ class WorldStates(WorldParts):
     def snapshot(self) -> bytes:
         """The whole state between two steps, to `restore` it here or in a world that was built alike.
 
-        Bodies, colliders, frames, grabs, attachments and joints, the wind, materials that were set, and all
-        that is going to act in the coming step are in it; a force field is not. Of the events recorded it has
-        what goes on, such as contacts. It holds numbers only, no code. The first call compiles, some seconds
-        at most.
+        Bodies, colliders, frames, grabs, attachments and joints, gravity, the wind, materials and frictions
+        that were set, and all that is going to act in the coming step are in it; a force field is not. Of the
+        events recorded it has what goes on, such as contacts. It holds numbers only, no code. The first call
+        compiles, some seconds at most.
         Raises: StateError before `build`.
         """
         data = take_snapshot(self._context)
@@ -50,8 +50,8 @@ class WorldStates(WorldParts):
     def state_hash(self) -> str:
         """A name of the state, 16 hexadecimal digits: the same in two worlds that are in step.
 
-        Made of step count, positions, velocities, pins, who lives, sleeps or is frozen, colliders, frames,
-        grabs and joints; the same for any number of threads.
+        Made of step count, gravity, positions, velocities, pins, who lives, sleeps or is frozen, colliders,
+        frames, grabs and joints; the same for any number of threads.
         Raises: StateError before `build`.
         """
         return state_hash(self._context)

@@ -324,7 +324,7 @@ def other_worlds():
     yield "another material", [(mesh, jelly, {}), (mesh, firm, {})], {}, "body 1"
     yield "another mesh", [(box((1, 1, 1.5), cells=(1, 1, 1)), jelly, {}), (mesh, jelly, {})], {}, "body 0"
     yield "another law", [(mesh, jelly, {}), (mesh, jelly, {"law": "face"})], {}, "body 1"
-    yield "another gravity", [(mesh, jelly, {})] * 2, {"gravity": (0, 0, -1.0)}, "gravity"
+    yield "another floor", [(mesh, jelly, {})] * 2, {"floor": -1.0}, "floor"
     yield "another integrator", [(mesh, jelly, {})] * 2, {"integrator": "lazy_leapfrog"}, "integrator"
 
 

@@ -343,6 +343,7 @@ WEIGHTS = choice((1 / 3, 1 / 3, 1 / 3), (1.0, 0.0, 0.0), [0.2, 0.3, 0.5], **NOT_
     "below zero": (-1.0, 1.0, 1.0), "sum": (1.0, 1.0, 1.0), "zeros": (0.0, 0.0, 0.0)
 })  # fmt: skip
 SCALE = number(0.5, 1.5)
+FRICTION = number(0.0, 1.0, below=-0.1, above=1e7)
 EVENTS = choice([Event], [ContactBegan], (), [FellAsleep, ContactBegan], none=None, number=1, one=Event, **{
     "other classes": [int], "words": ["ContactBegan"], "nothings": [None], "instances": [object()],
 })  # fmt: skip
@@ -482,6 +483,8 @@ CALLS: dict[str, dict[str, Call]] = {
             "max_force": or_none(number(0.0, 90.0, below=-1.0, strong=1e13)), "is_fixed": FLAG, "point": or_none(POINT),
         }, _drives_too_much),
         "apply_radial_impulse": Call({"center": POINT, "impulse": number(-20.0, 60.0, strong=1e21, **{"too strong for a body": 1e13}), "radius": number(0.5, 3.0, zero=0.0, below=-1.0)}),
+        "set_gravity": Call({"gravity": vector(-9.0, 9.0, far=(0.0, 0.0, -1e39))}),
+        "set_friction": Call({"friction": FRICTION}),
         "set_wind": Call({"velocity": or_none(SPEED), "density": number(0.5, 2.0, below=-1.0), "drag": number(0.1, 2.0, below=-1.0)}),
         "set_force_field": Call({"function": FIELD}),
         "read_positions": Call({"body": BODY, "alpha": number(0.0, 1.0, below=-0.1, above=1.1), "out": BUFFER}),
@@ -509,6 +512,7 @@ CALLS: dict[str, dict[str, Call]] = {
         }),
         "apply_force": Call({"force": PUSH, "particles": or_none(VERTICES)}),
         "set_gravity_scale": Call({"scale": SCALE}),
+        "set_friction": Call({"friction": FRICTION}),
         "set_linear_damping": Call({"rate": number(0.0, 2.0, below=-1.0)}),
         "set_sheltered": Call({"is_sheltered": FLAG}),
         "apply_impulse": Call({"impulse": PUSH, "particles": or_none(VERTICES)}, if_strong),
@@ -552,6 +556,7 @@ CALLS: dict[str, dict[str, Call]] = {
         "render_mesh": Call({"crease": or_none(number(0.0, 180.0, below=-1.0, above=181.0))}),
     },
     "Collider": {
+        "set_friction": Call({"friction": FRICTION}),
         "move_to": Call({"position": POINT, "rotation": ROTATION}),
         "set_velocity": Call({"linear": vector(-0.5, 0.5, fast=(0.0, 2e4, 0.0)), "angular": vector(-2.0, 2.0, fast=(2e4, 0.0, 0.0))}),
         "teleport": Call({"position": POINT, "rotation": ROTATION}),
@@ -592,7 +597,7 @@ CALLS: dict[str, dict[str, Call]] = {
 READERS: dict[str, str] = {
     "World": """bodies colliders dropped_events floor_collider frames grabs is_built islands joints last_dt motors restore_count settings slot_count step_count
         time""",
-    "Body": """aabb angular_momentum asset attachments center_of_mass deformations elastic_energy failure flipped_count flipped_tets
+    "Body": """aabb angular_momentum asset attachments center_of_mass deformations elastic_energy failure flipped_count flipped_tets friction
         gravitational_energy gravity_scale index is_alive is_asleep is_cut is_frozen is_held is_sheltered
         kinetic_energy level linear_damping masses material mesh momentum pinned plastic_strains pose render_meshes
         solve_residual stable_step strains stresses surface
@@ -615,7 +620,7 @@ DEAD = {"Body": "dead_body", "Collider": "dead_collider", "Frame": "dead_frame",
 DEAD |= {"Attachment": "dead_hold", "Joint": "dead_joint", "Motor": "dead_motor"}
 
 READABLE_WHEN_DEAD: dict[str, str] = {
-    "Body": """asset index is_alive is_cut is_frozen level masses material mesh render_meshes surface tet_origins tets topology_version
+    "Body": """asset friction index is_alive is_cut is_frozen level masses material mesh render_meshes surface tet_origins tets topology_version
         vertex_count vertex_origins""",
     "Collider": """angular_velocity friction group index is_alive mask position restitution rotation shape thickness
         velocity""",

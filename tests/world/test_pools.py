@@ -148,6 +148,7 @@ READABLE |= {
     "vertex_origins",
     "tet_origins",
     "render_meshes",
+    "friction",
     "level",
 }
 ARGUMENTS = {"set_motion": (np.zeros_like(MESH.vertices), np.zeros_like(MESH.vertices))}
@@ -160,7 +161,9 @@ ARGUMENTS |= {
     "attach_to": (None, [0]),
 }
 ARGUMENTS |= {"grab": (0, (1.0, 0.0, 0.0)), "pin": ([0],), "set_targets": ([0], [(9.0, 0.0, 0.0)])}
-ARGUMENTS |= {name: (1.0,) for name in ("set_damping", "set_gravity_scale", "set_linear_damping")}
+ARGUMENTS |= {
+    name: (1.0,) for name in ("set_damping", "set_friction", "set_gravity_scale", "set_linear_damping")
+}
 ARGUMENTS |= {"force_across": ((9.0, 0.0, 0.0), UP)}
 ARGUMENTS |= {"set_material": (JELLY,), "set_sheltered": (True,), "set_level": (0,)}
 
