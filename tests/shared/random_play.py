@@ -219,6 +219,15 @@ def _blow(world, cube, rng):
     world.set_wind(rng.uniform(-5, 5, 3) if rng.integers(2) else None)
 
 
+def _tilt(world, cube, rng):
+    world.set_gravity((*rng.uniform(-2, 2, 2), rng.uniform(-12, -6)))
+
+
+def _grease(world, cube, rng):
+    surfaces = (world, *world.colliders, *world.bodies)  # of the world it is the floor's
+    surfaces[rng.integers(len(surfaces))].set_friction(rng.uniform(0, 1))
+
+
 def _remake(world, cube, rng):
     _body(world, rng).set_material(FIRM if rng.integers(2) else SOFT)
 
@@ -243,7 +252,7 @@ ACTIONS = (
     _spawn, _despawn, _push, _force, _explode, _pin, _unpin, _grab, _move_grabs, _release, _attach, _move_frames,
     _detach, _move_collider, _drive_collider, _add_collider, _remove_collider, _blow, _remake, _tune, _throw,
     _join, _part, _pick, _cut, _jump_frame, _remove_frame, _add_ground,
-    _drive, _shift_gear, _brake,
+    _drive, _shift_gear, _brake, _tilt, _grease,
 )  # fmt: skip
 
 
