@@ -83,7 +83,7 @@ def _put_in(context: WorldContext, state: State, slot: int, wanted: BodyEntry) -
         body = context.make_body(context, slot, asset)
         context.handles.enlist(body, wanted.serial)
     record = record_of(body)
-    record.removed_in, record.friction = None, None
+    record.removed_in = None
     if _fills(body) != (name_of(wanted.part), wanted.level):
         record.become(wanted.part, wanted.level)
     record.description = _before_material(body, wanted)

@@ -173,8 +173,11 @@ def test_pieces_have_the_friction_of_their_body_and_who_comes_next_that_of_its_a
     assert frictions_of(world) == same({0: 0.1, 1: 0.1})
     world.restore(uncut)
     assert frictions_of(world) == same({0: 0.1})
-    world.spawn(loaf, position=(0, 3, 3))
-    assert frictions_of(world) == same({0: 0.1, 1: 0.4})
+    for _ in range(2):
+        guest = world.spawn(loaf, position=(0, 3, 3))
+        assert frictions_of(world) == same({0: 0.1, 1: 0.4})
+        guest.set_friction(0.2)
+        world.restore(uncut)
     world.restore(cut)
     assert frictions_of(world) == same({0: 0.1, 1: 0.1})
     for body in world.bodies:
