@@ -32,6 +32,7 @@ LAYERS = """
     bake
     export
     lab
+    live
     cli
     __main__
     demos

@@ -23,6 +23,7 @@ EXTRAS = {
     },
     "cluster": {"distributed": "distributed"},
     "panda3d": {"panda3d": "panda3d"},
+    "live": {"websockets": "websockets"},
     "tetgen": {"tetgen": "tetgen"},
     "ftetwild": {"pytetwild": "pytetwild"},
 }

@@ -1,0 +1,1 @@
+"""A world live in the browser."""
