@@ -1,1 +1,5 @@
-"""A world live in the browser."""
+"""A world live in a browser: seen, touched and tuned."""
+
+from taichi_soft.live.choices import choices
+
+__all__ = ["choices"]

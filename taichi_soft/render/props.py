@@ -48,7 +48,7 @@ class Scenery:
     ) -> None:
         """`colors`: sRGB from 0 to 1 of colliders that are to stand out from the others."""
         given = colors or {}
-        seen = [Prop(_drawn(c.shape), c, given.get(c, SLATE)) for c in world.colliders if not _is_level(c)]
+        seen = [Prop(drawn_surface(c.shape), c, given.get(c, SLATE)) for c in world.colliders if not is_level(c)]
         self._props = [*seen, *props]
         self._surfaces = [Surface(*prop.surface, color=prop.color) for prop in self._props]
         self._before: list[Any] = []
@@ -74,12 +74,12 @@ def _pose(prop: Prop) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     )
 
 
-def _is_level(collider: Collider) -> bool:
+def is_level(collider: Collider) -> bool:
     """Whether it is a level plane, as the floor is, which the renderer draws by itself."""
     return isinstance(collider.shape, PlaneShape) and np.asarray(collider.shape.normal)[2] > 1.0 - 1e-9
 
 
-def _drawn(shape: Shape) -> Triangles:
+def drawn_surface(shape: Shape) -> Triangles:
     """The surface of a shape; ground gets sides, down to its lowest place."""
     vertices, triangles = shape.surface()
     if not isinstance(shape, HeightFieldShape):

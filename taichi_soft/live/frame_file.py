@@ -1,0 +1,95 @@
+"""The newest picture of a world, in memory that two processes share: the writer never waits for a reader."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+PLACES = 3
+"""Pictures that there is room for: one that is read, one that is written, and the newest."""
+
+_HEAD = np.dtype([("newest", "<i8"), ("pad", "<i8", 7)])
+_FRAME = np.dtype([("number", "<i8"), ("version", "<i8"), ("time", "<f8"), ("is_tinted", "<i8")])
+
+TRIES = 8
+"""How often a reader begins anew where the writer has come round, until it leaves this picture out."""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Where everything is at one moment.
+
+    `positions` (n, 3) [m] and `normals` (n, 3), float32, of all render vertices; `tints` (n,), uint8, places
+    on a colour scale; `poses` (k, 12), float32: rotation, by rows, and position [m] of each collider.
+    """
+
+    number: int
+    version: int  # of the description of what is drawn
+    time: float  # [s]
+    is_tinted: bool
+    positions: NDArray[np.float32]
+    normals: NDArray[np.float32]
+    tints: NDArray[np.uint8]
+    poses: NDArray[np.float32]
+
+
+class FrameFile:
+    """Room for pictures of `vertices` vertices and `colliders` colliders, in a file that both sides map."""
+
+    def __init__(self, path: Path, vertices: int, colliders: int, *, is_new: bool = False) -> None:
+        size = _FRAME.itemsize + vertices * (24 + 1) + 48 * colliders
+        stride = -(-size // 64) * 64
+        shape = (_HEAD.itemsize + PLACES * stride,)
+        self._memory = np.memmap(path, dtype=np.uint8, mode="w+" if is_new else "r+", shape=shape)
+        self._newest = self._memory[: _HEAD.itemsize].view(_HEAD)["newest"]
+        self._vertices, self._colliders = vertices, colliders
+        self._places = [
+            self._views(self._memory[_HEAD.itemsize + i * stride :][:stride]) for i in range(PLACES)
+        ]
+
+    def _views(self, rows: NDArray[np.uint8]) -> tuple[NDArray[np.void], Frame]:
+        head, at, n = rows[: _FRAME.itemsize].view(_FRAME), _FRAME.itemsize, self._vertices
+        positions = rows[at : at + 12 * n].view("<f4").reshape(n, 3)
+        normals = rows[at + 12 * n : at + 24 * n].view("<f4").reshape(n, 3)
+        poses = rows[at + 24 * n : at + 24 * n + 48 * self._colliders].view("<f4").reshape(-1, 12)
+        tints = rows[at + 24 * n + 48 * self._colliders :][:n]
+        return head, Frame(0, 0, 0.0, False, positions, normals, tints, poses)
+
+    def begin(self) -> Frame:
+        """Arrays to fill for the next picture."""
+        number = int(self._newest[0]) + 1
+        head, frame = self._places[number % PLACES]
+        head["number"] = -1  # whoever reads it now sees that it changes
+        return frame
+
+    def publish(self, version: int, time: float, *, is_tinted: bool) -> int:
+        """Make what was filled the newest picture. Returns: its number, from 1."""
+        number = int(self._newest[0]) + 1
+        head = self._places[number % PLACES][0]
+        head["version"], head["time"], head["is_tinted"] = version, time, is_tinted
+        head["number"] = number
+        self._newest[0] = number
+        return number
+
+    def newest(self) -> Frame | None:
+        """A copy of the newest picture; None before the first."""
+        for _ in range(TRIES):
+            number = int(self._newest[0])
+            if number == 0:
+                return None
+            head, frame = self._places[number % PLACES]
+            if head["number"][0] != number:
+                continue
+            found = Frame(
+                number,
+                int(head["version"][0]),
+                float(head["time"][0]),
+                bool(head["is_tinted"][0]),
+                *(each.copy() for each in (frame.positions, frame.normals, frame.tints, frame.poses)),
+            )
+            if head["number"][0] == number:
+                return found
+        return None

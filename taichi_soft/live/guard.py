@@ -1,0 +1,100 @@
+"""Who may see and touch a live world: this machine, or who has the token; no page of another origin."""
+
+from __future__ import annotations
+
+import hmac
+import secrets
+import time
+from dataclasses import dataclass
+from http import HTTPStatus
+from ipaddress import ip_address
+from urllib.parse import parse_qs, urlsplit
+
+MOST_VISITORS = 16
+
+MESSAGES, BURST = 240.0, 480.0
+"""Of one visitor: messages a second, and how many at once. A hand that is moved sends 60."""
+
+LARGEST_UPLOAD = 16 * 2**20
+"""Of a visitor's mesh file [bytes]."""
+
+LARGEST_TEXT = 4096
+"""Of any other message [bytes]."""
+
+
+@dataclass(frozen=True)
+class Guard:
+    """What a request needs.
+
+    Args:
+        host: address that the server is bound to.
+        port: and its port.
+        token: part of the address that visitors are given; None on the loopback address.
+    """
+
+    host: str
+    port: int
+    token: str | None
+
+    @classmethod
+    def of(cls, host: str, port: int) -> Guard:
+        """A token for any address but the loopback one."""
+        return cls(host, port, None if is_loopback(host) else secrets.token_urlsafe(16))
+
+    def address(self) -> str:
+        """Which a visitor opens."""
+        name = f"[{self.host}]" if ":" in self.host else self.host
+        query = "" if self.token is None else f"?token={self.token}"
+        return f"http://{name}:{self.port}/{query}"
+
+    def refusal(self, path: str, host: str | None, origin: str | None) -> tuple[HTTPStatus, str] | None:
+        """Why a request is refused, or None.
+
+        A page of another origin may not open a connection, also not one whose name a name server has turned
+        to this machine: so the name in `Host` counts, and `Origin` has to agree.
+        Args:
+            path: with its query.
+            host, origin: headers of those names.
+        """
+        if self.token is None and not self._is_mine(host):
+            return HTTPStatus.FORBIDDEN, f"this world is served for {self.host}:{self.port}, not for {host!r}"
+        if origin is not None and urlsplit(origin).netloc != host:
+            return HTTPStatus.FORBIDDEN, f"a page of {origin!r} may not touch this world"
+        if self.token is not None:
+            given = parse_qs(urlsplit(path).query).get("token", [""])[0]
+            if not hmac.compare_digest(given.encode(), self.token.encode()):
+                return HTTPStatus.UNAUTHORIZED, "this address needs its token: open the one that was printed"
+        return None
+
+    def _is_mine(self, host: str | None) -> bool:
+        name = urlsplit(f"//{host}").hostname if host else None
+        try:
+            port = urlsplit(f"//{host}").port
+        except ValueError:
+            return False
+        return name is not None and is_loopback(name) and (port or 80) == self.port
+
+
+def is_loopback(host: str) -> bool:
+    """Whether only this machine reaches an address."""
+    if host == "localhost":
+        return True
+    try:
+        return ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+class Allowance:
+    """How many messages a visitor may still send: so many at once, and so many a second."""
+
+    def __init__(self) -> None:
+        self._left, self._then = BURST, time.monotonic()
+
+    def take(self) -> bool:
+        """One message. Returns: False where it is one too many."""
+        now = time.monotonic()
+        self._left = min(BURST, self._left + MESSAGES * (now - self._then))
+        self._then = now
+        self._left -= 1.0
+        return self._left >= 0.0

@@ -1,0 +1,58 @@
+"""What a visitor's page is sent, as bytes: what is drawn, and where it is.
+
+A packet begins with its kind and the pane that it is for, one byte each. Numbers are little-endian. Positions
+are shares of the picture's box, of 16 bits: a box of 10 m has steps of 0.15 mm.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.live.frame_file import Frame
+
+DRAWN, PICTURE = 1, 2
+"""Kinds of packets."""
+
+STEPS = 65535
+"""Of a coordinate, from one side of the box to the other."""
+
+_PICTURE = struct.Struct("<BBHIIId3f3f")
+"""Kind, pane, whether it is tinted, number, version, count of vertices, time, lowest corner, size of box."""
+
+
+def drawn_packet(pane: int, header: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> bytes:
+    """What is drawn: a header as JSON, which names the arrays that follow it."""
+    named = {name: [str(each.dtype), list(each.shape)] for name, each in arrays.items()}
+    text = json.dumps({**header, "arrays": named}).encode()
+    text += b" " * (-(8 + len(text)) % 4)
+    parts = [struct.pack("<BBHI", DRAWN, pane, 0, len(text)), text]
+    for each in arrays.values():
+        rows = np.ascontiguousarray(each).tobytes()
+        parts += [rows, bytes(-len(rows) % 4)]
+    return b"".join(parts)
+
+
+def quantised(positions: NDArray[np.float32]) -> tuple[NDArray[np.uint16], NDArray[np.float32], Any]:
+    """Positions (n, 3) [m] as shares of their box. Returns: the shares, the lowest corner, the size [m]."""
+    if len(positions) == 0:
+        return np.zeros((0, 3), np.uint16), np.zeros(3, np.float32), np.ones(3, np.float32)
+    low = positions.min(axis=0)
+    size = np.maximum(positions.max(axis=0) - low, np.float32(1e-6))
+    return ((positions - low) * (STEPS / size) + 0.5).astype(np.uint16), low, size
+
+
+def picture_packet(pane: int, frame: Frame) -> bytes:
+    """Where everything is."""
+    rows, low, size = quantised(frame.positions)
+    normals = np.zeros((len(rows), 4), np.int8)
+    normals[:, :3] = np.rint(frame.normals * 127.0)
+    if frame.is_tinted:
+        normals[:, 3] = (frame.tints >> 1).astype(np.int8)
+    numbers = pane, frame.is_tinted, frame.number & 0xFFFFFFFF, frame.version, len(rows), frame.time
+    head = _PICTURE.pack(PICTURE, *numbers, *low.tolist(), *size.tolist())
+    return b"".join([head, frame.poses.tobytes(), normals.tobytes(), rows.tobytes()])

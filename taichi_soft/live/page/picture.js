@@ -1,0 +1,264 @@
+// The picture: bodies, colliders and floor in light and shadow; one view of each pane beside the other.
+import * as THREE from "three";
+import { OrbitControls } from "./three/OrbitControls.js";
+
+const RAMP = [[77, 133, 204], [107, 191, 194], [242, 224, 133], [242, 145, 71], [204, 46, 56]].map(c => c.map(v => v / 255));
+const toLinear = v => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4);
+
+// What one world shows.
+class Pane {
+  constructor() {
+    this.scene = new THREE.Scene();
+    this.scene.background = new THREE.Color(0xc9d2dc);
+    this.scene.fog = new THREE.Fog(0xc9d2dc, 10, 60);
+    this.scene.add(new THREE.HemisphereLight(0xeaf2ff, 0xc9bfb2, 1.5));
+    this.sun = new THREE.DirectionalLight(0xfff1dd, 2.2);
+    this.sun.castShadow = true;
+    this.sun.shadow.mapSize.set(1024, 1024);
+    this.sun.shadow.bias = -0.0005;
+    this.sun.shadow.normalBias = 0.02;
+    this.scene.add(this.sun, this.sun.target);
+    this.body = null;
+    this.solids = [];
+    this.floor = null;
+    this.header = null;
+  }
+
+  draw(header, arrays) {
+    for (const old of [this.body, ...this.solids, this.floor]) {
+      if (old) { this.scene.remove(old); old.geometry.dispose(); old.material.dispose(); }
+    }
+    this.header = header;
+    const geometry = new THREE.BufferGeometry();
+    const n = header.vertices;
+    geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(3 * n), 3).setUsage(THREE.DynamicDrawUsage));
+    geometry.setAttribute("normal", new THREE.BufferAttribute(new Float32Array(3 * n), 3).setUsage(THREE.DynamicDrawUsage));
+    this.plain = new Float32Array(3 * n);
+    for (let i = 0; i < 3 * n; i++) this.plain[i] = toLinear(arrays.colors[i] / 255);
+    geometry.setAttribute("color", new THREE.BufferAttribute(new Float32Array(this.plain), 3));
+    geometry.setIndex(new THREE.BufferAttribute(arrays.triangles, 1));
+    const material = new THREE.MeshStandardMaterial({ vertexColors: true, roughness: 0.62, side: THREE.DoubleSide });
+    this.body = new THREE.Mesh(geometry, material);
+    this.body.castShadow = this.body.receiveShadow = true;
+    this.body.frustumCulled = false;
+    this.scene.add(this.body);
+    this.isTinted = false;
+    this.drawSolids(header, arrays);
+    this.drawFloor(header);
+    this.aim(header.camera.target, Math.max(3, 0.6 * distance(header.camera.eye, header.camera.target)));
+  }
+
+  drawSolids(header, arrays) {
+    let v = 0, t = 0;
+    this.solids = header.colliders.map(each => {
+      const geometry = new THREE.BufferGeometry();
+      geometry.setAttribute("position", new THREE.BufferAttribute(arrays.collider_vertices.slice(3 * v, 3 * (v + each.vertices)), 3));
+      geometry.setIndex(new THREE.BufferAttribute(arrays.collider_triangles.slice(3 * t, 3 * (t + each.triangles)), 1));
+      v += each.vertices; t += each.triangles;
+      const flat = geometry.toNonIndexed();
+      flat.computeVertexNormals();
+      geometry.dispose();
+      const [r, g, b] = header.collider_color;
+      const color = new THREE.Color().setRGB(r, g, b, THREE.SRGBColorSpace);
+      const mesh = new THREE.Mesh(flat, new THREE.MeshStandardMaterial({ color, roughness: 0.85, side: THREE.DoubleSide }));
+      mesh.castShadow = mesh.receiveShadow = true;
+      mesh.matrixAutoUpdate = false;
+      this.scene.add(mesh);
+      return mesh;
+    });
+  }
+
+  drawFloor(header) {
+    this.floor = null;
+    if (header.floor === null) return;
+    this.floor = new THREE.Mesh(new THREE.PlaneGeometry(400, 400), new THREE.MeshStandardMaterial({ color: 0xb7bcc2, roughness: 0.95 }));
+    this.floor.position.z = header.floor;
+    this.floor.receiveShadow = true;
+    this.scene.add(this.floor);
+  }
+
+  // The sun shines on what lies within `reach` of a point.
+  aim(target, reach) {
+    this.sun.target.position.set(...target);
+    this.sun.position.set(target[0] - 0.55 * reach, target[1] - 0.75 * reach, target[2] + 1.5 * reach);
+    const eye = this.sun.shadow.camera;
+    eye.left = eye.bottom = -reach; eye.right = eye.top = reach; eye.near = 0.1; eye.far = 5 * reach;
+    eye.updateProjectionMatrix();
+    this.scene.fog.near = 4 * reach; this.scene.fog.far = 16 * reach;
+  }
+
+  move(frame) {
+    const p = this.body.geometry.attributes.position, q = this.body.geometry.attributes.normal;
+    const [x, y, z] = frame.low, [sx, sy, sz] = frame.size.map(s => s / 65535);
+    const rows = frame.rows, normals = frame.normals, n = frame.count;
+    for (let i = 0, k = 0; i < n; i++, k += 3) {
+      p.array[k] = x + sx * rows[k]; p.array[k + 1] = y + sy * rows[k + 1]; p.array[k + 2] = z + sz * rows[k + 2];
+      q.array[k] = normals[4 * i]; q.array[k + 1] = normals[4 * i + 1]; q.array[k + 2] = normals[4 * i + 2];
+    }
+    p.needsUpdate = q.needsUpdate = true;
+    this.tint(frame);
+    this.solids.forEach((solid, i) => {
+      const m = frame.poses.subarray(12 * i, 12 * i + 12);
+      solid.matrix.set(m[0], m[1], m[2], m[9], m[3], m[4], m[5], m[10], m[6], m[7], m[8], m[11], 0, 0, 0, 1);
+      solid.matrixWorldNeedsUpdate = true;
+    });
+  }
+
+  tint(frame) {
+    if (!frame.isTinted && !this.isTinted) return;
+    const color = this.body.geometry.attributes.color;
+    if (!frame.isTinted) color.array.set(this.plain);
+    else for (let i = 0; i < frame.count; i++) color.array.set(LADDER[frame.normals[4 * i + 3]], 3 * i);
+    color.needsUpdate = true;
+    this.isTinted = frame.isTinted;
+  }
+}
+
+// Colours of a scale in 128 steps.
+const LADDER = Array.from({ length: 128 }, (_, i) => {
+  const place = (i / 127) * (RAMP.length - 1), at = Math.min(Math.floor(place), RAMP.length - 2), share = place - at;
+  return RAMP[at].map((v, k) => toLinear(v + share * (RAMP[at + 1][k] - v)));
+});
+
+const distance = (a, b) => Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
+
+export class Picture {
+  constructor(canvas, hand) {
+    this.canvas = canvas;
+    this.hand = hand;
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, preserveDrawingBuffer: true });
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.renderer.shadowMap.enabled = true;
+    this.renderer.shadowMap.type = THREE.PCFShadowMap;
+    this.renderer.toneMapping = THREE.NeutralToneMapping;
+    this.renderer.autoClear = false;
+    this.camera = new THREE.PerspectiveCamera(40, 1, 0.02, 500);
+    this.camera.up.set(0, 0, 1);
+    this.camera.position.set(3, -4, 2);
+    this.controls = new OrbitControls(this.camera, canvas);
+    this.controls.enableDamping = false;
+    this.controls.maxPolarAngle = 1.55;
+    this.controls.addEventListener("change", () => { this.isStale = true; });
+    this.panes = new Map();
+    this.shown = [0];
+    this.isPlaced = false;
+    this.isStale = true;
+    this.held = null;
+    for (const [name, call] of [["pointerdown", "press"], ["pointermove", "pull"], ["pointerup", "letGo"], ["pointercancel", "letGo"]]) {
+      canvas.addEventListener(name, event => this[call](event), { capture: true });
+    }
+    canvas.addEventListener("keydown", event => this.key(event));
+  }
+
+  pane(number) {
+    if (!this.panes.has(number)) this.panes.set(number, new Pane());
+    return this.panes.get(number);
+  }
+
+  draw(number, header, arrays) {
+    this.pane(number).draw(header, arrays);
+    if (!this.isPlaced) {
+      const { eye, target, fov } = header.camera;
+      this.camera.position.set(...eye);
+      this.controls.target.set(...target);
+      this.fov = fov;
+      this.controls.update();
+      this.isPlaced = true;
+    }
+    this.isStale = true;
+  }
+
+  move(number, frame) {
+    const pane = this.panes.get(number);
+    if (!pane || !pane.header || pane.header.version !== frame.version) return false;
+    pane.move(frame);
+    this.isStale = true;
+    return true;
+  }
+
+  render() {
+    const width = this.canvas.clientWidth, height = this.canvas.clientHeight;
+    const size = this.renderer.getSize(new THREE.Vector2());
+    if (size.x !== width || size.y !== height) { this.renderer.setSize(width, height, false); this.isStale = true; }
+    if (!this.isStale) return;
+    this.isStale = false;
+    this.renderer.setScissorTest(true);
+    const wide = width / this.shown.length;
+    this.camera.aspect = wide / height;
+    // The angle of view belongs to the shorter side, as in films.
+    const half = Math.tan(((this.fov ?? 40) * Math.PI) / 360);
+    this.camera.fov = (360 / Math.PI) * Math.atan(this.camera.aspect < 1 ? half / this.camera.aspect : half);
+    this.camera.updateProjectionMatrix();
+    this.shown.forEach((number, i) => {
+      const pane = this.panes.get(number);
+      if (!pane) return;
+      this.renderer.setViewport(i * wide, 0, wide, height);
+      this.renderer.setScissor(i * wide, 0, wide, height);
+      this.renderer.clear();
+      this.renderer.render(pane.scene, this.camera);
+    });
+  }
+
+  // The ray under a pointer, and the pane that it is in.
+  ray(event) {
+    const box = this.canvas.getBoundingClientRect(), wide = box.width / this.shown.length;
+    const i = Math.min(this.shown.length - 1, Math.max(0, Math.floor((event.clientX - box.left) / wide)));
+    return this.rayIn(event, i);
+  }
+
+  rayIn(event, i) {
+    const box = this.canvas.getBoundingClientRect(), wide = box.width / this.shown.length;
+    const x = (2 * (event.clientX - box.left - i * wide)) / wide - 1, y = 1 - (2 * (event.clientY - box.top)) / box.height;
+    const caster = new THREE.Raycaster();
+    caster.setFromCamera(new THREE.Vector2(x, y), this.camera);
+    return { place: i, pane: this.shown[i], caster };
+  }
+
+  press(event) {
+    if (event.button !== 0 || this.held) return;
+    const { place, pane, caster } = this.ray(event);
+    const mesh = this.panes.get(pane)?.body;
+    if (!mesh) return;
+    mesh.geometry.computeBoundingSphere();
+    const hit = caster.intersectObject(mesh)[0];
+    const solid = caster.intersectObjects(this.panes.get(pane).solids)[0];
+    if (!hit || (solid && solid.distance < hit.distance)) return;
+    event.stopImmediatePropagation();
+    this.canvas.setPointerCapture(event.pointerId);
+    const normal = this.camera.getWorldDirection(new THREE.Vector3());
+    this.held = { id: event.pointerId, place, pane, plane: new THREE.Plane().setFromNormalAndCoplanarPoint(normal, hit.point) };
+    const { origin, direction } = caster.ray;
+    this.hand.grab(pane, origin.toArray(), direction.toArray());
+  }
+
+  pull(event) {
+    if (!this.held || event.pointerId !== this.held.id) return;
+    event.stopImmediatePropagation();
+    const point = this.rayIn(event, this.held.place).caster.ray.intersectPlane(this.held.plane, new THREE.Vector3());
+    if (point) this.hand.move(this.held.pane, point.toArray());
+  }
+
+  letGo(event) {
+    if (!this.held || event.pointerId !== this.held.id) return;
+    event.stopImmediatePropagation();
+    this.hand.release(this.held.pane);
+    this.held = null;
+  }
+
+  key(event) {
+    const turn = { ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowUp: [0, -0.06], ArrowDown: [0, 0.06] }[event.key];
+    const zoom = { "+": 0.9, "=": 0.9, "-": 1.1 }[event.key];
+    if (!turn && !zoom) return;
+    event.preventDefault();
+    const away = this.camera.position.clone().sub(this.controls.target);
+    if (zoom) away.multiplyScalar(zoom);
+    else {
+      const length = away.length(), azimuth = Math.atan2(away.y, away.x) + turn[0];
+      const polar = Math.min(1.55, Math.max(0.1, Math.acos(away.z / length) + turn[1]));
+      away.set(Math.sin(polar) * Math.cos(azimuth), Math.sin(polar) * Math.sin(azimuth), Math.cos(polar)).multiplyScalar(length);
+    }
+    this.camera.position.copy(this.controls.target).add(away);
+    this.controls.update();
+    this.isStale = true;
+  }
+}

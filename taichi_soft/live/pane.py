@@ -1,0 +1,126 @@
+"""One world in its own process, as the server holds it: what goes to it, and what comes from it."""
+
+from __future__ import annotations
+
+import asyncio
+import multiprocessing
+import threading
+from collections import OrderedDict
+from collections.abc import Callable
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+from taichi_soft.live.frame_file import Frame, FrameFile
+from taichi_soft.live.scene import SceneSource
+
+MOST_WAITING = 256
+"""Wishes that wait for a world that is busy; more are refused."""
+
+
+class Runner:
+    """A process that runs `simulation.run`, with a thread for each direction.
+
+    Neither side waits for the other: wishes wait in a list, where a newer value of a slider takes the place
+    of an older one, and what the world tells is taken as soon as it comes.
+    """
+
+    def __init__(
+        self,
+        loop: asyncio.AbstractEventLoop,
+        folder: Path,
+        source: SceneSource,
+        given: dict[str, float],
+        heard: Callable[[Runner, tuple[Any, ...]], None],
+    ) -> None:
+        from taichi_soft.live.simulation import run
+
+        self.source, self.heard, self._loop = source, heard, loop
+        self.drawn: tuple[dict[str, Any], dict[str, Any]] | None = None
+        self.state: dict[str, Any] | None = None
+        self.frames: FrameFile | None = None
+        self.is_over = False
+        folder.mkdir(parents=True, exist_ok=True)
+        spawning = multiprocessing.get_context("spawn")
+        mine, theirs = spawning.Pipe()
+        self._connection: Connection = mine
+        self._process = spawning.Process(target=run, args=(theirs, str(folder), source, given), daemon=True)
+        self._process.start()
+        theirs.close()
+        self._waiting: OrderedDict[Any, tuple[Any, ...]] = OrderedDict()
+        self._changed = threading.Condition()
+        self._count = 0
+        for target in (self._listen, self._speak):
+            threading.Thread(target=target, daemon=True).start()
+
+    def send(self, *message: Any, key: Any = None) -> bool:
+        """Let the world have a wish, soon.
+
+        Args:
+            key: wishes of one key replace each other while they wait, unless one without a key lies between.
+        Returns: False where too many wait.
+        """
+        with self._changed:
+            if key is None:
+                self._count += 1
+            key = key, self._count
+            if key not in self._waiting and len(self._waiting) >= MOST_WAITING:
+                return False
+            self._waiting[key] = message
+            self._changed.notify()
+        return True
+
+    def stop(self) -> None:
+        """End the process."""
+        self.is_over = True
+        with self._changed:
+            self._waiting.clear()
+            self._waiting["stop"] = ("stop",)
+            self._changed.notify()
+
+    def end(self) -> None:
+        """Wait until it has ended, for a second or two."""
+        self.stop()
+        self._process.join(2.0)
+        if self._process.is_alive():
+            self._process.kill()
+            self._process.join(2.0)
+
+    def newest(self) -> Frame | None:
+        """The newest picture."""
+        return None if self.frames is None else self.frames.newest()
+
+    def _speak(self) -> None:
+        while True:
+            with self._changed:
+                while not self._waiting:
+                    self._changed.wait()
+                _, message = self._waiting.popitem(last=False)
+            try:
+                self._connection.send(message)
+            except (OSError, ValueError):
+                return
+            if message[0] == "stop":
+                return
+
+    def _listen(self) -> None:
+        while True:
+            try:
+                message = self._connection.recv()
+            except (EOFError, OSError):
+                message = ("ended",)
+            try:
+                self._loop.call_soon_threadsafe(self._hear, message)
+            except RuntimeError:  # the server has ended
+                return
+            if message[0] == "ended":
+                return
+
+    def _hear(self, message: tuple[Any, ...]) -> None:
+        if message[0] == "drawn":
+            _, path, sizes, header, arrays = message
+            self.frames = FrameFile(Path(path), *sizes)
+            self.drawn = header, arrays
+        elif message[0] in ("state", "ready"):
+            self.state = message[1]
+        self.heard(self, message)

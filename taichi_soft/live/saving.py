@@ -1,0 +1,96 @@
+"""What a visitor takes home: the script of the scene with a snapshot, and a film of the last seconds."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from taichi_soft.live.drawn import Drawn
+from taichi_soft.live.scene import Scene, SceneSource
+
+_RESTORED = """\
+
+world.restore(Path(__file__).with_name("scene.snapshot").read_bytes())
+assert world.state_hash() == {hash!r}, "another version of taichi-soft, or another script"
+
+DT, SUBSTEPS = {dt!r}, {substeps!r}  # of a step: seconds, and parts
+
+if __name__ == "__main__":
+    for _ in range(60):
+        world.step(DT, SUBSTEPS)
+    print(f"t = {{world.time:.3f}} s, state {{world.state_hash()}}")
+"""
+
+
+def saved_script(source: SceneSource, state_hash: str, dt: float, substeps: int) -> str:
+    """A script that makes the world as it is now, by the snapshot beside it, and then a second of steps."""
+    title = f'"""The scene {source.title!r} of `taichi-soft live`, as it was saved."""\n\n'
+    script = source.script(is_alone=True)
+    return title + script + _RESTORED.format(hash=state_hash, dt=dt, substeps=substeps)
+
+
+def packed(script: str, snapshot: bytes, source: SceneSource) -> bytes:
+    """A .zip of the script, its snapshot, and the files that it names."""
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("scene.py", script)
+        archive.writestr("scene.snapshot", snapshot)
+        for path in [*source.meshes, *([source.name] if source.kind == "script" else [])]:
+            archive.write(path, Path(path).name)
+    return out.getvalue()
+
+
+def film_frames(path: Path, recent: Sequence[tuple[float, int, Any]], drawn: Drawn, scene: Scene) -> None:
+    """Write what `film_file` draws: pictures of one version of the meshes, and the meshes."""
+    header, arrays = drawn.described()
+    frames = [rows for _, version, rows in recent if version == drawn.version]
+    camera = header["camera"]
+    rows: dict[str, Any] = dict(
+        positions=np.array([positions for positions, _ in frames], np.float32),
+        poses=np.array([poses for _, poses in frames], np.float32),
+        floor=np.array([np.nan if header["floor"] is None else header["floor"]]),
+        camera=np.array([*camera["eye"], *camera["target"], camera["fov"]]),
+        collider_counts=np.array(
+            [(each["vertices"], each["triangles"]) for each in header["colliders"]], np.int64
+        ).reshape(-1, 2),
+        **arrays,
+    )
+    np.savez(path, **rows)
+
+
+def film_file(frames: str, path: str, fps: float, size: tuple[int, int] = (1280, 720)) -> int:
+    """Draw a film of what `film_frames` wrote. Returns: how many pictures it has."""
+    from taichi_soft import init
+    from taichi_soft.render import Camera, Renderer, Surface, VideoWriter
+    from taichi_soft.render.props import SLATE
+
+    init("cpu")
+    with np.load(frames) as held:
+        data = {name: held[name] for name in held.files}
+    camera = data["camera"]
+    floor = float(data["floor"][0])
+    view = Camera(tuple(camera[:3]), tuple(camera[3:6]), fov_degrees=float(camera[6]))
+    bodies = Surface(
+        data["positions"][0],
+        data["triangles"].astype(np.int32),
+        color=data["colors"].astype(np.float32) / 255.0,
+    )
+    solids, at_vertex, at_triangle = [], 0, 0
+    for vertices, triangles in data["collider_counts"]:
+        rows = data["collider_vertices"][at_vertex : at_vertex + vertices]
+        faces = data["collider_triangles"][at_triangle : at_triangle + triangles].astype(np.int32)
+        solids.append((rows, Surface(rows, faces, color=SLATE)))
+        at_vertex, at_triangle = at_vertex + int(vertices), at_triangle + int(triangles)
+    with VideoWriter(path, fps=fps, size=size) as writer:
+        renderer = Renderer(*size, camera=view, floor=None if np.isnan(floor) else floor)
+        for positions, poses in zip(data["positions"], data["poses"], strict=True):
+            bodies.positions = positions
+            for (rows, surface), pose in zip(solids, poses, strict=True):
+                surface.positions = rows @ pose[:9].reshape(3, 3).T + pose[9:]
+            writer.write(renderer.render([*(surface for _, surface in solids), bodies]))
+    return len(data["positions"])

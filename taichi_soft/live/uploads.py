@@ -1,0 +1,70 @@
+"""Mesh files that visitors bring: small, of a known kind, and looked at where they can break nothing."""
+
+from __future__ import annotations
+
+import re
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
+from pathlib import Path
+
+from taichi_soft.core.errors import MeshError, OptionError
+from taichi_soft.live.guard import LARGEST_UPLOAD
+
+KINDS = (".glb", ".obj", ".ply", ".stl", ".off")
+"""Files of one piece. A .gltf names others, which a visitor could choose."""
+
+MOST_SECONDS = 60.0
+"""That making tetrahedra of a visitor's file may take."""
+
+MOST_TRIANGLES = 200_000
+
+
+def require_mesh(folder: Path, name: str, content: bytes) -> Path:
+    """Keep a visitor's file in a new folder, once it is known to make a body.
+
+    Args:
+        folder: is made, for this file alone.
+        name: as the visitor calls it: what is no letter, digit, - or _ is left out, folders too.
+    Raises: OptionError for a file that is too large or of another kind; MeshError for one that makes no body.
+    """
+    suffix = Path(name).suffix.lower()
+    if suffix not in KINDS:
+        raise OptionError(f"{name!r} is none of {', '.join(KINDS)}")
+    if not 0 < len(content) <= LARGEST_UPLOAD:
+        raise OptionError(f"{name!r} has {len(content):,} bytes: from 1 to {LARGEST_UPLOAD:,} are taken")
+    stem = re.sub(r"[^A-Za-z0-9_-]", "", Path(name).stem)[:40] or "mesh"
+    folder.mkdir(parents=True)
+    path = folder / f"{stem}{suffix}"
+    path.write_bytes(content)
+    spawning = get_context("spawn")
+    mine, theirs = spawning.Pipe(duplex=False)
+    process = spawning.Process(target=_look_at, args=(str(path), theirs), daemon=True)
+    process.start()
+    theirs.close()
+    try:
+        words = mine.recv() if mine.poll(MOST_SECONDS) else f"it took longer than {MOST_SECONDS:g} s"
+    except EOFError:
+        words = "reading it broke down"
+    process.kill()
+    process.join()
+    if words:
+        raise MeshError(f"{name!r} makes no body: {words}")
+    return path
+
+
+def _look_at(path: str, connection: Connection) -> None:
+    """Make a body of it. Sends: "" or what is wrong."""
+    from taichi_soft.bodies.asset import SoftBodyAsset
+    from taichi_soft.live.choices import VISITOR
+
+    try:
+        asset = SoftBodyAsset.from_surface(Path(path), VISITOR)
+        count = sum(len(skin.surface.triangles) for skin in asset.skins)
+        if count > MOST_TRIANGLES:
+            connection.send(f"it has {count:,} triangles, and {MOST_TRIANGLES:,} are taken")
+        elif max(asset.mesh.bounds[1] - asset.mesh.bounds[0]) > 20.0:
+            connection.send("it is larger than 20 m: scale it to metres")
+        else:
+            connection.send("")
+    except Exception as error:
+        connection.send(str(error) or type(error).__name__)

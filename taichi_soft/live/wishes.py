@@ -1,0 +1,138 @@
+"""What a visitor's page may say, checked: each message becomes a wish, or is refused with the reason."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+from taichi_soft.core.errors import OptionError
+from taichi_soft.core.types import Flips, Strain
+from taichi_soft.elements.laws import LAWS
+from taichi_soft.live.controls import checked_value
+from taichi_soft.live.guard import LARGEST_TEXT
+from taichi_soft.live.tints import QUANTITIES
+
+FARTHEST = 1e5
+"""From the origin that a hand reaches [m]."""
+
+SAVED = ("script", "film")
+"""What can be made of a world for a visitor."""
+
+
+def wish_of(text: str) -> dict[str, Any]:
+    """A message as a wish: `do`, and what belongs to it.
+
+    Raises: OptionError for one that is too long, no JSON, or asks for what there is not.
+    """
+    if len(text) > LARGEST_TEXT:
+        raise OptionError(f"a message has at most {LARGEST_TEXT} characters, got {len(text)}")
+    try:
+        said = json.loads(text)
+    except (ValueError, RecursionError):
+        raise OptionError("a message is JSON") from None
+    if not isinstance(said, dict) or not isinstance(said.get("do"), str) or said["do"] not in _CHECKS:
+        raise OptionError(f"a message has a 'do', one of {', '.join(_CHECKS)}")
+    pane = said.get("pane", 0)
+    if pane not in (0, 1) or isinstance(pane, bool):
+        raise OptionError(f"pane is 0 or 1, got {pane!r}")
+    return {"do": said["do"], "pane": int(pane), **_CHECKS[said["do"]](said)}
+
+
+def _nothing(said: dict[str, Any]) -> dict[str, Any]:
+    return {}
+
+
+def _seen(said: dict[str, Any]) -> dict[str, Any]:
+    number = said.get("number")
+    if not isinstance(number, int) or isinstance(number, bool) or not 0 <= number < 2**32:
+        raise OptionError(f"number is that of a picture, got {number!r}")
+    return {"number": number}
+
+
+def _set(said: dict[str, Any]) -> dict[str, Any]:
+    return {"name": said.get("name"), "value": checked_value(said.get("name"), said.get("value"))}
+
+
+def _vector(said: dict[str, Any], name: str) -> list[float]:
+    rows = said.get(name)
+    if not isinstance(rows, list) or len(rows) != 3:
+        raise OptionError(f"{name} is three numbers, got {rows!r}")
+    for each in rows:
+        if isinstance(each, bool) or not isinstance(each, (int, float)) or not math.isfinite(each):
+            raise OptionError(f"{name} is three finite numbers, got {rows!r}")
+        if abs(each) > FARTHEST:
+            raise OptionError(f"{name} lies within {FARTHEST:g}, got {rows!r}")
+    return [float(each) for each in rows]
+
+
+def _grab(said: dict[str, Any]) -> dict[str, Any]:
+    direction = _vector(said, "direction")
+    if not any(direction):
+        raise OptionError("direction is not zero")
+    return {"origin": _vector(said, "origin"), "direction": direction}
+
+
+def _move(said: dict[str, Any]) -> dict[str, Any]:
+    return {"point": _vector(said, "point")}
+
+
+def _flag(said: dict[str, Any]) -> dict[str, Any]:
+    if not isinstance(said.get("is_paused"), bool):
+        raise OptionError("is_paused is true or false")
+    return {"is_paused": said["is_paused"]}
+
+
+def _name(said: dict[str, Any]) -> dict[str, Any]:
+    name = said.get("name")
+    if not isinstance(name, str) or not 0 < len(name) <= 100:
+        raise OptionError(f"name is a word, got {name!r}")
+    return {"name": name}
+
+
+def _one_of(said: dict[str, Any], name: str, choices: Any) -> str | None:
+    value = said.get(name)
+    if value is not None and (not isinstance(value, str) or value not in choices):
+        raise OptionError(f"{name} is one of {', '.join(choices)}, or null, got {value!r}")
+    return value
+
+
+def _tint(said: dict[str, Any]) -> dict[str, Any]:
+    return {"quantity": _one_of(said, "quantity", QUANTITIES)}
+
+
+def _choose(said: dict[str, Any]) -> dict[str, Any]:
+    strains, flips = [each.value for each in Strain], [each.value for each in Flips]
+    return {
+        "law": _one_of(said, "law", LAWS),
+        "strain": _one_of(said, "strain", strains),
+        "flips": _one_of(said, "flips", flips),
+    }
+
+
+def _save(said: dict[str, Any]) -> dict[str, Any]:
+    what = _one_of(said, "what", SAVED)
+    if what is None:
+        raise OptionError(f"what is one of {', '.join(SAVED)}")
+    return {"what": what}
+
+
+_CHECKS = {
+    "seen": _seen,
+    "set": _set,
+    "grab": _grab,
+    "move": _move,
+    "release": _nothing,
+    "pause": _flag,
+    "step": _nothing,
+    "reset": _nothing,
+    "spawn": _name,
+    "despawn": _nothing,
+    "tint": _tint,
+    "choose": _choose,
+    "compare": _choose,
+    "alone": _nothing,
+    "save": _save,
+    "upload": _name,
+}
+"""By what a message asks for."""
