@@ -39,7 +39,7 @@ test-fast: $(VENV)/.test
 	@$(BIN)/python -m pytest -m "numpy or kernel"
 
 test-all: $(VENV)/.dev
-	@$(BIN)/python -m pytest
+	@$(BIN)/python -m pytest $(PYTEST)
 
 test-bounds: $(VENV)/.test
 	@TAICHI_SOFT_DEBUG=1 $(BIN)/python -m pytest tests/bounds

@@ -4,6 +4,7 @@ import gc
 import os
 import signal
 import sys
+import time
 from collections import Counter
 from pathlib import Path
 
@@ -18,8 +19,14 @@ from taichi_soft.bodies.capacity import LEAST
 from taichi_soft.core.extras import missing_packages
 from taichi_soft.core.runtime import DEBUG
 
+UNTIL = "TAICHI_SOFT_SOAKS_UNTIL"
+"""Name of the environment variable with the time [s since 1970] after which no soak begins: `.ci/run` has only so
+long, and a slow machine leaves some out, which it names."""
+
 ARCH = "TAICHI_SOFT_TEST_ARCH"
 """Name of the environment variable with which the tests run elsewhere than on the CPU: "cuda"."""
+
+TIME_IS_UP = "a soak for which no time was left on this machine"
 
 settings.register_profile("same every time", derandomize=True, deadline=None)
 settings.load_profile("same every time")
@@ -68,6 +75,7 @@ SECONDS = {
     "bake/test_formats": (1, 0),
     "bake/": (20, 20),
     "native/": (0, 660),
+    "live/": (3, 240),
     "test_readme": (1, 10),
     "test_package": (5, 60),
     "": (21, 0),
@@ -79,7 +87,7 @@ NUMPY = ("meshing/", "cages/", "elements/materials/", "bake/test_formats", "test
 KERNEL = ("elements/", "contact/distances/", "contact/shapes/", "core/math/")
 WORLD = ("elements/laws/test_energy_laws", "cages/test_thin.py::test_a_table_on")
 SOAK = (
-    *("lab/", "demos/", "cli/", "native/"),
+    *("lab/", "demos/", "cli/", "native/", "live/test_served", "live/test_page"),
     "feel/test_material_from_feel.py::test_random_wishes",
     "feel/test_material_from_feel.py::test_what_cannot",
     *(
@@ -216,6 +224,12 @@ def keeps_a_world(item):
     return any(each[-1].scope == "module" for each in made)
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item):
+    if is_soak(item.nodeid) and time.time() > float(os.environ.get(UNTIL, "inf")):
+        pytest.skip(TIME_IS_UP)
+
+
 @pytest.hookimpl(hookwrapper=True)
 def pytest_runtest_makereport():
     outcome = yield
@@ -232,7 +246,7 @@ def fail_if_skipped(report):
     """Where every extra is installed, as `.ci/run` has it, a test that is skipped tests nothing; but for one
     that needs a program which `.ci/run` could not install, and names."""
     if os.environ.get("TAICHI_SOFT_ALL_TESTS") == "1" and report.skipped and not hasattr(report, "wasxfail"):
-        without = os.environ.get("TAICHI_SOFT_WITHOUT", "").split()
+        without = [*os.environ.get("TAICHI_SOFT_WITHOUT", "").split(), TIME_IS_UP]
         if any(package in str(report.longrepr[-1]) for package in without):
             return
         report.outcome = "failed"

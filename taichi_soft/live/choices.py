@@ -43,7 +43,9 @@ def choices(
     """
     kept = {name: getattr(World, name) for name in ("add_body", "reserve", "spawn", "build")}
     changed: dict[int, tuple[SoftBodyAsset, SoftBodyAsset]] = {}
-    chosen: dict[str, Any] = {name: each for name, each in (("strain", strain), ("flips", flips)) if each is not None}
+    chosen: dict[str, Any] = {
+        name: each for name, each in (("strain", strain), ("flips", flips)) if each is not None
+    }
     if law is not None:
         chosen = {"law": law, "strain": strain, "flips": flips}
 

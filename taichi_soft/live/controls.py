@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
 from taichi_soft import Body, Material, World
-from taichi_soft.core.errors import OptionError
+from taichi_soft.core.errors import OptionError, StateError
 
 
 @dataclass(frozen=True)
@@ -130,7 +131,7 @@ class Controls:
         if {"young", "poisson", "damping"} & set(self.given):
             self._give_material(body)
         if "friction" in self.given:
-            body.set_friction(self.given["friction"])
+            _set_friction(body, self.given["friction"])
 
     def _give_material(self, body: Body) -> None:
         """Bodies of springs alone have no such numbers, and stay."""
@@ -146,7 +147,12 @@ class Controls:
         for collider in self.world.colliders:
             collider.set_friction(value)
         for body in self.world.bodies:
-            body.set_friction(value)
+            _set_friction(body, value)
+
+
+def _set_friction(body: Body, value: float) -> None:
+    with suppress(StateError):  # bodies of this world do not touch each other
+        body.set_friction(value)
 
 
 def _materials(world: World) -> list[Material]:

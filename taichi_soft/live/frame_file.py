@@ -58,16 +58,21 @@ class FrameFile:
         tints = rows[at + 24 * n + 48 * self._colliders :][:n]
         return head, Frame(0, 0, 0.0, False, positions, normals, tints, poses)
 
+    @property
+    def newest_number(self) -> int:
+        """Of the newest picture, 0 before the first."""
+        return int(self._newest[0])
+
     def begin(self) -> Frame:
         """Arrays to fill for the next picture."""
-        number = int(self._newest[0]) + 1
+        number = self.newest_number + 1
         head, frame = self._places[number % PLACES]
         head["number"] = -1  # whoever reads it now sees that it changes
         return frame
 
     def publish(self, version: int, time: float, *, is_tinted: bool) -> int:
         """Make what was filled the newest picture. Returns: its number, from 1."""
-        number = int(self._newest[0]) + 1
+        number = self.newest_number + 1
         head = self._places[number % PLACES][0]
         head["version"], head["time"], head["is_tinted"] = version, time, is_tinted
         head["number"] = number
@@ -77,7 +82,7 @@ class FrameFile:
     def newest(self) -> Frame | None:
         """A copy of the newest picture; None before the first."""
         for _ in range(TRIES):
-            number = int(self._newest[0])
+            number = self.newest_number
             if number == 0:
                 return None
             head, frame = self._places[number % PLACES]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from engine_adapter import EngineAdapter
 from taichi_soft import Grab
-from taichi_soft.core.errors import TaichiSoftError
+from taichi_soft.core.errors import TaichiSoftError, UnstableStepWarning
 from taichi_soft.live.controls import Controls
 from taichi_soft.live.drawn import Drawn
 from taichi_soft.live.frame_file import FrameFile
@@ -150,7 +150,10 @@ class Simulation:
             self._simulated += made * self.adapter.fixed_step.dt
             self.is_moving = True
         for each in caught:
-            self.connection.send(("said", str(each.message)))
+            # The page predicts by itself what is unstable: of the materials that bodies have, not of those
+            # that there is room for.
+            if not issubclass(each.category, UnstableStepWarning):
+                self.connection.send(("said", str(each.message)))
 
     # What a visitor may wish for.
 

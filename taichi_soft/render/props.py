@@ -48,7 +48,9 @@ class Scenery:
     ) -> None:
         """`colors`: sRGB from 0 to 1 of colliders that are to stand out from the others."""
         given = colors or {}
-        seen = [Prop(drawn_surface(c.shape), c, given.get(c, SLATE)) for c in world.colliders if not is_level(c)]
+        seen = [
+            Prop(drawn_surface(c.shape), c, given.get(c, SLATE)) for c in world.colliders if not is_level(c)
+        ]
         self._props = [*seen, *props]
         self._surfaces = [Surface(*prop.surface, color=prop.color) for prop in self._props]
         self._before: list[Any] = []

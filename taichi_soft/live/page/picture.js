@@ -11,7 +11,9 @@ class Pane {
     this.scene = new THREE.Scene();
     this.scene.background = new THREE.Color(0xc9d2dc);
     this.scene.fog = new THREE.Fog(0xc9d2dc, 10, 60);
-    this.scene.add(new THREE.HemisphereLight(0xeaf2ff, 0xc9bfb2, 1.5));
+    const sky = new THREE.HemisphereLight(0xeaf2ff, 0xc9bfb2, 1.7);
+    sky.position.set(0, 0, 1);
+    this.scene.add(sky);
     this.sun = new THREE.DirectionalLight(0xfff1dd, 2.2);
     this.sun.castShadow = true;
     this.sun.shadow.mapSize.set(1024, 1024);

@@ -1,0 +1,68 @@
+"""A live world served by the command line, as a visitor finds it."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))  # what the tests of this folder share
+
+pytest.importorskip("websockets", reason="needs websockets: pip install 'taichi-soft[live]'")
+
+from visitor import Visitor
+
+
+class Served:
+    """`taichi-soft live` in a process of its own."""
+
+    def __init__(self, *arguments):
+        command = [sys.executable, "-m", "taichi_soft", "live", "--port", "0", "--no-browser", *arguments]
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+        line = self.process.stdout.readline()
+        found = re.search(r"http://\S+", line)
+        assert found, line
+        self.address = found.group()
+
+    def end(self):
+        """As Ctrl-C does. Returns: the exit code."""
+        self.process.terminate()
+        code = self.process.wait(30)
+        self.process.stdout.close()
+        return code
+
+
+@pytest.fixture(scope="module")
+def served():
+    """The playground, ready."""
+    served = Served()
+    with Visitor(served.address) as visitor:
+        visitor.ready()
+    yield served
+    assert served.end() == 0
+
+
+@pytest.fixture
+def visitor(served):
+    """One who has just come, and finds the world as it began."""
+    with Visitor(served.address) as visitor:
+        visitor.ready()
+        visitor.say("pause", is_paused=False)
+        visitor.say("reset")
+        visitor.until(lambda: visitor.states[0]["time"] < 1.0 and not visitor.states[0]["is_paused"])
+        yield visitor
+
+
+@pytest.fixture
+def serve():
+    """A function that serves other scenes, until the test ends."""
+    started = []
+
+    def started_with(*arguments):
+        started.append(Served(*arguments))
+        return started[-1]
+
+    yield started_with
+    for each in started:
+        assert each.end() == 0

@@ -1,0 +1,63 @@
+"""Who may open a live world: this machine, or who has the token; no page of another origin."""
+
+import time
+
+import pytest
+
+pytest.importorskip("websockets", reason="needs websockets: pip install 'taichi-soft[live]'")
+
+from taichi_soft.live.guard import BURST, MESSAGES, Allowance, Guard
+
+
+@pytest.mark.parametrize(
+    ("host", "origin"),
+    [
+        ("127.0.0.1:8080", None),
+        ("localhost:8080", "http://localhost:8080"),
+        ("[::1]:8080", "http://[::1]:8080"),
+        ("127.0.0.1:8080", "http://127.0.0.1:8080"),
+    ],
+)
+def test_this_machine_needs_no_token(host, origin):
+    guard = Guard.of("127.0.0.1", 8080)
+    assert guard.token is None
+    assert guard.refusal("/live", host, origin) is None
+
+
+@pytest.mark.parametrize(
+    ("host", "origin"),
+    [
+        (None, None),
+        ("", None),
+        ("evil.example:8080", "http://evil.example:8080"),  # a name that was turned to this machine
+        ("127.0.0.1:8080", "http://evil.example"),
+        ("127.0.0.1:8080", "http://127.0.0.1:9999"),
+        ("127.0.0.1:8080", "null"),
+        ("127.0.0.1:9999", None),
+        ("127.0.0.1:port", None),
+    ],
+)
+def test_pages_of_other_origins_and_names_are_refused(host, origin):
+    assert Guard.of("127.0.0.1", 8080).refusal("/live", host, origin) is not None
+
+
+def test_any_other_address_asks_for_its_token_which_is_new_every_time():
+    guard = Guard.of("0.0.0.0", 8080)
+    assert guard.token != Guard.of("0.0.0.0", 8080).token
+    assert len(guard.token) >= 20
+    assert guard.token in guard.address()
+    assert guard.refusal(f"/live?token={guard.token}", "box.local:8080", "http://box.local:8080") is None
+    for path in ("/live", "/", "/live?token=", f"/live?token={guard.token}x", "/live?token=%00%ff"):
+        status, words = guard.refusal(path, "box.local:8080", None)
+        assert status == 401
+        assert guard.token not in words
+    assert guard.refusal(f"/live?token={guard.token}", "box.local:8080", "http://evil.example")[0] == 403
+
+
+def test_a_flood_of_messages_is_over_after_a_burst_and_an_allowance_comes_back(monkeypatch):
+    now = [100.0]
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    allowance = Allowance()
+    assert sum(allowance.take() for _ in range(int(BURST) + 50)) == BURST
+    now[0] += 1.0
+    assert 0 < sum(allowance.take() for _ in range(int(BURST))) <= MESSAGES

@@ -1,0 +1,308 @@
+"""A live world by its own protocol: what visitors do to it, and what they cannot do."""
+
+import http.client
+import io
+import json
+import os
+import signal
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+from urllib.parse import urlsplit
+from urllib.request import urlopen
+
+import numpy as np
+import pytest
+from visitor import Visitor
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+
+from taichi_soft import box
+
+FACTS = """
+import json, runpy
+made = runpy.run_path("scene.py")
+world = made["world"]
+m = world.bodies[0].material
+print(json.dumps([m.young, m.poisson, m.damping_ratio, list(map(float, world.settings.gravity)),
+    world.settings.friction, made["SUBSTEPS"], world.bodies[0].friction]))
+"""
+
+
+def script_of(visitor, folder):
+    """Have the scene saved, and lay it into a folder."""
+    before = len(visitor.made)
+    visitor.say("save", what="script")
+    offer = visitor.until(lambda: visitor.made[before:])[0]
+    parts = urlsplit(visitor.address)
+    with urlopen(f"http://{parts.netloc}{offer['made']}") as answer:
+        content = io.BytesIO(answer.read())
+    with zipfile.ZipFile(content) as archive:
+        archive.extractall(folder)
+
+
+def run_script(folder, *arguments):
+    """What it prints."""
+    done = subprocess.run([sys.executable, *arguments], cwd=folder, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def closing_code(visitor, messages):
+    """With what a server closes the connection of who sends these."""
+    try:
+        for message in messages:
+            visitor.socket.send(message)
+        visitor.listen(20.0)
+    except ConnectionClosed as closed:
+        return None if closed.rcvd is None else closed.rcvd.code
+    raise AssertionError("the connection is open")
+
+
+def paused(visitor):
+    """Stop the world, and wait until it says so."""
+    visitor.say("pause", is_paused=True)
+    visitor.until(lambda: visitor.states[0]["is_paused"])
+
+
+def test_bodies_fall_by_the_gravity_that_the_slider_says(visitor):
+    for gravity in (3.0, 0.5):
+        visitor.say("pause", is_paused=True)
+        visitor.say("set", name="gravity", value=gravity)
+        visitor.say("reset")
+        visitor.until(lambda: visitor.states[0]["is_paused"] and visitor.pictures[0]["time"] <= 0.0)
+        visitor.say("pause", is_paused=False)
+        times, heights = [], []
+        while not times or times[-1] < 0.35:
+            visitor.hear()
+            times.append(visitor.pictures[0]["time"])
+            heights.append(visitor.body(5)[:, 2].mean())
+        fit = np.polyfit(times, heights, 2)
+        assert fit[0] == pytest.approx(-gravity / 2, rel=0.03)
+    visitor.say("set", name="gravity", value=9.81)
+
+
+def test_each_slider_gives_the_world_the_value_that_it_shows_and_the_script_keeps_it(visitor, tmp_path):
+    given = {"young": 3e5, "poisson": 0.3, "damping": 0.4, "gravity": 2.5, "friction": 0.9, "substeps": 30}
+    for name, value in given.items():
+        visitor.say("set", name=name, value=value)
+    visitor.until(lambda: all(visitor.states[0]["values"][name] == value for name, value in given.items()))
+    script_of(visitor, tmp_path)
+    young, poisson, damping, gravity, floor, substeps, body = json.loads(run_script(tmp_path, "-c", FACTS))
+    assert (young, poisson, damping, substeps) == (3e5, 0.3, 0.4, 30)
+    assert gravity == pytest.approx([0.0, 0.0, -2.5])
+    assert (floor, body) == pytest.approx((0.9, 0.9))
+    back = {"young": 1.5e5, "poisson": 0.4, "damping": 0.15, "gravity": 9.81, "friction": 0.5, "substeps": 8}
+    for name, value in back.items():
+        visitor.say("set", name=name, value=value)
+
+
+def test_a_saved_script_goes_on_as_the_world_does_to_the_bit(visitor, tmp_path):
+    visitor.say("spawn", name="ring")
+    visitor.until(lambda: visitor.states[0]["bodies"] == 7 and visitor.states[0]["time"] > 0.4)
+    visitor.say("set", name="young", value=2e5)
+    paused(visitor)
+    script_of(visitor, tmp_path)
+    start = visitor.states[0]["time"]
+    for _ in range(60):
+        visitor.say("step")
+    dt = visitor.states[0]["dt"]
+    visitor.until(lambda: visitor.states[0]["time"] > start + 59.5 * dt)
+    assert visitor.states[0]["hash"] in run_script(tmp_path, "scene.py")
+    visitor.say("set", name="young", value=1.5e5)
+
+
+def test_a_body_is_grabbed_by_a_ray_follows_the_hand_and_flies_on_with_its_speed(visitor):
+    visitor.say("set", name="gravity", value=0.0)
+    visitor.say("reset")
+    visitor.until(lambda: visitor.states[0]["time"] < 0.3)
+    start = visitor.body(0).mean(axis=0)
+    eye = np.array([start[0], start[1] - 5.0, start[2]])
+    visitor.say("grab", origin=eye.tolist(), direction=[0.0, 1.0, 0.0])
+    began, velocity = visitor.pictures[0]["time"], np.array([0.0, -0.8, 1.2])
+    point = start - np.array([0.0, 0.3, 0.0])
+    while visitor.pictures[0]["time"] < began + 1.2:
+        visitor.say("move", point=(point + (visitor.pictures[0]["time"] - began) * velocity).tolist())
+        visitor.hear()
+    visitor.say("release")
+    times, places = [], []
+    end = visitor.pictures[0]["time"]
+    while visitor.pictures[0]["time"] < end + 0.5:
+        visitor.hear()
+        if visitor.pictures[0]["time"] > end + 0.1:
+            times.append(visitor.pictures[0]["time"])
+            places.append(visitor.body(0).mean(axis=0))
+    flown = np.polyfit(times, places, 1)[0]
+    assert flown == pytest.approx(velocity, abs=0.15)
+    visitor.say("set", name="gravity", value=9.81)
+
+
+def test_who_leaves_lets_go_and_nobody_else_is_disturbed(visitor, served):
+    with Visitor(served.address) as other:
+        other.ready()
+        start = other.body(0).mean(axis=0)
+        other.say("grab", origin=[start[0], start[1], 9.0], direction=[0.0, 0.0, -1.0])
+        other.say("move", point=[start[0], start[1], 3.0])
+        visitor.until(lambda: visitor.body(0)[:, 2].mean() > 2.0)
+    visitor.until(lambda: visitor.body(0)[:, 2].mean() < 1.0)
+    before = visitor.counts["pictures"]
+    visitor.until(lambda: visitor.counts["pictures"] > before + 10)
+
+
+def test_who_comes_again_finds_the_world_where_it_is(visitor, served):
+    visitor.until(lambda: visitor.states[0]["time"] > 0.5)
+    with Visitor(served.address) as again:
+        again.ready()
+        assert again.states[0]["time"] > 0.4
+        assert len(again.drawn[0][0]["bodies"]) == visitor.states[0]["bodies"]
+
+
+def test_a_slow_visitor_gets_fewer_pictures_and_the_newest(visitor, served):
+    with Visitor(served.address, is_slow=True) as slow:
+        slow.until(lambda: slow.counts["pictures"] >= 2)
+        last = slow.pictures[0]
+        before = visitor.counts["pictures"]
+        visitor.until(lambda: visitor.counts["pictures"] > before + 60)
+        slow.listen(0.3)
+        assert slow.pictures[0]["number"] == last["number"]  # none waits on its way
+        slow.say("seen", number=last["number"])
+        slow.until(lambda: slow.pictures[0]["number"] > last["number"])
+        assert slow.pictures[0]["time"] > last["time"] + 0.5
+        assert abs(slow.pictures[0]["time"] - slow.states[0]["time"]) < 5.0
+
+
+def test_a_visitor_that_stops_reading_stops_nobody(visitor, served):
+    silent = Visitor(served.address, max_queue=1)
+    try:
+        for number in range(1, 2000):
+            if number % 20 == 0:
+                silent.say("seen", number=number)
+                visitor.hear()
+        before = visitor.counts["pictures"]
+        visitor.until(lambda: visitor.counts["pictures"] > before + 60)
+    finally:
+        silent.end()
+
+
+def test_a_flood_of_messages_ends_its_connection_and_nothing_else(visitor, served):
+    flood = Visitor(served.address)
+    assert closing_code(flood, ['{"do": "step", "pane": 0, "x": "' + "y" * 200 + '"}'] * 3000) == 1008
+    visitor.say("pause", is_paused=False)
+    before = visitor.counts["pictures"]
+    visitor.until(lambda: visitor.counts["pictures"] > before + 20)
+
+
+def test_odd_messages_are_refused_with_the_reason_and_nothing_changes(visitor):
+    before = dict(visitor.states[0]["values"])
+    for text in ("", "{", '{"do": "stop"}', '{"do": "set", "name": "young", "value": -1}', "x" * 50_000):
+        count = len(visitor.refused)
+        visitor.socket.send(text)
+        visitor.until(lambda count=count: len(visitor.refused) > count)
+    visitor.say("spawn", name="castle")
+    visitor.until(lambda: any("castle" in words for words in visitor.said))
+    assert visitor.states[0]["values"] == before
+
+
+def test_a_file_that_is_too_large_ends_its_connection_and_nothing_else(visitor, served):
+    large = Visitor(served.address)
+    large.say("upload", name="large.obj")
+    assert closing_code(large, [bytes(17 * 2**20)]) in (None, 1009)  # or cut off while it sends
+    before = visitor.counts["pictures"]
+    visitor.until(lambda: visitor.counts["pictures"] > before + 20)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "reason"),
+    [
+        ("notes.txt", b"hello", "none of"),
+        ("scene.gltf", b"{}", "none of"),
+        ("broken.obj", b"v 0 0\nf 1 2 3\n", "no body"),
+        ("broken.glb", b"glTF" + bytes(40), "no body"),
+        ("broken.stl", bytes(90), "no body"),
+        ("empty.ply", b"", "bytes"),
+    ],
+)
+def test_a_file_that_makes_no_body_is_refused_with_the_reason(visitor, name, content, reason):
+    before = len(visitor.refused)
+    visitor.say("upload", name=name)
+    visitor.socket.send(content)
+    words = visitor.until(lambda: visitor.refused[before:])[0]
+    assert name in words
+    assert reason in words
+
+
+def test_a_file_without_a_name_is_refused(visitor):
+    visitor.socket.send(b"v 0 0 0\n")
+    assert "without its name" in visitor.until(lambda: visitor.refused)[0]
+
+
+def test_a_visitors_mesh_becomes_a_body_whatever_its_name_says(visitor):
+    mesh = box((0.4, 0.4, 0.4), (1, 1, 1))
+    lines = [f"v {x} {y} {z}" for x, y, z in mesh.vertices]
+    lines += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in mesh.surface]
+    visitor.say("upload", name="../../etc/my crate.obj")
+    visitor.socket.send("\n".join(lines).encode())
+    visitor.until(lambda: "mycrate" in visitor.states[0]["palette"], 240.0)
+    visitor.say("spawn", name="mycrate")
+    visitor.until(lambda: visitor.states[0]["bodies"] == 7)
+
+
+def test_another_law_goes_on_where_the_bodies_are_and_stands_beside_the_first(visitor):
+    visitor.until(lambda: visitor.states[0]["time"] > 4.0)
+    before = [visitor.body(i).mean(axis=0) for i in range(6)]
+    visitor.say("choose", law="st_venant_kirchhoff")
+    visitor.until(lambda: visitor.chosen[0]["law"] == "st_venant_kirchhoff", 240.0)
+    visitor.until(lambda: visitor.states[0]["time"] < 3.0)
+    visitor.listen(0.5)
+    after = [visitor.body(i).mean(axis=0) for i in range(6)]
+    assert np.abs(np.array(after) - before).max() < 0.05
+    visitor.say("choose", law="springs", strain="exact")  # springs know no strain
+    visitor.until(lambda: any("strain" in words and "springs" in words for words in visitor.said[-3:]))
+    assert visitor.chosen[0]["law"] == "st_venant_kirchhoff"
+    visitor.say("compare", law=None)
+    visitor.until(lambda: visitor.panes == [0, 1] and visitor.pictures.get(1), 240.0)
+    assert visitor.chosen[1]["law"] is None
+    visitor.say("alone")
+    visitor.until(lambda: visitor.panes == [0])
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="needs /proc to find the process")
+def test_a_world_whose_process_dies_is_made_anew(visitor, served):
+    children = Path(f"/proc/{served.process.pid}/task/{served.process.pid}/children").read_text().split()
+    for child in children:
+        command = Path(f"/proc/{child}/cmdline").read_bytes()
+        if b"spawn_main" in command:
+            os.kill(int(child), signal.SIGKILL)
+    visitor.until(lambda: any("broke down" in words for words in visitor.said))
+    visitor.until(lambda: visitor.said[-1].endswith("is ready"), 240.0)
+    before = visitor.counts["pictures"]
+    visitor.until(lambda: visitor.counts["pictures"] > before + 5)
+
+
+def test_pages_of_other_origins_are_refused(served):
+    for options in ({"origin": "http://evil.example"}, {"additional_headers": {"Host": "evil.example"}}):
+        with pytest.raises(InvalidStatus) as refused:
+            Visitor(served.address, **options)
+        assert refused.value.response.status_code in (400, 403)
+
+
+@pytest.mark.parametrize(
+    "path",
+    ["/../server.py", "/%2e%2e/server.py", "/three/../../server.py", "//etc/passwd", "/made/", "/live.py"],
+)
+def test_only_files_of_the_page_are_served(served, path):
+    parts = urlsplit(served.address)
+    connection = http.client.HTTPConnection(parts.hostname, parts.port)
+    connection.request("GET", path)
+    assert connection.getresponse().status == 404
+    connection.close()
+
+
+def test_another_address_asks_for_its_token(serve):
+    served = serve("--host", "0.0.0.0")
+    assert "token=" in served.address
+    with pytest.raises(InvalidStatus) as refused:
+        Visitor(served.address.split("?")[0])
+    assert refused.value.response.status_code == 401
+    with Visitor(served.address) as visitor:
+        visitor.until(lambda: visitor.hello)

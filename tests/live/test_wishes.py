@@ -1,0 +1,60 @@
+"""What a page may say: checked, and refused with the reason."""
+
+import json
+
+import pytest
+
+pytest.importorskip("websockets", reason="needs websockets: pip install 'taichi-soft[live]'")
+
+from taichi_soft.core.errors import OptionError
+from taichi_soft.live.wishes import wish_of
+
+
+@pytest.mark.parametrize(
+    ("said", "wish"),
+    [
+        ({"do": "pause", "is_paused": True}, {"is_paused": True}),
+        ({"do": "set", "name": "young", "value": 2e5}, {"name": "young", "value": 2e5}),
+        ({"do": "set", "name": "substeps", "value": 7.6}, {"name": "substeps", "value": 8.0}),
+        ({"do": "move", "point": [1, 2.5, -3], "extra": 1}, {"point": [1.0, 2.5, -3.0]}),
+        ({"do": "choose", "law": "springs"}, {"law": "springs", "strain": None, "flips": None}),
+        ({"do": "tint", "quantity": None}, {"quantity": None}),
+        ({"do": "seen", "number": 3}, {"number": 3}),
+    ],
+)
+def test_a_wish_has_what_was_said_and_nothing_else(said, wish):
+    assert wish_of(json.dumps(said)) == {"do": said["do"], "pane": 0, **wish}
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("", "JSON"),
+        ("[" * 2000, "JSON"),
+        ("[1]", "'do'"),
+        ('{"do": "fly"}', "one of"),
+        ('{"do": ["set"]}', "'do'"),
+        ('{"do": "stop"}', "one of"),
+        ('{"do": "set", "name": "young", "value": 1e12}', "1e.08"),
+        ('{"do": "set", "name": "young", "value": NaN}', "nan"),
+        ('{"do": "set", "name": "young", "value": true}', "True"),
+        ('{"do": "set", "name": "young", "value": "5"}', "'5'"),
+        ('{"do": "set", "name": "mass", "value": 1}', "no slider"),
+        ('{"do": "set", "name": {"a": 1}, "value": 1}', "no slider"),
+        ('{"do": "move", "point": [1, 2]}', "three"),
+        ('{"do": "move", "point": [1, 2, Infinity]}', "finite"),
+        ('{"do": "move", "point": [1, 2, 1e30]}', "within"),
+        ('{"do": "grab", "origin": [0, 0, 0], "direction": [0, 0, 0]}', "zero"),
+        ('{"do": "choose", "law": "magic"}', "law is one of"),
+        ('{"do": "choose", "law": ["virial"]}', "law is one of"),
+        ('{"do": "pause", "is_paused": 1}', "true or false"),
+        ('{"do": "pause", "is_paused": true, "pane": 5}', "pane"),
+        ('{"do": "save", "what": null}', "what is one of"),
+        ('{"do": "seen", "number": -1}', "number"),
+        (json.dumps({"do": "spawn", "name": "x" * 101}), "word"),
+        (json.dumps({"do": "spawn", "name": "x" * 10_000}), "4096"),
+    ],
+)
+def test_what_is_no_wish_is_refused_with_the_reason(text, reason):
+    with pytest.raises(OptionError, match=reason):
+        wish_of(text)
