@@ -1,4 +1,4 @@
-"""While a wheel is built: the browser's three.js comes in. Without a network `taichi-soft live` fetches it later."""
+"""While a wheel is built: three.js comes in. Without a network `taichi-soft live` fetches it later."""
 
 import runpy
 from pathlib import Path

@@ -20,7 +20,7 @@ from taichi_soft.core.extras import missing_packages
 from taichi_soft.core.runtime import DEBUG
 
 UNTIL = "TAICHI_SOFT_SOAKS_UNTIL"
-"""Name of the environment variable with the time [s since 1970] after which no soak begins: `.ci/run` has only so
+"""Name of the environment variable with the time [s since 1970] after which no soak begins: `.ci/run` has so
 long, and a slow machine leaves some out, which it names."""
 
 ARCH = "TAICHI_SOFT_TEST_ARCH"

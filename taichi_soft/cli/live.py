@@ -10,8 +10,9 @@ from typing import Annotated
 
 import typer
 from rich.markup import escape
+from rich.table import Table
 
-from taichi_soft.cli.console import say
+from taichi_soft.cli.console import console, progress_bar, say
 from taichi_soft.core.errors import OptionError
 from taichi_soft.core.extras import require_extra
 
@@ -26,15 +27,42 @@ def live(
     ] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="0 takes a free one.")] = 8080,
     browser: Annotated[bool, typer.Option(help="Open the page.")] = True,
+    measure: Annotated[
+        bool,
+        typer.Option("--measure", help="Instead, measure latency, and what a visitor costs."),
+    ] = False,
 ) -> None:
     """Show a world in the browser, to be seen, touched and tuned, until Ctrl-C."""
     require_extra("live", "a live world needs")
     from taichi_soft.live.scene import found_source
     from taichi_soft.live.server import LiveServer
 
+    if measure:
+        _measure()
+        return
     server = LiveServer(found_source(scene), host=host, port=port)
     with suppress(KeyboardInterrupt):
         asyncio.run(_serve(server, browser))
+
+
+def _measure() -> None:
+    from taichi_soft.live.measuring import measure
+
+    with progress_bar() as progress:
+        task = progress.add_task("compiling", total=None)
+        costs = measure(lambda words: progress.update(task, description=words))
+    table = Table(
+        "spheres", "triangles", "bytes a picture", "pictures/s", title="a live view, for one visitor"
+    )
+    for name in ("latency p50, p95 [ms]", "step p50, p99 [ms], no visitor", "one visitor"):
+        table.add_column(name)
+    for each in costs:
+        pairs = [f"{a:.1f}, {b:.1f}" for a, b in (each.latency_ms, each.alone_ms, each.visited_ms)]
+        table.add_row(
+            str(each.spheres), f"{each.triangles:,}", f"{each.packet:,}", f"{each.pictures:.0f}", *pairs
+        )
+    console.print(table)
+    say("latency: from a move of the hand to the first picture with it, at the socket; drawing comes on top")
 
 
 async def _serve(server: object, opens: bool) -> None:

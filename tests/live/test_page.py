@@ -1,0 +1,269 @@
+"""The page in a browser: what is seen, what mouse and keyboard do, and what screen readers find."""
+
+import io
+import re
+import shutil
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from visitor import Visitor
+
+playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright: pip install playwright")
+PIL = pytest.importorskip("PIL.Image", reason="needs pillow")
+
+BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+pytestmark = pytest.mark.skipif(BROWSER is None, reason="needs chromium: apt-get install chromium")
+
+FLAGS = [
+    *("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-first-run"),
+    *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
+]
+SLOW = 60_000  # [ms]: these machines draw without a GPU
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with playwright.sync_playwright() as started:
+        browser = started.chromium.launch(executable_path=BROWSER, args=FLAGS)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def troubles():
+    """What pages complained of: nothing is expected."""
+    found = []
+    yield found
+    assert found == []
+
+
+@pytest.fixture
+def open_page(browser, served, troubles):
+    """A function that opens the page in a window of a size, and waits for a picture."""
+    opened = []
+
+    def opened_at(width=1000, height=640, **options):
+        context = browser.new_context(viewport={"width": width, "height": height}, **options)
+        opened.append(context)
+        page = context.new_page()
+        page.set_default_timeout(SLOW)
+        page.on("console", lambda m: troubles.append(m.text) if m.type in ("error", "warning") else None)
+        page.on("pageerror", lambda error: troubles.append(str(error)))
+        page.on("requestfailed", lambda request: troubles.append(request.url))
+        page.goto(served.address)
+        playwright.expect(page.locator("#time")).to_have_text(re.compile(r"\d s"), timeout=SLOW)
+        playwright.expect(page.locator("#fps")).not_to_have_text("0 /s", timeout=SLOW)
+        return page
+
+    yield opened_at
+    for context in opened:
+        context.close()
+
+
+def picture_of(page):
+    """What the canvas shows, uint8 (h, w, 3), and its place on the page."""
+    box = page.locator("#picture").bounding_box()
+    shot = PIL.open(io.BytesIO(page.screenshot(clip=box))).convert("RGB")
+    return np.asarray(shot).astype(int), box
+
+
+def coral(picture):
+    """Where the first body is: its colour is found in nothing else. Middle and number of its pixels."""
+    red, green, blue = np.moveaxis(picture, 2, 0)
+    rows, columns = np.nonzero((red > green + 60) & (green > blue - 10) & (red > 140))
+    return np.array([columns.mean(), rows.mean()]), len(rows)
+
+
+@pytest.mark.parametrize(("width", "height"), [(1280, 800), (1000, 640), (390, 844)])
+def test_a_page_of_any_size_shows_bodies_and_all_its_controls(open_page, visitor, width, height, tmp_path):
+    page = open_page(width, height, has_touch=width < 500)
+    picture, box = picture_of(page)
+    assert coral(picture)[1] > 100
+    assert box["width"] >= 0.6 * width or width < 500
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    page.screenshot(path=tmp_path / "page.png")
+
+
+def test_every_control_has_a_name_and_is_reached_by_the_keyboard(open_page, visitor):
+    page = open_page()
+    nameless = page.evaluate(
+        """() => [...document.querySelectorAll("button, input, select, canvas")].filter(each =>
+            !(each.getAttribute("aria-label") || each.labels?.length || each.textContent.trim())
+        ).map(each => each.outerHTML)"""
+    )
+    assert nameless == []
+    names = [about["label"] for about in visitor.hello["sliders"]]
+    for name in names:
+        assert page.get_by_role("slider", name=name).count() == 1
+    page.locator("#picture").focus()
+    reached = set()
+    for _ in range(45):
+        page.keyboard.press("Tab")
+        reached.add(page.evaluate("document.activeElement.id || document.activeElement.textContent"))
+    wanted = {*(f"slider-{about['name']}" for about in visitor.hello["sliders"])}
+    wanted |= {
+        "pause",
+        "step",
+        "reset",
+        "law",
+        "strain",
+        "flips",
+        "choose",
+        "compare",
+        "tint",
+        "despawn",
+        "upload",
+    }
+    wanted |= {"shot", "film", "script", "ball", "block", "drum", "ring", "fold"}
+    assert wanted <= reached
+
+
+def test_a_slider_moved_by_keys_changes_the_world_by_the_value_that_it_shows(open_page, visitor):
+    page = open_page()
+    for about in visitor.hello["sliders"]:
+        slider = page.get_by_role("slider", name=about["label"])
+        slider.focus()
+        before = visitor.states[0]["values"][about["name"]]
+        for _ in range(12):
+            page.keyboard.press("ArrowLeft")
+        shown = slider.get_attribute("aria-valuetext")
+        name = about["name"]
+        visitor.until(lambda name=name, before=before: visitor.states[0]["values"][name] != before)
+        visitor.listen(0.5)
+        value, factor = visitor.states[0]["values"][name], 1.0
+        if about["unit"] == "Pa":
+            factor = {"kPa": 1e3, "MPa": 1e6, "Pa": 1.0}[shown.split()[1]]
+        assert float(shown.split()[0]) * factor == pytest.approx(value, rel=6e-3)
+    back = {"young": 1.5e5, "poisson": 0.4, "damping": 0.15, "gravity": 9.81, "friction": 0.5}
+    for name, value in {**back, "substeps": 8, "speed": 1.0}.items():
+        visitor.say("set", name=name, value=value)
+
+
+def test_too_few_substeps_are_said_beside_the_slider_before_they_are_felt(open_page, visitor):
+    visitor.say("pause", is_paused=True)
+    page = open_page()
+    page.get_by_role("slider", name="Substeps").focus()
+    page.keyboard.press("Home")
+    told = page.locator("#slider-substeps-told")
+    playwright.expect(told).to_have_text(re.compile(r"^unstable: this material needs \d+$"))
+    playwright.expect(told).to_have_class(re.compile("unstable"))
+    visitor.say("set", name="substeps", value=8)
+    visitor.say("pause", is_paused=False)
+
+
+def test_a_drag_lifts_a_body_and_lets_it_fly_while_a_drag_beside_it_turns_the_view(open_page, visitor):
+    page = open_page()
+    visitor.until(lambda: visitor.states[0]["time"] > 2.5)
+    picture, box = picture_of(page)
+    (x, y), count = coral(picture)
+    assert count > 100
+    before = visitor.body(0).mean(axis=0)
+    page.mouse.move(box["x"] + x, box["y"] + y)
+    page.mouse.down()
+    for i in range(1, 21):
+        page.mouse.move(box["x"] + x, box["y"] + y - 8 * i)
+        visitor.listen(0.08)
+    lifted = visitor.until(lambda: visitor.body(0).mean(axis=0)[2] > before[2] + 0.3)
+    assert lifted
+    for i in range(1, 9):  # and to the side
+        page.mouse.move(box["x"] + x + 25 * i, box["y"] + y - 160)
+        visitor.listen(0.05)
+    held = visitor.body(0).mean(axis=0), visitor.pictures[0]["time"]
+    page.mouse.up()
+    visitor.until(lambda: visitor.body(0).mean(axis=0)[2] < before[2] + 0.25)
+    thrown = visitor.body(0).mean(axis=0)
+    assert np.linalg.norm(thrown[:2] - before[:2]) > 0.3  # the way of the hand, and on
+    assert visitor.pictures[0]["time"] > held[1]
+    start, _ = picture_of(page)
+    page.mouse.move(box["x"] + 15, box["y"] + 15)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 200, box["y"] + 15, steps=5)
+    page.mouse.up()
+    page.wait_for_timeout(1500)
+    turned, _ = picture_of(page)
+    assert (np.abs(turned - start).max(axis=2) > 40).sum() > 500
+
+
+def test_keys_turn_the_view(open_page, visitor):
+    visitor.say("pause", is_paused=True)
+    page = open_page()
+    start, _ = picture_of(page)
+    page.locator("#picture").focus()
+    for key in ("ArrowLeft", "ArrowLeft", "+", "ArrowUp"):
+        page.keyboard.press(key)
+    page.wait_for_timeout(1500)
+    turned, _ = picture_of(page)
+    assert (np.abs(turned - start).max(axis=2) > 40).sum() > 500
+
+
+def test_pause_step_and_reset_do_what_they_say(open_page, visitor):
+    page = open_page()
+    page.get_by_role("button", name="pause").click()
+    visitor.until(lambda: visitor.states[0]["is_paused"])
+    before = visitor.states[0]["time"]
+    page.get_by_role("button", name="one step").click()
+    visitor.until(lambda: visitor.states[0]["time"] > before)
+    assert visitor.states[0]["time"] == pytest.approx(before + visitor.states[0]["dt"])
+    page.get_by_role("button", name="reset").click()
+    visitor.until(lambda: visitor.states[0]["time"] == 0.0)
+    playwright.expect(page.locator("#time")).to_have_text("0.00 s")
+    page.get_by_role("button", name="play").click()
+    visitor.until(lambda: not visitor.states[0]["is_paused"])
+
+
+def test_stress_is_shown_in_colours_with_their_scale(open_page, visitor):
+    page = open_page()
+    page.get_by_label("colour by").select_option("stress")
+    visitor.until(lambda: visitor.pictures[0]["is_tinted"] and visitor.states[0]["scale"])
+    playwright.expect(page.locator("#scale-name")).to_have_text("stress")
+    playwright.expect(page.locator("#scale-high")).to_have_text(re.compile(r"^[125]0* k?Pa$"))
+    page.wait_for_timeout(2000)
+    assert coral(picture_of(page)[0])[1] < 50
+    page.get_by_label("colour by").select_option("")
+    visitor.until(lambda: not visitor.pictures[0]["is_tinted"])
+
+
+def test_a_wrong_file_is_refused_on_the_page(open_page, visitor):
+    page = open_page()
+    wrong = {"name": "broken.obj", "mimeType": "text/plain", "buffer": b"this is no mesh"}
+    page.get_by_label("your own mesh").set_input_files(wrong)
+    said = page.locator("#said.refused")
+    playwright.expect(said).to_contain_text("broken.obj", timeout=SLOW)
+
+
+def test_a_script_and_a_picture_are_saved(open_page, visitor):
+    page = open_page()
+    for button, name in (("picture", "live.png"), ("script and snapshot", "scene.zip")):
+        with page.expect_download() as coming:
+            page.get_by_role("button", name=button, exact=True).click()
+        assert coming.value.suggested_filename == name
+        content = Path(coming.value.path()).read_bytes()
+        if name.endswith("zip"):
+            with zipfile.ZipFile(io.BytesIO(content)) as archive:
+                assert archive.namelist() == ["scene.py", "scene.snapshot"]
+        else:
+            assert coral(np.asarray(PIL.open(io.BytesIO(content)).convert("RGB")).astype(int))[1] > 100
+
+
+def test_a_film_of_the_last_seconds_is_saved(open_page, visitor):
+    page = open_page()
+    with page.expect_download(timeout=240_000) as coming:
+        page.get_by_role("button", name="film of 10 s").click()
+    assert coming.value.suggested_filename == "live.mp4"
+    assert Path(coming.value.path()).read_bytes()[4:8] == b"ftyp"
+
+
+def test_two_pages_see_one_world_and_a_reload_or_a_close_disturbs_neither(open_page, visitor, served):
+    one, two = open_page(700, 500), open_page(700, 500)
+    one.get_by_role("button", name="add a ball").click()
+    visitor.until(lambda: visitor.states[0]["bodies"] == 7)
+    two.reload()
+    playwright.expect(two.locator("#fps")).not_to_have_text("0 /s", timeout=SLOW)
+    one.close()
+    before = visitor.counts["pictures"]
+    visitor.until(lambda: visitor.counts["pictures"] > before + 30)
+    with Visitor(served.address) as another:
+        another.ready()
+        assert another.states[0]["bodies"] == 7
