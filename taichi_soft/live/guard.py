@@ -12,6 +12,9 @@ from urllib.parse import parse_qs, urlsplit
 
 MOST_VISITORS = 16
 
+VIEW_KEY = "TAICHI_SOFT_VIEW_KEY"
+"""Name of the environment variable by which a server and the program that started it know each other."""
+
 MESSAGES, BURST = 240.0, 480.0
 """Of one visitor: messages a second, and how many at once. A hand that is moved sends 60."""
 

@@ -8,18 +8,21 @@ import threading
 from collections import OrderedDict
 from collections.abc import Callable
 from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
 from taichi_soft.live.frame_file import Frame, FrameFile
 from taichi_soft.live.scene import SceneSource
 
+Heard = Callable[["Runner", tuple[Any, ...]], None]
+
 MOST_WAITING = 256
 """Wishes that wait for a world that is busy; more are refused."""
 
 
 class Runner:
-    """A process that runs `simulation.run`, with a thread for each direction.
+    """A world in another process, with a thread for each direction.
 
     Neither side waits for the other: wishes wait in a list, where a newer value of a slider takes the place
     of an older one, and what the world tells is taken as soon as it comes.
@@ -28,30 +31,44 @@ class Runner:
     def __init__(
         self,
         loop: asyncio.AbstractEventLoop,
-        folder: Path,
+        connection: Connection,
         source: SceneSource,
-        given: dict[str, float],
-        heard: Callable[[Runner, tuple[Any, ...]], None],
+        heard: Heard,
+        process: BaseProcess | None = None,
     ) -> None:
-        from taichi_soft.live.simulation import run
-
+        """Speak with a world at the other end of a connection; `process` is ended with it."""
         self.source, self.heard, self._loop = source, heard, loop
+        self._connection, self._process = connection, process
         self.drawn: tuple[dict[str, Any], dict[str, Any]] | None = None
         self.state: dict[str, Any] | None = None
         self.frames: FrameFile | None = None
         self.is_over = False
-        folder.mkdir(parents=True, exist_ok=True)
-        spawning = multiprocessing.get_context("spawn")
-        mine, theirs = spawning.Pipe()
-        self._connection: Connection = mine
-        self._process = spawning.Process(target=run, args=(theirs, str(folder), source, given), daemon=True)
-        self._process.start()
-        theirs.close()
+        self.is_lost = False  # the other end is gone
         self._waiting: OrderedDict[Any, tuple[Any, ...]] = OrderedDict()
         self._changed = threading.Condition()
         self._count = 0
         for target in (self._listen, self._speak):
             threading.Thread(target=target, daemon=True).start()
+
+    @classmethod
+    def started(
+        cls,
+        loop: asyncio.AbstractEventLoop,
+        folder: Path,
+        source: SceneSource,
+        given: dict[str, float],
+        heard: Heard,
+    ) -> Runner:
+        """A new process that runs `simulation.run`."""
+        from taichi_soft.live.simulation import run
+
+        folder.mkdir(parents=True, exist_ok=True)
+        spawning = multiprocessing.get_context("spawn")
+        mine, theirs = spawning.Pipe()
+        process = spawning.Process(target=run, args=(theirs, str(folder), source, given), daemon=True)
+        process.start()
+        theirs.close()
+        return cls(loop, mine, source, heard, process)
 
     def send(self, *message: Any, key: Any = None) -> bool:
         """Let the world have a wish, soon.
@@ -81,6 +98,8 @@ class Runner:
     def end(self) -> None:
         """Wait until it has ended, for a second or two."""
         self.stop()
+        if self._process is None:
+            return
         self._process.join(2.0)
         if self._process.is_alive():
             self._process.kill()
@@ -117,7 +136,9 @@ class Runner:
                 return
 
     def _hear(self, message: tuple[Any, ...]) -> None:
-        if message[0] == "drawn":
+        if message[0] == "ended":
+            self.is_lost = True
+        elif message[0] == "drawn":
             _, path, sizes, header, arrays = message
             self.frames = FrameFile(Path(path), *sizes)
             self.drawn = header, arrays

@@ -130,14 +130,14 @@ def made_scene(source: SceneSource) -> Scene:
     if isinstance(stage, Stage):
         colors = {actor.body.index: actor.color for actor in stage.actors if actor.world in (None, world)}
         return Scene(stage.title, world, stage.step, _camera_at_start(stage), stage.act, colors)
-    return Scene(source.title, world, FixedStep(), _framing(world))
+    return Scene(source.title, world, FixedStep(), framing_of(world))
 
 
 def _camera_at_start(stage: Stage) -> Camera:
-    return stage.camera if isinstance(stage.camera, Camera) else _framing(stage.world)
+    return stage.camera if isinstance(stage.camera, Camera) else framing_of(stage.world)
 
 
-def _framing(world: World) -> Camera:
+def framing_of(world: World) -> Camera:
     """All bodies, and the floor below them."""
     rows = np.concatenate([body.positions() for body in world.bodies] or [np.zeros((1, 3), np.float32)])
     low, high = rows.min(axis=0).astype(float), rows.max(axis=0).astype(float)

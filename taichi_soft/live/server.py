@@ -12,6 +12,7 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from http import HTTPStatus
 from multiprocessing import get_context
+from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -41,6 +42,9 @@ PAGE = Path(__file__).parent / "page"
 UNSEEN = 2
 """Pictures on their way to a visitor: more wait until it has shown one of these, and are then left out."""
 
+VIEWED = ("grab", "move", "release", "tint")
+"""What a visitor may do to a world that another program steps."""
+
 _KINDS = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
 
 _log = logging.getLogger("taichi_soft")
@@ -68,10 +72,18 @@ class LiveServer:
         source: what the first world is made from.
         host: address to bind to; any but a loopback one asks for a token.
         port: 0 takes a free one.
+        attached: to a world that another program steps, in place of one made from `source`.
     """
 
-    def __init__(self, source: SceneSource, *, host: str = "127.0.0.1", port: int = 8080) -> None:
-        self.source, self.host, self.port = source, host, port
+    def __init__(
+        self,
+        source: SceneSource,
+        *,
+        host: str = "127.0.0.1",
+        port: int = 8080,
+        attached: Connection | None = None,
+    ) -> None:
+        self.source, self.host, self.port, self.attached = source, host, port, attached
         self.guard: Guard
         self.visitors: dict[int, Visitor] = {}
         self.panes: dict[int, Runner] = {}  # whose worlds are shown
@@ -102,7 +114,10 @@ class LiveServer:
         )
         self.port = next(iter(self._listening.sockets)).getsockname()[1]
         self.guard = Guard.of(self.host, self.port)
-        self._begin(0, self.source)
+        if self.attached is None:
+            self._begin(0, self.source)
+        else:
+            self.panes[0] = Runner(self._loop, self.attached, self.source, partial_heard(self, 0))
         return self.guard.address()
 
     async def close(self) -> None:
@@ -125,7 +140,8 @@ class LiveServer:
             self.coming.pop(pane).stop()
         self._count += 1
         folder = Path(self._folder.name) / str(self._count)
-        self.coming[pane] = Runner(self._loop, folder, source, dict(self.given), partial_heard(self, pane))
+        heard = partial_heard(self, pane)
+        self.coming[pane] = Runner.started(self._loop, folder, source, dict(self.given), heard)
         self._say(f"compiling {_described(source)}" + (": the world goes on meanwhile" if self.panes else ""))
 
     def heard(self, pane: int, runner: Runner, message: tuple[Any, ...]) -> None:
@@ -198,6 +214,9 @@ class LiveServer:
             if not self.panes:
                 self._say("nothing to show: end it, and mend the scene")
             return
+        if self.attached is not None:
+            self._say("the program that steps this world has ended")
+            return
         self._say(f"the world broke down ({words}): it is made anew")
         self._begin(pane, runner.source)
 
@@ -249,7 +268,8 @@ class LiveServer:
         """What a page needs to know to draw its controls."""
         sliders = [asdict(each) for each in SLIDERS.values()]
         laws = [{"name": law.name, "about": law.summary} for law in LAWS.values()]
-        return {"sliders": sliders, "laws": laws, "quantities": list(QUANTITIES), "limit": LARGEST_UPLOAD}
+        offered = {"sliders": sliders, "laws": laws, "quantities": list(QUANTITIES), "limit": LARGEST_UPLOAD}
+        return {**offered, "is_view": self.attached is not None}
 
     def _hear(self, visitor: Visitor, message: str | bytes) -> None:
         try:
@@ -266,6 +286,8 @@ class LiveServer:
         if do == "seen":
             visitor.seen = max(visitor.seen, min(wish["number"], visitor.sent))
             visitor.wake.set()
+        elif self.attached is not None and do not in VIEWED:
+            raise OptionError("the program that steps this world decides that")
         elif do == "upload":
             visitor.upload = wish["name"]
         elif do == "choose":

@@ -100,6 +100,8 @@ class Simulation:
         self._energies: dict[str, float] = {}
         self._simulated = self._since = 0.0
         self._factor = 0.0
+        self._steps_seen = 0
+        self._alpha: float | None = None  # of a world that somebody else steps
 
     def start(self, given: dict[str, float]) -> None:
         """Compile all that a visitor may ask for, and tell what is drawn."""
@@ -108,9 +110,19 @@ class Simulation:
         self.world.warm_up()
         self._renew_adapter()
         self.first = self.world.snapshot()
-        self._describe()
+        self.describe()
         self.draw(time.perf_counter(), True)
         self.connection.send(("ready", self._told()))
+
+    def look(self, alpha: float) -> None:
+        """Do what visitors wish, and show a world that somebody else steps."""
+        while self.connection.poll():
+            self._obey(self.connection.recv())
+        if self.world.step_count != self._steps_seen:
+            self._steps_seen, self.is_moving = self.world.step_count, True
+        self._alpha = alpha
+        self.draw(time.perf_counter(), self.is_moving)
+        self._tell(time.perf_counter())
 
     def play(self) -> None:
         """Until told to stop."""
@@ -278,7 +290,7 @@ class Simulation:
     def draw(self, now: float, is_moving: bool) -> None:
         """Write a picture, where it is time for one and something moved."""
         if self.drawn.is_outdated:
-            self._describe()
+            self.describe()
             is_moving = True
         if self.tints is not None and now >= self._due["tints"]:
             self.tints.renew(self.world)
@@ -287,20 +299,21 @@ class Simulation:
         if not is_moving or now < self._due["picture"]:
             return
         frame = self.frames.begin()
-        self.drawn.fill(frame, self.adapter.alpha, None if self.tints is None else self.tints.rows)
-        number = self.frames.publish(self.drawn.version, self.adapter.time, is_tinted=self.tints is not None)
+        alpha = self.adapter.alpha if self._alpha is None else self._alpha
+        self.drawn.fill(frame, alpha, None if self.tints is None else self.tints.rows)
+        moment = self.world.time - (1.0 - alpha) * self.world.last_dt
+        number = self.frames.publish(self.drawn.version, moment, is_tinted=self.tints is not None)
         self.connection.send(("frame", number))
         if now >= self._due["film"]:
-            self.recent.append(
-                (self.adapter.time, self.drawn.version, (frame.positions.copy(), frame.poses.copy()))
-            )
+            self.recent.append((moment, self.drawn.version, (frame.positions.copy(), frame.poses.copy())))
             while self.recent and len(self.recent) > KEPT * FILM_FPS:
                 self.recent.popleft()
             self._due["film"] = now + 1.0 / FILM_FPS - 0.002
         self._due["picture"] = now + 1.0 / PICTURES - 0.001
         self.is_moving = False
 
-    def _describe(self) -> None:
+    def describe(self) -> None:
+        """Tell what is drawn."""
         self.versions += 1
         self.drawn = Drawn(self.scene, self.versions)
         path = self.folder / f"frames{self.versions}"

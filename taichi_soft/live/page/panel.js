@@ -91,6 +91,7 @@ export class Panel {
       at("fold").textContent = isOpen ? "hide controls" : "show controls";
     });
     this.plot = new Plot(at("plot"));
+    if (hello.is_view) document.body.classList.add("view");
   }
 
   async upload(limit) {
