@@ -172,8 +172,9 @@ class LiveServer:
 
     def _switch(self, pane: int, runner: Runner) -> None:
         """Show a world that is ready: from where the bodies of the one before it are."""
-        if pane in self.panes and runner.source.meshes == self.panes[pane].source.meshes:
-            self.panes[pane].send("motion")
+        before = self.panes.get(pane)
+        if before is not None and not before.is_lost and runner.source.meshes == before.source.meshes:
+            before.send("motion")
         elif pane == 1 and 0 in self.panes:
             self._show(pane, runner)
             self.reset_all()
@@ -208,6 +209,7 @@ class LiveServer:
     def _fail(self, pane: int, runner: Runner, words: str) -> None:
         """A world that could not be made is left out; one that broke down is made anew."""
         runner.stop()
+        runner.is_lost = True
         if self.coming.get(pane) is runner:
             del self.coming[pane]
             self._say(f"{_described(runner.source)}: {words}")
@@ -224,8 +226,9 @@ class LiveServer:
 
     def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
         """A file of the page, or None for what becomes a connection."""
-        headers = request.headers
-        refused = self.guard.refusal(request.path, headers.get("Host"), headers.get("Origin"))
+        hosts, origins = (request.headers.get_all(name) for name in ("Host", "Origin"))
+        host, origin = ", ".join(hosts), ", ".join(origins) if origins else None
+        refused = self.guard.refusal(request.path, host, origin)
         if refused is not None:
             return _response(refused[0], "text/plain", refused[1].encode())
         path = urlsplit(request.path).path
