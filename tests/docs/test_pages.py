@@ -32,7 +32,10 @@ PAGES = {
 CODE = {
     name: re.findall(r"^```python\n(.*?)^```", text, re.DOTALL | re.MULTILINE) for name, text in PAGES.items()
 }
-PUBLIC = ("taichi_soft", "taichi_soft.bake", "taichi_soft.export", "engine_adapter", "engine_adapter.panda3d")
+PUBLIC = (
+    *("taichi_soft", "taichi_soft.bake", "taichi_soft.export", "taichi_soft.live"),
+    *("engine_adapter", "engine_adapter.panda3d"),
+)
 """Modules of which a page may import the public names."""
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 
