@@ -72,7 +72,7 @@ def picture_of(page):
 def coral(picture):
     """Where the first body is: its colour is found in nothing else. Middle and number of its pixels."""
     red, green, blue = np.moveaxis(picture, 2, 0)
-    rows, columns = np.nonzero((red > green + 60) & (green > blue - 10) & (red > 140))
+    rows, columns = np.nonzero((red > 1.7 * green) & (green > blue - 10) & (red > 120))
     return np.array([columns.mean(), rows.mean()]), len(rows)
 
 
