@@ -52,7 +52,8 @@ class Visitor:
         query = f"?{parts.query}" if parts.query else ""
         self.address, self._open = address, ExitStack()
         place = f"ws://{parts.netloc}/live{query}"
-        self.socket = self._open.enter_context(connect(place, max_size=None, compression=None, **options))
+        options = {"max_size": None, "compression": None, "close_timeout": 1.0, **options}
+        self.socket = self._open.enter_context(connect(place, **options))
         self.is_slow = is_slow
         self.states, self.drawn, self.pictures, self.panes, self.chosen = {}, {}, {}, [], {}
         self.said, self.refused, self.made = [], [], []
