@@ -44,6 +44,7 @@ class Runner:
         self.frames: FrameFile | None = None
         self.is_over = False
         self.is_lost = False  # the other end is gone
+        self.is_fresh = False  # begins at its beginning, whatever was shown before it
         self._waiting: OrderedDict[Any, tuple[Any, ...]] = OrderedDict()
         self._changed = threading.Condition()
         self._count = 0

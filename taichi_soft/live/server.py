@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
+import math
 import secrets
 import tempfile
 from collections.abc import Callable
@@ -41,6 +42,9 @@ PAGE = Path(__file__).parent / "page"
 
 UNSEEN = 2
 """Pictures on their way to a visitor: more wait until it has shown one of these, and are then left out."""
+
+BETWEEN_CHOICES = 1.0
+"""Seconds: each choice starts a process."""
 
 VIEWED = ("grab", "move", "release", "tint")
 """What a visitor may do to a world that another program steps."""
@@ -94,6 +98,8 @@ class LiveServer:
         self._count = 0
         self._files = _page_files()
         self._folder = tempfile.TemporaryDirectory(prefix="taichi-soft-live-")
+        self._last_choice = -math.inf
+        self._is_reading = self._is_filming = False  # a visitor's file; a film
         self._tasks: set[asyncio.Task[None]] = set()
         self._listening: Listening | None = None
 
@@ -134,14 +140,16 @@ class LiveServer:
 
     # Worlds.
 
-    def _begin(self, pane: int, source: SceneSource) -> None:
+    def _begin(self, pane: int, source: SceneSource, *, is_fresh: bool = False) -> None:
         """Make a world beside the one that is shown, which goes on until the new one is ready."""
         if pane in self.coming:
             self.coming.pop(pane).stop()
         self._count += 1
         folder = Path(self._folder.name) / str(self._count)
         heard = partial_heard(self, pane)
-        self.coming[pane] = Runner.started(self._loop, folder, source, dict(self.given), heard)
+        runner = Runner.started(self._loop, folder, source, dict(self.given), heard)
+        runner.is_fresh = is_fresh
+        self.coming[pane] = runner
         self._say(f"compiling {_described(source)}" + (": the world goes on meanwhile" if self.panes else ""))
 
     def heard(self, pane: int, runner: Runner, message: tuple[Any, ...]) -> None:
@@ -173,7 +181,8 @@ class LiveServer:
     def _switch(self, pane: int, runner: Runner) -> None:
         """Show a world that is ready: from where the bodies of the one before it are."""
         before = self.panes.get(pane)
-        if before is not None and not before.is_lost and runner.source.meshes == before.source.meshes:
+        goes_on = before is not None and not before.is_lost and not runner.is_fresh
+        if before is not None and goes_on and runner.source.meshes == before.source.meshes:
             before.send("motion")
         elif pane == 1 and 0 in self.panes:
             self._show(pane, runner)
@@ -210,6 +219,7 @@ class LiveServer:
         """A world that could not be made is left out; one that broke down is made anew."""
         runner.stop()
         runner.is_lost = True
+        self._is_filming = False
         if self.coming.get(pane) is runner:
             del self.coming[pane]
             self._say(f"{_described(runner.source)}: {words}")
@@ -281,8 +291,7 @@ class LiveServer:
                 return
             self._obey(visitor, wish_of(message))
         except TaichiSoftError as error:
-            visitor.told.append(json.dumps({"refused": str(error)}))
-            visitor.wake.set()
+            self._put(visitor, refused=str(error))
 
     def _obey(self, visitor: Visitor, wish: dict[str, Any]) -> None:
         do, runner = wish["do"], self.panes.get(wish["pane"])
@@ -293,12 +302,8 @@ class LiveServer:
             raise OptionError("the program that steps this world decides that")
         elif do == "upload":
             visitor.upload = wish["name"]
-        elif do == "choose":
-            chosen = {key: wish[key] for key in ("law", "strain", "flips")}
-            self._begin(wish["pane"], replace(self._source(wish["pane"]), **chosen))
-        elif do == "compare":
-            chosen = {key: wish[key] for key in ("law", "strain", "flips")}
-            self._begin(1, replace(self._source(0), **chosen))
+        elif do in ("choose", "compare"):
+            self._choose(do, wish)
         elif do == "alone":
             for runners in (self.panes, self.coming):
                 if 1 in runners:
@@ -311,9 +316,25 @@ class LiveServer:
             key = ("move", visitor.number) if do == "move" else None
             self._require(runner.send(do, visitor.number, *values, key=key))
         elif do == "save":
+            if wish["what"] == "film" and self._is_filming:
+                raise OptionError("a film is being drawn: wait until it is there")
+            self._is_filming = self._is_filming or wish["what"] == "film"
             self._require(runner.send(wish["what"] if wish["what"] == "film" else "save", visitor.number))
+        elif do == "reset" and any((each.state or {}).get("restarts") for each in self.panes.values()):
+            for pane, each in list(self.panes.items()):
+                self._begin(pane, each.source, is_fresh=True)
         else:
             self._obey_for_all(wish)
+
+    def _choose(self, do: str, wish: dict[str, Any]) -> None:
+        """Compile another law, in place of the one that is shown or beside it."""
+        now = self._loop.time()
+        if now - self._last_choice < BETWEEN_CHOICES:
+            raise OptionError("a law was chosen just now: wait a second")
+        self._last_choice = now
+        chosen = {key: wish[key] for key in ("law", "strain", "flips")}
+        pane = 1 if do == "compare" else wish["pane"]
+        self._begin(pane, replace(self._source(0 if do == "compare" else pane), **chosen))
 
     def _obey_for_all(self, wish: dict[str, Any]) -> None:
         """What both worlds get."""
@@ -346,6 +367,9 @@ class LiveServer:
         name, visitor.upload = visitor.upload, None
         if name is None:
             raise OptionError("a file came without its name")
+        if self._is_reading:
+            raise OptionError("another file is being read: wait until it is there")
+        self._is_reading = True
         task = self._loop.create_task(self._add_mesh(visitor, name, content))
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
@@ -356,9 +380,10 @@ class LiveServer:
         try:
             path = await asyncio.to_thread(require_mesh, folder, name, content)
         except TaichiSoftError as error:
-            visitor.told.append(json.dumps({"refused": str(error)}))
-            visitor.wake.set()
+            self._put(visitor, refused=str(error))
             return
+        finally:
+            self._is_reading = False
         source = self._source(0)
         self._begin(0, replace(source, meshes=(*source.meshes, str(path))))
 
@@ -370,17 +395,20 @@ class LiveServer:
             del self.made[next(iter(self.made))]
         visitor = self.visitors.get(number)
         if visitor is not None:
-            visitor.told.append(json.dumps({"made": f"/made/{key}", "name": name}))
-            visitor.wake.set()
+            self._put(visitor, made=f"/made/{key}", name=name)
 
     async def _draw_film(self, number: int, frames: str) -> None:
         visitor = self.visitors.get(number)
+        if not frames:
+            self._is_filming = False
+            return
         if visitor is not None:
             self._tell(visitor, "drawing the film: some seconds")
         path = f"{frames}.mp4"
         process = get_context("spawn").Process(target=film_file, args=(frames, path, FILM_FPS), daemon=True)
         process.start()
         await asyncio.to_thread(process.join)
+        self._is_filming = False
         Path(frames).unlink(missing_ok=True)
         if process.exitcode != 0 or not Path(path).is_file():
             if visitor is not None:
@@ -398,8 +426,11 @@ class LiveServer:
             self._tell(visitor, words)
 
     def _tell(self, visitor: Visitor, words: str) -> None:
-        visitor.told.append(json.dumps({"said": words}))
-        del visitor.told[:-20]
+        self._put(visitor, said=words)
+
+    def _put(self, visitor: Visitor, **message: str) -> None:
+        visitor.told.append(json.dumps(message))
+        del visitor.told[:-20]  # of one who does not listen
         visitor.wake.set()
 
     def _wake(self) -> None:

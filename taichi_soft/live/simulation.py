@@ -38,6 +38,9 @@ KEPT = 10.0
 
 FILM_FPS = 30.0
 
+MOST_KEPT = 2**28
+"""Bytes of pictures: of many vertices a film is shorter."""
+
 MOST_HELD = 8
 """Bodies that visitors hold at a time."""
 
@@ -192,7 +195,9 @@ class Simulation:
         self._due["told"] = 0.0
 
     def do_reset(self) -> None:
-        """Go back to the beginning; what sliders say stays."""
+        """Go back to the beginning; what sliders say stays. A scene with code of its own is made anew by the
+        server instead: what that code remembers is in no snapshot.
+        """
         self.do_release_all()
         self.world.restore(self.first)
         self.controls.give_all()
@@ -282,7 +287,11 @@ class Simulation:
     def do_film(self, number: int) -> None:
         """Write the last seconds as frames to draw."""
         path = self.folder / f"film{number}.npz"
-        film_frames(path, list(self.recent), self.drawn, self.scene)
+        try:
+            film_frames(path, list(self.recent), self.drawn, self.scene)
+        except Exception:
+            self.connection.send(("filmed", number, ""))
+            raise
         self.connection.send(("filmed", number, str(path)))
 
     # What is told.
@@ -306,7 +315,8 @@ class Simulation:
         self.connection.send(("frame", number))
         if now >= self._due["film"]:
             self.recent.append((moment, self.drawn.version, (frame.positions.copy(), frame.poses.copy())))
-            while self.recent and len(self.recent) > KEPT * FILM_FPS:
+            most = min(KEPT * FILM_FPS, MOST_KEPT / (12 * max(self.drawn.vertex_count, 1)))
+            while len(self.recent) > most:
                 self.recent.popleft()
             self._due["film"] = now + 1.0 / FILM_FPS - 0.002
         self._due["picture"] = now + 1.0 / PICTURES - 0.001
@@ -360,6 +370,7 @@ class Simulation:
             "bodies": len(self.world.bodies),
             "scale": None if self.tints is None else self.tints.scale,
             "palette": sorted(palette_of(self.world)),
+            "restarts": self.scene.act is not None,
             "hash": None if self.is_playing else self.world.state_hash(),
         }
 
