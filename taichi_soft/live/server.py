@@ -14,6 +14,7 @@ from dataclasses import asdict, dataclass, field, replace
 from http import HTTPStatus
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -100,6 +101,7 @@ class LiveServer:
         self._folder = tempfile.TemporaryDirectory(prefix="taichi-soft-live-")
         self._last_choice = -math.inf
         self._is_reading = self._is_filming = False  # a visitor's file; a film
+        self._film: BaseProcess | None = None
         self._tasks: set[asyncio.Task[None]] = set()
         self._listening: Listening | None = None
 
@@ -130,6 +132,8 @@ class LiveServer:
         """End all processes and connections."""
         for runner in [*self.panes.values(), *self.coming.values()]:
             runner.stop()
+        if self._film is not None and self._film.is_alive():
+            self._film.kill()
         if self._listening is not None:
             self._listening.close()
             with suppress(asyncio.TimeoutError):
@@ -403,10 +407,11 @@ class LiveServer:
             self._is_filming = False
             return
         if visitor is not None:
-            self._tell(visitor, "drawing the film: some seconds")
+            self._tell(visitor, "drawing the film: up to a minute")
         path = f"{frames}.mp4"
         process = get_context("spawn").Process(target=film_file, args=(frames, path, FILM_FPS), daemon=True)
         process.start()
+        self._film = process
         await asyncio.to_thread(process.join)
         self._is_filming = False
         Path(frames).unlink(missing_ok=True)
