@@ -38,7 +38,7 @@ SLIDERS = {
     each.name: each
     for each in (
         Slider("young", "Young's modulus", "Pa", 1e3, 1e8, "stiffer takes more substeps", is_log=True),
-        Slider("poisson", "Poisson's ratio", "", 0.0, 0.49, "near 0.5 takes many more substeps"),
+        Slider("poisson", "Poisson's ratio", "", -0.9, 0.49, "near 0.5 takes many more substeps"),
         Slider("damping", "Damping ratio", "", 0.0, 1.0, "of the slowest vibration; costs nothing"),
         Slider("gravity", "Gravity", "m/s²", 0.0, 30.0, "costs nothing"),
         Slider("friction", "Friction", "", 0.0, 2.0, "of floor, colliders and bodies; costs nothing"),

@@ -19,12 +19,14 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
+import numpy as np
 from websockets.asyncio.server import Server as Listening
 from websockets.asyncio.server import ServerConnection, serve
 from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
+from taichi_soft import PRESETS
 from taichi_soft.core.errors import OptionError, TaichiSoftError
 from taichi_soft.elements.laws import LAWS
 from taichi_soft.live.controls import SLIDERS
@@ -285,8 +287,13 @@ class LiveServer:
         """What a page needs to know to draw its controls."""
         sliders = [asdict(each) for each in SLIDERS.values()]
         laws = [{"name": law.name, "about": law.summary} for law in LAWS.values()]
-        offered = {"sliders": sliders, "laws": laws, "quantities": list(QUANTITIES), "limit": LARGEST_UPLOAD}
-        return {**offered, "is_view": self.attached is not None}
+        presets = {
+            name: {"young": each.young, "poisson": each.poisson, "damping": each.damping_ratio}
+            for name, each in PRESETS.items()
+            if SLIDERS["poisson"].low <= float(np.max(each.poisson)) <= SLIDERS["poisson"].high
+        }
+        offered = {"sliders": sliders, "laws": laws, "quantities": list(QUANTITIES), "presets": presets}
+        return {**offered, "limit": LARGEST_UPLOAD, "is_view": self.attached is not None}
 
     def _hear(self, visitor: Visitor, message: str | bytes) -> None:
         try:

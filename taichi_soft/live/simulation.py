@@ -350,7 +350,7 @@ class Simulation:
         self._energies = {
             "kinetic": sum(body.kinetic_energy() for body in bodies),
             "elastic": sum(body.elastic_energy() for body in bodies if hasattr(body.mesh, "tets")),
-            "height": sum(body.gravitational_energy() for body in bodies),
+            "potential": sum(body.gravitational_energy() for body in bodies),
             "momentum": float(np.linalg.norm(sum((body.momentum() for body in bodies), np.zeros(3)))),
         }
         self._due["energies"] = start + (time.perf_counter() - start) / SHARE

@@ -147,6 +147,17 @@ def test_a_slider_moved_by_keys_changes_the_world_by_the_value_that_it_shows(ope
         visitor.say("set", name=name, value=value)
 
 
+def test_a_preset_moves_the_sliders_of_the_material(open_page, visitor):
+    page = open_page()
+    page.get_by_label("preset").select_option("gelatine")
+    visitor.until(lambda: visitor.states[0]["values"]["poisson"] == 0.45)
+    values = visitor.states[0]["values"]
+    assert (values["young"], values["damping"]) == (1e5, 0.08)
+    playwright.expect(page.locator("#slider-young")).to_have_attribute("aria-valuetext", "100 kPa")
+    for name, value in {"young": 1.5e5, "poisson": 0.4, "damping": 0.15}.items():
+        visitor.say("set", name=name, value=value)
+
+
 def test_too_few_substeps_are_said_beside_the_slider_before_they_are_felt(open_page, visitor):
     visitor.say("pause", is_paused=True)
     page = open_page()

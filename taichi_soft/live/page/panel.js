@@ -70,6 +70,10 @@ export class Panel {
       this.sliders.get(name).input.addEventListener("input", () => this.warn());
     }
     fill(at("law"), hello.laws.map(law => [law.name, `${law.name}: ${law.about}`]));
+    fill(at("preset"), Object.keys(hello.presets).map(name => [name, name.replaceAll("_", " ")]));
+    at("preset").onchange = () => {
+      for (const [name, value] of Object.entries(hello.presets[at("preset").value] ?? {})) wish({ do: "set", name, value });
+    };
     fill(at("tint"), hello.quantities.map(name => [name, name]));
     const chosen = () => Object.fromEntries(["law", "strain", "flips"].map(id => [id, at(id).value || null]));
     const on = (id, name, call) => { at(id)[`on${name}`] = call; };
@@ -90,7 +94,8 @@ export class Panel {
       at("fold").setAttribute("aria-expanded", isOpen);
       at("fold").textContent = isOpen ? "hide controls" : "show controls";
     });
-    this.plot = new Plot(at("plot"));
+    const energies = [["kinetic", "#b45309"], ["elastic", "#0b6b74"], ["potential", "#5b61a8"]];
+    this.plots = [new Plot(at("plot"), energies, "J"), new Plot(at("momentum"), [["momentum", "#7c3a68"]], "N s")];
     if (hello.is_view) document.body.classList.add("view");
   }
 
@@ -133,7 +138,7 @@ export class Panel {
     at("budget").style.width = `${Math.min(100, 100 * share)}%`;
     at("budget").classList.toggle("over", share > 1);
     this.showPalette(state.palette);
-    this.plot.put(state.time, state.energies);
+    for (const plot of this.plots) plot.put(state.time, state.energies);
     const e = state.energies;
     if (e.kinetic !== undefined) {
       at("energies").textContent = `kinetic ${joules(e.kinetic)}, elastic ${joules(e.elastic)}, momentum ${Number(e.momentum.toPrecision(3))} N s`;
@@ -191,9 +196,9 @@ function fill(select, rows) {
   for (const [value, text] of rows) select.add(new Option(text, value));
 }
 
-// Energies over the last seconds.
+// Numbers over the last seconds: lines of [name, colour], in one unit.
 class Plot {
-  constructor(canvas) { this.canvas = canvas; this.rows = []; }
+  constructor(canvas, lines, unit) { this.canvas = canvas; this.lines = lines; this.unit = unit; this.rows = []; }
 
   put(time, energies) {
     if (energies.kinetic === undefined) return;
@@ -209,8 +214,8 @@ class Plot {
     const { canvas, rows } = this, scale = devicePixelRatio;
     const width = (canvas.width = canvas.clientWidth * scale), height = (canvas.height = canvas.clientHeight * scale);
     const pen = canvas.getContext("2d");
-    const lines = [["kinetic", "#b45309"], ["elastic", "#0b6b74"], ["height", "#5b61a8"]];
-    const least = Math.min(0, ...rows.map(r => r.height)), most = Math.max(1e-9, ...rows.flatMap(r => lines.map(([k]) => r[k])));
+    const { lines, unit } = this;
+    const least = Math.min(0, ...rows.flatMap(r => lines.map(([k]) => r[k]))), most = Math.max(1e-9, ...rows.flatMap(r => lines.map(([k]) => r[k])));
     const x = t => ((t - rows[0].time) / Math.max(1e-9, rows.at(-1).time - rows[0].time)) * width;
     const y = v => height - 4 - ((v - least) / (most - least)) * (height - 22 * scale);
     pen.font = `${12 * scale}px system-ui`;
@@ -220,9 +225,9 @@ class Plot {
       pen.beginPath();
       rows.forEach((r, k) => (k ? pen.lineTo(x(r.time), y(r[key])) : pen.moveTo(x(r.time), y(r[key]))));
       pen.stroke();
-      pen.fillText(key, (8 + 70 * i) * scale, 12 * scale);
+      pen.fillText(key, (8 + 62 * i) * scale, 12 * scale);
     });
     pen.fillStyle = "#4a5866";
-    pen.fillText(joules(most), width - 70 * scale, 12 * scale);
+    pen.fillText(`${Number(most.toPrecision(3))} ${unit}`, width - 80 * scale, 12 * scale);
   }
 }
