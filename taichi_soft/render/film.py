@@ -30,6 +30,7 @@ from taichi_soft.render import (
     draw_text,
 )
 from taichi_soft.render.colors import Color
+from taichi_soft.render.film_html import film_html
 from taichi_soft.render.props import Prop, Scenery
 from taichi_soft.render.skin_looks import texture_picture, vertex_colors
 from taichi_soft.render.texture import Texture
@@ -100,6 +101,20 @@ class FilmReport:
         if len(self.step_times) == 0:
             return 0.0
         return float(len(self.step_times) / self.fps / self.step_times.sum())
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the film, and what it took."""
+        figures = {
+            "film": f"{self.frames} frames, {self.frames / self.fps:.1f} s",
+            "simulated": f"{self.simulated:.2f} s",
+        }
+        if len(self.step_times):
+            milliseconds = float(np.median(self.step_times)) * 1e3
+            figures["steps of a frame"] = f"{milliseconds:.2f} ms of {1e3 / self.fps:.1f} ms, at the median"
+            figures["speed"] = f"{self.real_time_factor:.1f} x real time"
+        if len(self.draw_times):
+            figures["drawing of a frame"] = f"{float(np.median(self.draw_times)) * 1e3:.1f} ms, at the median"
+        return film_html(self.path, figures)
 
 
 def film(
