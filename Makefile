@@ -2,7 +2,7 @@
 # make test: set everything up, run the tests that take minutes; make test-all: those that take an hour, too
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-fast test-all test-bounds native test-native dist-native lint profile docs clean
+.PHONY: help setup demo test test-fast test-all test-bounds native test-native dist-native lint profile gallery docs clean
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -17,6 +17,7 @@ help:
 	@echo "make test-native  set up, build it, play games in it and in Python"
 	@echo "make dist-native  build it, pack it with headers, wrappers and sample into dist; and a project for Godot 3"
 	@echo "make profile  set up, measure what a frame costs here"
+	@echo "make gallery  set up, film every demo for the documentation: takes minutes"
 	@echo "make docs     set up, build the documentation into out/docs"
 	@echo "make lint     set up with every extra, check style and types"
 	@echo "make setup    set up with every extra"
@@ -73,6 +74,9 @@ dist-native: native
 
 profile: $(VENV)/.demo
 	@$(BIN)/taichi-soft profile
+
+gallery: $(VENV)/.demo
+	@$(BIN)/python docs/make_gallery.py
 
 docs: $(VENV)/.docs
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict

@@ -1,4 +1,8 @@
-"""A soft bar hangs from a swinging plate: the engine moves the plate and is told what pulls at it."""
+"""A soft bar hangs from a swinging plate: the engine moves the plate and is told what pulls at it.
+
+The bar is longest at the lowest point of each swing, and its load largest; at both ends it is less than its
+weight.
+"""
 
 import numpy as np
 from numpy.typing import NDArray

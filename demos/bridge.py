@@ -1,4 +1,7 @@
-"""Soft bodies fall onto a rope bridge: it sags, swings, and carries them."""
+"""Soft bodies fall onto a rope bridge: it sags, swings, and carries them.
+
+The planks stay straight, and the ropes between them bend: the bridge is one mesh of two materials.
+"""
 
 import numpy as np
 

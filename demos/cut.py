@@ -1,4 +1,7 @@
-"""A bar hangs from its upper end and is cut in two: the lower part falls, and lies where it came down."""
+"""A bar hangs from its upper end and is cut in two: the lower part falls, and lies where it came down.
+
+The upper part springs up once the weight below it is gone. Both parts are closed where the blade went.
+"""
 
 import numpy as np
 

@@ -1,4 +1,7 @@
-"""A block that grows denser to the right: its heavy side is pressed most, rises last and least (fig. 6.3)."""
+"""A block that grows denser to the right: its heavy side is pressed most, rises last and least (fig. 6.3).
+
+The light side is in the air while the heavy one is still pressed flat, so the block turns as it rises.
+"""
 
 import numpy as np
 

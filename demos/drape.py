@@ -1,4 +1,7 @@
-"""A cloth falls over a ball that moves to and fro, and is carried along by friction."""
+"""A cloth falls over a ball that moves to and fro, and is carried along by friction.
+
+It hangs round the ball in folds, and its corners swing on when the ball turns back.
+"""
 
 import numpy as np
 from numpy.typing import NDArray

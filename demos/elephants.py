@@ -1,4 +1,7 @@
-"""Toy elephants fall down steps and flap their ears: an artist's textured mesh on cages of tetrahedra."""
+"""Toy elephants fall down steps and flap their ears: an artist's textured mesh on cages of tetrahedra.
+
+Ears and trunks go on swinging when the body has landed; the picture on the skin goes with it.
+"""
 
 import numpy as np
 import trimesh

@@ -1,4 +1,7 @@
-"""Three puddings on a tray that is jerked aside: each sags, wobbles and settles as it was wished for."""
+"""Three puddings on a tray that is jerked aside: each sags, wobbles and settles as it was wished for.
+
+The same jerk makes the left one shiver for a moment, and the right one sway for seconds.
+"""
 
 import numpy as np
 import trimesh

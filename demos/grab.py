@@ -1,4 +1,7 @@
-"""A hand picks bodies up, one after the other, and throws them into a crate."""
+"""A hand picks bodies up, one after the other, and throws them into a crate.
+
+What is held hangs from the place where the hand took it, and sways behind the hand.
+"""
 
 import numpy as np
 

@@ -1,4 +1,8 @@
-"""A ball drops onto a stack of jelly blocks: they squash under it, wobble, and carry it."""
+"""A ball drops onto a stack of jelly blocks: they squash under it, wobble, and carry it.
+
+The top block gives way first, and bulges. The blow then goes down through the others, and the ball is thrown
+up.
+"""
 
 import numpy as np
 

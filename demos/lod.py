@@ -1,4 +1,8 @@
-"""Soft balls roll down a chute towards the camera, of more tetrahedra the nearer they are."""
+"""Soft balls roll down a chute towards the camera, of more tetrahedra the nearer they are.
+
+Where a ball changes its colour it has other tetrahedra from that step on, and rolls on as if nothing had
+happened.
+"""
 
 import numpy as np
 import trimesh

@@ -1,4 +1,7 @@
-"""Sixty-four soft spheres rain down: bodies run side by side, one per processor core at a time."""
+"""Sixty-four soft spheres rain down: bodies run side by side, one per processor core at a time.
+
+They land at different moments, and each is squashed and thrown up by itself.
+"""
 
 from engine_adapter import FixedStep
 from taichi_soft import Material, World, load_mesh

@@ -1,4 +1,7 @@
-"""Soft bodies tumble through a course of every kind of collider, some of which move, and end in a hollow."""
+"""Soft bodies tumble through a course of every kind of collider, some of which move, and end in a hollow.
+
+Bodies squeeze through between rods, paddles and each other, and take back their shapes behind them.
+"""
 
 import numpy as np
 import trimesh

@@ -1,4 +1,7 @@
-"""Two machines play one game: each sees the other's inputs late, goes back, and makes the steps again."""
+"""Two machines play one game: each sees the other's inputs late, goes back, and makes the steps again.
+
+Each side is the picture of one machine. After a key the two differ for some frames, and then agree again.
+"""
 
 from dataclasses import dataclass, field
 

@@ -1,4 +1,7 @@
-"""A tower of slabs, each softer than the one below: a heavy one falls on it, the softest give way most."""
+"""A tower of slabs, each softer than the one below: a heavy one falls on it, the softest give way most.
+
+The top slab is squashed most, although those below it carry more: it is the softest.
+"""
 
 import numpy as np
 from numpy.typing import NDArray

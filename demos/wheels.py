@@ -1,4 +1,7 @@
-"""Soft wheels, driven at their hubs, climb a flight of steps and are braked at the top."""
+"""Soft wheels, driven at their hubs, climb a flight of steps and are braked at the top.
+
+The softest wheel stands on a flat foot and folds round the edge of each step; the firmest rolls over it.
+"""
 
 import numpy as np
 from numpy.typing import NDArray

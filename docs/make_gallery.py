@@ -1,0 +1,89 @@
+"""Makes the gallery of the documentation: films and stills of all demos, and the page with bodies to turn.
+
+`python docs/make_gallery.py` makes everything, in some minutes; names of demos behind it: what belongs to these.
+"""
+
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from viewer.motion import motion_of
+from viewer.page import write_page
+
+from taichi_soft.cli.console import progress_bar, say
+from taichi_soft.render.demos import demo_names, load_demo
+from taichi_soft.render.ffmpeg import run_ffmpeg
+from taichi_soft.render.film import Stage, film
+
+FOLDER = Path(__file__).parent / "gallery"
+SIZE, FPS = (480, 270), 25
+TURNABLE = ("jelly", "playground", "cloth")
+"""Demos on the page with bodies to turn."""
+
+FADE = 10
+"""Pictures in which the last one becomes the first again."""
+
+STILL = 0.35
+"""Share of a film after which its still is taken, where nothing else is said here."""
+
+STILLS = {"jelly": 0.15}
+"""Of these it shows less then [share]."""
+
+CODEC = ("-c:v", "libvpx-vp9", "-crf", "40", "-b:v", "0", "-deadline", "good", "-cpu-used", "2", "-row-mt", "1")
+"""Small files, for which encoding may take its time."""
+
+SIZES = {".webm": 6e6, ".motion": 3e6}
+"""What all files of a kind may have together [bytes]: a page is read on the way, too."""
+
+Progress = Callable[[int, int], None]
+
+
+def write_film(stage: Stage, name: str, on_frame: Progress) -> None:
+    """The film of a demo, which leads back into its beginning, and a still."""
+    with tempfile.TemporaryDirectory() as scratch:
+        film(stage, Path(scratch) / "f.png", fps=FPS, size=SIZE, on_frame=on_frame)
+        pictures = sorted(Path(scratch).iterdir())
+        first, last = cv2.imread(str(pictures[0])), cv2.imread(str(pictures[-1]))
+        for i in range(FADE):
+            share = (i + 1) / (FADE + 1)
+            cv2.imwrite(f"{scratch}/f_{len(pictures) + i:04d}.png", _mixed(last, first, share))
+        moment = pictures[round(STILLS.get(name, STILL) * (len(pictures) - 1))]
+        cv2.imwrite(str(FOLDER / f"{name}.jpg"), cv2.imread(str(moment)), [cv2.IMWRITE_JPEG_QUALITY, 82])
+        frames = ["-framerate", str(FPS), "-i", f"{scratch}/f_%04d.png", "-pix_fmt", "yuv420p"]
+        run_ffmpeg([*frames, *CODEC, FOLDER / f"{name}.webm"])
+
+
+def _mixed(one: NDArray[np.uint8], other: NDArray[np.uint8], share: float) -> NDArray[np.uint8]:
+    """Some of the other picture over the one."""
+    return np.asarray(cv2.addWeighted(one, 1.0 - share, other, share, 0.0), dtype=np.uint8)
+
+
+def main(names: list[str]) -> None:
+    """Make what belongs to these demos."""
+    FOLDER.mkdir(exist_ok=True)
+    with progress_bar() as bar:
+        task = bar.add_task("", total=None)
+        for name in names:
+
+            def show(done: int, total: int, name: str = name) -> None:
+                bar.update(task, description=name, completed=done, total=total)
+
+            bar.update(task, description=f"{name}: compiling", completed=0, total=None)
+            write_film(load_demo(name).stage(), name, show)
+            if name in TURNABLE:
+                (FOLDER / f"{name}.motion").write_bytes(motion_of(load_demo(name).stage()))
+            say(f"{name}: {(FOLDER / f'{name}.webm').stat().st_size / 1e3:.0f} kB")
+    motions = [FOLDER / f"{name}.motion" for name in TURNABLE]
+    if all(file.is_file() for file in motions):
+        write_page(FOLDER / "viewer.html", {file.stem: file.read_bytes() for file in motions})
+    for suffix, most in SIZES.items():
+        size = sum(file.stat().st_size for file in FOLDER.glob(f"*{suffix}"))
+        say(f"{suffix}: {size / 1e6:.1f} MB together" + (f", above {most / 1e6:.0f} MB" if size > most else ""))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:] or demo_names())

@@ -1,0 +1,38 @@
+// Plays the films of the gallery that are in view, unless the reader's system asks for less motion.
+const films = [...document.querySelectorAll("video.film")];
+const button = document.querySelector("#films");
+const inView = new Set();
+const held = new Set(); // what the reader has stopped
+let arePlaying = !window.matchMedia("(prefers-reduced-motion: reduce)").matches;
+
+function start(film) {
+  if (arePlaying && inView.has(film) && !held.has(film)) film.play().catch(() => {}); // a browser may refuse
+}
+
+function tell() {
+  button.textContent = arePlaying ? "Pause all films" : "Play films in view";
+}
+
+const observer = new IntersectionObserver((seen) => {
+  for (const { target, isIntersecting } of seen) {
+    inView[isIntersecting ? "add" : "delete"](target);
+    if (isIntersecting) start(target);
+    else target.pause();
+  }
+}, { threshold: 0.3 });
+
+for (const film of films) {
+  film.addEventListener("pause", () => arePlaying && inView.has(film) && held.add(film));
+  film.addEventListener("play", () => held.delete(film));
+  observer.observe(film);
+}
+if (button) {
+  button.hidden = false;
+  tell();
+  button.addEventListener("click", () => {
+    arePlaying = !arePlaying;
+    held.clear();
+    films.forEach(arePlaying ? start : (film) => film.pause());
+    tell();
+  });
+}
