@@ -1,9 +1,9 @@
 """The gallery of the documentation site: an entry for every demo, and a page with its script.
 
-An entry is made of the docstring of the demo: its first paragraph says what is seen, its second one what to notice.
-Films, stills and the page with bodies to turn come from `docs/gallery`, where `make_gallery.py` has put them. What
-is not there is left out, and the page says how to make it. MkDocs calls these functions by their names (mkdocs.yml,
-`hooks`).
+An entry is made of the docstring of the demo: its first paragraph says what is seen, its second one what to
+notice. Films, stills and the page with bodies to turn come from `docs/gallery`, where `make_gallery.py` puts
+them. What is not there is left out, and the page says how to make it. MkDocs calls these functions by their
+names (mkdocs.yml, `hooks`).
 """
 
 from __future__ import annotations
@@ -13,8 +13,6 @@ from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from typing import Any
-
-from mkdocs.structure.files import File, Files
 
 ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / "docs" / "gallery"
@@ -44,8 +42,8 @@ PAUSE = '<p><button id="films" class="md-button" type="button" hidden>Pause all 
 VIEWER = """<iframe class="viewer" src="gallery/viewer.html" title="Bodies to turn, and time to scrub" \
 loading="lazy"></iframe>
 
-[Open it by itself](gallery/viewer.html){{ target="_blank" }}. It is one file of {size:.1f} MB: save it, and it opens \
-from a folder too, without a server. The picture turns by dragging and by arrow keys."""
+[Open it by itself](gallery/viewer.html){{ target="_blank" }}. It is one file of {size:.1f} MB: save it, \
+and it opens from a folder too, without a server. The picture turns by dragging and by arrow keys."""
 
 MISSING = """!!! note "{what} not been made"
 
@@ -57,7 +55,8 @@ search:
 ---
 # demos/{name}.py
 
-{what} See it in [the gallery](../gallery.md#{name}), or make the film yourself: `taichi-soft demo {name} --out {name}.webm`.
+{what} See it in [the gallery](../gallery.md#{name}), or make the film yourself: \
+`taichi-soft demo {name} --out {name}.webm`.
 
 ```python
 {script}
@@ -90,8 +89,10 @@ def demos() -> list[Demo]:
     return [Demo.of(file) for file in files if "\ndef stage(" in file.read_text(encoding="utf-8")]
 
 
-def on_files(files: Files, config: Any) -> Files:
+def on_files(files: Any, config: Any) -> Any:
     """Add a page for the script of each demo."""
+    from mkdocs.structure.files import File  # here: what else is in this file works without MkDocs
+
     for demo in demos():
         text = SCRIPT.format(name=demo.name, what=demo.what, script=demo.script.strip())
         files.append(File.generated(config, f"demos/{demo.name}.md", content=text))
@@ -116,8 +117,8 @@ def viewer() -> str:
 def entries() -> str:
     """One for each demo, and what holds them."""
     shown = [_entry(demo) for demo in demos()]
-    is_whole = all('<video' in each for each in shown)
-    head = [PAUSE] if any('<video' in each for each in shown) else []
+    is_whole = all("<video" in each for each in shown)
+    head = [PAUSE] if any("<video" in each for each in shown) else []
     head += [] if is_whole else [MISSING.format(what="Some of the films have")]
     grid = ['<div class="gallery" markdown>', *shown, "</div>"]
     return "\n\n".join([*head, *grid, '<script src="theme/gallery.js" defer></script>'])

@@ -1,6 +1,6 @@
 """Makes the gallery of the documentation: films and stills of all demos, and the page with bodies to turn.
 
-`python docs/make_gallery.py` makes everything, in some minutes; names of demos behind it: what belongs to these.
+`python docs/make_gallery.py` makes everything, in some minutes; with names of demos, what belongs to these.
 """
 
 import sys
@@ -27,13 +27,20 @@ TURNABLE = ("jelly", "playground", "cloth")
 FADE = 10
 """Pictures in which the last one becomes the first again."""
 
-STILL = 0.35
+STILL = 0.3
 """Share of a film after which its still is taken, where nothing else is said here."""
 
 STILLS = {"jelly": 0.15}
-"""Of these it shows less then [share]."""
+"""Of these at another moment."""
 
-CODEC = ("-c:v", "libvpx-vp9", "-crf", "40", "-b:v", "0", "-deadline", "good", "-cpu-used", "2", "-row-mt", "1")
+SEEN, CHANGED, LOOK = 24, 0.01, 1.0
+"""A film ends so long [s] after the last picture of which more than this share differs from the last one of all by
+more levels than that: nobody wants to watch what lies still."""
+
+CODEC = (
+    *("-c:v", "libvpx-vp9", "-crf", "34", "-b:v", "0"),
+    *("-deadline", "good", "-cpu-used", "2", "-row-mt", "1"),
+)
 """Small files, for which encoding may take its time."""
 
 SIZES = {".webm": 6e6, ".motion": 3e6}
@@ -46,15 +53,24 @@ def write_film(stage: Stage, name: str, on_frame: Progress) -> None:
     """The film of a demo, which leads back into its beginning, and a still."""
     with tempfile.TemporaryDirectory() as scratch:
         film(stage, Path(scratch) / "f.png", fps=FPS, size=SIZE, on_frame=on_frame)
-        pictures = sorted(Path(scratch).iterdir())
-        first, last = cv2.imread(str(pictures[0])), cv2.imread(str(pictures[-1]))
+        pictures = [cv2.imread(str(file)) for file in sorted(Path(scratch).iterdir())]
+        pictures = pictures[: _end_of(pictures)]
+        still = pictures[round(STILLS.get(name, STILL) * (len(pictures) - 1))]
+        cv2.imwrite(str(FOLDER / f"{name}.jpg"), still, [cv2.IMWRITE_JPEG_QUALITY, 82])
         for i in range(FADE):
-            share = (i + 1) / (FADE + 1)
-            cv2.imwrite(f"{scratch}/f_{len(pictures) + i:04d}.png", _mixed(last, first, share))
-        moment = pictures[round(STILLS.get(name, STILL) * (len(pictures) - 1))]
-        cv2.imwrite(str(FOLDER / f"{name}.jpg"), cv2.imread(str(moment)), [cv2.IMWRITE_JPEG_QUALITY, 82])
-        frames = ["-framerate", str(FPS), "-i", f"{scratch}/f_%04d.png", "-pix_fmt", "yuv420p"]
-        run_ffmpeg([*frames, *CODEC, FOLDER / f"{name}.webm"])
+            fade = _mixed(pictures[-1], pictures[0], (i + 1) / (FADE + 1))
+            cv2.imwrite(f"{scratch}/f_{len(pictures) + i:04d}.png", fade)
+        frames = ["-framerate", str(FPS), "-i", f"{scratch}/f_%04d.png"]
+        count = ["-frames:v", str(len(pictures) + FADE), "-pix_fmt", "yuv420p"]
+        run_ffmpeg([*frames, *count, *CODEC, FOLDER / f"{name}.webm"])
+
+
+def _end_of(pictures: list[NDArray[np.uint8]]) -> int:
+    """How many of them there is something to see in."""
+    shares = [(cv2.absdiff(each, pictures[-1]).max(axis=2) > SEEN).mean() for each in pictures]
+    return min(
+        len(pictures), int(np.flatnonzero(np.array(shares) > CHANGED).max(initial=0)) + round(LOOK * FPS)
+    )
 
 
 def _mixed(one: NDArray[np.uint8], other: NDArray[np.uint8], share: float) -> NDArray[np.uint8]:
@@ -82,7 +98,10 @@ def main(names: list[str]) -> None:
         write_page(FOLDER / "viewer.html", {file.stem: file.read_bytes() for file in motions})
     for suffix, most in SIZES.items():
         size = sum(file.stat().st_size for file in FOLDER.glob(f"*{suffix}"))
-        say(f"{suffix}: {size / 1e6:.1f} MB together" + (f", above {most / 1e6:.0f} MB" if size > most else ""))
+        say(
+            f"{suffix}: {size / 1e6:.1f} MB together"
+            + (f", above {most / 1e6:.0f} MB" if size > most else "")
+        )
 
 
 if __name__ == "__main__":

@@ -1,13 +1,13 @@
 """The motion of a stage as data: where all that is seen was in every picture, in some hundred kilobytes.
 
-A motion is a gzip stream of three things: how many bytes its header has, uint32, little-endian; the header, JSON;
-and whole numbers from 0 to 65535, the lower bytes of all of them before the upper bytes of all of them.
+A motion is a gzip stream of three things: how many bytes its header has, uint32, little-endian; the header,
+JSON; and whole numbers from 0 to 65535, the lower bytes of all of them before the upper bytes of all of them.
 
-The numbers are for each part, in the order of the header: the point that each of its `vertices` stands for, and
-three vertices for each of its `triangles`. Then come the points of all parts that do not move, and for each of the
-`frames` those of all that move: of each part or frame all x, all y and all z. A coordinate is `lower` and so many
-times `quantum` [m]. Of what moves, the first frame stands as it is, and each later one as the change of its change,
-modulo 65536: that of the frame before is taken to go on.
+The numbers are for each part, in the order of the header: the point that each of its `vertices` stands for,
+and three vertices for each of its `triangles`. Then come the points of all parts that do not move, and for each
+of the `frames` those of all that move: of each part or frame all x, all y and all z. A coordinate is `lower`
+and so many times `quantum` [m]. Of what moves, the first frame stands as it is, and each later one as the
+change of its change, modulo 65536: that of the frame before is taken to go on.
 """
 
 from __future__ import annotations
@@ -75,9 +75,7 @@ def motion_of(stage: Stage, seconds: float | None = None) -> bytes:
     return _packed(stage, parts, frames, 1.0 / (every * stage.step.dt))
 
 
-def _packed(
-    stage: Stage, parts: list[_Part], frames: list[list[NDArray[np.float32]]], fps: float
-) -> bytes:
+def _packed(stage: Stage, parts: list[_Part], frames: list[list[NDArray[np.float32]]], fps: float) -> bytes:
     """All of it, as the head of this file says."""
     rows = [np.stack(each).astype(np.float64) for each in zip(*frames, strict=True)]  # (frames, points, 3)
     lower = np.min([each.min(axis=(0, 1)) for each in rows], axis=0)

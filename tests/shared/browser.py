@@ -1,0 +1,46 @@
+"""Chromium without a window, for pages that have to work in a browser."""
+
+import contextlib
+import shutil
+
+import cv2
+import numpy as np
+import pytest
+
+ARGUMENTS = (
+    *("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-first-run"),
+    *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
+)
+PATIENCE = 120_000
+"""What anything may take in it [ms]: it draws without a graphics card, on cores that are busy."""
+
+
+@contextlib.contextmanager
+def chromium():
+    """A browser of Playwright. The test is skipped where there is none."""
+    playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright: pip install playwright")
+    program = shutil.which("chromium")
+    if program is None:
+        pytest.skip("needs chromium: apt-get install chromium")
+    with playwright.sync_playwright() as started:
+        browser = started.chromium.launch(executable_path=program, args=list(ARGUMENTS), timeout=PATIENCE)
+        yield browser
+        browser.close()
+
+
+def opened(browser, address, **options):
+    """A page, and lists of what it complained of and what it asked for."""
+    page = browser.new_page(**options)
+    page.set_default_timeout(PATIENCE)
+    complaints, requests = [], []
+    page.on("console", lambda said: said.type in ("error", "warning") and complaints.append(said.text))
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.on("request", lambda request: requests.append(request.url))
+    page.goto(address)
+    return page, complaints, requests
+
+
+def pixels_of(page, selector):
+    """What an element looks like now, (height, width, 3), RGB."""
+    picture = np.frombuffer(page.locator(selector).screenshot(), np.uint8)
+    return cv2.imdecode(picture, cv2.IMREAD_COLOR)[..., ::-1].astype(int)
