@@ -34,8 +34,8 @@ STILLS = {"jelly": 0.15}
 """Of these at another moment."""
 
 SEEN, CHANGED, LOOK = 24, 0.01, 1.0
-"""A film ends so long [s] after the last picture of which more than this share differs from the last one of all by
-more levels than that: nobody wants to watch what lies still."""
+"""A picture of which more than this share differs by more levels than that from the last one shows something
+that moves. A film ends so long after the last of these [s]."""
 
 CODEC = (
     *("-c:v", "libvpx-vp9", "-crf", "34", "-b:v", "0"),
@@ -68,9 +68,8 @@ def write_film(stage: Stage, name: str, on_frame: Progress) -> None:
 def _end_of(pictures: list[NDArray[np.uint8]]) -> int:
     """How many of them there is something to see in."""
     shares = [(cv2.absdiff(each, pictures[-1]).max(axis=2) > SEEN).mean() for each in pictures]
-    return min(
-        len(pictures), int(np.flatnonzero(np.array(shares) > CHANGED).max(initial=0)) + round(LOOK * FPS)
-    )
+    moving = np.flatnonzero(np.array(shares) > CHANGED)
+    return min(len(pictures), int(moving.max(initial=0)) + 1 + round(LOOK * FPS))
 
 
 def _mixed(one: NDArray[np.uint8], other: NDArray[np.uint8], share: float) -> NDArray[np.uint8]:

@@ -4,10 +4,10 @@ A motion is a gzip stream of three things: how many bytes its header has, uint32
 JSON; and whole numbers from 0 to 65535, the lower bytes of all of them before the upper bytes of all of them.
 
 The numbers are for each part, in the order of the header: the point that each of its `vertices` stands for,
-and three vertices for each of its `triangles`. Then come the points of all parts that do not move, and for each
-of the `frames` those of all that move: of each part or frame all x, all y and all z. A coordinate is `lower`
-and so many times `quantum` [m]. Of what moves, the first frame stands as it is, and each later one as the
-change of its change, modulo 65536: that of the frame before is taken to go on.
+and three vertices for each of its `triangles`. Then come the points of all parts that do not move, and for
+each of the `frames` those of all that move: of each part or frame all x, all y and all z. A coordinate is
+`lower` and so many times `quantum` [m]. Of what moves, the first frame stands as it is, and each later one as
+the change of its change, modulo 65536: that of the frame before is taken to go on.
 """
 
 from __future__ import annotations

@@ -62,7 +62,7 @@ def hanging_stage():
 
 
 def decoded(motion):
-    """The header, and of each part its triangles (triangles, 3) of points and its places (frames, points, 3)."""
+    """The header, and of each part its triangles (m, 3) of points and its places (frames, points, 3)."""
     raw = gzip.decompress(motion)
     begin = 4 + int.from_bytes(raw[:4], "little")
     header = json.loads(raw[4:begin])
