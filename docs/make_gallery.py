@@ -3,6 +3,7 @@
 `python docs/make_gallery.py` makes everything, in some minutes; with names of demos, what belongs to these.
 """
 
+import shutil
 import sys
 import tempfile
 from collections.abc import Callable
@@ -15,6 +16,7 @@ from viewer.motion import motion_of
 from viewer.page import write_page
 
 from taichi_soft.cli.console import progress_bar, say
+from taichi_soft.render.containers import COLORS
 from taichi_soft.render.demos import demo_names, load_demo
 from taichi_soft.render.ffmpeg import run_ffmpeg
 from taichi_soft.render.film import Stage, film
@@ -61,8 +63,9 @@ def write_film(stage: Stage, name: str, on_frame: Progress) -> None:
             fade = _mixed(pictures[-1], pictures[0], (i + 1) / (FADE + 1))
             cv2.imwrite(f"{scratch}/f_{len(pictures) + i:04d}.png", fade)
         frames = ["-framerate", str(FPS), "-i", f"{scratch}/f_%04d.png"]
-        count = ["-frames:v", str(len(pictures) + FADE), "-pix_fmt", "yuv420p"]
-        run_ffmpeg([*frames, *count, *CODEC, FOLDER / f"{name}.webm"])
+        count = ["-frames:v", str(len(pictures) + FADE)]
+        run_ffmpeg([*frames, *count, *COLORS, *CODEC, f"{scratch}/f.webm"])
+        shutil.move(f"{scratch}/f.webm", FOLDER / f"{name}.webm")
 
 
 def _end_of(pictures: list[NDArray[np.uint8]]) -> int:
