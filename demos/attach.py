@@ -1,7 +1,7 @@
 """A soft bar hangs from a swinging plate: the engine moves the plate and is told what pulls at it.
 
-The bar is longest at the lowest point of each swing, and its load largest; at both ends it is less than its
-weight.
+The bar is longest at the lowest point of each swing, where it pulls most at the plate. At both ends it pulls
+with less than its weight.
 """
 
 import numpy as np

@@ -1,6 +1,6 @@
 """A complex object of bars falls on its corner, bends and rings on after it lifts off (fig. 6.2).
 
-It goes on bending to and fro in the air: stress runs through the bars although nothing touches them.
+The arms go on bending to and fro long after the blow, and where the bars cross they turn red each time.
 """
 
 import numpy as np

@@ -1,6 +1,6 @@
 """A cloth of springs pinned at two corners swings down, one implicit step a frame.
 
-It falls into folds while it swings, and stretches most at the two corners that hold it.
+The free edge stays behind, and whips round whenever the cloth swings back.
 """
 
 import numpy as np

@@ -91,11 +91,12 @@ function lights(motion, reach) {
   const [x, y] = [0, 1].map((axis) => motion.eye[axis] - motion.target[axis]);
   const angle = Math.atan2(y, x) - 1.1;
   sun.target.position.set(...motion.target);
-  sun.position.copy(sun.target.position).add(new THREE.Vector3(Math.cos(angle), Math.sin(angle), 1.28).multiplyScalar(reach));
+  sun.position.set(Math.cos(angle), Math.sin(angle), 1.28).multiplyScalar(reach).add(sun.target.position);
   sun.castShadow = true;
   sun.shadow.mapSize.set(2048, 2048);
   sun.shadow.normalBias = 0.01 * reach;
-  Object.assign(sun.shadow.camera, { left: -reach, right: reach, bottom: -reach, top: reach, near: 0.01, far: 4 * reach });
+  const seen = { left: -reach, right: reach, bottom: -reach, top: reach, near: 0.01, far: 4 * reach };
+  Object.assign(sun.shadow.camera, seen);
   const sky = new THREE.HemisphereLight(0xe3edf8, 0xb5ada2, 1.5);
   sky.position.set(0, 0, 1);
   return [sun, sun.target, sky];
@@ -108,11 +109,13 @@ function ground(height, reach) {
   const ink = Object.assign(tile.getContext("2d"), { fillStyle: "#b4bac0", strokeStyle: "#9aa2a9", lineWidth: 6 });
   ink.fillRect(0, 0, 256, 256);
   ink.strokeRect(0, 0, 256, 256);
-  const map = Object.assign(new THREE.CanvasTexture(tile), { wrapS: THREE.RepeatWrapping, wrapT: THREE.RepeatWrapping });
+  const map = new THREE.CanvasTexture(tile);
+  map.wrapS = map.wrapT = THREE.RepeatWrapping;
   map.repeat.set(size, size);
   map.colorSpace = THREE.SRGBColorSpace;
   map.anisotropy = renderer.capabilities.getMaxAnisotropy();
-  const floor = new THREE.Mesh(new THREE.PlaneGeometry(size, size), new THREE.MeshStandardMaterial({ map, roughness: 1 }));
+  const material = new THREE.MeshStandardMaterial({ map, roughness: 1 });
+  const floor = new THREE.Mesh(new THREE.PlaneGeometry(size, size), material);
   floor.receiveShadow = true;
   floor.position.z = height - 0.001; // what lies on it is not within it
   return floor;
@@ -126,7 +129,9 @@ function firstView() {
 }
 
 function show(motion) {
-  scene?.traverse((each) => (each.geometry?.dispose(), each.material?.map?.dispose(), each.material?.dispose()));
+  scene?.traverse((each) => {
+    for (const held of [each.geometry, each.material?.map, each.material]) held?.dispose();
+  });
   [shown, time] = [motion, 0];
   const distance = new THREE.Vector3(...motion.eye).distanceTo(new THREE.Vector3(...motion.target));
   const reach = distance * Math.tan((motion.fov * Math.PI) / 360) * FILMED;
