@@ -321,6 +321,12 @@ def test_the_page_plays_by_itself_where_motion_is_wanted(turned_page):
         assert complaints == []
 
 
+def test_a_browser_that_cannot_draw_says_so(turned_page):
+    with chromium("--disable-3d-apis") as browser:
+        page, _, _ = opened(browser, turned_page)
+        page.get_by_text("This browser cannot show the bodies").wait_for()
+
+
 def test_a_body_is_drawn_where_the_camera_of_its_stage_sees_it(turned_page):
     """Its red pixels lie about the place to which its middle is projected here."""
     header, _, places = decoded(motion_of(falling_stage()))

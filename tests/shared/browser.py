@@ -16,14 +16,16 @@ PATIENCE = 120_000
 
 
 @contextlib.contextmanager
-def chromium():
-    """A browser of Playwright. The test is skipped where there is none."""
+def chromium(*further):
+    """A browser of Playwright, with further arguments. The test is skipped where there is none."""
     playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright: pip install playwright")
     program = shutil.which("chromium")
     if program is None:
         pytest.skip("needs chromium: apt-get install chromium")
     with playwright.sync_playwright() as started:
-        browser = started.chromium.launch(executable_path=program, args=list(ARGUMENTS), timeout=PATIENCE)
+        browser = started.chromium.launch(
+            executable_path=program, args=[*ARGUMENTS, *further], timeout=PATIENCE
+        )
         yield browser
         browser.close()
 
