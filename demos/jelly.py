@@ -1,7 +1,7 @@
 """A ball drops onto a stack of jelly blocks: they squash under it, wobble, and carry it.
 
-The top block gives way first, and bulges. The blow then goes down through the others, and the ball is thrown
-up.
+The top block gives way first, and bulges. The blow then goes down through the others, and they lift the ball
+again.
 """
 
 import numpy as np

@@ -35,7 +35,7 @@ STILL = 0.3
 STILLS = {"jelly": 0.15}
 """Of these at another moment."""
 
-SEEN, CHANGED, LOOK = 24, 0.01, 1.0
+SEEN, CHANGED, LOOK = 24, 0.004, 1.0
 """A picture of which more than this share differs by more levels than that from the last one shows something
 that moves. A film ends so long after the last of these [s]."""
 
