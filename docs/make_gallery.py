@@ -29,11 +29,19 @@ TURNABLE = ("jelly", "playground", "cloth")
 FADE = 10
 """Pictures in which the last one becomes the first again."""
 
-STILL = 0.3
-"""Share of a film after which its still is taken, where nothing else is said here."""
+STILLS = {
+    "bars": 1.06,
+    "bounce": 1.3,
+    "elephants": 0.6,
+    "grab": 2.3,
+    "jelly": 0.74,
+    "lod": 3.1,
+    "wheels": 3.0,
+}
+"""The moments that their stills show [s]."""
 
-STILLS = {"jelly": 0.15}
-"""Of these at another moment."""
+STILL = 0.3
+"""Of other films: after which share of it."""
 
 SEEN, CHANGED, LOOK = 24, 0.004, 1.0
 """A picture of which more than this share differs by more levels than that from the last one shows something
@@ -57,8 +65,9 @@ def write_film(stage: Stage, name: str, on_frame: Progress) -> None:
         film(stage, Path(scratch) / "f.png", fps=FPS, size=SIZE, on_frame=on_frame)
         pictures = [cv2.imread(str(file)) for file in sorted(Path(scratch).iterdir())]
         pictures = pictures[: _end_of(pictures)]
-        still = pictures[round(STILLS.get(name, STILL) * (len(pictures) - 1))]
-        cv2.imwrite(str(FOLDER / f"{name}.jpg"), still, [cv2.IMWRITE_JPEG_QUALITY, 82])
+        last = len(pictures) - 1
+        still = min(last, round(STILLS[name] * FPS if name in STILLS else STILL * last))
+        cv2.imwrite(str(FOLDER / f"{name}.jpg"), pictures[still], [cv2.IMWRITE_JPEG_QUALITY, 82])
         for i in range(FADE):
             fade = _mixed(pictures[-1], pictures[0], (i + 1) / (FADE + 1))
             cv2.imwrite(f"{scratch}/f_{len(pictures) + i:04d}.png", fade)
