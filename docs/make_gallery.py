@@ -29,15 +29,7 @@ TURNABLE = ("jelly", "playground", "cloth")
 FADE = 10
 """Pictures in which the last one becomes the first again."""
 
-STILLS = {
-    "bars": 1.06,
-    "bounce": 1.3,
-    "elephants": 0.6,
-    "grab": 2.3,
-    "jelly": 0.74,
-    "lod": 3.1,
-    "wheels": 3.0,
-}
+STILLS = {"bounce": 1.3, "elephants": 0.6, "grab": 2.3, "jelly": 0.74, "lod": 3.1, "wheels": 3.0}
 """The moments that their stills show [s]."""
 
 STILL = 0.3
