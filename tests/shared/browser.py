@@ -11,6 +11,8 @@ ARGUMENTS = (
     *("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-first-run"),
     *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
 )
+NAMES = ("chromium", "chromium-browser", "google-chrome")
+
 PATIENCE = 120_000
 """What anything may take in it [ms]: it draws without a graphics card, on cores that are busy."""
 
@@ -19,7 +21,7 @@ PATIENCE = 120_000
 def chromium(*further):
     """A browser of Playwright, with further arguments. The test is skipped where there is none."""
     playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright: pip install playwright")
-    program = shutil.which("chromium")
+    program = next(filter(None, map(shutil.which, NAMES)), None)
     if program is None:
         pytest.skip("needs chromium: apt-get install chromium")
     with playwright.sync_playwright() as started:
