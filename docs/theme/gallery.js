@@ -21,7 +21,22 @@ const observer = new IntersectionObserver((seen) => {
   }
 }, { threshold: 0.3 });
 
+/** A button at the corner of an entry: a browser's own controls would cover the still. */
+function addButton(film) {
+  const its = Object.assign(document.createElement("button"), { type: "button" });
+  const name = () => {
+    its.textContent = film.paused ? "Play" : "Pause";
+    its.setAttribute("aria-label", `${its.textContent}: ${film.getAttribute("aria-label")}`);
+  };
+  its.addEventListener("click", () => (film.paused ? film.play() : film.pause()));
+  for (const event of ["play", "pause"]) film.addEventListener(event, name);
+  name();
+  film.controls = false;
+  film.after(its);
+}
+
 for (const film of films) {
+  addButton(film);
   film.addEventListener("pause", () => arePlaying && inView.has(film) && held.add(film));
   film.addEventListener("play", () => held.delete(film));
   observer.observe(film);

@@ -391,6 +391,11 @@ def test_films_of_the_gallery_play_in_view_unless_no_motion_is_wanted(folder, mo
         if motion == "reduce":
             page.wait_for_timeout(1000)
             assert page.evaluate(playing) == 0
+            its = page.get_by_role("button", name="Play: Film: A soft bar")
+            its.click()
+            page.wait_for_function(f"{playing} === 1")
+            page.get_by_role("button", name="Pause: Film: A soft bar").click()
+            page.wait_for_function(f"{playing} === 0")
             button.click()
         page.wait_for_function(f"{playing} > 0")
         assert page.evaluate(playing) < len(demo_names()) / 2  # those in view
