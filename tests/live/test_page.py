@@ -2,33 +2,22 @@
 
 import io
 import re
-import shutil
 import zipfile
 from pathlib import Path
 
 import numpy as np
 import pytest
+from browser import PATIENCE, chromium
 from visitor import Visitor
 
 playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright: pip install playwright")
 PIL = pytest.importorskip("PIL.Image", reason="needs pillow")
 
-BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-pytestmark = pytest.mark.skipif(BROWSER is None, reason="needs chromium: apt-get install chromium")
-
-FLAGS = [
-    *("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-first-run"),
-    *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
-]
-SLOW = 60_000  # [ms]: these machines draw without a GPU
-
 
 @pytest.fixture(scope="module")
 def browser():
-    with playwright.sync_playwright() as started:
-        browser = started.chromium.launch(executable_path=BROWSER, args=FLAGS)
+    with chromium() as browser:
         yield browser
-        browser.close()
 
 
 @pytest.fixture
@@ -48,13 +37,13 @@ def open_page(browser, served, troubles):
         context = browser.new_context(viewport={"width": width, "height": height}, **options)
         opened.append(context)
         page = context.new_page()
-        page.set_default_timeout(SLOW)
+        page.set_default_timeout(PATIENCE)
         page.on("console", lambda m: troubles.append(m.text) if m.type in ("error", "warning") else None)
         page.on("pageerror", lambda error: troubles.append(str(error)))
         page.on("requestfailed", lambda request: troubles.append(request.url))
         page.goto(served.address)
-        playwright.expect(page.locator("#time")).to_have_text(re.compile(r"\d s"), timeout=SLOW)
-        playwright.expect(page.locator("#fps")).not_to_have_text("0 /s", timeout=SLOW)
+        playwright.expect(page.locator("#time")).to_have_text(re.compile(r"\d s"), timeout=PATIENCE)
+        playwright.expect(page.locator("#fps")).not_to_have_text("0 /s", timeout=PATIENCE)
         return page
 
     yield opened_at
@@ -250,7 +239,7 @@ def test_a_wrong_file_is_refused_on_the_page(open_page, visitor):
     wrong = {"name": "broken.obj", "mimeType": "text/plain", "buffer": b"this is no mesh"}
     page.get_by_label("your own mesh").set_input_files(wrong)
     said = page.locator("#said.refused")
-    playwright.expect(said).to_contain_text("broken.obj", timeout=SLOW)
+    playwright.expect(said).to_contain_text("broken.obj", timeout=PATIENCE)
 
 
 def test_a_script_and_a_picture_are_saved(open_page, visitor):
@@ -280,7 +269,7 @@ def test_two_pages_see_one_world_and_a_reload_or_a_close_disturbs_neither(open_p
     one.get_by_role("button", name="add a ball").click()
     visitor.until(lambda: visitor.states[0]["bodies"] == 7)
     two.reload()
-    playwright.expect(two.locator("#fps")).not_to_have_text("0 /s", timeout=SLOW)
+    playwright.expect(two.locator("#fps")).not_to_have_text("0 /s", timeout=PATIENCE)
     one.close()
     before = visitor.counts["pictures"]
     visitor.until(lambda: visitor.counts["pictures"] > before + 30)

@@ -257,7 +257,8 @@ def test_another_law_goes_on_where_the_bodies_are_and_stands_beside_the_first(vi
     visitor.until(lambda: visitor.states[0]["time"] < 0.1)
     visitor.listen(0.5)
     after = [visitor.body(i).mean(axis=0) for i in range(6)]
-    assert np.abs(np.array(after) - before).max() < 1e-3
+    # A picture may be a step behind: at 2 m/s that is 33 mm. At the beginning bodies were 200 mm higher.
+    assert np.abs(np.array(after) - before).max() < 0.035
     visitor.say("pause", is_paused=False)
     visitor.say("choose", law="springs", strain="exact")  # springs know no strain
     visitor.until(lambda: any("strain" in words and "springs" in words for words in visitor.said[-3:]))
