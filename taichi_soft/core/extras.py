@@ -23,7 +23,12 @@ EXTRAS = {
     },
     "cluster": {"distributed": "distributed"},
     "panda3d": {"panda3d": "panda3d"},
-    "live": {"websockets": "websockets"},
+    "live": {
+        "websockets": "websockets",
+        "cv2": "opencv-python-headless",
+        "imageio_ffmpeg": "imageio-ffmpeg",
+        "PIL": "pillow",
+    },
     "tetgen": {"tetgen": "tetgen"},
     "ftetwild": {"pytetwild": "pytetwild"},
 }

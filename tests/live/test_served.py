@@ -263,6 +263,7 @@ def test_another_law_goes_on_where_the_bodies_are_and_stands_beside_the_first(vi
     visitor.say("choose", law="springs", strain="exact")  # springs know no strain
     visitor.until(lambda: any("strain" in words and "springs" in words for words in visitor.said[-3:]))
     assert visitor.chosen[0]["law"] == "st_venant_kirchhoff"
+    visitor.listen(1.2)  # a law was chosen just now
     visitor.say("compare", law=None)
     visitor.until(lambda: visitor.panes == [0, 1] and visitor.pictures.get(1), 240.0)
     assert visitor.chosen[1]["law"] is None
