@@ -26,6 +26,7 @@ EXTRAS = {
     "live": {"websockets": "websockets"},
     "tetgen": {"tetgen": "tetgen"},
     "ftetwild": {"pytetwild": "pytetwild"},
+    "peers": {"mujoco": "mujoco", "newton": "newton", "pybullet": "pybullet"},
 }
 """By extra: its modules, and the packages that have them, as in pyproject.toml."""
 
