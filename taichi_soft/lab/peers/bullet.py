@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from taichi_soft.lab.peers.course import RATE, Course, Progress, Simulation, record
 from taichi_soft.lab.peers.drop import GRAVITY, Drop
+from taichi_soft.lab.peers.silence import silenced
 
 FIRST = 2
 """Steps in 1 / RATE s: Bullet's default of 1/240 s."""
@@ -29,9 +30,10 @@ FLOOR = 5.0
 
 def simulate(drop: Drop, on_frame: Progress | None = None) -> Course:
     """The course of the drop."""
-    import pybullet
+    with silenced():
+        import pybullet
 
-    client = pybullet.connect(pybullet.DIRECT)
+        client = pybullet.connect(pybullet.DIRECT)
     try:
         return record(drop, lambda steps: _make(drop, client, steps), FIRST, on_frame)
     finally:

@@ -54,7 +54,7 @@ def film_wall(
         raise OptionError(f"seconds is {seconds:g} at {fps:g} per second: at most {LARGEST_COUNT:,} frames")
     count = max(2, round(frames))
     with VideoWriter(path, fps=fps, size=size) as writer:
-        wall = _Wall(drop, entries, writer.size, drop.seconds / seconds)
+        wall = _Wall(drop, entries, writer.size, f", at {drop.seconds / seconds:.2g} x speed")
         for number in range(count):
             writer.write(wall.draw(drop.seconds * number / (count - 1)))
             if on_frame:
@@ -62,10 +62,15 @@ def film_wall(
     return count
 
 
+def draw_wall(drop: Drop, entries: Sequence[Entry], time: float, size: tuple[int, int]) -> NDArray[np.uint8]:
+    """The picture of one moment [s] of such a film, sRGB, uint8 (height, width, 3)."""
+    return _Wall(drop, entries, size, "").draw(time)
+
+
 class _Wall:
     """Panels in rows of three at most; in each a line at the height of the reference's top."""
 
-    def __init__(self, drop: Drop, entries: Sequence[Entry], size: tuple[int, int], pace: float) -> None:
+    def __init__(self, drop: Drop, entries: Sequence[Entry], size: tuple[int, int], pace: str) -> None:
         self.entries, self.size, self.pace = entries, size, pace
         self.columns = min(len(entries), 2 if len(entries) == 4 else 3)
         rows = -(-len(entries) // self.columns)
@@ -94,14 +99,15 @@ class _Wall:
         for i, (entry, surface) in enumerate(zip(self.entries, self.surfaces, strict=True)):
             surface.positions = entry.course.at(time)
             panel = self.renderer.render([surface])
-            panel[self._height_of_reference(time)] = MARK
+            row = self._height_of_reference(time)
+            panel[row : row + 2] = MARK
             draw_text(panel, captions(entry), corner="bottom left")
             if i == 0:
-                draw_text(panel, [f"t = {time:.2f} s, at {self.pace:.2g} x speed"], corner="top left")
+                draw_text(panel, [f"t = {time:.2f} s{self.pace}"], corner="top left")
             if entry.is_reference:
                 draw_text(panel, ["the line: its top"], corner="top left")
-            row, column = divmod(i, self.columns)
-            top, left = row * (height + GAP), column * (width + GAP)
+            above, before = divmod(i, self.columns)
+            top, left = above * (height + GAP), before * (width + GAP)
             picture[top : top + height, left : left + width] = panel
         return picture
 
@@ -121,10 +127,16 @@ def captions(entry: Entry) -> list[str]:
         return ["reference: fine steps in float64", squash, bounce]
     return [
         entry.name,
-        f"{entry.cost * 1e3:.2g} ms for a frame of 1/60 s",
+        f"{_milliseconds(entry.cost)} for a frame of 1/60 s",
         f"{squash}, {_in_words(entry.squash_error)}",
         f"{bounce}, {_in_words(entry.bounce_error)}",
     ]
+
+
+def _milliseconds(time: float) -> str:
+    """In two digits or more."""
+    ms = time * 1e3
+    return f"{ms:.{0 if ms >= 10 else 1 if ms >= 1 else 2}f} ms"
 
 
 def _in_words(error: float) -> str:
