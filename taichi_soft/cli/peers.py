@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
 
 from rich.markup import escape
 
 from taichi_soft.cli.console import progress_bar, say
+from taichi_soft.core.checks import as_positive
 from taichi_soft.core.runtime import init
 from taichi_soft.core.types import ArchName
 
@@ -25,30 +28,23 @@ def film_peers(
     """Simulate, write the film, and print a line for each engine; without a path no film."""
     from taichi_soft.lab.peers import Drop, compare, missing_peers
     from taichi_soft.lab.peers.wall import captions, film_wall
+    from taichi_soft.render import VideoWriter
 
+    length = as_positive(SECONDS if seconds is None else seconds, "seconds", "s")
     missing = missing_peers()
     if missing:
         say(escape(f"not installed here: {', '.join(missing)}: pip install 'taichi-soft[peers]'"))
     init(arch, threads)
-    drop, bar = Drop(), progress_bar()
-    with bar as progress:
+    drop, bar, frames = Drop(), progress_bar(), 0
+    with nullcontext() if path is None else VideoWriter(path, fps=fps, size=size) as writer, bar as progress:
         task = progress.add_task("", total=None)
 
         def show(name: str, done: int, total: int) -> None:
             progress.update(task, description=name, completed=done, total=total)
 
         entries = compare(drop, show)
-        if path is not None:
-            length = SECONDS if seconds is None else seconds
-            frames = film_wall(
-                drop,
-                entries,
-                path,
-                seconds=length,
-                fps=fps,
-                size=size,
-                on_frame=lambda done, total: show("film", done, total),
-            )
+        if writer:
+            frames = film_wall(drop, entries, writer, seconds=length, on_frame=partial(show, "film"))
     if path is not None:
         say(f"wrote {escape(str(path))}: {frames} frames, {frames / fps:.1f} s")
     for entry in entries:

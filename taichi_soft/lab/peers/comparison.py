@@ -74,4 +74,10 @@ def compare(
 
 
 def _telling(name: str, on_frame: Callable[[str, int, int], object] | None) -> Progress | None:
-    return None if on_frame is None else lambda done, total: (on_frame(name, done, total), None)[1]
+    if on_frame is None:
+        return None
+
+    def tell(done: int, total: int) -> None:
+        on_frame(name, done, total)
+
+    return tell

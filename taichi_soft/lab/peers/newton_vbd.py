@@ -1,7 +1,7 @@
 """The drop in Newton (Apache-2.0) on the CPU, by vertex block descent: stable neo-Hookean material.
 
-Newton is made for GPUs. On a CPU its kernels run on one thread, and the first start compiles for two minutes.
-Contact is a spring under each vertex: so stiff that the body sinks in by a millimetre or less.
+Newton is made for GPUs. On a CPU its kernels run on one thread, and the first start compiles for a minute or
+two. Contact is a spring under each vertex: so stiff that the body sinks in by a millimetre or less.
 """
 
 from __future__ import annotations

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,35 +29,32 @@ MARK = (200, 30, 40)
 def film_wall(
     drop: Drop,
     entries: Sequence[Entry],
-    path: Path,
+    writer: VideoWriter,
     *,
     seconds: float,
-    fps: float,
-    size: tuple[int, int],
     on_frame: Progress | None = None,
 ) -> int:
     """Film courses side by side, each from its beginning to its end, and return the number of frames.
 
     Args:
         drop: that they are courses of.
-        entries: at most nine, as `compare` gives them.
-        path: of the film, see `VideoWriter`.
+        entries: as `compare` gives them.
+        writer: of the film.
         seconds: length of the film: what lasts shorter is shown slowed down.
-        fps: frames per second.
-        size: width and height [pixels].
         on_frame: called with (frames made, frames in all) after each.
-    Raises: VideoError or OptionError, before anything is drawn where the arguments are wrong.
+    Raises: OptionError for a length out of range.
     """
-    frames = as_positive(seconds, "seconds", "s") * as_positive(fps, "fps", "1/s")
+    frames = as_positive(seconds, "seconds", "s") * writer.fps
     if frames > LARGEST_COUNT:
-        raise OptionError(f"seconds is {seconds:g} at {fps:g} per second: at most {LARGEST_COUNT:,} frames")
+        raise OptionError(
+            f"seconds is {seconds:g} at {writer.fps:g} per second: at most {LARGEST_COUNT:,} frames"
+        )
     count = max(2, round(frames))
-    with VideoWriter(path, fps=fps, size=size) as writer:
-        wall = _Wall(drop, entries, writer.size, f", at {drop.seconds / seconds:.2g} x speed")
-        for number in range(count):
-            writer.write(wall.draw(drop.seconds * number / (count - 1)))
-            if on_frame:
-                on_frame(number + 1, count)
+    wall = _Wall(drop, entries, writer.size, f", at {drop.seconds / seconds:.2g} x speed")
+    for number in range(count):
+        writer.write(wall.draw(drop.seconds * number / (count - 1)))
+        if on_frame:
+            on_frame(number + 1, count)
     return count
 
 

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from taichi_soft import OptionError, StateError, box, sphere
+from taichi_soft import OptionError, StateError, VideoError, box, sphere
 from taichi_soft.cli.demo import demo
 from taichi_soft.cli.peers import film_peers
 from taichi_soft.lab import peers
@@ -15,6 +15,7 @@ from taichi_soft.lab.peers.course import RATE, Simulation, record
 from taichi_soft.lab.peers.drop import GRAVITY
 from taichi_soft.lab.peers.reference import Reference
 from taichi_soft.lab.peers.wall import captions, film_wall
+from taichi_soft.render import VideoWriter
 
 SMALL = Drop(mesh=sphere(0.5, 2), height=0.4, seconds=0.8)
 
@@ -126,15 +127,8 @@ def test_captions_say_cost_and_error(entries):
 def test_the_wall_has_a_panel_for_each_engine_in_which_its_own_body_is_drawn(tmp_path, entries):
     """Pictures side by side: where courses differ, so do their panels, but for words and colours."""
     seen = []
-    film_wall(
-        SMALL,
-        [*entries, entries[1]],
-        tmp_path / "w.png",
-        seconds=0.5,
-        fps=10,
-        size=(480, 160),
-        on_frame=lambda *now: seen.append(now),
-    )
+    with VideoWriter(tmp_path / "w.png", fps=10, size=(480, 160)) as writer:
+        film_wall(SMALL, [*entries, entries[1]], writer, seconds=0.5, on_frame=lambda *now: seen.append(now))
     assert seen == [(i + 1, 5) for i in range(5)]
     pictures = [cv2.imread(str(path)) for path in sorted(tmp_path.iterdir())]
     assert [picture.shape for picture in pictures] == [(160, 480, 3)] * 5
@@ -165,6 +159,17 @@ def test_the_command_names_what_is_missing_and_writes_the_film(monkeypatch, caps
     assert lines[1].endswith("w.mp4: 5 frames, 0.5 s")
     assert lines[2].startswith("taichi-soft; 1.0 ms")
     assert Path(tmp_path / "w.mp4").stat().st_size > 0
+
+
+@pytest.mark.parametrize(
+    ("name", "seconds", "error"), [("w.mkv", 1.0, VideoError), ("w.mp4", -1.0, OptionError)]
+)
+def test_a_film_that_cannot_be_written_is_refused_before_anything_is_simulated(
+    monkeypatch, tmp_path, name, seconds, error
+):
+    monkeypatch.setattr(peers, "compare", lambda *_: pytest.fail("simulated"))
+    with pytest.raises(error):
+        film_peers(tmp_path / name, seconds, 10.0, (320, 160), "cpu", None)
 
 
 def test_peers_are_refused_for_other_demos():
