@@ -76,7 +76,7 @@ class _Wall:
         top = float(drop.start[:, 2].max())
         camera = Camera.framing(
             (-1.2 * half[0], -half[1], -0.75 * top),
-            (1.2 * half[0], half[1], top),
+            (1.2 * half[0], half[1], 1.12 * top),
             azimuth=-90,
             elevation=8,
             aspect=width / height,
