@@ -37,12 +37,23 @@ CONTACT = 'solref="0.01 1" solimp="0.95 0.99 0.0001"'
 
 def simulate_discrete(drop: Drop, on_frame: Progress | None = None) -> Course:
     """By the integrator that MuJoCo advises for flexes: implicit, together with contact."""
-    return record(drop, partial(_make, drop, "discrete"), FIRST, on_frame)
+    return _simulate(drop, "discrete", on_frame)
 
 
 def simulate_euler(drop: Drop, on_frame: Progress | None = None) -> Course:
     """By its explicit integrator, which takes less time where the material is soft."""
-    return record(drop, partial(_make, drop, "Euler"), FIRST, on_frame)
+    return _simulate(drop, "Euler", on_frame)
+
+
+def _simulate(drop: Drop, integrator: str, on_frame: Progress | None) -> Course:
+    """Without the file that MuJoCo writes its warnings to, in the folder that it is called from."""
+    import mujoco
+
+    mujoco.set_mju_user_warning(lambda _: None)
+    try:
+        return record(drop, partial(_make, drop, integrator), FIRST, on_frame)
+    finally:
+        mujoco.set_mju_user_warning(None)
 
 
 def _make(drop: Drop, integrator: str, steps: int) -> Simulation:

@@ -69,6 +69,13 @@ def test_a_body_is_squashed_as_in_the_reference_and_bounces_no_higher_than_it_fe
     assert exact.bounce / 2 < outcome.bounce < 1.05
 
 
+@pytest.mark.skipif(bool(missing_packages("peers", "mujoco")), reason="needs mujoco: the extra peers")
+def test_mujoco_leaves_no_file_where_it_is_called(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    ENGINES["MuJoCo, explicit"](DROP, None)
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_each_frame_has_its_time(course):
     assert len(course.frame_times) == round(DROP.seconds * 60)
     assert (course.frame_times > 0).all()
