@@ -37,7 +37,7 @@ def main() -> None:
     cv2.imwrite(str(FOLDER / "laws.png"), still("compare", 0.72, (1040, 585)))
     if not missing_peers():
         drop = Drop()
-        cv2.imwrite(str(FOLDER / "peers.png"), draw_wall(drop, compare(drop), 0.46, (1040, 585))[:, :, ::-1])
+        cv2.imwrite(str(FOLDER / "peers.png"), draw_wall(drop, compare(drop), 0.92, (1040, 585))[:, :, ::-1])
 
 
 if __name__ == "__main__":
