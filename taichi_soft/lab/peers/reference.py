@@ -3,7 +3,7 @@
 psi = mu/2 (I - 3 - 2 ln J) + lambda/2 (ln J)^2 (Simo and Pister 1984) is the law of none of the engines. The
 floor is a stiff spring under each vertex, so contact takes no energy: the skin of a body has no mass, and
 what a vertex would lose in a blow depends on the mesh alone. Steps of half the length and a floor four times
-as stiff change squash and bounce by half a per cent.
+as stiff change squash and bounce by 0.6 % at most.
 """
 
 from __future__ import annotations
