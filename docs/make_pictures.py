@@ -6,6 +6,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from taichi_soft.lab.peers import Drop, compare, missing_peers
+from taichi_soft.lab.peers.wall import draw_wall
 from taichi_soft.render.demos import load_demo
 from taichi_soft.render.film import film
 
@@ -33,6 +35,9 @@ def main() -> None:
     cv2.imwrite(str(FOLDER / "demos.png"), np.vstack(rows))
     cv2.imwrite(str(FOLDER / "elephants.png"), still("elephants", 0.52, (1040, 585)))
     cv2.imwrite(str(FOLDER / "laws.png"), still("compare", 0.72, (1040, 585)))
+    if not missing_peers():
+        drop = Drop()
+        cv2.imwrite(str(FOLDER / "peers.png"), draw_wall(drop, compare(drop), 0.92, (1040, 585))[:, :, ::-1])
 
 
 if __name__ == "__main__":

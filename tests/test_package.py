@@ -17,6 +17,8 @@ from taichi_soft.core.package_data import ASSETS, DEMOS
 ROOT = Path(__file__).resolve().parents[1]
 CORE = ("taichi", "numpy", "trimesh")
 MESHERS = ("tetgen", "ftetwild")
+APART = (*MESHERS, "peers")
+"""Extras that are not in `all`."""
 
 
 def packages_of(extra):
@@ -43,13 +45,13 @@ def test_an_extra_installs_the_packages_that_are_asked_for(extra):
     asked = set(extras.EXTRAS[extra].values())
     assert asked <= packages_of(extra)
     assert packages_of(extra) <= packages_of("dev")
-    if extra not in MESHERS:
+    if extra not in APART:
         assert packages_of(extra) <= packages_of("all")
 
 
-def test_what_a_game_is_shipped_with_holds_no_mesher_of_others():
-    """TetGen is under the AGPL, and fTetWild has no wheels for some machines."""
-    assert packages_of("all").isdisjoint(set().union(*map(packages_of, MESHERS)))
+def test_what_a_game_is_shipped_with_holds_no_mesher_or_engine_of_others():
+    """TetGen is under the AGPL, and fTetWild has no wheels for some machines. Engines are large."""
+    assert packages_of("all").isdisjoint(set().union(*map(packages_of, APART)))
 
 
 def test_the_core_imports_no_package_of_an_extra():

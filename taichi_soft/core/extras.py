@@ -31,6 +31,7 @@ EXTRAS = {
     },
     "tetgen": {"tetgen": "tetgen"},
     "ftetwild": {"pytetwild": "pytetwild"},
+    "peers": {"mujoco": "mujoco", "newton": "newton", "pybullet": "pybullet"},
 }
 """By extra: its modules, and the packages that have them, as in pyproject.toml."""
 
