@@ -156,7 +156,8 @@ def palette_of(world: World) -> dict[str, Any]:
 def adapter_of(scene: Scene, substeps: int | None) -> EngineAdapter:
     """For a scene, with so many substeps, or those of the scene."""
     given = scene.step.substeps if substeps is None else substeps
-    step = FixedStep(dt=scene.step.dt, substeps=given, max_steps=4)
+    # Where a world is slower than real time, it shows slow motion rather than few pictures.
+    step = FixedStep(dt=scene.step.dt, substeps=given, max_steps=2)
     return EngineAdapter(scene.world, step, before_step=scene.act)
 
 
