@@ -54,7 +54,7 @@ def _measure() -> None:
     table = Table(
         "spheres", "triangles", "bytes a picture", "pictures/s", title="a live view, for one visitor"
     )
-    for name in ("latency p50, p95 [ms]", "step p50, p99 [ms], no visitor", "one visitor"):
+    for name in ("latency p50, p95 (ms)", "step p50, p99 (ms), no visitor", "one visitor"):
         table.add_column(name)
     for each in costs:
         pairs = [f"{a:.1f}, {b:.1f}" for a, b in (each.latency_ms, each.alone_ms, each.visited_ms)]
