@@ -11,7 +11,7 @@ COARSE = 4.0
 FAINTEST = 0.002
 """Share of a shadow below which it is not drawn."""
 
-SOFT_TAPS = 6
+SOFT_TAPS = 8
 """Width of the box over which shadows on bodies are averaged [texels of the shadow map]."""
 
 LIFT = 0.7
@@ -77,7 +77,8 @@ def sunlight(light: ti.template(), depth: ti.template(), size, p, normal, texel)
                 open_texels += ti.select(depth[i_texel] > height, 0, 1)
         lit = ti.select(open_texels == 0, 0.0, 1.0)
         if open_texels > 0 and open_texels < 9:
-            lit = box_average(depth, size, left, top, fu, fv, height)
+            share = box_average(depth, size, left, top, fu, fv, height)
+            lit = share * share * (3.0 - 2.0 * share)
     return lit
 
 
@@ -107,29 +108,95 @@ def floor_shadow(
 
 
 @ti.func
-def glow(color, normal, view, sun, lit, above):
-    """Light that a point of a body sends to the eye.
+def share_of_fifth(x):
+    """x to the fifth power, for reflection at grazing angles."""
+    return x * x * x * x * x
+
+
+@ti.func
+def mirrored(normal, view, sun, doublings: ti.template()):
+    """Brightness of the key's mirror image, 0 to 1; the more doublings the smaller it is."""
+    half = sun + view
+    shine = ti.max(normal.dot(half) / ti.sqrt(ti.max(half.dot(half), 1e-12)), 0.0)
+    for _ in ti.static(range(doublings)):
+        shine *= shine
+    return shine
+
+
+@ti.func
+def surroundings(normal, sun, above):
+    """Light from everywhere but the key on a surface of albedo 1.
 
     Args:
-        color: share of the light that it throws back.
-        normal, view, sun: unit vectors out of the body, to the eye and to the sun.
-        lit: share of the sun that reaches it.
         above: 0 on the floor to 1 well above it, where its underside sees light.
     """
     upward = 0.5 + 0.5 * normal.z
-    below = lighting.FLOOR_LIGHT * (0.35 + 0.65 * above)
-    over = lighting.SKY_LIGHT * (0.7 + 0.3 * above)
-    around = below + (over - below) * upward
-    facing = ti.max(normal.dot(sun), 0.0) * lit
-    half = sun + view
-    shine = ti.max(normal.dot(half) / ti.sqrt(half.dot(half)), 0.0)
-    for _ in ti.static(range(5)):
-        shine *= shine
-    grazing = 1.0 - ti.max(normal.dot(view), 0.0)
-    grazing = grazing * grazing
-    rim = lighting.RIM * grazing * grazing * upward
-    return (
-        color * (lighting.SUN * facing + around)
-        + lighting.HORIZON * rim
-        + lighting.SUN * (lighting.HIGHLIGHT * shine * lit)
-    )
+    below = lighting.FLOOR_LIGHT * (0.30 + 0.70 * above)
+    over = lighting.SKY_LIGHT * (0.75 + 0.25 * above)
+    # The fill stands opposite the key, at the height of the eye.
+    aside = 0.5 - 0.5 * (normal.x * sun.x + normal.y * sun.y) / ti.sqrt(1.0 - sun.z * sun.z)
+    return below + (over - below) * upward + lighting.FILL * (aside * aside)
+
+
+@ti.func
+def dimmed(light, color, openness):
+    """Light from around where only a share `openness` of it is seen.
+
+    What hides the rest is taken to be about as bright as the surface itself: bright bodies do not get dirty
+    where they touch.
+    """
+    return light * (openness / (1.0 - 0.55 * (1.0 - openness) * color))
+
+
+@ti.func
+def glow(look, color, normal, view, sun, lit, above, openness):
+    """Light that a point of a body sends to the eye.
+
+    Args:
+        look: a code of `look`.
+        color: share of the light that it throws back.
+        normal, view, sun: unit vectors out of the body, to the eye and to the key.
+        lit: share of the key that reaches the side of it that faces the key.
+        above: see `surroundings`.
+        openness: share of its surroundings that it sees, 0 to 1.
+    """
+    around = surroundings(normal, sun, above)
+    facing = normal.dot(sun)
+    grazing = share_of_fifth(1.0 - ti.math.clamp(normal.dot(view), 0.0, 1.0))
+    upward = 0.5 + 0.5 * normal.z
+    key = lighting.SUN * (lit * (0.65 + 0.35 * openness))
+    total = ti.Vector([0.0, 0.0, 0.0])
+    if look == 1:
+        # Thick parts are deeper in colour than those at the rim.
+        rim = 1.0 - ti.math.clamp(normal.dot(view), 0.0, 1.0)
+        inner = color * (0.62 + 0.38 * color) * (1.0 - rim * rim) + color * (1.25 * rim * rim)
+        wrapped = ti.max((facing + lighting.JELLY_WRAP) / (1.0 + lighting.JELLY_WRAP), 0.0)
+        kept = lighting.JELLY_KEPT + (1.0 - lighting.JELLY_KEPT) * lit * smooth_rise(facing)
+        # Light that went in at the lit side comes out opposite, where the body is dark otherwise.
+        through = lighting.JELLY_THROUGH * ti.max(0.25 - facing, 0.0) * (0.4 + 0.6 * rim)
+        total = inner * (lighting.SUN * (wrapped * kept + through) + dimmed(around, color, openness))
+        shine = mirrored(normal, view, sun, 7) + 0.12 * mirrored(normal, view, sun, 4)
+        total += lighting.SUN * (lighting.JELLY_HIGHLIGHT * shine * lit)
+        total += lighting.HORIZON * (lighting.JELLY_RIM * grazing * (0.35 + 0.65 * upward) * openness)
+    elif look == 0:
+        total = color * (key * ti.max(facing, 0.0) + dimmed(around, color, openness))
+        total += lighting.SUN * (lighting.HIGHLIGHT * mirrored(normal, view, sun, 4) * lit)
+        total += lighting.HORIZON * (lighting.RIM * grazing * upward * openness)
+    else:
+        own = color
+        if look == 3:
+            own = color + (lighting.THREAD - color) * lighting.CLOTH_PLAIN
+        straight = ti.select(facing > 0.0, facing, -lighting.CLOTH_THROUGH * facing)
+        # What comes through has been coloured by the threads twice.
+        tint = ti.select(facing > 0.0, own, own * color)
+        total = tint * (key * straight) + own * dimmed(around, own, openness)
+        fuzz = 1.0 - ti.math.clamp(normal.dot(view), 0.0, 1.0)
+        total += own * (lighting.CLOTH_SHEEN * fuzz * fuzz * fuzz) * (around + 0.5 * key)
+    return total
+
+
+@ti.func
+def smooth_rise(x):
+    """0 at 0 and below, 1 from 0.4 on, smooth between."""
+    s = ti.math.clamp(2.5 * x, 0.0, 1.0)
+    return s * s * (3.0 - 2.0 * s)

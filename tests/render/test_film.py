@@ -62,7 +62,7 @@ def test_frames_show_every_fixed_step_where_both_rates_agree(tmp_path):
 def test_the_time_in_the_picture_is_that_of_the_body_in_it(tmp_path, monkeypatch):
     """In free fall from z0 the lowest point is at z0 - g t^2 / 2 at the time that the panel tells."""
     told, drawn = [], []
-    monkeypatch.setattr("taichi_soft.render.film.draw_text", lambda picture, lines: told.append(lines[1]))
+    monkeypatch.setattr("taichi_soft.render.artist.draw_text", lambda picture, lines: told.append(lines[1]))
     original = Renderer.render
 
     def watched(self, surfaces):
@@ -116,7 +116,7 @@ def test_a_label_stands_on_the_floor_in_front_of_the_body(monkeypatch, tmp_path)
     """Wherever the body is above it: below all of its pixels, and as far as the floor goes."""
     places = []
     monkeypatch.setattr(
-        "taichi_soft.render.film.draw_labels", lambda picture, labels, rows: places.append(rows)
+        "taichi_soft.render.artist.draw_labels", lambda picture, labels, rows: places.append(rows)
     )
     stage = falling_box()
     film(stage, tmp_path / "b.png", seconds=0.4, size=(160, 120))

@@ -1,0 +1,23 @@
+"""What bodies are made of, to the eye."""
+
+from __future__ import annotations
+
+from typing import Literal, TypeAlias
+
+from taichi_soft.core.types import Choice
+
+
+class Look(Choice):
+    """How a surface throws light back."""
+
+    MATTE = "matte"  # rubber: dull, with a broad faint shine
+    JELLY = "jelly"  # light goes in and comes out beside: soft shades, a bright rim, a sharp shine
+    CLOTH = "cloth"  # thin, seen from both sides: the back is paler, and some light comes through
+
+
+LookName: TypeAlias = Literal["matte", "jelly", "cloth"]
+CODES = {Look.MATTE: 0, Look.JELLY: 1, Look.CLOTH: 2}
+"""Of looks, for kernels."""
+
+CLOTH_BACK = 3
+"""Code of a triangle that shows the back of a cloth."""
