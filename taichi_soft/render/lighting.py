@@ -14,7 +14,7 @@ vec3 = ti.types.vector(3, ti.f32)
 SUN = vec3(1.00, 0.885, 0.73)
 SKY_LIGHT = vec3(0.30, 0.355, 0.44)
 FILL = vec3(0.085, 0.105, 0.14)
-FLOOR_LIGHT = vec3(0.23, 0.205, 0.175)
+FLOOR_LIGHT = vec3(0.27, 0.24, 0.205)
 
 # Matte: mirror reflection of the key at its brightest, and of the sky at grazing angles.
 HIGHLIGHT = 0.10
@@ -33,7 +33,7 @@ CLOTH_THROUGH = 0.30
 CLOTH_PLAIN = 0.62
 THREAD = vec3(0.62, 0.58, 0.52)
 
-HORIZON = vec3(0.83, 0.82, 0.795)
+HORIZON = vec3(0.90, 0.885, 0.855)
 ZENITH = vec3(0.25, 0.38, 0.54)
 FLOOR_BRIGHT = vec3(0.64, 0.625, 0.60)
 FLOOR_DARK = vec3(0.51, 0.50, 0.485)

@@ -17,13 +17,13 @@ TAPS = 10
 """Places round a point that are looked at."""
 
 TURNS = 4
-"""Each of so many by so many points has its taps turned by another angle; then they are averaged."""
+"""Of so many by so many points each has its taps turned by another angle; then they are averaged."""
 
-WIDEST = 24.0
+WIDEST = 64.0
 """Distance of the farthest tap at most [points]."""
 
 BIAS = 0.12
-"""Sine of the angle above a triangle's plane up to which nothing counts: a round body is made of flat ones."""
+"""Sine of the angle above a triangle up to which nothing counts: round bodies are made of flat ones."""
 
 STRENGTH = 7.0
 """Of the darkening; it never gets black."""

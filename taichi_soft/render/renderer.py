@@ -29,8 +29,8 @@ LARGEST = 8192  # pixels along a picture; beyond it sample numbers leave 32 bits
 class Renderer:
     """Draws surfaces in a warm key light and a cool fill, over a checked floor that fades to the horizon.
 
-    Shadows are soft. Where bodies come close they take light from each other and from the floor. Light is taken to a screen as
-    film takes it, see `tone`.
+    Shadows are soft. Where bodies come close they take light from each other. What is too bright for a screen
+    is pressed together, see `tone`.
 
     Args:
         width, height: of the picture, 16 to 8192 [pixels].

@@ -153,7 +153,7 @@ def shade(
                                 lit = sunlight(light, light_depth, near_shadow.shape[0], p, outward, texel)
                             spot = light_place(contact_place, p)
                             above = smoothstep(0.0, reach, p.z - floor)
-                            above *= 1.0 - bilinear(contact, contact.shape[0], spot.x, spot.y)
+                            above *= 1.0 - 0.6 * bilinear(contact, contact.shape[0], spot.x, spot.y)
                             q = planes[t, 9] * (x + 0.5) + planes[t, 10] * (y + 0.5) + planes[t, 11]
                             openness = openness_at(q_map, hidden, x, y, q)
                             last = glow(look, c, n, view, sun, lit, above, openness)

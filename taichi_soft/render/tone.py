@@ -1,4 +1,4 @@
-"""From light without an upper end to what a screen shows: a toe, a straight middle, a shoulder, as of film."""
+"""From light without an upper end to what a screen shows: a toe, a straight middle and a shoulder."""
 
 from __future__ import annotations
 
