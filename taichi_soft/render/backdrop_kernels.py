@@ -37,7 +37,7 @@ def write_pixel(color, encode: ti.template(), out: ti.template(), x, y):
     grain = ti.math.fract(52.9829189 * ti.math.fract(0.06711056 * x + 0.00583715 * y))
     for k in ti.static(range(3)):
         root = ti.sqrt(ti.math.clamp(color[k] / WHITE, 0.0, 1.0))
-        level = encode[ti.i32(root * (encode.shape[0] - 1) + 0.5)]
+        level = encode[ti.math.clamp(ti.i32(root * (encode.shape[0] - 1) + 0.5), 0, encode.shape[0] - 1)]
         out[y, x, k] = ti.u8(ti.min(level + grain, 255.0))
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.core.runtime import ti
-from taichi_soft.render.occlusion_kernels import find_hidden, gather_depth, spread_hidden
+from taichi_soft.render.occlusion_kernels import find_hidden, gather_depth, spiral_taps, spread_hidden
 from taichi_soft.render.raster import Raster
 
 Floats = NDArray[np.float32]
@@ -32,6 +32,7 @@ class Occlusion:
         shape = (raster.height + 1) // 2, (raster.width + 1) // 2
         self.depth: Floats = np.zeros(shape, dtype=np.float32)
         self.hidden: Floats = np.zeros(shape, dtype=np.float32)
+        self._taps = spiral_taps()
         self._rough: Floats = np.zeros(shape, dtype=np.float32)
 
     def update(self, rays: Floats, lens: Floats, focal: float, backdrop: tuple[float, float, float]) -> None:
@@ -60,6 +61,7 @@ class Occlusion:
             raster.tile_begin,
             raster.owner,
             raster.planes,
+            self._taps,
             self.depth,
             self._rough,
         )

@@ -6,6 +6,8 @@ All at half the picture's width and height. A plane in space has q = 1 / depth =
 picture, so how high something stands above the plane of a triangle is seen from its q alone.
 """
 
+import numpy as np
+
 from taichi_soft.core.runtime import ti
 from taichi_soft.render.backdrop_kernels import pixel_ray
 from taichi_soft.render.kernel_types import TILE, ints, reals, rows, vec3
@@ -30,6 +32,19 @@ STRENGTH = 7.0
 
 ALIKE = 0.03
 """Difference of depth, as a share of it, beyond which two points are not of one surface."""
+
+
+def spiral_taps():
+    """Places round a point within a circle of radius 1, float32 (TURNS * TURNS * TAPS, 2).
+
+    Those of each of the points that are averaged come after each other: spirals that are denser inside.
+    """
+    k = np.arange(TAPS)
+    turn = np.arange(TURNS * TURNS)[:, None] * 7 % (TURNS * TURNS)
+    angle = 2.0 * np.pi * turn / (TURNS * TURNS) + 2.3999632 * k  # the golden angle
+    radius = (k + 0.6) / TAPS
+    places = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
+    return places.reshape(-1, 2).astype(np.float32)
 
 
 @ti.kernel
@@ -75,6 +90,7 @@ def hidden_share(
     offset_v,
     reach,
     focal,
+    taps: ti.template(),
 ):
     """Share of its surroundings that the point (i, j) of a triangle does not see.
 
@@ -93,22 +109,20 @@ def hidden_share(
     )
     scale = 1.0 / ti.sqrt(ti.max(normal.dot(normal), 1e-30))
     wide = ti.min(0.5 * focal * reach * q, WIDEST)
-    turn = (i % TURNS + TURNS * (j % TURNS)) * 7 % (TURNS * TURNS)
-    start = (6.2831853 / (TURNS * TURNS)) * turn
+    first = (i % TURNS + TURNS * (j % TURNS)) * TAPS
     total = 0.0
     for k in range(TAPS):
-        radius = wide * (k + 0.6) / TAPS
-        angle = start + 2.3999632 * k  # a spiral that leaves no gaps
-        x = ti.math.clamp(ti.i32(ti.round(i + radius * ti.cos(angle))), 0, q_map.shape[1] - 1)
-        y = ti.math.clamp(ti.i32(ti.round(j + radius * ti.sin(angle))), 0, q_map.shape[0] - 1)
+        x = ti.math.clamp(ti.i32(i + 0.5 + wide * taps[first + k, 0]), 0, q_map.shape[1] - 1)
+        y = ti.math.clamp(ti.i32(j + 0.5 + wide * taps[first + k, 1]), 0, q_map.shape[0] - 1)
         q_there = q_map[y, x]
         if q_there > 0.0:
             u_there, v_there = 2.0 * x + 0.5 + offset_u, 2.0 * y + 0.5 + offset_v
             above = scale * (1.0 - plane.dot(ti.Vector([u_there, v_there, 1.0])) / q_there)
-            way = pixel_ray(rays, u_there, v_there) / q_there - here
-            far2 = way.dot(way)
-            near = ti.max(1.0 - far2 / (reach * reach), 0.0)
-            total += ti.max(above / ti.sqrt(far2 + 1e-12 * reach * reach) - BIAS, 0.0) * near
+            if above > 0.0:
+                way = pixel_ray(rays, u_there, v_there) / q_there - here
+                far2 = way.dot(way)
+                near = ti.max(1.0 - far2 / (reach * reach), 0.0)
+                total += ti.max(above / ti.sqrt(far2 + 1e-12 * reach * reach) - BIAS, 0.0) * near
     return 1.0 - ti.exp(-STRENGTH * total / TAPS)
 
 
@@ -125,6 +139,7 @@ def find_hidden(
     tile_begin: ints,
     owner: ints,
     planes: rows,
+    taps: rows,
     q_map: rows,
     out: rows,
 ):
@@ -132,6 +147,7 @@ def find_hidden(
 
     Args:
         focal: pixels per unit of tangent.
+        taps: as `spiral_taps` has them.
         q_map: what `gather_depth` found.
         out: (height / 2, width / 2); 0 where there is no body.
     """
@@ -146,9 +162,9 @@ def find_hidden(
                     if t >= 0:
                         plane = ti.Vector([planes[t, 9], planes[t, 10], planes[t, 11]])
                         hidden = hidden_share(
-                            q_map, rays, lens, plane, i, j, offset_u, offset_v, reach, focal
+                            q_map, rays, lens, plane, i, j, offset_u, offset_v, reach, focal, taps
                         )
-                    out[j, i] = hidden
+                    out[j, i] = ti.select(hidden > 0.0, hidden, 0.0)  # written so that NaN hides nothing
 
 
 @ti.kernel
