@@ -164,7 +164,7 @@ def glow(look, color, normal, view, sun, lit, above, openness):
     facing = normal.dot(sun)
     grazing = share_of_fifth(1.0 - ti.math.clamp(normal.dot(view), 0.0, 1.0))
     upward = 0.5 + 0.5 * normal.z
-    key = lighting.SUN * (lit * (0.65 + 0.35 * openness))
+    key = lighting.SUN * (lit * (0.45 + 0.55 * openness))
     total = ti.Vector([0.0, 0.0, 0.0])
     if look == 1:
         # Thick parts are deeper in colour than those at the rim.
