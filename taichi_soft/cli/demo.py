@@ -26,6 +26,9 @@ def demo(
     slow: Annotated[float, typer.Option(help="How many times slower than the world the film is.")] = 1.0,
     blur: Annotated[int, typer.Option(help="Pictures averaged to one, for motion blur; 1 is sharp.")] = 1,
     framed: Annotated[bool, typer.Option(help="Look from where all places of the bodies are seen.")] = False,
+    orbit: Annotated[
+        float | None, typer.Option(help="The camera goes round once in so much time of the world [s].")
+    ] = None,
     video: Annotated[bool, typer.Option(help="Write a film, or only run and time the steps.")] = True,
     arch: Arch = "auto",
     threads: Threads = None,
@@ -42,6 +45,7 @@ def demo(
     module = load_demo(name)
     path = (out or Path("out") / f"{name}.mp4") if video else None
     init(arch, threads)
+    from taichi_soft.render.camera_moves import Orbit
     from taichi_soft.render.film import film
     from taichi_soft.render.framing import framed as framed_stage
 
@@ -52,6 +56,8 @@ def demo(
         stage = (
             framed_stage(module.stage, aspect=width / height, seconds=seconds) if framed else module.stage()
         )
+        if orbit is not None:
+            stage.camera = Orbit(stage.camera, orbit)
         report = film(
             stage,
             path,

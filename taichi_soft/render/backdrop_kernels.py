@@ -69,7 +69,7 @@ def paint_backdrop(
         up = ray.z / ray.norm()
         # Brightest at the horizon, deeper upwards; below it, where the floor has faded, it stays bright.
         color = lighting.HORIZON + (lighting.ZENITH - lighting.HORIZON) * smoothstep(
-            -0.05, 0.75, ti.sqrt(ti.max(up, 0.0))
+            -0.05, 0.65, ti.sqrt(ti.max(up, 0.0))
         )
         share = 0.0
         depth = (floor - eye.z) / ti.select(ti.abs(ray.z) > 1e-9, ray.z, 1e-9)

@@ -177,7 +177,7 @@ def glow(look, color, normal, view, sun, lit, above, openness):
         total = inner * (lighting.SUN * (wrapped * kept + through) + dimmed(around, color, openness))
         shine = mirrored(normal, view, sun, 7) + 0.12 * mirrored(normal, view, sun, 4)
         total += lighting.SUN * (lighting.JELLY_HIGHLIGHT * shine * lit)
-        total += lighting.HORIZON * (lighting.JELLY_RIM * grazing * (0.35 + 0.65 * upward) * openness)
+        total += lighting.HORIZON * (lighting.JELLY_RIM * grazing * (0.2 + 0.8 * upward) * openness)
     elif look == 0:
         total = color * (key * ti.max(facing, 0.0) + dimmed(around, color, openness))
         total += lighting.SUN * (lighting.HIGHLIGHT * mirrored(normal, view, sun, 4) * lit)
@@ -187,8 +187,8 @@ def glow(look, color, normal, view, sun, lit, above, openness):
         if look == 3:
             own = color + (lighting.THREAD - color) * lighting.CLOTH_PLAIN
         straight = ti.select(facing > 0.0, facing, -lighting.CLOTH_THROUGH * facing)
-        # What comes through has been coloured by the threads twice.
-        tint = ti.select(facing > 0.0, own, own * color)
+        # What comes through has been coloured by more threads.
+        tint = ti.select(facing > 0.0, own, own * (0.35 + 0.65 * color))
         total = tint * (key * straight) + own * dimmed(around, own, openness)
         fuzz = 1.0 - ti.math.clamp(normal.dot(view), 0.0, 1.0)
         total += own * (lighting.CLOTH_SHEEN * fuzz * fuzz * fuzz) * (around + 0.5 * key)

@@ -29,15 +29,15 @@ JELLY_THROUGH = 0.42
 # Cloth: what its fibres throw back at grazing angles, what comes through, and how its back differs: so much
 # of its colour is that of unbleached thread.
 CLOTH_SHEEN = 0.22
-CLOTH_THROUGH = 0.30
+CLOTH_THROUGH = 0.42
 CLOTH_PLAIN = 0.62
 THREAD = vec3(0.62, 0.58, 0.52)
 
-HORIZON = vec3(0.90, 0.885, 0.855)
-ZENITH = vec3(0.25, 0.38, 0.54)
-FLOOR_BRIGHT = vec3(0.64, 0.625, 0.60)
-FLOOR_DARK = vec3(0.51, 0.50, 0.485)
-POOL = 0.10  # the floor is brighter by this share where the camera looks
+HORIZON = vec3(0.93, 0.94, 0.95)
+ZENITH = vec3(0.21, 0.37, 0.58)
+FLOOR_BRIGHT = vec3(0.66, 0.635, 0.595)
+FLOOR_DARK = vec3(0.52, 0.50, 0.47)
+POOL = 0.14  # the floor is brighter by this share where the camera looks
 
 # Direction to the key when seen from the camera: over its left shoulder. The fill comes from the right.
 SUN_ELEVATION = np.radians(52.0)

@@ -86,6 +86,7 @@ def test_demo_writes_a_film_and_says_how_fast_it_ran(tmp_path):
         (("demo", "bounce", "--fps", "nan"), "nan"),
         (("demo", "bounce", "--slow", "0.5"), "slow"),
         (("demo", "bounce", "--blur", "0"), "blur"),
+        (("demo", "bounce", "--orbit", "0"), "period"),
         (("info", "--threads", "0"), "0"),
         (("info", "--law", "none"), "'none'"),
         (("profile", "--cores", "first"), "'first'"),
