@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from statistics import median
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.markup import escape
@@ -53,7 +53,7 @@ def demo(
     task = bar.add_task(name, total=None)
     with bar as progress, shown_by(lambda text: progress.update(task, description=escape(text) or name)):
         width, height = pixels
-        stage = (
+        stage: Any = (
             framed_stage(module.stage, aspect=width / height, seconds=seconds) if framed else module.stage()
         )
         if orbit is not None:

@@ -7,6 +7,7 @@ picture, so how high something stands above the plane of a triangle is seen from
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from taichi_soft.core.runtime import ti
 from taichi_soft.render.backdrop_kernels import pixel_ray
@@ -34,7 +35,7 @@ ALIKE = 0.03
 """Difference of depth, as a share of it, beyond which two points are not of one surface."""
 
 
-def spiral_taps():
+def spiral_taps() -> NDArray[np.float32]:
     """Places round a point within a circle of radius 1, float32 (TURNS * TURNS * TAPS, 2).
 
     Those of each of the points that are averaged come after each other: spirals that are denser inside.
