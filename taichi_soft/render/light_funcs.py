@@ -4,6 +4,7 @@
 
 from taichi_soft.core.runtime import ti
 from taichi_soft.render import lighting
+from taichi_soft.render.look import CLOTH_BACK, JELLY, MATTE
 
 COARSE = 4.0
 """Texels of the sun's map along one of the maps of far shadows."""
@@ -108,8 +109,8 @@ def floor_shadow(
 
 
 @ti.func
-def share_of_fifth(x):
-    """x to the fifth power, for reflection at grazing angles."""
+def fifth_power(x):
+    """Of x: how reflection rises towards grazing angles."""
     return x * x * x * x * x
 
 
@@ -149,6 +150,52 @@ def dimmed(light, color, openness):
 
 
 @ti.func
+def smooth_rise(x):
+    """0 at 0 and below, 1 from 0.4 on, smooth between."""
+    s = ti.math.clamp(2.5 * x, 0.0, 1.0)
+    return s * s * (3.0 - 2.0 * s)
+
+
+@ti.func
+def matte_glow(color, normal, view, sun, around, key, lit, rim, openness):
+    """Rubber; the arguments of this and of the next two are those of `glow` and what it computes."""
+    total = color * (key * ti.max(normal.dot(sun), 0.0) + dimmed(around, color, openness))
+    total += lighting.SUN * (lighting.HIGHLIGHT * mirrored(normal, view, sun, 4) * lit)
+    return total + lighting.HORIZON * (lighting.RIM * fifth_power(rim) * (0.5 + 0.5 * normal.z) * openness)
+
+
+@ti.func
+def jelly_glow(color, normal, view, sun, around, lit, rim, openness):
+    """Light goes in and comes out beside where it went in."""
+    facing = normal.dot(sun)
+    # Thick parts are deeper in colour than those at the rim.
+    inner = color * ((0.62 + 0.38 * color) * (1.0 - rim * rim) + 1.25 * rim * rim)
+    wrapped = ti.max((facing + lighting.JELLY_WRAP) / (1.0 + lighting.JELLY_WRAP), 0.0)
+    kept = lighting.JELLY_KEPT + (1.0 - lighting.JELLY_KEPT) * lit * smooth_rise(facing)
+    # Light that went in at the lit side comes out opposite, where the body is dark otherwise.
+    through = lighting.JELLY_THROUGH * ti.max(0.25 - facing, 0.0) * (0.4 + 0.6 * rim)
+    total = inner * (lighting.SUN * (wrapped * kept + through) + dimmed(around, color, openness))
+    shine = mirrored(normal, view, sun, 7) + 0.12 * mirrored(normal, view, sun, 4)
+    total += lighting.SUN * (lighting.JELLY_HIGHLIGHT * shine * lit)
+    mirror = lighting.JELLY_RIM * fifth_power(rim) * (0.6 + 0.4 * normal.z) * openness
+    return total + lighting.HORIZON * mirror
+
+
+@ti.func
+def cloth_glow(look, color, normal, sun, around, key, rim, openness):
+    """Fibres, through which some of the light of the other side comes."""
+    own = color
+    if look == CLOTH_BACK:
+        own = color + (lighting.THREAD - color) * lighting.CLOTH_PLAIN
+    facing = normal.dot(sun)
+    straight, tint = facing, own
+    if facing < 0.0:  # what comes through has been coloured by more threads
+        straight, tint = -lighting.CLOTH_THROUGH * facing, own * (0.35 + 0.65 * color)
+    total = tint * (key * straight) + own * dimmed(around, own, openness)
+    return total + own * (lighting.CLOTH_SHEEN * rim * rim * rim) * (around + 0.5 * key)
+
+
+@ti.func
 def glow(look, color, normal, view, sun, lit, above, openness):
     """Light that a point of a body sends to the eye.
 
@@ -161,42 +208,13 @@ def glow(look, color, normal, view, sun, lit, above, openness):
         openness: share of its surroundings that it sees, 0 to 1.
     """
     around = surroundings(normal, sun, above)
-    facing = normal.dot(sun)
-    grazing = share_of_fifth(1.0 - ti.math.clamp(normal.dot(view), 0.0, 1.0))
-    upward = 0.5 + 0.5 * normal.z
     key = lighting.SUN * (lit * (0.45 + 0.55 * openness))
+    rim = 1.0 - ti.math.clamp(normal.dot(view), 0.0, 1.0)
     total = ti.Vector([0.0, 0.0, 0.0])
-    if look == 1:
-        # Thick parts are deeper in colour than those at the rim.
-        rim = 1.0 - ti.math.clamp(normal.dot(view), 0.0, 1.0)
-        inner = color * (0.62 + 0.38 * color) * (1.0 - rim * rim) + color * (1.25 * rim * rim)
-        wrapped = ti.max((facing + lighting.JELLY_WRAP) / (1.0 + lighting.JELLY_WRAP), 0.0)
-        kept = lighting.JELLY_KEPT + (1.0 - lighting.JELLY_KEPT) * lit * smooth_rise(facing)
-        # Light that went in at the lit side comes out opposite, where the body is dark otherwise.
-        through = lighting.JELLY_THROUGH * ti.max(0.25 - facing, 0.0) * (0.4 + 0.6 * rim)
-        total = inner * (lighting.SUN * (wrapped * kept + through) + dimmed(around, color, openness))
-        shine = mirrored(normal, view, sun, 7) + 0.12 * mirrored(normal, view, sun, 4)
-        total += lighting.SUN * (lighting.JELLY_HIGHLIGHT * shine * lit)
-        total += lighting.HORIZON * (lighting.JELLY_RIM * grazing * (0.2 + 0.8 * upward) * openness)
-    elif look == 0:
-        total = color * (key * ti.max(facing, 0.0) + dimmed(around, color, openness))
-        total += lighting.SUN * (lighting.HIGHLIGHT * mirrored(normal, view, sun, 4) * lit)
-        total += lighting.HORIZON * (lighting.RIM * grazing * upward * openness)
+    if look == MATTE:
+        total = matte_glow(color, normal, view, sun, around, key, lit, rim, openness)
+    elif look == JELLY:
+        total = jelly_glow(color, normal, view, sun, around, lit, rim, openness)
     else:
-        own = color
-        if look == 3:
-            own = color + (lighting.THREAD - color) * lighting.CLOTH_PLAIN
-        straight = ti.select(facing > 0.0, facing, -lighting.CLOTH_THROUGH * facing)
-        # What comes through has been coloured by more threads.
-        tint = ti.select(facing > 0.0, own, own * (0.35 + 0.65 * color))
-        total = tint * (key * straight) + own * dimmed(around, own, openness)
-        fuzz = 1.0 - ti.math.clamp(normal.dot(view), 0.0, 1.0)
-        total += own * (lighting.CLOTH_SHEEN * fuzz * fuzz * fuzz) * (around + 0.5 * key)
+        total = cloth_glow(look, color, normal, sun, around, key, rim, openness)
     return total
-
-
-@ti.func
-def smooth_rise(x):
-    """0 at 0 and below, 1 from 0.4 on, smooth between."""
-    s = ti.math.clamp(2.5 * x, 0.0, 1.0)
-    return s * s * (3.0 - 2.0 * s)

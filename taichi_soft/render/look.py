@@ -16,8 +16,9 @@ class Look(Choice):
 
 
 LookName: TypeAlias = Literal["matte", "jelly", "cloth"]
-CODES = {Look.MATTE: 0, Look.JELLY: 1, Look.CLOTH: 2}
-"""Of looks, for kernels."""
 
-CLOTH_BACK = 3
-"""Code of a triangle that shows the back of a cloth."""
+MATTE, JELLY, CLOTH, CLOTH_BACK = range(4)
+"""How kernels call the looks of triangles; a cloth has two sides."""
+
+CODES = {Look.MATTE: MATTE, Look.JELLY: JELLY, Look.CLOTH: CLOTH}
+"""Of the front of a surface."""

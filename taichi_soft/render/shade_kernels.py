@@ -18,6 +18,7 @@ from taichi_soft.render.kernel_types import (
     vec3,
 )
 from taichi_soft.render.light_funcs import bilinear, floor_shadow, glow, light_place, sunlight
+from taichi_soft.render.look import CLOTH
 from taichi_soft.render.occlusion_kernels import openness_at
 from taichi_soft.render.texture_funcs import texture_light
 
@@ -146,7 +147,7 @@ def shade(
                             look = looks[t]
                             # Of a cloth, the other side may be the one that the key shines on.
                             outward = n
-                            if look >= 2 and n.dot(sun) < 0.0:
+                            if look >= CLOTH and n.dot(sun) < 0.0:
                                 outward = -n
                             lit = 0.0
                             if outward.dot(sun) > 0.0:

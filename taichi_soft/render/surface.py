@@ -10,7 +10,7 @@ from taichi_soft.core.errors import MeshError, OptionError
 from taichi_soft.meshing import BodyMesh, ParticleMesh, TetMesh
 from taichi_soft.meshing.creases import ROUND, split_at_creases
 from taichi_soft.render.colors import PALETTE, to_linear
-from taichi_soft.render.look import CLOTH_BACK, CODES, Look, LookName
+from taichi_soft.render.look import CLOTH, CLOTH_BACK, CODES, Look, LookName
 from taichi_soft.render.texture import Texture
 
 # Coordinates beyond this [m] come from an explosion; their products would overflow in float32.
@@ -156,5 +156,5 @@ def _both_sides(triangles: NDArray[np.integer]) -> tuple[NDArray[np.integer], ND
     """
     _, first = np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)
     front = triangles[np.sort(first)]
-    codes = np.repeat(np.array([CODES[Look.CLOTH], CLOTH_BACK], dtype=np.int32), len(front))
+    codes = np.repeat(np.array([CLOTH, CLOTH_BACK], dtype=np.int32), len(front))
     return np.concatenate([front, front[:, ::-1]]), codes
