@@ -11,10 +11,10 @@ vec3 = ti.types.vector(3, ti.f32)
 # Light of a surface of albedo 1: the warm key straight on, the cool sky on what faces up, a weak cool fill
 # from the side that the key leaves dark, and what the floor throws back on what faces down. What faces the
 # key gets a little more than 1, which `tone` presses together.
-SUN = vec3(1.00, 0.885, 0.73)
-SKY_LIGHT = vec3(0.30, 0.355, 0.44)
+SUN = vec3(1.10, 0.97, 0.80)
+SKY_LIGHT = vec3(0.34, 0.39, 0.47)
 FILL = vec3(0.085, 0.105, 0.14)
-FLOOR_LIGHT = vec3(0.27, 0.24, 0.205)
+FLOOR_LIGHT = vec3(0.33, 0.295, 0.25)
 
 # Matte: mirror reflection of the key at its brightest, and of the sky at grazing angles.
 HIGHLIGHT = 0.10

@@ -28,7 +28,7 @@ WIDEST = 64.0
 BIAS = 0.12
 """Sine of the angle above a triangle up to which nothing counts: round bodies are made of flat ones."""
 
-STRENGTH = 11.0
+STRENGTH = 10.0
 """Of the darkening; it never gets black."""
 
 ALIKE = 0.03
