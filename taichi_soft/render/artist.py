@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from taichi_soft.bodies.skin_mesh import SkinMesh
 from taichi_soft.render import Renderer, Surface, draw_color_scale, draw_labels, draw_legend, draw_text
+from taichi_soft.render.motion_blur import mean_picture
 from taichi_soft.render.skin_looks import texture_picture, vertex_colors
 from taichi_soft.render.stage import Actor
 from taichi_soft.render.take import Take, skins_of
@@ -78,9 +79,10 @@ class Artist:
         self._spent += time.perf_counter() - start
         return picture
 
-    def finish(self, picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """The picture of a frame with the words of the stage; it is changed in place and returned."""
+    def finish(self, pictures: Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:
+        """The mean of the pictures of a frame, with the words of the stage; one alone is changed in place."""
         start = time.perf_counter()
+        picture = mean_picture(pictures)
         stage = self.take.stage
         self._draw_labels(picture)
         told = f"t = {self.take.adapter.time:.2f} s   {speed_of(self.take.times, self.rate)}".rstrip()

@@ -14,7 +14,7 @@ from taichi_soft.core.checks import LARGEST_COUNT, as_count, as_number, as_posit
 from taichi_soft.core.errors import OptionError
 from taichi_soft.render import VideoWriter
 from taichi_soft.render.artist import Artist, speed_of
-from taichi_soft.render.motion_blur import mean_picture, shutter_times
+from taichi_soft.render.motion_blur import shutter_times
 from taichi_soft.render.props import Scenery
 from taichi_soft.render.stage import Actor, Stage
 from taichi_soft.render.take import Take
@@ -88,7 +88,7 @@ def film(
     if 1.0 / rate > stage.step.dt * stage.step.max_steps:
         raise OptionError(
             f"fps is {fps:g}: a frame takes at most {stage.step.max_steps} steps of {stage.step.dt:g} s: use "
-            f"{1.0 / (stage.step.dt * stage.step.max_steps):g} or more"
+            f"{fps / (rate * stage.step.dt * stage.step.max_steps):g} or more"
         )
     start = stage.world.time
     scenery = Scenery(stage.world, stage.props, stage.collider_colors)
@@ -107,7 +107,7 @@ def film(
                     pictures.append(artist.draw())
             take.end_frame()
             if artist and writer:
-                writer.write(artist.finish(mean_picture(pictures)))
+                writer.write(artist.finish(pictures))
             if on_frame:
                 on_frame(number + 1, count)
     return FilmReport(
@@ -130,5 +130,5 @@ def _warm_up(stage: Stage, take: Take, artist: Artist | None) -> None:
     take.end_frame()
     take.times.clear()
     if artist:
-        artist.finish(artist.draw())
+        artist.finish([artist.draw()])
         artist.times.clear()
