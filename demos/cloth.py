@@ -30,7 +30,7 @@ def stage() -> Stage:
     return Stage(
         "cloth, one implicit step a frame",
         world,
-        [Actor(body, PALETTE[2])],
+        [Actor(body, PALETTE[2], look="cloth")],
         camera,
         FixedStep(dt=1 / 60, substeps=1),
         seconds=5.0,

@@ -60,7 +60,7 @@ def stage() -> Stage:
     return Stage(
         "cloth over a moving ball",
         world,
-        [Actor(body, PALETTE[2])],
+        [Actor(body, PALETTE[2], look="cloth")],
         camera,
         STEP,
         8.0,

@@ -46,7 +46,7 @@ def stage() -> Stage:
         body.set_gravity_scale(feel.gravity_scale)
 
     colors = [PALETTE[i] for i in (0, 4, 2)]
-    actors = [Actor(body, color) for body, color in zip(world.bodies, colors, strict=True)]
+    actors = [Actor(body, color, look="jelly") for body, color in zip(world.bodies, colors, strict=True)]
     legend = [
         (color, f"{wish['wobble_hz']:g} Hz, still after {wish['settle_s']:g} s")
         for color, wish in zip(colors, WISHES, strict=True)

@@ -54,7 +54,10 @@ def stage() -> Stage:
     world.add_body(sphere(RADIUS, 4), RUBBER, position=(0.0, 0.0, top), contact=contact)
     world.build()
     colors = [PALETTE[5], PALETTE[2], PALETTE[4], PALETTE[1]]
-    actors = [Actor(body, color) for body, color in zip(world.bodies, colors, strict=True)]
+    actors = [
+        Actor(body, color, look="jelly" if i < LAYERS else "matte")
+        for i, (body, color) in enumerate(zip(world.bodies, colors, strict=True))
+    ]
     seen = (-1.15, -1.15, 0.0), (1.15, 1.15, 3.2)
     camera = Camera.framing(*seen, aspect=16 / 9, azimuth=-62, elevation=9, margin=1.02)
     title = f"jelly, E = {JELLY.young / 1e3:g} kPa"

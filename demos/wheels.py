@@ -10,7 +10,9 @@ from engine_adapter import FixedStep
 from taichi_soft import Body, BoxShape, Contact, Material, Motor, World, cylinder
 from taichi_soft.cli import main
 from taichi_soft.render import PALETTE, Camera
-from taichi_soft.render.film import Actor, Color, Paint, Stage
+from taichi_soft.render.colors import Color
+from taichi_soft.render.film import Actor, Stage
+from taichi_soft.render.stage import Paint
 
 STIFFNESSES = (4e4, 1e5, 4e5)  # Young's moduli, from the softest wheel to the firmest [Pa]
 RADIUS, WIDTH, HUB = 0.5, 0.7, 0.2  # of the wheels; radius of what the motor drives [m]

@@ -41,7 +41,7 @@ LEVEL = {name: level for level, name in enumerate(LAYERS.split())}
 
 OURS = ("taichi_soft", "engine_adapter", "demos")
 
-PICTURES = ("film", "props", "demos", "replay")
+PICTURES = ("artist", "camera_moves", "demos", "film", "framing", "props", "replay", "stage", "take")
 """Files of render that know worlds; the others draw triangles."""
 
 NO_TAICHI = (

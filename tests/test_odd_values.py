@@ -18,7 +18,9 @@ from taichi_soft.render import (
     draw_text,
     highlight,
 )
+from taichi_soft.render.camera_moves import Follow, Orbit
 from taichi_soft.render.film import Actor, Stage, film
+from taichi_soft.render.framing import framed
 
 ODD = (
     *(None, True, 0, -0.0, -1, 1.5, np.nan, np.inf, 10**400, 1j, np.float32(2), np.int64(3)),
@@ -171,6 +173,13 @@ CALLS = {
     "init cores": lambda v, _: ts.init("cpu", cores=v),
     **keywords(framing, "aspect", "azimuth", "elevation"),
     "framing lower": lambda v, _: Camera.framing(v, (1, 1, 1)),
+    "seeing": lambda v, _: CAMERA.seeing((0, 0, 0), v),
+    "seeing margin": lambda v, _: CAMERA.seeing((0, 0, 0), (1, 1, 1), margin=v),
+    "Orbit": lambda v, _: Orbit(v),
+    "Orbit period": lambda v, _: Orbit(CAMERA, v),
+    "Follow": lambda v, _: Follow(v, CAMERA),
+    "Follow view": lambda v, game: Follow(game.world.bodies[0], v),
+    "Follow lag": lambda v, game: Follow(game.world.bodies[0], CAMERA, lag=v),
     "project": lambda v, _: CAMERA.project(v, 100, 100),
     "project width": lambda v, _: CAMERA.project([[0, 0, 0]], v, 100),
     "Surface positions": lambda v, _: Surface(v, MESH.surface),
@@ -178,6 +187,8 @@ CALLS = {
     "Surface color": lambda v, _: Surface(POINTS, MESH.surface, color=v),
     "Surface texture": lambda v, _: Surface(POINTS, MESH.surface, texture=v, uv=POINTS[:, :2]),
     "Surface uv": lambda v, _: Surface(POINTS, MESH.surface, texture=Texture(PICTURE), uv=v),
+    "Surface look": lambda v, _: Surface(POINTS, MESH.surface, look=v),
+    "set normals": lambda v, _: setattr(Surface.of(MESH), "normals", v),
     "Texture": lambda v, _: Texture(v),
     "Surface.of": lambda v, _: Surface.of(v),
     "set positions": lambda v, _: setattr(Surface.of(MESH), "positions", v),
@@ -204,6 +215,10 @@ MOVES = {
     "set_motion velocities": lambda v, game: game.world.bodies[0].set_motion(POINTS, v),
     "film fps": lambda v, game: film(stage_of(game), None, fps=v, seconds=0.05),
     "film seconds": lambda v, game: film(stage_of(game), None, seconds=v),
+    "film slow": lambda v, game: film(stage_of(game), None, slow=v, seconds=0.05),
+    "film blur": lambda v, game: film(stage_of(game), None, blur=v, seconds=0.05),
+    "framed seconds": lambda v, game: framed(lambda: stage_of(game), seconds=v),
+    "framed aspect": lambda v, game: framed(lambda: stage_of(game), aspect=v, seconds=0.05),
     "film size": lambda v, game: film(stage_of(game), "x.png", size=v, seconds=0.05),
 }
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from statistics import median
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.markup import escape
@@ -23,6 +23,12 @@ def demo(
     seconds: Annotated[float | None, typer.Option(help="Length of the film [s].")] = None,
     fps: Annotated[float, typer.Option(help="Frames per second.")] = 50.0,
     size: Annotated[str, typer.Option(help="Width x height in pixels.")] = "1280x720",
+    slow: Annotated[float, typer.Option(help="How many times slower than the world the film is.")] = 1.0,
+    blur: Annotated[int, typer.Option(help="Pictures averaged to one, for motion blur; 1 is sharp.")] = 1,
+    framed: Annotated[bool, typer.Option(help="Look from where all places of the bodies are seen.")] = False,
+    orbit: Annotated[
+        float | None, typer.Option(help="The camera goes round once in so much time of the world [s].")
+    ] = None,
     video: Annotated[bool, typer.Option(help="Write a film, or only run and time the steps.")] = True,
     peers: Annotated[
         bool, typer.Option("--peers", help="compare: one drop here and in other engines.")
@@ -49,18 +55,27 @@ def demo(
     module = load_demo(name)
     path = (out or Path("out") / f"{name}.mp4") if video else None
     init(arch, threads)
+    from taichi_soft.render.camera_moves import Orbit
     from taichi_soft.render.film import film
+    from taichi_soft.render.framing import framed as framed_stage
 
     bar = progress_bar()
     task = bar.add_task(name, total=None)
     with bar as progress, shown_by(lambda text: progress.update(task, description=escape(text) or name)):
-        stage = module.stage()
+        width, height = pixels
+        stage: Any = (
+            framed_stage(module.stage, aspect=width / height, seconds=seconds) if framed else module.stage()
+        )
+        if orbit is not None:
+            stage.camera = Orbit(stage.camera, orbit)
         report = film(
             stage,
             path,
             fps=fps,
             size=pixels,
             seconds=seconds,
+            slow=slow,
+            blur=blur,
             on_frame=lambda done, total: progress.update(task, description=name, completed=done, total=total),
         )
     if report.path is not None:

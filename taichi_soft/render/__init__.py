@@ -2,6 +2,7 @@
 
 from taichi_soft.render.camera import Camera
 from taichi_soft.render.colors import FLIPPED, PALETTE, ColorScale, colormap, highlight
+from taichi_soft.render.look import Look
 from taichi_soft.render.overlay import Corner, draw_color_scale, draw_labels, draw_legend, draw_text
 from taichi_soft.render.renderer import Renderer
 from taichi_soft.render.surface import Surface
@@ -14,6 +15,7 @@ __all__ = [
     "Camera",
     "ColorScale",
     "Corner",
+    "Look",
     "Renderer",
     "Surface",
     "Texture",

@@ -5,6 +5,7 @@
 from taichi_soft.core.runtime import ti
 from taichi_soft.render import lighting
 from taichi_soft.render.kernel_types import image, picture, reals, rows, vec3
+from taichi_soft.render.tone import WHITE
 
 
 @ti.func
@@ -31,11 +32,12 @@ def check_average(x, width):
 
 @ti.func
 def write_pixel(color, encode: ti.template(), out: ti.template(), x, y):
-    """Store linear light as sRGB; `encode` is sRGB, 0 to 255, of linear light 0 to 1 in equal steps."""
+    """Store linear light as sRGB; `encode` is `tone.encode_table`."""
     # A fixed pattern of less than one step of brightness, against bands in smooth gradients.
     grain = ti.math.fract(52.9829189 * ti.math.fract(0.06711056 * x + 0.00583715 * y))
     for k in ti.static(range(3)):
-        level = encode[ti.i32(ti.math.clamp(color[k], 0.0, 1.0) * (encode.shape[0] - 1) + 0.5)]
+        root = ti.sqrt(ti.math.clamp(color[k] / WHITE, 0.0, 1.0))
+        level = encode[ti.math.clamp(ti.i32(root * (encode.shape[0] - 1) + 0.5), 0, encode.shape[0] - 1)]
         out[y, x, k] = ti.u8(ti.min(level + grain, 255.0))
 
 
@@ -67,7 +69,7 @@ def paint_backdrop(
         up = ray.z / ray.norm()
         # Brightest at the horizon, deeper upwards; below it, where the floor has faded, it stays bright.
         color = lighting.HORIZON + (lighting.ZENITH - lighting.HORIZON) * smoothstep(
-            -0.05, 0.9, ti.sqrt(ti.max(up, 0.0))
+            -0.05, 0.65, ti.sqrt(ti.max(up, 0.0))
         )
         share = 0.0
         depth = (floor - eye.z) / ti.select(ti.abs(ray.z) > 1e-9, ray.z, 1e-9)
@@ -82,9 +84,12 @@ def paint_backdrop(
             wide_x = (ti.abs(at_right.x - at.x) + ti.abs(at_below.x - at.x)) / check + 1e-4
             wide_y = (ti.abs(at_right.y - at.y) + ti.abs(at_below.y - at.y)) / check + 1e-4
             wave = check_average(at.x / check, wide_x) * check_average(at.y / check, wide_y)
+            # Checks that are hardly larger than a pixel would shimmer.
+            wave *= 1.0 - smoothstep(0.15, 0.7, ti.max(wide_x, wide_y))
             tiles = lighting.FLOOR_DARK + (lighting.FLOOR_BRIGHT - lighting.FLOOR_DARK) * (0.5 + 0.5 * wave)
             far = ti.sqrt((at.x - target.x) ** 2 + (at.y - target.y) ** 2) / fade
-            share = ti.exp(-2.5 * far * far) * smoothstep(0.0, 0.06, -steep / ray.norm())
+            tiles *= 1.0 + lighting.POOL * ti.exp(-16.0 * far * far)
+            share = ti.exp(-2.5 * far * far) * smoothstep(0.0, 0.10, -steep / ray.norm())
             color = color + (tiles - color) * share
         for k in ti.static(range(3)):
             out[y, x, k] = color[k]

@@ -16,6 +16,8 @@ Point = tuple[float, float, float]
 
 # Nearest visible depth as a share of the distance to the target: nearer than that is inside the lens.
 NEAREST = 1e-3
+# Largest angle between the line of sight and the ground of a camera that frames a box [degrees].
+STEEP = 89.0
 # Sine of the smallest angle between the line of sight and `up` that still says where up is.
 STEEPEST = 1e-4
 
@@ -83,7 +85,7 @@ class Camera:
         if (low > high).any() or not (low < high).any():
             raise OptionError(f"the box from {low.tolist()} to {high.tolist()} has no extent to frame")
         a = math.radians(as_number(azimuth, "azimuth", -1e4, 1e4))
-        e = math.radians(as_number(elevation, "elevation", -89.0, 89.0))
+        e = math.radians(as_number(elevation, "elevation", -STEEP, STEEP))
         half = math.tan(math.radians(as_number(fov_degrees, "fov_degrees", 1.0, 150.0)) / 2.0)
         half /= as_number(margin, "margin", 1.0, 10.0)
         ratio = as_number(aspect, "aspect", 0.05, 20.0)
@@ -97,6 +99,25 @@ class Camera:
         # A corner at depth d + z is inside where |x| and |y| are at most reach * (d + z).
         distance = float(((np.abs(seen[:, :2]) / reach).max(axis=1) - seen[:, 2]).max())
         return cls(tuple(target + distance * outward), tuple(target), fov_degrees=fov_degrees)
+
+    def seeing(
+        self, lower: ArrayLike, upper: ArrayLike, *, margin: float = 1.1, aspect: float = 1.0
+    ) -> Camera:
+        """A camera that looks the same way with the same angle, from just far enough to see the whole box.
+
+        Args: see `framing`.
+        Raises: as `framing`. One that looked straight up or down looks a little aside.
+        """
+        x, y, z = np.subtract(self.eye, self.target)
+        return Camera.framing(
+            lower,
+            upper,
+            azimuth=math.degrees(math.atan2(y, x)),
+            elevation=min(max(math.degrees(math.asin(z / self.distance)), -STEEP), STEEP),
+            fov_degrees=self.fov_degrees,
+            margin=margin,
+            aspect=aspect,
+        )
 
     @property
     def axes(self) -> NDArray[np.float64]:

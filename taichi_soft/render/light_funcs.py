@@ -4,6 +4,7 @@
 
 from taichi_soft.core.runtime import ti
 from taichi_soft.render import lighting
+from taichi_soft.render.look import CLOTH_BACK, JELLY, MATTE
 
 COARSE = 4.0
 """Texels of the sun's map along one of the maps of far shadows."""
@@ -11,7 +12,7 @@ COARSE = 4.0
 FAINTEST = 0.002
 """Share of a shadow below which it is not drawn."""
 
-SOFT_TAPS = 6
+SOFT_TAPS = 8
 """Width of the box over which shadows on bodies are averaged [texels of the shadow map]."""
 
 LIFT = 0.7
@@ -77,7 +78,8 @@ def sunlight(light: ti.template(), depth: ti.template(), size, p, normal, texel)
                 open_texels += ti.select(depth[i_texel] > height, 0, 1)
         lit = ti.select(open_texels == 0, 0.0, 1.0)
         if open_texels > 0 and open_texels < 9:
-            lit = box_average(depth, size, left, top, fu, fv, height)
+            share = box_average(depth, size, left, top, fu, fv, height)
+            lit = share * share * (3.0 - 2.0 * share)
     return lit
 
 
@@ -107,29 +109,112 @@ def floor_shadow(
 
 
 @ti.func
-def glow(color, normal, view, sun, lit, above):
-    """Light that a point of a body sends to the eye.
+def fifth_power(x):
+    """Of x: how reflection rises towards grazing angles."""
+    return x * x * x * x * x
+
+
+@ti.func
+def mirrored(normal, view, sun, doublings: ti.template()):
+    """Brightness of the key's mirror image, 0 to 1; the more doublings the smaller it is."""
+    half = sun + view
+    shine = ti.max(normal.dot(half) / ti.sqrt(ti.max(half.dot(half), 1e-12)), 0.0)
+    for _ in ti.static(range(doublings)):
+        shine *= shine
+    return shine
+
+
+@ti.func
+def surroundings(normal, sun, above):
+    """Light from everywhere but the key on a surface of albedo 1.
 
     Args:
-        color: share of the light that it throws back.
-        normal, view, sun: unit vectors out of the body, to the eye and to the sun.
-        lit: share of the sun that reaches it.
         above: 0 on the floor to 1 well above it, where its underside sees light.
     """
     upward = 0.5 + 0.5 * normal.z
-    below = lighting.FLOOR_LIGHT * (0.35 + 0.65 * above)
-    over = lighting.SKY_LIGHT * (0.7 + 0.3 * above)
-    around = below + (over - below) * upward
-    facing = ti.max(normal.dot(sun), 0.0) * lit
-    half = sun + view
-    shine = ti.max(normal.dot(half) / ti.sqrt(half.dot(half)), 0.0)
-    for _ in ti.static(range(5)):
-        shine *= shine
-    grazing = 1.0 - ti.max(normal.dot(view), 0.0)
-    grazing = grazing * grazing
-    rim = lighting.RIM * grazing * grazing * upward
-    return (
-        color * (lighting.SUN * facing + around)
-        + lighting.HORIZON * rim
-        + lighting.SUN * (lighting.HIGHLIGHT * shine * lit)
-    )
+    below = lighting.FLOOR_LIGHT * (0.30 + 0.70 * above)
+    over = lighting.SKY_LIGHT * (0.75 + 0.25 * above)
+    # The fill stands opposite the key, at the height of the eye.
+    aside = 0.5 - 0.5 * (normal.x * sun.x + normal.y * sun.y) / ti.sqrt(1.0 - sun.z * sun.z)
+    return below + (over - below) * upward + lighting.FILL * (aside * aside)
+
+
+@ti.func
+def dimmed(light, color, openness):
+    """Light from around where only a share `openness` of it is seen.
+
+    What hides the rest is taken to be about as bright as the surface itself: bright bodies do not get dirty
+    where they touch.
+    """
+    return light * (openness / (1.0 - 0.55 * (1.0 - openness) * color))
+
+
+@ti.func
+def smooth_rise(x):
+    """0 at 0 and below, 1 from 0.4 on, smooth between."""
+    s = ti.math.clamp(2.5 * x, 0.0, 1.0)
+    return s * s * (3.0 - 2.0 * s)
+
+
+@ti.func
+def matte_glow(color, normal, view, sun, around, key, lit, rim, openness):
+    """Rubber; the arguments of this and of the next two are those of `glow` and what it computes."""
+    total = color * (key * ti.max(normal.dot(sun), 0.0) + dimmed(around, color, openness))
+    total += lighting.SUN * (lighting.HIGHLIGHT * mirrored(normal, view, sun, 4) * lit)
+    return total + lighting.HORIZON * (lighting.RIM * fifth_power(rim) * (0.5 + 0.5 * normal.z) * openness)
+
+
+@ti.func
+def jelly_glow(color, normal, view, sun, around, lit, rim, openness):
+    """Light goes in and comes out beside where it went in."""
+    facing = normal.dot(sun)
+    # Thick parts are deeper in colour than those at the rim.
+    inner = color * ((0.62 + 0.38 * color) * (1.0 - rim * rim) + 1.25 * rim * rim)
+    wrapped = ti.max((facing + lighting.JELLY_WRAP) / (1.0 + lighting.JELLY_WRAP), 0.0)
+    kept = lighting.JELLY_KEPT + (1.0 - lighting.JELLY_KEPT) * lit * smooth_rise(facing)
+    # Light that went in at the lit side comes out opposite, where the body is dark otherwise.
+    through = lighting.JELLY_THROUGH * ti.max(0.25 - facing, 0.0) * (0.4 + 0.6 * rim)
+    total = inner * (lighting.SUN * (wrapped * kept + through) + dimmed(around, color, openness))
+    shine = mirrored(normal, view, sun, 7) + 0.12 * mirrored(normal, view, sun, 4)
+    total += lighting.SUN * (lighting.JELLY_HIGHLIGHT * shine * lit)
+    mirror = lighting.JELLY_RIM * fifth_power(rim) * (0.6 + 0.4 * normal.z) * openness
+    return total + lighting.HORIZON * mirror
+
+
+@ti.func
+def cloth_glow(look, color, normal, sun, around, key, rim, openness):
+    """Fibres, through which some of the light of the other side comes."""
+    own = color
+    if look == CLOTH_BACK:
+        own = color + (lighting.THREAD - color) * lighting.CLOTH_PLAIN
+    facing = normal.dot(sun)
+    straight, tint = facing, own
+    if facing < 0.0:  # what comes through has been coloured by more threads
+        straight, tint = -lighting.CLOTH_THROUGH * facing, own * (0.35 + 0.65 * color)
+    total = tint * (key * straight) + own * dimmed(around, own, openness)
+    return total + own * (lighting.CLOTH_SHEEN * rim * rim * rim) * (around + 0.5 * key)
+
+
+@ti.func
+def glow(look, color, normal, view, sun, lit, above, openness):
+    """Light that a point of a body sends to the eye.
+
+    Args:
+        look: a code of `look`.
+        color: share of the light that it throws back.
+        normal, view, sun: unit vectors out of the body, to the eye and to the key.
+        lit: share of the key that reaches the side of it that faces the key.
+        above: see `surroundings`.
+        openness: share of its surroundings that it sees, 0 to 1.
+    """
+    around = surroundings(normal, sun, above)
+    key = lighting.SUN * (lit * (0.45 + 0.55 * openness))
+    rim = 1.0 - ti.math.clamp(normal.dot(view), 0.0, 1.0)
+    total = ti.Vector([0.0, 0.0, 0.0])
+    if look == MATTE:
+        total = matte_glow(color, normal, view, sun, around, key, lit, rim, openness)
+    elif look == JELLY:
+        total = jelly_glow(color, normal, view, sun, around, lit, rim, openness)
+    else:
+        total = cloth_glow(look, color, normal, sun, around, key, rim, openness)
+    return total

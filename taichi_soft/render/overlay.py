@@ -24,7 +24,7 @@ LETTER = 22.0  # height of a line of this font at scale 1 [pixels]
 GAP = 0.45  # between lines, and round the words [line heights]
 INDENT = " " * 5  # room for a swatch before a line
 BAR = 12  # blanks between the ends of a colour bar
-PANEL, OPACITY, INK = (22, 26, 34), 0.62, (245, 247, 250)
+PANEL, OPACITY, INK = (22, 26, 34), 0.70, (245, 247, 250)
 
 
 class Corner(Choice):

@@ -13,19 +13,24 @@ from taichi_soft.core.errors import OptionError
 from taichi_soft.core.runtime import init, is_initialized, ti
 from taichi_soft.render.backdrop_kernels import paint_backdrop
 from taichi_soft.render.camera import Camera
-from taichi_soft.render.colors import to_linear, to_srgb
+from taichi_soft.render.colors import to_linear
 from taichi_soft.render.floor_tiles import FloorTiles
+from taichi_soft.render.occlusion import REACH, Occlusion
 from taichi_soft.render.raster import NOTHING_BEHIND, ROTATED_GRID, Raster
 from taichi_soft.render.scene import SceneArrays
 from taichi_soft.render.shade_kernels import shade
 from taichi_soft.render.shadows import ShadowMaps
 from taichi_soft.render.surface import Surface
+from taichi_soft.render.tone import encode_table
 
 LARGEST = 8192  # pixels along a picture; beyond it sample numbers leave 32 bits
 
 
 class Renderer:
-    """Draws surfaces lit by a sun and the sky, over a checked floor, with soft shadows.
+    """Draws surfaces in a warm key light and a cool fill, over a checked floor that fades to the horizon.
+
+    Shadows are soft. Where bodies come close they take light from each other. What is too bright for a screen
+    is pressed together, see `tone`.
 
     Args:
         width, height: of the picture, 16 to 8192 [pixels].
@@ -62,9 +67,10 @@ class Renderer:
             init()
         self._raster = Raster(self.width, self.height, ROTATED_GRID)
         self._shadows = ShadowMaps(camera, self.floor, self._scale)
+        self._occlusion = Occlusion(self._raster, REACH * self._scale)
         self._backdrop = np.empty((self.height, self.width, 4), dtype=np.float32)
         self._plain = np.empty((self.height, self.width, 3), dtype=np.uint8)
-        self._encode = 255.0 * to_srgb(np.linspace(0.0, 1.0, 4096, dtype=np.float32))
+        self._encode = encode_table()
         self._decode = to_linear(np.arange(256, dtype=np.float32) / 255.0)
         self._camera: Camera | None = None
         self.camera = camera
@@ -89,7 +95,7 @@ class Renderer:
         self._camera = camera
         self._to_picture = np.vstack([camera.matrix(self.width, self.height), [0.0, 0.0, 0.0, 1.0]])
         rays = np.linalg.inv(self._to_picture[:3, :3])
-        self._rays = rays.astype(np.float32)
+        self._rays, self._lens = rays.astype(np.float32), self._to_picture[:3, :3].astype(np.float32)
         self._tiles = FloorTiles(self.width, self.height, rays, np.array(camera.eye), self.floor)
         paint_backdrop(
             self._rays,
@@ -118,7 +124,10 @@ class Renderer:
         scene = SceneArrays.of(surfaces)
         camera = self.camera
         self._shadows.update(scene, camera)
-        self._raster.draw(scene, self._to_picture, camera.near, self._floor_depth(), keep_empty_tiles=True)
+        behind = self._floor_depth()
+        self._raster.draw(scene, self._to_picture, camera.near, behind, keep_empty_tiles=True)
+        focal = min(self.width, self.height) / (2.0 * math.tan(math.radians(camera.fov_degrees) / 2.0))
+        self._occlusion.update(self._rays, self._lens, focal, behind)
         picture = np.empty((self.height, self.width, 3), dtype=np.uint8)
         maps = self._shadows
         shade(
@@ -141,6 +150,9 @@ class Renderer:
             scene.normals,
             scene.colors,
             scene.triangles,
+            scene.looks,
+            self._occlusion.depth,
+            self._occlusion.hidden,
             scene.textures.uv,
             scene.textures.first_level,
             scene.textures.texels,

@@ -21,6 +21,7 @@ class SceneArrays:
     Attributes:
         positions, normals, colors: float32 (n, 3), [m], unit length, linear light.
         triangles: int32 (m, 3), outward counterclockwise.
+        looks: int32 (m,), codes of the triangles, see `look`.
         textures: of vertices and triangles.
     """
 
@@ -28,6 +29,7 @@ class SceneArrays:
     normals: NDArray[np.float32]
     colors: NDArray[np.float32]
     triangles: NDArray[np.int32]
+    looks: NDArray[np.int32]
     textures: SceneTextures
 
     @property
@@ -49,7 +51,8 @@ class SceneArrays:
         if not surfaces:
             nothing = np.zeros((1, 3), dtype=np.float32)
             textures = SceneTextures.of([None], [None], [1], [1])
-            return cls(nothing, nothing, nothing, np.zeros((1, 3), dtype=np.int32), textures)
+            none = np.zeros((1, 3), dtype=np.int32)
+            return cls(nothing, nothing, nothing, none, none[:, 0].copy(), textures)
         positions = np.concatenate([surface.positions for surface in surfaces])
         counts = [len(surface.positions) for surface in surfaces]
         offsets = np.cumsum([0, *counts[:-1]], dtype=np.int32)
@@ -68,4 +71,5 @@ class SceneArrays:
             counts,
             [len(surface.triangles) for surface in surfaces],
         )
-        return cls(positions, normals, colors, triangles, textures)
+        looks = np.concatenate([surface.looks for surface in surfaces])
+        return cls(positions, normals, colors, triangles, looks, textures)

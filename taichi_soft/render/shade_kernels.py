@@ -17,7 +17,9 @@ from taichi_soft.render.kernel_types import (
     rows,
     vec3,
 )
-from taichi_soft.render.light_funcs import floor_shadow, glow, sunlight
+from taichi_soft.render.light_funcs import bilinear, floor_shadow, glow, light_place, sunlight
+from taichi_soft.render.look import CLOTH
+from taichi_soft.render.occlusion_kernels import openness_at
 from taichi_soft.render.texture_funcs import texture_light
 
 
@@ -74,6 +76,9 @@ def shade(
     normals: rows,
     colors: rows,
     triangles: int_rows,
+    looks: ints,
+    q_map: rows,
+    hidden: rows,
     uvs: rows,
     first_level: ints,
     texels: byte_rows,
@@ -93,6 +98,8 @@ def shade(
         reach: height [m] up to which the floor darkens what is above it.
         light, texel, light_depth: the sun's shadow map, as `shadows.ShadowMaps` has them.
         near_shadow, far_shadow, far_height, contact, contact_place: the floor's shadows, from there too.
+        looks: codes of the triangles, as `look` has them.
+        q_map, hidden: as `occlusion.Occlusion` has them.
         uvs, first_level, texels, levels: as `texture.SceneTextures` has them; a texture is multiplied by the
             colours of the vertices.
         decode: linear light of sRGB 0 to 255.
@@ -137,11 +144,20 @@ def shade(
                                 )
                             n = n / ti.sqrt(ti.max(n.dot(n), 1e-20))
                             view = (eye - p) / ti.sqrt((eye - p).dot(eye - p))
+                            look = looks[t]
+                            # Of a cloth, the other side may be the one that the key shines on.
+                            outward = n
+                            if look >= CLOTH and n.dot(sun) < 0.0:
+                                outward = -n
                             lit = 0.0
-                            if n.dot(sun) > 0.0:
-                                lit = sunlight(light, light_depth, near_shadow.shape[0], p, n, texel)
+                            if outward.dot(sun) > 0.0:
+                                lit = sunlight(light, light_depth, near_shadow.shape[0], p, outward, texel)
+                            spot = light_place(contact_place, p)
                             above = smoothstep(0.0, reach, p.z - floor)
-                            last = glow(c, n, view, sun, lit, above)
+                            above *= 1.0 - 0.6 * bilinear(contact, contact.shape[0], spot.x, spot.y)
+                            q = planes[t, 9] * (x + 0.5) + planes[t, 10] * (y + 0.5) + planes[t, 11]
+                            openness = openness_at(q_map, hidden, x, y, q)
+                            last = glow(look, c, n, view, sun, lit, above, openness)
                         total += last
                 shadow = ti.Vector([0.0, 0.0, 0.0])
                 if open_samples > 0 and tile_shadowed[tile] != 0 and backdrop[y, x, 3] > 0.004:

@@ -20,7 +20,7 @@ SIZE = 384  # texels along the sun's map
 CONTACT_SIZE = 192  # texels along the map of what lies over the floor
 # In shares of the size of the scene: blur of a shadow cast from right above the floor, and of one cast from
 # `FAR_HEIGHT` or more; blur and fading height of the darkening where a body touches the floor.
-NEAR_BLUR, FAR_BLUR, FAR_HEIGHT = 0.004, 0.022, 0.3
+NEAR_BLUR, FAR_BLUR, FAR_HEIGHT = 0.006, 0.032, 0.3
 CONTACT_BLUR, CONTACT_HEIGHT = 0.016, 0.05
 SUNK = 0.05  # what lies deeper than this under the floor casts no shadow on it [size of the scene]
 # Bodies farther from the camera's target than this many camera distances cast no shadow, so that one that

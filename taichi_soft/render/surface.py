@@ -1,4 +1,4 @@
-"""What is drawn: a closed surface of triangles whose vertices move and may have colours."""
+"""What is drawn: a surface of triangles whose vertices move and may have colours."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from taichi_soft.core.errors import MeshError, OptionError
 from taichi_soft.meshing import BodyMesh, ParticleMesh, TetMesh
 from taichi_soft.meshing.creases import ROUND, split_at_creases
 from taichi_soft.render.colors import PALETTE, to_linear
+from taichi_soft.render.look import CLOTH, CLOTH_BACK, CODES, Look, LookName
 from taichi_soft.render.texture import Texture
 
 # Coordinates beyond this [m] come from an explosion; their products would overflow in float32.
@@ -23,15 +24,17 @@ class Surface:
         positions: (n, 3), all vertices of the body, inner ones too [m]. Where the surface bends by more than
             60 degrees between two triangles now, it keeps a sharp edge; elsewhere it is shaded as round.
         triangles: (m, 3) vertex indices, counterclockwise seen from outside. Triangles are seen from
-            outside only, and shadows take the surface to be closed.
+            outside only, but those of a cloth, and shadows take the surface to be closed.
         color: sRGB from 0 to 1, either (3,) for the whole body or (n, 3), one per vertex.
         normals: (n, 3) of unit length to shade by instead; set them with the positions before each frame.
         texture: a picture on it, which is multiplied by `color`: give that as white, to see it as it is.
         uv: (n, 2), where the vertices lie on the texture: (0, 0) at its lower left, (1, 1) at its upper
             right; beyond that it repeats.
-    Raises: OptionError for wrong shapes, a texture without `uv` or the reverse, positions that are not finite
-        (a picture of an exploded body shows nothing) or colours out of range; MeshError for indices out of
-        range.
+        look: what it is made of, see `Look`.
+            Where a cloth has each triangle twice, once from either side, the first of both is its front.
+    Raises: OptionError for wrong shapes, an unknown look, a texture without `uv` or the reverse, positions
+        that are not finite (a picture of an exploded body shows nothing) or colours out of range; MeshError
+        for indices out of range.
     """
 
     def __init__(
@@ -43,6 +46,7 @@ class Surface:
         normals: ArrayLike | None = None,
         texture: Texture | None = None,
         uv: ArrayLike | None = None,
+        look: Look | LookName = Look.MATTE,
     ) -> None:
         first = as_array(positions, "positions", (None, 3))
         self.vertex_count = len(first)
@@ -53,16 +57,24 @@ class Surface:
             raise MeshError(
                 f"triangles name vertices {corners.min()} to {corners.max()}, there are {self.vertex_count}"
             )
+        self.look = Look.parse(look)
+        codes = np.full(len(corners), CODES[self.look], dtype=np.int32)
+        if self.look is Look.CLOTH:
+            corners, codes = _both_sides(corners)
+        self.looks = codes
         # Only vertices on the surface are projected and lit, those on sharp edges once per side.
         if normals is None:
             self._used, self.triangles = split_at_creases(first, corners, ROUND)
         else:
             self._used, self.triangles = np.arange(self.vertex_count), corners.astype(np.int32)
+            if self.look is Look.CLOTH:  # whose back has vertices of its own, with normals the other way
+                self._used = np.tile(self._used, 2)
+                self.triangles[codes == CLOTH_BACK] += self.vertex_count
         self.positions = first
         self.color = color
-        self.normals: NDArray[np.float32] | None = None
+        self._normals: NDArray[np.float32] | None = None
         if normals is not None:
-            self.normals = as_array(normals, "normals", (self.vertex_count, 3)).astype(np.float32)
+            self.normals = normals
         if not (texture is None or isinstance(texture, Texture)):
             raise OptionError(f"texture must be a Texture, got {type(texture).__name__}")
         if (texture is None) != (uv is None):
@@ -73,7 +85,9 @@ class Surface:
             self.uv = as_array(uv, "uv", (self.vertex_count, 2))[self._used].astype(np.float32)
 
     @classmethod
-    def of(cls, mesh: BodyMesh, *, color: ArrayLike = PALETTE[0]) -> Surface:
+    def of(
+        cls, mesh: BodyMesh, *, color: ArrayLike = PALETTE[0], look: Look | LookName = Look.MATTE
+    ) -> Surface:
         """The surface of a mesh, at rest until its `positions` are set.
 
         Raises: MeshError for a `ParticleMesh` without triangles, such as a rope.
@@ -82,7 +96,7 @@ class Surface:
             raise MeshError(f"a surface is made of a TetMesh or a ParticleMesh, got {type(mesh).__name__}")
         if len(mesh.surface) == 0:
             raise MeshError(f"{mesh!r} has no triangles to draw: give it some with surface=")
-        return cls(mesh.vertices, mesh.surface, color=color)
+        return cls(mesh.vertices, mesh.surface, color=color, look=look)
 
     @property
     def positions(self) -> NDArray[np.float32]:
@@ -107,6 +121,17 @@ class Surface:
         self._positions: NDArray[np.float32] = outer
 
     @property
+    def normals(self) -> NDArray[np.float32] | None:
+        """Normals of `positions` to shade by, float32 (k, 3), or None. Set them to (n, 3)."""
+        return self._normals
+
+    @normals.setter
+    def normals(self, values: ArrayLike) -> None:
+        rows = as_array(values, "normals", (self.vertex_count, 3)).astype(np.float32)[self._used]
+        rows[self.vertex_count :] *= -1.0
+        self._normals = rows
+
+    @property
     def color(self) -> NDArray[np.float32]:
         """Linear light of `positions`, float32 (k, 3). Set it to sRGB, (3,) or (n, 3)."""
         return self._color
@@ -122,3 +147,14 @@ class Surface:
         if not (outer.min() >= 0.0 and outer.max() <= 1.0):
             raise OptionError(f"color must be sRGB from 0 to 1, got {outer.min():g} to {outer.max():g}")
         self._color = to_linear(outer)
+
+
+def _both_sides(triangles: NDArray[np.integer]) -> tuple[NDArray[np.integer], NDArray[np.int32]]:
+    """The triangles of a sheet from its front and then from its back, and their codes.
+
+    What is there twice, from either side, is taken once.
+    """
+    _, first = np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)
+    front = triangles[np.sort(first)]
+    codes = np.repeat(np.array([CLOTH, CLOTH_BACK], dtype=np.int32), len(front))
+    return np.concatenate([front, front[:, ::-1]]), codes

@@ -65,10 +65,11 @@ def test_demo_without_a_name_lists_the_demos_with_a_summary_each():
 
 def test_demo_writes_a_film_and_says_how_fast_it_ran(tmp_path):
     film = tmp_path / "films" / "b.webm"
-    done = run("demo", "bounce", "--seconds", "0.2", "--size", "128x96", "--out", str(film), "--threads", "1")
+    how = ("--size", "128x96", "--threads", "1", "--slow", "2", "--blur", "2", "--framed")
+    done = run("demo", "bounce", "--seconds", "0.2", "--out", str(film), *how)
     assert done.returncode == 0, done.stderr
     capture = cv2.VideoCapture(str(film))
-    assert int(capture.get(cv2.CAP_PROP_FRAME_COUNT)) == 10
+    assert int(capture.get(cv2.CAP_PROP_FRAME_COUNT)) == 20
     assert "x real time" in done.stdout.replace("\n", " ")
     assert "a picture of 128x96 took" in done.stdout
     assert done.stderr == ""
@@ -83,6 +84,9 @@ def test_demo_writes_a_film_and_says_how_fast_it_ran(tmp_path):
         (("demo", "bounce", "--out", "/proc/nowhere/x.mp4"), "/proc/nowhere"),
         (("demo", "bounce", "--seconds", "-1"), "-1"),
         (("demo", "bounce", "--fps", "nan"), "nan"),
+        (("demo", "bounce", "--slow", "0.5"), "slow"),
+        (("demo", "bounce", "--blur", "0"), "blur"),
+        (("demo", "bounce", "--orbit", "0"), "period"),
         (("info", "--threads", "0"), "0"),
         (("info", "--law", "none"), "'none'"),
         (("profile", "--cores", "first"), "'first'"),

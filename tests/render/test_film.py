@@ -9,6 +9,7 @@ from PIL import Image
 from engine_adapter import FixedStep
 from taichi_soft import BoxShape, Material, OptionError, SoftBodyAsset, VideoError, World, box
 from taichi_soft.render import Camera, ColorScale, Renderer, VideoWriter
+from taichi_soft.render.camera_moves import Follow
 from taichi_soft.render.film import Actor, Stage, film, speed_of
 from taichi_soft.render.props import SLATE, Scenery
 
@@ -62,7 +63,7 @@ def test_frames_show_every_fixed_step_where_both_rates_agree(tmp_path):
 def test_the_time_in_the_picture_is_that_of_the_body_in_it(tmp_path, monkeypatch):
     """In free fall from z0 the lowest point is at z0 - g t^2 / 2 at the time that the panel tells."""
     told, drawn = [], []
-    monkeypatch.setattr("taichi_soft.render.film.draw_text", lambda picture, lines: told.append(lines[1]))
+    monkeypatch.setattr("taichi_soft.render.artist.draw_text", lambda picture, lines: told.append(lines[1]))
     original = Renderer.render
 
     def watched(self, surfaces):
@@ -116,7 +117,7 @@ def test_a_label_stands_on_the_floor_in_front_of_the_body(monkeypatch, tmp_path)
     """Wherever the body is above it: below all of its pixels, and as far as the floor goes."""
     places = []
     monkeypatch.setattr(
-        "taichi_soft.render.film.draw_labels", lambda picture, labels, rows: places.append(rows)
+        "taichi_soft.render.artist.draw_labels", lambda picture, labels, rows: places.append(rows)
     )
     stage = falling_box()
     film(stage, tmp_path / "b.png", seconds=0.4, size=(160, 120))
@@ -136,6 +137,101 @@ def test_the_real_time_factor_is_simulated_time_over_time_taken():
     assert len(report.draw_times) == 0
 
 
+def drawn_by(monkeypatch):
+    """Positions of the first surface in every picture that is drawn from now on."""
+    drawn = []
+    original = Renderer.render
+
+    def watched(self, surfaces):
+        drawn.append(surfaces[0].positions.copy())
+        return original(self, surfaces)
+
+    monkeypatch.setattr(Renderer, "render", watched)
+    return drawn
+
+
+def test_slow_motion_shows_the_same_states_of_the_world_and_what_lies_between(monkeypatch, tmp_path):
+    """Every fourth picture is one of the film at full speed; the others lie on the straight way."""
+    drawn = drawn_by(monkeypatch)
+    plain, slowed = falling_box(), falling_box()
+    film(plain, tmp_path / "p.png", seconds=0.2, size=(160, 120))
+    fast = [rows.copy() for rows in drawn[1:]]  # the first picture is drawn to compile
+    drawn.clear()
+    report = film(slowed, tmp_path / "s.png", seconds=0.2, size=(160, 120), slow=4)
+    slow = drawn[1:]
+    assert report.frames == len(slow) == 4 * len(fast) == 40
+    assert slowed.world.step_count == plain.world.step_count
+    assert slowed.world.state_hash() == plain.world.state_hash()
+    for number, rows in enumerate(fast[2:-1], start=2):
+        np.testing.assert_allclose(slow[4 * number], rows, atol=1e-6)
+        between = rows + 0.75 * (fast[number + 1] - rows)
+        np.testing.assert_allclose(slow[4 * number + 3], between, atol=1e-6)
+    assert report.real_time_factor == pytest.approx(39 * 0.005 / report.step_times.sum())
+
+
+def test_what_is_slowed_says_so(monkeypatch, tmp_path):
+    told = []
+    monkeypatch.setattr("taichi_soft.render.artist.draw_text", lambda picture, lines: told.append(lines))
+    film(falling_box(), tmp_path / "s.png", seconds=0.04, size=(160, 120), slow=2.5)
+    assert told[-1][2] == "shown 2.5 x slower"
+
+
+def test_a_blurred_film_shows_the_time_of_the_shutter_and_the_world_makes_the_same_steps(
+    monkeypatch, tmp_path
+):
+    drawn = drawn_by(monkeypatch)
+    plain, blurred = falling_box(), falling_box()
+    film(plain, None, seconds=0.2)
+    film(blurred, tmp_path / "b.png", seconds=0.2, size=(160, 120), blur=3)
+    assert plain.world.state_hash() == blurred.world.state_hash()
+    heights = np.array([rows[:, 2].min() for rows in drawn[2:]]).reshape(-1, 3)
+    # In steps of half a frame from the shutter's opening to its closing, in free fall.
+    falls = -np.diff(heights[2:], axis=1)
+    assert (falls > 0).all()
+    np.testing.assert_allclose(falls[:, 0], falls[:, 1], rtol=1e-2)
+    np.testing.assert_allclose(
+        heights[3:, 0] - heights[3:, 2], (heights[2:-1, 2] - heights[3:, 2]) / 2, rtol=1e-2
+    )
+
+
+def test_a_blurred_film_of_what_stands_still_is_the_sharp_film(tmp_path):
+    world = World(gravity=(0.0, 0.0, 0.0))
+    body = world.add_body(box((1, 1, 1), (2, 2, 2)), Material(1e5, 0.2, 1000, 10), position=(0, 0, 1))
+    world.build()
+    camera = Camera.framing((-1, -1, 0), (1, 1, 2))
+    pictures = {}
+    for blur in (1, 4):
+        stage = Stage("", world, [Actor(body)], camera, FixedStep(dt=0.02), 1.0)
+        film(stage, tmp_path / f"{blur}.png", seconds=0.06, size=(320, 240), blur=blur)
+        pictures[blur] = cv2.imread(str(tmp_path / f"{blur}_0002.png"))[80:]  # below the words
+    np.testing.assert_array_equal(pictures[1], pictures[4])
+
+
+def test_a_camera_that_follows_keeps_a_falling_body_in_the_picture(monkeypatch, tmp_path):
+    """It leaves the picture of one that stays."""
+    cameras, drawn = [], drawn_by(monkeypatch)
+    watched = Renderer.render
+    monkeypatch.setattr(
+        Renderer, "render", lambda self, surfaces: cameras.append(self.camera) or watched(self, surfaces)
+    )
+    stage = falling_box()
+    stage.camera = Follow(stage.actors[0].body, Camera((0, -5, 4), (0, 0, 4), fov_degrees=40))
+    film(stage, tmp_path / "f.png", seconds=0.8, size=(160, 120))
+    for camera, rows in zip(cameras, drawn, strict=True):
+        pixels = camera.project(rows, 160, 120)[:, :2]
+        assert ((pixels > 0) & (pixels < (160, 120))).all()
+    assert (cameras[0].project(drawn[-1], 160, 120)[:, 1] > 120).any()
+
+
+def test_a_camera_that_follows_what_is_not_drawn_is_refused_before_anything_moves(tmp_path):
+    stage, other = falling_box(), falling_box()
+    stage.camera = Follow(other.actors[0].body, stage.camera)
+    with pytest.raises(OptionError, match="no actor"):
+        film(stage, tmp_path / "f.png", seconds=0.1)
+    assert stage.world.step_count == 0
+    assert not list(tmp_path.iterdir())
+
+
 def test_the_picture_changes_as_the_body_falls(tmp_path):
     film(falling_box(), tmp_path / "f.png", seconds=0.6, fps=10, size=(160, 120))
     first, last = (cv2.imread(str(tmp_path / f"f_{i:04}.png")) for i in (0, 5))
@@ -144,7 +240,10 @@ def test_the_picture_changes_as_the_body_falls(tmp_path):
 
 @pytest.mark.parametrize(
     ("option", "value"),
-    [("seconds", 0.0), ("seconds", 1e300), ("seconds", np.nan), ("fps", -5), ("fps", "x")],
+    [
+        *(("seconds", 0.0), ("seconds", 1e300), ("seconds", np.nan), ("fps", -5), ("fps", "x")),
+        *(("slow", 0.5), ("slow", np.nan), ("blur", 0), ("blur", 1.5), ("blur", 65)),
+    ],
 )
 def test_a_wrong_number_is_refused_before_anything_moves(option, value, tmp_path):
     stage = falling_box()

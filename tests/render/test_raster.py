@@ -24,7 +24,7 @@ def scene(*triangles):
     corners = np.arange(len(positions), dtype=np.int32).reshape(-1, 3)
     nothing = np.zeros_like(positions)
     plain = SceneTextures.of([None], [None], [len(positions)], [len(corners)])
-    return SceneArrays(positions, nothing, nothing, corners, plain)
+    return SceneArrays(positions, nothing, nothing, corners, np.zeros(len(corners), dtype=np.int32), plain)
 
 
 def draw(parts, camera=CAMERA, width=WIDTH, height=HEIGHT):

@@ -264,7 +264,8 @@ from taichi_soft.meshing import sphere, torus
 from taichi_soft.render import Camera, Renderer, Surface
 ball, ring = sphere(0.5, 4), torus()
 parts = [Surface(ball.vertices + [0.3 * i - 1, 0.2 * i, 0.5 + 0.3 * i], ball.surface) for i in range(5)]
-parts.append(Surface(ring.vertices + [0, 0, 0.5], ring.surface, color=(0.2, 0.5, 0.6)))
+parts.append(Surface(ring.vertices + [0, 0, 0.5], ring.surface, color=(0.2, 0.5, 0.6), look="jelly"))
+parts.append(Surface(ball.vertices + [1, 0, 0.5], ball.surface[:40], look="cloth"))
 picture = Renderer(322, 182, camera=Camera.framing((-1, -1, 0), (1, 1, 1.6))).render(parts)
 print(hashlib.sha256(picture.tobytes()).hexdigest())
 """

@@ -1,0 +1,144 @@
+"""Pictures of a stage, with what the steps cost written beside it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.bodies.skin_mesh import SkinMesh
+from taichi_soft.render import Renderer, Surface, draw_color_scale, draw_labels, draw_legend, draw_text
+from taichi_soft.render.motion_blur import mean_picture
+from taichi_soft.render.skin_looks import texture_picture, vertex_colors
+from taichi_soft.render.stage import Actor
+from taichi_soft.render.take import Take, skins_of
+from taichi_soft.render.texture import Texture
+
+_RECENT = 25
+"""Frames of whose times the picture tells the median."""
+
+LABEL_ROOM = 1.2
+"""How far in front of the middle of a body its label stands, in half widths of the body at rest."""
+
+
+def speed_of(times: Sequence[float], fps: float) -> str:
+    """How fast the last frames were, at the median: one of them may have been disturbed.
+
+    Args:
+        times: of stepping each frame [s]. The first shows the stage as it stands, and does not count.
+    """
+    recent = times[1:][-_RECENT:]
+    if not recent:
+        return ""
+    factor = 1.0 / fps / float(np.median(recent))
+    return f"{factor:.{0 if factor >= 10 else 1 if factor >= 0.1 else 2}f} x real time"
+
+
+class Artist:
+    """Draws a take and writes beside it what the steps cost.
+
+    Args:
+        size: width and height [pixels].
+        rate: frames per second of the world.
+        slow: how many times slower than the world the film is.
+
+    Attributes:
+        times: that drawing each frame took [s].
+    """
+
+    def __init__(self, take: Take, size: tuple[int, int], rate: float, slow: float) -> None:
+        self.take = take
+        self.rate, self.slow = rate, slow
+        self.renderer = Renderer(*size, camera=take.camera(), floor=take.stage.world.settings.floor)
+        self.times: list[float] = []
+        self._spent = 0.0
+        self._surfaces: dict[tuple[int, int], list[Surface]] = {}  # by actor and version of its topology
+        self._textures: dict[int, tuple[Any, Texture]] = {}  # by picture, which is kept: its id stays its own
+
+    def draw(self) -> NDArray[np.uint8]:
+        """The picture of the take as it is now, without words."""
+        start = time.perf_counter()
+        take = self.take
+        surfaces = take.scenery.at(take.adapter.alpha).copy()
+        for actor, rows, own in zip(take.stage.actors, take.positions, take.normals, strict=True):
+            at = 0
+            for surface in self._surfaces_of(actor):
+                its = slice(at, at + surface.vertex_count)
+                at += surface.vertex_count
+                surface.positions = rows[its]
+                if surface.normals is not None:
+                    surface.normals = own[its]
+                if actor.paint:
+                    surface.color = actor.paint(actor.body)
+                surfaces.append(surface)
+        self.renderer.camera = take.camera()
+        picture = self.renderer.render(surfaces)
+        self._spent += time.perf_counter() - start
+        return picture
+
+    def finish(self, pictures: Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:
+        """The mean of the pictures of a frame, with the words of the stage; one alone is changed in place."""
+        start = time.perf_counter()
+        picture = mean_picture(pictures)
+        stage = self.take.stage
+        self._draw_labels(picture)
+        told = f"t = {self.take.adapter.time:.2f} s   {speed_of(self.take.times, self.rate)}".rstrip()
+        lines = [stage.title, told]
+        if self.slow > 1.0:
+            lines.append(f"shown {self.slow:g} x slower")
+        if stage.caption:
+            lines.append(stage.caption())
+        draw_text(picture, lines)
+        if stage.scale:
+            draw_color_scale(picture, stage.scale, corner="top right")
+        if stage.legend:
+            draw_legend(picture, stage.legend, corner="top right")
+        self.times.append(self._spent + time.perf_counter() - start)
+        self._spent = 0.0
+        return picture
+
+    def _surfaces_of(self, actor: Actor) -> list[Surface]:
+        """Its skins, or else its surface, made anew where a cut has changed it."""
+        key = id(actor), actor.body.topology_version
+        if key not in self._surfaces:
+            skins = [self._skin_surface(mesh, actor) for mesh in skins_of(actor)]
+            self._surfaces[key] = skins or [Surface.of(actor.body.mesh, color=actor.color, look=actor.look)]
+        return self._surfaces[key]
+
+    def _skin_surface(self, mesh: SkinMesh, actor: Actor) -> Surface:
+        """In its own colours and texture where it has any."""
+        picture, texture = texture_picture(mesh.visual, mesh.vertex_count), None
+        if picture is not None:
+            if id(picture) not in self._textures:
+                self._textures[id(picture)] = picture, Texture(np.asarray(picture.convert("RGB")))
+            texture = self._textures[id(picture)][1]
+        nowhere = np.zeros((mesh.vertex_count, 3), dtype=np.float32)
+        return Surface(
+            nowhere,
+            mesh.triangles,
+            color=vertex_colors(mesh.visual, mesh.vertex_count, actor.color),
+            normals=nowhere,
+            texture=texture,
+            uv=None if texture is None else mesh.visual.uv,
+            look=actor.look,
+        )
+
+    def _draw_labels(self, picture: NDArray[np.uint8]) -> None:
+        """A caption on the floor in front of each body that has one, clear of it."""
+        stage = self.take.stage
+        named = [(a, rows) for a, rows in zip(stage.actors, self.take.positions, strict=True) if a.label]
+        if not named:
+            return
+        floor, camera = stage.world.settings.floor, self.renderer.camera
+        forward = np.subtract(camera.eye, camera.target)[:2]
+        forward = forward / max(float(np.linalg.norm(forward)), 1e-9)
+        feet = np.array([rows.mean(axis=0) for _, rows in named], dtype=np.float64)
+        for foot, (actor, rows) in zip(feet, named, strict=True):
+            half = float(np.ptp(actor.body.mesh.vertices, axis=0)[:2].max()) / 2
+            foot[:2] += LABEL_ROOM * half * forward
+            foot[2] = rows[:, 2].min() if floor is None else floor
+        places = camera.project(feet, self.renderer.width, self.renderer.height)
+        draw_labels(picture, [actor.label for actor, _ in named], places)

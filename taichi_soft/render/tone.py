@@ -1,0 +1,46 @@
+"""From light without an upper end to what a screen shows: a toe, a straight middle and a shoulder."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.render.colors import to_srgb
+
+Floats = NDArray[np.float32]
+
+WHITE = 4.0
+"""Linear light that a picture shows as full white, and all that is brighter."""
+
+TOE = 0.010
+"""Linear light about which dark tones are deepened."""
+
+KNEE = 0.55
+"""Linear light above which bright tones are pressed together; between the toe and it colours are kept."""
+
+STEPS = 4096
+"""Length of the table that kernels read."""
+
+
+def tone_map(light: NDArray[np.floating]) -> Floats:
+    """Linear light of a scene as linear light of a screen, 0 to 1: 0 stays black, `WHITE` becomes white.
+
+    Args:
+        light: of any shape; it is taken as 0 below 0 and as `WHITE` above it.
+    """
+    x = np.clip(np.asarray(light, dtype=np.float64), 0.0, WHITE)
+    deep = x * x / (x + TOE)
+    return np.asarray(_shoulder(deep) / _shoulder(np.float64(WHITE * WHITE / (WHITE + TOE))), np.float32)
+
+
+def _shoulder(x: NDArray[np.float64] | np.float64) -> NDArray[np.float64]:
+    """Straight up to the knee, then ever flatter, without a bend."""
+    room = 1.0 - KNEE
+    return np.where(x < KNEE, x, 1.0 - room * np.exp(-np.maximum(x - KNEE, 0.0) / room))
+
+
+def encode_table() -> Floats:
+    """sRGB, 0 to 255, of light from 0 to `WHITE`, `STEPS` of them: even steps of its square root, as the eye
+    tells dark tones apart better than bright ones."""
+    root = np.linspace(0.0, 1.0, STEPS)
+    return np.asarray(255.0 * to_srgb(tone_map(WHITE * root * root)), dtype=np.float32)
