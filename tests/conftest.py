@@ -88,7 +88,7 @@ NUMPY = ("meshing/", "cages/", "elements/materials/", "bake/test_formats", "test
 KERNEL = ("elements/", "contact/distances/", "contact/shapes/", "core/math/")
 WORLD = ("elements/laws/test_energy_laws", "cages/test_thin.py::test_a_table_on")
 SOAK = (
-    *("lab/", "demos/", "cli/", "native/", "live/test_served", "live/test_page"),
+    *("lab/", "demos/", "cli/", "native/", "live/test_served", "live/test_page", "live/test_measuring"),
     "feel/test_material_from_feel.py::test_random_wishes",
     "feel/test_material_from_feel.py::test_what_cannot",
     *(

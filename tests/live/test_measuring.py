@@ -1,0 +1,24 @@
+"""What `taichi-soft live --measure` finds, for one sphere and a short time."""
+
+import pytest
+
+pytest.importorskip("websockets", reason="needs websockets: pip install 'taichi-soft[live]'")
+
+from taichi_soft import sphere
+from taichi_soft.live import measuring
+
+
+def test_a_measurement_counts_what_is_sent_and_orders_its_percentiles(monkeypatch):
+    monkeypatch.setattr(measuring, "COUNTS", (1,))
+    monkeypatch.setattr(measuring, "SECONDS", 1.0)
+    monkeypatch.setattr(measuring, "PULLS", 3)
+    told = []
+    (cost,) = measuring.measure(told.append)
+    mesh = sphere(0.3, 4)
+    outer = len({int(v) for v in mesh.surface.ravel()})
+    assert told == ["1 spheres"]
+    assert cost.triangles == len(mesh.surface)
+    assert cost.packet == 48 + 10 * outer
+    assert cost.pictures > 0.0
+    for low, high in (cost.latency_ms, cost.alone_ms, cost.visited_ms):
+        assert 0.0 < low <= high
