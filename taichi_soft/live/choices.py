@@ -88,6 +88,11 @@ def choices(
             setattr(World, name, function)
 
 
+def palette_of(world: World) -> dict[str, SoftBodyAsset]:
+    """What visitors may add, by name."""
+    return dict(PALETTES.get(world, {}))
+
+
 def _palette(meshes: Sequence[str | Path]) -> dict[str, SoftBodyAsset]:
     """Shapes of about half a metre, and the surfaces of files, by name."""
     shapes = {

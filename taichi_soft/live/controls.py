@@ -7,8 +7,13 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
-from taichi_soft import Body, Material, World
+import numpy as np
+
+from taichi_soft import Body, Material, SoftBodyAsset, World
 from taichi_soft.core.errors import OptionError, StateError
+from taichi_soft.live.choices import palette_of
+from taichi_soft.solver.substeps import SOFT_CONTACT_STEP
+from taichi_soft.world.world import context_of_world
 
 
 @dataclass(frozen=True)
@@ -54,8 +59,8 @@ def checked_value(name: Any, value: Any) -> float:
     if not isinstance(name, str) or name not in SLIDERS:
         raise OptionError(f"there is no slider {name!r}")
     slider = SLIDERS[name]
-    is_number = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
-    if not is_number or not slider.low <= value <= slider.high:
+    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    if not is_number or not slider.low <= value <= slider.high:  # as a NaN is
         raise OptionError(f"{slider.label} goes from {slider.low:g} to {slider.high:g}, got {value!r}")
     return float(round(value)) if slider.is_whole else float(value)
 
@@ -67,25 +72,36 @@ class Controls:
         self.world, self.dt = world, dt
         self.given: dict[str, float] = {}
         self._own_substeps = substeps
-        self._first = next(iter(_materials(world)), None)
+        self._own = {body.index: body.material for body in world.bodies}
+        self._first = next((each for each in self._own.values() if isinstance(each, Material)), None)
         self._first_stable = world.stable_substeps(dt)
-        self._constants = [(_number(m.young), _number(m.poisson)) for m in _materials(world)]
+        assets = {id(body.asset): body.asset for body in world.bodies}
+        self._assets = [*assets.values(), *palette_of(world).values()]
+        self._down = np.asarray(world.settings.gravity, dtype=np.float64)
+        length = float(np.linalg.norm(self._down))
+        self._down = self._down / length if length else np.array([0.0, 0.0, -1.0])
 
     @property
     def stable_substeps(self) -> int:
-        """How many a step needs with these materials, predicted from the speed of waves.
+        """How many a step needs with these materials, predicted from the speed of waves in each asset.
 
         An estimate of every body anew would stop the world for a moment at each move of a slider.
         """
-        if self._first is None or not {"young", "poisson"} & set(self.given):
+        is_implicit = self.world.settings.is_implicit
+        if self._first is None or is_implicit or not {"young", "poisson"} & set(self.given):
             return self._first_stable
-        after = max(
-            self.given.get("young", young) * _wave_factor(self.given.get("poisson", poisson))
-            for young, poisson in self._constants
-        )
-        before = max(young * _wave_factor(poisson) for young, poisson in self._constants)
-        least = 4 if self.world.colliders else 1
-        return max(least, math.ceil(self._first_stable * math.sqrt(after / before) - 1e-9))
+        counts = [self.dt / asset.stable_step.recommended * self._factor(asset) for asset in self._assets]
+        soft = context_of_world(self.world).contact.soft
+        return math.ceil(max(*counts, 1.0, self.dt / SOFT_CONTACT_STEP if soft else 1.0) - 1e-9)
+
+    def _factor(self, asset: SoftBodyAsset) -> float:
+        """By how much faster waves are in it than they were."""
+        material = asset.material
+        if not isinstance(material, Material):
+            return 1.0
+        young, poisson = _number(material.young), _number(material.poisson)
+        after = self.given.get("young", young) * _wave_factor(self.given.get("poisson", poisson))
+        return math.sqrt(after / (young * _wave_factor(poisson)))
 
     @property
     def substeps(self) -> int:
@@ -117,7 +133,7 @@ class Controls:
             for body in self.world.bodies:
                 self._give_material(body)
         elif name == "gravity":
-            self.world.set_gravity((0.0, 0.0, -value))
+            self.world.set_gravity(value * self._down)
         elif name == "friction":
             self._give_friction(value)
 
@@ -135,7 +151,7 @@ class Controls:
 
     def _give_material(self, body: Body) -> None:
         """Bodies of springs alone have no such numbers, and stay."""
-        material = body.asset.material
+        material = self._own.get(body.index, body.asset.material)
         if isinstance(material, Material):
             names = {"young": "young", "poisson": "poisson", "damping": "damping_ratio"}
             given = {names[name]: value for name, value in self.given.items() if name in names}
@@ -153,10 +169,6 @@ class Controls:
 def _set_friction(body: Body, value: float) -> None:
     with suppress(StateError):  # bodies of this world do not touch each other
         body.set_friction(value)
-
-
-def _materials(world: World) -> list[Material]:
-    return [body.material for body in world.bodies if isinstance(body.material, Material)]
 
 
 def _number(constant: Any) -> float:

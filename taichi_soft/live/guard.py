@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hmac
 import secrets
+import socket
 import time
 from dataclasses import dataclass
 from http import HTTPStatus
@@ -14,6 +15,15 @@ MOST_VISITORS = 16
 
 VIEW_KEY = "TAICHI_SOFT_VIEW_KEY"
 """Name of the environment variable by which a server and the program that started it know each other."""
+
+EVERYWHERE = ("0.0.0.0", "::")
+"""Addresses that stand for all of a machine."""
+
+PUBLIC = (
+    *("/live.css", "/live.js", "/picture.js", "/panel.js"),
+    *(f"/three/{name}.js" for name in ("three.module", "three.core", "OrbitControls")),
+)
+"""Files of the page."""
 
 MESSAGES, BURST = 240.0, 480.0
 """Of one visitor: messages a second, and how many at once. A hand that is moved sends 60."""
@@ -46,12 +56,13 @@ class Guard:
 
     def address(self) -> str:
         """Which a visitor opens."""
-        name = f"[{self.host}]" if ":" in self.host else self.host
+        name = socket.gethostname() if self.host in EVERYWHERE else self.host
+        name = f"[{name}]" if ":" in name else name
         query = "" if self.token is None else f"?token={self.token}"
         return f"http://{name}:{self.port}/{query}"
 
     def refusal(self, path: str, host: str | None, origin: str | None) -> tuple[HTTPStatus, str] | None:
-        """Why a request is refused, or None.
+        """Why a request is refused, or None. The page's scripts hold no secret, and ask for no token.
 
         A page of another origin may not open a connection, also not one whose name a name server has turned
         to this machine: so the name in `Host` counts, and `Origin` has to agree.
@@ -61,18 +72,18 @@ class Guard:
         """
         if self.token is None and not self._is_mine(host):
             return HTTPStatus.FORBIDDEN, f"this world is served for {self.host}:{self.port}, not for {host!r}"
-        if origin is not None and urlsplit(origin).netloc != host:
+        if origin is not None and origin not in (f"http://{host}", f"https://{host}"):
             return HTTPStatus.FORBIDDEN, f"a page of {origin!r} may not touch this world"
-        if self.token is not None:
+        if self.token is not None and urlsplit(path).path not in PUBLIC:
             given = parse_qs(urlsplit(path).query).get("token", [""])[0]
             if not hmac.compare_digest(given.encode(), self.token.encode()):
                 return HTTPStatus.UNAUTHORIZED, "this address needs its token: open the one that was printed"
         return None
 
     def _is_mine(self, host: str | None) -> bool:
-        name = urlsplit(f"//{host}").hostname if host else None
         try:
-            port = urlsplit(f"//{host}").port
+            parts = urlsplit(f"//{host or ''}")
+            name, port = parts.hostname, parts.port
         except ValueError:
             return False
         return name is not None and is_loopback(name) and (port or 80) == self.port

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from websockets.asyncio.client import ClientConnection, connect
 
+from taichi_soft.core.errors import StateError
 from taichi_soft.live.packets import PICTURE
 from taichi_soft.live.scene import SceneSource
 from taichi_soft.live.server import LiveServer
@@ -72,6 +73,8 @@ async def _measured(on_part: Callable[[str], object]) -> list[LiveCost]:
             await server.open()
             try:
                 while not server.panes:
+                    if server.trouble is not None:
+                        raise StateError(server.trouble)
                     await asyncio.sleep(0.1)
                 found.append(await _cost(server, count))
             finally:

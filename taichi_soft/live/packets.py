@@ -21,6 +21,9 @@ DRAWN, PICTURE = 1, 2
 STEPS = 65535
 """Of a coordinate, from one side of the box to the other."""
 
+LARGEST_BOX = np.float32(400.0)
+"""Of a picture [m]: what lies outside is drawn at its side."""
+
 _PICTURE = struct.Struct("<BBHIIId3f3f")
 """Kind, pane, whether it is tinted, number, version, count of vertices, time, lowest corner, size of box."""
 
@@ -41,8 +44,12 @@ def quantised(positions: NDArray[np.float32]) -> tuple[NDArray[np.uint16], NDArr
     """Positions (n, 3) [m] as shares of their box. Returns: the shares, the lowest corner, the size [m]."""
     if len(positions) == 0:
         return np.zeros((0, 3), np.uint16), np.zeros(3, np.float32), np.ones(3, np.float32)
-    low = positions.min(axis=0)
-    size = np.maximum(positions.max(axis=0) - low, np.float32(1e-6))
+    low, high = positions.min(axis=0), positions.max(axis=0)
+    if float((high - low).max()) > LARGEST_BOX:  # a body flew away: the others are to be seen well
+        middle = np.median(positions, axis=0)
+        positions = np.clip(positions, middle - LARGEST_BOX / 2, middle + LARGEST_BOX / 2)
+        low, high = positions.min(axis=0), positions.max(axis=0)
+    size = np.maximum(high - low, np.float32(1e-6))
     return ((positions - low) * (STEPS / size) + 0.5).astype(np.uint16), low, size
 
 

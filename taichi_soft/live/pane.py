@@ -44,6 +44,7 @@ class Runner:
         self.frames: FrameFile | None = None
         self.is_over = False
         self.is_lost = False  # the other end is gone
+        self.is_asked = False  # for whom the one that is shown was asked where its bodies are
         self.is_fresh = False  # begins at its beginning, whatever was shown before it
         self._waiting: OrderedDict[Any, tuple[Any, ...]] = OrderedDict()
         self._changed = threading.Condition()
@@ -82,7 +83,7 @@ class Runner:
             if key is None:
                 self._count += 1
             key = key, self._count
-            if key not in self._waiting and len(self._waiting) >= MOST_WAITING:
+            if key not in self._waiting and len(self._waiting) >= MOST_WAITING and message[0] != "release":
                 return False
             self._waiting[key] = message
             self._changed.notify()
@@ -95,6 +96,12 @@ class Runner:
             self._waiting.clear()
             self._waiting["stop"] = ("stop",)
             self._changed.notify()
+
+    def kill(self) -> None:
+        """End the process at once, also one that compiles."""
+        self.stop()
+        if self._process is not None:
+            self._process.kill()
 
     def end(self) -> None:
         """Wait until it has ended, for a second or two."""
@@ -141,7 +148,10 @@ class Runner:
             self.is_lost = True
         elif message[0] == "drawn":
             _, path, sizes, header, arrays = message
-            self.frames = FrameFile(Path(path), *sizes)
+            try:
+                self.frames = FrameFile(Path(path), *sizes)
+            except OSError:
+                return  # a newer one has taken its place
             self.drawn = header, arrays
         elif message[0] in ("state", "ready"):
             self.state = message[1]

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from taichi_soft.core.errors import StateError
 from taichi_soft.live.drawn import Drawn
 from taichi_soft.live.scene import Scene, SceneSource
 
@@ -21,7 +22,7 @@ assert world.state_hash() == {hash!r}, "another version of taichi-soft, or anoth
 DT, SUBSTEPS = {dt!r}, {substeps!r}  # of a step: seconds, and parts
 
 if __name__ == "__main__":
-    for _ in range(60):
+    for _ in range(60):{act}
         world.step(DT, SUBSTEPS)
     print(f"t = {{world.time:.3f}} s, state {{world.state_hash()}}")
 """
@@ -31,7 +32,8 @@ def saved_script(source: SceneSource, state_hash: str, dt: float, substeps: int)
     """A script that makes the world as it is now, by the snapshot beside it, and then a second of steps."""
     title = f'"""The scene {source.title!r} of `taichi-soft live`, as it was saved."""\n\n'
     script = source.script(is_alone=True)
-    return title + script + _RESTORED.format(hash=state_hash, dt=dt, substeps=substeps)
+    act = "\n        if act is not None:\n            act(world)" if source.kind == "demo" else ""
+    return title + script + _RESTORED.format(hash=state_hash, dt=dt, substeps=substeps, act=act)
 
 
 def packed(script: str, snapshot: bytes, source: SceneSource) -> bytes:
@@ -41,14 +43,23 @@ def packed(script: str, snapshot: bytes, source: SceneSource) -> bytes:
         archive.writestr("scene.py", script)
         archive.writestr("scene.snapshot", snapshot)
         for path in [*source.meshes, *([source.name] if source.kind == "script" else [])]:
-            archive.write(path, Path(path).name)
+            archive.write(path, f"files/{Path(path).name}")
     return out.getvalue()
+
+
+FILM_FPS = 30.0
 
 
 def film_frames(path: Path, recent: Sequence[tuple[float, int, Any]], drawn: Drawn, scene: Scene) -> None:
     """Write what `film_file` draws: pictures of one version of the meshes, and the meshes."""
     header, arrays = drawn.described()
-    frames = [rows for _, version, rows in recent if version == drawn.version]
+    own = [(moment, rows) for moment, version, rows in recent if version == drawn.version]
+    if not own:
+        raise StateError("nothing has moved yet: there is no film")
+    # Each picture of the film shows the last one that was kept before its moment.
+    moments = np.array([moment for moment, _ in own])
+    shown = np.arange(moments[0], moments[-1] + 1e-9, 1.0 / FILM_FPS)
+    frames = [own[i][1] for i in np.searchsorted(moments, shown + 1e-9, side="right") - 1]
     camera = header["camera"]
     rows: dict[str, Any] = dict(
         positions=np.array([positions for positions, _ in frames], np.float32),

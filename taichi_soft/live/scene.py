@@ -13,7 +13,6 @@ import numpy as np
 from engine_adapter import EngineAdapter, FixedStep
 from taichi_soft import World
 from taichi_soft.core.errors import OptionError
-from taichi_soft.live.choices import PALETTES
 from taichi_soft.render import PALETTE, Camera
 from taichi_soft.render.colors import Color
 from taichi_soft.render.film import Stage
@@ -35,14 +34,14 @@ _DEMO = """\
 from taichi_soft.render.demos import load_demo
 
 stage = load_demo({name!r}).stage()
-world = stage.world
+world, act = stage.world, stage.act
 """
 
 _SCRIPT = """\
 import runpy
 
-made = runpy.run_path(str(Path(__file__).with_name({name!r})), run_name="taichi_soft_scene")
-world = next(each for each in made.values() if isinstance(each, World))
+made = runpy.run_path(str({name!r}), run_name="taichi_soft_scene")
+(world,) = {each for each in made.values() if isinstance(each, World)}
 if not world.is_built:
     world.build()
 """
@@ -79,23 +78,25 @@ class SceneSource:
         """The script that makes `world`.
 
         Args:
-            is_alone: whether the files that it names lie beside it, as where it was saved.
+            is_alone: whether the files that it names lie in `files` beside it, as where it was saved.
         """
-        meshes = [Path(each).name if is_alone else each for each in self.meshes]
-        files = ", ".join(
-            f"Path(__file__).with_name({each!r})" if is_alone else repr(each) for each in meshes
-        )
+        files = ", ".join(self._place(each, is_alone) for each in self.meshes)
         options = [
             f"{key}={getattr(self, key)!r}" for key in ("law", "strain", "flips") if getattr(self, key)
         ]
-        options += ["has_palette=True", *([f"meshes=[{files}]"] if meshes else [])]
+        options += ["has_palette=True", *([f"meshes=[{files}]"] if self.meshes else [])]
         body = {"playground": _PLAYGROUND, "demo": _DEMO, "script": _SCRIPT}[self.kind]
-        name = Path(self.name).name if self.kind == "script" else self.name
-        lines = body.replace("{name!r}", repr(name)).splitlines()
+        name = self._place(self.name, is_alone) if self.kind == "script" else repr(self.name)
+        lines = body.replace("{name!r}", name).splitlines()
         inner = "\n".join(f"    {line}" if line else "" for line in lines)
         head = "from pathlib import Path\n\n"
         head += "from taichi_soft import World\nfrom taichi_soft.live import choices\n"
         return f"{head}\nwith choices({', '.join(options)}):\n{inner}\n"
+
+    @staticmethod
+    def _place(path: str, is_alone: bool) -> str:
+        """A file, as the script names it."""
+        return f'Path(__file__).parent / "files" / {Path(path).name!r}' if is_alone else repr(path)
 
 
 @dataclass
@@ -125,7 +126,12 @@ def made_scene(source: SceneSource) -> Scene:
         sys.path[:0] = [str(source.folder)]
         if not Path(source.name).is_file():
             raise OptionError(f"cannot read {source.name}: no such file")
-    exec(compile(source.script(), path.name, "exec"), names)
+    try:
+        exec(compile(source.script(), path.name, "exec"), names)
+    except ValueError as error:
+        if "values to unpack" in str(error) and source.kind == "script":
+            raise OptionError(f"{source.name} must make one World, in a variable of its own") from None
+        raise
     stage, world = names.get("stage"), names["world"]
     if isinstance(stage, Stage):
         colors = {actor.body.index: actor.color for actor in stage.actors if actor.world in (None, world)}
@@ -148,17 +154,11 @@ def framing_of(world: World) -> Camera:
     return Camera.framing(low, high, aspect=16 / 9, azimuth=-62.0, elevation=22.0, fov_degrees=40.0)
 
 
-def palette_of(world: World) -> dict[str, Any]:
-    """What visitors may add, by name."""
-    return dict(PALETTES.get(world, {}))
-
-
-def adapter_of(scene: Scene, substeps: int | None) -> EngineAdapter:
-    """For a scene, with so many substeps, or those of the scene."""
-    given = scene.step.substeps if substeps is None else substeps
+def adapter_of(scene: Scene, substeps: int, before: Callable[[World], object]) -> EngineAdapter:
+    """For a scene, with so many substeps; `before` is called before each step."""
     # Where a world is slower than real time, it shows slow motion rather than few pictures.
-    step = FixedStep(dt=scene.step.dt, substeps=given, max_steps=2)
-    return EngineAdapter(scene.world, step, before_step=scene.act)
+    step = FixedStep(dt=scene.step.dt, substeps=substeps, max_steps=2)
+    return EngineAdapter(scene.world, step, before_step=before)
 
 
 def found_source(text: str | None) -> SceneSource:

@@ -6,6 +6,7 @@ import asyncio
 import json
 import logging
 import math
+import re
 import secrets
 import tempfile
 from collections.abc import Callable
@@ -33,9 +34,8 @@ from taichi_soft.live.controls import SLIDERS
 from taichi_soft.live.guard import LARGEST_UPLOAD, MOST_VISITORS, Allowance, Guard
 from taichi_soft.live.packets import drawn_packet, picture_packet
 from taichi_soft.live.pane import Runner
-from taichi_soft.live.saving import film_file, packed
+from taichi_soft.live.saving import FILM_FPS, film_file, packed
 from taichi_soft.live.scene import SceneSource
-from taichi_soft.live.simulation import FILM_FPS
 from taichi_soft.live.three_js import fetch_three_js
 from taichi_soft.live.tints import QUANTITIES
 from taichi_soft.live.uploads import require_mesh
@@ -46,8 +46,14 @@ PAGE = Path(__file__).parent / "page"
 UNSEEN = 2
 """Pictures on their way to a visitor: more wait until it has shown one of these, and are then left out."""
 
+MOST_BREAKDOWNS = 2
+"""Of a world in a minute, after which it is not made anew."""
+
 BETWEEN_CHOICES = 1.0
 """Seconds: each choice starts a process."""
+
+FRAMED_BY = "'self' http://localhost:* http://127.0.0.1:* vscode-webview:"
+"""Pages that may show a world within them: those of notebooks on this machine."""
 
 VIEWED = ("grab", "move", "release", "tint")
 """What a visitor may do to a world that another program steps."""
@@ -100,7 +106,9 @@ class LiveServer:
         self.made: dict[str, tuple[str, str, bytes]] = {}  # downloads: kind, name, bytes
         self._count = 0
         self._files = _page_files()
-        self._folder = tempfile.TemporaryDirectory(prefix="taichi-soft-live-")
+        self._folder = tempfile.TemporaryDirectory(prefix="taichi-soft-live-", ignore_cleanup_errors=True)
+        self.trouble: str | None = None  # why there is no world
+        self._broken: list[float] = []  # when worlds broke down
         self._last_choice = -math.inf
         self._is_reading = self._is_filming = False  # a visitor's file; a film
         self._film: BaseProcess | None = None
@@ -149,12 +157,13 @@ class LiveServer:
     def _begin(self, pane: int, source: SceneSource, *, is_fresh: bool = False) -> None:
         """Make a world beside the one that is shown, which goes on until the new one is ready."""
         if pane in self.coming:
-            self.coming.pop(pane).stop()
+            self.coming.pop(pane).kill()
+        self.trouble = None
         self._count += 1
         folder = Path(self._folder.name) / str(self._count)
         heard = partial_heard(self, pane)
         runner = Runner.started(self._loop, folder, source, dict(self.given), heard)
-        runner.is_fresh = is_fresh
+        runner.is_fresh = is_fresh or self._restarts(pane)
         self.coming[pane] = runner
         self._say(f"compiling {_described(source)}" + (": the world goes on meanwhile" if self.panes else ""))
 
@@ -172,7 +181,7 @@ class LiveServer:
             self._fail(pane, runner, "its process ended")
         elif name == "said":
             self._say(rest[0])
-        elif name == "motion" and is_shown and pane in self.coming:
+        elif name == "motion" and is_shown and pane in self.coming and self.coming[pane].is_asked:
             self._take_over(pane, rest[0])
         elif name == "saved":
             number, script, snapshot = rest
@@ -188,9 +197,9 @@ class LiveServer:
         """Show a world that is ready: from where the bodies of the one before it are."""
         before = self.panes.get(pane)
         goes_on = before is not None and not before.is_lost and not runner.is_fresh
-        if before is not None and goes_on and runner.source.meshes == before.source.meshes:
-            before.send("motion")
-        elif pane == 1 and 0 in self.panes:
+        if before is not None and goes_on and before.send("motion"):
+            runner.is_asked = True
+        elif pane == 1 and before is None and 0 in self.panes:
             self._show(pane, runner)
             self.reset_all()
         else:
@@ -205,21 +214,33 @@ class LiveServer:
         before = self.panes.get(pane)
         self.panes[pane] = runner
         self.coming.pop(pane, None)
-        if self.paused:
-            runner.send("pause", True)
+        self._last_choice = self._loop.time()
         if self.tint:
             runner.send("tint", self.tint)
         if before is not None:
             before.stop()
         for name, value in self.given.items():
             runner.send("set", name, value, key=("set", name))
+        for mesh in runner.source.meshes:
+            if before is None or mesh not in before.source.meshes:
+                runner.send("spawn", Path(mesh).stem)
+        runner.send("pause", self.paused)
         self._say(f"{_described(runner.source)} is ready")
         self._wake()
 
     def reset_all(self) -> None:
-        """Both worlds from their beginnings, at the same moment."""
-        for runner in self.panes.values():
-            runner.send("reset")
+        """Worlds from their beginnings. One with code of its own is made anew: no snapshot has what that
+        remembers.
+        """
+        for pane, runner in list(self.panes.items()):
+            if self._restarts(pane):
+                self._begin(pane, runner.source, is_fresh=True)
+            else:
+                runner.send("reset")
+
+    def _restarts(self, pane: int) -> bool:
+        runner = self.panes.get(pane)
+        return runner is not None and bool((runner.state or {}).get("restarts"))
 
     def _fail(self, pane: int, runner: Runner, words: str) -> None:
         """A world that could not be made is left out; one that broke down is made anew."""
@@ -228,12 +249,25 @@ class LiveServer:
         self._is_filming = False
         if self.coming.get(pane) is runner:
             del self.coming[pane]
-            self._say(f"{_described(runner.source)}: {words}")
+            words = f"{_described(runner.source)}: {words}"
+            self._say(words)
             if not self.panes:
-                self._say("nothing to show: end it, and mend the scene")
+                self.trouble = words
+                _log.warning("live: %s", words)
+            return
+        if pane in self.coming:  # which is shown once it is ready
+            if self.coming[pane].is_asked:
+                self._show(pane, self.coming[pane])
             return
         if self.attached is not None:
             self._say("the program that steps this world has ended")
+            return
+        now = self._loop.time()
+        self._broken = [each for each in self._broken if now - each < 60.0] + [now]
+        if len(self._broken) > MOST_BREAKDOWNS:
+            self.trouble = f"the world broke down again ({words}): end it and begin anew"
+            self._say(self.trouble)
+            del self.panes[pane]
             return
         self._say(f"the world broke down ({words}): it is made anew")
         self._begin(pane, runner.source)
@@ -269,6 +303,8 @@ class LiveServer:
             await connection.send(json.dumps({"hello": visitor.number, **self._offered()}))
             for runner in self.coming.values():
                 self._tell(visitor, f"compiling {_described(runner.source)}")
+            if self.trouble is not None:
+                self._tell(visitor, self.trouble)
             visitor.wake.set()
             async for message in connection:
                 if not visitor.allowance.take():
@@ -331,21 +367,25 @@ class LiveServer:
                 raise OptionError("a film is being drawn: wait until it is there")
             self._is_filming = self._is_filming or wish["what"] == "film"
             self._require(runner.send(wish["what"] if wish["what"] == "film" else "save", visitor.number))
-        elif do == "reset" and any((each.state or {}).get("restarts") for each in self.panes.values()):
-            for pane, each in list(self.panes.items()):
-                self._begin(pane, each.source, is_fresh=True)
+        elif do == "reset":
+            if any(map(self._restarts, self.panes)):
+                self._require_patience()
+            self.reset_all()
         else:
             self._obey_for_all(wish)
 
     def _choose(self, do: str, wish: dict[str, Any]) -> None:
         """Compile another law, in place of the one that is shown or beside it."""
-        now = self._loop.time()
-        if now - self._last_choice < BETWEEN_CHOICES:
-            raise OptionError("a law was chosen just now: wait a second")
-        self._last_choice = now
+        self._require_patience()
         chosen = {key: wish[key] for key in ("law", "strain", "flips")}
         pane = 1 if do == "compare" else wish["pane"]
         self._begin(pane, replace(self._source(0 if do == "compare" else pane), **chosen))
+
+    def _require_patience(self) -> None:
+        now = self._loop.time()
+        if now - self._last_choice < BETWEEN_CHOICES:
+            raise OptionError("a world was begun just now: wait a second")
+        self._last_choice = now
 
     def _obey_for_all(self, wish: dict[str, Any]) -> None:
         """What both worlds get."""
@@ -387,6 +427,9 @@ class LiveServer:
 
     async def _add_mesh(self, visitor: Visitor, name: str, content: bytes) -> None:
         self._tell(visitor, f"looking at {name}")
+        taken = {Path(each).stem for each in self._source(0).meshes}
+        if re.sub(r"[^A-Za-z0-9_-]", "", Path(name).stem)[:40] in taken:
+            name = f"{Path(name).stem[:36]}{len(taken) + 1}{Path(name).suffix}"
         folder = Path(self._folder.name) / f"mesh{secrets.token_hex(4)}"
         try:
             path = await asyncio.to_thread(require_mesh, folder, name, content)
@@ -395,8 +438,9 @@ class LiveServer:
             return
         finally:
             self._is_reading = False
-        source = self._source(0)
-        self._begin(0, replace(source, meshes=(*source.meshes, str(path))))
+        for pane in sorted({0, *self.panes}):
+            source = self._source(pane)
+            self._begin(pane, replace(source, meshes=(*source.meshes, str(path))))
 
     def _offer(self, number: int, kind: str, name: str, content: bytes) -> None:
         """Let a visitor fetch a file, by a name that nobody guesses."""
@@ -517,10 +561,9 @@ def _response(status: HTTPStatus, kind: str, content: bytes, name: str | None = 
     headers["Content-Length"] = str(len(content))
     headers["Cache-Control"] = "no-store"
     headers["X-Content-Type-Options"] = "nosniff"
-    headers["X-Frame-Options"] = "SAMEORIGIN"
     headers["Content-Security-Policy"] = (
         "default-src 'self'; script-src 'self' 'unsafe-inline'; style-src 'self' 'unsafe-inline'; "
-        "img-src 'self' data: blob:; connect-src 'self' ws: wss:"
+        f"img-src 'self' data: blob:; connect-src 'self' ws: wss:; frame-ancestors {FRAMED_BY}"
     )
     if name is not None:
         headers["Content-Disposition"] = f'attachment; filename="{name}"'

@@ -6,6 +6,7 @@ import time
 import traceback
 import warnings
 from collections import deque
+from contextlib import suppress
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -15,13 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine_adapter import EngineAdapter
-from taichi_soft import Grab
+from taichi_soft import Grab, World
 from taichi_soft.core.errors import TaichiSoftError, UnstableStepWarning
+from taichi_soft.live.choices import palette_of
 from taichi_soft.live.controls import Controls
 from taichi_soft.live.drawn import Drawn
 from taichi_soft.live.frame_file import FrameFile
-from taichi_soft.live.saving import film_frames, saved_script
-from taichi_soft.live.scene import Scene, SceneSource, adapter_of, made_scene, palette_of
+from taichi_soft.live.saving import FILM_FPS, film_frames, saved_script
+from taichi_soft.live.scene import Scene, SceneSource, adapter_of, made_scene
 from taichi_soft.live.tints import Tints
 
 PICTURES = 60.0
@@ -35,8 +37,6 @@ SHARE = 0.05
 
 KEPT = 10.0
 """Seconds that a film can be made of."""
-
-FILM_FPS = 30.0
 
 MOST_KEPT = 2**28
 """Bytes of pictures: of many vertices a film is shorter."""
@@ -89,12 +89,13 @@ class Simulation:
         self.connection, self.folder, self.scene, self.source = connection, folder, scene, source
         self.world = scene.world
         self.controls = Controls(self.world, scene.step.dt, scene.step.substeps)
-        self.adapter: EngineAdapter = adapter_of(scene, self.controls.substeps)
+        self._begun: list[float] = []  # when each of the steps of an advance began
+        self.adapter: EngineAdapter = adapter_of(scene, self.controls.substeps, self._before_step)
         self.first = b""  # its state before anything moved
-        self.is_playing, self.is_moving = True, True
+        self.is_playing, self.is_moving = False, True  # until it is shown
         self.hands: dict[int, Grab] = {}
         self.tints: Tints | None = None
-        self.step_times: deque[float] = deque(maxlen=240)
+        self.step_times: deque[float] = deque(maxlen=600)
         self.recent: deque[tuple[float, int, Any]] = deque()
         self.versions = 0
         self.drawn: Drawn
@@ -154,16 +155,26 @@ class Simulation:
             self.connection.send(("said", _words_of(error)))
         self.is_moving = True
 
+    def _before_step(self, world: World) -> None:
+        if self.scene.act is not None:
+            self.scene.act(world)
+        self._begun.append(time.perf_counter())
+
     def _advance(self, seconds: float) -> None:
-        before, start = self.world.step_count, time.perf_counter()
+        """Let time go on. A step that fails stops the world, which says why."""
+        before = self.world.step_count
+        self._begun.clear()
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
-            self.adapter.advance(seconds)
-        made = self.world.step_count - before
-        if made:
-            self.step_times.extend([(time.perf_counter() - start) / made] * made)
-            self._simulated += made * self.adapter.fixed_step.dt
-            self.is_moving = True
+            try:
+                self.adapter.advance(seconds)
+            except Exception as error:
+                self.is_playing = False
+                self.connection.send(("said", f"stopped: {_words_of(error)}"))
+        ends = [*self._begun[1:], time.perf_counter()]
+        self.step_times.extend(end - start for start, end in zip(self._begun, ends, strict=False))
+        self._simulated += (self.world.step_count - before) * self.adapter.fixed_step.dt
+        self.is_moving = True  # also between two steps
         for each in caught:
             # The page predicts by itself what is unstable: of the materials that bodies have, not of those
             # that there is room for.
@@ -188,9 +199,9 @@ class Simulation:
     def do_step(self) -> None:
         """Make one step of a world that stands."""
         self.is_playing = False
-        start = time.perf_counter()
+        self._begun.clear()
         self.adapter.step()
-        self.step_times.append(time.perf_counter() - start)
+        self.step_times.append(time.perf_counter() - self._begun[0])
         self._simulated += self.adapter.fixed_step.dt
         self._due["told"] = 0.0
 
@@ -329,6 +340,8 @@ class Simulation:
         path = self.folder / f"frames{self.versions}"
         self.frames = FrameFile(path, self.drawn.vertex_count, len(self.drawn.colliders), is_new=True)
         self.recent.clear()
+        with suppress(OSError):  # one that is still read where files in use cannot be removed
+            (self.folder / f"frames{self.versions - 2}").unlink(missing_ok=True)
         if self.tints is not None:
             self.tints.renew(self.world)
         sizes = self.drawn.vertex_count, len(self.drawn.colliders)
@@ -359,6 +372,7 @@ class Simulation:
         times = np.array(self.step_times) if self.step_times else np.zeros(1)
         return {
             "values": self.controls.values(),
+            "given": self.controls.given.get("substeps"),
             "stable": self.controls.stable_substeps,
             "dt": self.adapter.fixed_step.dt,
             "time": self.world.time,
@@ -375,4 +389,4 @@ class Simulation:
         }
 
     def _renew_adapter(self) -> None:
-        self.adapter = adapter_of(self.scene, self.controls.substeps)
+        self.adapter = adapter_of(self.scene, self.controls.substeps, self._before_step)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -48,6 +49,7 @@ def require_mesh(folder: Path, name: str, content: bytes) -> Path:
     process.kill()
     process.join()
     if words:
+        shutil.rmtree(folder, ignore_errors=True)
         raise MeshError(f"{name!r} makes no body: {words}")
     return path
 

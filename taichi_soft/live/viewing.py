@@ -7,6 +7,7 @@ import secrets
 import subprocess
 import sys
 import tempfile
+import threading
 import weakref
 from collections.abc import Mapping
 from html import escape
@@ -32,20 +33,27 @@ class View:
 
     def __init__(self, world: World, colors: Mapping[Body, Color], height: int) -> None:
         self._world, self._height = world, height
-        self._folder = tempfile.TemporaryDirectory(prefix="taichi-soft-view-")
+        self._folder = tempfile.TemporaryDirectory(prefix="taichi-soft-view-", ignore_cleanup_errors=True)
         key = secrets.token_bytes(16)
         with Listener(("127.0.0.1", 0), authkey=key) as listener:
             place = f"{listener.address[0]}:{listener.address[1]}"
             command = [sys.executable, "-m", "taichi_soft.live.serving", place]
-            environment = {**os.environ, VIEW_KEY: key.hex()}
-            self._server = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True)
-            self._connection = listener.accept()
+            path = os.pathsep.join(each for each in sys.path if each)
+            environment = {**os.environ, VIEW_KEY: key.hex(), "PYTHONPATH": path}
+            # A group of its own: what interrupts a notebook's cell does not end it.
+            group: dict[str, Any] = {"start_new_session": True}
+            if sys.platform == "win32":
+                group = {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
+            streams: dict[str, Any] = {"stdout": subprocess.PIPE, "text": True}
+            self._server = subprocess.Popen(command, env=environment, **streams, **group)
+            self._connection = _accepted(listener, self._server)
         self._end = weakref.finalize(self, _end, self._server, self._connection, self._folder)
         assert self._server.stdout is not None
         self.address = self._server.stdout.readline().strip()
         slots = {body.index: color for body, color in colors.items()}
         scene = Scene("a world", world, FixedStep(), framing_of(world), None, slots)
         self._simulation = Simulation(self._connection, Path(self._folder.name), scene, SceneSource())
+        self._simulation.is_playing = True
         self._simulation.describe()
         self.update()
 
@@ -59,7 +67,11 @@ class View:
         """
         if not self._end.alive:
             raise StateError("this view was closed: make another")
-        self._simulation.look(alpha)
+        try:
+            self._simulation.look(alpha)
+        except (EOFError, OSError) as error:
+            self.close()
+            raise StateError("the server of this view has ended: make another") from error
 
     def close(self) -> None:
         """End it."""
@@ -104,6 +116,18 @@ def view(
     if not found.is_built:
         raise StateError("the world is not built: call world.build() before it is viewed")
     return View(found, colors or {}, height)
+
+
+def _accepted(listener: Listener, server: subprocess.Popen[str]) -> Any:
+    """The connection that a server makes. Raises: StateError where it ends before."""
+    found: list[Any] = []
+    waiting = threading.Thread(target=lambda: found.append(listener.accept()), daemon=True)
+    waiting.start()
+    while waiting.is_alive():
+        waiting.join(0.1)
+        if server.poll() is not None:
+            raise StateError(f"the server of this view ended with code {server.returncode}: see what it said")
+    return found[0]
 
 
 def _end(server: subprocess.Popen[str], connection: Any, folder: tempfile.TemporaryDirectory[str]) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from typing import Any
 
 from taichi_soft.core.errors import OptionError
@@ -59,9 +58,9 @@ def _vector(said: dict[str, Any], name: str) -> list[float]:
     if not isinstance(rows, list) or len(rows) != 3:
         raise OptionError(f"{name} is three numbers, got {rows!r}")
     for each in rows:
-        if isinstance(each, bool) or not isinstance(each, (int, float)) or not math.isfinite(each):
-            raise OptionError(f"{name} is three finite numbers, got {rows!r}")
-        if abs(each) > FARTHEST:
+        if isinstance(each, bool) or not isinstance(each, (int, float)) or each != each:
+            raise OptionError(f"{name} is three numbers, got {rows!r}")
+        if not -FARTHEST <= each <= FARTHEST:
             raise OptionError(f"{name} lies within {FARTHEST:g}, got {rows!r}")
     return [float(each) for each in rows]
 

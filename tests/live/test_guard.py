@@ -35,6 +35,7 @@ def test_this_machine_needs_no_token(host, origin):
         ("127.0.0.1:8080", "null"),
         ("127.0.0.1:9999", None),
         ("127.0.0.1:port", None),
+        ("[", None),
     ],
 )
 def test_pages_of_other_origins_and_names_are_refused(host, origin):
@@ -52,6 +53,8 @@ def test_any_other_address_asks_for_its_token_which_is_new_every_time():
         assert status == 401
         assert guard.token not in words
     assert guard.refusal(f"/live?token={guard.token}", "box.local:8080", "http://evil.example")[0] == 403
+    assert guard.refusal("/live.js", "box.local:8080", None) is None  # what the page asks for by itself
+    assert "0.0.0.0" not in guard.address()
 
 
 def test_a_flood_of_messages_is_over_after_a_burst_and_an_allowance_comes_back(monkeypatch):

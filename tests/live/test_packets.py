@@ -28,6 +28,16 @@ def test_positions_arrive_within_half_a_step_and_normals_within_a_127th(count):
     assert (found["poses"] == poses).all()
 
 
+def test_a_body_that_flew_away_takes_nothing_from_the_others():
+    near = np.random.default_rng(1).uniform(0.0, 3.0, (200, 3)).astype(np.float32)
+    rows = np.concatenate([near, np.full((20, 3), 1e5, np.float32)])
+    frame = Frame(
+        1, 1, 0.0, False, rows, np.zeros_like(rows), np.zeros(220, np.uint8), np.zeros((0, 12), "f4")
+    )
+    found = decoded_picture(picture_packet(0, frame))["positions"]
+    assert np.abs(found[:200] - near).max() < 0.01
+
+
 def test_what_is_drawn_arrives_as_it_was():
     arrays = {"triangles": np.arange(9, dtype="<u4").reshape(3, 3), "colors": np.arange(15, dtype=np.uint8)}
     arrays["rows"] = np.array([[0.5, 1.5]], dtype="<f4")

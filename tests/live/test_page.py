@@ -1,9 +1,13 @@
 """The page in a browser: what is seen, what mouse and keyboard do, and what screen readers find."""
 
+import functools
 import io
 import re
+import threading
 import zipfile
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
@@ -262,6 +266,32 @@ def test_a_film_of_the_last_seconds_is_saved(open_page, visitor):
         page.get_by_role("button", name="film of 10 s").click()
     assert coming.value.suggested_filename == "live.mp4"
     assert Path(coming.value.path()).read_bytes()[4:8] == b"ftyp"
+
+
+def test_a_page_of_another_address_loads_with_its_token_and_without_it_says_why(browser, serve, troubles):
+    served = serve("--host", "0.0.0.0")
+    address = f"http://127.0.0.1:{urlsplit(served.address).port}/"
+    page = browser.new_page()
+    page.on("pageerror", lambda error: troubles.append(str(error)))
+    page.goto(f"{address}?{urlsplit(served.address).query}")
+    playwright.expect(page.locator("#said")).to_contain_text("compiling", timeout=PATIENCE)
+    assert page.goto(address).status == 401
+    assert "token" in page.locator("body").inner_text()
+    page.close()
+
+
+def test_a_notebook_of_this_machine_may_show_the_page_within_its_own(browser, served, tmp_path):
+    frame = f'<iframe src="{served.address}" width="900" height="600"></iframe>'
+    (tmp_path / "notebook.html").write_text(frame)
+    handler = functools.partial(SimpleHTTPRequestHandler, directory=tmp_path)
+    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as notebook:
+        threading.Thread(target=notebook.serve_forever, daemon=True).start()
+        page = browser.new_page()
+        page.goto(f"http://127.0.0.1:{notebook.server_port}/notebook.html")
+        inner = page.frame_locator("iframe")
+        playwright.expect(inner.locator("#time")).to_have_text(re.compile(r"\d s"), timeout=PATIENCE)
+        page.close()
+        notebook.shutdown()
 
 
 def test_two_pages_see_one_world_and_a_reload_or_a_close_disturbs_neither(open_page, visitor, served):

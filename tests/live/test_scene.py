@@ -1,12 +1,19 @@
 """Scenes as scripts: another law and room for more, without a change of the scene."""
 
+import io
+import math
+import zipfile
+from dataclasses import replace
+
 import pytest
 
 pytest.importorskip("websockets", reason="needs websockets: pip install 'taichi-soft[live]'")
 
-from taichi_soft import Material, OptionError, SoftBodyAsset, World, box
+from taichi_soft import Material, OptionError, SoftBodyAsset, World, box, element_model, stable_step
 from taichi_soft.live import choices
 from taichi_soft.live.choices import PALETTES
+from taichi_soft.live.controls import Controls
+from taichi_soft.live.saving import packed, saved_script
 from taichi_soft.live.scene import SceneSource, found_source, made_scene
 
 SOFT = Material(young=1e5, poisson=0.3, density=500.0)
@@ -74,4 +81,42 @@ def test_scripts_are_sound_and_name_files_beside_them(kind, tmp_path):
     compile(text, "scene.py", "exec")
     assert "/a/b" not in text
     assert "/c" not in text
-    assert "with_name('d.obj')" in text
+    assert "\"files\" / 'd.obj'" in text
+
+
+def test_a_script_that_makes_no_world_or_two_is_refused(tmp_path):
+    for number, text in enumerate(("x = 1\n", "from taichi_soft import World\na, b = World(), World()\n")):
+        path = tmp_path / f"game{number}.py"
+        path.write_text(text)
+        with pytest.raises(OptionError, match="must make one World"):
+            made_scene(SceneSource("script", str(path)))
+
+
+def test_a_saved_script_and_that_of_the_scene_do_not_take_each_others_place(tmp_path):
+    path = tmp_path / "scene.py"
+    path.write_text(SCENE)
+    source = SceneSource("script", str(path))
+    text = saved_script(source, "0" * 16, 1 / 60, 4)
+    with zipfile.ZipFile(io.BytesIO(packed(text, b"snapshot", source))) as archive:
+        assert sorted(archive.namelist()) == ["files/scene.py", "scene.py", "scene.snapshot"]
+        assert archive.read("scene.py").decode() == text
+        assert archive.read("files/scene.py").decode() == SCENE
+
+
+def test_the_substeps_predicted_for_another_material_are_those_that_bodies_of_it_need():
+    """Of bodies of different size, stiffness and shape of one material, against a new estimate of each."""
+    with choices(has_palette=True):
+        world = World()
+        world.add_body(box((2.0, 2.0, 0.2), (6, 6, 1)), SOFT, position=(0, 0, 1))
+        stiff = Material(young=4e5, poisson=0.2, density=500.0)
+        world.add_body(box((2.0, 2.0, 2.0), (2, 2, 2)), stiff, position=(0, 0, 4))
+        world.build()
+    controls = Controls(world, 1 / 60, None)
+    for young, poisson in ((1e6, 0.3), (1e7, 0.45)):
+        controls.given.update(young=young, poisson=poisson)
+        needed = 0
+        for asset in [*(body.asset for body in world.bodies), *PALETTES[world].values()]:
+            material = replace(asset.material, young=young, poisson=poisson)
+            step = stable_step(asset.mesh, material, element_model(asset.law)).recommended
+            needed = max(needed, math.ceil(1 / 60 / step))
+        assert needed <= controls.stable_substeps <= 1.25 * needed + 1

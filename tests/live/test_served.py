@@ -304,10 +304,35 @@ def test_only_files_of_the_page_are_served(served, path):
 
 
 def test_another_address_asks_for_its_token(serve):
-    served = serve("--host", "0.0.0.0")
-    assert "token=" in served.address
+    parts = urlsplit(serve("--host", "0.0.0.0").address)
+    address = f"http://127.0.0.1:{parts.port}/"  # whatever this machine is called
+    assert parts.query.startswith("token=")
     with pytest.raises(InvalidStatus) as refused:
-        Visitor(served.address.split("?")[0])
+        Visitor(address)
     assert refused.value.response.status_code == 401
-    with Visitor(served.address) as visitor:
+    with Visitor(f"{address}?{parts.query}") as visitor:
         visitor.until(lambda: visitor.hello)
+
+
+def test_a_scene_that_cannot_be_made_says_why_to_whoever_comes(serve, tmp_path):
+    (tmp_path / "empty.py").write_text("x = 1\n")
+    served = serve(str(tmp_path / "empty.py"))
+    for _ in range(2):
+        with Visitor(served.address) as visitor:
+            visitor.until(lambda visitor=visitor: any("must make one World" in each for each in visitor.said))
+
+
+def test_a_step_that_raises_stops_the_world_and_says_why(serve, tmp_path):
+    text = "from taichi_soft import Material, World, box\nworld = World(max_substeps=20)\n"
+    text += "world.add_body(box((0.5, 0.5, 0.5), (2, 2, 2)), Material(1e5, 0.3, 500.0), position=(0, 0, 1))\n"
+    (tmp_path / "strict.py").write_text(text)
+    served = serve(str(tmp_path / "strict.py"))
+    with Visitor(served.address) as visitor:
+        visitor.ready()
+        visitor.say("set", name="substeps", value=40)
+        visitor.until(lambda: any("stopped" in words and "20" in words for words in visitor.said))
+        visitor.until(lambda: visitor.states[0]["is_paused"])
+        visitor.say("set", name="substeps", value=10)
+        visitor.say("pause", is_paused=False)
+        before = visitor.states[0]["time"]
+        visitor.until(lambda: visitor.states[0]["time"] > before + 0.1)

@@ -6,14 +6,14 @@ const DRAWN = 1, PICTURE = 2;
 const TYPES = { uint8: Uint8Array, uint32: Uint32Array, float32: Float32Array };
 const ARRAYS = { "<u4": "uint32", "<f4": "float32" };
 
-let socket = null, panel = null, waiting = [], shown = [];
+let tries = 0, socket = null, panel = null, waiting = [], shown = [];
 const wish = said => {
   if (socket?.readyState !== WebSocket.OPEN) return;
   socket.send(said instanceof ArrayBuffer ? said : JSON.stringify(said));
 };
 
-// A hand moves at most once a picture: pointers tell more often.
-let moved = null;
+// A hand moves at most 60 times a second: pointers tell more often.
+let moved = null, movedAt = 0;
 const hand = {
   grab: (pane, origin, direction) => wish({ do: "grab", pane, origin, direction }),
   move: (pane, point) => { moved = { do: "move", pane, point }; },
@@ -29,10 +29,12 @@ function connect() {
   socket = new WebSocket(`${scheme}://${location.host}/live${location.search}`);
   socket.binaryType = "arraybuffer";
   socket.onmessage = event => (typeof event.data === "string" ? hear(JSON.parse(event.data)) : take(event.data));
-  socket.onclose = () => {
+  socket.onopen = () => { tries = 0; };
+  socket.onclose = event => {
     waiting = [];
-    say("the connection is lost: trying again");
-    setTimeout(connect, 1000);
+    tries += 1;
+    say(event.code === 1008 ? "cut off: too many messages" : "there is no connection: it was refused, or the server has ended");
+    setTimeout(connect, Math.min(1000 * 2 ** (tries - 1), 15000));
   };
 }
 
@@ -96,7 +98,7 @@ function take(buffer) {
 let counted = 0, since = performance.now();
 function frame() {
   requestAnimationFrame(frame);
-  if (moved) { wish(moved); moved = null; }
+  if (moved && performance.now() - movedAt > 15) { wish(moved); moved = null; movedAt = performance.now(); }
   let number = 0;
   waiting.forEach((buffer, pane) => {
     if (!buffer) return;

@@ -116,7 +116,8 @@ export class Panel {
     if (has.young !== null && has.poisson !== null) {
       needed = Math.ceil(state.stable * Math.sqrt((young * waves(nu)) / (has.young * waves(has.poisson))) - 1e-9);
     }
-    const given = sliders.get("substeps").touched ? sliders.get("substeps").value() : Math.max(needed, state.values.substeps);
+    const isTouched = performance.now() - sliders.get("substeps").touched < 600;
+    const given = isTouched ? sliders.get("substeps").value() : state.given ?? Math.max(needed, state.values.substeps);
     const told = sliders.get("substeps").told;
     const isShort = given < needed;
     told.classList.toggle("unstable", isShort);
