@@ -1,6 +1,7 @@
 """A world live in a browser: seen, touched and tuned."""
 
 from taichi_soft.live.choices import choices
+from taichi_soft.live.stress_table import StressRow, StressTable, stress_table
 from taichi_soft.live.viewing import View, view
 
-__all__ = ["View", "choices", "view"]
+__all__ = ["StressRow", "StressTable", "View", "choices", "stress_table", "view"]

@@ -362,7 +362,7 @@ class Simulation:
         bodies = self.world.bodies
         self._energies = {
             "kinetic": sum(body.kinetic_energy() for body in bodies),
-            "elastic": sum(body.elastic_energy() for body in bodies if hasattr(body.mesh, "tets")),
+            "elastic": sum(body.elastic_energy() for body in bodies),
             "potential": sum(body.gravitational_energy() for body in bodies),
             "momentum": float(np.linalg.norm(sum((body.momentum() for body in bodies), np.zeros(3)))),
         }

@@ -1,0 +1,96 @@
+"""Stress of all bodies as a table and a plot, for notebooks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft import StateError, TetMesh, World
+from taichi_soft.render.colors import ColorScale
+
+BARS = 24
+"""Of a plot."""
+
+WIDTH, HEIGHT = 480, 120  # of a plot [pixels]
+
+
+@dataclass(frozen=True)
+class StressRow:
+    """One body: its slot, its law, and of its tetrahedra the largest and the mean stress by volume, von Mises
+    [Pa], the largest strain, and how many are inside out.
+    """
+
+    body: int
+    law: str
+    largest: float
+    mean: float
+    strain: float
+    flipped: int
+
+
+@dataclass(frozen=True)
+class StressTable:
+    """Made by `stress_table`. A notebook shows it as a table, with volume over stress as bars beneath it."""
+
+    rows: tuple[StressRow, ...]
+    edges: NDArray[np.float64]  # of the bars [Pa], (BARS + 1,)
+    volumes: NDArray[np.float64]  # of the material within each [m^3], (BARS,)
+
+    def _repr_html_(self) -> str:
+        names = "body", "law", "largest", "mean", "strain", "inside out"
+        heads = "".join(f"<th>{name}</th>" for name in names)
+        lines = "".join(
+            f"<tr><td>{row.body}</td><td>{row.law}</td><td>{_pascals(row.largest)}</td>"
+            f"<td>{_pascals(row.mean)}</td><td>{row.strain:.3g}</td><td>{row.flipped}</td></tr>"
+            for row in self.rows
+        )
+        return f"<table><thead><tr>{heads}</tr></thead><tbody>{lines}</tbody></table>{self._bars()}"
+
+    def _bars(self) -> str:
+        high = max(float(self.edges[-1]), 1e-12)
+        scale = ColorScale("stress", 0.0, high, "Pa")
+        most = max(float(self.volumes.max(initial=0.0)), 1e-300)
+        wide, bars = WIDTH / BARS, []
+        colors = np.rint(255 * scale.colors((self.edges[1:] + self.edges[:-1]) / 2)).astype(int)
+        for i, (volume, color) in enumerate(zip(self.volumes, colors, strict=True)):
+            tall = HEIGHT * float(volume) / most
+            place = f'x="{i * wide:.1f}" y="{HEIGHT - tall:.1f}" width="{wide - 1:.1f}" height="{tall:.1f}"'
+            bars.append(f'<rect {place} fill="rgb({color[0]},{color[1]},{color[2]})"/>')
+        low, top = scale.ticks()
+        label = f"Volume of material over its stress, from {low} to {top}"
+        head = f'<svg width="{WIDTH}" height="{HEIGHT + 20}" role="img" aria-label="{label}">'
+        foot = f'<text x="0" y="{HEIGHT + 15}">{low}</text>'
+        foot += f'<text x="{WIDTH}" y="{HEIGHT + 15}" text-anchor="end">{top}, von Mises</text>'
+        return f"{head}{''.join(bars)}{foot}</svg>"
+
+
+def stress_table(world: World) -> StressTable:
+    """Stress of all bodies of tetrahedra, as they are now.
+
+    Raises: StateError for a world that is not built, or has no such body.
+    """
+    if not world.is_built:
+        raise StateError("the world is not built: call world.build() before its stress is asked for")
+    bodies = [body for body in world.bodies if isinstance(body.mesh, TetMesh)]
+    if not bodies:
+        raise StateError("no body of this world has tetrahedra, which alone have a stress")
+    rows, stresses, volumes = [], [], []
+    for body in bodies:
+        stress, volume = body.tet_stress(), np.abs(body.volumes())
+        mean = float(np.average(stress, weights=volume)) if volume.any() else float(stress.mean())
+        law = str(body.asset.law)
+        strain = float(body.tet_strain().max())
+        rows.append(StressRow(body.index, law, float(stress.max()), mean, strain, body.flipped_count()))
+        stresses.append(stress)
+        volumes.append(volume)
+    every = np.concatenate(stresses)
+    counts, edges = np.histogram(
+        every, BARS, (0.0, max(float(every.max()), 1e-12)), weights=np.concatenate(volumes)
+    )
+    return StressTable(tuple(rows), np.asarray(edges, np.float64), np.asarray(counts, np.float64))
+
+
+def _pascals(value: float) -> str:
+    return ColorScale("stress", 0.0, max(value, 1e-12), "Pa").ticks()[1]
