@@ -243,8 +243,9 @@ def test_a_visitors_mesh_becomes_a_body_whatever_its_name_says(visitor):
     visitor.say("upload", name="../../etc/my crate.obj")
     visitor.socket.send("\n".join(lines).encode())
     visitor.until(lambda: "mycrate" in visitor.states[0]["palette"], 240.0)
+    visitor.until(lambda: visitor.states[0]["bodies"] == 7)  # it is there by itself
     visitor.say("spawn", name="mycrate")
-    visitor.until(lambda: visitor.states[0]["bodies"] == 7)
+    visitor.until(lambda: visitor.states[0]["bodies"] == 8)
 
 
 def test_another_law_goes_on_where_the_bodies_are_and_stands_beside_the_first(visitor):
