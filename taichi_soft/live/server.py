@@ -214,7 +214,6 @@ class LiveServer:
         before = self.panes.get(pane)
         self.panes[pane] = runner
         self.coming.pop(pane, None)
-        self._last_choice = self._loop.time()
         if self.tint:
             runner.send("tint", self.tint)
         if before is not None:
