@@ -241,8 +241,8 @@ def refill_slot(
 
 
 def write_surface(context: Context, state: BodyFields, slot: int, asset: SoftBodyAsset) -> None:
-    """Write what follows from an asset as a whole, where levels of detail differ in it."""
-    if context.slots.assets[slot].coarser:
+    """Write what follows from an asset as a whole, where levels of detail or what cuts leave differ in it."""
+    if context.slots.assets[slot].coarser or asset.spare_vertices:
         _write_kind(state, slot, asset)
 
 

@@ -74,7 +74,7 @@ def film_frames(path: Path, recent: Sequence[tuple[float, int, Any]], drawn: Dra
     np.savez(path, **rows)
 
 
-def film_file(frames: str, path: str, fps: float, size: tuple[int, int] = (960, 540)) -> int:
+def film_file(frames: str, path: str, fps: float, size: tuple[int, int] = (854, 480)) -> int:
     """Draw a film of what `film_frames` wrote. Returns: how many pictures it has."""
     from taichi_soft import init
     from taichi_soft.render import Camera, Renderer, Surface, VideoWriter

@@ -142,7 +142,7 @@ def enter(context: WorldContext, asset: SoftBodyAsset, rows: Floats32) -> Body:
     else:
         if context.layout.bodies[slot] is not asset.arrays:
             refill_slot(context, simulation.state, slot)
-        else:  # a snapshot may have brought along what the level of an earlier body had here
+        else:  # a snapshot may have brought along what an earlier body had here, at another level or cut
             write_surface(context, simulation.state, slot, asset)
         simulation.fill(slot, rows)
     return take_in(context, asset)

@@ -1,6 +1,7 @@
 """Snapshots of bodies that were cut or torn: here, in a world that never saw the cuts, and over a rewind."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -300,3 +301,24 @@ def test_a_damaged_part_is_refused_before_anything_changes(played, name):
         played.restore(data)
     assert played.state_hash() == before
     assert meshes(played) == seen
+
+
+def test_a_slot_that_a_cut_body_left_holds_the_same_new_body_before_and_after_a_restore(played):
+    """Its vibrations fade as those of its asset, though the snapshot has what another material left there."""
+    bar = played.bodies[0]
+    bar.cut(plane=FIRST)
+    bar.set_material(replace(bar.material, damping_ratio=0.6))
+    for body in [body for body in played.bodies if body.asset is bar.asset]:
+        played.despawn(body)
+    left = played.snapshot()
+
+    def spawned():
+        body = played.spawn(bar.asset, position=(0.0, 0.0, 0.8))
+        played.apply_radial_impulse((0.3, 0.0, 0.8), 20.0, 0.5)
+        for _ in range(20):
+            played.step(DT, SUBSTEPS)
+        return body.positions()
+
+    before = spawned()
+    played.restore(left)
+    assert (spawned() == before).all()

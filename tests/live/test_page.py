@@ -262,7 +262,7 @@ def test_a_script_and_a_picture_are_saved(open_page, visitor):
 
 def test_a_film_of_the_last_seconds_is_saved(open_page, visitor):
     page = open_page()
-    with page.expect_download(timeout=240_000) as coming:
+    with page.expect_download(timeout=4 * PATIENCE) as coming:
         page.get_by_role("button", name="film of 10 s").click()
     assert coming.value.suggested_filename == "live.mp4"
     assert Path(coming.value.path()).read_bytes()[4:8] == b"ftyp"

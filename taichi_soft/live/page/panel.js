@@ -49,7 +49,8 @@ class Slider {
 
   // What the world has, unless a hand is on it.
   show(value) {
-    if (performance.now() - this.touched < 600) return;
+    const patience = document.activeElement === this.input ? 5000 : 600;
+    if (performance.now() - this.touched < patience) return;
     const { low, high, is_log } = this.about;
     if (value !== null) {
       const share = is_log ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low);
