@@ -325,6 +325,8 @@ class Simulation:
         number = self.frames.publish(self.drawn.version, moment, is_tinted=self.tints is not None)
         self.connection.send(("frame", number))
         if now >= self._due["film"]:
+            if self.recent and moment < self.recent[-1][0]:
+                self.recent.clear()  # it went back to its beginning
             self.recent.append((moment, self.drawn.version, (frame.positions.copy(), frame.poses.copy())))
             most = min(KEPT * FILM_FPS, MOST_KEPT / (12 * max(self.drawn.vertex_count, 1)))
             while len(self.recent) > most:
