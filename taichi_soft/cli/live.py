@@ -12,7 +12,7 @@ import typer
 from rich.markup import escape
 from rich.table import Table
 
-from taichi_soft.cli.console import console, progress_bar, say
+from taichi_soft.cli.console import console, errors, progress_bar, say
 from taichi_soft.core.errors import OptionError
 from taichi_soft.core.extras import require_extra
 
@@ -82,6 +82,12 @@ async def _serve(server: object, opens: bool) -> None:
     if opens:
         webbrowser.open(address)
     try:
-        await ended.wait()
+        told = None
+        while not ended.is_set():
+            with suppress(asyncio.TimeoutError):
+                await asyncio.wait_for(ended.wait(), 1.0)
+            if server.trouble not in (None, told):
+                told = server.trouble
+                errors.print(f"[bold red]error:[/] {escape(told)}", soft_wrap=True, highlight=False)
     finally:
         await server.close()

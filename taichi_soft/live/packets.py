@@ -53,6 +53,11 @@ def quantised(positions: NDArray[np.float32]) -> tuple[NDArray[np.uint16], NDArr
     return ((positions - low) * (STEPS / size) + 0.5).astype(np.uint16), low, size
 
 
+def numbered(packet: bytes, number: int) -> bytes:
+    """A picture's packet with the number that it has for one visitor."""
+    return packet[:4] + struct.pack("<I", number & 0xFFFFFFFF) + packet[8:]
+
+
 def picture_packet(pane: int, frame: Frame) -> bytes:
     """Where everything is."""
     rows, low, size = quantised(frame.positions)

@@ -12,7 +12,8 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
-from taichi_soft.live.frame_file import Frame, FrameFile
+from taichi_soft.live.frame_file import FrameFile
+from taichi_soft.live.packets import picture_packet
 from taichi_soft.live.scene import SceneSource
 
 Heard = Callable[["Runner", tuple[Any, ...]], None]
@@ -42,6 +43,7 @@ class Runner:
         self.drawn: tuple[dict[str, Any], dict[str, Any]] | None = None
         self.state: dict[str, Any] | None = None
         self.frames: FrameFile | None = None
+        self._packed = 0, 0, b""  # the newest picture
         self.is_over = False
         self.is_lost = False  # the other end is gone
         self.is_asked = False  # for whom the one that is shown was asked where its bodies are
@@ -113,9 +115,14 @@ class Runner:
             self._process.kill()
             self._process.join(2.0)
 
-    def newest(self) -> Frame | None:
-        """The newest picture."""
-        return None if self.frames is None else self.frames.newest()
+    def newest_packet(self, pane: int) -> tuple[int, int, bytes]:
+        """The newest picture, packed once for all visitors: version (0 before it), number and packet."""
+        number = 0 if self.frames is None else self.frames.newest_number
+        if self.frames is not None and number != self._packed[1]:
+            frame = self.frames.newest()
+            if frame is not None:
+                self._packed = frame.version, frame.number, picture_packet(pane, frame)
+        return self._packed
 
     def _speak(self) -> None:
         while True:
@@ -153,6 +160,7 @@ class Runner:
             except OSError:
                 return  # a newer one has taken its place
             self.drawn = header, arrays
+            self._packed = 0, 0, b""
         elif message[0] in ("state", "ready"):
             self.state = message[1]
         self.heard(self, message)

@@ -23,7 +23,6 @@ from urllib.parse import urlsplit
 import numpy as np
 from websockets.asyncio.server import Server as Listening
 from websockets.asyncio.server import ServerConnection, serve
-from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
@@ -32,16 +31,14 @@ from taichi_soft.core.errors import OptionError, TaichiSoftError
 from taichi_soft.elements.laws import LAWS
 from taichi_soft.live.controls import SLIDERS
 from taichi_soft.live.guard import LARGEST_UPLOAD, MOST_VISITORS, Allowance, Guard
-from taichi_soft.live.packets import drawn_packet, picture_packet
+from taichi_soft.live.packets import drawn_packet, numbered
+from taichi_soft.live.page_files import page_files, response
 from taichi_soft.live.pane import Runner
 from taichi_soft.live.saving import FILM_FPS, film_file, packed
 from taichi_soft.live.scene import SceneSource
-from taichi_soft.live.three_js import fetch_three_js
 from taichi_soft.live.tints import QUANTITIES
 from taichi_soft.live.uploads import require_mesh
 from taichi_soft.live.wishes import wish_of
-
-PAGE = Path(__file__).parent / "page"
 
 UNSEEN = 2
 """Pictures on their way to a visitor: more wait until it has shown one of these, and are then left out."""
@@ -52,13 +49,8 @@ MOST_BREAKDOWNS = 2
 BETWEEN_CHOICES = 1.0
 """Seconds: each choice starts a process."""
 
-FRAMED_BY = "'self' http://localhost:* http://127.0.0.1:* vscode-webview:"
-"""Pages that may show a world within them: those of notebooks on this machine."""
-
 VIEWED = ("grab", "move", "release", "tint")
 """What a visitor may do to a world that another program steps."""
-
-_KINDS = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
 
 _log = logging.getLogger("taichi_soft")
 
@@ -105,7 +97,7 @@ class LiveServer:
         self.paused, self.tint = False, None
         self.made: dict[str, tuple[str, str, bytes]] = {}  # downloads: kind, name, bytes
         self._count = 0
-        self._files = _page_files()
+        self._files = page_files()
         self._folder = tempfile.TemporaryDirectory(prefix="taichi-soft-live-", ignore_cleanup_errors=True)
         self.trouble: str | None = None  # why there is no world
         self._broken: list[float] = []  # when worlds broke down
@@ -279,19 +271,19 @@ class LiveServer:
         host, origin = ", ".join(hosts), ", ".join(origins) if origins else None
         refused = self.guard.refusal(request.path, host, origin)
         if refused is not None:
-            return _response(refused[0], "text/plain", refused[1].encode())
+            return response(refused[0], "text/plain", refused[1].encode())
         path = urlsplit(request.path).path
         if path == "/live":
             if len(self.visitors) >= MOST_VISITORS:
                 words = f"{MOST_VISITORS} visitors are here already"
-                return _response(HTTPStatus.SERVICE_UNAVAILABLE, "text/plain", words.encode())
+                return response(HTTPStatus.SERVICE_UNAVAILABLE, "text/plain", words.encode())
             return None
         if path in self._files:
-            return _response(HTTPStatus.OK, *self._files[path])
+            return response(HTTPStatus.OK, *self._files[path])
         made = self.made.get(path.removeprefix("/made/"))
         if made is not None:
-            return _response(HTTPStatus.OK, made[0], made[2], name=made[1])
-        return _response(HTTPStatus.NOT_FOUND, "text/plain", b"there is no such page")
+            return response(HTTPStatus.OK, made[0], made[2], name=made[1])
+        return response(HTTPStatus.NOT_FOUND, "text/plain", b"there is no such page")
 
     async def _visit(self, connection: ServerConnection) -> None:
         """One page, from its coming to its going."""
@@ -518,18 +510,16 @@ class LiveServer:
         """The newest, unless those before it are not seen yet."""
         if runner.drawn is None or visitor.sent - visitor.seen >= UNSEEN * len(self.panes):
             return
-        frame = runner.newest()
-        if frame is None:
-            return
-        identity = id(runner), frame.version
+        version, number, packet = runner.newest_packet(pane)
+        identity = id(runner), version
         header, arrays = runner.drawn
-        if header["version"] != frame.version or visitor.last.get(pane) == (*identity, frame.number):
+        if header["version"] != version or visitor.last.get(pane) == (*identity, number):
             return
         if visitor.last.get(pane, (0, 0, 0))[:2] != identity:
             await visitor.connection.send(drawn_packet(pane, header, arrays))
-        visitor.last[pane] = *identity, frame.number
+        visitor.last[pane] = *identity, number
         visitor.sent += 1
-        await visitor.connection.send(picture_packet(pane, replace(frame, number=visitor.sent)))
+        await visitor.connection.send(numbered(packet, visitor.sent))
 
 
 def partial_heard(server: LiveServer, pane: int) -> Callable[[Runner, tuple[Any, ...]], None]:
@@ -541,29 +531,3 @@ def _described(source: SceneSource) -> str:
     choices = [f"{key} {value}" for key, value in (("law", source.law), ("strain", source.strain)) if value]
     choices += [f"flips {source.flips}"] if source.flips else []
     return ", ".join([source.title, *choices])
-
-
-def _page_files() -> dict[str, tuple[str, bytes]]:
-    """All that a page may ask for, by path: nothing else is ever read from the disk."""
-    fetch_three_js()
-    found = {}
-    for path in [*PAGE.iterdir(), *(PAGE / "three").iterdir()]:
-        if path.suffix in _KINDS:
-            found[f"/{path.relative_to(PAGE).as_posix()}"] = _KINDS[path.suffix], path.read_bytes()
-    found["/"] = found["/index.html"]
-    return found
-
-
-def _response(status: HTTPStatus, kind: str, content: bytes, name: str | None = None) -> Response:
-    headers = Headers()
-    headers["Content-Type"] = f"{kind}; charset=utf-8" if kind.startswith("text/") else kind
-    headers["Content-Length"] = str(len(content))
-    headers["Cache-Control"] = "no-store"
-    headers["X-Content-Type-Options"] = "nosniff"
-    headers["Content-Security-Policy"] = (
-        "default-src 'self'; script-src 'self' 'unsafe-inline'; style-src 'self' 'unsafe-inline'; "
-        f"img-src 'self' data: blob:; connect-src 'self' ws: wss:; frame-ancestors {FRAMED_BY}"
-    )
-    if name is not None:
-        headers["Content-Disposition"] = f'attachment; filename="{name}"'
-    return Response(int(status), status.phrase, headers, content)
