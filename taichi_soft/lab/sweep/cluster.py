@@ -32,6 +32,9 @@ START_LIMIT = 120.0
 RESTART_LIMIT = 30.0
 """For a worker to be restarted [s]."""
 
+ANSWER_LIMIT = 30.0
+"""For the scheduler to say which workers there are [s]."""
+
 LOOK = 1.0
 """Whether a worker is still there is looked up this often [s]."""
 
@@ -75,7 +78,7 @@ def cluster_workers(address: str, arch: ArchName = "cpu") -> Iterator[list[Worke
 def _require_same_code(client: Any, arch: ArchName) -> None:
     mine = origin(arch)
     with _losses():
-        found = client.run(origin, arch, on_error="return")
+        found = client.run(origin, arch, on_error="return", callback_timeout=START_LIMIT)
     for worker, theirs in found.items():
         if theirs != mine:
             raise SweepError(
@@ -106,7 +109,7 @@ class _Addresses:
     def all(self) -> list[str]:
         """Raises: SweepError."""
         with _losses():
-            return list(self._client.nthreads())
+            return list(self._client.nthreads(callback_timeout=ANSWER_LIMIT))
 
     def claim(self) -> str | None:
         """The address of a worker that was never claimed before."""

@@ -1,6 +1,11 @@
-"""A cluster of Dask of two processes on this machine."""
+"""A cluster of Dask of two workers on this machine, in processes of their own."""
 
+import os
+import signal
+import subprocess
+import sys
 from contextlib import closing
+from pathlib import Path
 
 import pytest
 from acts import act, root
@@ -14,12 +19,52 @@ TIME_LIMIT = 12.0
 distributed = pytest.importorskip("distributed")
 
 
+CLUSTER = """
+import faulthandler
+from sys import stdin
+from distributed import LocalCluster
+if __name__ == "__main__":
+    faulthandler.dump_traceback_later(120, exit=True)
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+        faulthandler.cancel_dump_traceback_later()
+        print(cluster.scheduler_address, flush=True)
+        stdin.read()
+"""
+
+
+class Cluster:
+    """A scheduler and its workers, which end with the process that started them."""
+
+    def __init__(self, script):
+        paths = [str(Path(__file__).parent), *sys.path]  # the workers import `acts`
+        self._process = subprocess.Popen(
+            [sys.executable, script],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+            env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, paths))},
+        )
+        self.scheduler_address = self._process.stdout.readline().strip()
+        assert self.scheduler_address, "it did not start: its last words are above"
+
+    def signal(self, number):
+        os.killpg(self._process.pid, number)
+
+    def close(self):
+        """As where the power fails: nobody says goodbye."""
+        if self._process.poll() is None:
+            self.signal(signal.SIGKILL)
+        self._process.communicate()
+
+
 @pytest.fixture(scope="module")
-def cluster():
-    with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
-    ) as cluster:
-        yield cluster
+def cluster(tmp_path_factory):
+    script = tmp_path_factory.mktemp("cluster") / "cluster.py"
+    script.write_text(CLUSTER)
+    cluster = Cluster(script)
+    yield cluster
+    cluster.close()
 
 
 def outcomes(tasks, crew):
@@ -72,6 +117,27 @@ def test_a_client_whose_thread_is_late_is_started_again(cluster, monkeypatch):
     with cluster_workers(cluster.scheduler_address) as crew:
         assert len(crew) == 2
     assert len(starts) == 2
+
+
+def test_a_cluster_that_stands_still_ends_the_sweep(cluster, monkeypatch):
+    """Its connections are open, but nobody answers."""
+    monkeypatch.setattr("taichi_soft.lab.sweep.cluster.ANSWER_LIMIT", 1.0)
+    tasks = [Task("a", act, {"x": x, "do": "sleep", "seconds": 0.2}) for x in range(500)]
+
+    def compute_some():
+        with (
+            cluster_workers(cluster.scheduler_address) as crew,
+            closing(compute_all(tasks, crew, TIME_LIMIT)) as outcomes,
+        ):
+            next(outcomes)
+            cluster.signal(signal.SIGSTOP)
+            list(outcomes)
+
+    try:
+        with pytest.raises(SweepError, match="scheduler of the cluster was lost"):
+            compute_some()
+    finally:
+        cluster.signal(signal.SIGCONT)
 
 
 @pytest.mark.parametrize("address", ["127.0.0.1:1", "nonsense", "moon://x:1", ""])
