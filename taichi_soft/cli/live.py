@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import signal
 import webbrowser
+from collections.abc import Iterable
 from contextlib import suppress
 from typing import Annotated
 
@@ -29,7 +30,7 @@ def live(
     browser: Annotated[bool, typer.Option(help="Open the page.")] = True,
     measure: Annotated[
         bool,
-        typer.Option("--measure", help="Instead, measure latency, and what a visitor costs."),
+        typer.Option("--measure", help="Instead, measure latency, and what a visitor costs: 6 minutes."),
     ] = False,
 ) -> None:
     """Show a world in the browser, to be seen, touched and tuned, until Ctrl-C."""
@@ -51,18 +52,22 @@ def _measure() -> None:
     with progress_bar() as progress:
         task = progress.add_task("compiling", total=None)
         costs = measure(lambda words: progress.update(task, description=words))
-    table = Table(
-        "spheres", "triangles", "bytes a picture", "pictures/s", title="a live view, for one visitor"
-    )
-    for name in ("latency p50, p95 (ms)", "step p50, p99 (ms), no visitor", "one visitor"):
-        table.add_column(name)
-    for each in costs:
-        pairs = [f"{a:.1f}, {b:.1f}" for a, b in (each.latency_ms, each.alone_ms, each.visited_ms)]
-        table.add_row(
-            str(each.spheres), f"{each.triangles:,}", f"{each.packet:,}", f"{each.pictures:.0f}", *pairs
-        )
+    table = Table("spheres", *(str(each.spheres) for each in costs), title="a live view, for one visitor")
+    table.add_row("triangles", *(f"{each.triangles:,}" for each in costs))
+    table.add_row("bytes a picture", *(f"{each.packet:,}" for each in costs))
+    table.add_row("pictures a second", *(f"{each.pictures:.0f}" for each in costs))
+    table.add_row("latency p50, p95 (ms)", *(_numbers(each.latency_ms, 1) for each in costs))
+    table.add_row("step p50, p99 (ms), no visitor", *(_numbers(each.alone_ms, 1) for each in costs))
+    table.add_row("step p50, p99 (ms), one visitor", *(_numbers(each.visited_ms, 1) for each in costs))
+    middle = [(each.ratios[0], each.ratios[len(each.ratios) // 2], each.ratios[-1]) for each in costs]
+    table.add_row("ratio of p99: least, median, most", *(_numbers(three, 2) for three in middle))
     console.print(table)
     say("latency: from a move of the hand to the first picture with it, at the socket; drawing comes on top")
+    say("step: median of turns without and with a visitor; the ratio is that of one turn's p99")
+
+
+def _numbers(numbers: Iterable[float], digits: int) -> str:
+    return ", ".join(f"{number:.{digits}f}" for number in numbers)
 
 
 async def _serve(server: object, opens: bool) -> None:

@@ -7,7 +7,8 @@ import json
 import struct
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,7 +25,10 @@ COUNTS = (1, 16, 64)
 """Spheres in a world."""
 
 SECONDS = 6.0
-"""That each part is measured for."""
+"""That each turn is measured for: the percentiles that a world reports are those of its last four seconds."""
+
+TURNS = 5
+"""Without a visitor and with one."""
 
 PULLS = 40
 """Moves of the hand whose way to a picture is timed."""
@@ -42,7 +46,8 @@ world.build()
 
 @dataclass(frozen=True)
 class LiveCost:
-    """Of one world: `step_ms` are the 50th and 99th percentile, without a visitor and with one."""
+    """Of one world. Steps have their 50th and 99th percentiles, without a visitor and with one: medians of
+    the turns. `ratios` are those of the 99th percentiles in each turn, with over without, in rising order."""
 
     spheres: int
     triangles: int
@@ -51,6 +56,7 @@ class LiveCost:
     latency_ms: tuple[float, float]  # 50th and 95th percentile, from a move to the first picture with it
     alone_ms: tuple[float, float]
     visited_ms: tuple[float, float]
+    ratios: tuple[float, ...]
 
 
 def measure(on_part: Callable[[str], object]) -> list[LiveCost]:
@@ -83,25 +89,45 @@ async def _measured(on_part: Callable[[str], object]) -> list[LiveCost]:
 
 
 async def _cost(server: LiveServer, count: int) -> LiveCost:
-    await asyncio.sleep(2.0)
-    alone = await _step_times(server, None)
-    async with connect(f"ws://127.0.0.1:{server.port}/live", max_size=None, compression=None) as socket:
-        reader = _Reader(socket)
-        await reader.listen(2.0)
-        reader.pictures, start = 0, time.perf_counter()
-        visited = await _step_times(server, reader)
-        pictures = reader.pictures / (time.perf_counter() - start)
+    alone, visited, rates = [], [], []
+    for _ in range(TURNS):
+        await asyncio.sleep(SECONDS)
+        alone.append(_step_times(server))
+        async with _visitor(server) as reader:
+            await reader.listen(SECONDS)
+            visited.append(_step_times(server))
+            rates.append(reader.pictures / SECONDS)
+    async with _visitor(server) as reader:
+        await reader.listen(0.5)
         latencies = [await _latency(reader, i) for i in range(PULLS)]
-    p50, p95 = (float(each) for each in np.percentile(np.array(latencies) * 1e3, (50, 95)))
-    return LiveCost(count, reader.triangles, reader.size, pictures, (p50, p95), alone, visited)
+    return LiveCost(
+        count,
+        reader.triangles,
+        reader.size,
+        float(np.median(rates)),
+        _pair(np.percentile(np.array(latencies) * 1e3, (50, 95))),
+        _pair(np.median(alone, axis=0)),
+        _pair(np.median(visited, axis=0)),
+        tuple(sorted(with_one[1] / without[1] for with_one, without in zip(visited, alone, strict=True))),
+    )
 
 
-async def _step_times(server: LiveServer, reader: _Reader | None) -> tuple[float, float]:
-    """What a step took at its 50th and 99th percentile, in the last four seconds."""
-    await (asyncio.sleep(SECONDS) if reader is None else reader.listen(SECONDS))
+def _pair(numbers: np.ndarray) -> tuple[float, float]:
+    return float(numbers[0]), float(numbers[1])
+
+
+def _step_times(server: LiveServer) -> tuple[float, float]:
+    """What a step took at its 50th and 99th percentile, in the last four seconds [ms]."""
     state = server.panes[0].state
     assert state is not None
     return state["step_ms"][0], state["step_ms"][1]
+
+
+@asynccontextmanager
+async def _visitor(server: LiveServer) -> AsyncIterator[_Reader]:
+    address = f"ws://127.0.0.1:{server.port}/live"
+    async with connect(address, max_size=None, compression=None) as socket:
+        yield _Reader(socket)
 
 
 class _Reader:

@@ -11,6 +11,7 @@ from taichi_soft.live import measuring
 def test_a_measurement_counts_what_is_sent_and_orders_its_percentiles(monkeypatch):
     monkeypatch.setattr(measuring, "COUNTS", (1,))
     monkeypatch.setattr(measuring, "SECONDS", 1.0)
+    monkeypatch.setattr(measuring, "TURNS", 2)
     monkeypatch.setattr(measuring, "PULLS", 3)
     told = []
     (cost,) = measuring.measure(told.append)
@@ -22,3 +23,5 @@ def test_a_measurement_counts_what_is_sent_and_orders_its_percentiles(monkeypatc
     assert cost.pictures > 0.0
     for low, high in (cost.latency_ms, cost.alone_ms, cost.visited_ms):
         assert 0.0 < low <= high
+    assert len(cost.ratios) == 2
+    assert list(cost.ratios) == sorted(cost.ratios)
