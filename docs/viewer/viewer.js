@@ -8,7 +8,13 @@ const isEmbedded = window !== window.top;
 const BACK = 0xd3dbe2; // colour of what is far away, sRGB
 const FILMED = 16 / 9; // width over height of the pictures that the cameras of the demos frame
 
-const renderer = new THREE.WebGLRenderer({ canvas, antialias: true });
+let renderer;
+try {
+  renderer = new THREE.WebGLRenderer({ canvas, antialias: true });
+} catch (error) {
+  told.textContent = "no WebGL to draw with: switch your browser's hardware acceleration on";
+  throw error;
+}
 renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
 renderer.shadowMap.enabled = true;
 const camera = new THREE.PerspectiveCamera();

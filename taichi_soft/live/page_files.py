@@ -12,8 +12,9 @@ from taichi_soft.live.three_js import fetch_three_js
 
 PAGE = Path(__file__).parent / "page"
 
-FRAMED_BY = "'self' http://localhost:* http://127.0.0.1:* vscode-webview:"
-"""Pages that may show a world within them: those of notebooks on this machine."""
+FRAMED_BY = "'self' http://localhost:* http://127.0.0.1:* vscode-webview: vscode-file:"
+"""Pages that may show a world within them: those of notebooks on this machine. A browser asks for every page
+round it: in VS Code a vscode-webview: within a vscode-file:."""
 
 _KINDS = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
 

@@ -11,7 +11,7 @@ from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
-from browser import PATIENCE, chromium
+from browser import PATIENCE, chromium, launched
 from visitor import Visitor
 
 playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright: pip install playwright")
@@ -194,6 +194,55 @@ def test_a_drag_lifts_a_body_and_lets_it_fly_while_a_drag_beside_it_turns_the_vi
     page.wait_for_timeout(1500)
     turned, _ = picture_of(page)
     assert (np.abs(turned - start).max(axis=2) > 40).sum() > 500
+
+
+def test_a_finger_lifts_a_body_too(open_page, visitor):
+    page = open_page(390, 844, has_touch=True)
+    visitor.say("reset")
+    visitor.until(lambda: visitor.states[0]["time"] < 1.0)
+    visitor.until(lambda: visitor.states[0]["time"] > 2.5)
+    picture, box = picture_of(page)
+    place, count = coral(picture)
+    assert count > 100
+    before = visitor.body(0)[:, 2].mean()
+    x, y = box["x"] + place[0], box["y"] + place[1]
+    fingers = page.context.new_cdp_session(page)
+
+    def touch(kind, *points):
+        points = [{"x": float(at[0]), "y": float(at[1])} for at in points]
+        fingers.send("Input.dispatchTouchEvent", {"type": f"touch{kind}", "touchPoints": points})
+
+    touch("Start", (x, y))
+    for i in range(1, 16):
+        touch("Move", (x, y - 5 * i))
+        visitor.listen(0.08)
+    assert visitor.until(lambda: visitor.body(0)[:, 2].mean() > before + 0.2)
+    assert page.evaluate("window.scrollY") == 0.0
+    touch("End")
+    visitor.until(lambda: visitor.body(0)[:, 2].mean() < before + 0.1)
+
+
+def test_two_fingers_bring_the_view_nearer(open_page, visitor):
+    visitor.say("pause", is_paused=True)
+    page = open_page(390, 844, has_touch=True)
+    start, box = picture_of(page)
+    fingers = page.context.new_cdp_session(page)
+    y = box["y"] + 20.0
+    for kind, apart in [("Start", 40), *(("Move", 40 + 3 * i) for i in range(1, 11)), ("End", None)]:
+        points = [] if apart is None else [{"x": 195.0 + side * apart, "y": y} for side in (-1, 1)]
+        fingers.send("Input.dispatchTouchEvent", {"type": f"touch{kind}", "touchPoints": points})
+        page.wait_for_timeout(50)
+    page.wait_for_timeout(1000)
+    assert coral(picture_of(page)[0])[1] > 1.5 * coral(start)[1]
+    visitor.say("pause", is_paused=False)
+
+
+def test_a_browser_that_cannot_draw_is_told_so(browser, served):
+    blind = launched(browser.browser_type, "--disable-3d-apis")
+    page = blind.new_page()
+    page.goto(served.address)
+    playwright.expect(page.locator("#said")).to_have_text(re.compile("no WebGL"), timeout=PATIENCE)
+    blind.close()
 
 
 def test_keys_turn_the_view(open_page, visitor):

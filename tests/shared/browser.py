@@ -21,15 +21,18 @@ PATIENCE = 120_000
 def chromium(*further):
     """A browser of Playwright, with further arguments. The test is skipped where there is none."""
     playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright: pip install playwright")
+    with playwright.sync_playwright() as started:
+        browser = launched(started.chromium, *further)
+        yield browser
+        browser.close()
+
+
+def launched(kind, *further):
+    """Another browser of the same kind: `browser.browser_type` is one."""
     program = next(filter(None, map(shutil.which, NAMES)), None)
     if program is None:
         pytest.skip("needs chromium: apt-get install chromium")
-    with playwright.sync_playwright() as started:
-        browser = started.chromium.launch(
-            executable_path=program, args=[*ARGUMENTS, *further], timeout=PATIENCE
-        )
-        yield browser
-        browser.close()
+    return kind.launch(executable_path=program, args=[*ARGUMENTS, *further], timeout=PATIENCE)
 
 
 def opened(browser, address, **options):

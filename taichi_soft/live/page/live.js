@@ -21,7 +21,13 @@ const hand = {
 };
 
 const canvas = document.getElementById("picture");
-const picture = new Picture(canvas, hand);
+let picture;
+try {
+  picture = new Picture(canvas, hand);
+} catch (error) {
+  say("this browser has no WebGL to draw with: switch its hardware acceleration on, or take another browser");
+  throw error;
+}
 picture.shot = () => canvas.toBlob(blob => panel.offer(URL.createObjectURL(blob), "live.png"));
 
 function connect() {
