@@ -44,6 +44,7 @@ class Runner:
         self.state: dict[str, Any] | None = None
         self.frames: FrameFile | None = None
         self._packed = 0, 0, b""  # the newest picture
+        self.pulls: dict[int, int] = {}  # by visitor, the move of its hand that the newest picture shows
         self.is_over = False
         self.is_lost = False  # the other end is gone
         self.is_asked = False  # for whom the one that is shown was asked where its bodies are
@@ -161,6 +162,8 @@ class Runner:
                 return  # a newer one has taken its place
             self.drawn = header, arrays
             self._packed = 0, 0, b""
+        elif message[0] == "frame":
+            self.pulls.update(message[2])
         elif message[0] in ("state", "ready"):
             self.state = message[1]
         self.heard(self, message)

@@ -350,7 +350,7 @@ class LiveServer:
         elif runner is None:
             raise OptionError("there is no world yet: it is being compiled")
         elif do in ("grab", "move", "release"):
-            values = [wish[key] for key in ("origin", "direction", "point") if key in wish]
+            values = [wish[key] for key in ("origin", "direction", "point", "number") if key in wish]
             key = ("move", visitor.number) if do == "move" else None
             self._require(runner.send(do, visitor.number, *values, key=key))
         elif do == "save":
@@ -517,6 +517,9 @@ class LiveServer:
             return
         if visitor.last.get(pane, (0, 0, 0))[:2] != identity:
             await visitor.connection.send(drawn_packet(pane, header, arrays))
+        pull = runner.pulls.pop(visitor.number, None)
+        if pull is not None:  # so the page can tell how late its pictures are
+            await visitor.connection.send(json.dumps({"pull": pull}))
         visitor.last[pane] = *identity, number
         visitor.sent += 1
         await visitor.connection.send(numbered(packet, visitor.sent))

@@ -105,6 +105,7 @@ class Simulation:
         self._simulated = self._since = 0.0
         self._factor = 0.0
         self._steps_seen = 0
+        self._pulls: dict[int, tuple[int, int]] = {}  # by visitor: a move that no picture shows, the step
         self._alpha: float | None = None  # of a world that somebody else steps
 
     def start(self, given: dict[str, float]) -> None:
@@ -223,11 +224,13 @@ class Simulation:
         if grab is not None:
             self.hands[visitor] = grab
 
-    def do_move(self, visitor: int, point: list[float]) -> None:
-        """Pull what a visitor holds to a point."""
+    def do_move(self, visitor: int, point: list[float], number: int = 0) -> None:
+        """Pull what a visitor holds to a point; `number` tells its moves apart."""
         grab = self.hands.get(visitor)
         if grab is not None and grab.is_held:
             grab.move(point)
+            if number:
+                self._pulls.setdefault(visitor, (number, self.world.step_count))
 
     def do_release(self, visitor: int) -> None:
         """Let go of what a visitor holds, with the speed that it has."""
@@ -323,7 +326,10 @@ class Simulation:
         self.drawn.fill(frame, alpha, None if self.tints is None else self.tints.rows)
         moment = self.world.time - (1.0 - alpha) * self.world.last_dt
         number = self.frames.publish(self.drawn.version, moment, is_tinted=self.tints is not None)
-        self.connection.send(("frame", number))
+        steps = self.world.step_count
+        pulls = {visitor: move for visitor, (move, step) in self._pulls.items() if step != steps}
+        self._pulls = {each: pull for each, pull in self._pulls.items() if each not in pulls}
+        self.connection.send(("frame", number, pulls))
         if now >= self._due["film"]:
             if self.recent and moment < self.recent[-1][0]:
                 self.recent.clear()  # it went back to its beginning

@@ -42,11 +42,15 @@ def _nothing(said: dict[str, Any]) -> dict[str, Any]:
     return {}
 
 
-def _seen(said: dict[str, Any]) -> dict[str, Any]:
+def _number(said: dict[str, Any]) -> int:
     number = said.get("number")
     if not isinstance(number, int) or isinstance(number, bool) or not 0 <= number < 2**32:
-        raise OptionError(f"number is that of a picture, got {number!r}")
-    return {"number": number}
+        raise OptionError(f"number is a whole number below 2^32, got {number!r}")
+    return number
+
+
+def _seen(said: dict[str, Any]) -> dict[str, Any]:
+    return {"number": _number(said)}
 
 
 def _set(said: dict[str, Any]) -> dict[str, Any]:
@@ -73,7 +77,7 @@ def _grab(said: dict[str, Any]) -> dict[str, Any]:
 
 
 def _move(said: dict[str, Any]) -> dict[str, Any]:
-    return {"point": _vector(said, "point")}
+    return {"point": _vector(said, "point"), "number": _number({"number": 0, **said})}
 
 
 def _flag(said: dict[str, Any]) -> dict[str, Any]:

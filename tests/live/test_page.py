@@ -186,6 +186,8 @@ def test_a_drag_lifts_a_body_and_lets_it_fly_while_a_drag_beside_it_turns_the_vi
     thrown = visitor.body(0).mean(axis=0)
     assert np.linalg.norm(thrown[:2] - before[:2]) > 0.3  # the way of the hand, and on
     assert visitor.pictures[0]["time"] > held[1]
+    median, most = map(float, re.fullmatch(r"(\d+), (\d+) ms", page.locator("#late").text_content()).groups())
+    assert 0.0 < median <= most
     start, _ = picture_of(page)
     page.mouse.move(box["x"] + 15, box["y"] + 15)
     page.mouse.down()

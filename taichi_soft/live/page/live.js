@@ -12,11 +12,27 @@ const wish = said => {
   socket.send(said instanceof ArrayBuffer ? said : JSON.stringify(said));
 };
 
+// From a move of the hand to the frame after the one that first shows it [ms], of the last moves.
+const begun = new Map(), late = [];
+let pull = 0;
+
+function arrived(pull) {
+  if (!begun.has(pull)) return;
+  late.push(performance.now() - begun.get(pull));
+  begun.forEach((_, number) => { if (number <= pull) begun.delete(number); });
+  if (late.length > 60) late.shift();
+  const sorted = [...late].sort((a, b) => a - b), share = q => sorted[Math.floor(q * (sorted.length - 1))].toFixed(0);
+  document.getElementById("late").textContent = `${share(0.5)}, ${share(0.95)} ms`;
+}
+
 // A hand moves at most 60 times a second: pointers tell more often.
-let moved = null, movedAt = 0;
+let moved = null, movedAt = 0, moves = 0;
 const hand = {
   grab: (pane, origin, direction) => wish({ do: "grab", pane, origin, direction }),
-  move: (pane, point) => { moved = { do: "move", pane, point }; },
+  move: (pane, point) => {
+    if (!moved) begun.set(++moves, performance.now());
+    moved = { do: "move", pane, point, number: moves };
+  },
   release: pane => { if (moved) wish(moved); moved = null; wish({ do: "release", pane }); },
 };
 
@@ -54,6 +70,7 @@ function hear(message) {
     if (!panel) panel = new Panel(message, wish, picture);
     panel.say("");
   }
+  else if (message.pull) pull = message.pull;
   else if (message.said) panel.say(message.said);
   else if (message.refused) panel.refuse(message.refused);
   else if (message.made) panel.offer(message.made + location.search, message.name);
@@ -115,6 +132,7 @@ function frame() {
     counted += pane === 0;
   });
   picture.render();
+  if (number && pull) { const done = pull; pull = 0; requestAnimationFrame(() => arrived(done)); }
   if (number) wish({ do: "seen", number });
   const now = performance.now();
   if (now - since > 1000) {
