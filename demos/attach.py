@@ -69,7 +69,7 @@ def stage() -> Stage:
         Prop((plate[0] + (0, 0, 0.04), plate[1]), frame),
         Prop((rod[0] + (0, 0, ROD / 2), rod[1]), frame),
     ]
-    camera = Camera.framing((-2.3, -0.3, 0.2), (2.3, 0.3, 3.9), aspect=16 / 9, azimuth=-80, elevation=5)
+    camera = Camera.framing((-2.3, -0.3, 0.2), (2.3, 0.3, 4.6), aspect=16 / 9, azimuth=-80, elevation=5)
     actors = [Actor(body, paint=_stress)]
     found = Stage("hung from a frame", world, actors, camera, STEP, 8.0, act=swing, props=props)
     found.caption, found.scale = swing.caption, STRESS

@@ -70,7 +70,7 @@ def stage() -> Stage:
         Prop((plate[0] + (0, 0, 0.06), plate[1]), ceiling),
         Prop(steel, blade, color=(0.95, 0.93, 0.88)),
     ]
-    camera = Camera.framing((-1.4, -0.6, 0.0), (1.4, 0.6, 3.5), aspect=16 / 9, azimuth=-66, elevation=8)
+    camera = Camera.framing((-1.4, -0.6, 0.0), (1.4, 0.6, 4.6), aspect=16 / 9, azimuth=-66, elevation=8)
     found = Stage("cut in two", world, [Actor(bar)], camera, STEP, 7.0, props=props)
     found.act = knife = Knife(blade, found)
     found.caption = knife.caption

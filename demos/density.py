@@ -27,7 +27,7 @@ def stage() -> Stage:
     world.build()
     scale = ColorScale("density", LIGHT, HEAVY, "kg/m^3")
     colors = scale.colors(LIGHT + (HEAVY - LIGHT) * (mesh.vertices[:, 0] + 1.5) / 3.0)
-    camera = Camera.framing((-2.0, -0.8, 0.0), (2.8, 0.8, 3.9), aspect=16 / 9, azimuth=-75.0, elevation=8.0)
+    camera = Camera.framing((-2.0, -0.8, 0.0), (2.8, 0.8, 4.7), aspect=16 / 9, azimuth=-75.0, elevation=8.0)
     actor = Actor(body, paint=lambda body: colors)
     return Stage("heavier to the right", world, [actor], camera, FixedStep(dt=1 / 50), 5.0, scale=scale)
 

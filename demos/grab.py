@@ -111,7 +111,7 @@ def stage() -> Stage:
     frame = world.add_frame((-0.6, 0.0, 2.2))
     props = [Prop(SphereShape(0.09).surface(), frame, color=(0.95, 0.93, 0.88))]
     camera = Camera.framing(
-        (-1.5, -1.4, 0.0), (3.7, 1.2, 2.6), aspect=16 / 9, azimuth=-72, elevation=34, margin=1.0
+        (-1.5, -1.4, 0.0), (3.7, 1.2, 3.1), aspect=16 / 9, azimuth=-72, elevation=34, margin=1.0
     )
     return Stage("picked up and thrown", world, actors, camera, STEP, 10.0, act=Hand(frame), props=props)
 

@@ -38,7 +38,7 @@ def stage() -> Stage:
         place = (1.2 * (i - (COUNT - 1) / 2), y, y * np.tan(SLOPE) + 1.3)
         world.add_body(asset, position=place, velocity=(0.0, -2.5, 0.0))
     world.build()
-    camera = Camera(eye=(0.0, -7.0, 5.6), target=(0.0, 4.6, 2.3), fov_degrees=38.0)
+    camera = Camera(eye=(0.0, -7.0, 5.6), target=(0.0, 4.6, 2.75), fov_degrees=43.0)
     choice = Choice(np.asarray(camera.eye))
     choice(world)
 

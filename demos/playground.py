@@ -108,7 +108,7 @@ def stage() -> Stage:
         actors.append(Actor(body, PALETTE[i % len(PALETTE)]))
     world.build()
     camera = Camera.framing(
-        (-2.9, -2.4, 0.0), (3.9, 2.0, 6.8), aspect=16 / 9, azimuth=-74, elevation=20, margin=1.0
+        (-4.0, -2.4, 0.0), (3.9, 2.0, 8.4), aspect=16 / 9, azimuth=-74, elevation=20, margin=1.0
     )
     return Stage(
         "a course of colliders", world, actors, camera, STEP, 8.0, act=course, collider_colors=course.colors

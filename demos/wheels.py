@@ -77,7 +77,7 @@ def stage() -> Stage:
         world.add_motor(body, hub, (0.0, 0.0, 1.0), speed=0.0, max_torque=TORQUE, is_fixed=True)
     drivers = Drivers(motors)
     camera = Camera.framing(
-        (-0.4, -2.3, 0.0), (5.9, 1.9, 1.2), aspect=16 / 9, azimuth=-112, elevation=26, margin=1.0
+        (-0.4, -2.3, 0.0), (5.9, 1.9, 2.2), aspect=16 / 9, azimuth=-112, elevation=26, margin=1.0
     )
     legend = [(PALETTE[i], f"E = {young / 1e3:.0f} kPa") for i, young in enumerate(STIFFNESSES)]
     found = Stage("wheels driven at their hubs", world, actors, camera, STEP, 7.0, act=drivers)
