@@ -102,7 +102,8 @@ class LiveServer:
         self.trouble: str | None = None  # why there is no world
         self._broken: list[float] = []  # when worlds broke down
         self._last_choice = -math.inf
-        self._is_reading = self._is_filming = False  # a visitor's file; a film
+        self._is_reading = self._is_drawing = False  # a visitor's file; a film
+        self._filming: Runner | None = None  # which was asked for its last seconds
         self._film: BaseProcess | None = None
         self._tasks: set[asyncio.Task[None]] = set()
         self._listening: Listening | None = None
@@ -179,6 +180,9 @@ class LiveServer:
             number, script, snapshot = rest
             self._offer(number, "application/zip", "scene.zip", packed(script, snapshot, runner.source))
         elif name == "filmed":
+            self._filming, self._is_drawing = None, bool(rest[1])
+            if not self._is_drawing:
+                return
             task = self._loop.create_task(self._draw_film(*rest))
             self._tasks.add(task)
             task.add_done_callback(self._tasks.discard)
@@ -237,7 +241,6 @@ class LiveServer:
         """A world that could not be made is left out; one that broke down is made anew."""
         runner.stop()
         runner.is_lost = True
-        self._is_filming = False
         if self.coming.get(pane) is runner:
             del self.coming[pane]
             words = f"{_described(runner.source)}: {words}"
@@ -345,7 +348,7 @@ class LiveServer:
         elif do == "alone":
             for runners in (self.panes, self.coming):
                 if 1 in runners:
-                    runners.pop(1).stop()
+                    runners.pop(1).kill()  # also one that compiles, and hears nothing
             self._wake()
         elif runner is None:
             raise OptionError("there is no world yet: it is being compiled")
@@ -354,16 +357,23 @@ class LiveServer:
             key = ("move", visitor.number) if do == "move" else None
             self._require(runner.send(do, visitor.number, *values, key=key))
         elif do == "save":
-            if wish["what"] == "film" and self._is_filming:
-                raise OptionError("a film is being drawn: wait until it is there")
-            self._is_filming = self._is_filming or wish["what"] == "film"
-            self._require(runner.send(wish["what"] if wish["what"] == "film" else "save", visitor.number))
+            self._save(visitor, runner, wish["what"])
         elif do == "reset":
             if any(map(self._restarts, self.panes)):
                 self._require_patience()
             self.reset_all()
         else:
             self._obey_for_all(wish)
+
+    def _save(self, visitor: Visitor, runner: Runner, what: str) -> None:
+        if what == "film":
+            # One whose world has ended meanwhile never comes.
+            is_asked = self._filming is not None and not self._filming.is_over
+            if is_asked or self._is_drawing:
+                raise OptionError("a film is being drawn: wait until it is there")
+        self._require(runner.send("film" if what == "film" else "save", visitor.number))
+        if what == "film":
+            self._filming = runner
 
     def _choose(self, do: str, wish: dict[str, Any]) -> None:
         """Compile another law, in place of the one that is shown or beside it."""
@@ -445,9 +455,6 @@ class LiveServer:
 
     async def _draw_film(self, number: int, frames: str) -> None:
         visitor = self.visitors.get(number)
-        if not frames:
-            self._is_filming = False
-            return
         if visitor is not None:
             self._tell(visitor, "drawing the film: up to a minute")
         path = f"{frames}.mp4"
@@ -455,7 +462,7 @@ class LiveServer:
         process.start()
         self._film = process
         await asyncio.to_thread(process.join)
-        self._is_filming = False
+        self._is_drawing = False
         Path(frames).unlink(missing_ok=True)
         if process.exitcode != 0 or not Path(path).is_file():
             if visitor is not None:
