@@ -16,6 +16,9 @@ from taichi_soft.core.types import FlipsName, LawName, StrainName
 VISITOR = Material(young=1.5e5, poisson=0.4, density=500.0, damping_ratio=0.15)
 """Of what visitors add, until a slider says otherwise."""
 
+SHAPES = ("ball", "block", "drum", "ring")
+"""Names of those that every world has room for."""
+
 ROOM = 6
 """Bodies of each kind that visitors may add."""
 
@@ -95,13 +98,13 @@ def palette_of(world: World) -> dict[str, SoftBodyAsset]:
 
 def _palette(meshes: Sequence[str | Path]) -> dict[str, SoftBodyAsset]:
     """Shapes of about half a metre, and the surfaces of files, by name."""
-    shapes = {
-        "ball": sphere(0.3, 3),
-        "block": box((0.5, 0.5, 0.5), (3, 3, 3)),
-        "drum": cylinder(0.28, 0.5, rings=2, layers=4),
-        "ring": torus(0.32, 0.13, rings=1, segments=18),
-    }
-    found = {name: SoftBodyAsset(mesh, VISITOR) for name, mesh in shapes.items()}
+    shapes = (
+        sphere(0.3, 3),
+        box((0.5, 0.5, 0.5), (3, 3, 3)),
+        cylinder(0.28, 0.5, rings=2, layers=4),
+        torus(0.32, 0.13, rings=1, segments=18),
+    )
+    found = {name: SoftBodyAsset(mesh, VISITOR) for name, mesh in zip(SHAPES, shapes, strict=True)}
     for path in meshes:
         found[Path(path).stem] = SoftBodyAsset.from_surface(Path(path), VISITOR)
     return found

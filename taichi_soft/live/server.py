@@ -6,7 +6,6 @@ import asyncio
 import json
 import logging
 import math
-import re
 import secrets
 import tempfile
 from collections.abc import Callable
@@ -29,6 +28,7 @@ from websockets.http11 import Request, Response
 from taichi_soft import PRESETS
 from taichi_soft.core.errors import OptionError, TaichiSoftError
 from taichi_soft.elements.laws import LAWS
+from taichi_soft.live.choices import SHAPES
 from taichi_soft.live.controls import SLIDERS
 from taichi_soft.live.guard import LARGEST_UPLOAD, MOST_VISITORS, Allowance, Guard
 from taichi_soft.live.packets import drawn_packet, numbered
@@ -428,18 +428,16 @@ class LiveServer:
 
     async def _add_mesh(self, visitor: Visitor, name: str, content: bytes) -> None:
         self._tell(visitor, f"looking at {name}")
-        taken = {Path(each).stem for each in self._source(0).meshes}
-        if re.sub(r"[^A-Za-z0-9_-]", "", Path(name).stem)[:40] in taken:
-            name = f"{Path(name).stem[:36]}{len(taken) + 1}{Path(name).suffix}"
+        taken = {*SHAPES, *(Path(each).stem for each in self._source(0).meshes)}
         folder = Path(self._folder.name) / f"mesh{secrets.token_hex(4)}"
         try:
-            path = await asyncio.to_thread(require_mesh, folder, name, content)
+            path = await asyncio.to_thread(require_mesh, folder, name, content, taken)
         except TaichiSoftError as error:
             self._put(visitor, refused=str(error))
             return
         finally:
             self._is_reading = False
-        for pane in sorted({0, *self.panes}):
+        for pane in sorted({0, *self.panes, *self.coming}):
             source = self._source(pane)
             self._begin(pane, replace(source, meshes=(*source.meshes, str(path))))
 

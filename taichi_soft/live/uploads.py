@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 import shutil
+from collections.abc import Collection
+from itertools import chain, count
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -20,12 +22,13 @@ MOST_SECONDS = 60.0
 MOST_TRIANGLES = 200_000
 
 
-def require_mesh(folder: Path, name: str, content: bytes) -> Path:
+def require_mesh(folder: Path, name: str, content: bytes, taken: Collection[str] = ()) -> Path:
     """Keep a visitor's file in a new folder, once it is known to make a body.
 
     Args:
         folder: is made, for this file alone.
         name: as the visitor calls it: what is no letter, digit, - or _ is left out, folders too.
+        taken: names that others have, by which bodies are told apart: a number is put behind one of these.
     Raises: OptionError for a file that is too large or of another kind; MeshError for one that makes no body.
     """
     suffix = Path(name).suffix.lower()
@@ -33,7 +36,8 @@ def require_mesh(folder: Path, name: str, content: bytes) -> Path:
         raise OptionError(f"{name!r} is none of {', '.join(KINDS)}")
     if not 0 < len(content) <= LARGEST_UPLOAD:
         raise OptionError(f"{name!r} has {len(content):,} bytes: from 1 to {LARGEST_UPLOAD:,} are taken")
-    stem = re.sub(r"[^A-Za-z0-9_-]", "", Path(name).stem)[:40] or "mesh"
+    own = re.sub(r"[^A-Za-z0-9_-]", "", Path(name).stem)[:40] or "mesh"
+    stem = next(each for each in chain([own], (f"{own[:36]}{i}" for i in count(2))) if each not in taken)
     folder.mkdir(parents=True)
     path = folder / f"{stem}{suffix}"
     path.write_bytes(content)
@@ -61,9 +65,9 @@ def _look_at(path: str, connection: Connection) -> None:
 
     try:
         asset = SoftBodyAsset.from_surface(Path(path), VISITOR)
-        count = sum(len(skin.surface.triangles) for skin in asset.skins)
-        if count > MOST_TRIANGLES:
-            connection.send(f"it has {count:,} triangles, and {MOST_TRIANGLES:,} are taken")
+        triangles = sum(len(skin.surface.triangles) for skin in asset.skins)
+        if triangles > MOST_TRIANGLES:
+            connection.send(f"it has {triangles:,} triangles, and {MOST_TRIANGLES:,} are taken")
         elif max(asset.mesh.bounds[1] - asset.mesh.bounds[0]) > 20.0:
             connection.send("it is larger than 20 m: scale it to metres")
         else:
