@@ -17,11 +17,13 @@ from typing import Any
 
 from engine_adapter import EngineAdapter, FixedStep
 from taichi_soft import Body, StateError, World
+from taichi_soft.core.checks import as_count
 from taichi_soft.core.errors import OptionError
 from taichi_soft.core.extras import require_extra
 from taichi_soft.live.guard import VIEW_KEY
 from taichi_soft.live.scene import Scene, SceneSource, framing_of
 from taichi_soft.live.simulation import Simulation
+from taichi_soft.render.arguments import as_color
 from taichi_soft.render.colors import Color
 
 
@@ -50,6 +52,9 @@ class View:
         self._end = weakref.finalize(self, _end, self._server, self._connection, self._folder)
         assert self._server.stdout is not None
         self.address = self._server.stdout.readline().strip()
+        if not self.address:
+            self._end()
+            raise StateError("the server of this view could not begin to serve: see what it said")
         slots = {body.index: color for body, color in colors.items()}
         scene = Scene("a world", world, FixedStep(), framing_of(world), None, slots)
         self._simulation = Simulation(self._connection, Path(self._folder.name), scene, SceneSource())
@@ -74,8 +79,11 @@ class View:
             raise StateError("the server of this view has ended: make another") from error
 
     def close(self) -> None:
-        """End it."""
-        self._end()
+        """End it, and let go of what visitors hold."""
+        try:
+            self._simulation.do_release_all()
+        finally:
+            self._end()
 
     def __enter__(self) -> View:
         return self
@@ -106,8 +114,8 @@ def view(
         world: built, or an adapter of it.
         colors: of bodies, sRGB from 0 to 1.
         height: in a notebook [pixels].
-    Raises: StateError for a world that is not built; OptionError for what is none; MissingExtraError without
-        the extra `live`.
+    Raises: StateError for a world that is not built; OptionError for what is none, and for odd colours or
+        heights; MissingExtraError without the extra `live`.
     """
     require_extra("live", "a live world needs")
     found = world.world if isinstance(world, EngineAdapter) else world
@@ -115,7 +123,15 @@ def view(
         raise OptionError(f"world must be a World or an EngineAdapter, got {world!r}")
     if not found.is_built:
         raise StateError("the world is not built: call world.build() before it is viewed")
-    return View(found, colors or {}, height)
+    return View(found, _checked({} if colors is None else colors), as_count(height, "height"))
+
+
+def _checked(colors: Mapping[Body, Color]) -> dict[Body, Color]:
+    if not isinstance(colors, Mapping) or not all(isinstance(body, Body) for body in colors):
+        raise OptionError(f"colors is a mapping from bodies to their colours, got {colors!r}")
+    for color in colors.values():
+        as_color(color, "a color")
+    return dict(colors)
 
 
 def _accepted(listener: Listener, server: subprocess.Popen[str]) -> Any:

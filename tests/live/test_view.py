@@ -1,5 +1,7 @@
 """A world that a script steps, seen and touched from a browser."""
 
+import subprocess
+
 import numpy as np
 import pytest
 from visitor import Visitor
@@ -72,6 +74,17 @@ def test_a_visitor_pulls_a_body_between_the_scripts_steps_and_decides_nothing_el
     assert not world.grabs
 
 
+def test_a_view_that_is_closed_lets_go_of_what_visitors_hold(world):
+    window = view(world)
+    with Visitor(window.address) as visitor:
+        until(window, visitor, lambda: 0 in visitor.pictures)
+        x, y, _ = world.bodies[0].center_of_mass()
+        visitor.say("grab", origin=[x, y, 9.0], direction=[0.0, 0.0, -1.0])
+        until(window, visitor, lambda: len(world.grabs) == 1)
+        window.close()
+    assert not world.grabs
+
+
 def test_a_notebook_gets_a_frame_with_the_address(window):
     html = window._repr_html_()
     assert f'src="{window.address}"' in html
@@ -83,6 +96,43 @@ def test_what_is_no_built_world_is_refused():
         view("world")
     with pytest.raises(StateError, match="build"):
         view(World())
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"colors": [1]},
+        {"colors": {0: (1.0, 0.0, 0.0)}},
+        {"colors": "red"},
+        {"height": "1px"},
+        {"height": 0},
+    ],
+)
+def test_odd_options_are_refused_before_anything_is_served(world, options):
+    with pytest.raises(OptionError, match=next(iter(options))):
+        view(world, **options)
+
+
+@pytest.mark.parametrize("color", ["red", (1.0, 0.0), (1.0, 0.0, 7.0)])
+def test_an_odd_colour_is_refused_before_anything_is_served(world, color):
+    with pytest.raises(OptionError, match="color"):
+        view(world, colors={world.bodies[0]: color})
+
+
+def test_a_server_that_ends_before_it_serves_is_told_of(world, monkeypatch, tmp_path):
+    (tmp_path / "ends.py").write_text(
+        "import os, sys\nfrom multiprocessing.connection import Client\n"
+        "host, port = sys.argv[1].split(':')\n"
+        "Client((host, int(port)), authkey=bytes.fromhex(os.environ['TAICHI_SOFT_VIEW_KEY']))\n"
+    )
+    start = subprocess.Popen
+
+    def ends_at_once(command, **options):
+        return start([command[0], str(tmp_path / "ends.py"), command[-1]], **options)
+
+    monkeypatch.setattr(subprocess, "Popen", ends_at_once)
+    with pytest.raises(StateError, match="could not begin"):
+        view(world)
 
 
 def test_a_view_of_an_adapter_ends_where_it_is_closed(world):
