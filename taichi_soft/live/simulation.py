@@ -41,6 +41,9 @@ KEPT = 10.0
 MOST_KEPT = 2**28
 """Bytes of pictures: of many vertices a film is shorter."""
 
+STEPS = 600
+"""The last ones, whose percentiles are told."""
+
 MOST_HELD = 8
 """Bodies that visitors hold at a time."""
 
@@ -95,7 +98,7 @@ class Simulation:
         self.is_playing, self.is_moving = False, True  # until it is shown
         self.hands: dict[int, Grab] = {}
         self.tints: Tints | None = None
-        self.step_times: deque[float] = deque(maxlen=600)
+        self.step_times: deque[float] = deque(maxlen=STEPS)
         self.recent: deque[tuple[float, int, Any]] = deque()
         self.versions = 0
         self.drawn: Drawn
@@ -195,6 +198,7 @@ class Simulation:
     def do_pause(self, is_paused: bool) -> None:
         """Stop, or go on."""
         self.is_playing = not is_paused
+        self._pulls.clear()  # how long it stood is not how late a picture is
         self._due["told"] = 0.0
 
     def do_step(self) -> None:
@@ -229,7 +233,7 @@ class Simulation:
         grab = self.hands.get(visitor)
         if grab is not None and grab.is_held:
             grab.move(point)
-            if number:
+            if number and self.is_playing:
                 self._pulls.setdefault(visitor, (number, self.world.step_count))
 
     def do_release(self, visitor: int) -> None:

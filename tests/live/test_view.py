@@ -1,6 +1,7 @@
 """A world that a script steps, seen and touched from a browser."""
 
 import subprocess
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -83,6 +84,26 @@ def test_a_view_that_is_closed_lets_go_of_what_visitors_hold(world):
         until(window, visitor, lambda: len(world.grabs) == 1)
         window.close()
     assert not world.grabs
+
+
+def test_how_late_a_picture_is_leaves_out_how_long_a_world_stood(world, window):
+    simulation, told = window._simulation, []
+    x, y, z = world.bodies[0].center_of_mass()
+    simulation.connection = SimpleNamespace(send=told.append, poll=lambda: False)
+    try:
+        simulation.do_grab(99, [x, y, 9.0], [0.0, 0.0, -1.0])
+        for number, is_paused in ((1, True), (2, None), (3, False), (4, None)):
+            simulation.do_move(99, [x, y, z], number)
+            if is_paused is not None:
+                simulation.do_pause(is_paused)
+        world.step(1 / 60)
+        simulation._due["picture"] = 0.0
+        window.update()
+        simulation.do_release(99)
+    finally:
+        simulation.connection = window._connection
+    pulls = [message[2] for message in told if message[0] == "frame"]
+    assert pulls == [{99: 4}]
 
 
 def test_a_notebook_gets_a_frame_with_the_address(window):
