@@ -30,7 +30,7 @@ def live(
     browser: Annotated[bool, typer.Option(help="Open the page.")] = True,
     measure: Annotated[
         bool,
-        typer.Option("--measure", help="Instead, measure latency, and what a visitor costs: 6 minutes."),
+        typer.Option("--measure", help="Instead, measure latency, and what a visitor costs: 8 minutes."),
     ] = False,
 ) -> None:
     """Show a world in the browser, to be seen, touched and tuned, until Ctrl-C."""

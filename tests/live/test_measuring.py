@@ -4,8 +4,10 @@ import pytest
 
 pytest.importorskip("websockets", reason="needs websockets: pip install 'taichi-soft[live]'")
 
+from engine_adapter import FixedStep
 from taichi_soft import sphere
 from taichi_soft.live import measuring
+from taichi_soft.live.simulation import STEPS
 
 
 def test_a_measurement_counts_what_is_sent_and_orders_its_percentiles(monkeypatch):
@@ -25,3 +27,7 @@ def test_a_measurement_counts_what_is_sent_and_orders_its_percentiles(monkeypatc
         assert 0.0 < low <= high
     assert len(cost.ratios) == 2
     assert list(cost.ratios) == sorted(cost.ratios)
+
+
+def test_no_step_of_the_turn_before_is_among_those_of_a_turn():
+    assert STEPS * FixedStep().dt + 0.5 < measuring.SECONDS  # and a world tells them now and then
