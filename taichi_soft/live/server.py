@@ -46,6 +46,9 @@ UNSEEN = 2
 MOST_BREAKDOWNS = 2
 """Of a world in a minute, after which it is not made anew."""
 
+MOST_MESHES = 8
+"""That visitors add: a world has room for bodies of each."""
+
 BETWEEN_CHOICES = 1.0
 """Seconds: each choice starts a process."""
 
@@ -351,7 +354,9 @@ class LiveServer:
                     runners.pop(1).kill()  # also one that compiles, and hears nothing
             self._wake()
         elif runner is None:
-            raise OptionError("there is no world yet: it is being compiled")
+            raise OptionError(
+                "there is no second world" if wish["pane"] else "there is no world yet: it is being compiled"
+            )
         elif do in ("grab", "move", "release"):
             values = [wish[key] for key in ("origin", "direction", "point", "number") if key in wish]
             key = ("move", visitor.number) if do == "move" else None
@@ -421,6 +426,8 @@ class LiveServer:
             raise OptionError("a file came without its name")
         if self._is_reading:
             raise OptionError("another file is being read: wait until it is there")
+        if len(self._source(0).meshes) >= MOST_MESHES:
+            raise OptionError(f"{MOST_MESHES} meshes were added: that is what there is room for")
         self._is_reading = True
         task = self._loop.create_task(self._add_mesh(visitor, name, content))
         self._tasks.add(task)

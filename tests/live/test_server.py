@@ -74,3 +74,18 @@ def test_a_second_world_that_still_compiles_ends_at_once_where_one_alone_is_wish
     obey(server, '{"do": "alone"}')
     assert coming.is_killed
     assert not server.coming
+
+
+def test_a_ninth_mesh_is_refused_and_nothing_is_read(server):
+    server.panes[0] = Runner()
+    server.panes[0].source = SceneSource(meshes=tuple(f"{i}.obj" for i in range(8)))
+    visitor = Visitor(1, None, upload="ninth.obj")
+    with pytest.raises(OptionError, match="8 meshes"):
+        server._take_upload(visitor, b"v 0 0 0")
+    assert not server._is_reading
+
+
+def test_what_is_wished_for_a_second_world_says_that_there_is_none(server):
+    server.panes[0] = Runner()
+    with pytest.raises(OptionError, match="no second world"):
+        obey(server, '{"do": "release", "pane": 1}')
