@@ -9,6 +9,26 @@ from taichi_soft.contact.distances.plane import plane_distance
 from taichi_soft.contact.distances.sphere import sphere_distance
 from taichi_soft.core.runtime import ti
 
+_Vector8 = ti.types.vector(8, ti.f32)
+
+
+@ti.real_func
+def _grid_distance(
+    samples: ti.template(),
+    kind: ti.i32,
+    parameters: _Vector8,
+    resolution: ti.math.ivec3,
+    offset: ti.i32,
+    x: ti.math.vec3,
+) -> ti.math.vec4:
+    """Normal and distance from a solid that has a grid. By itself: it is more code than all other solids."""
+    distance, normal = ti.cast(0.0, ti.f32), ti.Vector.zero(ti.f32, 3)
+    if kind == ShapeKind.MESH:
+        distance, normal = mesh_distance(samples, parameters, resolution, offset, x)
+    else:
+        distance, normal = height_field_distance(samples, parameters, resolution, offset, x)
+    return ti.Vector([normal.x, normal.y, normal.z, distance])
+
 
 @ti.func
 def signed_distance(samples: ti.template(), kind, parameters, resolution, offset, x):
@@ -32,8 +52,7 @@ def signed_distance(samples: ti.template(), kind, parameters, resolution, offset
         distance, normal = box_distance(parameters, x)
     elif kind == ShapeKind.CAPSULE:
         distance, normal = capsule_distance(parameters, x)
-    elif kind == ShapeKind.HEIGHT_FIELD:
-        distance, normal = height_field_distance(samples, parameters, resolution, offset, x)
-    elif kind == ShapeKind.MESH:
-        distance, normal = mesh_distance(samples, parameters, resolution, offset, x)
+    elif kind == ShapeKind.HEIGHT_FIELD or kind == ShapeKind.MESH:
+        found = _grid_distance(samples, kind, parameters, resolution, offset, x)
+        distance, normal = found.w, found.xyz
     return distance, normal

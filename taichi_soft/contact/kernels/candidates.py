@@ -1,23 +1,25 @@
 """Candidates: the triangles that each vertex is near, until bodies have moved too far."""
 
 from taichi_soft.contact.fields import FOUND, NO_CONTACT, SLOTS
+from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
 SHORTEST, LONGEST = 0.1, 0.3
 """Mean edges: for which way of a body's fastest vertex a search holds, at least and at most."""
 
 
-@ti.func
-def forget_candidates(state: ti.template(), body):
+@ti.real_func
+def forget_candidates(state: ti.template(), body: ti.i32):
     """Drop the candidates of a body's vertices, but for what its search needs to go on with their contacts.
 
     A search that began without the impulses of the last substep would let all sag a little, once a step, and
     a heap would never cease to tremble.
     """
     outer = state.touching.body_outer[body]
-    for k in range(outer[0], outer[1]):
-        p = state.touching.outer_particle[k]
-        state.soft.kept_normal_impulse[p] = 0.0
+    vertex = outer[0]
+    while vertex < outer[1]:
+        state.soft.kept_normal_impulse[state.touching.outer_particle[vertex]] = 0.0
+        vertex = row_behind(vertex)
     first_slot = outer[0] * SLOTS
     for k in range(first_slot, first_slot + state.soft.contact_count[body]):
         slot = state.soft.contact_slot[k]
@@ -77,9 +79,10 @@ def list_candidates(state: ti.template(), body, thickness):
         thickness: the greatest at which it touches another body [m].
     """
     outer = state.touching.body_outer[body]
-    total = 0
-    for k in range(outer[0], outer[1]):
-        total += state.soft.found_count[k]
+    total, vertex = 0, outer[0]
+    while vertex < outer[1]:
+        total += state.soft.found_count[vertex]
+        vertex = row_behind(vertex)
     is_too_much = total > (outer[1] - outer[0]) * SLOTS
     slot, contacts = outer[0] * SLOTS, 0
     for k in range(outer[0], outer[1]):

@@ -5,6 +5,7 @@ from taichi_soft.contact.fields import NO_COLLIDER
 from taichi_soft.contact.kernels.rebound import add_normal_impulse
 from taichi_soft.contact.kernels.restitution import resolved_velocity
 from taichi_soft.core.math.quaternion import spun, turned, turned_back
+from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
 MOST_TOUCHES = 4
@@ -89,18 +90,22 @@ def find_near_colliders(state: ti.template(), body: ti.i32, reach: ti.f32, since
         state.contact.particle_clearance[p] = _clearance(state, p, row, count, reach, since, left)
 
 
-@ti.func
-def forget_contacts(state: ti.template(), body):
+@ti.real_func
+def forget_contacts(state: ti.template(), body: ti.i32):
     """Start a step: no impulses yet, and where there is any collider, nobody knows which are near."""
-    for row in range(body * state.contact.capacity.colliders, (body + 1) * state.contact.capacity.colliders):
+    row = body * state.contact.capacity.colliders
+    while row < (body + 1) * state.contact.capacity.colliders:
         state.contact.impulse[row] = ti.Vector.zero(ti.f32, 3)
         state.contact.angular_impulse[row] = ti.Vector.zero(ti.f32, 3)
         state.contact.normal_impulse[row] = ti.Vector.zero(ti.f32, 3)
         state.contact.normal_impulse_rates[row] = ti.Vector.zero(ti.f32, 3)
+        row = row_behind(row)
     was_deep = state.contact.reach[body] > DEEP * state.body_edge[body]
     if was_deep and state.contact.near_count[body] > 0:
-        for p in range(state.body_particles[body][0], state.body_particles[body][1]):
+        p = state.body_particles[body][0]
+        while p < state.body_particles[body][1]:
             state.contact.particle_clearance[p] = UNSEEN  # the next search may leave those inside alone
+            p = row_behind(p)
     state.contact.near_count[body] = 0
     state.contact.reach[body] = ti.select(state.contact.collider_count[None] == 0, 1e30, -1.0)
     state.contact.gone[body] = 0.0

@@ -7,6 +7,7 @@ body, and never more than contact gave: a collider does not pull.
 """
 
 from taichi_soft.contact.distances.floor import RESTITUTION_SPEED
+from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
 LEAST_REBOUND = 0.1
@@ -16,18 +17,22 @@ LEAST_REBOUND = 0.1
 @ti.func
 def begin_rebounds(state: ti.template(), body):
     """Before the impulses of the last step are cleared: contacts that ended in it are over."""
-    for row in range(body * state.contact.capacity.colliders, (body + 1) * state.contact.capacity.colliders):
+    row = body * state.contact.capacity.colliders
+    while row < (body + 1) * state.contact.capacity.colliders:
         lasts = ti.abs(state.contact.impulse[row]).max() > 0.0
         leave = ti.select(lasts, state.contact.rebound[row], 0.0)
         state.contact.rebound[row] = leave
         state.contact.prev_rebound[row] = leave
+        row = row_behind(row)
 
 
 @ti.func
 def take_back_rebounds(state: ti.template(), body):
     """The step is made again."""
-    for row in range(body * state.contact.capacity.colliders, (body + 1) * state.contact.capacity.colliders):
+    row = body * state.contact.capacity.colliders
+    while row < (body + 1) * state.contact.capacity.colliders:
         state.contact.rebound[row] = state.contact.prev_rebound[row]
+        row = row_behind(row)
 
 
 @ti.func

@@ -7,6 +7,7 @@ by hashing. What is read is cleared, and nothing else writes there.
 from taichi_soft.bodies.status import ACTIVE, ASLEEP
 from taichi_soft.contact.fields import PAIR_ROWS, SLOTS
 from taichi_soft.core.math.finite import is_finite
+from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
 OF_COLLIDER, OF_BODY = 0, 1
@@ -58,9 +59,11 @@ def add_touches(state: ti.template(), island):
 def forget_touches(state: ti.template(), island):
     """Clear the rows of an island: its step is made again."""
     first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
-    for row in range(first * PAIR_ROWS, last * PAIR_ROWS):
+    row = first * PAIR_ROWS
+    while row < last * PAIR_ROWS:
         state.soft.pair_bodies[row] = ti.Vector.zero(ti.i32, 2)
         state.soft.pair_impulse[row] = ti.Vector.zero(ti.f32, 3)
+        row = row_behind(row)
 
 
 @ti.func

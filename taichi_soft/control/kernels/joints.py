@@ -18,6 +18,7 @@ from typing import Any
 from taichi_soft.bodies.kernels.particles import inv_mass_of, velocity
 from taichi_soft.bodies.status import FEELS_REACTION, JOINED
 from taichi_soft.core.math.finite import is_finite
+from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import holds_fields, ti
 
 MOST_JOINTS, JOINT_ROWS = 64, 2048
@@ -253,12 +254,15 @@ def end_joint(state: ti.template(), j: ti.i32):
                     state.joints.rows[each] = state.joints.rows[each] - count
                 for i in ti.static(range(2)):
                     state.body_drives[here[i] - 1] = state.body_drives[here[i] - 1] | JOINED
-        for r in range(rows[1], used):
+        r, k = rows[1], rows[1] * ENDS
+        while r < used:
             state.joints.row_impulse[r - count] = state.joints.row_impulse[r]
-        for k in range(rows[1] * ENDS, used * ENDS):
+            r = row_behind(r)
+        while k < used * ENDS:
             state.joints.particle[k - count * ENDS] = state.joints.particle[k]
             state.joints.weight[k - count * ENDS] = state.joints.weight[k]
             state.joints.share[k - count * ENDS] = state.joints.share[k]
+            k = row_behind(k)
 
 
 @ti.kernel

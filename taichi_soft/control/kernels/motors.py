@@ -19,6 +19,7 @@ import numpy as np
 
 from taichi_soft.bodies.kernels.particles import gravity_on
 from taichi_soft.core.field_loader import Loader
+from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.math.svd import nearest_rotation
 from taichi_soft.core.runtime import holds_fields, ti
 from taichi_soft.core.types import Integrator
@@ -80,13 +81,15 @@ def _axis_now(state: ti.template(), motor):
     x0, r0 = state.particle_position[first], state.rest_position[first]
     mass, now, rest = x0.x * 0.0, x0 * 0.0, x0 * 0.0
     a, b, c, size = x0 * 0.0, x0 * 0.0, x0 * 0.0, x0.x * 0.0
-    for row in range(motor.first, motor.end):
+    row = motor.first
+    while row < motor.end:
         p = state.motors.particle[row]
         m = state.particle_mass[p]
         x, r = state.particle_position[p] - x0, state.rest_position[p] - r0
         mass += m
         now, rest = now + m * x, rest + m * r
         a, b, c, size = a + m * r.x * x, b + m * r.y * x, c + m * r.z * x, size + m * r.dot(r)
+        row = row_behind(row)
     point, axis = motor.point, motor.axis
     if motor.has_point == 0:
         point = x0 + now / mass
@@ -193,8 +196,10 @@ def write_motors(
                 limit=numbers[k, 7],
             )
             state.motors.is_driven[rows[k, 1]] = 1
-        for row in range(particles.shape[0]):
+        row = 0
+        while row < particles.shape[0]:
             state.motors.particle[row] = particles[row]
+            row = row_behind(row)
 
 
 @ti.kernel
@@ -212,11 +217,13 @@ def read_speed(state: ti.template(), number: ti.i32) -> ti.f32:
     for _ in range(1):
         motor = state.motors.motor[number]
         point, axis = _axis_now(state, motor)
-        for row in range(motor.first, motor.end):
+        row = motor.first
+        while row < motor.end:
             p = state.motors.particle[row]
             d = _pattern(state, motor, p, point, axis)
             inertia += state.particle_mass[p] * d.dot(d)
             momentum += state.particle_mass[p] * d.dot(state.particle_velocity[p])
+            row = row_behind(row)
     return momentum / ti.max(inertia, 1e-30)
 
 

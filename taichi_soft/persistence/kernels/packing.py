@@ -7,12 +7,16 @@ from numpy.typing import NDArray
 
 from taichi_soft.bodies.status import ABSENT
 from taichi_soft.core.constants import LANES
+from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 from taichi_soft.solver.state import State
 
 OWNERS = PARTICLE, BODY, SHAPE, WORLD = range(4)
 """What a field has a row for: a particle, a body, a number of a rest shape, or the world. Behind these come
 the groups of slices."""
+
+LONG = 256
+"""Rows from which on a group takes a part of the time of a snapshot that counts."""
 
 
 def carried(state: State, owner: int) -> list[tuple[Any, int, int]]:
@@ -69,6 +73,39 @@ def row_table(
     return np.array([*rows, (0, 0, at)], dtype=np.int32)
 
 
+def _is_long(state: State, owner: int) -> bool:
+    """Whether copying its rows in vector instructions is worth their longer compile time."""
+    return owner != WORLD and all(field.shape[0] >= LONG for field, _, _ in carried(state, owner))
+
+
+@ti.func
+def _copy_row(
+    state: ti.template(),
+    table: ti.template(),
+    words: ti.template(),
+    packs: ti.template(),
+    owner: ti.template(),
+    i,
+):
+    for field, column, width in ti.static(carried(state, owner)):
+        at = table[owner, 2] + i * table[owner, 1] + column
+        for k in ti.static(range(width)):
+            if ti.static(owner == WORLD):
+                if ti.static(packs):
+                    words[at + k] = ti.bit_cast(field[None][k], ti.i32)
+                else:
+                    field[None][k] = ti.bit_cast(words[at + k], field.dtype)
+            elif ti.static(width == 1):
+                if ti.static(packs):
+                    words[at] = ti.bit_cast(field[i], ti.i32)
+                else:
+                    field[i] = ti.bit_cast(words[at], field.dtype)
+            elif ti.static(packs):
+                words[at + k] = ti.bit_cast(field[i][k], ti.i32)
+            else:
+                field[i][k] = ti.bit_cast(words[at + k], field.dtype)
+
+
 @ti.kernel
 def copy_state(
     state: ti.template(),
@@ -78,25 +115,15 @@ def copy_state(
 ):
     """Copy everything that is `carried` into `words`, row by row as `table` says; back where not `packs`."""
     for owner in ti.static(owners(state)):
-        ti.loop_config(serialize=True)
-        for i in range(table[owner, 0]):
-            for field, column, width in ti.static(carried(state, owner)):
-                at = table[owner, 2] + i * table[owner, 1] + column
-                for k in ti.static(range(width)):
-                    if ti.static(owner == WORLD):
-                        if ti.static(packs):
-                            words[at + k] = ti.bit_cast(field[None][k], ti.i32)
-                        else:
-                            field[None][k] = ti.bit_cast(words[at + k], field.dtype)
-                    elif ti.static(width == 1):
-                        if ti.static(packs):
-                            words[at] = ti.bit_cast(field[i], ti.i32)
-                        else:
-                            field[i] = ti.bit_cast(words[at], field.dtype)
-                    elif ti.static(packs):
-                        words[at + k] = ti.bit_cast(field[i][k], ti.i32)
-                    else:
-                        field[i][k] = ti.bit_cast(words[at + k], field.dtype)
+        if ti.static(_is_long(state, owner)):
+            ti.loop_config(serialize=True)
+            for i in range(table[owner, 0]):
+                _copy_row(state, table, words, packs, owner, i)
+        else:
+            i = 0
+            while i < table[owner, 0]:
+                _copy_row(state, table, words, packs, owner, i)
+                i = row_behind(i)
 
 
 @ti.func

@@ -14,6 +14,7 @@ from taichi_soft.contact.kernels.hull import place_points
 from taichi_soft.contact.kernels.hull_colliders import forget_held, forget_held_if_free
 from taichi_soft.contact.kernels.rebound import begin_rebounds, take_back_rebounds
 from taichi_soft.contact.kernels.touches import forget_touches
+from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 from taichi_soft.core.types import Integrator
 from taichi_soft.elements.kernels.internal_forces import clear_forces
@@ -95,10 +96,12 @@ def _put_back_body(state: ti.template(), program: ti.template(), body):
     """Put a body back to where it was before the step."""
     state.body_jolted[body] = 1
     particles = state.body_particles[body]
-    for p in range(particles[0], particles[1]):
+    p = particles[0]
+    while p < particles[1]:
         restore_particle(state, p)
         if state.body_drives[body] & FEELS_REACTION != 0:
             state.particle_reaction[p] = state.prev_reaction[p]
+        p = row_behind(p)
     clear_forces(state, body)
     if ti.static(program.has_contact):
         if ti.static(state.capacity.implicit):
@@ -126,8 +129,10 @@ def put_back_island(state: ti.template(), program: ti.template(), island: ti.i32
 def brake_island(state: ti.template(), program: ti.template(), island, is_braked):
     """Brake the vibrations of all that is in an island sharply (1), or no longer (0)."""
     first, end = rows_of(state, program, island)
-    for row in range(first, end):
+    row = first
+    while row < end:
         state.body_is_braked[body_at(state, program, row)] = is_braked
+        row = row_behind(row)
 
 
 @ti.func

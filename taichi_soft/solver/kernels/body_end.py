@@ -7,6 +7,7 @@ from taichi_soft.contact.kernels.candidates import forget_candidates
 from taichi_soft.contact.kernels.collide import forget_contacts
 from taichi_soft.control.kernels.drives import push_particles
 from taichi_soft.control.kernels.reactions import forget_loads
+from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 from taichi_soft.core.types import Integrator
 from taichi_soft.elements.kernels.internal_forces import clear_forces
@@ -21,8 +22,10 @@ def _freeze_if_broken(state: ti.template(), body):
     sound = body_is_sound(state, body)
     if sound == 0:
         particles = state.body_particles[body]
-        for p in range(particles[0], particles[1]):
+        p = particles[0]
+        while p < particles[1]:
             restore_particle(state, p)
+            p = row_behind(p)
         clear_forces(state, body)
         forget_loads(state, body)
         state.body_status[body] = FROZEN

@@ -3,6 +3,7 @@
 from taichi_soft.bodies.status import ACTIVE, ASLEEP, SKIPPING
 from taichi_soft.contact.fields import NO_COLLIDER
 from taichi_soft.contact.kernels.hull import has_hull, place_points
+from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
 CALM_TIME = 0.5
@@ -38,13 +39,16 @@ def wake_island(state: ti.template(), island: ti.i32) -> ti.i32:
     """Wake all bodies of an island of which one is awake. Returns whether any is."""
     first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
     is_awake = 0
-    for i in range(first, last):
+    i = first
+    while i < last:
         is_awake = is_awake | int(state.body_status[state.contact.island_body[i]] == ACTIVE)
-    if is_awake == 1:
-        for i in range(first, last):
-            body = state.contact.island_body[i]
-            if state.body_status[body] == ASLEEP or state.body_status[body] == SKIPPING:
-                state.body_status[body] = ACTIVE
+        i = row_behind(i)
+    i = ti.select(is_awake == 1, first, last)
+    while i < last:
+        body = state.contact.island_body[i]
+        if state.body_status[body] == ASLEEP or state.body_status[body] == SKIPPING:
+            state.body_status[body] = ACTIVE
+        i = row_behind(i)
     return is_awake
 
 
@@ -96,10 +100,12 @@ def note_boxes_of_skipping(state: ti.template(), body_count: ti.i32):
 def _put_to_sleep(state: ti.template(), body):
     """Stop a body where it is; when it wakes it counts anew."""
     particles = state.body_particles[body]
-    for p in range(particles[0], particles[1]):
+    p = particles[0]
+    while p < particles[1]:
         state.prev_position[p] = state.particle_position[p]
         state.particle_velocity[p] = ti.Vector.zero(state.real, 3)
         state.prev_velocity[p] = ti.Vector.zero(state.real, 3)
+        p = row_behind(p)
     note_box(state, body)
     state.body_velocity_lag[body] = 0.0
     state.contact.calm[body] = 0.0
@@ -114,11 +120,13 @@ def settle_island(state: ti.template(), island: ti.i32, dt: ti.f32) -> ti.i32:
     """
     first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
     calm = ti.cast(1e30, ti.f32)
-    for i in range(first, last):
-        body = state.contact.island_body[i]
+    row = first
+    while row < last:
+        body = state.contact.island_body[row]
         if state.body_status[body] == ACTIVE:
             state.contact.calm[body] = state.contact.calm[body] + dt
             calm = ti.min(calm, state.contact.calm[body])
+        row = row_behind(row)
     is_awake = int(not (calm > CALM_TIME and state.contact.sleep_speed[None] > 0.0))
     if is_awake == 0:
         for i in range(first, last):

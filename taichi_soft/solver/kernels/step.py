@@ -9,6 +9,7 @@ A long step is made in several calls, so that Ctrl-C can come between: each isla
 """
 
 from taichi_soft.bodies.status import ACTIVE
+from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 from taichi_soft.solver.kernels.attempts import (
     attempts_of,
@@ -137,8 +138,10 @@ def _end(state: ti.template(), program: ti.template(), island, run: ti.template(
     failed = 0
     if ti.static(program.has_contact):
         each_body(state, program, island, Job(phase=END, substeps=substeps, h=h))
-        for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
-            failed += state.contact.has_failed[state.contact.island_body[i]]
+        row = state.contact.island_first[island]
+        while row < state.contact.island_first[island + 1]:
+            failed += state.contact.has_failed[state.contact.island_body[row]]
+            row = row_behind(row)
     else:
         failed = end_body(state, program, island, substeps, h)
     brake_island(state, program, island, 0)
