@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from taichi_soft.bodies.asset import SoftBodyAsset
 from taichi_soft.bodies.kernels.render_mesh import RING, SMALL_RING, write_render_mesh
 from taichi_soft.bodies.soft_body import SoftBody, require_alive
 from taichi_soft.core.checks import as_number
@@ -130,14 +132,16 @@ def read_render_mesh(
     mesh._write(state, alpha, positions, normals)
 
 
-def warm_up(state: Any) -> None:
-    """Compile what `read_render_mesh` calls, for few vertices and for many."""
+def warm_up(state: Any, assets: Iterable[SoftBodyAsset]) -> None:
+    """Compile what `read_render_mesh` calls: for few vertices, and for many where one of `assets` may have so
+    many."""
     table = render_table(
         np.zeros(3, dtype=np.int64), np.arange(3).reshape(1, 3)
     )  # of a vertex of the first body
     positions, normals = np.empty((2, 3, 3), dtype=np.float32)
-    for is_serial in (True, False):
-        _write(state, is_serial, 0, 1.0, table, positions, normals)
+    _write(state, True, 0, 1.0, table, positions, normals)
+    if any(asset.spare_vertices or 3 * len(asset.mesh.surface) >= FEWEST_SHARED for asset in assets):
+        _write(state, False, 0, 1.0, table, positions, normals)
 
 
 def _write(

@@ -61,7 +61,7 @@ def warm_up(context: WorldContext) -> None:
             _measure(context, body)
         for asset in context.slots.kinds:
             prepare(asset)
-        warm_up_render_meshes(context.built.state)
+        warm_up_render_meshes(context.built.state, context.slots.kinds)
         if any(asset.skin for asset in context.slots.assets):
             warm_up_skins(context.built.state)
         _ask(context)

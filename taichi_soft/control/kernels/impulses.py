@@ -5,6 +5,7 @@ Leapfrog keeps velocities half a substep behind; a change of velocity is simply 
 
 from taichi_soft.bodies.status import ABSENT
 from taichi_soft.core.constants import VELOCITY_LIMIT
+from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
 
@@ -54,21 +55,25 @@ def add_impulse_near(
         particles = state.body_particles[body]
         nearest2 = ti.cast(ti.math.inf, ti.f32)
         weight, highest = ti.cast(0.0, ti.f64), ti.cast(0.0, ti.f64)
-        for p in range(particles[0], particles[1]):
+        p = particles[0]
+        while p < particles[1]:
             distance2 = (state.particle_position[p] - point).norm_sqr()
             share = ti.cast(falloff(distance2, radius * radius), ti.f64)
             nearest2 = ti.min(nearest2, distance2)
             highest = ti.max(highest, share)
             weight += share * state.particle_mass[p]
+            p = row_behind(p)
         found[0] = ti.sqrt(nearest2)
         found[1] = 0.0
         if weight > 0.0:
             found[1] = highest / weight * impulse.norm()
             if found[1] < VELOCITY_LIMIT:
-                for p in range(particles[0], particles[1]):
+                p = particles[0]
+                while p < particles[1]:
                     distance2 = (state.particle_position[p] - point).norm_sqr()
                     share = falloff(distance2, radius * radius) / weight
                     _change_velocity(state, p, ti.cast(share, ti.f32) * impulse)
+                    p = row_behind(p)
 
 
 @ti.kernel
@@ -96,12 +101,14 @@ def add_radial_impulse(
             centre, radius2 = ti.Vector([place[0], place[1], place[2]]), place[3] * place[3]
             speed = place[4] / _mass(state, body)
             particles = state.body_particles[body]
-            for p in range(particles[0], particles[1]):
+            p = particles[0]
+            while p < particles[1]:
                 away = state.particle_position[p] - centre
                 distance2 = away.norm_sqr()
                 if 0.0 < distance2 < radius2:
                     change = speed * falloff(distance2, radius2) / ti.sqrt(distance2) * away
                     _change_velocity(state, p, change)
+                p = row_behind(p)
     found[0] = highest
 
 
@@ -109,6 +116,8 @@ def add_radial_impulse(
 def _mass(state: ti.template(), body):
     particles = state.body_particles[body]
     mass = ti.cast(0.0, ti.f64)
-    for p in range(particles[0], particles[1]):
+    p = particles[0]
+    while p < particles[1]:
         mass += state.particle_mass[p]
+        p = row_behind(p)
     return ti.cast(mass, ti.f32)

@@ -138,9 +138,10 @@ def solve_joints(
     Returns: the highest speed of a particle that a joint names [m/s], and the highest beside `common`.
     """
     first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
-    is_joined = 0
-    for i in range(first, last):
-        is_joined = is_joined | (state.body_drives[state.contact.island_body[i]] & JOINED)
+    is_joined, member = 0, first
+    while member < last:
+        is_joined = is_joined | (state.body_drives[state.contact.island_body[member]] & JOINED)
+        member = row_behind(member)
     highest, highest_beside = ti.cast(0.0, ti.f32), ti.cast(0.0, ti.f32)
     sweeps = ti.select(is_joined != 0, SWEEPS + 2, 0)
     for sweep in range(sweeps):

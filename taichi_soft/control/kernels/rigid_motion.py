@@ -2,6 +2,7 @@
 
 from taichi_soft.control.kernels.pins import TO_TARGET
 from taichi_soft.core.constants import POSITION_LIMIT, VELOCITY_LIMIT
+from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
 
@@ -10,9 +11,11 @@ def _center_of_mass(state: ti.template(), body):
     """In float64 [m]."""
     particles = state.body_particles[body]
     moment, mass = ti.Vector.zero(ti.f64, 3), ti.cast(0.0, ti.f64)
-    for p in range(particles[0], particles[1]):
+    p = particles[0]
+    while p < particles[1]:
         mass += state.particle_mass[p]
         moment += ti.cast(state.particle_position[p], ti.f64) * state.particle_mass[p]
+        p = row_behind(p)
     return moment / mass
 
 
@@ -41,13 +44,17 @@ def write_rigid_velocity(
         angular = ti.Vector([motion[3], motion[4], motion[5]])
         center = _center_of_mass(state, body)
         particles = state.body_particles[body]
-        for p in range(particles[0], particles[1]):
+        p = particles[0]
+        while p < particles[1]:
             fastest = ti.max(fastest, (linear + angular.cross(_relative(state, p, center))).norm())
+            p = row_behind(p)
         if fastest < VELOCITY_LIMIT:
-            for p in range(particles[0], particles[1]):
+            p = particles[0]
+            while p < particles[1]:
                 if state.particle_inv_mass[p] > 0.0:
                     velocity = linear + angular.cross(_relative(state, p, center))
                     state.particle_velocity[p] = velocity
+                p = row_behind(p)
             state.body_velocity_lag[body] = 0.0
     found[0] = fastest
 
@@ -82,13 +89,16 @@ def jump(
         particles = state.body_particles[body]
         lowest, highest = ti.cast(ti.math.inf, ti.f64), ti.cast(-ti.math.inf, ti.f64)
         farthest = ti.cast(0.0, ti.f64)
-        for p in range(particles[0], particles[1]):
+        p = particles[0]
+        while p < particles[1]:
             x = _turned(turn, ti.cast(state.particle_position[p], ti.f64) - center) + target
             lowest, highest = ti.min(lowest, x.z), ti.max(highest, x.z)
             farthest = ti.max(farthest, ti.abs(x.x), ti.abs(x.y), ti.abs(x.z))
+            p = row_behind(p)
         found[0], found[1], found[2] = lowest, highest, farthest
         if farthest < POSITION_LIMIT and lowest >= place[3] - 1e-3 * (highest - lowest):
-            for p in range(particles[0], particles[1]):
+            p = particles[0]
+            while p < particles[1]:
                 for old in ti.static((state.particle_position, state.prev_position)):
                     old[p] = ti.cast(_turned(turn, ti.cast(old[p], ti.f64) - center) + target, ti.f32)
                 for old in ti.static((state.particle_velocity, state.prev_velocity)):
@@ -98,3 +108,4 @@ def jump(
                     state.particle_target[p] = ti.cast(_turned(turn, target_before - center) + target, ti.f32)
                 if ti.static(state.capacity.implicit):
                     state.particle_contact[p] = 0
+                p = row_behind(p)

@@ -101,12 +101,11 @@ def _put_back_body(state: ti.template(), program: ti.template(), body):
         restore_particle(state, p)
         if state.body_drives[body] & FEELS_REACTION != 0:
             state.particle_reaction[p] = state.prev_reaction[p]
+        if ti.static(program.has_contact and state.capacity.implicit):
+            state.particle_contact[p] = state.prev_contact[p]
         p = row_behind(p)
     clear_forces(state, body)
     if ti.static(program.has_contact):
-        if ti.static(state.capacity.implicit):
-            for p in range(particles[0], particles[1]):
-                state.particle_contact[p] = state.prev_contact[p]
         take_back_rebounds(state, body)
         forget_contacts(state, body)
         if ti.static(state.capacity.contact.hull):

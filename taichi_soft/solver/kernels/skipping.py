@@ -6,6 +6,7 @@ As sleepers, they make the step after all where something comes near that moves:
 from taichi_soft.bodies.kernels.particles import remember_particle
 from taichi_soft.bodies.status import ACTIVE, PUSHED, SKIPPING
 from taichi_soft.contact.kernels.collide import forget_contacts
+from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 from taichi_soft.solver.kernels.sleep import note_boxes_of_skipping
 
@@ -40,8 +41,10 @@ def end_skips(state: ti.template(), body_count: ti.i32) -> ti.i32:
     for body in range(body_count):
         if state.body_status[body] == SKIPPING:
             particles = state.body_particles[body]
-            for p in range(particles[0], particles[1]):
+            p = particles[0]
+            while p < particles[1]:
                 remember_particle(state, p)
+                p = row_behind(p)
             if ti.static(state.capacity.has_contact):
                 forget_contacts(state, body)
             state.body_drives[body] = state.body_drives[body] & ~PUSHED

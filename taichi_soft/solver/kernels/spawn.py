@@ -4,6 +4,7 @@ from taichi_soft.bodies.kernels.plasticity import restore_shape
 from taichi_soft.bodies.status import ABSENT, ACTIVE
 from taichi_soft.contact.kernels.collide import forget_contacts
 from taichi_soft.contact.kernels.hull_colliders import forget_held
+from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
 
@@ -18,7 +19,8 @@ def spawn_body(state: ti.template(), body: ti.i32, rows: ti.types.ndarray(dtype=
     ti.loop_config(serialize=True)
     for _ in range(1):
         begin = state.body_particles[body][0]
-        for i in range(rows.shape[0]):
+        i = 0
+        while i < rows.shape[0]:
             p = state.particle_of_vertex[begin + i]
             x = ti.Vector([rows[i, 0], rows[i, 1], rows[i, 2]])
             v = ti.Vector([rows[i, 3], rows[i, 4], rows[i, 5]])
@@ -34,6 +36,7 @@ def spawn_body(state: ti.template(), body: ti.i32, rows: ti.types.ndarray(dtype=
                 state.particle_contact[p] = 0
             if ti.static(state.capacity.contact.soft):
                 state.soft.kept_normal_impulse[p] = 0.0
+            i = row_behind(i)
         state.body_velocity_lag[body] = 0.0
         state.body_drives[body] = 0
         state.body_gravity_scale[body] = 1.0
@@ -46,13 +49,15 @@ def spawn_body(state: ti.template(), body: ti.i32, rows: ti.types.ndarray(dtype=
         if ti.static(state.capacity.contact.colliders > 0):
             state.contact.calm[body] = 0.0
             particles = state.body_particles[body]
-            for p in range(particles[0], particles[1]):
+            p = particles[0]
+            while p < particles[1]:
                 state.contact.particle_touches[p] = 0
+                p = row_behind(p)
             if ti.static(state.capacity.contact.hull):
                 forget_held(state, body)
             if ti.static(state.capacity.contact.hull and state.capacity.contact.soft):
-                for p in range(state.hull.body_points[body][0], state.hull.body_points[body][1]):
-                    state.soft.kept_normal_impulse[p] = 0.0
+                for point in range(state.hull.body_points[body][0], state.hull.body_points[body][1]):
+                    state.soft.kept_normal_impulse[point] = 0.0
         state.body_status[body] = ACTIVE
 
 
