@@ -19,6 +19,7 @@ from taichi_soft.contact.kernels.hull import is_held
 from taichi_soft.contact.kernels.vertex_grid import MOST_EDGES, boxes_overlap, cell_of, fill_grid, find_box
 from taichi_soft.control.kernels.joints import are_joined
 from taichi_soft.core.constants import LANES, ROW_BITS
+from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.math.triangle import closest_point_on_triangle
 from taichi_soft.core.runtime import ti
 
@@ -206,16 +207,18 @@ def note_way(state: ti.template(), body: ti.i32, shared: ti.math.vec3):
     The length of its path would be much more: a pile of soft bodies is never quite still.
     """
     particles = state.body_particles[body]
-    farthest = ti.Vector.zero(ti.f32, LANES)
-    for block in range((particles[1] - particles[0] + LANES - 1) // LANES):
-        first = (particles[0] + block * LANES) & ROW_BITS
+    farthest, first = ti.Vector.zero(ti.f32, LANES), particles[0]
+    while first < particles[1]:
         count, gone = particles[1] - first, ti.Vector.zero(ti.f32, LANES)
         for lane in range(LANES):
             way = state.particle_position[first + lane] - state.soft.searched_position[first + lane] - shared
             gone[lane] = ti.select(lane < count, way.norm(), 0.0)
-        for lane in range(ti.min(count, LANES)):
+        lane = 0
+        while lane < ti.min(count, LANES):
             state.soft.particle_gone[first + lane] = gone[lane]
+            lane = row_behind(lane)
         farthest = ti.max(farthest, gone)
+        first = (first + LANES) & ROW_BITS  # as `row_behind`, block by block
     state.soft.body_gone[body] = farthest.max()
     if ti.static(state.capacity.contact.hull):
         for p in range(state.hull.body_points[body][0], state.hull.body_points[body][1]):

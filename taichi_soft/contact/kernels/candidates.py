@@ -36,9 +36,11 @@ def forget_candidates(state: ti.template(), body: ti.i32):
 def _farthest_found(soft: ti.template(), k):
     """Row of what is farthest of all that was found for a vertex."""
     farthest = k * FOUND
-    for row in range(k * FOUND + 1, k * FOUND + soft.found_count[k]):
+    row = farthest + 1
+    while row < k * FOUND + soft.found_count[k]:
         if soft.found_distance[row] > soft.found_distance[farthest]:
             farthest = row
+        row = row_behind(row)
     return farthest
 
 
@@ -87,13 +89,14 @@ def list_candidates(state: ti.template(), body, thickness):
     slot, contacts = outer[0] * SLOTS, 0
     for k in range(outer[0], outer[1]):
         while is_too_much and state.soft.found_count[k] > SLOTS:
-            row, last = _farthest_found(state.soft, k), k * FOUND + state.soft.found_count[k] - 1
-            note_lost(state, body, state.soft.found_distance[row], thickness)
-            state.soft.found_triangle[row] = state.soft.found_triangle[last]
-            state.soft.found_distance[row] = state.soft.found_distance[last]
+            farthest, last = _farthest_found(state.soft, k), k * FOUND + state.soft.found_count[k] - 1
+            note_lost(state, body, state.soft.found_distance[farthest], thickness)
+            state.soft.found_triangle[farthest] = state.soft.found_triangle[last]
+            state.soft.found_distance[farthest] = state.soft.found_distance[last]
             state.soft.found_count[k] = state.soft.found_count[k] - 1
         p = state.touching.outer_particle[k]
-        for row in range(k * FOUND, k * FOUND + state.soft.found_count[k]):
+        row = k * FOUND
+        while row < k * FOUND + state.soft.found_count[k]:
             triangle = state.soft.found_triangle[row]
             corners = state.touching.triangle_vertices[triangle]
             other = state.particle_body[corners[0]]
@@ -109,5 +112,6 @@ def list_candidates(state: ti.template(), body, thickness):
                 state.soft.contact_slot[outer[0] * SLOTS + contacts] = slot
                 contacts += 1
             slot += 1
+            row = row_behind(row)
     state.soft.slot_count[body] = slot - outer[0] * SLOTS
     state.soft.contact_count[body] = contacts

@@ -8,6 +8,7 @@ from taichi_soft.contact.fields import NO_CONTACT, SLOTS
 from taichi_soft.contact.kernels.contact_solver import note_levers
 from taichi_soft.core.constants import LANES, ROW_BITS
 from taichi_soft.core.math.finite import is_finite
+from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.math.triangle import closest_point_on_triangle
 from taichi_soft.core.runtime import ti
 
@@ -227,13 +228,14 @@ def find_gaps(state: ti.template(), body: ti.i32, given: ti.f32, h: ti.f32):
         slot = state.soft.contact_slot[k]
         if state.soft.slot_gap[slot] >= NO_CONTACT:
             _clear_impulses(state.soft, slot)
-    count = 0
-    for k in range(first_slot, first_slot + near):
-        slot = state.soft.near_slot[k]
+    count, near_row = 0, first_slot
+    while near_row < first_slot + near:
+        slot = state.soft.near_slot[near_row]
         if state.soft.slot_gap[slot] < NO_CONTACT:
             note_levers(state, slot)
             state.soft.contact_slot[first_slot + count] = slot
             count += 1
         else:
             _clear_impulses(state.soft, slot)  # a twin's, before one pushing elsewhere took its place
+        near_row = row_behind(near_row)
     state.soft.contact_count[body] = count

@@ -1,5 +1,6 @@
 """A grid of the vertices of one body that may be near another one."""
 
+from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
 CELL = 1.5
@@ -50,13 +51,15 @@ def find_box(state: ti.template(), body):
     state.contact.body_lower[body] = lower
     state.contact.body_upper[body] = upper
     triangles = state.touching.body_triangles[body]
-    for t in range(triangles[0], triangles[1]):
+    t = triangles[0]
+    while t < triangles[1]:
         corners = state.touching.triangle_vertices[t]
         a = state.particle_position[corners[0]]
         b = state.particle_position[corners[1]]
         c = state.particle_position[corners[2]]
         state.soft.triangle_lower[t] = ti.min(a, b, c)
         state.soft.triangle_upper[t] = ti.max(a, b, c)
+        t = row_behind(t)
 
 
 @ti.func
@@ -100,10 +103,13 @@ def fill_grid(state: ti.template(), table, body, other, margin):
     if count > 0:
         cells, cell = _choose_cells(highest - lowest, count, cell)
         last = table[0] + cells.x * cells.y * cells.z
-        for row in range(table[0], last + 1):
-            state.soft.cell_first[row] = 0
+        cell_row = table[0]
+        while cell_row <= last:
+            state.soft.cell_first[cell_row] = 0
+            cell_row = row_behind(cell_row)
         for pass_number in range(2):
-            for i in range(table[1], table[1] + count):
+            i = table[1]
+            while i < table[1] + count:
                 k = state.soft.item[i]
                 x = state.particle_position[state.touching.outer_particle[k]]
                 row = table[0] + _row_of(cell_of(x, lowest, cells, cell), cells)
@@ -113,9 +119,11 @@ def fill_grid(state: ti.template(), table, body, other, margin):
                 if pass_number == 1:
                     state.soft.cell_item[at] = k
                     state.soft.cell_position[at] = x
+                i = row_behind(i)
             if pass_number == 0:
-                total = table[1]
-                for row in range(table[0], last + 1):
-                    total += state.soft.cell_first[row]
-                    state.soft.cell_first[row] = total
+                total, cell_row = table[1], table[0]
+                while cell_row <= last:
+                    total += state.soft.cell_first[cell_row]
+                    state.soft.cell_first[cell_row] = total
+                    cell_row = row_behind(cell_row)
     return count, lowest, highest, cells, cell

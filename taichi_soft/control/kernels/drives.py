@@ -7,6 +7,7 @@ are between.
 
 from taichi_soft.bodies.kernels.particles import gravity_on
 from taichi_soft.bodies.status import ACTIVE, DAMPED, FEELS_REACTION, PUSHED, SHELTERED, SKIPPING
+from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
 
@@ -38,7 +39,8 @@ def blow_on(state: ti.template(), body: ti.i32, h: ti.f32):
     drives = state.body_drives[body]
     if wind.w > 0.0 and drives & SHELTERED == 0:
         triangles = state.body_triangles[body]
-        for t in range(triangles[0], triangles[1]):
+        t = triangles[0]
+        while t < triangles[1]:
             corners = state.triangle_vertices[t]
             a, b, c = corners[0], corners[1], corners[2]
             x = state.particle_position[a]
@@ -56,6 +58,7 @@ def blow_on(state: ti.template(), body: ti.i32, h: ti.f32):
                 state.particle_velocity[p] = state.particle_velocity[p] + inv_mass * impulse
                 if inv_mass == 0.0 and drives & FEELS_REACTION != 0:
                     state.particle_reaction[p] = state.particle_reaction[p] + impulse
+            t = row_behind(t)
 
 
 @ti.real_func

@@ -13,6 +13,7 @@ import numpy as np
 from taichi_soft.bodies.kernels.particles import gravity_on
 from taichi_soft.bodies.status import GRABBED
 from taichi_soft.core.field_loader import Loader
+from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.math.tensors import widened
 from taichi_soft.core.runtime import holds_fields, ti
 
@@ -106,7 +107,8 @@ def pull_grabs(state: ti.template(), body: ti.i32, h: ti.f32, kick: ti.f32):
                 wanted, total = -pull, ti.Vector.zero(state.real, 3)
                 for turn in range(2):  # the first time to see how strong it is, the second to do it
                     total = ti.Vector.zero(state.real, 3)
-                    for row in range(g * PATCH_ROWS, g * PATCH_ROWS + state.grabs.count[g]):
+                    row = g * PATCH_ROWS
+                    while row < g * PATCH_ROWS + state.grabs.count[g]:
                         p, share = state.grabs.particle[row], state.grabs.share[row]
                         inv_mass = state.particle_inv_mass[p]
                         if inv_mass > 0.0:
@@ -116,13 +118,16 @@ def pull_grabs(state: ti.template(), body: ti.i32, h: ti.f32, kick: ti.f32):
                             state.particle_velocity[p] = v + part * inv_mass * impulse
                             total += impulse
                             wanted -= ti.select(turn == 0, share * drag, 0.0) * (v + kick * gravity)
+                        row = row_behind(row)
                     if turn == 0:
                         part = ti.min(1.0, h * state.grabs.limits[g].x / ti.max(total.norm(), 1e-30))
                 change = _rest_of_pull(state, g, wanted, h, drag)
                 if change.norm_sqr() > 0.0:
-                    for p in range(particles[0], particles[1]):
+                    p = particles[0]
+                    while p < particles[1]:
                         if state.particle_inv_mass[p] > 0.0:
                             state.particle_velocity[p] = state.particle_velocity[p] + change
+                        p = row_behind(p)
                 state.grabs.force[g] = (part * total + change / state.grabs.limits[g].z) / h
 
 

@@ -159,7 +159,8 @@ def solve_joints(
                     if sweep == 0 and is_first == 1:
                         state.joints.impulse[j] = ti.Vector.zero(ti.f32, 3)
                     rows = state.joints.rows[j]
-                    for row in range(rows[0], rows[1]):
+                    row = rows[0]
+                    while row < rows[1]:
                         r = _turned(row, rows[0], rows[1], back)
                         if sweep == 0:
                             _open_row(state, r, h, state.joints.draw_speed[j])
@@ -170,6 +171,7 @@ def solve_joints(
                                 v = state.particle_velocity[state.joints.particle[k]]
                                 highest = ti.max(highest, v.dot(v))
                                 highest_beside = ti.max(highest_beside, (v - common).dot(v - common))
+                        row = row_behind(row)
     return ti.math.vec2(ti.sqrt(highest), ti.sqrt(highest_beside))
 
 
@@ -190,8 +192,10 @@ def mark_held(state: ti.template(), is_held):
     """Note which particles joints hold (1), or held (0)."""
     for j in range(MOST_JOINTS):
         if state.joints.bodies[j][0] > 0:
-            for r in range(state.joints.rows[j][0], state.joints.rows[j][1]):
+            r = state.joints.rows[j][0]
+            while r < state.joints.rows[j][1]:
                 state.joints.is_held[state.joints.particle[r * ENDS]] = is_held
+                r = row_behind(r)
 
 
 @ti.kernel

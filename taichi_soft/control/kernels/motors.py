@@ -112,7 +112,8 @@ def _run_motor(state: ti.template(), program: ti.template(), motor, h, kick):
     gravity, sound_speed = gravity_on(state, motor.body - 1), state.body_sound_speed[motor.body - 1]
     point, axis = _axis_now(state, motor)
     inertia, momentum, longest = point.x * 0.0, point.x * 0.0, point.x * 0.0
-    for row in range(motor.first, motor.end):
+    row = motor.first
+    while row < motor.end:
         p = state.motors.particle[row]
         inv_mass = state.particle_inv_mass[p]
         if inv_mass > 0.0:
@@ -125,17 +126,20 @@ def _run_motor(state: ti.template(), program: ti.template(), motor, h, kick):
             inertia += state.particle_mass[p] * d.dot(d)
             momentum += state.particle_mass[p] * d.dot(velocity)
             longest = ti.max(longest, d.dot(d))
+        row = row_behind(row)
     impulse = point.x * 0.0
     if inertia > 0.0:
         speed = momentum / inertia
         most = ti.min(motor.limit * h / inertia, MOST_CHANGE * sound_speed / ti.sqrt(longest))
         change = ti.max(-most, ti.min(motor.speed - speed, most))
         if ti.abs(speed) < 1e18 and ti.abs(change) < 1e18:  # or the body is on its way to infinity
-            for row in range(motor.first, motor.end):
+            row = motor.first
+            while row < motor.end:
                 p = state.motors.particle[row]
                 if state.particle_inv_mass[p] > 0.0:
                     d = _pattern(state, motor, p, point, axis)
                     state.particle_velocity[p] = state.particle_velocity[p] + change * d
+                row = row_behind(row)
             impulse = inertia * change
     return impulse
 

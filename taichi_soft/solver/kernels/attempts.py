@@ -138,9 +138,10 @@ def brake_island(state: ti.template(), program: ti.template(), island, is_braked
 def body_is_sound(state: ti.template(), body):
     """Whether all of a body can still be computed with (1)."""
     particles = state.body_particles[body]
-    sound = 1
-    for p in range(particles[0], particles[1]):
+    sound, p = 1, particles[0]
+    while p < particles[1]:
         sound = sound & particle_is_sound(state, p)
+        p = row_behind(p)
     return sound
 
 

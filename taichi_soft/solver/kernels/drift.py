@@ -5,6 +5,7 @@ from taichi_soft.contact.kernels.hull import has_hull, place_points
 from taichi_soft.contact.kernels.hull_colliders import collide_points, forget_held
 from taichi_soft.contact.kernels.rebound import limit_rebounds
 from taichi_soft.core.constants import LANES, ROW_BITS
+from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 from taichi_soft.solver.kernels.sleep import note_motion
 from taichi_soft.solver.step_fields import Job
@@ -27,8 +28,10 @@ def has_drifted(state: ti.template(), body, speed, h):
         note_motion(state, body, speed)
     else:
         particles = state.body_particles[body]
-        for p in range(particles[0], particles[1]):
+        p = particles[0]
+        while p < particles[1]:
             state.particle_position[p] = state.particle_position[p] - h * state.particle_velocity[p]
+            p = row_behind(p)
     return clear
 
 

@@ -9,6 +9,7 @@ from taichi_soft.bodies.status import ABSENT, ASLEEP
 from taichi_soft.contact.kernels.filters import may_touch
 from taichi_soft.contact.kernels.hull import motion_of
 from taichi_soft.control.kernels.joints import MOST_JOINTS, mark_held
+from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
 SPARE = 0.25
@@ -31,13 +32,15 @@ def _find_boxes(state: ti.template(), body_count, dt):
         if ti.static(state.capacity.contact.hull):
             lower, slow = motion_of(state, p)
             upper, fast = lower, slow
-        for k in range(outer[0], outer[1]):
+        k = outer[0]
+        while k < outer[1]:
             p = state.touching.outer_particle[k]
             x, v = state.particle_position[p], state.particle_velocity[p]
             if ti.static(state.capacity.contact.hull):
                 x, v = motion_of(state, p)
             lower, upper = ti.min(lower, x, x + dt * v), ti.max(upper, x, x + dt * v)
             slow, fast = ti.min(slow, v), ti.max(fast, v)
+            k = row_behind(k)
         surface = state.soft.body_surface[body]
         # What its parts do beside each other, they may do otherwise before the step is over.
         fall = gravity_on(state, body).norm() * dt * dt
@@ -125,10 +128,11 @@ def _list_islands(state: ti.template(), body_count, end):
             island = contact.body_island[root]
             contact.body_island[body] = island
             contact.island_first[island] = contact.island_first[island] + 1
-    rows = 0
-    for island in range(islands):
+    rows, island = 0, 0
+    while island < islands:
         rows += contact.island_first[island]
         contact.island_first[island] = rows  # the row after its last one
+        island = row_behind(island)
     for i in range(body_count):
         body = body_count - 1 - i
         if _is_listed(state, body, end):
@@ -143,8 +147,10 @@ def _list_islands(state: ti.template(), body_count, end):
 @ti.real_func
 def find_islands(state: ti.template(), body_count: ti.i32, dt: ti.f32):
     """Find which bodies may touch within a step of `dt` [s], and list them."""
-    for body in range(body_count):
+    body = 0
+    while body < body_count:
         state.contact.parent[body] = body
+        body = row_behind(body)
     _find_boxes(state, body_count, dt)
     _sort_by_lower_x(state, body_count)
     _join_overlapping(state, body_count)

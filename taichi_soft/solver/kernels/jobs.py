@@ -20,6 +20,7 @@ owner then waits for the bodies that others took. Nobody waits for a thread that
 free the owner takes all bodies itself. What becomes of a body does not depend on which thread took it.
 """
 
+from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 from taichi_soft.solver.step_fields import MOST_PARTS, Job
 
@@ -111,11 +112,12 @@ def run_job(
 @ti.func
 def open_shared_islands(state: ti.template(), helpers):
     """Before the islands are stepped: what there is to help with."""
-    islands, members = 0, 0
-    for island in range(state.contact.island_count[None]):
+    islands, members, island = 0, 0, 0
+    while island < state.contact.island_count[None]:
         if is_shared_island(state, island):
             islands += 1
             members += _size_of(state, island)
+        island = row_behind(island)
     state.jobs.parts[None] = ti.min(helpers + 1, MOST_PARTS)
     state.jobs.unfinished_islands[None] = islands
     state.jobs.useful_helpers[None] = members - islands

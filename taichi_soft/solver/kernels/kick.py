@@ -6,6 +6,7 @@ Between the two the island takes velocities away, in joints and in contact of bo
 from taichi_soft.bodies.kernels.particles import gravity_on
 from taichi_soft.contact.kernels.hull import note_points
 from taichi_soft.core.constants import LANES, ROW_BITS
+from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.math.tensors import widened
 from taichi_soft.core.runtime import ti
 from taichi_soft.core.types import Integrator
@@ -23,28 +24,51 @@ def _put_block(
     state: ti.template(),
     program: ti.template(),
     first,
+    positions: ti.template(),
+    velocities: ti.template(),
+    speeds_beside: ti.template(),
+):
+    """Write what a kick made of `LANES` particles from `first` on, and clear what the next one begins with.
+
+    Field by field: a loop over one field, of a length that the compiler knows, becomes a few wide stores.
+    """
+    for lane in range(LANES):
+        for i in ti.static(range(3)):
+            state.particle_position[first + lane][i] = positions[lane, i]
+    for lane in range(LANES):
+        for i in ti.static(range(3)):
+            state.particle_velocity[first + lane][i] = velocities[lane, i]
+    if ti.static(program.has_soft_contact):
+        for lane in range(LANES):
+            state.soft.particle_speed[first + lane] = speeds_beside[lane]
+    for lane in range(LANES):
+        state.contact.particle_touches[first + lane] = 0
+    for lane in range(LANES):
+        state.particle_force[first + lane] = ti.Vector.zero(state.real, 4)
+
+
+@ti.func
+def _put_last_block(
+    state: ti.template(),
+    program: ti.template(),
+    first,
     count,
     positions: ti.template(),
     velocities: ti.template(),
     speeds_beside: ti.template(),
 ):
-    """Write what a kick made of `count` particles from `first` on, and clear what the next one begins with.
-
-    Field by field: a loop over one field, of a length that the compiler knows, becomes a few wide stores.
-    """
-    for lane in range(count):
+    """The same of the last particles of a body, fewer than `LANES`."""
+    lane = 0
+    while lane < count:
+        p = first + lane
         for i in ti.static(range(3)):
-            state.particle_position[first + lane][i] = positions[lane, i]
-    for lane in range(count):
-        for i in ti.static(range(3)):
-            state.particle_velocity[first + lane][i] = velocities[lane, i]
-    if ti.static(program.has_soft_contact):
-        for lane in range(count):
-            state.soft.particle_speed[first + lane] = speeds_beside[lane]
-    for lane in range(count):
-        state.contact.particle_touches[first + lane] = 0
-    for lane in range(count):
-        state.particle_force[first + lane] = ti.Vector.zero(state.real, 4)
+            state.particle_position[p][i] = positions[lane, i]
+            state.particle_velocity[p][i] = velocities[lane, i]
+        if ti.static(program.has_soft_contact):
+            state.soft.particle_speed[p] = speeds_beside[lane]
+        state.contact.particle_touches[p] = 0
+        state.particle_force[p] = ti.Vector.zero(state.real, 4)
+        lane = row_behind(lane)
 
 
 @ti.func
@@ -82,9 +106,9 @@ def _kick_block(state: ti.template(), program: ti.template(), first, count, grav
         counts = ti.select(was_touched, 1.0 / PRESSED**2, 1.0)
         acceleration2[lane] = ti.select(lane < count, counts * acceleration.dot(acceleration), 0.0)
     if count >= LANES:
-        _put_block(state, program, first, LANES, positions, velocities, speeds_beside)
+        _put_block(state, program, first, positions, velocities, speeds_beside)
     else:
-        _put_block(state, program, first, count, positions, velocities, speeds_beside)
+        _put_last_block(state, program, first, count, positions, velocities, speeds_beside)
     return speed2, beside2, acceleration2
 
 

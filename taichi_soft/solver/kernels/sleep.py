@@ -76,9 +76,11 @@ def note_box(state: ti.template(), body):
     particles = state.body_particles[body]
     lower = state.particle_position[particles[0]]
     upper = lower
-    for p in range(particles[0], particles[1]):
+    p = particles[0]
+    while p < particles[1]:
         x = state.particle_position[p]
         lower, upper = ti.min(lower, x), ti.max(upper, x)
+        p = row_behind(p)
     if ti.static(state.capacity.contact.hull):
         place_points(state, body)
         for p in range(state.hull.body_points[body][0], state.hull.body_points[body][1]):

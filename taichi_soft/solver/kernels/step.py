@@ -113,8 +113,10 @@ def _mean_velocity(state: ti.template(), island):
         body = state.contact.island_body[i]
         if state.body_status[body] == ACTIVE:
             particles = state.body_particles[body]
-            for p in range(particles[0], particles[1]):
+            p = particles[0]
+            while p < particles[1]:
                 total += state.particle_velocity[p]
+                p = row_behind(p)
             count += particles[1] - particles[0]
         else:
             moves = 0.0

@@ -10,13 +10,13 @@ altogether all of it goes there, within a second.
 
 from taichi_soft.bodies.status import PLACED
 from taichi_soft.core.constants import LANES
+from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.math.svd import nearest_rotation
 from taichi_soft.core.math.tensors import determinant
 from taichi_soft.core.math.tetrahedron import shape
 from taichi_soft.core.runtime import ti
 from taichi_soft.core.types import Flips
 from taichi_soft.elements.kernels.elastic import particles_of, rest_inverse_of
-from taichi_soft.solver.kernels.vibration import fade_vibration
 
 PATIENCE = 15
 """Fixed steps between two looks: a quarter of a second."""
@@ -47,11 +47,12 @@ def _is_caught(state: ti.template(), positions: ti.template(), block, lane):
 
 @ti.func
 def _caught_count(state: ti.template(), positions: ti.template(), body):
-    caught, blocks = ti.Vector.zero(ti.i32, LANES), state.body_blocks[body]
-    for block in range(blocks[0], blocks[1]):
-        for lane in range(LANES):
-            caught[lane] += _is_caught(state, positions, block, lane)
-    return caught.sum()
+    caught, blocks = 0, state.body_blocks[body]
+    row = blocks[0] * LANES
+    while row < blocks[1] * LANES:
+        caught += _is_caught(state, positions, row // LANES, row % LANES)
+        row = row_behind(row)
+    return caught
 
 
 @ti.func
@@ -74,18 +75,22 @@ def _best_fit(state: ti.template(), body):
     particles = state.body_particles[body]
     x0, r0 = state.particle_position[particles[0]], state.rest_position[particles[0]]
     total, now, rest = x0.x * 0.0, x0 * 0.0, x0 * 0.0
-    for p in range(particles[0], particles[1]):
+    p = particles[0]
+    while p < particles[1]:
         mass = state.particle_mass[p]
         total += mass
         now += mass * (state.particle_position[p] - x0)
         rest += mass * (state.rest_position[p] - r0)
+        p = row_behind(p)
     now, rest = x0 + now / total, r0 + rest / total
     a, b, c, size = x0 * 0.0, x0 * 0.0, x0 * 0.0, 1e-30
-    for p in range(particles[0], particles[1]):
+    p = particles[0]
+    while p < particles[1]:
         share = state.particle_mass[p] / total
         x, r = state.particle_position[p] - now, state.rest_position[p] - rest
         a, b, c = a + share * r.x * x, b + share * r.y * x, c + share * r.z * x
         size += share * r.dot(r)
+        p = row_behind(p)
     return rest, now, nearest_rotation((a / size, b / size, c / size))
 
 
@@ -93,7 +98,8 @@ def _best_fit(state: ti.template(), body):
 def _pull(state: ti.template(), program: ti.template(), p, fit: ti.template(), share, seconds):
     """Move a particle a share of the way to where it fits best; a pinned one stays.
 
-    Among colliders, which may be in the way, it is thrown there in the coming step, of so many seconds.
+    Among colliders, which may be in the way, it is thrown there in the coming step, of so many seconds, which
+    begins by taking its share of that.
     """
     rest, now, rows = fit
     if state.particle_inv_mass[p] > 0.0:
@@ -101,7 +107,7 @@ def _pull(state: ti.template(), program: ti.template(), p, fit: ti.template(), s
         goal = now + ti.Vector([rows[0].dot(r), rows[1].dot(r), rows[2].dot(r)])
         way = share * (goal - state.particle_position[p])
         if ti.static(program.has_contact):
-            state.particle_velocity[p] = state.particle_velocity[p] + way / seconds
+            state.particle_velocity[p] = state.particle_velocity[p] + way / (CALMING * seconds)
         else:
             state.particle_position[p] = state.particle_position[p] + way
 
@@ -111,11 +117,13 @@ def _free(state: ti.template(), program: ti.template(), body):
     """Move the corners of what is caught half of the way."""
     fit = _best_fit(state, body)
     blocks = state.body_blocks[body]
-    for block in range(blocks[0], blocks[1]):
-        for lane in range(LANES):
-            if _is_caught(state, state.particle_position, block, lane) == 1:
-                for corner in ti.static(range(4)):
-                    _pull(state, program, particles_of(state, block, lane)[corner], fit, 0.5, 1.0)
+    row = blocks[0] * LANES
+    while row < blocks[1] * LANES:
+        block, lane = row // LANES, row % LANES
+        if _is_caught(state, state.particle_position, block, lane) == 1:
+            for corner in ti.static(range(4)):
+                _pull(state, program, particles_of(state, block, lane)[corner], fit, 0.5, 1.0)
+        row = row_behind(row)
 
 
 @ti.func
@@ -123,8 +131,10 @@ def _raise(state: ti.template(), program: ti.template(), body, steps_left, secon
     """Move all of a wreck a part of the way, in the last step all of it."""
     fit = _best_fit(state, body)
     particles = state.body_particles[body]
-    for p in range(particles[0], particles[1]):
+    p = particles[0]
+    while p < particles[1]:
         _pull(state, program, p, fit, 1.0 / steps_left, seconds)
+        p = row_behind(p)
 
 
 @ti.func
@@ -135,6 +145,17 @@ def _recovers(state: ti.template(), program: ti.template(), body):
         if ti.static(model.flips == Flips.RECOVER):
             recovers = recovers | int(state.body_model[body] == m)
     return recovers
+
+
+@ti.func
+def kept_while_caught(state: ti.template(), body, seconds):
+    """The share of its vibration that a body of which some is caught keeps in a step of so many seconds."""
+    age, keep = state.body_patience[body], 1.0
+    if age >= PATIENCE:
+        keep = ti.exp(-FADING * seconds)
+    elif age >= -RAISING_STEPS and age < 0:
+        keep = CALMING
+    return keep
 
 
 @ti.real_func
@@ -152,13 +173,6 @@ def untangle_body(state: ti.template(), program: ti.template(), body: ti.i32, se
         if is_look:
             if _caught_count(state, state.particle_position, body) == 0:
                 age = 0
-        keep = 1.0
-        if age < 0:
-            keep = CALMING
-        elif age >= PATIENCE:
-            keep = ti.exp(-FADING * seconds)
-        if keep < 1.0:
-            fade_vibration(state, program, body, 0.0, 0.0, keep)
         if age < 0:
             _raise(state, program, body, -age, seconds)
         elif is_look and age >= 2 * PATIENCE:

@@ -15,8 +15,10 @@ from taichi_soft.bodies.kernels.particles import gravity_on
 from taichi_soft.bodies.status import FEELS_REACTION
 from taichi_soft.contact.distances.floor import resolve_floor
 from taichi_soft.core.constants import LANES, ROW_BITS
+from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 from taichi_soft.core.types import Integrator
+from taichi_soft.solver.kernels.untangling import kept_while_caught
 
 MOST_FADING = 0.43
 """What damping takes from a vibration in one substep, at most: exp(-0.43) = 0.65 is left, d below. The kick
@@ -176,7 +178,8 @@ def _limit_vibration(state: ti.template(), program: ti.template(), body, kick, f
         center_now, velocity_now, spin_now = _rigid_motion(state, program, body, kick, 0.0, 0, x0, v0)
         if turn == 0:
             center, velocity, spin = center_now, velocity_now, spin_now
-        for p in range(particles[0], particles[1]):
+        p = particles[0]
+        while p < particles[1]:
             if state.particle_inv_mass[p] > 0.0:
                 arm = state.particle_position[p] - x0 - center
                 change = velocity - velocity_now + (spin - spin_now).cross(arm)
@@ -185,6 +188,7 @@ def _limit_vibration(state: ti.template(), program: ti.template(), body, kick, f
                     rigid = v0 + velocity + spin.cross(arm)
                     change = rigid + _slower(kicked - rigid, farthest) - kicked
                 state.particle_velocity[p] = state.particle_velocity[p] + change
+            p = row_behind(p)
 
 
 @ti.func
@@ -258,6 +262,8 @@ def damp_body(state: ti.template(), program: ti.template(), body, kick, h, s, su
     """As `damp_vibration`, where only CPUs run it. Each part is called here alone: LLVM puts it back, and its
     rounding does not depend on what else a world has."""
     keep = kept_vibration(state, body, h, s, substeps)
+    if s == 0:
+        keep *= kept_while_caught(state, body, substeps * h)
     if keep < 1.0:
         _fade_body(state, program, body, _to_positions(program, kick, h), h, keep)
     if state.body_is_braked[body] == 1:
