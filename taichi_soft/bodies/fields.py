@@ -210,7 +210,7 @@ class BodyFields:
         fill(self.body_sound_speed, own[:, 1])
         fill(self.body_fading, own[:, 2])
         fill(self.body_fading_interval, own[:, 3])
-        self.wind[None] = [0.0, 0.0, 0.0, 0.0]
+        fill(self.wind, np.zeros((0, 4)))
         fill(self.body_gravity_scale, np.ones(self.capacity.bodies))
         fill(self.block_model, np.repeat(models, [r.blocks[1] - r.blocks[0] for r in ranges]))
         self.loader.write()

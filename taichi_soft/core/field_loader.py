@@ -22,9 +22,9 @@ class Loader:
         self._waiting: list[tuple[Any, NDArray[Any]]] = []
 
     def fill(self, field: Any, rows: NDArray[Any]) -> None:
-        """Note `rows` for the front of a one-dimensional field, and zeros behind them."""
+        """Note `rows` for the front of a field of one dimension or of none, and zeros behind them."""
         width = getattr(field, "n", 1)
-        whole = np.zeros((field.shape[0], width), np.int32 if field.dtype == ti.i32 else np.float64)
+        whole = np.zeros((_rows_of(field), width), np.int32 if field.dtype == ti.i32 else np.float64)
         if len(rows):
             whole[: len(rows)] = rows.reshape(len(rows), width)
         self._waiting.append((field, whole.reshape(-1)))
@@ -45,6 +45,10 @@ class Loader:
         _write_pieces(self, np.concatenate(reals), np.concatenate(wholes))
 
 
+def _rows_of(field: Any) -> int:
+    return int(field.shape[0]) if field.shape else 1
+
+
 @ti.kernel
 def _write_pieces(
     loader: ti.template(),
@@ -55,14 +59,19 @@ def _write_pieces(
         # Serial loops become one function, and of many fields that compiles three times as long as a function
         # per field; but to write the few of a collider, no threads are worth waking up.
         ti.loop_config(serialize=ti.static(len(loader.pieces) < 20))
-        for i in range(field.shape[0]):
+        for i in range(ti.static(_rows_of(field))):
             for k in ti.static(range(width)):
                 value = (
                     wholes[start + i * width + k]
                     if ti.static(is_whole == 1)
                     else reals[start + i * width + k]
                 )
-                if ti.static(width == 1):
-                    field[i] = ti.cast(value, field.dtype)
+                number = ti.cast(value, field.dtype)
+                if ti.static(len(field.shape) == 0 and width == 1):
+                    field[None] = number
+                elif ti.static(len(field.shape) == 0):
+                    field[None][k] = number
+                elif ti.static(width == 1):
+                    field[i] = number
                 else:
-                    field[i][k] = ti.cast(value, field.dtype)
+                    field[i][k] = number

@@ -30,9 +30,13 @@ class FirstLaunches:
         self._flag: Any = None
         self._made: list[tuple[Any, Any, str]] = []  # kernel, what Taichi tells its arrays apart by, digest
 
+    def make_flag(self) -> None:
+        """Make the field that short bodies set, as Taichi starts."""
+        self._flag = ti.field(ti.i32, ())
+
     def open(self, known: KnownKernels) -> None:
-        """From now on look for kernels among those known. Makes a field: called as Taichi starts."""
-        self._flag, self._known = ti.field(ti.i32, ()), known
+        """From now on look for kernels among those known."""
+        self._known = known
 
     def install(self) -> None:
         """Have Taichi ask here."""
@@ -96,7 +100,7 @@ class FirstLaunches:
         slots = kernel.template_slot_locations
         given = [(args[i] if i in slots else features[i], i in slots) for i in range(len(args))]
         try:
-            return digest_of(kernel.func, given)
+            return digest_of(kernel.func, self._known.options, given)
         except UnknownPartError:
             return None
 

@@ -53,16 +53,17 @@ def digest_of_sources() -> str:
     return found.hexdigest()
 
 
-def digest_of(function: Any, arguments: list[tuple[Any, bool]]) -> str:
+def digest_of(function: Any, options: str, arguments: list[tuple[Any, bool]]) -> str:
     """Of a kernel and what it is compiled for.
 
     Args:
         function: the Python function.
+        options: those of Taichi's that code depends on.
         arguments: of each its value, and whether it is a template argument; of others what Taichi tells them
             apart by.
     Raises: UnknownPartError.
     """
-    parts: list[str] = [digest_of_sources(), function.__module__, function.__qualname__]
+    parts: list[str] = [digest_of_sources(), options, function.__module__, function.__qualname__]
     if function.__closure__:
         raise UnknownPartError(function.__qualname__)
     seen: dict[int, tuple[int, Any]] = {}
@@ -174,8 +175,9 @@ def short_name_of(digest: str) -> str:
 class KnownKernels:
     """Those in one folder of Taichi's."""
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
+    def __init__(self, folder: Path, options: str) -> None:
+        """Read which there are. `options`: as `digest_of` takes them."""
+        self.folder, self.options = folder, options
         self._known = self._read()
 
     def __contains__(self, digest: object) -> bool:

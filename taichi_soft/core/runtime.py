@@ -35,11 +35,15 @@ from taichi_soft.core.cores import (
 from taichi_soft.core.errors import DeviceError, OptionError
 from taichi_soft.core.first_launch import FIRST_LAUNCHES
 from taichi_soft.core.kernel_cache import await_lock, folder_of
-from taichi_soft.core.known_kernels import KnownKernels
+from taichi_soft.core.known_kernels import KnownKernels, digest_of_sources
+from taichi_soft.core.package_data import IS_INSTALLED
 from taichi_soft.core.subnormals import learn
 from taichi_soft.core.taichi_patches import (
+    MOST_THREADS,
     check_real_functions,
     has_pending_fields,
+    keep_kernels_apart,
+    let_any_number_of_threads_run,
     let_threads_in,
     let_whole_numbers_overflow,
     remember_sources,
@@ -66,7 +70,6 @@ Class = TypeVar("Class", bound=type)
 DEBUG = "TAICHI_SOFT_DEBUG"
 """Name of the environment variable that at 1 has every index in a kernel checked: slow, for tests only."""
 
-_MOST_THREADS = 256
 _ARCHS = ("cpu", "cuda", "vulkan", "metal")
 
 
@@ -134,11 +137,9 @@ def init(arch: ArchName = "auto", threads: int | None = None, cores: Sequence[in
     if not isinstance(arch, str) or arch not in ("auto", *_ARCHS):
         raise OptionError(f"unknown arch {arch!r}: choose one of 'auto', {', '.join(map(repr, _ARCHS))}")
     if threads is not None and (
-        isinstance(threads, bool) or not isinstance(threads, int) or not 1 <= threads <= _MOST_THREADS
+        isinstance(threads, bool) or not isinstance(threads, int) or not 1 <= threads <= MOST_THREADS
     ):
-        raise OptionError(
-            f"threads must be None or a whole number from 1 to {_MOST_THREADS}, got {threads!r}"
-        )
+        raise OptionError(f"threads must be None or a whole number from 1 to {MOST_THREADS}, got {threads!r}")
     there = available_cores()
     taken = () if _device is None else _device.cores  # the caller may have left them to our threads since
     bound = () if cores is None else require_cores(cores, sorted({*there, *taken}))
@@ -218,10 +219,15 @@ def _start(arch: ArchName, reason: str, threads: int, cores: tuple[int, ...], is
     if is_checked:
         check_real_functions()
         let_whole_numbers_overflow()
-    elif arch == "cpu":
-        FIRST_LAUNCHES.open(KnownKernels(kernel_folder()))
+    has_known = arch == "cpu" and not is_checked
+    if has_known:
+        FIRST_LAUNCHES.make_flag()
     _first_field = ti.field(ti.i32, ())
     ti.lang.impl.get_runtime().materialize()  # once, by the first kernel otherwise, in whichever thread
+    if has_known:
+        # In a checkout kernels stay under one key, or each edit would compile all of them.
+        decisive = keep_kernels_apart(digest_of_sources() if IS_INSTALLED else "")
+        FIRST_LAUNCHES.open(KnownKernels(kernel_folder(), decisive))
     _process = os.getpid()
     atexit.register(_end)
     _device = Device(arch=arch, threads=threads if arch == "cpu" else 1, reason=reason)
@@ -333,6 +339,7 @@ def _lay_out(lay_out: Callable[[bool], None], is_first_call: bool) -> None:
 if ti.__version__[:2] == (1, 7):
     remember_sources()
     let_threads_in(_lay_out)
+    let_any_number_of_threads_run()
     FIRST_LAUNCHES.install()
 
 

@@ -10,6 +10,7 @@ import threading
 import types
 import warnings
 import weakref
+import zlib
 from collections.abc import Callable
 from importlib import import_module
 from typing import Any
@@ -25,14 +26,20 @@ from taichi_soft.core.subnormals import without_subnormals
 from taichi_soft.core.threads import in_turn
 
 __all__ = [
+    "MOST_THREADS",
     "check_real_functions",
     "has_pending_fields",
+    "keep_kernels_apart",
+    "let_any_number_of_threads_run",
     "let_threads_in",
     "let_whole_numbers_overflow",
     "remember_sources",
     "ti",
     "tree_of",
 ]
+
+MOST_THREADS = 256
+"""Of which kernels may make use."""
 
 # A `ti.real_func` is compiled once and by itself, where a `ti.func` is copied to wherever it is called. But
 # Taichi 1.7 puts branches and loops of a `ti.func` called in it into the kernel, and crashes. With this
@@ -108,6 +115,46 @@ def let_threads_in(lay_out_now: Callable[[Callable[[bool], None], bool], None]) 
     accessor.__init__ = make_in_turn
     lay_out = ti.lang.impl.PyTaichi.materialize_root_fb
     ti.lang.impl.PyTaichi.materialize_root_fb = staticmethod(functools.partial(lay_out_now, lay_out))
+
+
+def let_any_number_of_threads_run() -> None:
+    """Taichi 1.7 compiles into each parallel loop how many threads may run it: as many as the machine has.
+    Another machine would not find that kernel, or run it on too few. Here it is `MOST_THREADS`, of which
+    Taichi takes those that it has started."""
+    builder, is_given = ti._lib.core.ASTBuilder, threading.local()
+    parallelize = builder.parallelize
+
+    def give(self: Any, threads: int) -> None:  # 1 where the loop is to be serial
+        is_given.at_all = True
+        parallelize(self, threads)
+
+    def opening(begin: Callable[..., Any]) -> Callable[..., Any]:
+        def begin_loop(self: Any, *arguments: Any) -> Any:
+            if not getattr(is_given, "at_all", False):
+                parallelize(self, MOST_THREADS)
+            is_given.at_all = False
+            return begin(self, *arguments)
+
+        return begin_loop
+
+    builder.parallelize = give
+    for kind in ("range_for", "struct_for_on_snode", "struct_for_on_external_tensor"):
+        name = f"begin_frontend_{kind}"
+        setattr(builder, name, opening(getattr(builder, name)))
+
+
+def keep_kernels_apart(version: str) -> str:
+    """Have Taichi, which runs already, look for kernels under another key in each version of the package.
+
+    A key has in it on how many threads a kernel may run. That is from now on a number that no machine
+    reaches, made of the version.
+    Returns: all options of Taichi's that code depends on.
+    """
+    config = ti.lang.impl.current_cfg()
+    config.cpu_max_num_threads = MOST_THREADS + zlib.crc32(version.encode()) % (1 << 20)
+    names = [name for name in dir(config) if not name.startswith(("_", "offline_cache", "print_", "verbose"))]
+    numbers = {name: getattr(config, name) for name in names if name != "num_compile_threads"}
+    return str({name: value for name, value in numbers.items() if isinstance(value, (bool, int, float))})
 
 
 def tree_of(kernel: Any, arguments: Any, features: Any) -> tuple[Any, Any]:

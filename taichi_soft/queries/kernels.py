@@ -6,6 +6,7 @@ face counts, whatever the number of threads.
 
 from taichi_soft.bodies.kernels.faces import box_around, face_corners, face_count, is_inside, write_place
 from taichi_soft.bodies.status import ABSENT
+from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.math.triangle import closest_point_on_triangle, pierce_triangle, triangle_touches_box
 from taichi_soft.core.runtime import ti
 
@@ -58,7 +59,8 @@ def find_hits(
         for i in range(bodies.shape[0]):
             body = bodies[i]
             if entry_of(state.body_lower[body] - origin, state.body_upper[body] - origin, inv) < best:
-                for face in range(face_count(state, body)):
+                face, faces = 0, face_count(state, body)
+                while face < faces:
                     a, b, c = face_corners(state, body, face, origin)
                     side, w = pierce_triangle(
                         ti.Vector([right.dot(a), up.dot(a), d.dot(a)]),
@@ -69,6 +71,7 @@ def find_hits(
                     is_seen = side < 0 or (side > 0 and rays[r, 7] == 0.0)
                     if is_seen and distance >= 0.0 and distance < best:
                         best, best_body, best_face, weights = distance, body, face, w
+                    face = row_behind(face)
         if best_body >= 0:
             write_place(state, r, hits, best_body, best_face, weights, best, d)
 
@@ -168,10 +171,12 @@ def find_overlaps(
                 if shape_contains(size, is_box, x):
                     inside[i] = 1
                     touches = 1
-            for face in range(face_count(state, body)):
+            face, faces = 0, face_count(state, body)
+            while face < faces:
                 if touches == 0:
                     a, b, c = face_corners(state, body, face, center)
                     touches = int(shape_touches(size, is_box, axes @ a, axes @ b, axes @ c))
+                face = row_behind(face)
             if touches == 0 and ti.min(upper - center, center - lower).min() >= 0.0:
                 touches = int(is_inside(state, body, center))
             if touches == 1:

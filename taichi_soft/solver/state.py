@@ -16,6 +16,7 @@ from taichi_soft.control.kernels.joints import JointFields
 from taichi_soft.control.kernels.motors import MotorFields
 from taichi_soft.core.runtime import holds_fields, ti
 from taichi_soft.core.settings import Settings
+from taichi_soft.solver.kernels.surroundings import write_surroundings
 from taichi_soft.solver.step_fields import JobFields, Progress
 
 _NO_CONTACT = ContactCapacity()
@@ -76,9 +77,11 @@ class State(BodyFields):
         return groups
 
     def write_surroundings(self, settings: Settings) -> None:
-        """Write gravity, and the floor of a world without colliders."""
-        self.gravity[None] = settings.gravity.tolist()
-        self.floor[None] = [settings.floor or 0.0, settings.restitution or 0.0, settings.friction]
+        """Write what holds for all bodies: gravity, the floor of a world without colliders, how exact a step
+        is."""
+        floor = settings.floor or 0.0, settings.restitution or 0.0, settings.friction
+        solver = settings.tolerance, settings.most_iterations
+        write_surroundings(self, np.array([*settings.gravity, *floor, *solver, settings.retries]))
 
     def load(self, scene: Scene, models: list[int], kinds: NDArray[np.float64] | None = None) -> None:
         """As `BodyFields.load`."""
@@ -102,7 +105,7 @@ class State(BodyFields):
         # What lies inside a body is never near anything.
         fill(contact.particle_clearance, np.full(scene.particle_count, np.inf))
         fill(contact.particle_touches, np.zeros(0))
-        contact.island_count[None] = count
+        fill(contact.island_count, np.array([count]))
         fill(contact.island_first, np.arange(count + 1))
         fill(contact.island_body, np.arange(count))
         fill(contact.body_island, np.arange(count))
@@ -113,7 +116,7 @@ class State(BodyFields):
             fill(self.soft.slot_count, np.zeros(0))
             fill(self.soft.contact_count, np.zeros(0))
             fill(self.soft.kept_normal_impulse, np.zeros(0))
-            self.soft.records_touches[None] = 0
-            self.soft.pairs_lost[None] = 0
+            fill(self.soft.records_touches, np.zeros(0))
+            fill(self.soft.pairs_lost, np.zeros(0))
             fill(self.soft.pair_bodies, np.zeros((0, 2)))
             fill(self.soft.pair_impulse, np.zeros((0, 3)))

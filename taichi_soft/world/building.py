@@ -75,7 +75,7 @@ def build(context: WorldContext) -> Simulation:
     for slot, rows in pools.starts.items():
         spawn_body(state, slot, rows)
     pools.starts.clear()
-    _set(settings, state)
+    state.write_surroundings(settings)
     tears = context.of(Tears)
     tears.open(state, program)
     simulation = Simulation(
@@ -95,7 +95,6 @@ def build(context: WorldContext) -> Simulation:
         tears,
     )
     if has_contact:
-        state.contact.sleep_speed[None] = contact.sleep_speed
         colliders.load(state.contact, len(pools.slots))
         woken = weakref.WeakMethod(simulation.wake_near)  # or the two would keep each other
         colliders.on_jump = lambda lower, upper: (woken() or ignore)(lower, upper)
@@ -171,7 +170,7 @@ def _program(context: WorldContext, settings: Settings, device: Device, has_cont
         has_contact,
         context.contact.soft,
         _is_plastic(context),
-        device.threads,
+        device.threads if settings.schedule is Schedule.FLAT else 1,
     )
 
 
@@ -190,6 +189,7 @@ def _fill(context: WorldContext, state: State, program: StepProgram) -> None:
         flows = [a.plasticity.row if a.plasticity else RIGID_ROW for a in assets]
         fill(state.body_plasticity, np.array(flows))
     if program.has_contact:
+        fill(state.contact.sleep_speed, np.array([context.contact.sleep_speed]))
         fill(state.contact.body_filter, np.array([(a.contact.group, a.contact.mask) for a in assets]))
     if program.has_soft_contact:
         fill(state.soft.body_surface, np.array([a.surface_row for a in assets]))
@@ -209,11 +209,3 @@ def _warm_up(context: WorldContext, state: State) -> None:
             warm_up(context, state, slot)
         spawn_body(state, slot, asset.rest_rows)
         despawn_body(state, slot)
-
-
-def _set(settings: Settings, state: State) -> None:
-    """Write the numbers that hold for all bodies."""
-    state.write_surroundings(settings)
-    state.retries[None] = settings.retries
-    if settings.is_implicit:
-        state.solver[None] = [settings.tolerance, settings.most_iterations]

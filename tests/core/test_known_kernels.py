@@ -19,10 +19,17 @@ PROGRAM = """
 import logging, sys
 logging.basicConfig(level=logging.DEBUG)
 from taichi_soft import Material, World, box, init
-init("cpu", threads=1)
-world = World(collider_room=len(sys.argv[2]))
-cube = box(cells=(int(sys.argv[1]),) * 3)
-world.add_body(cube, Material(2e5, 0.3, 1000), position=(0, 0, 0.6), law="virial")
+from taichi_soft.core import known_kernels, runtime
+cells, room, bodies, threads = map(int, sys.argv[1:5])
+runtime.available_cores = lambda: list(range(threads))  # of another machine
+runtime.can_bind = lambda: False
+if sys.argv[5]:
+    runtime.IS_INSTALLED = True
+    runtime.digest_of_sources = known_kernels.digest_of_sources = lambda: sys.argv[5]
+init("cpu", threads=threads)
+world = World(collider_room=room)
+for i in range(bodies):
+    world.add_body(box(cells=(cells,) * 3), Material(2e5, 0.3, 1000), position=(3 * i, 0, 0.6), law="virial")
 world.build()
 for _ in range(20):
     world.step(1 / 60, 12)
@@ -30,10 +37,14 @@ print(world.state_hash())
 """
 
 
-def play(folder, cells=2, has_collider=False):
-    """State at the end, and the kernels that were made from their source and those that were known."""
+def play(folder, cells=2, has_collider=False, bodies=1, threads=1, sources=""):
+    """State at the end, and the kernels that were made from their source and those that were known.
+
+    `sources`: what is taken for a digest of an installed package.
+    """
+    options = (cells, int(has_collider), bodies, threads, sources)
     done = subprocess.run(
-        [sys.executable, "-c", PROGRAM, str(cells), "1" * has_collider],
+        [sys.executable, "-c", PROGRAM, *map(str, options)],
         env={**os.environ, "TI_OFFLINE_CACHE_FILE_PATH": str(folder)},
         capture_output=True,
         text=True,
@@ -83,6 +94,24 @@ def test_what_is_missing_from_the_cache_is_made_from_its_source_again(folder):
     assert known == []
 
 
+@pytest.mark.parametrize("has_collider", [False, True], ids=["without contact", "with contact"])
+def test_a_machine_with_another_number_of_cores_finds_all_kernels_and_moves_bodies_alike(
+    tmp_path, has_collider
+):
+    state, made, _ = play(tmp_path, has_collider=has_collider, bodies=2, threads=2)
+    for threads in (3, 8):
+        again, made_again, known = play(tmp_path, has_collider=has_collider, bodies=2, threads=threads)
+        assert (again, made_again, known) == (state, [], made)
+
+
+def test_after_an_update_kernels_are_made_once_and_then_known(tmp_path):
+    """Taichi would find those that did not change, under the names that they had before."""
+    state, made, _ = play(tmp_path, sources="a")
+    assert play(tmp_path, sources="b") == (state, made, [])
+    assert play(tmp_path, sources="b") == (state, [], made)
+    assert play(tmp_path, sources="a") == (state, [], made)
+
+
 @holds_fields
 class Fields:
     def __init__(self, size, dtype=ti.f32, option="a"):
@@ -101,7 +130,7 @@ def kernel_like():
 
 
 def digest(*values):
-    return digest_of(kernel_like, [(value, True) for value in values])
+    return digest_of(kernel_like, "", [(value, True) for value in values])
 
 
 def test_a_digest_tells_apart_all_that_code_is_made_of():
@@ -117,6 +146,11 @@ def test_a_digest_tells_apart_all_that_code_is_made_of():
     found += [digest(np.arange(3)), digest(np.arange(4)), digest(1, 2), digest({1: 2}), digest([1, 2])]
     assert len(set(found)) == len(found)
     assert digest(fields) == digest(fields)
+
+
+def test_other_options_of_taichi_give_another_digest():
+    """They are in the key under which Taichi keeps a kernel, and not in its name."""
+    assert digest_of(kernel_like, "fast_math", []) != digest_of(kernel_like, "", [])
 
 
 def test_other_sources_give_another_digest(monkeypatch):

@@ -1,6 +1,7 @@
 """Copies between the fields of a world and the caller's arrays, in the caller's vertex order."""
 
 from taichi_soft.bodies.status import ABSENT, ACTIVE, PLACED
+from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
 
@@ -44,8 +45,8 @@ def write_motion(
     velocities: ti.types.ndarray(ndim=2),
 ):
     """Put the particles of one body somewhere else, with velocities of the same moment."""
-    ti.loop_config(serialize=True)
-    for i in range(positions.shape[0]):
+    i = 0
+    while i < positions.shape[0]:
         p = state.particle_of_vertex[state.body_particles[body][0] + i]
         x = ti.Vector([positions[i, 0], positions[i, 1], positions[i, 2]])
         state.particle_position[p] = x
@@ -55,6 +56,7 @@ def write_motion(
         state.particle_force[p] = ti.Vector.zero(state.real, 4)
         if ti.static(state.capacity.implicit):
             state.particle_contact[p] = 0
+        i = row_behind(i)
     state.body_velocity_lag[body] = 0.0
     state.body_patience[body] = PLACED
     state.body_status[body] = ACTIVE

@@ -1,5 +1,6 @@
 """What the caller says of colliders, into their fields."""
 
+from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
 MOTION_WIDTH = 20
@@ -14,8 +15,8 @@ def _vector(rows: ti.template(), c, at):
 @ti.kernel
 def write_collider_motion(contact: ti.template(), rows: ti.types.ndarray(dtype=ti.f32, ndim=2)):
     """Where all colliders are and how they move, rows (n, `MOTION_WIDTH`)."""
-    ti.loop_config(serialize=True)
-    for c in range(rows.shape[0]):
+    c = 0
+    while c < rows.shape[0]:
         contact.collider_position[c] = _vector(rows, c, 0)
         contact.collider_rotation[c] = ti.Vector([rows[c, 3], rows[c, 4], rows[c, 5], rows[c, 6]])
         contact.collider_velocity[c] = _vector(rows, c, 7)
@@ -23,6 +24,7 @@ def write_collider_motion(contact: ti.template(), rows: ti.types.ndarray(dtype=t
         contact.collider_lower[c] = _vector(rows, c, 13)
         contact.collider_upper[c] = _vector(rows, c, 16)
         contact.collider_speed[c] = rows[c, 19]
+        c = row_behind(c)
 
 
 @ti.kernel
@@ -40,10 +42,12 @@ def sum_collider_impulses(
     ti.loop_config(serialize=True)
     for c in range(out.shape[0]):
         linear, angular = ti.Vector.zero(ti.f32, 3), ti.Vector.zero(ti.f32, 3)
-        for body in range(body_count):
+        body = 0
+        while body < body_count:
             row = body * contact.capacity.colliders + c
             linear += contact.impulse[row]
             angular += contact.angular_impulse[row]
+            body = row_behind(body)
         for i in ti.static(range(3)):
             out[c, i] = linear[i]
             out[c, 3 + i] = angular[i]

@@ -230,12 +230,14 @@ def write_joint(
         state.joints.rows[j] = ti.Vector([first, first + particles.shape[0]])
         state.joints.draw_speed[j] = draw_speed
         state.joints.impulse[j] = ti.Vector.zero(ti.f32, 3)
-        for i in range(particles.shape[0]):
+        i = 0
+        while i < particles.shape[0]:
             state.joints.row_impulse[first + i] = ti.Vector.zero(ti.f32, 3)
             for k in range(ENDS):
                 state.joints.particle[(first + i) * ENDS + k] = particles[i, k]
                 state.joints.weight[(first + i) * ENDS + k] = weights[i, k]
                 state.joints.share[(first + i) * ENDS + k] = weights[i, k]
+            i = row_behind(i)
         state.body_drives[body] = state.body_drives[body] | JOINED
         state.body_drives[other] = state.body_drives[other] | JOINED
 
@@ -286,10 +288,12 @@ def add_joint_forces(
     for j in range(MOST_JOINTS):
         ends = state.joints.bodies[j]
         if ends[0] == body + 1 or ends[1] == body + 1:
-            for k in range(state.joints.rows[j][0] * ENDS, state.joints.rows[j][1] * ENDS):
+            k = state.joints.rows[j][0] * ENDS
+            while k < state.joints.rows[j][1] * ENDS:
                 p = state.joints.particle[k]
                 if state.particle_body[p] == body:
                     force = state.joints.share[k] / h * state.joints.row_impulse[k // ENDS]
                     for i in ti.static(range(3)):
                         row = p - state.body_particles[body][0]
                         forces[row, i] = forces[row, i] + force[i]
+                k = row_behind(k)

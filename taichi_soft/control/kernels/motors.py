@@ -186,7 +186,8 @@ def write_motors(
             state.motors.is_driven[body] = 0
         for number in range(MOST_MOTORS):
             state.motors.motor[number].body = 0
-        for k in range(rows.shape[0]):
+        k = 0
+        while k < rows.shape[0]:
             state.motors.motor[rows[k, 0]] = MotorRow(
                 body=rows[k, 1] + 1,
                 first=rows[k, 2],
@@ -200,6 +201,7 @@ def write_motors(
                 limit=numbers[k, 7],
             )
             state.motors.is_driven[rows[k, 1]] = 1
+            k = row_behind(k)
         row = 0
         while row < particles.shape[0]:
             state.motors.particle[row] = particles[row]

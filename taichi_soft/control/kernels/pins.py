@@ -6,6 +6,7 @@ any more (`ARRIVED`, with the velocity of the step before still to be taken from
 """
 
 from taichi_soft.bodies.status import ACTIVE, ASLEEP, FEELS_REACTION, FROZEN, MOVES_PINS, SKIPPING
+from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
 STILL, TO_TARGET, ARRIVED, WITH_FRAME = 0, 1, 2, 3
@@ -81,8 +82,8 @@ def attach_particles(
     places: ti.types.ndarray(dtype=ti.f32, ndim=2),
 ):
     """Let particles of one body go with a frame, at `places` in its axes [m], and feel their load or not."""
-    ti.loop_config(serialize=True)
-    for i in range(particles.shape[0]):
+    i = 0
+    while i < particles.shape[0]:
         p = particles[i]
         state.particle_inv_mass[p] = 0.0
         state.particle_aim[p] = WITH_FRAME + frame
@@ -90,6 +91,7 @@ def attach_particles(
         state.particle_reaction[p] = ti.Vector.zero(state.real, 3)
         if ti.static(state.capacity.implicit):
             state.particle_contact[p] = 0
+        i = row_behind(i)
     bits = MOVES_PINS | ti.select(feels != 0, FEELS_REACTION, 0)
     state.body_drives[body] = state.body_drives[body] | bits
 
@@ -114,10 +116,12 @@ def read_reaction(
     for _ in range(1):
         center = ti.Vector([origin[0], origin[1], origin[2]])
         impulse, moment = ti.Vector.zero(ti.f64, 3), ti.Vector.zero(ti.f64, 3)
-        for i in range(particles.shape[0]):
+        i = 0
+        while i < particles.shape[0]:
             part = ti.cast(state.particle_reaction[particles[i]], ti.f64)
             impulse += part
             moment += ti.cast(state.particle_position[particles[i]] - center, ti.f64).cross(part)
+            i = row_behind(i)
         for k in ti.static(range(3)):
             load[k], load[3 + k] = impulse[k], moment[k]
 
@@ -141,13 +145,15 @@ def aim_pinned(
         elif drives & MOVES_PINS != 0:
             moving = 0
             particles = state.body_particles[body]
-            for p in range(particles[0], particles[1]):
+            p = particles[0]
+            while p < particles[1]:
                 if state.particle_inv_mass[p] == 0.0:
                     before = state.particle_velocity[p]
                     moving += _aim(state, p, dt, frames)
                     change = state.particle_velocity[p] - before
                     if drives & FEELS_REACTION != 0:
                         state.particle_reaction[p] = -change * state.particle_mass[p]
+                p = row_behind(p)
             if moving == 0:
                 state.body_drives[body] = drives & ~MOVES_PINS
             waiting += int(moving > 0)
