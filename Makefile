@@ -24,7 +24,7 @@ help:
 	@echo "make clean    delete the environment and what was written"
 
 # One environment for all of them; each adds to it what it needs.
-$(VENV)/.%: pyproject.toml setup.sh
+$(VENV)/.%: pyproject.toml taichi_soft/core/version.py setup.sh
 	@sh setup.sh "$(VENV)" $*
 	@touch $@
 

@@ -5,10 +5,6 @@ from pathlib import Path
 _PACKAGE = Path(__file__).resolve().parents[1]
 
 
-IS_INSTALLED = (_PACKAGE / "demos").is_dir()
-"""Whether this is an installed package, whose files stay as they are, and no checkout."""
-
-
 def _folder(name: str) -> Path:
     installed = _PACKAGE / name
     return installed if installed.is_dir() else _PACKAGE.parent / name

@@ -35,8 +35,7 @@ from taichi_soft.core.cores import (
 from taichi_soft.core.errors import DeviceError, OptionError
 from taichi_soft.core.first_launch import FIRST_LAUNCHES
 from taichi_soft.core.kernel_cache import await_lock, folder_of
-from taichi_soft.core.known_kernels import KnownKernels, digest_of_sources
-from taichi_soft.core.package_data import IS_INSTALLED
+from taichi_soft.core.known_kernels import KnownKernels
 from taichi_soft.core.subnormals import learn
 from taichi_soft.core.taichi_patches import (
     MOST_THREADS,
@@ -51,6 +50,7 @@ from taichi_soft.core.taichi_patches import (
 )
 from taichi_soft.core.threads import in_turn, leave_behind
 from taichi_soft.core.types import ArchName
+from taichi_soft.core.version import VERSION
 
 __all__ = [
     "Device",
@@ -225,9 +225,7 @@ def _start(arch: ArchName, reason: str, threads: int, cores: tuple[int, ...], is
     _first_field = ti.field(ti.i32, ())
     ti.lang.impl.get_runtime().materialize()  # once, by the first kernel otherwise, in whichever thread
     if has_known:
-        # In a checkout kernels stay under one key, or each edit would compile all of them.
-        decisive = keep_kernels_apart(digest_of_sources() if IS_INSTALLED else "")
-        FIRST_LAUNCHES.open(KnownKernels(kernel_folder(), decisive))
+        FIRST_LAUNCHES.open(KnownKernels(kernel_folder(), keep_kernels_apart(VERSION)))
     _process = os.getpid()
     atexit.register(_end)
     _device = Device(arch=arch, threads=threads if arch == "cpu" else 1, reason=reason)

@@ -24,8 +24,7 @@ cells, room, bodies, threads = map(int, sys.argv[1:5])
 runtime.available_cores = lambda: list(range(threads))  # of another machine
 runtime.can_bind = lambda: False
 if sys.argv[5]:
-    runtime.IS_INSTALLED = True
-    runtime.digest_of_sources = known_kernels.digest_of_sources = lambda: sys.argv[5]
+    runtime.VERSION, known_kernels.digest_of_sources = sys.argv[5], lambda: sys.argv[5]
 init("cpu", threads=threads)
 world = World(collider_room=room)
 for i in range(bodies):
@@ -37,12 +36,12 @@ print(world.state_hash())
 """
 
 
-def play(folder, cells=2, has_collider=False, bodies=1, threads=1, sources=""):
+def play(folder, cells=2, has_collider=False, bodies=1, threads=1, version=""):
     """State at the end, and the kernels that were made from their source and those that were known.
 
-    `sources`: what is taken for a digest of an installed package.
+    `version`: for which the package is taken, with files of its own.
     """
-    options = (cells, int(has_collider), bodies, threads, sources)
+    options = (cells, int(has_collider), bodies, threads, version)
     done = subprocess.run(
         [sys.executable, "-c", PROGRAM, *map(str, options)],
         env={**os.environ, "TI_OFFLINE_CACHE_FILE_PATH": str(folder)},
@@ -106,10 +105,10 @@ def test_a_machine_with_another_number_of_cores_finds_all_kernels_and_moves_bodi
 
 def test_after_an_update_kernels_are_made_once_and_then_known(tmp_path):
     """Taichi would find those that did not change, under the names that they had before."""
-    state, made, _ = play(tmp_path, sources="a")
-    assert play(tmp_path, sources="b") == (state, made, [])
-    assert play(tmp_path, sources="b") == (state, [], made)
-    assert play(tmp_path, sources="a") == (state, [], made)
+    state, made, _ = play(tmp_path, version="a")
+    assert play(tmp_path, version="b") == (state, made, [])
+    assert play(tmp_path, version="b") == (state, [], made)
+    assert play(tmp_path, version="a") == (state, [], made)
 
 
 @holds_fields

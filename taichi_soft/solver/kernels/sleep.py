@@ -83,8 +83,8 @@ def note_box(state: ti.template(), body):
         p = row_behind(p)
     if ti.static(state.capacity.contact.hull):
         place_points(state, body)
-        for p in range(state.hull.body_points[body][0], state.hull.body_points[body][1]):
-            x = state.particle_position[p]
+        for point in range(state.hull.body_points[body][0], state.hull.body_points[body][1]):
+            x = state.particle_position[point]
             lower, upper = ti.min(lower, x), ti.max(upper, x)
     state.contact.body_lower[body], state.contact.body_upper[body] = lower, upper
 
