@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from taichi_soft.core.compilation import BURST
@@ -37,6 +38,20 @@ class FirstLaunches:
     def open(self, known: KnownKernels) -> None:
         """From now on look for kernels among those known."""
         self._known = known
+
+    @contextmanager
+    def making_anew(self, made: list[Any]) -> Iterator[None]:
+        """Have these kernels made from their source within, whatever is known of them or was made before."""
+        known, self._known = self._known, None
+        before = [kernel.compiled_kernels for kernel in made]
+        for kernel in made:
+            kernel.compiled_kernels = {}
+        try:
+            yield
+        finally:
+            self._known = known
+            for kernel, compiled in zip(made, before, strict=True):
+                kernel.compiled_kernels = compiled
 
     def install(self) -> None:
         """Have Taichi ask here."""

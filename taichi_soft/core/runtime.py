@@ -38,13 +38,13 @@ from taichi_soft.core.kernel_cache import await_lock, folder_of
 from taichi_soft.core.known_kernels import KnownKernels
 from taichi_soft.core.subnormals import learn
 from taichi_soft.core.taichi_patches import (
-    MOST_THREADS,
     check_real_functions,
     has_pending_fields,
     keep_kernels_apart,
     let_any_number_of_threads_run,
     let_threads_in,
     let_whole_numbers_overflow,
+    limiting_threads,
     remember_sources,
     ti,
 )
@@ -70,6 +70,7 @@ Class = TypeVar("Class", bound=type)
 DEBUG = "TAICHI_SOFT_DEBUG"
 """Name of the environment variable that at 1 has every index in a kernel checked: slow, for tests only."""
 
+_MOST_THREADS = 256
 _ARCHS = ("cpu", "cuda", "vulkan", "metal")
 
 
@@ -137,9 +138,11 @@ def init(arch: ArchName = "auto", threads: int | None = None, cores: Sequence[in
     if not isinstance(arch, str) or arch not in ("auto", *_ARCHS):
         raise OptionError(f"unknown arch {arch!r}: choose one of 'auto', {', '.join(map(repr, _ARCHS))}")
     if threads is not None and (
-        isinstance(threads, bool) or not isinstance(threads, int) or not 1 <= threads <= MOST_THREADS
+        isinstance(threads, bool) or not isinstance(threads, int) or not 1 <= threads <= _MOST_THREADS
     ):
-        raise OptionError(f"threads must be None or a whole number from 1 to {MOST_THREADS}, got {threads!r}")
+        raise OptionError(
+            f"threads must be None or a whole number from 1 to {_MOST_THREADS}, got {threads!r}"
+        )
     there = available_cores()
     taken = () if _device is None else _device.cores  # the caller may have left them to our threads since
     bound = () if cores is None else require_cores(cores, sorted({*there, *taken}))
@@ -284,6 +287,9 @@ def make_fields(function: Callable[[], Result]) -> Result:
 def export_kernels(folder: Path, kernels: Mapping[str, tuple[Any, dict[str, Any]]], fields: Any) -> None:
     """Write kernels for programs without Python: the last thing that this process does with Taichi.
 
+    They take no more threads than this process has. They are made from their source: where a file of a known
+    kernel is missing, its short body would be written here.
+
     Args:
         kernels: by name, each with its template arguments, and an array like each of the others.
         fields: the first fields of each of the layouts that they are compiled for.
@@ -293,9 +299,11 @@ def export_kernels(folder: Path, kernels: Mapping[str, tuple[Any, dict[str, Any]
         module = ti.aot.Module(ti.x64)
         for number, field in enumerate([_first_field, *fields]):
             module.add_field(f"layout{number}", field)
-        for name, (kernel, arguments) in kernels.items():
-            module.add_kernel(kernel, arguments, name)
-        module.save(str(folder))
+        made = list({id(kernel): kernel._primal for kernel, _ in kernels.values()}.values())
+        with limiting_threads(device().threads), FIRST_LAUNCHES.making_anew(made):
+            for name, (kernel, arguments) in kernels.items():
+                module.add_kernel(kernel, arguments, name)
+            module.save(str(folder))
 
     _at_home(write, device().arch)
 

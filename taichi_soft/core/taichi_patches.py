@@ -11,7 +11,8 @@ import types
 import warnings
 import weakref
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from typing import Any
 
@@ -33,13 +34,14 @@ __all__ = [
     "let_any_number_of_threads_run",
     "let_threads_in",
     "let_whole_numbers_overflow",
+    "limiting_threads",
     "remember_sources",
     "ti",
     "tree_of",
 ]
 
-MOST_THREADS = 256
-"""Of which kernels may make use."""
+MOST_THREADS = 1 << 20
+"""Of which kernels may make use: no machine has as many."""
 
 # A `ti.real_func` is compiled once and by itself, where a `ti.func` is copied to wherever it is called. But
 # Taichi 1.7 puts branches and loops of a `ti.func` called in it into the kernel, and crashes. With this
@@ -121,18 +123,20 @@ def let_any_number_of_threads_run() -> None:
     """Taichi 1.7 compiles into each parallel loop how many threads may run it: as many as the machine has.
     Another machine would not find that kernel, or run it on too few. Here it is `MOST_THREADS`, of which
     Taichi takes those that it has started."""
-    builder, is_given = ti._lib.core.ASTBuilder, threading.local()
+    builder, given = ti._lib.core.ASTBuilder, threading.local()
     parallelize = builder.parallelize
 
-    def give(self: Any, threads: int) -> None:  # 1 where the loop is to be serial
-        is_given.at_all = True
+    def give(self: Any, threads: int) -> None:  # 1 where the next loop is to be serial
+        given.within = ti.lang.impl.get_runtime().compiling_callable
         parallelize(self, threads)
 
     def opening(begin: Callable[..., Any]) -> Callable[..., Any]:
         def begin_loop(self: Any, *arguments: Any) -> Any:
-            if not getattr(is_given, "at_all", False):
+            # To find how far a loop goes, a real function may be compiled, with loops of its own.
+            if getattr(given, "within", None) is ti.lang.impl.get_runtime().compiling_callable:
+                given.within = None
+            else:
                 parallelize(self, MOST_THREADS)
-            is_given.at_all = False
             return begin(self, *arguments)
 
         return begin_loop
@@ -151,10 +155,21 @@ def keep_kernels_apart(version: str) -> str:
     Returns: all options of Taichi's that code depends on.
     """
     config = ti.lang.impl.current_cfg()
-    config.cpu_max_num_threads = MOST_THREADS + zlib.crc32(version.encode()) % (1 << 20)
+    config.cpu_max_num_threads = MOST_THREADS + zlib.crc32(version.encode()) % MOST_THREADS
     names = [name for name in dir(config) if not name.startswith(("_", "offline_cache", "print_", "verbose"))]
     numbers = {name: getattr(config, name) for name in names if name != "num_compile_threads"}
     return str({name: value for name, value in numbers.items() if isinstance(value, (bool, int, float))})
+
+
+@contextmanager
+def limiting_threads(count: int) -> Iterator[None]:
+    """Compile kernels within for no more than so many threads."""
+    config = ti.lang.impl.current_cfg()
+    usual, config.cpu_max_num_threads = config.cpu_max_num_threads, count
+    try:
+        yield
+    finally:
+        config.cpu_max_num_threads = usual
 
 
 def tree_of(kernel: Any, arguments: Any, features: Any) -> tuple[Any, Any]:

@@ -39,7 +39,7 @@ class ExportReport:
 
 
 def export_world(
-    world: World, path: Path, *, axes: str = "z-up", names: Mapping[Any, str] | None = None
+    world: World, path: str | Path, *, axes: str = "z-up", names: Mapping[Any, str] | None = None
 ) -> ExportReport:
     """Write a built world, as it is now, as a folder that the native library loads.
 
@@ -52,7 +52,7 @@ def export_world(
     Raises: StateError for a world that is not built; OptionError for a path that is taken or cannot be
         written, and for what the native library does not run, by name.
     """
-    matrix = axes_of(axes)
+    path, matrix = Path(path), axes_of(axes)
     if not world.is_built:
         raise StateError("the world is not built: call world.build() before it is exported")
     context = context_of_world(world)

@@ -207,16 +207,20 @@ def note_way(state: ti.template(), body: ti.i32, shared: ti.math.vec3):
     The length of its path would be much more: a pile of soft bodies is never quite still.
     """
     particles = state.body_particles[body]
-    farthest, first = ti.Vector.zero(ti.f32, LANES), particles[0]
+    farthest, first = ti.Vector.zero(ti.f32, LANES), particles[0] & ROW_BITS
     while first < particles[1]:
         count, gone = particles[1] - first, ti.Vector.zero(ti.f32, LANES)
         for lane in range(LANES):
             way = state.particle_position[first + lane] - state.soft.searched_position[first + lane] - shared
             gone[lane] = ti.select(lane < count, way.norm(), 0.0)
-        lane = 0
-        while lane < ti.min(count, LANES):
-            state.soft.particle_gone[first + lane] = gone[lane]
-            lane = row_behind(lane)
+        if count >= LANES:
+            for lane in range(LANES):
+                state.soft.particle_gone[first + lane] = gone[lane]
+        else:
+            last = 0
+            while last < count:
+                state.soft.particle_gone[first + last] = gone[last]
+                last = row_behind(last)
         farthest = ti.max(farthest, gone)
         first = (first + LANES) & ROW_BITS  # as `row_behind`, block by block
     state.soft.body_gone[body] = farthest.max()

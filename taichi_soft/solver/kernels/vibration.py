@@ -23,7 +23,8 @@ from taichi_soft.solver.kernels.untangling import kept_while_caught
 MOST_FADING = 0.43
 """What damping takes from a vibration in one substep, at most: exp(-0.43) = 0.65 is left, d below. The kick
 of what is pressed is no part of that vibration, so there a mode of stiffness k and mass 1 becomes d v + h a.
-That is stable for h^2 k < 2 (1 + d), here up to 0.9 of leapfrog's own longest step."""
+That is stable for h^2 k < 2 (1 + d), here up to 0.9 of leapfrog's own longest step. What is caught inside out
+loses more, once in a step."""
 
 SHARP_BRAKE = 0.5
 """Of the vibration that a substep leaves where a step that failed is made for the last time."""
