@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+from taichi_soft.core.version import VERSION
+
 ROOT = Path(__file__).resolve().parents[1]
 TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
@@ -47,6 +49,4 @@ def test_every_command_it_prints_exists():
 
 
 def test_the_wheel_it_names_is_of_this_version():
-    project = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
-    version = re.search(r'^version = "(.*)"', project, re.MULTILINE).group(1)
-    assert f"taichi_soft-{version}-py3-none-any.whl" in TEXT
+    assert f"taichi_soft-{VERSION}-py3-none-any.whl" in TEXT

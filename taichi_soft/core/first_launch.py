@@ -40,17 +40,18 @@ class FirstLaunches:
         self._known = known
 
     @contextmanager
-    def making_anew(self, made: list[Any]) -> Iterator[None]:
+    def making_anew(self, functions: set[Any]) -> Iterator[None]:
         """Have these kernels made from their source within, whatever is known of them or was made before."""
         known, self._known = self._known, None
-        before = [kernel.compiled_kernels for kernel in made]
+        made = [vars(function)["_primal"] for function in functions]  # Taichi's own object behind each
+        before = [(kernel, kernel.compiled_kernels) for kernel in made]
         for kernel in made:
             kernel.compiled_kernels = {}
         try:
             yield
         finally:
             self._known = known
-            for kernel, compiled in zip(made, before, strict=True):
+            for kernel, compiled in before:
                 kernel.compiled_kernels = compiled
 
     def install(self) -> None:

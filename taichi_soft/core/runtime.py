@@ -299,8 +299,8 @@ def export_kernels(folder: Path, kernels: Mapping[str, tuple[Any, dict[str, Any]
         module = ti.aot.Module(ti.x64)
         for number, field in enumerate([_first_field, *fields]):
             module.add_field(f"layout{number}", field)
-        made = list({id(kernel): kernel._primal for kernel, _ in kernels.values()}.values())
-        with limiting_threads(device().threads), FIRST_LAUNCHES.making_anew(made):
+        functions = {kernel for kernel, _ in kernels.values()}
+        with limiting_threads(device().threads), FIRST_LAUNCHES.making_anew(functions):
             for name, (kernel, arguments) in kernels.items():
                 module.add_kernel(kernel, arguments, name)
             module.save(str(folder))
