@@ -39,6 +39,7 @@ from taichi_soft.core.known_kernels import KnownKernels
 from taichi_soft.core.subnormals import learn
 from taichi_soft.core.taichi_patches import (
     check_real_functions,
+    code_options,
     has_pending_fields,
     keep_kernels_apart,
     let_any_number_of_threads_run,
@@ -228,7 +229,8 @@ def _start(arch: ArchName, reason: str, threads: int, cores: tuple[int, ...], is
     _first_field = ti.field(ti.i32, ())
     ti.lang.impl.get_runtime().materialize()  # once, by the first kernel otherwise, in whichever thread
     if has_known:
-        FIRST_LAUNCHES.open(KnownKernels(kernel_folder(), keep_kernels_apart(VERSION)))
+        keep_kernels_apart(VERSION)
+        FIRST_LAUNCHES.open(KnownKernels(kernel_folder(), code_options()))
     _process = os.getpid()
     atexit.register(_end)
     _device = Device(arch=arch, threads=threads if arch == "cpu" else 1, reason=reason)

@@ -27,8 +27,8 @@ from taichi_soft.core.subnormals import without_subnormals
 from taichi_soft.core.threads import in_turn
 
 __all__ = [
-    "MOST_THREADS",
     "check_real_functions",
+    "code_options",
     "has_pending_fields",
     "keep_kernels_apart",
     "let_any_number_of_threads_run",
@@ -40,7 +40,7 @@ __all__ = [
     "tree_of",
 ]
 
-MOST_THREADS = 1 << 20
+_MOST_THREADS = 1 << 20
 """Of which kernels may make use: no machine has as many."""
 
 # A `ti.real_func` is compiled once and by itself, where a `ti.func` is copied to wherever it is called. But
@@ -121,7 +121,7 @@ def let_threads_in(lay_out_now: Callable[[Callable[[bool], None], bool], None]) 
 
 def let_any_number_of_threads_run() -> None:
     """Taichi 1.7 compiles into each parallel loop how many threads may run it: as many as the machine has.
-    Another machine would not find that kernel, or run it on too few. Here it is `MOST_THREADS`, of which
+    Another machine would not find that kernel, or run it on too few. Here it is `_MOST_THREADS`, of which
     Taichi takes those that it has started."""
     builder, given = ti._lib.core.ASTBuilder, threading.local()
     parallelize = builder.parallelize
@@ -136,7 +136,7 @@ def let_any_number_of_threads_run() -> None:
             if getattr(given, "within", None) is ti.lang.impl.get_runtime().compiling_callable:
                 given.within = None
             else:
-                parallelize(self, MOST_THREADS)
+                parallelize(self, _MOST_THREADS)
             return begin(self, *arguments)
 
         return begin_loop
@@ -147,15 +147,20 @@ def let_any_number_of_threads_run() -> None:
         setattr(builder, name, opening(getattr(builder, name)))
 
 
-def keep_kernels_apart(version: str) -> str:
+def keep_kernels_apart(version: str) -> None:
     """Have Taichi, which runs already, look for kernels under another key in each version of the package.
 
     A key has in it on how many threads a kernel may run. That is from now on a number that no machine
     reaches, made of the version.
-    Returns: all options of Taichi's that code depends on.
     """
+    ti.lang.impl.current_cfg().cpu_max_num_threads = (
+        _MOST_THREADS + zlib.crc32(version.encode()) % _MOST_THREADS
+    )
+
+
+def code_options() -> str:
+    """All options with which Taichi runs that code depends on."""
     config = ti.lang.impl.current_cfg()
-    config.cpu_max_num_threads = MOST_THREADS + zlib.crc32(version.encode()) % MOST_THREADS
     names = [name for name in dir(config) if not name.startswith(("_", "offline_cache", "print_", "verbose"))]
     numbers = {name: getattr(config, name) for name in names if name != "num_compile_threads"}
     return str({name: value for name, value in numbers.items() if isinstance(value, (bool, int, float))})

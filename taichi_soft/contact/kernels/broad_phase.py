@@ -217,10 +217,10 @@ def note_way(state: ti.template(), body: ti.i32, shared: ti.math.vec3):
             for lane in range(LANES):
                 state.soft.particle_gone[first + lane] = gone[lane]
         else:
-            last = 0
-            while last < count:
-                state.soft.particle_gone[first + last] = gone[last]
-                last = row_behind(last)
+            lane = 0
+            while lane < count:
+                state.soft.particle_gone[first + lane] = gone[lane]
+                lane = row_behind(lane)
         farthest = ti.max(farthest, gone)
         first = (first + LANES) & ROW_BITS  # as `row_behind`, block by block
     state.soft.body_gone[body] = farthest.max()
