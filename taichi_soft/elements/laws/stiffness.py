@@ -14,8 +14,8 @@ from taichi_soft.core.math.tensors import determinant, symmetric_part, transpose
 from taichi_soft.core.runtime import ti
 from taichi_soft.elements.laws.principal import hooke_principal
 
-CLOSE = 1.0e-3
-"""Stretches nearer to each other share a limit: their difference would be rounding."""
+CLOSE = 2.0e-3
+"""Part of the larger of two stretches: nearer to each other they share a limit, not to divide by rounding."""
 
 
 @ti.func
@@ -45,12 +45,14 @@ def shear_and_rotation(sa, sb, pa, pb, along, largest, projected: ti.template())
     """Sum and difference halves alpha, beta of a pair's shear and rotation stiffness [Pa].
 
     Args:
+        sa, sb: stretches, sa >= |sb| as `signed_svd` has them.
+        pa, pb: stress along them [Pa].
         along: limit of the shear stiffness for equal stretches.
-        largest: bound of the rotation stiffness, which has a pole where sa = -sb.
+        largest: bound of the rotation stiffness, which near sa = -sb is one rounding by another.
     """
     gap, total = sa - sb, sa + sb
     shear = along
-    if ti.abs(gap) > CLOSE * (ti.abs(sa) + ti.abs(sb)):
+    if gap > CLOSE * sa:
         shear = (pa - pb) / gap
     rotation = (pa + pb) / ti.max(total, 1e-9)
     if ti.static(projected):
@@ -63,10 +65,9 @@ def shear_and_rotation(sa, sb, pa, pb, along, largest, projected: ti.template())
 def weighed_rows(rest_inverse):
     """Rows of A^-1 that take a move of each vertex to F (four vec3), times the root of the volume at rest.
 
-    Zero for the lanes that pad a block, which have no volume.
+    Zero for the lanes that pad a block, whose rows are.
     """
-    inverse_volume6 = determinant(rest_inverse)
-    root = ti.select(inverse_volume6 > 0.0, 1.0 / ti.sqrt(6.0 * ti.max(inverse_volume6, 1e-37)), 0.0)
+    root = 1.0 / ti.sqrt(6.0 * ti.max(determinant(rest_inverse), 1e-37))
     rows = transposed(rest_inverse)
     g1, g2, g3 = rows[0] * root, rows[1] * root, rows[2] * root
     return -(g1 + g2 + g3), g1, g2, g3

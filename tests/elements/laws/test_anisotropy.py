@@ -253,6 +253,43 @@ def test_the_projected_system_is_symmetric_and_never_negative(law, strain, flips
     np.testing.assert_allclose(K, exact, atol=1e-6 * np.abs(K).max())
 
 
+@pytest.mark.parametrize("stretches", [(1.3, 0.9, 0.7), (1.2, 0.8, 0.03), (1.2, 1.1, -0.8)])
+@pytest.mark.parametrize(("law", "strain", "flips"), [mode for mode in MODES if mode[0] == "virial"])
+def test_the_projected_system_holds_the_rotation_and_counts_what_pulls(law, strain, flips, stretches):
+    """V [M B_i^T C B_j M^T + (g_i . T g_j) I] of F = R U, with M M^T = R cof(U) R^T, or det(U) I where the
+    strain is linear, and T the positive part of S cof(U)^2 / det(U), det(U) at least 1/20. What comes back
+    from inside out has the modulus that brings it back."""
+    rng = np.random.default_rng(6)
+    mesh = oracle.ONE_TET
+    material = any_material(mesh, rng)
+    matrix, frame = material.stiffness.matrix, material.frame[0]
+    left, right = oracle.rotation(rng), oracle.rotation(rng)
+    F = left * stretches @ right
+    s = np.abs(stretches)
+    R = left * np.sign(stretches) @ right
+    of_axes = lambda values: right.T * values @ right  # noqa: E731
+    area = s.prod() / s
+    M = R @ (of_axes(np.sqrt(area)) if strain == "exact" else np.sqrt(s.prod()) * I3)
+    S = stress_in(frame, matrix, of_axes(s - 1 if strain == "exact" else (s**2 - 1) / 2))
+    T = S @ of_axes(area**2) / max(s.prod(), 0.05)
+    values, axes = np.linalg.eigh((T + T.T) / 2)
+    T = (axes * np.maximum(values, 0)) @ axes.T
+    if flips == "recover" and stretches[2] < 0:
+        M, T = 0 * I3, mean_wave_modulus(matrix) * I3
+    inverse = np.linalg.inv((mesh.vertices[1:] - mesh.vertices[0]).T)
+    g = np.vstack([-inverse.sum(axis=0), inverse])
+    expected = np.zeros((4, 3, 4, 3))
+    for i, j in np.ndindex(4, 4):
+        N = [
+            stress_in(frame, matrix, (np.outer(unit, g[j]) + np.outer(g[j], unit)) / 2) @ g[i] for unit in I3
+        ]
+        expected[i, :, j] = M @ np.transpose(N) @ M.T + g[i] @ T @ g[j] * I3
+    expected *= -oracle.signed_volume(mesh.vertices)
+    options = {"law": law, "strain": strain, "flips": flips}
+    found = force_gradient(mesh, material, mesh.vertices @ F.T, **options, projected=True)
+    np.testing.assert_allclose(found, expected, atol=1e-9 * np.abs(expected).max())
+
+
 @pytest.mark.parametrize("law", ["virial", "st_venant_kirchhoff"])
 def test_implicit_euler_holds_a_hanging_bar_of_wood_at_the_length_of_its_modulus(law):
     """Its own weight stretches it by rho g L^2 / (2 E) along the grain."""

@@ -4,7 +4,7 @@ import bond_meshes
 import bond_oracle as bonds
 import numpy as np
 import pytest
-from force_oracle import MESHES
+from force_oracle import MESHES, ONE_TET, rotation, signed_volume
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -168,6 +168,50 @@ def test_the_projected_system_is_symmetric_and_never_negative(mode, pose):
     if pose == "at rest" and law != "volume_springs":
         exact = -force_gradient(BALL, MATERIAL, x, **options).reshape(size, size)
         np.testing.assert_allclose(K, exact, atol=1e-6 * np.abs(K).max())
+
+
+def piola(law_options, material, F):
+    """P of ONE_TET deformed by F [Pa], from its forces f_i = -V P g_i, g_i the rows of A^-1."""
+    rest = ONE_TET.vertices
+    forces = internal_forces(ONE_TET, material, rest @ F.T, **law_options)
+    return -forces[1:].T @ (rest[1:] - rest[0]) / signed_volume(rest)
+
+
+STRETCHES = {
+    "shaken": (1.2, 0.9, 0.8),
+    "pressed": (1.1, 0.9, 0.3),
+    "drawn out": (6.0, 5.5, 1.5),
+    "inside out": (1.2, 0.9, -0.7),
+    "nearly flat": (1.2, 0.7, -0.02),
+}
+
+
+@pytest.mark.parametrize("poisson", [0.3, -0.3])
+@pytest.mark.parametrize("stretches", STRETCHES.values(), ids=STRETCHES)
+@pytest.mark.parametrize(("law", "strain", "flips"), SOLID, ids=SOLID_IDS)
+def test_the_projected_system_is_the_positive_part_of_dp_by_df(law, strain, flips, stretches, poisson):
+    """Of its symmetric part, by differences of the stress; against turning, 10 (2 mu + |lambda|) at most."""
+    options = {"law": law, "strain": strain, "flips": flips}
+    material = Material(1e6, poisson, 1000.0)
+    rng = np.random.default_rng(4)
+    U, V = rotation(rng), rotation(rng)
+    F, h = U * stretches @ V.T, 1e-4
+    H = np.zeros((9, 9))
+    for k, unit in enumerate(np.eye(9).reshape(9, 3, 3)):
+        for step, weight in ((1, 2 / 3), (-1, -2 / 3), (2, -1 / 12), (-2, 1 / 12)):
+            H[:, k] += weight / h * piola(options, material, F + step * h * unit).ravel()
+    H = (H + H.T) / 2
+    for a, b in ((0, 1), (0, 2), (1, 2)):
+        turn = (np.outer(U[:, a], V[:, b]) - np.outer(U[:, b], V[:, a])).ravel() / np.sqrt(2)
+        largest = 10 * (2 * material.lame_mu + abs(material.lame_lambda))
+        H -= max(turn @ H @ turn - largest, 0) * np.outer(turn, turn)
+    values, axes = np.linalg.eigh(H)
+    H = (axes * np.maximum(values, 0)) @ axes.T
+    inverse = np.linalg.inv((ONE_TET.vertices[1:] - ONE_TET.vertices[0]).T)
+    g = np.vstack([-inverse.sum(axis=0), inverse])
+    expected = -signed_volume(ONE_TET.vertices) * np.einsum("ia,jb,kalb->ikjl", g, g, H.reshape((3,) * 4))
+    found = force_gradient(ONE_TET, material, ONE_TET.vertices @ F.T, **options, projected=True)
+    np.testing.assert_allclose(found, expected, atol=1e-6 * np.abs(expected).max())
 
 
 def test_the_stiffness_of_the_thesis_is_not_symmetric_away_from_rest():
