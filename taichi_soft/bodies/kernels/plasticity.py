@@ -6,7 +6,7 @@ determinant 1. P is taken from it, so nothing but `tet_rest_inverse` changes. Se
 
 from taichi_soft.bodies.status import ACTIVE
 from taichi_soft.core.constants import LANES
-from taichi_soft.core.math.eigen import symmetric_eigen
+from taichi_soft.core.math.eigen import from_axes, symmetric_eigen
 from taichi_soft.core.math.tensors import (
     cofactor,
     determinant,
@@ -20,7 +20,6 @@ from taichi_soft.core.math.tensors import (
 from taichi_soft.core.math.tetrahedron import shape
 from taichi_soft.core.runtime import ti
 from taichi_soft.elements.kernels.elastic import particles_of, rest_inverse_of
-from taichi_soft.elements.laws.strain import from_axes
 
 _ROUNDS = 12
 """Of the search for the strain at yield; from twice its length it is exact to float32 after eight."""

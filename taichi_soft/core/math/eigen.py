@@ -61,3 +61,14 @@ def symmetric_eigen(columns):
         values = values.yxz
         a, b = b, a
     return values, (a, b, a.cross(b))
+
+
+@ti.func
+def from_axes(values, axes):
+    """The symmetric matrix with these eigenvalues (vec3) and unit eigenvectors, as columns."""
+    a, b, c = axes[0] * values.x, axes[1] * values.y, axes[2] * values.z
+    return (
+        a * axes[0].x + b * axes[1].x + c * axes[2].x,
+        a * axes[0].y + b * axes[1].y + c * axes[2].y,
+        a * axes[0].z + b * axes[1].z + c * axes[2].z,
+    )

@@ -11,7 +11,7 @@ by its form: the stiffness C, turned with R and weighed as the deformed areas we
 Gross 2004, Interactive virtual materials), and what tension adds to it.
 """
 
-from taichi_soft.core.math.eigen import symmetric_eigen
+from taichi_soft.core.math.eigen import from_axes, symmetric_eigen
 from taichi_soft.core.math.polar import orthogonal_factor
 from taichi_soft.core.math.tensors import (
     cofactor,
@@ -55,7 +55,7 @@ def held_stiffness(model: ti.template(), F, stiffness):
     weight = ti.sqrt(ti.max(values, 0.0))
     if ti.static(model.strain != Strain.EXACT):  # d eps = sym(U dU), and U cof(U) = det(U) I
         weight = weight * 0.0 + ti.sqrt(ti.max(determinant(U), 0.0))
-    W = product((A[0] * weight.x, A[1] * weight.y, A[2] * weight.z), transposed(A))
+    W = from_axes(weight, A)
     S = _stress_in_rest_axes(model, F, U, stiffness)
     tension = positive_part(product(S, product(others, others)))
     a, b, c = plus(tension, 1.0 / ti.max(determinant(U), FLATTEST), tension, 0.0)

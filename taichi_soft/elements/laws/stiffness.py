@@ -8,7 +8,7 @@ not symmetric.) Projected, the block is symmetrised and nothing is negative: the
 definite for every pose, which conjugate gradients need.
 """
 
-from taichi_soft.core.math.eigen import symmetric_eigen
+from taichi_soft.core.math.eigen import from_axes, symmetric_eigen
 from taichi_soft.core.math.svd import signed_svd
 from taichi_soft.core.math.tensors import determinant, symmetric_part, transposed
 from taichi_soft.core.runtime import ti
@@ -31,13 +31,7 @@ def principal(model: ti.template(), s, lame_lambda, lame_mu):
 def positive_part(columns):
     """The nearest positive semi-definite matrix to the symmetric part, as columns."""
     values, axes = symmetric_eigen(symmetric_part(columns))
-    x, y, z = ti.max(values.x, 0.0), ti.max(values.y, 0.0), ti.max(values.z, 0.0)
-    u, v, w = axes[0], axes[1], axes[2]
-    return (
-        u * (x * u.x) + v * (y * v.x) + w * (z * w.x),
-        u * (x * u.y) + v * (y * v.y) + w * (z * w.y),
-        u * (x * u.z) + v * (y * v.z) + w * (z * w.z),
-    )
+    return from_axes(ti.max(values, 0.0), axes)
 
 
 @ti.func

@@ -25,14 +25,3 @@ def linear_strain(F):
 def exact_strain(F):
     """U - I with U = sqrt(F F^T) = F R^T, the root that thesis chapter 7 leaves open. Blind to flips."""
     return scaled_plus_identity(symmetric_part(product(F, transposed(orthogonal_factor(F)))), 1.0, -1.0)
-
-
-@ti.func
-def from_axes(values, axes):
-    """The symmetric matrix with these principal values, as columns."""
-    a, b, c = axes[0] * values.x, axes[1] * values.y, axes[2] * values.z
-    return (
-        a * axes[0].x + b * axes[1].x + c * axes[2].x,
-        a * axes[0].y + b * axes[1].y + c * axes[2].y,
-        a * axes[0].z + b * axes[1].z + c * axes[2].z,
-    )
