@@ -144,6 +144,27 @@ def test_a_watch_fires_just_below_the_stress_of_the_law_and_not_above_it(name, s
         np.testing.assert_allclose(np.abs(events[1].normals @ turned[:, 0]), 1.0, atol=1e-5)
 
 
+SHEARED = {
+    "pulled two ways": [[1.3, 0.1, 0.0], [0.0, 1.25, -0.1], [0.0, 0.0, 0.9]],
+    "pulled and sheared": [[1.2, 0.3, 0.1], [0.0, 1.0, 0.2], [0.1, 0.0, 0.9]],
+    "pressed one way": [[1.1, 0.0, 0.1], [0.1, 1.1, 0.0], [0.0, 0.0, 0.7]],
+}
+
+
+@pytest.mark.parametrize("F", SHEARED.values(), ids=SHEARED)
+def test_a_watch_for_tearing_finds_the_largest_principal_stress_of_any_stress(F, still):
+    """And the direction in which it pulls: of the matrix from `stresses`, by NumPy."""
+    body = deform(still, "virial", F)
+    pulls, axes = np.linalg.eigh(body.stresses()[0])
+    assert pulls[2] > 0
+    for part, count in ((1.001, 0), (0.999, 1)):
+        body.watch_tearing(part * pulls[2])
+        events = look(still)
+        assert len(events) == count
+    np.testing.assert_allclose(events[0].stress, pulls[2], rtol=1e-4)
+    np.testing.assert_allclose(np.abs(events[0].normals @ axes[:, 2]), 1.0, atol=1e-5)
+
+
 @pytest.mark.parametrize("name", CASES)
 def test_the_force_across_a_plane_is_the_stress_on_its_section(name, still, turned):
     """sigma n A of a cube sheared and stretched evenly: a plane through its middle cuts out a square of F."""
