@@ -280,9 +280,8 @@ def test_the_projected_system_holds_the_rotation_and_counts_what_pulls(law, stra
     g = np.vstack([-inverse.sum(axis=0), inverse])
     expected = np.zeros((4, 3, 4, 3))
     for i, j in np.ndindex(4, 4):
-        N = [
-            stress_in(frame, matrix, (np.outer(unit, g[j]) + np.outer(g[j], unit)) / 2) @ g[i] for unit in I3
-        ]
+        by_move = [(np.outer(unit, g[j]) + np.outer(g[j], unit)) / 2 for unit in I3]
+        N = [stress_in(frame, matrix, eps) @ g[i] for eps in by_move]
         expected[i, :, j] = M @ np.transpose(N) @ M.T + g[i] @ T @ g[j] * I3
     expected *= -oracle.signed_volume(mesh.vertices)
     options = {"law": law, "strain": strain, "flips": flips}
