@@ -39,11 +39,12 @@ def heap():
     world = World(soft_contact=True, sleep_speed=0.4, collider_room=10)
     ball = SoftBodyAsset(sphere(radius=0.25, resolution=3), RUBBER, contact=Contact(thickness=0.005))
     brick = SoftBodyAsset(box((0.5, 0.4, 0.3), (3, 2, 2)), RUBBER)
-    for asset, count in ((ball, 5), (brick, 4)):
+    for asset, count in ((ball, 5), (brick, 5)):
         world.reserve(asset, count)
     for i in range(3):
         world.spawn(ball, position=(0.05 * i, 0.03 * i, 0.9 + 0.6 * i))
         world.spawn(brick, position=(1.2, 0.02 * i, 0.3 + 0.4 * i))
+    world.spawn(brick, position=(-4.0, -4.0, 0.16))  # far from all others: it sleeps soon
     world.add_collider(BoxShape((1.0, 1.0, 0.3)), position=(0.0, 0.0, 0.2))
     world.add_collider(SphereShape(0.2), position=(3.0, 0.0, 0.5))
     world.add_collider(PlaneShape((-1.0, 0.0, 0.2)), position=(2.5, 0.0, 0.0))
@@ -52,7 +53,7 @@ def heap():
 
 
 def heap_game():
-    """Colliders: 0 the lift, 1 a ball, 2 a wall, 3 the floor. Slots: 0 to 4 balls, 5 to 8 bricks."""
+    """Colliders: 0 the lift, 1 a ball, 2 a wall, 3 the floor. Slots: 0 to 4 balls, 5 to 9 bricks, 8 apart."""
     rng = np.random.default_rng(7)
     for i in range(STEPS):
         if i in (0, 450, 470, 490):
@@ -80,6 +81,7 @@ def heap_game():
         if i in (170, 310):
             yield line("impulse", 1, (5.0, 0.0, 20.0), [])
             yield line("impulse", 5, (0.0, 3.0, 10.0), [3, 0, 1, 2])
+            yield line("impulse", 8, (0.0, 0.0, 30.0), [])
             yield line("force", 2, (0.0, 0.0, 400.0), [])
         if i in (130, 360):
             for kind, size in enumerate(((1, 1, 1), (0.2, 0, 0), (0.4, 0.3, 0.2), (0.1, 0.5, 0))):
