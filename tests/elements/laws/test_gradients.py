@@ -1,5 +1,7 @@
 """How forces change: exact gradients against differences of the forces, and what conjugate gradients see."""
 
+from itertools import permutations
+
 import bond_meshes
 import bond_oracle as bonds
 import numpy as np
@@ -213,6 +215,43 @@ def test_the_projected_system_is_the_positive_part_of_dp_by_df(law, strain, flip
     expected = -signed_volume(ONE_TET.vertices) * np.einsum("ia,jb,kalb->ikjl", g, g, H.reshape((3,) * 4))
     found = force_gradient(ONE_TET, material, ONE_TET.vertices @ F.T, **options, projected=True)
     np.testing.assert_allclose(found, expected, atol=1e-6 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("pose", ["pressed to half", "shaken", "inside out"])
+@pytest.mark.parametrize("law", PAIRWISE)
+def test_the_projected_system_of_springs_is_that_of_each_and_the_positive_part_of_each_volume(law, pose):
+    """A pressed spring releases nothing by turning. A volume pulls its corners with w for each part by which
+    it has grown, g as they move: of w g^T counts the symmetric part, and of that by NumPy the positive one."""
+    rng = np.random.default_rng(6)
+    count = len(BALL.tets)
+    E, nu = rng.uniform(1e5, 1e6, count), rng.uniform(0.1, 0.4, count)
+    x = POSES[pose](BALL.vertices, rng)
+    expected = np.zeros((*x.shape, *x.shape))
+    for p, q in BALL.edges.tolist():
+        r = x[q] - x[p]
+        n, length = bonds.unit(r), np.linalg.norm(r)
+        pull = getattr(bonds, law.removesuffix("s"))(BALL, p, q, x, E, nu) @ n
+        along = bonds.mean_over(BALL, p, q, E) * bonds.edge_area(BALL, p, q) / bonds.rest_length(BALL, p, q)
+        across = max(pull / length, 0.0)
+        block = along * np.outer(n, n) + across * (np.eye(3) - np.outer(n, n))
+        for i, j, sign in ((p, p, 1), (q, q, 1), (p, q, -1), (q, p, -1)):
+            expected[i, :, j] += sign * block
+    for t, tet in enumerate(BALL.tets) if law == "volume_springs" else ():
+        corners, before = x[tet], signed_volume(BALL.vertices[tet])
+        w, g = np.zeros((4, 3)), np.zeros((4, 3))
+        for i, j in permutations(range(4), 2):
+            area = bonds.edge_area(BALL, int(tet[i]), int(tet[j]))
+            w[i] -= E[t] * nu[t] * area * bonds.unit(corners[j] - corners[i])
+        for k in np.ndindex(4, 3):  # the volume is linear in each coordinate
+            moved = corners.copy()
+            moved[k] += 1e-3
+            g[k] = (abs(signed_volume(moved)) - abs(signed_volume(corners))) / (1e-3 * before)
+        part = np.outer(w, g)
+        values, axes = np.linalg.eigh((part + part.T) / 2)
+        part = (axes * np.maximum(values, 0)) @ axes.T
+        expected[np.ix_(tet, range(3), tet, range(3))] += part.reshape(4, 3, 4, 3)
+    found = -force_gradient(BALL, Material(E, nu, 1000.0), x, law=law, projected=True)
+    np.testing.assert_allclose(found, expected, atol=1e-8 * np.abs(expected).max())
 
 
 def test_the_stiffness_of_the_thesis_is_not_symmetric_away_from_rest():
