@@ -158,12 +158,11 @@ class SoftBodyAsset:
                 raise OptionError(f"level {level} must have the hull of the finest")
             if self.description.bonds is not None:
                 raise OptionError(f"law {self.law!r} has no levels of detail: it looks at edges")
-            self._require_coarser(level, each)
+            self._require_coarser((self, *self.coarser)[level - 1], each, level)
         return tuple(self.coarser)
 
-    def _require_coarser(self, level: int, asset: SoftBodyAsset) -> None:
+    def _require_coarser(self, before: SoftBodyAsset, asset: SoftBodyAsset, level: int) -> None:
         """Raises: MeshError for a level that is not coarser than the one before, or of something else."""
-        before = (self, *self.coarser)[level - 1]
         room, needed = room_of(self.arrays, 0), room_of(asset.arrays, 0)
         if len(asset.mesh.tets) >= len(before.mesh.tets) or any(
             n > m for n, m in zip(needed, room, strict=True)
@@ -212,8 +211,12 @@ class SoftBodyAsset:
             held = mesh.vertices[:, None] - self.mesh.vertices[self.description.pinned]
             pinned = np.unique((held**2).sum(axis=2).argmin(axis=0)) if held.shape[1] else ()
             bare = SoftBodyAsset(mesh, material, pinned=pinned, **plain)
-            levels.append(replace(bare, material=calibrated(self.description, bare.description)))
-        return replace(self, coarser=tuple(levels))
+            self._require_coarser((self, *levels)[-1], bare, len(levels) + 1)
+            levels.append(bare)
+        # Takes seconds: only now that no mesh is refused.
+        materials = calibrated(self.description, [each.description for each in levels])
+        fitted = (replace(each, material=its) for each, its in zip(levels, materials, strict=True))
+        return replace(self, coarser=tuple(fitted))
 
     def _require_hull(self) -> None:
         if not isinstance(self.mesh, TetMesh):

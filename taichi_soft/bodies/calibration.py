@@ -9,6 +9,7 @@ goes with its modulus. Of all moduli with the right frequencies those are taken 
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -45,16 +46,21 @@ MOST_CHANGE = 3.0
 """Of a modulus, as a factor beside that of all of them: beyond, the body would be of another kind."""
 
 
-def calibrated(fine: BodyDescription, coarse: BodyDescription) -> Material:
-    """The material of `coarse` that gives it the mass and the lowest frequencies of `fine`.
+def calibrated(fine: BodyDescription, coarser: Sequence[BodyDescription]) -> list[Material]:
+    """The materials of coarser bodies that give each the mass and the lowest frequencies of `fine`.
 
     Args: bodies of one material with a number for each constant.
-    Returns: with a Young's modulus for each tetrahedron.
+    Returns: each with a Young's modulus for each tetrahedron.
     """
+    wanted, _ = lowest_modes(fine, MODES, EXACT)
+    return [_fitted(wanted, fine.masses.sum(), each) for each in coarser]
+
+
+def _fitted(wanted: Floats, mass: float, coarse: BodyDescription) -> Material:
+    """The material of `coarse` with which it has these angular frequencies [rad/s] and this mass [kg]."""
     material = coarse.material
     assert isinstance(material, Material)
-    density = material.density * fine.masses.sum() / coarse.masses.sum()
-    wanted, _ = lowest_modes(fine, MODES, EXACT)
+    density = material.density * mass / coarse.masses.sum()
     factors = np.zeros(len(coarse.mesh.tets))  # logarithms
     best, least = coarse.material, np.inf
     for _ in range(MOST_UPDATES):

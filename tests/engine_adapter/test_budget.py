@@ -5,6 +5,7 @@ The clock is ours: a step takes as long as the tetrahedra that move in it say.
 """
 
 import warnings
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -14,13 +15,21 @@ import trimesh
 from engine_adapter import EngineAdapter, FixedStep
 from taichi_soft import Body, Material, OptionError, SoftBodyAsset, StateError, World
 
-KIND = SoftBodyAsset.from_surface(
-    trimesh.creation.icosphere(subdivisions=3, radius=0.4), Material(1e5, 0.4, 1000.0), cells=(6, 4, 3)
-)
-SIZES = [len(level.mesh.tets) for level in KIND.levels]
 COUNT = 6
 EYE = np.array([-10.0, 0.0, 0.5])
 DRIFT = np.array([0.0, 0.1, 0.0])  # [m/s]: who stands still skips steps
+
+
+@cache
+def kind():
+    """A ball of three levels: not made while tests are only collected."""
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.4)
+    return SoftBodyAsset.from_surface(ball, Material(1e5, 0.4, 1000.0), cells=(6, 4, 3))
+
+
+def size(level):
+    """Tetrahedra of a ball."""
+    return len(kind().levels[level].mesh.tets)
 
 
 class Clock:
@@ -55,8 +64,8 @@ def clock(monkeypatch):
 def row_of(clock, count=COUNT, apart=2.0, soft_contact=False, **options):
     """Balls in a row that drift side by side, the first nearest to the eye."""
     world = World(gravity=(0, 0, 0), floor=None, soft_contact=soft_contact)
-    world.reserve(KIND, count)
-    bodies = [world.spawn(KIND, position=(apart * i, 0.0, 0.4), velocity=DRIFT) for i in range(count)]
+    world.reserve(kind(), count)
+    bodies = [world.spawn(kind(), position=(apart * i, 0.0, 0.4), velocity=DRIFT) for i in range(count)]
     world.build()
     clock.world = world
     game = EngineAdapter(world, FixedStep(dt=1 / 60), **options)
@@ -68,7 +77,7 @@ def levels(bodies):
 
 
 def test_twice_the_load_that_fits_comes_inside_the_budget_the_farthest_coarser_first(clock):
-    budget = 1e3 * clock.per_tet * COUNT * SIZES[0] / 2
+    budget = 1e3 * clock.per_tet * COUNT * size(0) / 2
     game, bodies = row_of(clock, budget_ms=budget)
     game.see_from(EYE)
     for _ in range(200):
@@ -83,7 +92,7 @@ def test_twice_the_load_that_fits_comes_inside_the_budget_the_farthest_coarser_f
 
 
 def test_levels_stand_still_once_the_budget_is_met(clock):
-    game, bodies = row_of(clock, budget_ms=1e3 * clock.per_tet * COUNT * SIZES[0] / 2)
+    game, bodies = row_of(clock, budget_ms=1e3 * clock.per_tet * COUNT * size(0) / 2)
     for _ in range(100):
         game.step()
     seen = set()
@@ -94,7 +103,7 @@ def test_levels_stand_still_once_the_budget_is_met(clock):
 
 
 def test_detail_comes_back_the_nearest_first_when_there_is_time(clock):
-    game, bodies = row_of(clock, budget_ms=1e3 * clock.per_tet * COUNT * SIZES[0] / 2)
+    game, bodies = row_of(clock, budget_ms=1e3 * clock.per_tet * COUNT * size(0) / 2)
     game.see_from(EYE)
     for _ in range(60):
         game.step()
@@ -111,7 +120,7 @@ def test_detail_comes_back_the_nearest_first_when_there_is_time(clock):
 
 
 def test_what_moves_away_is_lowered_in_place_of_what_came_near(clock):
-    game, bodies = row_of(clock, budget_ms=1e3 * clock.per_tet * COUNT * SIZES[0] / 2)
+    game, bodies = row_of(clock, budget_ms=1e3 * clock.per_tet * COUNT * size(0) / 2)
     game.see_from(-EYE + np.array([20.0, 0.0, 0.0]))
     for _ in range(60):
         game.step()
@@ -120,7 +129,7 @@ def test_what_moves_away_is_lowered_in_place_of_what_came_near(clock):
 
 
 def test_a_budget_that_cannot_be_met_is_told(clock):
-    game, bodies = row_of(clock, budget_ms=1e3 * clock.per_tet * SIZES[2] / 2)
+    game, bodies = row_of(clock, budget_ms=1e3 * clock.per_tet * size(2) / 2)
     for _ in range(60):
         game.step()
     assert levels(bodies) == [2] * COUNT
@@ -138,7 +147,7 @@ def assert_moves_at_least_at_a_quarter(skipped):
 
 def test_the_farthest_skip_steps_where_all_are_as_coarse_as_can_be(clock, monkeypatch):
     monkeypatch.setattr("engine_adapter.budget.perf_counter", lambda: 0.0)  # deciding takes no time
-    budget = 1e3 * clock.per_tet * COUNT * SIZES[2]
+    budget = 1e3 * clock.per_tet * COUNT * size(2)
     game, bodies = row_of(clock, budget_ms=budget)
     game.see_from(EYE)
     for _ in range(100):
@@ -155,7 +164,7 @@ def test_the_farthest_skip_steps_where_all_are_as_coarse_as_can_be(clock, monkey
 
 
 def test_steps_fit_at_once_while_levels_change_one_by_one(clock, monkeypatch):
-    budget = 1e3 * clock.per_tet * COUNT * SIZES[0] / 2
+    budget = 1e3 * clock.per_tet * COUNT * size(0) / 2
     moments = iter(np.arange(1e4) * 0.3e-3 * budget)
     monkeypatch.setattr("engine_adapter.budget.perf_counter", lambda: next(moments))
     game, _ = row_of(clock, budget_ms=budget)
@@ -170,7 +179,7 @@ def test_steps_fit_at_once_while_levels_change_one_by_one(clock, monkeypatch):
 
 def test_skipping_ends_before_any_level_is_raised(clock, monkeypatch):
     monkeypatch.setattr("engine_adapter.budget.perf_counter", lambda: 0.0)  # deciding takes no time
-    game, bodies = row_of(clock, budget_ms=1e3 * clock.per_tet * COUNT * SIZES[2] * 0.85)
+    game, bodies = row_of(clock, budget_ms=1e3 * clock.per_tet * COUNT * size(2) * 0.85)
     game.see_from(EYE)
     for _ in range(100):
         game.step()
@@ -187,7 +196,7 @@ def test_skipping_ends_before_any_level_is_raised(clock, monkeypatch):
 
 
 def test_bodies_that_touch_skip_steps_together(clock):
-    budget = 1e3 * clock.per_tet * 4 * SIZES[2] * 0.85
+    budget = 1e3 * clock.per_tet * 4 * size(2) * 0.85
     game, bodies = row_of(clock, 4, 3.0, True, budget_ms=budget)
     game.see_from(EYE)
     x = bodies[2].positions()
@@ -202,7 +211,7 @@ def test_bodies_that_touch_skip_steps_together(clock):
 
 
 def test_what_is_held_keeps_its_level(clock):
-    game, bodies = row_of(clock, budget_ms=1e3 * clock.per_tet * COUNT * SIZES[2] / 2)
+    game, bodies = row_of(clock, budget_ms=1e3 * clock.per_tet * COUNT * size(2) / 2)
     hold = bodies[2].grab(0)
     for _ in range(60):
         game.step()
@@ -214,8 +223,9 @@ def test_what_is_held_keeps_its_level(clock):
     assert levels(bodies) == [2] * COUNT
 
 
-@pytest.mark.parametrize("budget", [COUNT * SIZES[0] / 2, COUNT * SIZES[2] * 0.85])
-def test_steps_that_are_made_again_get_the_levels_that_they_had(clock, budget):
+@pytest.mark.parametrize(("level", "part"), [(0, 0.5), (2, 0.85)])
+def test_steps_that_are_made_again_get_the_levels_that_they_had(clock, level, part):
+    budget = COUNT * size(level) * part
     game, bodies = row_of(clock, budget_ms=1e3 * clock.per_tet * budget, rewind_ticks=30)
     hashes = []
     for _ in range(20):
@@ -240,7 +250,7 @@ def test_steps_that_are_made_again_with_other_inputs_leave_what_is_held_then(clo
             held.append(world.bodies[-1].grab(0))
 
     game, bodies = row_of(
-        clock, budget_ms=1e3 * clock.per_tet * COUNT * SIZES[0] / 2, rewind_ticks=30, before_step=before_step
+        clock, budget_ms=1e3 * clock.per_tet * COUNT * size(0) / 2, rewind_ticks=30, before_step=before_step
     )
     while bodies[-1].level < 2:
         game.step()
@@ -273,13 +283,13 @@ def test_a_bad_budget_and_a_bad_place_are_refused(clock, value):
 
 def test_frozen_bodies_and_bodies_without_levels_are_left_alone(clock):
     world = World(retries=0)
-    plain = SoftBodyAsset(KIND.mesh, KIND.material)
-    world.reserve(KIND, 1)
+    plain = SoftBodyAsset(kind().mesh, kind().material)
+    world.reserve(kind(), 1)
     world.reserve(plain, 1)
-    one, other = world.spawn(KIND, position=(0, 0, 0.5)), world.spawn(plain, position=(3, 0, 0.5))
+    one, other = world.spawn(kind(), position=(0, 0, 0.5)), world.spawn(plain, position=(3, 0, 0.5))
     world.build()
     clock.world = world
-    far = KIND.mesh.vertices * np.array([40.0, 0.02, 30.0])
+    far = kind().mesh.vertices * np.array([40.0, 0.02, 30.0])
     one.set_motion(far, 1e3 * np.random.default_rng(0).normal(size=far.shape))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -295,7 +305,7 @@ def test_frozen_bodies_and_bodies_without_levels_are_left_alone(clock):
 
 
 def test_changes_that_take_long_are_spread_over_frames(clock, monkeypatch):
-    budget = 1e3 * clock.per_tet * COUNT * SIZES[0] / 2
+    budget = 1e3 * clock.per_tet * COUNT * size(0) / 2
     moments = iter(np.arange(1e4) * 1e-3 * budget)  # each look at the clock a whole budget after the last
     monkeypatch.setattr("engine_adapter.budget.perf_counter", lambda: next(moments))
     game, bodies = row_of(clock, budget_ms=budget)
@@ -309,7 +319,7 @@ def test_changes_that_take_long_are_spread_over_frames(clock, monkeypatch):
 
 
 def test_where_nothing_can_be_done_it_is_looked_now_and_then_only(clock, monkeypatch):
-    game, bodies = row_of(clock, budget_ms=1e3 * clock.per_tet * COUNT * SIZES[0] / 2)
+    game, bodies = row_of(clock, budget_ms=1e3 * clock.per_tet * COUNT * size(0) / 2)
     game.see_from(EYE)
     for _ in range(100):
         game.step()
@@ -324,7 +334,7 @@ def test_where_nothing_can_be_done_it_is_looked_now_and_then_only(clock, monkeyp
 
 def test_who_sleeps_is_not_woken_to_be_coarser(clock, monkeypatch):
     monkeypatch.setattr(Body, "is_asleep", property(lambda body: body.index == 2))
-    game, bodies = row_of(clock, budget_ms=1e3 * clock.per_tet * COUNT * SIZES[2] / 2)
+    game, bodies = row_of(clock, budget_ms=1e3 * clock.per_tet * COUNT * size(2) / 2)
     for _ in range(60):
         game.step()
     assert levels(bodies) == [2, 2, 0, 2, 2, 2]

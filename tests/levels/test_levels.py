@@ -1,5 +1,7 @@
 """Levels of detail: cages of several sizes that are the same body, and bodies that change over in motion."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 import trimesh
@@ -24,8 +26,18 @@ from taichi_soft import (
 RUBBER = Material(young=8e4, poisson=0.4, density=900.0)
 RING = trimesh.creation.torus(0.5, 0.2)
 BAR = [box((1.2, 0.3, 0.25), cells) for cells in ((16, 4, 4), (8, 3, 2), (5, 2, 2))]
-KIND = SoftBodyAsset.from_surface(RING, RUBBER, cells=(9, 6, 4))
 DT = 1 / 60
+
+
+@cache
+def ring():
+    """Its three levels: not made while tests are only collected, nor twice."""
+    return SoftBodyAsset.from_surface(RING, RUBBER, cells=(9, 6, 4))
+
+
+@cache
+def bar():
+    return SoftBodyAsset(BAR[0], RUBBER).with_coarser(*BAR[1:])
 
 
 def frequencies(mesh, young, density, count):
@@ -47,7 +59,7 @@ def inertia(body_or_mesh, masses, x):
 
 def test_coarser_bars_have_the_mass_and_the_lowest_frequencies_of_the_finest():
     """Others are faster: linear tetrahedra are stiff in bending."""
-    asset = SoftBodyAsset(BAR[0], RUBBER).with_coarser(*BAR[1:])
+    asset = bar()
     wanted = frequencies(BAR[0], RUBBER.young, RUBBER.density, 4)
     for mesh, level in zip(BAR[1:], asset.coarser, strict=True):
         made_of = level.material
@@ -60,27 +72,27 @@ def test_coarser_bars_have_the_mass_and_the_lowest_frequencies_of_the_finest():
 
 
 def test_cages_of_several_sizes_have_the_same_mass_and_centre_and_less_of_everything_else():
-    sizes = [len(level.mesh.tets) for level in KIND.levels]
+    sizes = [len(level.mesh.tets) for level in ring().levels]
     assert sizes == sorted(sizes, reverse=True)
     assert len(set(sizes)) == 3
-    first = KIND.description
-    center, spread = inertia(KIND, first.masses, first.mesh.vertices)
-    for level in KIND.coarser:
+    first = ring().description
+    center, spread = inertia(ring(), first.masses, first.mesh.vertices)
+    for level in ring().coarser:
         made_of = level.description
         own, other = inertia(level, made_of.masses, made_of.mesh.vertices)
         assert made_of.masses.sum() == pytest.approx(first.masses.sum(), rel=1e-9)
         assert np.abs(own - center).max() < 0.01
         assert np.abs(other - spread).max() < 0.02 * np.abs(spread).max()
-        assert level.skin == KIND.skin
+        assert level.skin == ring().skin
 
 
 @pytest.fixture
 def flying():
     """A body in the air that turns, drifts and wobbles."""
     world = World(floor=None)
-    world.reserve(KIND, 2)
+    world.reserve(ring(), 2)
     body = world.spawn(
-        KIND, position=(0.5, 0.0, 3.0), velocity=(2.0, -1.0, 0.5), angular_velocity=(3.0, 1.0, -4.0)
+        ring(), position=(0.5, 0.0, 3.0), velocity=(2.0, -1.0, 0.5), angular_velocity=(3.0, 1.0, -4.0)
     )
     world.build()
     x = body.positions().astype(np.float64)
@@ -104,7 +116,7 @@ def test_a_change_of_level_keeps_centre_momentum_and_angular_momentum(flying, wa
     for level in way:
         body.set_level(level)
         assert body.level == level
-        assert len(body.tets) == len(KIND.levels[level].mesh.tets)
+        assert len(body.tets) == len(ring().levels[level].mesh.tets)
     for name, was, now in zip(("centre", "momentum", "spin"), before, moments(body), strict=True):
         assert np.abs(now - was).max() < 2e-5 * np.abs(was).max(), name
 
@@ -112,7 +124,7 @@ def test_a_change_of_level_keeps_centre_momentum_and_angular_momentum(flying, wa
 def test_a_rigid_motion_passes_over_exactly_and_a_smooth_bend_nearly(flying):
     """A quadratic field, whose second derivatives both meshes see alike."""
     _, body = flying
-    rest = [level.mesh.vertices for level in KIND.levels]
+    rest = [level.mesh.vertices for level in ring().levels]
     turn, _ = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))
     turn *= np.sign(np.linalg.det(turn))
     far = np.array([1.0, 2.0, 3.0])
@@ -201,14 +213,14 @@ def test_what_was_pinned_at_a_coarse_level_is_held_at_the_finest(flying):
 def test_a_push_keeps_its_force_and_its_torque():
     """What it does in the next step is what it would have done: momentum and spin, without gravity."""
     world = World(gravity=(0, 0, 0), floor=None)
-    world.reserve(KIND, 1)
-    body = world.spawn(KIND, position=(0.3, 0.2, 1.0))
+    world.reserve(ring(), 1)
+    body = world.spawn(ring(), position=(0.3, 0.2, 1.0))
     world.build()
     before = world.snapshot()
     found = []
     for level in (0, 1, 2):
         world.restore(before)
-        body.apply_force((0.0, 4.0, 2.0), np.argsort(KIND.mesh.vertices[:, 0])[-20:])
+        body.apply_force((0.0, 4.0, 2.0), np.argsort(ring().mesh.vertices[:, 0])[-20:])
         body.set_level(level)
         world.step(DT)
         found.append(moments(body)[1:])
@@ -219,9 +231,8 @@ def test_a_push_keeps_its_force_and_its_torque():
 
 def hung_bar(two_way=False):
     """A bar of three levels, of which a frame holds the one end and another frame the other."""
-    asset = SoftBodyAsset(BAR[0], RUBBER).with_coarser(*BAR[1:])
     world = World(floor=None)
-    body = world.add_body(asset, position=(0, 0, 2))
+    body = world.add_body(bar(), position=(0, 0, 2))
     world.build()
     ends = [np.flatnonzero(BAR[0].vertices[:, 0] == end) for end in (-0.6, 0.6)]
     frames = [world.add_frame(position=(x, 0.1, 2), rotation=TURNED) for x in (-0.6, 0.6)]
@@ -316,7 +327,7 @@ def test_snapshots_and_recordings_know_the_level(flying):
     end = world.state_hash(), body.positions().copy()
     world.restore(fine)
     assert body.level == 0
-    assert len(body.tets) == len(KIND.mesh.tets)
+    assert len(body.tets) == len(ring().mesh.tets)
     body.set_level(2)
     assert world.snapshot() == coarse
     for _ in range(10):
@@ -359,9 +370,9 @@ def test_a_slot_that_a_coarse_body_leaves_is_fine_again_for_the_next(flying):
     world, body = flying
     body.set_level(2)
     world.despawn(body)
-    one = world.spawn(KIND, position=(0, 0, 9.0))
-    other = world.spawn(KIND, position=(5, 0, 9.0))
-    assert (one.index, one.level, len(one.tets)) == (body.index, 0, len(KIND.mesh.tets))
+    one = world.spawn(ring(), position=(0, 0, 9.0))
+    other = world.spawn(ring(), position=(5, 0, 9.0))
+    assert (one.index, one.level, len(one.tets)) == (body.index, 0, len(ring().mesh.tets))
     for _ in range(20):
         world.step(DT)
     apart = other.positions() - one.positions()
@@ -370,8 +381,8 @@ def test_a_slot_that_a_coarse_body_leaves_is_fine_again_for_the_next(flying):
 
 def test_levels_in_contact_change_back_and_forth_and_the_pile_stays_whole():
     world = World(soft_contact=True)
-    world.reserve(KIND, 3)
-    bodies = [world.spawn(KIND, position=(0.05 * i, 0, 0.3 + 0.5 * i)) for i in range(3)]
+    world.reserve(ring(), 3)
+    bodies = [world.spawn(ring(), position=(0.05 * i, 0, 0.3 + 0.5 * i)) for i in range(3)]
     world.build()
     rng = np.random.default_rng(7)
     for _ in range(240):
@@ -396,7 +407,7 @@ def test_a_material_of_its_own_bars_a_change(flying):
     body.set_material(Material(2e5, 0.3, 900.0))
     with pytest.raises(StateError, match="material of its own"):
         body.set_level(0)
-    body.set_material(KIND.levels[1].material)
+    body.set_material(ring().levels[1].material)
     with pytest.raises(StateError, match="material of its own"):
         body.set_level(0)
 
@@ -412,11 +423,11 @@ def test_a_level_that_there_is_not_is_refused(flying, level):
 
 def test_a_frozen_body_and_a_world_that_is_not_built_change_nothing():
     world = World(floor=None, retries=0)
-    body = world.add_body(KIND)
+    body = world.add_body(ring())
     with pytest.raises(StateError, match="not built"):
         body.set_level(1)
     world.build()
-    far = KIND.mesh.vertices * np.array([40.0, 0.02, 30.0])
+    far = ring().mesh.vertices * np.array([40.0, 0.02, 30.0])
     body.set_motion(far, 1e3 * np.random.default_rng(0).normal(size=far.shape))
     with pytest.warns(FrozenBodyWarning):
         world.step(0.5, substeps=1)
