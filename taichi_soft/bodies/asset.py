@@ -204,7 +204,7 @@ class SoftBodyAsset:
             name: getattr(self, name)
             for name in ("law", "strain", "flips", "damping_model", "contact", "skin", "hull")
         }
-        levels = []
+        levels: list[SoftBodyAsset] = []
         for mesh in meshes:
             if not isinstance(mesh, TetMesh):
                 raise MeshError(f"a level of detail must be a TetMesh, got {mesh!r}")

@@ -205,10 +205,12 @@ def test_a_neo_hookean_tetrahedron_rolls_back_to_its_shape_from_any_pose(seed, n
     x = rng.normal(size=(4, 3))
     for _ in range(2500):
         force = internal_forces(mesh, material, x, law="neo_hookean")
+        if np.abs(force).max() < 1e-6:
+            break
         x = x + force * min(0.2, 0.05 / np.abs(force).max())
     rest = mesh.vertices[1:] - mesh.vertices[0]
     stretches = np.linalg.svd(np.linalg.solve(rest, x[1:] - x[0]), compute_uv=False)
-    np.testing.assert_allclose(stretches, 1, atol=1e-3)
+    np.testing.assert_allclose(stretches, 1, atol=1e-4)
     assert np.linalg.det(x[1:] - x[0]) > 0
 
 

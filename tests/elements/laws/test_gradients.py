@@ -221,7 +221,7 @@ def test_the_projected_system_is_the_positive_part_of_dp_by_df(law, strain, flip
 @pytest.mark.parametrize("law", PAIRWISE)
 def test_the_projected_system_of_springs_is_that_of_each_and_the_positive_part_of_each_volume(law, pose):
     """A pressed spring releases nothing by turning. A volume pulls its corners with w for each part by which
-    it has grown, g as they move: of w g^T counts the symmetric part, and of that by NumPy the positive one."""
+    it has grown, g as they move: of w g^T counts the symmetric part, of that the positive one, by NumPy."""
     rng = np.random.default_rng(6)
     count = len(BALL.tets)
     E, nu = rng.uniform(1e5, 1e6, count), rng.uniform(0.1, 0.4, count)
