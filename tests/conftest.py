@@ -86,7 +86,7 @@ Neighbours have worlds of the same kinds, which each worker compiles once."""
 
 NUMPY = ("meshing/", "cages/", "elements/materials/", "bake/test_formats", "test_layers")
 KERNEL = ("elements/", "contact/distances/", "contact/shapes/", "core/math/")
-WORLD = ("elements/laws/test_energy_laws", "cages/test_thin.py::test_a_table_on")
+WORLD = ("elements/laws/test_energy_laws",)
 SOAK = (
     *("lab/", "demos/", "cli/", "native/", "live/test_served", "live/test_page", "live/test_measuring"),
     "feel/test_material_from_feel.py::test_random_wishes",
@@ -134,7 +134,7 @@ SOAK = (
         "solver/test_coarse_steps.py::test_what_one_may_ask_of_implicit_euler",
         "solver/test_floor.py::test_without",
     ),
-    "render/test_props.py::test_a_collider_is_drawn_on_its_way",
+    *("render/test_props.py::test_a_collider_is_drawn_on_its_way", "render/test_film.py::test_colors_of"),
     *("contact/test_narrow_phase.py::test_a_tip", "persistence/test_snapshot.py::test_a_rope"),
     # Meshers that are in none of the extras of `make test`.
     "cages/test_methods",
@@ -143,7 +143,10 @@ SOAK = (
         "cages/test_difficult_surfaces",
         "cages/test_cage.py::test_a_bar_along",
         "cages/test_thin.py::test_the_cell",
+        "cages/test_thin.py::test_a_table_on",
     ),
+    *("live/test_frame_file.py::test_a_reader", "live/test_uploads.py::test_a_name"),
+    "render/test_renderer.py::test_same_bits",
     *("cages/test_thin.py::test_the_octaves", "contact/test_soft_contact.py::test_a_coarse_plate"),
     "contact/test_piles.py::test_a_block_bears_one_of_many_times_its_mass_for_a_minute[1000-50.0",
     "contact/test_colliders.py::test_a_sheet_of_1_cm_lands_without_freezing[0.01",
@@ -165,6 +168,7 @@ VARIANTS = {
     "control/test_grabs": ("implicit",),
     "control/test_pins": ("lazy_leapfrog", "implicit", "flat"),
     "control/test_motors": ("lazy_leapfrog", "implicit"),
+    "control/test_surroundings": ("lazy_leapfrog", "implicit", "flat"),
     "control/test_joints": ("soft",),
     "solver/test_coarse_steps": ("flat",),
     "elements/laws/test_energy_laws": ("flat",),
@@ -177,7 +181,6 @@ VARIANTS = {
     "fracture/test_tearing": ("virial", "st_venant_kirchhoff"),
     # What takes long although its kernels are there.
     "cages/test_thin": ("ball", "a wall"),
-    "live/test_uploads": ("ball",),
     "render/test_video.py::test_a_killed_film": (".webm", ".gif"),
     "solver/integrators/test_safe_step": ("cylinder", "cmpm"),
 }
