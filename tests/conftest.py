@@ -151,7 +151,10 @@ SOAK = (
     "contact/test_piles.py::test_a_block_bears_one_of_many_times_its_mass_for_a_minute[1000-50.0",
     "contact/test_colliders.py::test_a_sheet_of_1_cm_lands_without_freezing[0.01",
     *("core/test_kernel_cache.py::test_a_lock", "docs/test_pages.py::test_every_command"),
-    "meshing/test_locating.py::test_a_point_outside_gets_the_nearest_point_of_the_mesh[torus-5.0",
+    *(
+        "cages/test_cage.py::test_parts_that_do_not_touch",
+        "contact/shapes/test_mesh_shape.py::test_one_thread",
+    ),
     # Processes that compile worlds; the first one of its kind is in `make test`.
     *("core/test_signals.py::test_a_film", "core/test_runtime.py::test_more_threads"),
     *(
@@ -180,7 +183,9 @@ VARIANTS = {
     "elements/laws/test_gradients": ("virial-exact-recover", "virial-linear-off"),
     "fracture/test_tearing": ("virial", "st_venant_kirchhoff"),
     # What takes long although its kernels are there.
+    "cages/test_cage": ("turned box", "capsule", "tube"),
     "cages/test_thin": ("ball", "a wall"),
+    "meshing/test_locating.py::test_a_point_outside": ("torus",),
     "render/test_video.py::test_a_killed_film": (".webm", ".gif"),
     "solver/integrators/test_safe_step": ("cylinder", "cmpm"),
 }
