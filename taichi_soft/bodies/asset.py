@@ -140,16 +140,17 @@ class SoftBodyAsset:
         object.__setattr__(self, "hull", as_hull(self.hull, surfaces, outer))
         if self.hull is not None:
             self._require_hull()
-        object.__setattr__(self, "coarser", self._checked_levels())
+        object.__setattr__(self, "coarser", self._checked_levels(self.coarser))
 
-    def _checked_levels(self) -> tuple[SoftBodyAsset, ...]:
-        if not isinstance(self.coarser, (tuple, list)) or not all(
-            isinstance(each, SoftBodyAsset) for each in self.coarser
+    def _checked_levels(self, coarser: object) -> tuple[SoftBodyAsset, ...]:
+        """Raises: OptionError, MeshError for what are no levels of detail of this asset."""
+        if not isinstance(coarser, (tuple, list)) or not all(
+            isinstance(each, SoftBodyAsset) for each in coarser
         ):
-            raise OptionError(f"coarser must be a tuple of assets, got {self.coarser!r}")
-        if self.coarser and (self.spare_vertices or self.plasticity is not None):
+            raise OptionError(f"coarser must be a tuple of assets, got {coarser!r}")
+        if coarser and (self.spare_vertices or self.plasticity is not None):
             raise OptionError("an asset that is cut, tears or is bent for good has no levels of detail")
-        for level, each in enumerate(self.coarser, start=1):
+        for level, each in enumerate(coarser, start=1):
             if each.coarser or each.spare_vertices or each.plasticity is not None:
                 raise OptionError(f"level {level} must be without levels, cuts and plasticity of its own")
             if each.description.model != self.description.model or each.contact != self.contact:
@@ -158,8 +159,8 @@ class SoftBodyAsset:
                 raise OptionError(f"level {level} must have the hull of the finest")
             if self.description.bonds is not None:
                 raise OptionError(f"law {self.law!r} has no levels of detail: it looks at edges")
-            self._require_coarser((self, *self.coarser)[level - 1], each, level)
-        return tuple(self.coarser)
+            self._require_coarser((self, *coarser)[level - 1], each, level)
+        return tuple(coarser)
 
     def _require_coarser(self, before: SoftBodyAsset, asset: SoftBodyAsset, level: int) -> None:
         """Raises: MeshError for a level that is not coarser than the one before, or of something else."""
@@ -204,16 +205,15 @@ class SoftBodyAsset:
             name: getattr(self, name)
             for name in ("law", "strain", "flips", "damping_model", "contact", "skin", "hull")
         }
-        levels: list[SoftBodyAsset] = []
+        levels = []
         for mesh in meshes:
             if not isinstance(mesh, TetMesh):
                 raise MeshError(f"a level of detail must be a TetMesh, got {mesh!r}")
             held = mesh.vertices[:, None] - self.mesh.vertices[self.description.pinned]
             pinned = np.unique((held**2).sum(axis=2).argmin(axis=0)) if held.shape[1] else ()
-            bare = SoftBodyAsset(mesh, material, pinned=pinned, **plain)
-            self._require_coarser((self, *levels)[-1], bare, len(levels) + 1)
-            levels.append(bare)
-        # Takes seconds: only now that no mesh is refused.
+            levels.append(SoftBodyAsset(mesh, material, pinned=pinned, **plain))
+        self._checked_levels(levels)
+        # Takes seconds: only now that nothing is refused.
         materials = calibrated(self.description, [each.description for each in levels])
         fitted = (replace(each, material=its) for each, its in zip(levels, materials, strict=True))
         return replace(self, coarser=tuple(fitted))

@@ -436,7 +436,9 @@ def test_a_frozen_body_and_a_world_that_is_not_built_change_nothing():
     assert body.level == 0
 
 
-def test_levels_that_are_none_are_refused():
+def test_levels_that_are_none_are_refused(monkeypatch):
+    """Before their constants are sought, which takes seconds."""
+    monkeypatch.setattr("taichi_soft.bodies.asset.calibrated", lambda *_: pytest.fail("sought constants"))
     asset = SoftBodyAsset(BAR[0], RUBBER)
     with pytest.raises(MeshError, match="must be a TetMesh"):
         asset.with_coarser(rope(1.0, 4, mass=0.1))
@@ -452,6 +454,8 @@ def test_levels_that_are_none_are_refused():
         SoftBodyAsset.from_surface(RING, RUBBER, cells=(None, 5))
     with pytest.raises(OptionError, match="no levels of detail"):
         SoftBodyAsset(BAR[0], RUBBER, coarser=(SoftBodyAsset(BAR[1], RUBBER),), spare_vertices=10)
+    with pytest.raises(OptionError, match="no levels of detail"):
+        SoftBodyAsset(BAR[0], RUBBER, law="springs").with_coarser(BAR[1])
     with pytest.raises(OptionError, match="coarser must be a tuple of assets"):
         SoftBodyAsset(BAR[0], RUBBER, coarser=(BAR[1],))
     with pytest.raises(OptionError, match="law and the contact"):
