@@ -194,7 +194,8 @@ class SoftBodyAsset:
         Their constants are such that they weigh as much and vibrate as fast in the slowest modes. Takes
         seconds for each.
         Raises: MeshError for a mesh that is not coarser; MaterialError for another material than one with a
-            number for each constant.
+            number for each constant; OptionError for a body that is cut, tears, is bent for good, or whose
+            law looks at edges. All of them before that work begins.
         """
         material = self.material
         if not isinstance(material, Material) or any(

@@ -152,9 +152,8 @@ def test_a_step_in_one_piece_does_not_depend_on_how_others_fare(law, damping_mod
     paths = []
     for places in ((0,), (0, -3, 3)):
         world = World(integrator="implicit_euler")
-        # Added from left to right, so that it is neither the first nor the last.
         options = {"law": law, "damping_model": damping_model}
-        bodies = {
+        bodies = {  # from left to right, so that the calm one is neither the first nor the last
             x: world.add_body(ball, SOFT, position=(x, 0, 3 if x else 0.5), **options) for x in sorted(places)
         }
         world.build()
