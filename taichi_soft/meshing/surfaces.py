@@ -6,7 +6,7 @@ import contextlib
 import logging
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -36,6 +36,7 @@ class Surface:
     triangles: IntArray  # (m, 3)
     normals: FloatArray  # (n, 3), of unit length
     visual: Any = None  # trimesh's: texture coordinates, material, colours; None where there are none
+    notes: tuple[str, ...] = ()  # sentences on what the reader assumed, repaired or left out
 
 
 def read_surfaces(source: Any, up: Up | None = None) -> tuple[Surface, ...]:
@@ -173,4 +174,4 @@ def _turned(surface: Surface, up: Up) -> Surface:
         read_only(np.stack([rows[:, 0], -rows[:, 2], rows[:, 1]], axis=1))
         for rows in (surface.vertices, surface.normals)
     )
-    return Surface(surface.name, vertices, surface.triangles, normals, surface.visual)
+    return replace(surface, vertices=vertices, normals=normals)

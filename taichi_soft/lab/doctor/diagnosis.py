@@ -107,6 +107,8 @@ def diagnose(
     found = Diagnosis(path.name)
     if path.suffix.lower() in SURFACES:
         surfaces = read_surfaces(path, up)
+        for note in dict.fromkeys(note for each in surfaces for note in each.notes):
+            found.say(Grade.NOTE, note)
         found.surface = facts_of(surfaces)
         _judge_surface(found, found.surface)
         try:
