@@ -13,7 +13,7 @@ from taichi_soft.core.errors import MeshError
 from taichi_soft.lab.doctor.surface import NO_AREA
 from taichi_soft.meshing.arrays import FloatArray
 from taichi_soft.meshing.io import SURFACES
-from taichi_soft.meshing.surfaces import Surface, joined
+from taichi_soft.meshing.surface import Surface, joined
 
 VOXELS = 96
 """Along the longest side, by which inside and outside are told apart."""
