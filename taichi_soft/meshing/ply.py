@@ -69,13 +69,14 @@ def read_ply(path: Path) -> list[Surface]:
     rest = _Text(body) if order == "" else _Binary(body, order)
     for element in elements:
         read[element.name] = rest.read(element)
-        if element.name == "face":
+        if element.name in ("face", "tristrips"):
             break  # what is behind belongs to no triangle
     vertices, faces = read.get("vertex", {}), read.get("face", {})
     corners = next((faces[name] for name in ("vertex_indices", "vertex_index") if name in faces), None)
+    strips = read.get("tristrips", {}).get("vertex_indices")
+    if corners is None and isinstance(strips, _List):
+        corners, faces = _unwound(strips), {}
     if not isinstance(corners, _List) or len(corners.values) == 0:
-        if any(element.name == "tristrips" and element.count for element in elements):
-            raise MeshError("its triangles are strips (tristrips): export it with faces")
         return []
     if not all(axis in vertices for axis in "xyz"):
         raise MeshError("its vertices have no x, y and z")
@@ -113,6 +114,24 @@ def _surface(
     return surface_of(
         name, points[made.vertex], made.triangles, normals=normals[made.vertex], visual=visual, notes=notes
     )
+
+
+def _unwound(strips: _List) -> _List:
+    """Triangles of strips: each vertex makes one with the two before it, of which every other one is turned
+    round. -1 ends a strip."""
+    ends = np.cumsum(strips.counts)
+    values = np.insert(strips.values.astype(np.int64), ends[:-1], -1)
+    three = (
+        np.stack([values[:-2], values[1:-1], values[2:]], axis=1)
+        if len(values) > 2
+        else np.zeros((0, 3), int)
+    )
+    at = np.arange(len(values))
+    start = np.maximum.accumulate(np.where(values == -1, at + 1, 0))
+    is_odd = (at - start)[: len(three)] % 2 == 1
+    three[is_odd] = three[is_odd][:, [1, 0, 2]]
+    kept = three[(three >= 0).all(axis=1) & (np.diff(np.sort(three, axis=1), axis=1) > 0).all(axis=1)]
+    return _List(kept.ravel().astype(np.float64), np.full(len(kept), 3))
 
 
 def _table(columns: Columns, choices: tuple[tuple[str, ...], ...]) -> FloatArray | None:
@@ -153,7 +172,11 @@ def _look(path: Path, textures: list[str], notes: list[str]) -> Look | None:
 def _header(data: bytes) -> tuple[str, list[_Element], list[str], bytes]:
     """Byte order ("" for text), elements, files of textures, and what is behind."""
     start = re.match(rb"ply[ \t]*(\r\n|\n|\r)", data)
-    end = re.search(rb"(?:\r\n|\n|\r)end_header[ \t]*" + start[1], data) if start else None
+    end = (
+        re.search(start[1] + rb"end_header[ \t]*" + (b"\r" if start[1] == b"\r" else b"\r?\n"), data)
+        if start
+        else None
+    )
     if start is None or end is None:
         raise MeshError("it does not begin as a .ply file does: download or export it anew")
     order, elements, textures = None, list[_Element](), list[str]()
@@ -191,7 +214,9 @@ class _Text:
 
     def read(self, element: _Element) -> Columns:
         if not any(each.count_kind for each in element.properties):
-            rows = self._take(element.count * len(element.properties)).reshape(element.count, -1)
+            rows = self._take(element.count * len(element.properties)).reshape(
+                element.count, len(element.properties)
+            )
             return {
                 each.name: column.astype(each.kind if each.kind[0] == "u" else "f8")
                 for each, column in zip(element.properties, rows.T, strict=True)

@@ -65,14 +65,16 @@ def read_surfaces(
     return _placed(tuple(_all(source, up)), bool(center), as_positive(scale, "scale", "(1 for metres)"))
 
 
-def assumed_up(path: Path) -> str:
-    """Which axis is taken as up in a file whose format does not say, and how to choose the other one; else
-    nothing."""
-    suffix = path.suffix.lower()
+def assumed_up(source: Any) -> str:
+    """A sentence on the axis that is taken as up in a file whose format does not say, and on the other one;
+    nothing for all else."""
+    suffix = Path(source).suffix.lower() if isinstance(source, (str, os.PathLike)) else ""
     if suffix in DEFINED or suffix not in UP:
         return ""
     other = "z" if UP[suffix] == "y" else "y"
-    return f"{UP[suffix]} is taken as up, as most {suffix} files have it: take {other} if it lies on its side"
+    return (
+        f"{UP[suffix]} is taken as up, as in most {suffix} files: if it lies on its side, choose up={other!r}"
+    )
 
 
 def _all(source: Any, up: Up | None) -> Iterator[Surface]:

@@ -38,19 +38,25 @@ def decoded(name: bytes) -> str:
         return name.decode("latin-1")
 
 
-def numbers(rows: Sequence[Sequence[bytes]], width: int, what: str) -> FloatArray:
+def numbers(rows: Sequence[Sequence[bytes]], width: int, what: str, *, may_lack: bool = False) -> FloatArray:
     """The first `width` numbers of each row, (n, width).
 
-    Raises: MeshError for a row with fewer of them, or a word that is no number, with the name `what`.
+    Args:
+        what: a row is, for errors.
+        may_lack: make NaN of a row with fewer of them, or with a word that is no number.
+    Raises: MeshError for such a row otherwise.
     """
     try:
         return np.fromiter(
             map(float, chain.from_iterable(row[:width] for row in rows)), np.float64, width * len(rows)
         ).reshape(-1, width)
     except ValueError:
+        if may_lack:
+            lacking = [b"nan"] * width
+            return numbers([row if _has_numbers(row, width) else lacking for row in rows], width, what)
         for number, row in enumerate(rows):
             words = b" ".join(row)
-            if len(row) < width or not all(_is_number(word) for word in row[:width]):
+            if not _has_numbers(row, width):
                 wanted = "is a number" if width == 1 else f"are {width} numbers"
                 raise MeshError(
                     f"{what} {number} is '{decoded(words)[:60]}': wanted {wanted}, with a decimal point"
@@ -58,7 +64,12 @@ def numbers(rows: Sequence[Sequence[bytes]], width: int, what: str) -> FloatArra
         raise
 
 
-def _is_number(word: bytes) -> bool:
+def _has_numbers(row: Sequence[bytes], width: int) -> bool:
+    return len(row) >= width and all(is_number(word) for word in row[:width])
+
+
+def is_number(word: bytes) -> bool:
+    """Whether a word is a number."""
     try:
         float(word)
     except ValueError:

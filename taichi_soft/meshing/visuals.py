@@ -38,6 +38,7 @@ def visual_of(
 
     has_picture = look is not None and look.picture is not None
     if colors is not None and not has_picture:
+        colors = np.nan_to_num(colors)
         scale = 255.0 if colors.max(initial=0.0) <= 1.0 else 1.0
         return ColorVisuals(vertex_colors=np.clip(np.round(scale * colors), 0, 255).astype(np.uint8))
     if uv is None or np.isnan(uv).all():

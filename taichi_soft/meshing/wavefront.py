@@ -57,8 +57,8 @@ def read_obj(path: Path) -> list[Surface]:
     if not said.counts:
         return []
     points, colors = _points(said.vertices)
-    places = numbers([[*row, b"0"][:2] for row in said.places], 2, "texture coordinate")
-    normals = numbers(said.normals, 3, "normal")
+    places = numbers([[*row, b"0"][:2] for row in said.places], 2, "texture coordinate", may_lack=True)
+    normals = numbers(said.normals, 3, "normal", may_lack=True)
     rows, counts = np.array(said.corners, dtype=np.int64), np.array(said.counts, dtype=np.int64)
     require_vertices(rows[:, 0], counts, len(points))
     for column, table, what in ((1, places, "texture coordinates"), (2, normals, "normals")):

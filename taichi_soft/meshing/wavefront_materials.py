@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from taichi_soft.core.errors import MeshError
-from taichi_soft.meshing.text import as_ascii, decoded
+from taichi_soft.meshing.text import as_ascii, decoded, is_number
 from taichi_soft.meshing.visuals import Look, find_beside, read_picture
 
 MOST_ARGUMENTS = {b"-mm": 2, b"-o": 3, b"-s": 3, b"-t": 3}
@@ -94,15 +94,7 @@ def _file(line: bytes) -> bytes:
         option, rest = rest.split(None, 1)
         for _ in range(MOST_ARGUMENTS.get(option.lower(), 1)):
             word, _, behind = rest.partition(b" ")
-            if option.lower() in (b"-o", b"-s", b"-t") and not _is_number(word):
+            if option.lower() in (b"-o", b"-s", b"-t") and not is_number(word):
                 break
             rest = behind.lstrip()
     return rest
-
-
-def _is_number(word: bytes) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
