@@ -65,7 +65,9 @@ def read_obj(path: Path) -> list[Surface]:
         is_missing = rows[:, column] >= len(table)
         rows[is_missing, column] = NONE
         if is_missing.any():
-            notes.append(f"{is_missing.sum():,} corners name {what} that are not there: they get none")
+            count = int(is_missing.sum())
+            who = "1 corner of a face names" if count == 1 else f"{count:,} corners of faces name"
+            notes.append(f"{who} {what} that are not there")
     triangles, face = triangulated(points[rows[:, 0]], counts)
     corners = rows[triangles]
     smooth = vertex_normals(points, corners[..., 0])
