@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from taichi_soft.core.errors import MeshError
 from taichi_soft.meshing.arrays import FloatArray, as_points
-from taichi_soft.meshing.corners import NONE, Attribute, require_vertices, split
+from taichi_soft.meshing.corners import BEYOND, NONE, Attribute, require_vertices, split
 from taichi_soft.meshing.surface import Surface, surface_of, vertex_normals
 from taichi_soft.meshing.text import as_ascii, decoded, numbers
 from taichi_soft.meshing.triangulation import triangulated
@@ -26,9 +26,6 @@ Ints = NDArray[np.int64]
 
 LEFT_OUT = {b"l": "lines", b"p": "points", b"curv": "curves", b"curv2": "curves", b"surf": "curved surfaces"}
 """Statements that make no triangles."""
-
-BEYOND = 1 << 40
-"""Row of an index that counts back beyond the first row: none has it."""
 
 
 @dataclass
@@ -61,6 +58,7 @@ def read_obj(path: Path) -> list[Surface]:
     normals = numbers(said.normals, 3, "normal", may_lack=True)
     rows, counts = np.array(said.corners, dtype=np.int64), np.array(said.counts, dtype=np.int64)
     require_vertices(rows[:, 0], counts, len(points))
+    points = as_points(points)
     for column, table, what in ((1, places, "texture coordinates"), (2, normals, "normals")):
         is_missing = rows[:, column] >= len(table)
         rows[is_missing, column] = NONE
@@ -175,7 +173,7 @@ def _row(index: bytes, length: int) -> int:
 
 def _points(rows: list[list[bytes]]) -> tuple[FloatArray, FloatArray | None]:
     """Vertices (n, 3), and their colours (n, 3) where all have some behind."""
-    points = as_points(numbers(rows, 3, "vertex"))
+    points = numbers(rows, 3, "vertex")
     if rows and all(len(row) >= 6 for row in rows):
         return points, numbers([row[3:6] for row in rows], 3, "colour of vertex")
     return points, None

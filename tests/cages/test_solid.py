@@ -55,6 +55,26 @@ def test_what_is_wrong_with_triangles_changes_the_solid_little(name):
     assert solid(mesh).volume == pytest.approx(volume, rel=0.02)
 
 
+BRICK = trimesh.creation.box((1.0, 0.7, 0.4))
+
+
+@pytest.mark.parametrize(
+    ("mesh", "volume"),
+    [
+        (joined(BALL, BALL), BALL.volume),
+        (turned(joined(BRICK, BRICK, BRICK)), 0.28),
+        (turned(joined(BRICK, BRICK.subdivide())), 0.28),  # cut in other triangles
+        (joined(BALL, ball(0.999)), BALL.volume),
+        (turned(joined(BRICK, BRICK.copy().apply_translation((0.5, 0.0, 0.0)))), 0.42),
+        (joined(*(with_triangles(BALL, BALL.faces[:, ::-1]) for _ in range(2))), BALL.volume),
+    ],
+    ids=["twice", "three times", "cut otherwise", "nearly twice", "overlapping", "twice inside out"],
+)
+def test_what_is_inside_of_several_parts_counts_once(mesh, volume):
+    """In voxels as coarse as those of ten cells, of which many lie at the surface."""
+    assert solid(mesh, 40).volume == pytest.approx(volume, rel=5e-3)
+
+
 def test_second_moments_are_those_of_the_solid():
     """Of a ball of radius r and volume V about any axis through its middle: V r^2 / 5."""
     points, volumes = solid(ball(subdivisions=5)).quadrature()

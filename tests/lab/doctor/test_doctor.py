@@ -73,6 +73,25 @@ def test_a_sound_file_would_simulate_and_its_body_is_told(tmp_path):
     assert {each.grade for each in found.findings} == {Grade.GOOD}
 
 
+def test_the_axis_that_was_assumed_is_named_with_the_other_one(tmp_path):
+    file = written(trimesh.creation.box((1.0, 0.5, 0.3)), tmp_path / "crate.obj")
+    told = [each.text for each in diagnose(file, RUBBER, cells=3).findings]
+    assert [text for text in told if "y is taken as up" in text and "up='z'" in text]
+    assert not [
+        each for each in diagnose(file, RUBBER, cells=3, up="z").findings if "taken as up" in each.text
+    ]
+
+
+@pytest.mark.parametrize("suffix", ["obj", "ply", "glb"])
+def test_a_mended_file_stands_as_its_broken_one_does(tmp_path, suffix):
+    tall = trimesh.creation.box((1.0, 2.0, 3.0))
+    write_mended(read_surfaces(tall), tmp_path / f"tall.{suffix}")
+    surfaces = read_surfaces(tmp_path / f"tall.{suffix}")
+    np.testing.assert_allclose(np.ptp(surfaces[0].vertices, axis=0), (1.0, 2.0, 3.0), atol=1e-6)
+    a, b, c = np.moveaxis(surfaces[0].vertices[surfaces[0].triangles], 1, 0)
+    assert np.einsum("ij,ij->", a, np.cross(b, c)) / 6 == pytest.approx(6.0)
+
+
 @pytest.mark.parametrize("name", REFUSED)
 def test_what_makes_no_body_is_bad(tmp_path, name):
     found = diagnose(written(REFUSED[name], tmp_path / "x.ply"), RUBBER)
