@@ -6,6 +6,7 @@ import trimesh
 from surfaces import ball, joined, lens_volume, turned, with_some_turned, with_triangles, without
 
 from taichi_soft.cages.solid import solid_of
+from taichi_soft.cages.voxels import volume_within
 
 BALL = ball()
 
@@ -73,6 +74,12 @@ BRICK = trimesh.creation.box((1.0, 0.7, 0.4))
 def test_what_is_inside_of_several_parts_counts_once(mesh, volume):
     """In voxels as coarse as those of ten cells, of which many lie at the surface."""
     assert solid(mesh, 40).volume == pytest.approx(volume, rel=5e-3)
+
+
+def test_the_volume_is_the_same_far_from_the_origin():
+    """At 5,000 km, where the cubes of coordinates have no digit left for a cubic metre."""
+    away = np.array([500_000.0, 4_649_776.0, 312.0])
+    assert volume_within(BALL.triangles + away) == pytest.approx(BALL.volume, rel=1e-6)
 
 
 def test_second_moments_are_those_of_the_solid():
