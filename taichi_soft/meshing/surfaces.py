@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from taichi_soft.core.checks import as_path
 from taichi_soft.core.errors import MeshError, OptionError
 from taichi_soft.meshing.arrays import FloatArray, IntArray, as_indices, as_points, read_only
+from taichi_soft.meshing.gltf import Part, read_gltf
 from taichi_soft.meshing.io import SURFACES
 
 if TYPE_CHECKING:
@@ -58,10 +59,11 @@ def read_surfaces(source: Any, up: Up | None = None) -> tuple[Surface, ...]:
         return tuple(surface for each in source for surface in read_surfaces(each, up))
     if isinstance(source, (str, os.PathLike)):
         path = as_path(source)
+        if path.suffix.lower() in Y_UP:
+            return tuple(_turned(surface, up or "y") for surface in _of_gltf(path))
         found = _read(path)
-        up = up or ("y" if path.suffix.lower() in Y_UP else "z")
         try:
-            return tuple(_turned(surface, up) for surface in _surfaces(found, path.name))
+            return tuple(_turned(surface, up or "z") for surface in _surfaces(found, path.name))
         except MeshError as error:
             raise MeshError(f"{path.name}: {error}") from None
     return tuple(_turned(surface, up or "z") for surface in _surfaces(source, ""))
@@ -106,6 +108,25 @@ def _surfaces(source: Any, name: str) -> list[Surface]:
         "a surface is the path of a file, a trimesh.Trimesh or Scene, or (vertices, triangles), got "
         f"{type(source).__name__}"
     )
+
+
+def _of_gltf(path: Path) -> list[Surface]:
+    """Raises: MeshError, with the file's name."""
+    if not path.is_file():
+        raise MeshError(f"{path.name}: cannot be read (no such file)")
+    try:
+        return [_of_part(part) for part in read_gltf(path)]
+    except MeshError as error:
+        raise MeshError(f"{path.name}: {error}") from None
+
+
+def _of_part(part: Part) -> Surface:
+    surface = _of_arrays(part.vertices, part.triangles, part.name)
+    normals = surface.normals
+    if part.normals is not None:
+        lengths = np.linalg.norm(part.normals, axis=1, keepdims=True)
+        normals = read_only(np.where(np.isfinite(lengths) & (lengths > 0.0), _unit(part.normals), normals))
+    return replace(surface, normals=normals, visual=part.visual, notes=part.notes)
 
 
 def _of_scene(scene: trimesh.Scene, name: str) -> list[Surface]:
