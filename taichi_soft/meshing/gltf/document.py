@@ -98,7 +98,7 @@ class Document:
             raise MeshError(
                 f"cannot be read: {name} has the type {kind!r}, where {' or '.join(types)} is needed"
             )
-        shape, dtype = (count, COLUMNS[kind]), _dtype(entry, name)
+        shape, dtype = (count, COLUMNS[kind]), component_type(entry, name)
         if "bufferView" in entry:
             rows = self._stored(entry, shape, dtype, name)
         elif count > MOST_IMPLICIT_ROWS:
@@ -191,7 +191,7 @@ class Document:
         """A copy in which some rows are replaced."""
         count, name = whole(sparse, "count", name), f"the sparse part of {name}"
         indices, values = sparse["indices"], sparse["values"]
-        places = self._stored(indices, (count, 1), _dtype(indices, name), name)[:, 0].astype(np.int64)
+        places = self._stored(indices, (count, 1), component_type(indices, name), name)[:, 0].astype(np.int64)
         if count and not 0 <= places.min() <= places.max() < len(rows):
             raise MeshError(f"cannot be read: {name} replaces row {places.max():,} of {len(rows):,}")
         changed: NDArray[Any] = rows.copy()
@@ -205,6 +205,14 @@ def decoded(rows: NDArray[Any], accessor: Entry) -> FloatArray:
     if accessor.get("normalized") and rows.dtype.kind in "iu":
         reals = np.maximum(reals / np.iinfo(rows.dtype).max, -1.0)
     return reals
+
+
+def component_type(entry: Entry, name: str) -> np.dtype[Any]:
+    """Return the type of an accessor's numbers. Raises: MeshError for an unknown one."""
+    component = entry.get("componentType")
+    if component not in COMPONENTS:
+        raise MeshError(f"cannot be read: {name} has the unknown component type {component!r}")
+    return COMPONENTS[component]
 
 
 def whole(entry: Entry, key: str, name: str, default: int | None = None) -> int:
@@ -273,10 +281,3 @@ def _embedded(uri: str) -> bytes:
         return base64.b64decode(content)
     except ValueError:
         raise MeshError("cannot be read: a data: URI in it is damaged") from None
-
-
-def _dtype(entry: Entry, name: str) -> np.dtype[Any]:
-    component = entry.get("componentType")
-    if component not in COMPONENTS:
-        raise MeshError(f"cannot be read: {name} has the unknown component type {component!r}")
-    return COMPONENTS[component]

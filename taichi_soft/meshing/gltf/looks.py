@@ -25,11 +25,13 @@ TEXTURES = (
     "emissiveTexture",
 )
 
-SOURCES = ("EXT_texture_webp", "EXT_texture_avif", "MSFT_texture_dds", "KHR_texture_basisu")
-"""Extensions that name the image of a texture in another format, those that pillow reads first."""
+SOURCES = ("EXT_texture_webp", "EXT_texture_avif", "MSFT_texture_dds")
+"""Extensions that name the image of a texture in another format."""
 
 GLOSS = "KHR_materials_pbrSpecularGlossiness"
 TRANSFORM = "KHR_texture_transform"
+READ = (GLOSS, TRANSFORM, *SOURCES)
+ALL_SOURCES = (*SOURCES, "KHR_texture_basisu")  # whose format pillow may not read
 
 
 class Looks:
@@ -108,44 +110,41 @@ class Looks:
     def _image(self, used: Entry) -> Any:
         """pillow's image of a texture, or None with a note."""
         texture = self.document.named("textures", used.get("index"))
-        sources = [extension(texture, name).get("source") for name in SOURCES]
-        choices = [number for number in (texture.get("source"), *sources) if number is not None]
-        for number in choices:
+        sources = [texture.get("source"), *(extension(texture, name).get("source") for name in ALL_SOURCES)]
+        reasons = []
+        for number in (each for each in sources if each is not None):
             if number not in self._images:
-                self._images[number] = self._opened(number, is_last=number == choices[-1])
-            if self._images[number] is not None:
+                self._images[number] = self._opened(number)
+            if not isinstance(self._images[number], str):
                 return self._images[number]
+            reasons.append(self._images[number])
+        self._say(reasons[0] if reasons else f"texture {used.get('index')} has no image")
         return None
 
-    def _opened(self, number: int, is_last: bool) -> Any:
+    def _opened(self, number: int) -> Any:
+        """pillow's image, or what to say of one that is not read."""
         if missing_packages("film", "PIL"):
-            self._say("texture images are not read without pillow: run pip install 'taichi-soft[film]'")
-            return None
-        from PIL import Image
+            return "texture images are not read without pillow: run pip install 'taichi-soft[film]'"
+        from PIL import Image, UnidentifiedImageError
 
-        image = self.document.named("images", number)
-        name = str(image.get("name") or image.get("uri", ""))[:60] or f"image {number}"
+        entry = self.document.named("images", number)
+        uri = str(entry.get("uri", "data:"))
+        name = f"image {number}" if uri[:5].lower() == "data:" else repr(uri[:60])
         try:
             data = (
-                self.document.view(image["bufferView"])[0]
-                if "bufferView" in image
-                else self.document.fetch(image["uri"])
+                self.document.view(entry["bufferView"])[0]
+                if "bufferView" in entry
+                else self.document.fetch(uri)
             )
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", Image.DecompressionBombWarning)
                 opened = Image.open(io.BytesIO(data))
-                opened.load()  # a damaged one fails here, and not while a picture is drawn
+                opened.load()  # a damaged one fails here, and not while a frame is drawn
             return opened
-        except Exception as error:  # pillow raises whatever a format's reader does
-            if is_last:
-                kind = image.get("mimeType", "")
-                reason = (
-                    f"pillow does not read {kind}"
-                    if kind == "image/ktx2"
-                    else " ".join(str(error).split())[:100]
-                )
-                self._say(f"the texture image {name!r} is not read ({reason})")
-            return None
+        except UnidentifiedImageError:
+            return f"texture {name} is not read: its format is unknown to pillow. Save it as .png or .jpg"
+        except Exception as error:  # pillow raises whatever the reader of a format does
+            return f"texture {name} is not read ({' '.join(str(error).split())[:150]})"
 
     def _say(self, note: str) -> None:
         if note not in self.notes:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from taichi_soft.core.errors import MeshError
 from taichi_soft.core.extras import missing_packages
 from taichi_soft.meshing.arrays import FloatArray
-from taichi_soft.meshing.gltf.document import COLUMNS, Document, Entry, copy_command, decoded
+from taichi_soft.meshing.gltf.document import COLUMNS, Document, Entry, component_type, copy_command, decoded
 from taichi_soft.meshing.gltf.nodes import extension
 
 DRACO = "KHR_draco_mesh_compression"
@@ -133,12 +133,11 @@ class Primitive:
         lost = [name for name, number in numbers.items() if number not in found]
         if lost:
             raise MeshError(f"cannot be read: the {DRACO} data of {self.name} lacks {', '.join(lost)}")
-        rows = {name: found[number].reshape(len(found[number]), -1) for name, number in numbers.items()}
-        for name in rows:
-            columns = COLUMNS.get(
-                self.document.named("accessors", self._attributes.get(name)).get("type", "")
-            )
-            if rows[name].shape[1] != columns:
+        rows = {}
+        for name, number in numbers.items():  # DracoPy gives integers as reals: the accessor has their type
+            accessor = self.document.named("accessors", self._attributes.get(name))
+            rows[name] = found[number].reshape(len(found[number]), -1).astype(component_type(accessor, name))
+            if rows[name].shape[1] != COLUMNS.get(accessor.get("type", "")):
                 raise MeshError(f"cannot be read: the {DRACO} data of {self.name} is no {name}")
         return getattr(mesh, "faces", np.zeros((0, 3), np.int64)), rows
 

@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 from taichi_soft.core.errors import MeshError
 from taichi_soft.meshing.arrays import FloatArray
-from taichi_soft.meshing.gltf import nodes
+from taichi_soft.meshing.gltf import looks, nodes
 from taichi_soft.meshing.gltf.document import MESHOPT, Document, Entry, copy_command
-from taichi_soft.meshing.gltf.looks import GLOSS, Looks
+from taichi_soft.meshing.gltf.looks import Looks
 from taichi_soft.meshing.gltf.nodes import INSTANCING, VISIBILITY
 from taichi_soft.meshing.gltf.primitives import DRACO, Primitive
 
-READ = (DRACO, "KHR_mesh_quantization", INSTANCING, VISIBILITY, GLOSS, "KHR_texture_transform")
+READ = (DRACO, "KHR_mesh_quantization", INSTANCING, VISIBILITY, *looks.READ)
 """Extensions that are read."""
 
 SHAPELESS = (
