@@ -491,6 +491,16 @@ def test_damaged_files_are_refused_in_a_line_before_memory_is_taken(path, name):
     assert peak < 1_000_000
 
 
+@pytest.mark.parametrize("name", ["NORMAL", "TEXCOORD_0", "COLOR_0", "JOINTS_0", "WEIGHTS_0"])
+def test_attributes_with_other_rows_than_the_vertices_are_refused(path, name):
+    writer, columns = GltfWriter(), {"NORMAL": 3, "TEXCOORD_0": 2}.get(name, 4)
+    attributes = {"JOINTS_0": np.zeros((4, 4), np.uint8), "WEIGHTS_0": np.ones((4, 4), np.float32)}
+    rows = np.zeros((3, columns), np.uint8 if name == "JOINTS_0" else np.float32)
+    mesh = writer.mesh(attributes={**attributes, name: rows})
+    writer.node(mesh=mesh, skin=writer.add("skins", joints=[0]))
+    assert f"3 rows of {name} for 4 vertices" in refusal(writer.write(path))
+
+
 def test_an_index_beyond_the_vertices_is_refused(path):
     writer = GltfWriter()
     writer.node(mesh=writer.mesh(triangles=np.array([[0, 1, 2], [0, 1, 9]], np.uint8)))

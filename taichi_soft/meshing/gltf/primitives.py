@@ -11,7 +11,15 @@ from numpy.typing import NDArray
 from taichi_soft.core.errors import MeshError
 from taichi_soft.core.extras import missing_packages
 from taichi_soft.meshing.arrays import FloatArray
-from taichi_soft.meshing.gltf.document import COLUMNS, Document, Entry, component_type, copy_command, decoded
+from taichi_soft.meshing.gltf.document import (
+    COLUMNS,
+    Document,
+    Entry,
+    component_type,
+    copy_command,
+    decoded,
+    whole,
+)
 from taichi_soft.meshing.gltf.nodes import extension
 
 DRACO = "KHR_draco_mesh_compression"
@@ -48,12 +56,29 @@ class Primitive:
         )
 
     def rows(self, attribute: str, *types: str) -> NDArray[Any] | None:
-        """Read an attribute as it is stored, (n, columns); None where there is none."""
-        if attribute in self._compressed:
-            return self._compressed[attribute]
+        """Read an attribute as it is stored, (n, columns); None where there is none.
+
+        Raises: MeshError unless it has a row for every vertex.
+        """
         if attribute not in self._attributes:
             return None
-        return self.document.rows(self._attributes[attribute], *types)
+        found = self._compressed.get(attribute)
+        if found is None:
+            found = self.document.rows(self._attributes[attribute], *types)
+        if len(found) != self.vertex_count:
+            raise MeshError(
+                f"cannot be read: {self.name} has {len(found):,} rows of {attribute} for "
+                f"{self.vertex_count:,} vertices"
+            )
+        return found
+
+    @property
+    def vertex_count(self) -> int:
+        """Number of rows of its positions."""
+        if "POSITION" in self._compressed:
+            return len(self._compressed["POSITION"])
+        number = self._attributes["POSITION"]
+        return whole(self.document.named("accessors", number), "count", f"accessor {number}")
 
     def vertices(self, weights: Sequence[float]) -> tuple[FloatArray, FloatArray | None]:
         """Positions (n, 3) and normals (n, 3) or None, with the morph targets blended in.
@@ -63,10 +88,6 @@ class Primitive:
         """
         positions, normals = self.values("POSITION", "VEC3"), self.values("NORMAL", "VEC3")
         assert positions is not None
-        if normals is not None and len(normals) != len(positions):
-            raise MeshError(
-                f"cannot be read: {self.name} has {len(normals):,} normals of {len(positions):,} vertices"
-            )
         for weight, target in zip(weights, self.entry.get("targets", ()), strict=False):
             for name, rows in (("POSITION", positions), ("NORMAL", normals)):
                 if weight == 0.0 or rows is None or name not in target:

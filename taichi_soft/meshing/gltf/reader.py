@@ -159,10 +159,9 @@ class _Reader:
                 0, 2, 1
             )  # columns first
         used = joints[weights > 0.0]
-        if len(joints) != count or (len(used) and used.max() >= len(matrices)):
+        if len(used) and used.max() >= len(matrices):
             raise MeshError(
-                f"cannot be read: {primitive.name} has {len(joints):,} rows of joints for {count:,} "
-                f"vertices, up to joint {used.max(initial=0)} of {len(matrices)}"
+                f"cannot be read: {primitive.name} refers to joint {used.max()} of {len(matrices)}"
             )
         totals = weights.sum(axis=1, keepdims=True)
         weights = np.where(
