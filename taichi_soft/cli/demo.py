@@ -29,6 +29,9 @@ def demo(
     orbit: Annotated[
         float | None, typer.Option(help="The camera goes round once in so much time of the world [s].")
     ] = None,
+    stats: Annotated[
+        bool, typer.Option("--stats", help="Write time and speed of this machine on each frame.")
+    ] = False,
     video: Annotated[bool, typer.Option(help="Write a film, or only run and time the steps.")] = True,
     peers: Annotated[
         bool, typer.Option("--peers", help="compare: one drop here and in other engines.")
@@ -76,6 +79,7 @@ def demo(
             seconds=seconds,
             slow=slow,
             blur=blur,
+            stats=stats,
             on_frame=lambda done, total: progress.update(task, description=name, completed=done, total=total),
         )
     if report.path is not None:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from engine_adapter import FixedStep
 from taichi_soft.contact.collider import Collider
 from taichi_soft.render import PALETTE, Camera, ColorScale, Look
+from taichi_soft.render.backdrop import Backdrop, BackdropName
 from taichi_soft.render.camera_moves import Follow, Orbit
 from taichi_soft.render.colors import Color
 from taichi_soft.render.look import LookName
@@ -53,3 +54,4 @@ class Stage:
     scale: ColorScale | None = None  # what the colours of bodies mean, shown as a bar
     legend: list[tuple[Color, str]] = field(default_factory=list)  # colours of bodies and what these are
     collider_colors: dict[Collider, Color] = field(default_factory=dict)  # of those that are to stand out
+    backdrop: Backdrop | BackdropName = Backdrop.DAY  # sky and floor
