@@ -12,17 +12,18 @@ from numpy.typing import NDArray
 
 from taichi_soft.core.checks import LARGEST_COUNT, as_count, as_number, as_positive
 from taichi_soft.core.errors import OptionError
-from taichi_soft.render import VideoWriter
-from taichi_soft.render.artist import Artist, speed_of
+from taichi_soft.render import Camera, VideoWriter
+from taichi_soft.render.artist import Artist
+from taichi_soft.render.camera_moves import Follow, Orbit
 from taichi_soft.render.film_html import film_html
 from taichi_soft.render.motion_blur import shutter_times
-from taichi_soft.render.props import Scenery
+from taichi_soft.render.props import Prop, Scenery
 from taichi_soft.render.stage import Actor, Stage
 from taichi_soft.render.take import Take
 from taichi_soft.world.warm_up import warm_up_step
 from taichi_soft.world.world import context_of_world
 
-__all__ = ["Actor", "FilmReport", "Stage", "film", "speed_of"]
+__all__ = ["Actor", "Camera", "FilmReport", "Follow", "Orbit", "Prop", "Stage", "film"]
 
 Progress = Callable[[int, int], None]
 
