@@ -39,18 +39,21 @@ class Released(Event):
 
 @dataclass(frozen=True, eq=False)
 class ContactBegan(Event):
-    """A body has begun to touch a collider (the floor is one) or another body."""
+    """A body has begun to touch a collider (the floor is one) or another body.
 
-    a: SoftBody
-    b: Collider | SoftBody  # of two bodies the one with the larger index
+    `a` is always a soft body. `isinstance(event.b, Collider)` tells what it touches.
+    """
+
+    a: SoftBody  # the body; of two bodies the one with the smaller index
+    b: Collider | SoftBody  # the collider, or the other body
     impulse: Floats  # (3,) that `a` gave `b` in that step [N s]; a hit may go on in the next one
 
 
 @dataclass(frozen=True, eq=False)
 class ContactEnded(Event):
-    """They have not touched for `CONTACT_PAUSE`, or one of them was removed."""
+    """A body and a collider, or two bodies, have not touched for 0.05 s, or one of them was removed."""
 
-    a: SoftBody
+    a: SoftBody  # as in `ContactBegan`
     b: Collider | SoftBody
     impulse: Floats  # (3,) that `a` gave `b` from beginning to end [N s]; what sleeps gives none
     duration: float  # [s] from the start of the first step with one to the end of the last, or of sleep

@@ -52,6 +52,7 @@ class WorldBodies(WorldParts):
         position: ArrayLike = (0.0, 0.0, 0.0),
         rotation: ArrayLike | None = None,
         velocity: ArrayLike = (0.0, 0.0, 0.0),
+        on_floor: bool = False,
         pinned: ArrayLike = (),
         contact: Contact = DEFAULT_CONTACT,
         plasticity: Plasticity | None = None,
@@ -87,7 +88,7 @@ class WorldBodies(WorldParts):
         )
         if asset is mesh:
             _require_defaults(material, options)
-        return add_body(self._context, asset, position, rotation, velocity)
+        return add_body(self._context, asset, position, rotation, velocity, on_floor)
 
     def reserve(self, asset: SoftBodyAsset, count: int) -> None:
         """Make room for `count` more bodies of an asset, before `build`; `spawn` fills it.
@@ -107,6 +108,7 @@ class WorldBodies(WorldParts):
         rotation: ArrayLike | None = None,
         velocity: ArrayLike = (0.0, 0.0, 0.0),
         angular_velocity: ArrayLike = (0.0, 0.0, 0.0),
+        on_floor: bool = False,
     ) -> Body:
         """Put a body into the lowest free slot of its asset, before `build` or between two steps.
 
@@ -120,7 +122,7 @@ class WorldBodies(WorldParts):
         Raises: OptionError for a value out of range, or a place out of reach, below the floor or inside a
             collider; StateError for an asset without a pool in this world, or whose pool is full.
         """
-        return spawn(self._context, asset, position, rotation, velocity, angular_velocity)
+        return spawn(self._context, asset, position, rotation, velocity, angular_velocity, on_floor)
 
     @recorded
     def despawn(self, body: Body) -> None:

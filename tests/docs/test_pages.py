@@ -119,7 +119,8 @@ def test_every_command_and_option_of_a_page_exists(name):
 def test_every_public_name_is_on_a_page_of_the_reference_once(package):
     text = "\n".join(text for name, text in PAGES.items() if name.startswith("reference/"))
     listed = re.findall(rf"^::: {package.__name__}\.(\w+)$", text, re.MULTILINE)
-    assert sorted(listed) == sorted(package.__all__)
+    elsewhere = engine_adapter.__all__ if package is taichi_soft else ()
+    assert sorted(listed) == sorted(set(package.__all__) - set(elsewhere))
 
 
 @pytest.mark.parametrize(
