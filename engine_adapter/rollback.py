@@ -61,6 +61,8 @@ class Rollback:
     def rewind_to(self, step: int) -> None:
         """Put the world back to where `save` was called at that step count; what was saved later is dropped.
 
+        Args:
+            step: one of `steps`.
         Raises: OptionError for a step that is not among `steps`, with nothing changed.
         """
         wanted = as_count(step, "step", 0)

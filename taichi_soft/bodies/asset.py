@@ -193,6 +193,8 @@ class SoftBodyAsset:
 
         Their constants are such that they weigh as much and vibrate as fast in the slowest modes. Takes
         seconds for each.
+        Args:
+            meshes: rest shapes of fewer and fewer tetrahedra.
         Raises: MeshError for a mesh that is not coarser; MaterialError for another material than one with a
             number for each constant; OptionError for a body that is cut, tears, is bent for good, or whose
             law looks at edges. All of them before that work begins.
@@ -342,7 +344,11 @@ class SoftBodyAsset:
         return replace(arrays, hull=HullArrays(carriers, hull.weights, hull.triangles))
 
     def touching_points(self, x: Floats) -> Floats:
-        """Where the points are by which it touches colliders, of vertices at `x` (n, 3) [m]."""
+        """Where the points are by which it touches colliders, of vertices at `x` (n, 3) [m].
+
+        Args:
+            x: positions of the vertices, (n, 3) [m].
+        """
         hull = self.bound_hull
         if hull is None:
             return x[outer_vertices(self.mesh)]
@@ -364,6 +370,8 @@ class SoftBodyAsset:
         [1/s], and after what time at most they are damped again [s].
 
         Of another material the frequency goes with the root of its mean stiffness over its mass.
+        Args:
+            body: description of that body.
         """
         material = body.material
         if isinstance(material, SpringMaterial) or material.damping_ratio * self.first_frequency == 0.0:
@@ -411,7 +419,9 @@ class SoftBodyAsset:
     ) -> Floats32:
         """Position, velocity, inverse mass and mass of each vertex of a body that begins there, (n, 8).
 
-        Args: as `World.spawn` takes them, and the height of the floor [m].
+        Args:
+            position, rotation, velocity, angular_velocity: as `World.spawn` takes them.
+            floor: height of the floor [m], or None.
         Raises: OptionError for bad values, a vertex that is too fast, and a place out of reach or below the
             floor, which would crush the body.
         """

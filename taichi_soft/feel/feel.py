@@ -66,7 +66,7 @@ class Behaviour:
 class Feel:
     """What `material_from_feel` found."""
 
-    material: Material
+    material: Material  # for `World.add_body`
     gravity_scale: float  # for `Body.set_gravity_scale`; 1 unless both sag and wobble_hz were wished for
     predicted: Behaviour  # by its statics, and by its slowest mode
     simulated: Behaviour  # as in a game: put down on a floor, and ringing in the air

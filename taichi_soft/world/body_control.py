@@ -46,7 +46,11 @@ class BodyControl(SoftBody):
 
     @recorded
     def set_gravity_scale(self, scale: float) -> None:
-        """Multiply the world's gravity for this body, from now on: 0 floats, -1 rises."""
+        """Multiply the world's gravity for this body, from now on: 0 floats, -1 rises.
+
+        Args:
+            scale: factor of the world's gravity; 1 at first.
+        """
         set_gravity_scale(self, scale)
 
     @recorded
@@ -54,6 +58,8 @@ class BodyControl(SoftBody):
         """Change the friction of its `Contact`, which counts between bodies, from the next step on.
 
         What it finds on a floor or another collider is theirs: `World.set_friction`, `Collider.set_friction`.
+        Args:
+            friction: Coulomb's coefficient, 0 or more.
         Raises: OptionError for a number out of range; StateError before `build`, and in a world without
             `soft_contact`, where bodies do not touch each other.
         """
@@ -76,13 +82,19 @@ class BodyControl(SoftBody):
     def set_linear_damping(self, rate: float) -> None:
         """Let all velocities fade by exp(-rate t), from now on, against the world at rest [1/s].
 
+        Args:
+            rate: [1/s], 0 or more; 0 at first.
         Raises: OptionError for a negative rate; StateError before `build` and under schedule "flat".
         """
         set_linear_damping(self, rate)
 
     @recorded
     def set_sheltered(self, is_sheltered: bool) -> None:
-        """True keeps the wind of `World.set_wind` off this body, from now on."""
+        """True keeps the wind of `World.set_wind` off this body, from now on.
+
+        Args:
+            is_sheltered: False at first.
+        """
         set_sheltered(self, is_sheltered)
 
     @recorded
@@ -136,12 +148,20 @@ class BodyControl(SoftBody):
 
     @recorded
     def pin(self, particles: ArrayLike) -> None:
-        """Hold particles where they are, from now on."""
+        """Hold particles where they are, from now on.
+
+        Args:
+            particles: vertices of this body.
+        """
         pin(self, particles)
 
     @recorded
     def unpin(self, particles: ArrayLike | None = None) -> None:
-        """Let pinned particles go, all if None, with the velocity that they were moved with last."""
+        """Let pinned particles go, all if None, with the velocity that they were moved with last.
+
+        Args:
+            particles: vertices of this body; None, the default, means all.
+        """
         unpin(self, particles)
 
     @recorded
@@ -149,6 +169,9 @@ class BodyControl(SoftBody):
         """Move pinned particles by hand: in the coming step they go straight to `positions`, (n, 3) [m].
 
         After it they stand still, unless they are given new targets.
+        Args:
+            particles: pinned vertices, (n,).
+            positions: where they go, (n, 3) [m].
         Raises: OptionError for shapes that do not fit; StateError for a particle that is not pinned.
         """
         set_targets(self, particles, positions)
@@ -227,6 +250,8 @@ class BodyControl(SoftBody):
     def set_damping(self, damping: float | NDArray[np.float64]) -> None:
         """Change the material's damping b [N s/m], from now on, one number or one per element.
 
+        Args:
+            damping: [N s/m], 0 or more: one number, or one for each element.
         Raises: as `set_material`.
         """
         set_damping(self, damping)

@@ -203,6 +203,8 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
         count with an estimate of their own after each change, which takes some 35 ms for 5,000 tetrahedra and
         several times as much with `damping`: give substeps where that is too long. 1 for implicit Euler,
         which needs none; with `soft_contact` so many that they last no longer than 1/240 s.
+        Args:
+            dt: length of the fixed step [s], above 0.
         """
         return self._context.substeps.stable_count(dt)
 
@@ -214,6 +216,9 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
         the step again with up to eight times the substeps, by `World(retries=3)`.
         Ctrl-C lets a step of less than about 0.03 s end first. It ends a longer one within a second, and the
         world is as before that step.
+        Args:
+            dt: length of the fixed step [s], above 0.
+            substeps: number of equal substeps, 1 or more; None chooses it by `stable_substeps`.
         Warns: FrozenBodyWarning; UnstableStepWarning for substeps longer than the stable step of the stiffest
             asset; SlowStepWarning as `build`, once in a world; SolverWarning, of implicit Euler.
         Raises: OptionError if dt is not a positive number or substeps not a positive whole one, and where

@@ -138,6 +138,11 @@ def element_model(
 ) -> ElementModel:
     """The model that these names choose; None takes the law's own.
 
+    Args:
+        law: a key of `LAWS`, such as "neo_hookean".
+        strain: "linear" or "exact"; None takes the default of the law.
+        flips: "tolerant", "recover" or "off"; None takes the default of the law.
+        damping_model: "edge", the default, or "tet_mean".
     Raises: OptionError for a name that is not known or that the law does not take.
     """
     if not isinstance(law, str) or law not in LAWS:
