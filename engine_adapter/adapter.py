@@ -41,6 +41,12 @@ class EngineAdapter:
             they are.
     Raises: StateError if the world is not built; OptionError if `fixed_step` is not a FixedStep, or
         `before_step` cannot be called.
+    Example:
+        game = EngineAdapter(world, FixedStep(dt=1 / 60))
+        vertices = np.empty((body.vertex_count, 3), np.float32)
+        for frame in range(3):
+            game.advance(1 / 75)  # seconds since the last frame
+            game.positions(body, out=vertices)  # between the last two steps
     """
 
     def __init__(

@@ -90,6 +90,10 @@ class SoftBodyAsset:
         coarser: the same thing of fewer and fewer tetrahedra, as `with_coarser` makes it: levels of detail
             for `Body.set_level`. Takes no spare vertices and no plasticity.
     Raises: MeshError, MaterialError or OptionError for bad input.
+    Example:
+        crate = SoftBodyAsset(box((0.4, 0.4, 0.4), (3, 3, 3)), jelly, contact=Contact(friction=0.8))
+        arena = World()
+        arena.reserve(crate, 10)  # room for ten of them
     """
 
     mesh: BodyMesh
@@ -266,8 +270,6 @@ class SoftBodyAsset:
     ) -> SoftBodyAsset:
         """A body from an artist's mesh: a cage of tetrahedra that carries the mesh as its skin.
 
-            duck = SoftBodyAsset.from_surface("duck.glb", Material(2e5, 0.4, 900.0), cells=10)
-
         The surface may have holes, faces turned round, walls within and parts that overlap: see
         `taichi_soft.cages`. Mass, centre and inertia are those of the solid that it encloses.
         Args:
@@ -293,6 +295,9 @@ class SoftBodyAsset:
         Raises: MeshError for a surface that cannot be read or encloses nothing, with the way out, and for a
             process that crashes or takes too long; OptionError for cells out of range, with the memory that
             they would take; MissingExtraError without the package of the method.
+        Example:
+            duck = SoftBodyAsset.from_surface("duck.glb", jelly, cells=8)
+            print(duck.mesh.quality.summary())
         """
         surfaces = read_surfaces(surface, up)
         numbers: list[Any] = [cells]

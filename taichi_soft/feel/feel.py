@@ -98,6 +98,9 @@ def material_from_feel(
         law: of the body, as `SoftBodyAsset` takes it.
     Raises: OptionError for wishes that are out of range or cannot be met together, with the nearest that
         can; MeshError and MaterialError as `SoftBodyAsset`.
+    Example:
+        feel = material_from_feel(sphere(radius=0.3), sag=0.05, settle_s=0.8)
+        print(feel.material)
     """
     if not isinstance(mesh, TetMesh):
         raise OptionError(f"mesh must be a TetMesh, such as asset.mesh, got {mesh!r}")

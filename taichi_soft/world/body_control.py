@@ -105,6 +105,8 @@ class BodyControl(SoftBody):
             impulse: total, (3,) [N s]. What falls to pinned particles goes to what holds them.
             particles: that it acts on; None means all.
         Raises: OptionError for bad numbers or vertices; StateError before `build`. So do all that follow.
+        Example:
+            body.apply_impulse((0, 0, 2.0 * body.masses.sum()))  # 2 m/s upwards
         """
         apply_impulse(self, impulse, particles)
 
@@ -152,6 +154,11 @@ class BodyControl(SoftBody):
 
         Args:
             particles: vertices of this body.
+        Example:
+            left = np.flatnonzero(body.mesh.vertices[:, 0] < -0.24)
+            body.pin(left)
+            world.step(1 / 60)
+            body.unpin(left)
         """
         pin(self, particles)
 
@@ -207,6 +214,12 @@ class BodyControl(SoftBody):
         Raises: OptionError for what is no other body, for bad vertices, and without `onto` for those that are
             too far away; StateError before `build`, in a world without contact, under implicit Euler, and
             where the world's 64 joints, or the 2,048 particles that they may hold, are all in use.
+        Example:
+            rider = world.spawn(ball, position=(0, 0, 0.8))
+            lowest = rider.positions()[:, 2].argsort()[:4]
+            joint = rider.attach_to(body, lowest)
+            world.step(1 / 60)
+            joint.release()
         """
         return self._context.of(Joints).join(self, other, particles, onto)
 
@@ -243,6 +256,8 @@ class BodyControl(SoftBody):
         Args:
             material: of the type that the body has, fit for its law and mesh.
         Raises: MaterialError for another type, or constants that do not fit; StateError before `build`.
+        Example:
+            body.set_material(Material(young=2e5, poisson=0.4, density=1000))  # four times as stiff
         """
         set_material(self, material)
 

@@ -76,6 +76,13 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
             `save_recording`.
         record_to: file that it writes when a body freezes, the first time that this happens.
     Raises: OptionError for a value out of range or a name that is not known.
+    Example:
+        arena = World(floor=0.0)
+        cube = arena.add_body(box(), jelly, position=(0, 0, 2))
+        arena.build()
+        for frame in range(60):
+            arena.step(1 / 60)
+            vertices = cube.positions()  # draw them
     """
 
     def __init__(
@@ -223,6 +230,9 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
             asset; SlowStepWarning as `build`, once in a world; SolverWarning, of implicit Euler.
         Raises: OptionError if dt is not a positive number or substeps not a positive whole one, and where
             there are more than `max_substeps`; StateError before `build`.
+        Example:
+            world.step(1 / 60)  # as many substeps as stability needs
+            world.step(1 / 60, substeps=10)  # the same cost in every frame
         """
         simulation = self._context.fields or self._built  # which raises
         seconds, count, h = self._context.substeps.choose(dt, substeps)

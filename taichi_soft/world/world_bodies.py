@@ -86,6 +86,10 @@ class WorldBodies(WorldParts):
             tearing: where it tears by itself, into its spare vertices; None for nowhere.
         Returns: a handle.
         Raises: MeshError, MaterialError or OptionError for bad input; StateError after `build`.
+        Example:
+            arena = World(floor=0.0)
+            table = arena.add_body(box((2, 1, 0.2), (8, 4, 1)), jelly, on_floor=True)
+            bowling = arena.add_body(ball, position=(-2, 0, 0.4), velocity=(5, 0, 0))
         """
         require_open(self._context)
         options: dict[str, Any] = {
@@ -145,6 +149,10 @@ class WorldBodies(WorldParts):
         Returns: a new handle.
         Raises: OptionError for a value out of range, or a place out of reach, below the floor or inside a
             collider; StateError for an asset without a pool in this world, or whose pool is full.
+        Example:
+            shot = world.spawn(ball, position=(-2, 0, 1), velocity=(6, 0, 1))
+            world.step(1 / 60)
+            world.despawn(shot)
         """
         return spawn(self._context, asset, position, rotation, velocity, angular_velocity, on_floor)
 

@@ -20,6 +20,10 @@ class WorldStates(WorldParts):
         events recorded it has what goes on, such as contacts. It holds numbers only, no code. The first call
         compiles, some seconds at most.
         Raises: StateError before `build`.
+        Example:
+            before = world.snapshot()  # bytes: keep them in a file, or send them
+            world.step(1 / 60)
+            world.restore(before)
         """
         data = take_snapshot(self._context)
         if self._recorder is not None:

@@ -48,6 +48,8 @@ class Material:
             rigid motion does not. However large, it takes no more substeps. `damping` comes on top.
         shear_damping: b_m of eq. 4.5 [N s/m] of the same laws, across the edges; None is `damping`.
     Raises: MaterialError with the first value out of range.
+    Example:
+        rubber = Material(young=1e6, poisson=0.45, density=1100, damping_ratio=0.1)
     """
 
     young: float | Array
