@@ -20,7 +20,8 @@ from taichi_soft.core.errors import MeshError, OptionError
 from taichi_soft.core.runtime import init
 from taichi_soft.elements.materials import preset
 from taichi_soft.meshing.io import SURFACES
-from taichi_soft.meshing.surfaces import joined, read_surfaces
+from taichi_soft.meshing.surface import joined
+from taichi_soft.meshing.surfaces import read_surfaces
 
 if TYPE_CHECKING:
     from taichi_soft.render.stage import Stage
