@@ -90,6 +90,10 @@ class SoftBodyAsset:
         coarser: the same thing of fewer and fewer tetrahedra, as `with_coarser` makes it: levels of detail
             for `Body.set_level`. Takes no spare vertices and no plasticity.
     Raises: MeshError, MaterialError or OptionError for bad input.
+    Example:
+        crate = SoftBodyAsset(box((0.4, 0.4, 0.4), (3, 3, 3)), jelly, contact=Contact(friction=0.8))
+        arena = World()
+        arena.reserve(crate, 10)  # room for ten of them
     """
 
     mesh: BodyMesh
@@ -193,6 +197,8 @@ class SoftBodyAsset:
 
         Their constants are such that they weigh as much and vibrate as fast in the slowest modes. Takes
         seconds for each.
+        Args:
+            meshes: rest shapes of fewer and fewer tetrahedra.
         Raises: MeshError for a mesh that is not coarser; MaterialError for another material than one with a
             number for each constant; OptionError for a body that is cut, tears, is bent for good, or whose
             law looks at edges. All of them before that work begins.
@@ -266,8 +272,6 @@ class SoftBodyAsset:
     ) -> SoftBodyAsset:
         """A body from an artist's mesh: a cage of tetrahedra that carries the mesh as its skin.
 
-            duck = SoftBodyAsset.from_surface("duck.glb", Material(2e5, 0.4, 900.0), cells=10)
-
         The surface may have holes, faces turned round, walls within and parts that overlap: see
         `taichi_soft.cages`. Mass, centre and inertia are those of the solid that it encloses.
         Args:
@@ -297,6 +301,9 @@ class SoftBodyAsset:
         Raises: MeshError for a surface that cannot be read or encloses nothing, with the way out, and for a
             process that crashes or takes too long; OptionError for cells out of range, with the memory that
             they would take; MissingExtraError without the package of the method.
+        Example:
+            duck = SoftBodyAsset.from_surface("duck.glb", jelly, cells=8)
+            print(duck.mesh.quality.summary())
         """
         surfaces = read_surfaces(surface, up, center=center, scale=scale)
         if up is None and (assumed := assumed_up(surface)):
@@ -352,7 +359,11 @@ class SoftBodyAsset:
         return replace(arrays, hull=HullArrays(carriers, hull.weights, hull.triangles))
 
     def touching_points(self, x: Floats) -> Floats:
-        """Where the points are by which it touches colliders, of vertices at `x` (n, 3) [m]."""
+        """Where the points are by which it touches colliders, of vertices at `x` (n, 3) [m].
+
+        Args:
+            x: positions of the vertices, (n, 3) [m].
+        """
         hull = self.bound_hull
         if hull is None:
             return x[outer_vertices(self.mesh)]
@@ -374,6 +385,8 @@ class SoftBodyAsset:
         [1/s], and after what time at most they are damped again [s].
 
         Of another material the frequency goes with the root of its mean stiffness over its mass.
+        Args:
+            body: description of that body.
         """
         material = body.material
         if isinstance(material, SpringMaterial) or material.damping_ratio * self.first_frequency == 0.0:
@@ -421,7 +434,9 @@ class SoftBodyAsset:
     ) -> Floats32:
         """Position, velocity, inverse mass and mass of each vertex of a body that begins there, (n, 8).
 
-        Args: as `World.spawn` takes them, and the height of the floor [m].
+        Args:
+            position, rotation, velocity, angular_velocity: as `World.spawn` takes them.
+            floor: height of the floor [m], or None.
         Raises: OptionError for bad values, a vertex that is too fast, and a place out of reach or below the
             floor, which would crush the body.
         """

@@ -73,8 +73,14 @@ def save_mesh(mesh: TetMesh, path: str | os.PathLike[str]) -> None:
 
     The file appears whole or not at all: one that was there before stays until the new one is complete.
     Naming either of TetGen's two files writes both.
+    Args:
+        mesh: tetrahedra.
+        path: of the file. Its suffix is one of those that `load_mesh` reads.
     Raises: MeshError for an unknown suffix, something that is not a TetMesh, a place that cannot be written
         to, or if meshio is needed and missing; OptionError for a path that names no file.
+    Example:
+        save_mesh(box(), "crate.npz")
+        crate = load_mesh("crate.npz")
     """
     if not isinstance(mesh, TetMesh):
         raise MeshError(f"save_mesh got a {type(mesh).__name__}: only a TetMesh has a file format")

@@ -15,6 +15,7 @@ import numpy as np
 from taichi_soft.core.checks import as_path, as_positive
 from taichi_soft.core.errors import MeshError, OptionError
 from taichi_soft.meshing.arrays import FloatArray, read_only
+from taichi_soft.meshing.gltf import read_gltf
 from taichi_soft.meshing.io import SURFACES, refuse_stand_in
 from taichi_soft.meshing.off import read_off
 from taichi_soft.meshing.ply import read_ply
@@ -120,15 +121,9 @@ def _read(path: Path) -> list[Surface]:
     return found
 
 
-def _by_trimesh(path: Path) -> list[Surface]:
-    import trimesh  # half a second that a game need not wait for
-
-    return _of_scene(trimesh.load_scene(path, process=False, maintain_order=True))
-
-
 READERS: dict[str, Callable[[Path], list[Surface]]] = {
-    ".glb": _by_trimesh,
-    ".gltf": _by_trimesh,
+    ".glb": read_gltf,
+    ".gltf": read_gltf,
     ".obj": read_obj,
     ".off": read_off,
     ".ply": read_ply,
