@@ -528,6 +528,10 @@ def test_a_file_cut_short_is_refused_wherever_it_ends(tmp_path, suffix):
     for end in [*range(0, len(whole), 9), *range(len(whole) - 20, len(whole))]:
         (tmp_path / f"x{suffix}").write_bytes(whole[:end])
         refusal(tmp_path / f"x{suffix}")
+    text = whole.decode("utf-8", errors="replace").encode()
+    if suffix == ".glb":
+        (tmp_path / "x.glb").write_bytes(text)
+        assert "converted it as text" in refusal(tmp_path / "x.glb")
     (tmp_path / "x.gltf").write_bytes(b"version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 9\n")
     assert "git lfs pull" in refusal(tmp_path / "x.gltf")
 
