@@ -518,7 +518,7 @@ def test_a_small_file_that_asks_for_many_vertices_is_refused_before_memory_is_ta
     message = refusal(path)
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
-    assert "more than 20,000,000 vertices" in message
+    assert "more than 5,000,000 vertices" in message
     assert peak < 30_000_000
 
 
@@ -528,6 +528,10 @@ def test_a_file_cut_short_is_refused_wherever_it_ends(tmp_path, suffix):
     for end in [*range(0, len(whole), 9), *range(len(whole) - 20, len(whole))]:
         (tmp_path / f"x{suffix}").write_bytes(whole[:end])
         refusal(tmp_path / f"x{suffix}")
+    text = whole.decode("utf-8", errors="replace").encode()
+    if suffix == ".glb":
+        (tmp_path / "x.glb").write_bytes(text)
+        assert "converted it as text" in refusal(tmp_path / "x.glb")
     (tmp_path / "x.gltf").write_bytes(b"version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 9\n")
     assert "git lfs pull" in refusal(tmp_path / "x.gltf")
 
@@ -583,12 +587,11 @@ def test_whatever_is_wrong_in_the_json_is_refused_or_read_but_nothing_else(path)
     places = [place for place in leaves(whole) if place]
     read_count = 0
     for place in places:
-        for odd in random.choice(len(ODD), 2, replace=False):
-            writer.json = copy.deepcopy(whole)
-            target = writer.json
-            for key in place[:-1]:
-                target = target[key]
-            target[place[-1]] = ODD[odd]
-            with contextlib.suppress(MeshError):
-                read_count += len(read(writer, path)) > 0
-    assert 0 < read_count < 2 * len(places)
+        writer.json = copy.deepcopy(whole)
+        target = writer.json
+        for key in place[:-1]:
+            target = target[key]
+        target[place[-1]] = ODD[random.integers(len(ODD))]
+        with contextlib.suppress(MeshError):
+            read_count += len(read(writer, path)) > 0
+    assert 0 < read_count < len(places)

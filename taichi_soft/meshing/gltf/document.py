@@ -38,6 +38,9 @@ MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 
 JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 
+NO_CHARACTER = "\ufffd".encode()
+"""What text editors and tools write for bytes that are no characters."""
+
 
 class Document:
     """The JSON of a .glb or .gltf file, with access to its binary data.
@@ -243,6 +246,10 @@ def _chunks(path: Path, data: bytes) -> tuple[bytes, bytes | None]:
     """The JSON and the binary chunk of a .glb file."""
     if len(data) < 20:
         raise MeshError(f"cannot be read: it is cut short, at {len(data)} bytes")
+    if NO_CHARACTER in data[:20]:
+        raise MeshError(
+            "cannot be read: a program has converted it as text. Copy the original as a binary file"
+        )
     version, length = struct.unpack_from("<II", data, 4)
     if version != 2:
         raise MeshError(f"is GLB of version {version}: {upgrade_command(path)}")

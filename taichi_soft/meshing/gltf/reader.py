@@ -35,7 +35,7 @@ SHAPELESS = (
 )
 """Beginnings of the names of extensions that change no shape: a file that requires one of these is read."""
 
-MOST_ROWS = 20_000_000
+MOST_ROWS = 5_000_000
 """Vertices or triangles of all parts. Many nodes can show one mesh: a small file could ask for any memory."""
 
 
@@ -125,9 +125,10 @@ class _Reader:
                 raise MeshError(
                     f"has {INSTANCING} on the skinned mesh {name!r}: remove the skin or the instances"
                 )
-            poses = (
-                world[None] @ instances if instances is not None else [world if skinned is None else skinned]
-            )
+            if skinned is not None:
+                poses = skinned[None]
+            else:
+                poses = (world[None] if instances is None else world @ instances)[:, None]
             if len(triangles) and len(poses):
                 part = _Part(name, positions, triangles, normals, self.looks.of(primitive))
                 yield _posed(part, poses)
@@ -234,28 +235,27 @@ class _Reader:
         return (*found, *self.looks.notes)
 
 
-def _posed(part: _Part, poses: Any) -> _Part:
-    """The part under each of some matrices in turn, (4, 4) or one for every vertex (n, 4, 4), as one part."""
-    vertices, normals, triangles = [], [], []
-    for number, matrices in enumerate(poses):
-        linear = matrices[..., :3, :3]
-        vertices.append(np.einsum("...ij,...j->...i", linear, part.vertices) + matrices[..., :3, 3])
-        rows = np.moveaxis(linear, -2, 0)
-        cofactors = np.stack(
-            [np.cross(rows[1], rows[2]), np.cross(rows[2], rows[0]), np.cross(rows[0], rows[1])], -2
-        )
-        turned = np.asarray(np.linalg.det(linear) < 0.0)  # mirrored
-        if part.normals is not None:  # by the inverse transpose, but for its length
-            moved = np.einsum("...ij,...j->...i", cofactors, part.normals)
-            normals.append(np.where(turned[..., None], -moved, moved))
-        mirrored = np.all(np.broadcast_to(turned, len(part.vertices))[part.triangles], axis=1, keepdims=True)
-        faces = np.where(mirrored, part.triangles[:, [0, 2, 1]], part.triangles)
-        triangles.append(faces + number * len(part.vertices))
+def _posed(part: _Part, poses: FloatArray) -> _Part:
+    """The instances of a part, as one part.
+
+    Args:
+        poses: matrices to the file's axes, (instances, 1 or vertices, 4, 4).
+    """
+    linear, count = poses[..., :3, :3], len(part.vertices)
+    vertices = np.einsum("...ij,...j->...i", linear, part.vertices) + poses[..., :3, 3]
+    turned = np.asarray(np.linalg.det(linear) < 0.0)  # mirrored
+    normals = None
+    if part.normals is not None:  # by the inverse transpose, but for the length
+        cofactors = np.cross(linear[..., [1, 2, 0], :], linear[..., [2, 0, 1], :])
+        moved = np.einsum("...ij,...j->...i", cofactors, part.normals)
+        normals = np.where(turned[..., None], -moved, moved).reshape(-1, 3)
+    mirrored = np.broadcast_to(turned, vertices.shape[:2])[:, part.triangles].all(axis=2, keepdims=True)
+    triangles = np.where(mirrored, part.triangles[:, [0, 2, 1]], part.triangles)
     return replace(
         part,
-        vertices=np.concatenate(vertices),
-        triangles=np.concatenate(triangles),
-        normals=np.concatenate(normals) if normals else None,
+        vertices=vertices.reshape(-1, 3),
+        triangles=(triangles + count * np.arange(len(poses))[:, None, None]).reshape(-1, 3),
+        normals=normals,
         visual=_repeated(part.visual, len(poses)),
     )
 
