@@ -42,7 +42,7 @@ from taichi_soft.elements.materials import AnisotropicMaterial, AnyMaterial, Mat
 from taichi_soft.meshing import BodyMesh, ParticleMesh, TetMesh
 from taichi_soft.meshing.arrays import read_only
 from taichi_soft.meshing.cage_mesh import CageMesh
-from taichi_soft.meshing.surfaces import Up, read_surfaces
+from taichi_soft.meshing.surfaces import Surface, Up, read_surfaces
 
 _log = logging.getLogger(__name__)
 
@@ -157,6 +157,10 @@ class SoftBodyAsset:
                 raise OptionError(f"level {level} must have the law and the contact of the finest")
             if each.hull is not self.hull and digest_of(each.hull) != digest_of(self.hull):
                 raise OptionError(f"level {level} must have the hull of the finest")
+            if not _are_same(each.skin, self.skin):
+                raise OptionError(
+                    f"level {level} must have the skin of the finest: with_coarser gives it that"
+                )
             if self.description.bonds is not None:
                 raise OptionError(f"law {self.law!r} has no levels of detail: it looks at edges")
             self._require_coarser((self, *coarser)[level - 1], each, level)
@@ -447,6 +451,14 @@ class SoftBodyAsset:
                 f"the body starts {depth:.4g} m below the floor: position=({origin[0]:g}, {origin[1]:g}, "
                 f"{origin[2] + depth:.6g}) puts it on the floor, World(floor=None) has none"
             )
+
+
+def _are_same(skin: tuple[Surface, ...], other: tuple[Surface, ...]) -> bool:
+    """True if two skins have the same vertices and triangles."""
+    return len(skin) == len(other) and all(
+        a is b or (np.array_equal(a.vertices, b.vertices) and np.array_equal(a.triangles, b.triangles))
+        for a, b in zip(skin, other, strict=True)
+    )
 
 
 def _mean_stiffness(body: BodyDescription) -> float:

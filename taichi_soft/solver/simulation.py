@@ -23,7 +23,7 @@ from taichi_soft.control.joints import Joints
 from taichi_soft.control.pins import pinned_vertices
 from taichi_soft.core.clock import Clock
 from taichi_soft.core.constants import POSITION_LIMIT, VELOCITY_LIMIT
-from taichi_soft.core.errors import DroppedEventsWarning, OptionError, SolverWarning, StateError
+from taichi_soft.core.errors import OptionError, SolverWarning, StateError
 from taichi_soft.core.settings import Settings
 from taichi_soft.events import EventLog
 from taichi_soft.fracture.tearing import Tears
@@ -59,6 +59,7 @@ class Simulation:
     events: EventLog
     tears: Tears
     readout: Readout = field(init=False)
+    loss: str = ""  # why the last step lost events, the first time since a drain
     troubled: int = 0  # bodies that failed in the last step, or whose solves were not exact
     _skips: bool = True  # somebody may stand still in the coming step
     _is_still: bool = False  # none was awake after the last step, and nothing was changed since
@@ -86,9 +87,7 @@ class Simulation:
         clock.steps += 1
         clock.time += seconds
         clock.last_dt = seconds
-        loss = self.events.collect(clock.steps - 1, clock.time, seconds)
-        if loss:
-            warnings.warn(loss, DroppedEventsWarning, stacklevel=4)
+        self.loss = self.events.collect(clock.steps - 1, clock.time, seconds)
         if self._skips:
             skipped = end_skips(self.state, len(self.pools.slots))
             self._is_still, self._skips = self._is_still and not skipped, False

@@ -16,7 +16,7 @@ from taichi_soft.control.drives import ForceField, push_by_field, require_field
 from taichi_soft.core.checks import as_count, as_flag, as_friction, as_gravity, as_number, as_path
 from taichi_soft.core.clock import Clock
 from taichi_soft.core.constants import GRAVITY_EARTH, VELOCITY_LIMIT
-from taichi_soft.core.errors import FrozenBodyWarning, OptionError, StateError
+from taichi_soft.core.errors import DroppedEventsWarning, FrozenBodyWarning, OptionError, StateError
 from taichi_soft.core.handles import Handles, recorded, serial_of
 from taichi_soft.core.settings import ContactSettings, Settings
 from taichi_soft.core.signals import Whole
@@ -231,6 +231,8 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
             reports += self._recorder.note_step(self._context, seconds, count, is_broken=bool(reports))
         if reports:
             warnings.warn("; ".join(reports), FrozenBodyWarning, stacklevel=3)
+        if simulation.loss:
+            warnings.warn(simulation.loss, DroppedEventsWarning, stacklevel=3)
         if simulation.troubled:
             simulation.check_solves()
 
@@ -248,7 +250,7 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
             self._push()
             return simulation.step(seconds, substeps, h)
         except KeyboardInterrupt:
-            restore_snapshot(self._context, before)
+            restore_snapshot(self._context, before, keeps_events=True)
             raise
 
     @recorded
@@ -287,6 +289,21 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
 def context_of_world(world: World) -> WorldContext:
     """What is behind its public face, for what the library builds upon it."""
     return world._context
+
+
+def may_refuse_step(world: World) -> bool:
+    """True if its force field or its limit of substeps may refuse a step."""
+    return world._force_field is not None or world._context.substeps.has_limit
+
+
+def take_back(world: World, data: bytes) -> None:
+    """Undo what was done since `World.snapshot` returned `data`, where no step was made since.
+
+    Unlike `World.restore` it keeps the events that wait, and `restore_count` stays.
+    """
+    restore_snapshot(world._context, data, keeps_events=True)
+    if world._recorder is not None:
+        world._recorder.go_back(world._context, data)
 
 
 def force_field_of(world: World) -> ForceField | None:
