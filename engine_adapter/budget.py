@@ -13,8 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from engine_adapter.skips import Skips
 from taichi_soft import Body, StateError, World
 from taichi_soft.core.checks import as_positive, as_vector
-from taichi_soft.core.handles import serial_of
-from taichi_soft.world.world import may_refuse_step, take_back
+from taichi_soft.core.handles import keep, serial_of, undo
 
 TIGHT, FULL, ROOMY = 0.98, 0.86, 0.7
 """Of the budget: what a long step is expected to take where something is given up, until it is expected to
@@ -120,7 +119,7 @@ class Budget:
     def take_back(self) -> None:
         """Undo what the last `prepare` changed: its step was refused, and is chosen for anew."""
         if self._before is not None:
-            take_back(self._world, self._before)
+            undo(self._world, self._before)
         step = self._world.step_count
         if step == self._newest:
             self._newest -= 1
@@ -128,8 +127,8 @@ class Budget:
 
     def _keep(self) -> None:
         """Before a change: keep the world as it is, where the coming step may be refused."""
-        if self._before is None and may_refuse_step(self._world):
-            self._before = self._world.snapshot()
+        if self._before is None:
+            self._before = keep(self._world)
 
     def restart(self) -> None:
         """The world was put to another state: what was decided belongs to another course of events."""

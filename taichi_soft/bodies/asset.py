@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from taichi_soft.bodies.calibration import calibrated
 from taichi_soft.bodies.contact import DEFAULT_CONTACT, THIN, Contact
 from taichi_soft.bodies.description import BodyDescription, outer_vertices, require_size
-from taichi_soft.bodies.first_mode import first_frequency
+from taichi_soft.bodies.first_mode import first_frequency, guessed_frequency
 from taichi_soft.bodies.hull import BoundHull, bind
 from taichi_soft.bodies.layout import BodyArrays, HullArrays, arrange, room_of
 from taichi_soft.bodies.plasticity import Plasticity
@@ -362,6 +362,11 @@ class SoftBodyAsset:
         """Angular frequency of the slowest vibration where nothing holds the body [rad/s], from above by less
         than a fifth; 0 for ropes and cloth, which bend freely."""
         return 0.0 if isinstance(self.mesh, ParticleMesh) else first_frequency(self.description)
+
+    @cached_property
+    def guessed_frequency(self) -> float:
+        """About the same, sooner found; 0 also for pairwise laws."""
+        return guessed_frequency(self.description)
 
     def vibration_row(self, body: BodyDescription) -> tuple[float, float]:
         """How vibrations of a body of this asset fade, which may be cut or of another material: at what rate

@@ -18,6 +18,7 @@ from taichi_soft.bodies.soft_body import SoftBody, present_asset, record_of
 from taichi_soft.bodies.status import ASLEEP, FROZEN
 from taichi_soft.contact.clearance import require_clear
 from taichi_soft.contact.colliders import Colliders
+from taichi_soft.control.easing import Easings
 from taichi_soft.control.frames import Frames
 from taichi_soft.control.joints import Joints
 from taichi_soft.control.pins import pinned_vertices
@@ -49,6 +50,7 @@ class Simulation:
     scene: Scene
     clock: Clock
     frames: Frames
+    easings: Easings
     joints: Joints
     colliders: Colliders | None  # None in a world without contact
     sleeps: bool  # whether bodies fall asleep
@@ -71,6 +73,8 @@ class Simulation:
     def step(self, seconds: float, substeps: int, h: float) -> list[str]:
         """Make one fixed step of `seconds`, in substeps of `h` [s]. Returns a line for each body it froze."""
         clock, colliders = self.clock, self.colliders
+        if self.easings.by_body:
+            self.easings.advance(seconds)
         self.frames.aim(self.state, len(self.pools.slots), seconds)
         goes_on = not self._is_still or self.frames.has_work
         if colliders is not None:

