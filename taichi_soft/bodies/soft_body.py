@@ -203,6 +203,7 @@ class BodyRecord:
 
     description: BodyDescription  # as added, or as set or cut since
     first_step: int
+    present: BodyArrays | None = None  # with constants on the way to those, while a material is eased in
     removed_in: int | None = None  # step
     frozen_in: FailedStep | None = None
     failure: Failure | None = None  # once it was asked for

@@ -18,12 +18,13 @@ from taichi_soft.bodies.soft_body import SoftBody, present_asset, record_of
 from taichi_soft.bodies.status import ASLEEP, FROZEN
 from taichi_soft.contact.clearance import require_clear
 from taichi_soft.contact.colliders import Colliders
+from taichi_soft.control.easing import Easings
 from taichi_soft.control.frames import Frames
 from taichi_soft.control.joints import Joints
 from taichi_soft.control.pins import pinned_vertices
 from taichi_soft.core.clock import Clock
 from taichi_soft.core.constants import POSITION_LIMIT, VELOCITY_LIMIT
-from taichi_soft.core.errors import DroppedEventsWarning, OptionError, SolverWarning, StateError
+from taichi_soft.core.errors import OptionError, SolverWarning, StateError
 from taichi_soft.core.settings import Settings
 from taichi_soft.events import EventLog
 from taichi_soft.fracture.tearing import Tears
@@ -49,6 +50,7 @@ class Simulation:
     scene: Scene
     clock: Clock
     frames: Frames
+    easings: Easings
     joints: Joints
     colliders: Colliders | None  # None in a world without contact
     sleeps: bool  # whether bodies fall asleep
@@ -59,6 +61,7 @@ class Simulation:
     events: EventLog
     tears: Tears
     readout: Readout = field(init=False)
+    loss: str = ""  # why the last step lost events, the first time since a drain
     troubled: int = 0  # bodies that failed in the last step, or whose solves were not exact
     _skips: bool = True  # somebody may stand still in the coming step
     _is_still: bool = False  # none was awake after the last step, and nothing was changed since
@@ -70,6 +73,8 @@ class Simulation:
     def step(self, seconds: float, substeps: int, h: float) -> list[str]:
         """Make one fixed step of `seconds`, in substeps of `h` [s]. Returns a line for each body it froze."""
         clock, colliders = self.clock, self.colliders
+        if self.easings.by_body:
+            self.easings.advance(seconds)
         self.frames.aim(self.state, len(self.pools.slots), seconds)
         goes_on = not self._is_still or self.frames.has_work
         if colliders is not None:
@@ -86,9 +91,7 @@ class Simulation:
         clock.steps += 1
         clock.time += seconds
         clock.last_dt = seconds
-        loss = self.events.collect(clock.steps - 1, clock.time, seconds)
-        if loss:
-            warnings.warn(loss, DroppedEventsWarning, stacklevel=4)
+        self.loss = self.events.collect(clock.steps - 1, clock.time, seconds)
         if self._skips:
             skipped = end_skips(self.state, len(self.pools.slots))
             self._is_still, self._skips = self._is_still and not skipped, False

@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike
 from taichi_soft.bodies.asset import Floats32, SoftBodyAsset
 from taichi_soft.bodies.soft_body import lives_in, present_asset, record_of, require_alive
 from taichi_soft.contact.clearance import free_points, require_clear
+from taichi_soft.control.constants import write_constants
 from taichi_soft.control.frictions import give_friction
-from taichi_soft.control.materials import set_material
 from taichi_soft.core.checks import as_count, as_flag, as_rotation, as_vector
 from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.core.math.rotations import turned
@@ -147,7 +147,7 @@ def _let_go(context: WorldContext, body: Body) -> None:
         each.let_go(body)
     present = present_asset(body)
     if record_of(body).description is not present.description and not body.is_cut:
-        set_material(body, present.material)
+        context.built.change(body.index, write_constants, body, present.description)
     if record_of(body).friction is not None:
         give_friction(context.built.state, body, None)
 
