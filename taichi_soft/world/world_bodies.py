@@ -19,7 +19,15 @@ from taichi_soft.bodies.tearing import Tearing
 from taichi_soft.core.checks import as_number
 from taichi_soft.core.errors import OptionError
 from taichi_soft.core.handles import recorded
-from taichi_soft.core.types import DampingModel, DampingModelName, FlipsName, LawName, StrainName
+from taichi_soft.core.types import (
+    DampingModel,
+    DampingModelName,
+    FlipsName,
+    LawName,
+    Overlap,
+    OverlapName,
+    StrainName,
+)
 from taichi_soft.elements.materials import AnyMaterial
 from taichi_soft.meshing import BodyMesh
 from taichi_soft.world.body import Body
@@ -57,6 +65,7 @@ class WorldBodies(WorldParts):
         plasticity: Plasticity | None = None,
         spare_vertices: int = 0,
         tearing: Tearing | None = None,
+        overlap: OverlapName = Overlap.PART,
     ) -> Body:
         """Add a body before `build`: an asset of its own, one slot for it, and a body in that.
 
@@ -64,7 +73,7 @@ class WorldBodies(WorldParts):
         Args:
             mesh, material, law, strain, flips, damping_model, pinned, contact, plasticity, spare_vertices,
                 tearing: as `SoftBodyAsset` takes them. Or an asset in place of the mesh, which has them all.
-            position, rotation, velocity: as `spawn` takes them.
+            position, rotation, velocity, overlap: as `spawn` takes them.
         Returns: a handle.
         Raises: MeshError, MaterialError or OptionError for bad input; StateError after `build`.
         """
@@ -87,7 +96,7 @@ class WorldBodies(WorldParts):
         )
         if asset is mesh:
             _require_defaults(material, options)
-        return add_body(self._context, asset, position, rotation, velocity)
+        return add_body(self._context, asset, position, rotation, velocity, overlap)
 
     def reserve(self, asset: SoftBodyAsset, count: int) -> None:
         """Make room for `count` more bodies of an asset, before `build`; `spawn` fills it.
@@ -107,6 +116,7 @@ class WorldBodies(WorldParts):
         rotation: ArrayLike | None = None,
         velocity: ArrayLike = (0.0, 0.0, 0.0),
         angular_velocity: ArrayLike = (0.0, 0.0, 0.0),
+        overlap: OverlapName = Overlap.PART,
     ) -> Body:
         """Put a body into the lowest free slot of its asset, before `build` or between two steps.
 
@@ -116,11 +126,14 @@ class WorldBodies(WorldParts):
             rotation: about the mesh's origin, matrix (3, 3) or quaternion (x, y, z, w).
             velocity: of the centre of mass, (3,) [m/s].
             angular_velocity: about the centre of mass, (3,) [rad/s]. Pinned vertices rest.
+            overlap: "part" or "refuse": with `soft_contact`, a body that starts inside another is moved apart
+                from it over the next steps, or it is refused.
         Returns: a new handle.
-        Raises: OptionError for a value out of range, or a place out of reach, below the floor or inside a
-            collider; StateError for an asset without a pool in this world, or whose pool is full.
+        Raises: OptionError for a value out of range, or a place out of reach, below the floor, inside a
+            collider or, with "refuse", inside another body; StateError for an asset without a pool in this
+            world, or whose pool is full.
         """
-        return spawn(self._context, asset, position, rotation, velocity, angular_velocity)
+        return spawn(self._context, asset, position, rotation, velocity, angular_velocity, overlap)
 
     @recorded
     def despawn(self, body: Body) -> None:
