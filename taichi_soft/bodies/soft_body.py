@@ -96,6 +96,9 @@ class Built(Protocol):
     def was_cut(self, body: SoftBody) -> None:
         """Take note that a body has other vertices."""
 
+    def was_placed(self, body: SoftBody) -> None:
+        """Look for bodies that a body overlaps, in the next step."""
+
     def become(self, settings: Settings) -> None:
         """Have other gravity, or another friction of the floor."""
 

@@ -42,7 +42,7 @@ from taichi_soft.persistence.world_structure import require_structure, structure
 from taichi_soft.solver.context import WorldContext
 from taichi_soft.solver.state import State
 
-MARK, VERSION = b"TSOFTSNP", 11
+MARK, VERSION = b"TSOFTSNP", 12
 
 Words = NDArray[np.int32]
 

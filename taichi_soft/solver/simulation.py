@@ -18,6 +18,7 @@ from taichi_soft.bodies.soft_body import SoftBody, present_asset, record_of
 from taichi_soft.bodies.status import ASLEEP, FROZEN
 from taichi_soft.contact.clearance import require_clear
 from taichi_soft.contact.colliders import Colliders
+from taichi_soft.contact.kernels.parting import mark_placed
 from taichi_soft.control.easing import Easings
 from taichi_soft.control.frames import Frames
 from taichi_soft.control.joints import Joints
@@ -243,6 +244,7 @@ class Simulation:
                 raise OptionError(f"{name} must lie within {limit:g} of zero")
         left = self.box_of(body)
         write_motion(self.state, body.index, x, v)
+        self.was_placed(body)
         self.rouse(body.index)
         self.wake_near(*left)
 
@@ -276,6 +278,11 @@ class Simulation:
         """Have other gravity, or another friction of the floor."""
         self.settings = self.readout.settings = settings
         self.state.write_surroundings(settings)
+
+    def was_placed(self, body: SoftBody) -> None:
+        """Look for bodies that a body overlaps, in the next step."""
+        if self.program.has_soft_contact:
+            mark_placed(self.state, body.index)
 
     def was_cut(self, body: SoftBody) -> None:
         """Take note that a body has other vertices."""
