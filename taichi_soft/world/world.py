@@ -215,7 +215,8 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
         Ctrl-C lets a step of less than about 0.03 s end first. It ends a longer one within a second, and the
         world is as before that step.
         Warns: FrozenBodyWarning; UnstableStepWarning for substeps longer than the stable step of the stiffest
-            asset; SlowStepWarning as `build`, once in a world; SolverWarning, of implicit Euler.
+            asset; SlowStepWarning as `build`, once in a world; SolverWarning of inexact solves by implicit
+            Euler, and once of a body that has had tetrahedra inside out for 120 steps.
         Raises: OptionError if dt is not a positive number or substeps not a positive whole one, and where
             there are more than `max_substeps`; StateError before `build`.
         """
@@ -232,6 +233,7 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
         if reports:
             warnings.warn("; ".join(reports), FrozenBodyWarning, stacklevel=3)
         if simulation.troubled:
+            simulation.check_shapes()
             simulation.check_solves()
 
     def _push(self) -> None:
