@@ -36,6 +36,7 @@ from taichi_soft.solver.kernels.skipping import begin_skips, end_skips, skip_bod
 from taichi_soft.solver.kernels.sleep import wake_body, wake_near
 from taichi_soft.solver.kernels.spawn import despawn_body, spawn_body
 from taichi_soft.solver.kernels.step import ALL_SLEEP
+from taichi_soft.solver.kernels.untangling import REPORTED
 from taichi_soft.solver.program import StepProgram
 from taichi_soft.solver.readout import Readout
 from taichi_soft.solver.schedules import Launch
@@ -63,10 +64,11 @@ class Simulation:
     tears: Tears
     readout: Readout = field(init=False)
     loss: str = ""  # why the last step lost events, the first time since a drain
-    troubled: int = 0  # bodies that failed in the last step, or whose solves were not exact
+    troubled: int = 0  # bodies that failed in the last step, stay inside out, or whose solves were not exact
     _skips: bool = True  # somebody may stand still in the coming step
     _is_still: bool = False  # none was awake after the last step, and nothing was changed since
     _warned: set[int] = field(default_factory=set)  # slots of bodies with such solves
+    _inverted: set[int] = field(default_factory=set)  # slots of bodies that were reported as inside out
 
     def __post_init__(self) -> None:
         self.readout = Readout(self.settings, self.state, self.program, self.scene, self.joints)
@@ -109,6 +111,7 @@ class Simulation:
         self.launch(1, seconds)
         end_skips(self.state, len(self.pools.slots))
         self.state.body_status.to_numpy()  # as where a body fails
+        self.state.body_patience.to_numpy()  # as where a body stays inside out
 
     def _note_failures(self, substeps: int, h: float) -> list[str]:
         """Mark the bodies that the last step froze; a line about each."""
@@ -142,6 +145,22 @@ class Simulation:
             )
         return "Use more substeps or a softer material"
 
+    def check_shapes(self) -> None:
+        """Warn of bodies that keep tetrahedra inside out, once of each."""
+        patience = self.state.body_patience.to_numpy()
+        for body in self.pools.living:
+            index = body.index
+            if patience[index] < REPORTED or index in self._inverted or body.is_frozen:
+                continue
+            self._inverted.add(index)
+            warnings.warn(
+                f"body {index} has tetrahedra inside out that do not turn back, as where its weight folds it: "
+                "body.flipped_tets() lists them. Take a larger Young's modulus, a coarser mesh or "
+                "mesh.improved()",
+                SolverWarning,
+                stacklevel=4,
+            )
+
     def check_solves(self) -> None:
         """Warn of bodies whose implicit solves were not exact in the last step, once of each."""
         if not self.settings.is_implicit:
@@ -169,6 +188,7 @@ class Simulation:
     def empty(self, slot: int) -> None:
         """Take the body in a slot out of the fields."""
         self._warned.discard(slot)
+        self._inverted.discard(slot)
         self._is_still = False
         despawn_body(self.state, slot)
 

@@ -227,7 +227,8 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
             dt: length of the fixed step [s], above 0.
             substeps: number of equal substeps, 1 or more; None chooses it by `stable_substeps`.
         Warns: FrozenBodyWarning; UnstableStepWarning for substeps longer than the stable step of the stiffest
-            asset; SlowStepWarning as `build`, once in a world; SolverWarning, of implicit Euler.
+            asset; SlowStepWarning as `build`, once in a world; SolverWarning of inexact solves by implicit
+            Euler, and once of a body that has had tetrahedra inside out for 120 steps.
         Raises: OptionError if dt is not a positive number or substeps not a positive whole one, and where
             there are more than `max_substeps`; StateError before `build`.
         Example:
@@ -249,6 +250,7 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
         if simulation.loss:
             warnings.warn(simulation.loss, DroppedEventsWarning, stacklevel=3)
         if simulation.troubled:
+            simulation.check_shapes()
             simulation.check_solves()
 
     def _push(self) -> None:
