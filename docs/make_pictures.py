@@ -12,7 +12,7 @@ from taichi_soft.render.demos import load_demo
 from taichi_soft.render.film import film
 
 FOLDER = Path(__file__).parent / "pictures"
-MOMENTS = {"dents": 0.44, "bars": 1.06, "tower": 0.6, "drape": 2.6, "bridge": 1.6, "bowl": 3.0}
+MOMENTS = {"dents": 0.44, "bars": 1.06, "tower": 1.7, "drape": 2.6, "bridge": 1.6, "bowl": 3.0}
 """That show what each demo is about [s]."""
 
 

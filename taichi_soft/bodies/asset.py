@@ -42,7 +42,7 @@ from taichi_soft.elements.materials import AnisotropicMaterial, AnyMaterial, Mat
 from taichi_soft.meshing import BodyMesh, ParticleMesh, TetMesh
 from taichi_soft.meshing.arrays import read_only
 from taichi_soft.meshing.cage_mesh import CageMesh
-from taichi_soft.meshing.surfaces import Up, read_surfaces
+from taichi_soft.meshing.surfaces import Up, assumed_up, read_surfaces
 
 _log = logging.getLogger(__name__)
 
@@ -266,6 +266,8 @@ class SoftBodyAsset:
         time_limit: float | None = None,
         refine: int | None = None,
         up: Up | None = None,
+        center: bool = False,
+        scale: float = 1.0,
         **options: Any,
     ) -> SoftBodyAsset:
         """A body from an artist's mesh: a cage of tetrahedra that carries the mesh as its skin.
@@ -289,9 +291,13 @@ class SoftBodyAsset:
                 left out, thinner than about a sixteenth of a cell: 0 to 3, and 1 if None. Each time halves
                 the substep. What stays left out is drawn, but neither bends nor touches anything. Both is
                 logged, with the `cell_size` that keeps it.
-            up: axis that points up in the file; None takes "y" for .glb and .gltf, as their format has it,
-                and "z" for all else.
+            up: axis that points up in the file, "y" or "z"; None takes "y" for .glb, .gltf and .obj, and "z"
+                for all else, which is what most programs write.
+            center: move the middle of the box round it to the origin, as a file needs that lies kilometres
+                away from it (geographic coordinates): positions are 32-bit numbers.
+            scale: factor from the unit of the file to metres: 0.001 for millimetres.
             options: further arguments of `SoftBodyAsset`. A `skin` is drawn in place of the surface.
+        What was assumed, repaired or left out of the file is logged (logger `taichi_soft`).
         Raises: MeshError for a surface that cannot be read or encloses nothing, with the way out, and for a
             process that crashes or takes too long; OptionError for cells out of range, with the memory that
             they would take; MissingExtraError without the package of the method.
@@ -299,7 +305,11 @@ class SoftBodyAsset:
             duck = SoftBodyAsset.from_surface("duck.glb", jelly, cells=8)
             print(duck.mesh.quality.summary())
         """
-        surfaces = read_surfaces(surface, up)
+        surfaces = read_surfaces(surface, up, center=center, scale=scale)
+        if up is None and (assumed := assumed_up(surface)):
+            _log.info("%s", assumed)
+        for note in dict.fromkeys(note for each in surfaces for note in each.notes):
+            _log.warning("%s", note)
         numbers: list[Any] = [cells]
         if isinstance(cells, (tuple, list, np.ndarray)):
             numbers = [as_count(number, "cells", 1, 1_000_000) for number in cells]

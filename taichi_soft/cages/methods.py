@@ -15,7 +15,7 @@ from taichi_soft.core.checks import as_count, as_positive, choose_one_of
 from taichi_soft.core.errors import OptionError
 from taichi_soft.core.types import CageMethodName
 from taichi_soft.meshing import TetMesh
-from taichi_soft.meshing.surfaces import Surface, joined
+from taichi_soft.meshing.surface import Surface, joined
 
 METHODS = get_args(CageMethodName)
 

@@ -30,7 +30,7 @@ from taichi_soft.meshing.tetgen import read_tetgen, write_elements, write_nodes
 
 SUFFIXES = (".npz", ".node", ".ele", *FORMATS)
 SURFACES = (".stl", ".obj", ".ply", ".off", ".glb", ".gltf")
-"""Triangles only, which trimesh reads by itself."""
+"""Triangles only, which `SoftBodyAsset.from_surface` reads."""
 
 
 def load_mesh(path: str | os.PathLike[str], *, fix_orientation: bool = True) -> TetMesh:
@@ -58,7 +58,7 @@ def load_mesh(path: str | os.PathLike[str], *, fix_orientation: bool = True) -> 
     _require_format(source, f"; of many others {converted} makes one of these")
     read = _read_npz if suffix == ".npz" else read_interchange if suffix in FORMATS else read_tetgen
     try:
-        _refuse_stand_in(source)
+        refuse_stand_in(source)
         vertices, tets = read(source)
     except OSError as error:
         raise MeshError(f"{_named(error, source)}: cannot be read ({error.strerror or error})") from None
@@ -123,7 +123,7 @@ def _require_format(path: Path, way_out: str = "") -> None:
         )
 
 
-def _refuse_stand_in(source: Path) -> None:
+def refuse_stand_in(source: Path) -> None:
     """Raises: MeshError where git or a browser has put something else in the place of the file."""
     pair = source.suffix.lower() in (".node", ".ele")
     for path in (source.with_suffix(".node"), source.with_suffix(".ele")) if pair else (source,):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 from difficult_surfaces import REFUSED
+from gltf_writer import GltfWriter
 from surfaces import ball, joined, with_some_turned, with_triangles, without
 
 from taichi_soft import Material, MeshError, box, save_mesh
@@ -182,3 +183,15 @@ def test_the_command_mends(tmp_path, capsys):
     assert run("doctor", str(bad), *arguments) == 0
     assert "turned round" in capsys.readouterr().out
     assert (tmp_path / "out.glb").is_file()
+
+
+def test_what_a_gltf_file_has_besides_its_surface_is_told(tmp_path):
+    """Of a flat one, whose body need not be made."""
+    writer = GltfWriter()
+    writer.node(mesh=writer.mesh(triangles=np.array([[0, 1, 2]], np.uint16)))
+    writer.add("animations", name="run", channels=[], samplers=[])
+    writer.json["extensionsUsed"] = ["KHR_materials_unlit"]
+    found = diagnose(writer.write(tmp_path / "flat.glb"), RUBBER)
+    notes = [each.text for each in found.findings if each.grade is Grade.NOTE]
+    assert notes[:2] == ["1 animation (run): not played", "extensions: KHR_materials_unlit (ignored)"]
+    assert not found.is_fit
