@@ -20,6 +20,8 @@ from taichi_soft.live.wishes import wish_of
         ({"do": "move", "point": [1, 2, 3], "number": 7}, {"point": [1.0, 2.0, 3.0], "number": 7}),
         ({"do": "choose", "law": "springs"}, {"law": "springs", "strain": None, "flips": None}),
         ({"do": "tint", "quantity": None}, {"quantity": None}),
+        ({"do": "upload", "name": "a.obj"}, {"name": "a.obj", "up": None}),
+        ({"do": "upload", "name": "a.obj", "up": "z"}, {"name": "a.obj", "up": "z"}),
         ({"do": "seen", "number": 3}, {"number": 3}),
     ],
 )
@@ -51,6 +53,7 @@ def test_a_wish_has_what_was_said_and_nothing_else(said, wish):
         ('{"do": "grab", "origin": [0, 0, 0], "direction": [0, 0, 0]}', "zero"),
         ('{"do": "choose", "law": "magic"}', "law is one of"),
         ('{"do": "choose", "law": ["virial"]}', "law is one of"),
+        ('{"do": "upload", "name": "a.obj", "up": "x"}', "up is one of y, z"),
         ('{"do": "pause", "is_paused": 1}', "true or false"),
         ('{"do": "pause", "is_paused": true, "pane": 5}', "pane"),
         ('{"do": "save", "what": null}', "what is one of"),
