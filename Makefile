@@ -76,7 +76,7 @@ profile: $(VENV)/.demo
 	@$(BIN)/taichi-soft profile
 
 gallery: $(VENV)/.demo
-	@$(BIN)/python docs/make_gallery.py
+	@$(BIN)/python docs/make_gallery.py $(GALLERY)
 
 docs: $(VENV)/.docs
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict

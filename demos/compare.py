@@ -10,6 +10,7 @@ from statistics import median
 from engine_adapter import FixedStep
 from taichi_soft import LAWS, Material, TetMesh, World, sphere
 from taichi_soft.cli import main
+from taichi_soft.core.extras import missing_packages
 from taichi_soft.lab.profiling.spread import time_calls
 from taichi_soft.render import PALETTE, Camera
 from taichi_soft.render.film import Actor, Stage
@@ -19,6 +20,7 @@ HEIGHT = 2.2  # of the centres [m]
 STEP = FixedStep(dt=1 / 50, substeps=10)
 PER_ROW = 3
 COLORS = (*PALETTE, (0.93, 0.92, 0.88), (0.58, 0.16, 0.24), (0.70, 0.85, 0.30))
+NO_BODY = (0.09, 0.10, 0.13)  # colour of a line of the legend without a sphere
 PITCH, DEPTH = 2.8, 3.2  # between spheres, across and away from the eye [m]
 
 
@@ -27,18 +29,21 @@ def stage() -> Stage:
     mesh = sphere(1.0, 3)
     world = World()
     actors = []
-    for i, law in enumerate(LAWS):
+    missing = {"cmpm": missing_packages("voronoi")}
+    laws = [law for law in LAWS if not missing.get(law)]
+    for i, law in enumerate(laws):
         row, column = divmod(i, PER_ROW)
-        in_row = min(PER_ROW, len(LAWS) - row * PER_ROW)
+        in_row = min(PER_ROW, len(laws) - row * PER_ROW)
         place = PITCH * (column - (in_row - 1) / 2), -DEPTH * row, HEIGHT
         body = world.add_body(mesh, SOFT, law=law, position=place)
         actors.append(Actor(body, COLORS[i]))
     world.build()
-    rows = -(-len(LAWS) // PER_ROW)
+    rows = -(-len(laws) // PER_ROW)
     left, right = -PITCH - 1.2, PITCH + 1.2
     seen = (left, -DEPTH * (rows - 1) - 1.4, 0.0), (right + 1.8 * (right - left), 1.0, 2.8)
     camera = Camera.framing(*seen, aspect=16 / 9, azimuth=-90, elevation=38, margin=1.0)
-    legend = [(COLORS[i], f"{law}  {_cost(mesh, law):.2f} ms") for i, law in enumerate(LAWS)]
+    legend = [(COLORS[i], f"{law}  {_cost(mesh, law):.2f} ms") for i, law in enumerate(laws)]
+    legend += [(NO_BODY, f"{law}  needs {', '.join(names)}") for law, names in missing.items() if names]
     return Stage(
         "every law, time of a step", world, actors, camera, STEP, seconds=6.0, legend=legend, backdrop="paper"
     )

@@ -1,9 +1,10 @@
 """The gallery of the documentation site: an entry for every demo, and a page with its script.
 
 An entry is made of the docstring of the demo: its first paragraph says what is seen, its second one what to
-notice. Films, stills and the page with bodies to turn come from `docs/gallery`, where `make_gallery.py` puts
-them. What is not there is left out, and the page says how to make it. MkDocs calls these functions by their
-names (mkdocs.yml, `hooks`).
+notice. Its still comes from `docs/pictures/demos`, which is in the repository. Films and the page with bodies
+to turn come from `docs/gallery`, where `make_gallery.py` puts them. Without its film an entry shows its
+still, and the page says how to make the films. MkDocs calls these functions by their names (mkdocs.yml,
+`hooks`).
 """
 
 from __future__ import annotations
@@ -32,22 +33,30 @@ ENTRY = """<section class="demo" markdown>
 </section>"""
 
 FILM = """<video class="film" controls loop muted playsinline preload="none" width="480" height="270" \
-poster="gallery/{name}.jpg" aria-label="Film: {alt}">
+poster="pictures/demos/{name}.jpg" aria-label="Film: {alt}">
 <source src="gallery/{name}.webm" type="video/webm">
-<img src="gallery/{name}.jpg" alt="{alt}" width="480" height="270">
+{still}
 </video>"""
+
+STILL = """<img class="film" src="pictures/demos/{name}.jpg" alt="{alt}" width="480" height="270" \
+loading="lazy">"""
 
 PAUSE = '<p><button id="films" class="md-button" type="button" hidden>Pause all films</button></p>'
 
-VIEWER = """<iframe class="viewer" src="gallery/viewer.html" title="Bodies to turn, and time to scrub" \
+VIEWER = """## Turn it, and stop the time
+
+{count} demos as data: the places of all vertices in each picture, in some hundred kilobytes.
+
+<iframe class="viewer" src="gallery/viewer.html" title="Bodies to turn, and time to scrub" \
 loading="lazy"></iframe>
 
 [Open it by itself](gallery/viewer.html){{ target="_blank" }}. It is one file of {size:.1f} MB: save it, \
 and it opens from a folder too, without a server. The picture turns by dragging and by arrow keys."""
 
-MISSING = """!!! note "{what} not been made"
+MISSING = """!!! note "Stills instead of films"
 
-    `make gallery` makes what is missing, in some minutes, and `make docs` takes it into the site."""
+    This copy of the documentation was built without {what}. `make gallery` films every demo, in some \
+minutes; then `make docs` takes the films into the site."""
 
 SCRIPT = """---
 search:
@@ -107,27 +116,30 @@ def on_page_markdown(text: str, page: Any, **_: Any) -> str:
 
 
 def viewer() -> str:
-    """The page with bodies to turn, within this one."""
+    """The page with bodies to turn, within this one; nothing where it was not made."""
     file = FOLDER / "viewer.html"
     if not file.is_file():
-        return MISSING.format(what="This page has")
-    return VIEWER.format(size=file.stat().st_size / 1e6)
+        return ""
+    return VIEWER.format(count=len(list(FOLDER.glob("*.motion"))), size=file.stat().st_size / 1e6)
 
 
 def entries() -> str:
     """One for each demo, and what holds them."""
     shown = [_entry(demo) for demo in demos()]
-    is_whole = all("<video" in each for each in shown)
-    head = [PAUSE] if any("<video" in each for each in shown) else []
-    head += [] if is_whole else [MISSING.format(what="Some of the films have")]
+    filmed = sum("<video" in each for each in shown)
+    head = [PAUSE] if filmed else []
+    if filmed < len(shown):
+        head.append(MISSING.format(what="some of its films" if filmed else "its films"))
     grid = ['<div class="gallery" markdown>', *shown, "</div>"]
     return "\n\n".join([*head, *grid, '<script src="theme/gallery.js" defer></script>'])
 
 
 def _entry(demo: Demo) -> str:
-    """What the page shows of a demo, without its film where there is none."""
-    is_filmed = all((FOLDER / f"{demo.name}{suffix}").is_file() for suffix in (".webm", ".jpg"))
-    film = FILM.format(name=demo.name, alt=escape(demo.what, quote=True)) if is_filmed else ""
+    """What the page shows of a demo: its film, or else its still."""
+    named = {"name": demo.name, "alt": escape(demo.what, quote=True)}
+    film = STILL.format(**named)
+    if (FOLDER / f"{demo.name}.webm").is_file():
+        film = FILM.format(still=film, **named)
     is_turned = all((FOLDER / name).is_file() for name in (f"{demo.name}.motion", "viewer.html"))
     turn = f' &middot; [Turn it](gallery/viewer.html#{demo.name}){{ target="_blank" }}' if is_turned else ""
     return ENTRY.format(name=demo.name, film=film, what=demo.what, notice=demo.notice, turn=turn)

@@ -1,10 +1,11 @@
-"""Makes the gallery of the documentation: films and stills of all demos, and the page with bodies to turn.
+"""Make the gallery of the documentation: films of all demos, and the page with bodies to turn.
 
-`python docs/make_gallery.py` makes everything, in some minutes; with names of demos, what belongs to these.
+`python docs/make_gallery.py` makes everything, in some minutes; with names of demos, only their films. A demo
+that needs a missing package is skipped by name. `make_pictures.py` makes the stills.
 """
 
+import argparse
 import shutil
-import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -12,10 +13,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from rich.markup import escape
 from viewer.motion import motion_of
 from viewer.page import write_page
 
-from taichi_soft.cli.console import progress_bar, say
+from taichi_soft.cli.console import filming, say
+from taichi_soft.cli.filming import size_of
+from taichi_soft.core.errors import MissingExtraError
 from taichi_soft.render.containers import COLORS
 from taichi_soft.render.demos import demo_names, load_demo
 from taichi_soft.render.ffmpeg import run_ffmpeg
@@ -28,12 +32,6 @@ TURNABLE = ("jelly", "playground", "cloth")
 
 FADE = 10
 """Pictures in which the last one becomes the first again."""
-
-STILLS = {"bounce": 1.3, "elephants": 0.6, "grab": 2.3, "jelly": 0.74, "lod": 3.1, "wheels": 3.0}
-"""The moments that their stills show [s]."""
-
-STILL = 0.3
-"""Of other films: after which share of it."""
 
 SEEN, CHANGED, LOOK = 24, 0.004, 1.0
 """A picture of which more than this share differs by more levels than that from the last one shows something
@@ -51,15 +49,12 @@ SIZES = {".webm": 6e6, ".motion": 3e6}
 Progress = Callable[[int, int], None]
 
 
-def write_film(stage: Stage, name: str, on_frame: Progress) -> None:
-    """The film of a demo, which leads back into its beginning, and a still."""
+def write_film(stage: Stage, name: str, on_frame: Progress, size: tuple[int, int] = SIZE) -> None:
+    """Write the film of a demo, which leads back into its beginning."""
     with tempfile.TemporaryDirectory() as scratch:
-        film(stage, Path(scratch) / "f.png", fps=FPS, size=SIZE, on_frame=on_frame)
+        film(stage, Path(scratch) / "f.png", fps=FPS, size=size, on_frame=on_frame)
         pictures = [cv2.imread(str(file)) for file in sorted(Path(scratch).iterdir())]
         pictures = pictures[: _end_of(pictures)]
-        last = len(pictures) - 1
-        still = min(last, round(STILLS[name] * FPS if name in STILLS else STILL * last))
-        cv2.imwrite(str(FOLDER / f"{name}.jpg"), pictures[still], [cv2.IMWRITE_JPEG_QUALITY, 82])
         for i in range(FADE):
             fade = _mixed(pictures[-1], pictures[0], (i + 1) / (FADE + 1))
             cv2.imwrite(f"{scratch}/f_{len(pictures) + i:04d}.png", fade)
@@ -81,31 +76,44 @@ def _mixed(one: NDArray[np.uint8], other: NDArray[np.uint8], share: float) -> ND
     return np.asarray(cv2.addWeighted(one, 1.0 - share, other, share, 0.0), dtype=np.uint8)
 
 
-def main(names: list[str]) -> None:
-    """Make what belongs to these demos."""
+def main() -> None:
+    """Make what belongs to the demos that are named."""
+    options = argparse.ArgumentParser(description="Film the demos for the gallery of the documentation.")
+    options.add_argument("names", nargs="*", metavar="NAME", help="a demo; all of them by default")
+    options.add_argument("--seconds", type=float, help="shows at most this much of each demo")
+    options.add_argument("--size", default="x".join(map(str, SIZE)), help="of the films, in pixels")
+    given = options.parse_args()
+    size, names = size_of(given.size), given.names or demo_names()
     FOLDER.mkdir(exist_ok=True)
-    with progress_bar() as bar:
-        task = bar.add_task("", total=None)
-        for name in names:
 
-            def show(done: int, total: int, name: str = name) -> None:
-                bar.update(task, description=name, completed=done, total=total)
+    def stage_of(name: str) -> Stage:
+        stage = load_demo(name).stage()
+        stage.seconds = min(stage.seconds, given.seconds or stage.seconds)
+        return stage
 
-            bar.update(task, description=f"{name}: compiling", completed=0, total=None)
-            write_film(load_demo(name).stage(), name, show)
-            if name in TURNABLE:
-                (FOLDER / f"{name}.motion").write_bytes(motion_of(load_demo(name).stage()))
-            say(f"{name}: {(FOLDER / f'{name}.webm').stat().st_size / 1e3:.0f} kB")
+    for number, name in enumerate(names, start=1):
+        try:
+            with filming(f"{name}, {number} of {len(names)}") as show:
+                write_film(stage_of(name), name, show, size)
+                if name in TURNABLE:
+                    (FOLDER / f"{name}.motion").write_bytes(motion_of(stage_of(name)))
+        except MissingExtraError as error:
+            say(f"{name}: skipped. {escape(str(error))}")
+            continue
+        say(f"{name}: {(FOLDER / f'{name}.webm').stat().st_size / 1e3:.0f} kB")
     motions = [FOLDER / f"{name}.motion" for name in TURNABLE]
     if all(file.is_file() for file in motions):
-        write_page(FOLDER / "viewer.html", {file.stem: file.read_bytes() for file in motions})
+        try:
+            write_page(FOLDER / "viewer.html", {file.stem: file.read_bytes() for file in motions})
+        except OSError as error:  # three.js has to be fetched once
+            say(f"viewer.html: skipped. {escape(str(error))}")
     for suffix, most in SIZES.items():
-        size = sum(file.stat().st_size for file in FOLDER.glob(f"*{suffix}"))
+        total = sum(file.stat().st_size for file in FOLDER.glob(f"*{suffix}"))
         say(
-            f"{suffix}: {size / 1e6:.1f} MB together"
-            + (f", above {most / 1e6:.0f} MB" if size > most else "")
+            f"{suffix}: {total / 1e6:.1f} MB together"
+            + (f", above {most / 1e6:.0f} MB" if total > most else "")
         )
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:] or demo_names())
+    main()

@@ -1,39 +1,81 @@
-"""Make the pictures of the README and the pages: `python docs/make_pictures.py`, in some minutes."""
+"""Make the pictures of the README and the stills of the gallery.
 
+`python docs/make_pictures.py` makes all, in some minutes; with names of demos, only their stills.
+"""
+
+import subprocess
+import sys
 import tempfile
 from pathlib import Path
 
 import cv2
 import numpy as np
 
+from taichi_soft.core.package_data import ASSETS
 from taichi_soft.lab.peers import Drop, compare, missing_peers
 from taichi_soft.lab.peers.wall import draw_wall
-from taichi_soft.render.demos import load_demo
+from taichi_soft.render.demos import demo_names, load_demo
 from taichi_soft.render.film import film
 
 FOLDER = Path(__file__).parent / "pictures"
 MOMENTS = {"dents": 0.44, "bars": 1.06, "tower": 1.7, "drape": 2.6, "bridge": 1.6, "bowl": 3.0}
 """That show what each demo is about [s]."""
 
+STILLS = {"bounce": 1.3, "elephants": 0.6, "grab": 2.3, "jelly": 0.74, "lod": 3.1, "wheels": 3.0}
+"""Moments of demos that their stills in the gallery show [s]."""
 
-def still(name: str, moment: float, size: tuple[int, int] = (520, 292)) -> np.ndarray:
-    """The picture of a demo at a moment, uint8 (height, width, 3)."""
+STILL = 0.3
+"""Moment of all others [share of the film's length]."""
+
+STRIP = (4, 6, 8, 14)
+"""Numbers of the frames that the page on films shows, at 20 per second."""
+
+STILL_SIZE, QUALITY = (480, 270), 82
+"""Width and height [pixels] of the gallery's stills, and quality of their JPEG: about 20 kB each."""
+
+
+def still(name: str, moment: float | None, size: tuple[int, int] = (520, 292)) -> np.ndarray:
+    """Picture of a demo at a moment, uint8 (height, width, 3)."""
+    stage = load_demo(name).stage()
+    film(stage, None, seconds=STILL * stage.seconds if moment is None else moment)  # draws nothing
     with tempfile.TemporaryDirectory() as folder:
-        film(load_demo(name).stage(), Path(folder) / "f.png", seconds=moment + 0.04, size=size)
-        return cv2.imread(str(sorted(Path(folder).iterdir())[-1]))
+        film(stage, Path(folder) / "f.png", fps=50, seconds=0.02, size=size)
+        return cv2.imread(f"{folder}/f_0000.png")
 
 
-def main() -> None:
-    """Write all pictures."""
+def write_still(name: str) -> None:
+    """Write the still of a demo in the gallery."""
+    file = FOLDER / "demos" / f"{name}.jpg"
+    file.parent.mkdir(exist_ok=True)
+    cv2.imwrite(str(file), still(name, STILLS.get(name), STILL_SIZE), [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
+
+
+def write_strip() -> None:
+    """Write some pictures of the film that `taichi-soft film` makes of an artist's mesh."""
+    with tempfile.TemporaryDirectory() as folder:
+        options = ["--out", f"{folder}/f.png", "--seconds", "1", "--fps", "20", "--size", "480x270"]
+        command = [sys.executable, "-m", "taichi_soft", "film", str(ASSETS / "elephant.glb"), *options]
+        subprocess.run(command, check=True)
+        frames = [cv2.imread(f"{folder}/f_{number:04d}.png")[55:245, 90:390] for number in STRIP]
+    cv2.imwrite(str(FOLDER / "film.jpg"), np.hstack(frames), [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
+
+
+def main(names: list[str]) -> None:
+    """Write the stills of these demos, or all pictures."""
+    for name in names or demo_names():
+        write_still(name)
+    if names:
+        return
     stills = [still(name, moment) for name, moment in MOMENTS.items()]
     rows = [np.hstack(stills[i : i + 2]) for i in range(0, len(stills), 2)]
     cv2.imwrite(str(FOLDER / "demos.png"), np.vstack(rows))
     cv2.imwrite(str(FOLDER / "elephants.png"), still("elephants", 0.52, (1040, 585)))
     cv2.imwrite(str(FOLDER / "laws.png"), still("compare", 0.72, (1040, 585)))
+    write_strip()
     if not missing_peers():
         drop = Drop()
         cv2.imwrite(str(FOLDER / "peers.png"), draw_wall(drop, compare(drop), 0.92, (1040, 585))[:, :, ::-1])
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])

@@ -78,6 +78,7 @@ SECONDS = {
     "native/": (0, 660),
     "live/": (13, 244),
     "test_readme": (1, 10),
+    "test_first_steps": (1, 240),
     "test_package": (2, 60),
     "": (40, 0),
 }
@@ -115,7 +116,11 @@ SOAK = (
     *(f"persistence/test_snapshot.py::test_{name}" for name in ("rest_shapes", "other_integrators")),
     *(f"test_package.py::test_a_{name}" for name in ("source", "wheel")),
     "docs/test_pages.py::test_the_code",
-    *(f"docs/test_gallery.py::test_{name}" for name in ("a_motion", "the_motion", "a_film", "films_of")),
+    *(f"test_first_steps.py::test_the_{name}" for name in ("first_films", "documentation", "gallery")),
+    *(
+        f"docs/test_gallery.py::test_{name}"
+        for name in ("a_demo_that", "a_motion", "the_motion", "a_film", "films_of")
+    ),
     *(f"docs/test_gallery.py::test_{name}" for name in ("the_page_plays", "a_b", "every_control")),
     *(
         "control/test_joint_lives.py::test_a_recording",

@@ -6,13 +6,24 @@ import shutil
 import sys
 from html.parser import HTMLParser
 from pathlib import Path
+from types import SimpleNamespace
 
+import cv2
 import numpy as np
 import pytest
 from browser import chromium, opened, pixels_of
 
 from engine_adapter import FixedStep
-from taichi_soft import BoxShape, Material, SpringMaterial, World, box, cloth, cloth_constants
+from taichi_soft import (
+    BoxShape,
+    Material,
+    MissingExtraError,
+    SpringMaterial,
+    World,
+    box,
+    cloth,
+    cloth_constants,
+)
 from taichi_soft.core.package_data import DEMOS
 from taichi_soft.render import Camera, VideoWriter
 from taichi_soft.render.demos import demo_names, load_demo
@@ -146,12 +157,11 @@ class Films(HTMLParser):
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    """Films and stills for all demos, none of which is true."""
+    """Empty files for the films of all demos."""
     made = tmp_path / "gallery"
     made.mkdir()
     for name in demo_names():
         (made / f"{name}.webm").touch()
-        (made / f"{name}.jpg").touch()
     monkeypatch.setattr(gallery_hooks, "FOLDER", made)
     return made
 
@@ -165,7 +175,7 @@ def test_every_demo_has_an_entry_with_film_still_words_script_and_command(folder
         summary, _, notice = load_demo(name).__doc__.strip().partition("\n\n")
         summary, notice = (" ".join(text.split()) for text in (summary, notice))
         assert source["src"] == f"gallery/{name}.webm"
-        assert film["poster"] == still["src"] == f"gallery/{name}.jpg"
+        assert film["poster"] == still["src"] == f"pictures/demos/{name}.jpg"
         assert {"loop", "muted", "playsinline", "controls"} <= set(film)
         assert "autoplay" not in film  # gallery.js starts it, where motion is wanted
         assert still["alt"] == summary
@@ -178,17 +188,31 @@ def test_every_demo_has_an_entry_with_film_still_words_script_and_command(folder
     assert "make gallery" not in gallery_hooks.entries()
 
 
-def test_the_page_says_how_to_make_what_is_missing(folder):
-    assert "make gallery" in gallery_hooks.viewer()
+def test_without_films_the_gallery_shows_stills_and_says_how_to_make_films(folder):
+    assert gallery_hooks.viewer() == ""
     (folder / "viewer.html").write_text("x" * 2_300_000)
     (folder / "jelly.motion").touch()
     assert "2.3 MB" in gallery_hooks.viewer()
     assert "gallery/viewer.html#jelly" in gallery_hooks.entries()
     (folder / "cut.webm").unlink()
     text = gallery_hooks.entries()
-    assert "make gallery" in text
+    assert "without some of its films. `make gallery`" in text
     assert len(Films(text).found["video"]) == len(demo_names()) - 1
+    shutil.rmtree(folder)
+    text = gallery_hooks.entries()
+    assert "without its films. `make gallery`" in text
+    stills = Films(text).found["img"]
+    assert [still["src"] for still in stills] == [f"pictures/demos/{name}.jpg" for name in demo_names()]
+    assert "video" not in Films(text).found
     assert "demos/cut.md" in text
+
+
+@pytest.mark.parametrize("name", demo_names())
+def test_every_demo_has_a_still_in_the_repository(name):
+    """`python docs/make_pictures.py NAME` makes it."""
+    file = ROOT / "docs" / "pictures" / "demos" / f"{name}.jpg"
+    assert cv2.imread(str(file)).shape == (270, 480, 3)
+    assert file.stat().st_size < 40_000
 
 
 def test_the_page_of_a_script_holds_it_as_it_is():
@@ -207,8 +231,6 @@ def test_a_demo_without_a_word_on_what_to_notice_is_refused(tmp_path):
 
 def test_a_film_of_the_gallery_ends_where_it_begins(tmp_path, monkeypatch):
     """Its last picture is nearer to its first one than the one before the fade is."""
-    import cv2
-
     monkeypatch.setattr(make_gallery, "FOLDER", tmp_path)
     seen = []
     make_gallery.write_film(falling_stage(), "box", lambda *now: seen.append(now))
@@ -224,7 +246,30 @@ def test_a_film_of_the_gallery_ends_where_it_begins(tmp_path, monkeypatch):
     assert pictures[0].shape == (270, 480, 3)
     gaps = [np.abs(picture - pictures[0]).mean() for picture in (pictures[-1], pictures[14])]
     assert gaps[0] < 0.5 * gaps[1]
-    assert cv2.imread(str(tmp_path / "box.jpg")).shape == (270, 480, 3)
+
+
+def test_a_demo_that_needs_a_missing_package_is_skipped_by_name(tmp_path, monkeypatch, capsys):
+    def load(name):
+        if name == "rich":
+            raise MissingExtraError("riches need gold, not installed here")
+        return SimpleNamespace(stage=falling_stage)
+
+    monkeypatch.setattr(make_gallery, "FOLDER", tmp_path)
+    monkeypatch.setattr(make_gallery, "load_demo", load)
+    monkeypatch.setattr(
+        sys, "argv", ["make_gallery.py", "rich", "box", "--seconds", "0.1", "--size", "96x54"]
+    )
+    make_gallery.main()
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[:3] == [
+        "filming rich, 1 of 2",
+        "rich: skipped. riches need gold, not installed here",
+        "filming box, 2 of 2",
+    ]
+    assert lines[3].startswith("box: ")
+    film = cv2.VideoCapture(str(tmp_path / "box.webm"))
+    assert int(film.get(cv2.CAP_PROP_FRAME_COUNT)) == 2 + make_gallery.FADE
+    assert film.get(cv2.CAP_PROP_FRAME_WIDTH) == 96
 
 
 @pytest.mark.parametrize("name", make_gallery.TURNABLE)
