@@ -44,7 +44,9 @@ def stage() -> Stage:
     camera = Camera.framing(*seen, aspect=16 / 9, azimuth=-90, elevation=38, margin=1.0)
     legend = [(COLORS[i], f"{law}  {_cost(mesh, law):.2f} ms") for i, law in enumerate(laws)]
     legend += [(NO_BODY, f"{law}  needs {', '.join(names)}") for law, names in missing.items() if names]
-    return Stage("every law, time of a step", world, actors, camera, STEP, seconds=6.0, legend=legend)
+    return Stage(
+        "every law, time of a step", world, actors, camera, STEP, seconds=6.0, legend=legend, backdrop="paper"
+    )
 
 
 def _cost(mesh: TetMesh, law: str) -> float:

@@ -1,4 +1,4 @@
-"""Make the pictures of the README and the stills of the gallery.
+"""Make the pictures of the README and the pages, and the stills of the gallery.
 
 `python docs/make_pictures.py` makes all, in some minutes; with names of demos, only their stills.
 """
@@ -18,10 +18,7 @@ from taichi_soft.render.demos import demo_names, load_demo
 from taichi_soft.render.film import film
 
 FOLDER = Path(__file__).parent / "pictures"
-FILMS = {"jelly": 3.0, "bounce": 3.8}
-"""How much of them is shown [s]."""
-
-MOMENTS = {"dents": 0.44, "bars": 1.06, "tower": 0.6, "drape": 2.6, "bridge": 1.6, "bowl": 3.0}
+MOMENTS = {"dents": 0.44, "bars": 1.06, "tower": 1.7, "drape": 2.6, "bridge": 1.6, "bowl": 3.0}
 """That show what each demo is about [s]."""
 
 STILLS = {"bounce": 1.3, "elephants": 0.6, "grab": 2.3, "jelly": 0.74, "lod": 3.1, "wheels": 3.0}
@@ -69,8 +66,6 @@ def main(names: list[str]) -> None:
         write_still(name)
     if names:
         return
-    for name, seconds in FILMS.items():
-        film(load_demo(name).stage(), FOLDER / f"{name}.gif", fps=25, size=(560, 316), seconds=seconds)
     stills = [still(name, moment) for name, moment in MOMENTS.items()]
     rows = [np.hstack(stills[i : i + 2]) for i in range(0, len(stills), 2)]
     cv2.imwrite(str(FOLDER / "demos.png"), np.vstack(rows))

@@ -41,6 +41,12 @@ class EngineAdapter:
             they are.
     Raises: StateError if the world is not built; OptionError if `fixed_step` is not a FixedStep, or
         `before_step` cannot be called.
+    Example:
+        game = EngineAdapter(world, FixedStep(dt=1 / 60))
+        vertices = np.empty((body.vertex_count, 3), np.float32)
+        for frame in range(3):
+            game.advance(1 / 75)  # seconds since the last frame
+            game.positions(body, out=vertices)  # between the last two steps
     """
 
     def __init__(
@@ -112,19 +118,30 @@ class EngineAdapter:
     def step(self) -> None:
         """Make exactly one fixed step, past the accumulator: for replays, tests and servers.
 
-        Raises: what `before_step` and `World.step` raise.
+        Raises: what `before_step` and `World.step` raise. If the step was not made, nothing has changed but
+            what `before_step` itself has done.
         """
         if self._before_step is not None:
             self._before_step(self._world)
         if self._budget is None:
             self._world.step(self._fixed_step.dt, self._fixed_step.substeps)
         else:
-            self._budget.prepare(self._rewind_ticks)
-            start = perf_counter()
-            self._world.step(self._fixed_step.dt, self._fixed_step.substeps)
-            self._budget.note(perf_counter() - start)
+            self._step_within(self._budget)
         if self._rollback is not None:
             self._rollback.save()
+
+    def _step_within(self, budget: Budget) -> None:
+        """Make a step for which a budget chooses what is given up."""
+        step = self._world.step_count
+        try:
+            budget.prepare(self._rewind_ticks)
+            start = perf_counter()
+            self._world.step(self._fixed_step.dt, self._fixed_step.substeps)
+            budget.note(perf_counter() - start)
+        except BaseException:
+            if self._world.step_count == step:
+                budget.take_back()
+            raise
 
     @one_thread
     def advance(self, frame_dt: float) -> int:
@@ -153,6 +170,8 @@ class EngineAdapter:
     def see_from(self, viewer: ArrayLike) -> None:
         """Say where the camera is, (3,) [m]: a budget takes from the farthest bodies first.
 
+        Args:
+            viewer: place of the camera, (3,) [m].
         Raises: OptionError for what is no place; StateError without `budget_ms`.
         """
         self._required_budget.see_from(viewer)
@@ -177,6 +196,8 @@ class EngineAdapter:
 
         `alpha` stays: make the steps again by `step`, with the inputs as they should have been, and the
         picture goes on where it was.
+        Args:
+            steps: number of fixed steps, from 1 to `rewind_ticks`.
         Raises: OptionError for more steps than `rewind_ticks`, or than were made since the last `restore`;
             StateError where nothing is kept.
         """
@@ -195,6 +216,8 @@ class EngineAdapter:
     def restore(self, data: bytes) -> None:
         """Load a state: as `World.restore`, with `alpha` 0, and `rewind` as far as to here.
 
+        Args:
+            data: made by `snapshot`, of this world or one that was built of the same things.
         Raises: as `World.restore`, with nothing changed.
         """
         self._world.restore(data)

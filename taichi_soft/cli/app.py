@@ -29,11 +29,13 @@ app = typer.Typer(
     help="Real-time soft bodies from real material parameters.",
     no_args_is_help=True,
     add_completion=False,
+    rich_markup_mode=None,  # it would take units in brackets, such as [s], for markup
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 for _command in (demo, film, live, info, doctor, bake, export, replay, profile, drop_test, report, warm):
-    app.command()(_command)
+    summary = (_command.__doc__ or "").split("\n\n")[0]
+    app.command(short_help=" ".join(summary.split()))(_command)
 
 
 def run(*arguments: str) -> None:

@@ -9,7 +9,7 @@ import typer
 from rich.markup import escape
 
 from taichi_soft.cli.console import Arch, Threads, say
-from taichi_soft.cli.filming import Blur, Fps, Out, Seconds, Size, Slow, make_film, size_of
+from taichi_soft.cli.filming import Blur, Fps, Out, Seconds, Size, Slow, Stats, make_film, size_of
 from taichi_soft.core.errors import OptionError
 from taichi_soft.core.runtime import init
 
@@ -26,6 +26,7 @@ def demo(
     orbit: Annotated[
         float | None, typer.Option(help="The camera goes round once in so much time of the world [s].")
     ] = None,
+    stats: Stats = False,
     video: Annotated[bool, typer.Option(help="Write a film, or only run and time the steps.")] = True,
     peers: Annotated[
         bool, typer.Option("--peers", help="compare: one drop here and in other engines.")
@@ -64,4 +65,6 @@ def demo(
             stage.camera = Orbit(stage.camera, orbit)
         return stage
 
-    make_film(name, make_stage, path, size=pixels, seconds=seconds, fps=fps, slow=slow, blur=blur)
+    make_film(
+        name, make_stage, path, size=pixels, seconds=seconds, fps=fps, slow=slow, blur=blur, stats=stats
+    )

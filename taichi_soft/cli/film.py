@@ -13,14 +13,15 @@ import typer
 from rich.markup import escape
 
 from taichi_soft.cli.console import Arch, Threads, say
-from taichi_soft.cli.filming import Blur, Fps, Out, Seconds, Size, Slow, make_film, size_of
+from taichi_soft.cli.filming import Blur, Fps, Out, Seconds, Size, Slow, Stats, make_film, size_of
 from taichi_soft.cli.named_function import function_of, variables_of
 from taichi_soft.core.checks import as_positive
 from taichi_soft.core.errors import MeshError, OptionError
 from taichi_soft.core.runtime import init
 from taichi_soft.elements.materials import preset
 from taichi_soft.meshing.io import SURFACES
-from taichi_soft.meshing.surfaces import joined, read_surfaces
+from taichi_soft.meshing.surface import joined
+from taichi_soft.meshing.surfaces import read_surfaces
 
 if TYPE_CHECKING:
     from taichi_soft.render.stage import Stage
@@ -52,6 +53,7 @@ def film(
     size: Size = "1280x720",
     slow: Slow = 1.0,
     blur: Blur = 1,
+    stats: Stats = False,
     orbit: Annotated[
         bool, typer.Option("--orbit", help="Let the camera go round once while the film runs.")
     ] = False,
@@ -91,7 +93,9 @@ def film(
         return _stage_of(find, name, scene, pixels, seconds, orbit)
 
     path = out or Path("out") / f"{name}.mp4"
-    make_film(name, make_stage, path, size=pixels, seconds=seconds, fps=fps, slow=slow, blur=blur)
+    make_film(
+        name, make_stage, path, size=pixels, seconds=seconds, fps=fps, slow=slow, blur=blur, stats=stats
+    )
 
 
 def _stage_of(

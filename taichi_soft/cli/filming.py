@@ -23,6 +23,10 @@ Size = Annotated[str, typer.Option(help="Width x height in pixels.")]
 Slow = Annotated[float, typer.Option(help="How many times slower than the world the film is.")]
 Blur = Annotated[int, typer.Option(help="Number of pictures averaged to one, for motion blur; 1 is sharp.")]
 
+Stats = Annotated[
+    bool, typer.Option("--stats", help="Write the time and the speed of this machine on each frame.")
+]
+
 
 def size_of(text: str) -> tuple[int, int]:
     """Width and height [pixels] of `1280x720`. Raises: OptionError."""
@@ -42,13 +46,22 @@ def make_film(
     fps: float,
     slow: float,
     blur: int,
+    stats: bool,
 ) -> None:
     """Film a stage, and say what was written and how fast it ran; without a path, only run it."""
     from taichi_soft.render.film import film
 
     with filming(name) as show:
         report = film(
-            make_stage(), path, fps=fps, size=size, seconds=seconds, slow=slow, blur=blur, on_frame=show
+            make_stage(),
+            path,
+            fps=fps,
+            size=size,
+            seconds=seconds,
+            slow=slow,
+            blur=blur,
+            stats=stats,
+            on_frame=show,
         )
     if report.path is not None:
         say(f"wrote {escape(str(report.path))}: {report.frames} frames, {report.frames / fps:.1f} s")

@@ -9,6 +9,7 @@ import re
 from enum import Enum
 from typing import Literal, TypeAlias, TypeVar
 
+from taichi_soft.core.checks import choose_one_of
 from taichi_soft.core.errors import OptionError
 
 
@@ -21,9 +22,9 @@ class Choice(str, Enum):
         try:
             return cls(value)
         except ValueError:
-            names = ", ".join(repr(member.value) for member in cls)
+            names = [member.value for member in cls]
             option = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", cls.__name__).lower()
-            raise OptionError(f"unknown {option} {value!r}: choose one of {names}") from None
+            raise OptionError(f"unknown {option} {value!r}: {choose_one_of(names, value)}") from None
 
 
 ChoiceT = TypeVar("ChoiceT", bound=Choice)
@@ -68,6 +69,13 @@ class Schedule(Choice):
     FLAT = "flat"  # all tetrahedra of all bodies in parallel, substep by substep
 
 
+class Overlap(Choice):
+    """What becomes of a body that is placed inside others."""
+
+    PART = "part"  # they are moved apart over the next steps
+    REFUSE = "refuse"  # it is not placed
+
+
 StrainName: TypeAlias = Strain | Literal["linear", "exact"]
 FlipsName: TypeAlias = Flips | Literal["tolerant", "recover", "off"]
 DampingModelName: TypeAlias = DampingModel | Literal["edge", "tet_mean"]
@@ -75,6 +83,7 @@ IntegratorName: TypeAlias = (
     Integrator | Literal["explicit_euler", "leapfrog", "lazy_leapfrog", "implicit_euler"]
 )
 ScheduleName: TypeAlias = Schedule | Literal["auto", "per_body", "flat"]
+OverlapName: TypeAlias = Overlap | Literal["part", "refuse"]
 ArchName: TypeAlias = Literal["auto", "cpu", "cuda", "vulkan", "metal"]
 CageMethodName: TypeAlias = Literal["lattice", "tetgen", "ftetwild"]
 LawName: TypeAlias = Literal[

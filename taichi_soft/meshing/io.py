@@ -30,7 +30,7 @@ from taichi_soft.meshing.tetgen import read_tetgen, write_elements, write_nodes
 
 SUFFIXES = (".npz", ".node", ".ele", *FORMATS)
 SURFACES = (".stl", ".obj", ".ply", ".off", ".glb", ".gltf")
-"""Triangles only, which trimesh reads by itself."""
+"""Triangles only, which `SoftBodyAsset.from_surface` reads."""
 
 
 def load_mesh(path: str | os.PathLike[str], *, fix_orientation: bool = True) -> TetMesh:
@@ -58,7 +58,7 @@ def load_mesh(path: str | os.PathLike[str], *, fix_orientation: bool = True) -> 
     _require_format(source, f"; of many others {converted} makes one of these")
     read = _read_npz if suffix == ".npz" else read_interchange if suffix in FORMATS else read_tetgen
     try:
-        _refuse_stand_in(source)
+        refuse_stand_in(source)
         vertices, tets = read(source)
     except OSError as error:
         raise MeshError(f"{_named(error, source)}: cannot be read ({error.strerror or error})") from None
@@ -73,8 +73,14 @@ def save_mesh(mesh: TetMesh, path: str | os.PathLike[str]) -> None:
 
     The file appears whole or not at all: one that was there before stays until the new one is complete.
     Naming either of TetGen's two files writes both.
+    Args:
+        mesh: tetrahedra.
+        path: of the file. Its suffix is one of those that `load_mesh` reads.
     Raises: MeshError for an unknown suffix, something that is not a TetMesh, a place that cannot be written
         to, or if meshio is needed and missing; OptionError for a path that names no file.
+    Example:
+        save_mesh(box(), "crate.npz")
+        crate = load_mesh("crate.npz")
     """
     if not isinstance(mesh, TetMesh):
         raise MeshError(f"save_mesh got a {type(mesh).__name__}: only a TetMesh has a file format")
@@ -117,7 +123,7 @@ def _require_format(path: Path, way_out: str = "") -> None:
         )
 
 
-def _refuse_stand_in(source: Path) -> None:
+def refuse_stand_in(source: Path) -> None:
     """Raises: MeshError where git or a browser has put something else in the place of the file."""
     pair = source.suffix.lower() in (".node", ".ele")
     for path in (source.with_suffix(".node"), source.with_suffix(".ele")) if pair else (source,):

@@ -74,6 +74,7 @@ def film(
     seconds: float | None = None,
     slow: float = 1.0,
     blur: int = 1,
+    stats: bool = False,
     on_frame: Progress | None = None,
 ) -> FilmReport:
     """Run a stage and write what it shows.
@@ -87,6 +88,7 @@ def film(
         slow: how many times longer the film is than what it shows, 1 to 1000. The world makes the same steps;
             between two of them bodies are drawn on the straight way from one to the other.
         blur: how many pictures within the time of the shutter are averaged to one, 1 to 64; 1 is sharp.
+        stats: write the time of the world [s] and the speed of this machine on each frame, too.
         on_frame: called with (frames made, frames in all) after each.
     Raises: VideoError or OptionError, before anything moves where the arguments are wrong.
     """
@@ -112,7 +114,7 @@ def film(
     take.play(0.0)
     take.camera()
     with nullcontext() if path is None else VideoWriter(path, fps=fps, size=size) as writer:
-        artist = Artist(take, writer.size, rate, slow) if writer else None
+        artist = Artist(take, writer.size, rate, slow, stats) if writer else None
         _warm_up(stage, take, artist)
         for number in range(count):
             pictures = []

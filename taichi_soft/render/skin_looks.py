@@ -39,8 +39,10 @@ def vertex_colors(visual: Any, count: int, otherwise: ArrayLike) -> Floats32:
     kind = getattr(visual, "kind", None)
     if kind == "texture":
         factor = getattr(visual.material, "baseColorFactor", None)
-        if texture_picture(visual, count) is not None:
+        own = visual.vertex_attributes.get("color")
+        if own is not None or texture_picture(visual, count) is not None:
             rows[:] = 1.0 if factor is None else _as_colors(factor)[:3]
+            rows *= 1.0 if own is None else _as_colors(own)[:, :3]
         elif factor is not None and not np.array_equal(_as_colors(factor)[:3], UNSAID):
             rows[:] = _as_colors(factor)[:3]
     elif kind in ("vertex", "face"):

@@ -12,6 +12,7 @@ from engine_adapter import FixedStep
 from taichi_soft.contact.collider import Collider
 from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.render import PALETTE, Camera, ColorScale, Look
+from taichi_soft.render.backdrop import Backdrop, BackdropName
 from taichi_soft.render.camera_moves import Follow, Orbit
 from taichi_soft.render.colors import Color
 from taichi_soft.render.look import LookName
@@ -68,6 +69,7 @@ class Stage:
     scale: ColorScale | None = None  # meaning of the colours of bodies, drawn as a bar
     legend: list[tuple[Color, str]] = field(default_factory=list)  # colours and what they stand for
     collider_colors: dict[Collider, Color] = field(default_factory=dict)  # of colliders that are to stand out
+    backdrop: Backdrop | BackdropName = Backdrop.DAY  # sky and floor
 
     @classmethod
     def of(

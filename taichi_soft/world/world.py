@@ -16,7 +16,7 @@ from taichi_soft.control.drives import ForceField, push_by_field, require_field
 from taichi_soft.core.checks import as_count, as_flag, as_friction, as_gravity, as_number, as_path
 from taichi_soft.core.clock import Clock
 from taichi_soft.core.constants import GRAVITY_EARTH, VELOCITY_LIMIT
-from taichi_soft.core.errors import FrozenBodyWarning, OptionError, StateError
+from taichi_soft.core.errors import DroppedEventsWarning, FrozenBodyWarning, OptionError, StateError
 from taichi_soft.core.handles import Handles, recorded, serial_of
 from taichi_soft.core.settings import ContactSettings, Settings
 from taichi_soft.core.signals import Whole
@@ -76,6 +76,13 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
             `save_recording`.
         record_to: file that it writes when a body freezes, the first time that this happens.
     Raises: OptionError for a value out of range or a name that is not known.
+    Example:
+        arena = World(floor=0.0)
+        cube = arena.add_body(box(), jelly, position=(0, 0, 2))
+        arena.build()
+        for frame in range(60):
+            arena.step(1 / 60)
+            vertices = cube.positions()  # draw them
     """
 
     def __init__(
@@ -203,6 +210,8 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
         count with an estimate of their own after each change, which takes some 35 ms for 5,000 tetrahedra and
         several times as much with `damping`: give substeps where that is too long. 1 for implicit Euler,
         which needs none; with `soft_contact` so many that they last no longer than 1/240 s.
+        Args:
+            dt: length of the fixed step [s], above 0.
         """
         return self._context.substeps.stable_count(dt)
 
@@ -214,10 +223,17 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
         the step again with up to eight times the substeps, by `World(retries=3)`.
         Ctrl-C lets a step of less than about 0.03 s end first. It ends a longer one within a second, and the
         world is as before that step.
+        Args:
+            dt: length of the fixed step [s], above 0.
+            substeps: number of equal substeps, 1 or more; None chooses it by `stable_substeps`.
         Warns: FrozenBodyWarning; UnstableStepWarning for substeps longer than the stable step of the stiffest
-            asset; SlowStepWarning as `build`, once in a world; SolverWarning, of implicit Euler.
+            asset; SlowStepWarning as `build`, once in a world; SolverWarning of inexact solves by implicit
+            Euler, and once of a body that has had tetrahedra inside out for 120 steps.
         Raises: OptionError if dt is not a positive number or substeps not a positive whole one, and where
             there are more than `max_substeps`; StateError before `build`.
+        Example:
+            world.step(1 / 60)  # as many substeps as stability needs
+            world.step(1 / 60, substeps=10)  # the same cost in every frame
         """
         simulation = self._context.fields or self._built  # which raises
         seconds, count, h = self._context.substeps.choose(dt, substeps)
@@ -231,7 +247,10 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
             reports += self._recorder.note_step(self._context, seconds, count, is_broken=bool(reports))
         if reports:
             warnings.warn("; ".join(reports), FrozenBodyWarning, stacklevel=3)
+        if simulation.loss:
+            warnings.warn(simulation.loss, DroppedEventsWarning, stacklevel=3)
         if simulation.troubled:
+            simulation.check_shapes()
             simulation.check_solves()
 
     def _push(self) -> None:
@@ -241,6 +260,16 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
             if self._recorder is not None:
                 self._recorder.pushes = [(serial_of(body), accelerations) for body, accelerations in rows]
 
+    def _keep(self) -> bytes | None:
+        if self._force_field is None and not self._context.substeps.has_limit:
+            return None
+        return self.snapshot()
+
+    def _undo(self, data: bytes) -> None:
+        restore_snapshot(self._context, data, keeps_events=True)
+        if self._recorder is not None:
+            self._recorder.go_back(self._context, data)
+
     def _make_long_step(self, simulation: Simulation, seconds: float, substeps: int, h: float) -> list[str]:
         """One that Ctrl-C may end, and then all is as before."""
         before = take_snapshot(self._context)
@@ -248,7 +277,7 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
             self._push()
             return simulation.step(seconds, substeps, h)
         except KeyboardInterrupt:
-            restore_snapshot(self._context, before)
+            restore_snapshot(self._context, before, keeps_events=True)
             raise
 
     @recorded

@@ -35,6 +35,16 @@ def test_a_material_without_texture_gives_its_own_colour():
     np.testing.assert_allclose(vertex_colors(visual, 3, OTHERWISE), [(0, 1, 0)] * 3)
 
 
+@pytest.mark.parametrize(("factor", "wanted"), [(None, (1, 0, 0.6)), ([0.5, 1, 0.5, 1], (0.5, 0, 0.3))])
+@pytest.mark.parametrize("texture", [None, PICTURE])
+def test_colours_of_vertices_are_multiplied_by_the_factor_of_their_material(factor, wanted, texture):
+    """As glTF says it; with a texture, that is multiplied by the product."""
+    material = trimesh.visual.material.PBRMaterial(baseColorFactor=factor, baseColorTexture=texture)
+    visual = trimesh.visual.TextureVisuals(uv=np.zeros((3, 2)), material=material)
+    visual.vertex_attributes["color"] = np.tile(np.array([255, 0, 153, 255], np.uint8), (3, 1))
+    np.testing.assert_allclose(vertex_colors(visual, 3, OTHERWISE), [wanted] * 3, atol=3e-3)
+
+
 def test_vertices_keep_their_own_colours():
     mesh = trimesh.creation.box()
     mesh.visual.vertex_colors = np.tile([0, 0, 255, 255], (8, 1)).astype(np.uint8)

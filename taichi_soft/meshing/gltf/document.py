@@ -1,0 +1,290 @@
+"""A glTF 2.0 file: its JSON, its buffers, and arrays read through its accessors.
+
+Source: the glTF 2.0 specification, sections 3.6 (binary data) and 4.4 (GLB).
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import struct
+from pathlib import Path
+from typing import Any, TypeAlias
+from urllib.parse import unquote, unquote_to_bytes, urlsplit
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.core.errors import MeshError
+from taichi_soft.meshing.arrays import FloatArray
+from taichi_soft.meshing.io import refuse_stand_in
+
+Entry: TypeAlias = "dict[str, Any]"
+
+COMPONENTS: dict[Any, np.dtype[Any]] = {
+    5120: np.dtype("<i1"),
+    5121: np.dtype("<u1"),
+    5122: np.dtype("<i2"),
+    5123: np.dtype("<u2"),
+    5125: np.dtype("<u4"),
+    5126: np.dtype("<f4"),
+}
+COLUMNS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+
+MOST_IMPLICIT_ROWS = 10_000_000
+"""Rows of an accessor without a buffer view: its zeros take memory, and no byte of the file backs them."""
+
+MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
+
+JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
+
+NO_CHARACTER = "\ufffd".encode()
+"""What text editors and tools write for bytes that are no characters."""
+
+
+class Document:
+    """The JSON of a .glb or .gltf file, with access to its binary data.
+
+    Attributes:
+        json: the whole JSON object.
+        path: of the file. Names of other files are relative to its folder.
+    """
+
+    def __init__(self, path: Path) -> None:
+        refuse_stand_in(path)
+        data = path.read_bytes()
+        self.path = path
+        self._is_binary = data[:4] == b"glTF"
+        text, self._chunk = _chunks(path, data) if self._is_binary else (data, None)
+        self.json = _parsed(text)
+        self._buffers: dict[int, memoryview] = {}
+        version = self.entry("asset").get("version")
+        if not isinstance(version, str):
+            raise MeshError("cannot be read: it does not say that it is glTF 2.0")
+        if version.split(".")[0] != "2":
+            raise MeshError(f"is glTF of version {version[:10]}: {upgrade_command(path)}")
+
+    def entry(self, name: str, parent: Entry | None = None) -> Entry:
+        """Return the object of a name, or an empty one."""
+        found = (self.json if parent is None else parent).get(name, {})
+        return found if isinstance(found, dict) else {}
+
+    def entries(self, kind: str) -> list[Any]:
+        """Return the list of a kind, such as "nodes"."""
+        found = self.json.get(kind, [])
+        if not isinstance(found, list):
+            raise MeshError(f"cannot be read: its {kind!r} are no list")
+        return found
+
+    def named(self, kind: str, number: Any) -> Entry:
+        """Return one entry of a kind. Raises: MeshError if there is none of that number."""
+        found = self.entries(kind)
+        if not isinstance(number, int) or isinstance(number, bool) or not 0 <= number < len(found):
+            raise MeshError(f"cannot be read: it refers to {kind}[{number!r}], and has {len(found)} of these")
+        entry = found[number]
+        if not isinstance(entry, dict):
+            raise MeshError(f"cannot be read: its {kind}[{number}] is no object")
+        return entry
+
+    def rows(self, number: Any, *types: str) -> NDArray[Any]:
+        """Read an accessor as it is stored, shape (count, columns).
+
+        Args:
+            number: of the accessor.
+            types: allowed values of its `type`, such as "VEC3".
+        Raises: MeshError for an accessor of another type, and for one that its buffer does not hold, before
+            memory is allocated.
+        """
+        entry, name = self.named("accessors", number), f"accessor {number}"
+        kind, count = entry.get("type"), whole(entry, "count", name)
+        if kind not in types:
+            raise MeshError(
+                f"cannot be read: {name} has the type {kind!r}, where {' or '.join(types)} is needed"
+            )
+        shape, dtype = (count, COLUMNS[kind]), component_type(entry, name)
+        if "bufferView" in entry:
+            rows = self._stored(entry, shape, dtype, name)
+        elif count > MOST_IMPLICIT_ROWS:
+            raise MeshError(
+                f"cannot be read: {name} has {count:,} rows without data: {MOST_IMPLICIT_ROWS:,} at most"
+            )
+        else:
+            rows = np.zeros(shape, dtype)
+        return self._with_sparse(rows, entry["sparse"], name) if "sparse" in entry else rows
+
+    def values(self, number: Any, *types: str) -> FloatArray:
+        """Read an accessor as real numbers, with normalised integers decoded, shape (count, columns)."""
+        rows = self.rows(number, *types)
+        return decoded(rows, self.named("accessors", number))
+
+    def view(self, number: Any) -> tuple[memoryview, int]:
+        """Return the bytes of a buffer view and its stride, 0 where it has none."""
+        entry, name = self.named("bufferViews", number), f"buffer view {number}"
+        start, length = whole(entry, "byteOffset", name, 0), whole(entry, "byteLength", name)
+        data = self._buffer(entry.get("buffer"))
+        if start + length > len(data):
+            raise MeshError(
+                f"cannot be read: {name} ends at byte {start + length:,} of a buffer of {len(data):,} bytes"
+            )
+        return data[start : start + length], whole(entry, "byteStride", name, 0)
+
+    def fetch(self, uri: Any) -> bytes:
+        """Return the content of a data: URI or of a file that is named relative to this one.
+
+        Raises: MeshError for a missing file, a network address and an absolute path. A .glb must not name
+            files outside its folder either: the live page reads such files of anyone.
+        """
+        if not isinstance(uri, str):
+            raise MeshError(f"cannot be read: {uri!r} is no URI")
+        if uri[:5].lower() == "data:":
+            return _embedded(uri)
+        shown = uri[:100]
+        if urlsplit(uri).scheme or uri[:1] in ("/", "\\"):
+            raise MeshError(
+                f"cannot be read: it refers to {shown!r}: put that file beside it, and its name only"
+            )
+        candidates = dict.fromkeys([unquote(uri), uri])  # some programs do not encode what they write
+        for name in candidates:
+            if self._is_binary and ".." in Path(name.replace("\\", "/")).parts:
+                raise MeshError(f"cannot be read: it refers to {shown!r}, outside its folder")
+            path = self.path.parent / name
+            if "\0" not in name and path.is_file():
+                refuse_stand_in(path)
+                return path.read_bytes()
+        raise MeshError(f"cannot be read: it refers to the file {shown!r}, and there is none")
+
+    def _buffer(self, number: Any) -> memoryview:
+        entry, name = self.named("buffers", number), f"buffer {number}"
+        if number not in self._buffers:
+            data = self._content(number, entry)
+            length = whole(entry, "byteLength", name)
+            if len(data) < length:
+                raise MeshError(
+                    f"cannot be read: it is cut short, {name} has {len(data):,} of {length:,} bytes"
+                )
+            self._buffers[number] = memoryview(data)[:length]
+        return self._buffers[number]
+
+    def _content(self, number: int, entry: Entry) -> bytes:
+        if "uri" in entry:
+            return self.fetch(entry["uri"])
+        if number == 0 and self._chunk is not None:
+            return self._chunk
+        for extension in MESHOPT:
+            if extension in self.entry("extensions", entry):
+                raise MeshError(f"is compressed with {extension}: {copy_command(self.path)}")
+        raise MeshError(f"cannot be read: buffer {number} has no data")
+
+    def _stored(self, entry: Entry, shape: tuple[int, int], dtype: np.dtype[Any], name: str) -> NDArray[Any]:
+        """Rows of a buffer view, without a copy."""
+        data, stride = self.view(entry["bufferView"])
+        size, start = shape[1] * dtype.itemsize, whole(entry, "byteOffset", name, 0)
+        stride = stride or size
+        end = start + (shape[0] - 1) * stride + size
+        if stride < size or (shape[0] and end > len(data)):
+            raise MeshError(
+                f"cannot be read: {name} has {shape[0]:,} rows of {size} bytes, {stride} bytes apart, and "
+                f"its buffer view has {max(len(data) - start, 0):,} bytes"
+            )
+        if shape[0] == 0:
+            return np.zeros(shape, dtype)
+        return np.asarray(np.ndarray(shape, dtype, data, start, (stride, dtype.itemsize)))
+
+    def _with_sparse(self, rows: NDArray[Any], sparse: Entry, name: str) -> NDArray[Any]:
+        """A copy in which some rows are replaced."""
+        count, name = whole(sparse, "count", name), f"the sparse part of {name}"
+        indices, values = sparse["indices"], sparse["values"]
+        places = self._stored(indices, (count, 1), component_type(indices, name), name)[:, 0].astype(np.int64)
+        if count and not 0 <= places.min() <= places.max() < len(rows):
+            raise MeshError(f"cannot be read: {name} replaces row {places.max():,} of {len(rows):,}")
+        changed: NDArray[Any] = rows.copy()
+        changed[places] = self._stored(values, (count, rows.shape[1]), rows.dtype, name)
+        return changed
+
+
+def decoded(rows: NDArray[Any], accessor: Entry) -> FloatArray:
+    """Stored numbers as reals; integers of a normalised accessor become -1 to 1 or 0 to 1 (section 3.11)."""
+    reals = rows.astype(np.float64)
+    if accessor.get("normalized") and rows.dtype.kind in "iu":
+        reals = np.maximum(reals / np.iinfo(rows.dtype).max, -1.0)
+    return reals
+
+
+def component_type(entry: Entry, name: str) -> np.dtype[Any]:
+    """Return the type of an accessor's numbers. Raises: MeshError for an unknown one."""
+    component = entry.get("componentType")
+    if component not in COMPONENTS:
+        raise MeshError(f"cannot be read: {name} has the unknown component type {component!r}")
+    return COMPONENTS[component]
+
+
+def whole(entry: Entry, key: str, name: str, default: int | None = None) -> int:
+    """Return a count or an offset. Raises: MeshError unless it is a whole number of at least 0."""
+    value = entry.get(key, default)
+    if not isinstance(value, int) or isinstance(value, bool) or value < 0:
+        raise MeshError(f"cannot be read: {key} of {name} is {value!r}, not a whole number of at least 0")
+    return value
+
+
+def copy_command(path: Path) -> str:
+    """The command that writes a file without compression."""
+    return (
+        f"run `npx @gltf-transform/cli copy {path.name} {path.stem}-plain.glb` (needs Node.js), or export it "
+        "without compression"
+    )
+
+
+def upgrade_command(path: Path) -> str:
+    """The command that makes glTF 2.0 of an older file."""
+    return (
+        f"version 2.0 is read. Convert it with `npx gltf-pipeline -i {path.name} -o {path.stem}-2.glb` "
+        "(needs Node.js)"
+    )
+
+
+def _chunks(path: Path, data: bytes) -> tuple[bytes, bytes | None]:
+    """The JSON and the binary chunk of a .glb file."""
+    if len(data) < 20:
+        raise MeshError(f"cannot be read: it is cut short, at {len(data)} bytes")
+    if NO_CHARACTER in data[:20]:
+        raise MeshError(
+            "cannot be read: a program has converted it as text. Copy the original as a binary file"
+        )
+    version, length = struct.unpack_from("<II", data, 4)
+    if version != 2:
+        raise MeshError(f"is GLB of version {version}: {upgrade_command(path)}")
+    if length > len(data):
+        raise MeshError(f"cannot be read: it is cut short, {len(data):,} of {length:,} bytes")
+    found: dict[int, bytes] = {}
+    at = 12
+    while at + 8 <= length:
+        size, kind = struct.unpack_from("<II", data, at)
+        if at + 8 + size > length:
+            raise MeshError(f"cannot be read: a chunk of {size:,} bytes goes beyond its end")
+        found.setdefault(kind, data[at + 8 : at + 8 + size])
+        at += 8 + size
+    if JSON_CHUNK not in found:
+        raise MeshError("cannot be read: it has no JSON chunk")
+    return found[JSON_CHUNK], found.get(BINARY_CHUNK)
+
+
+def _parsed(text: bytes) -> Entry:
+    try:
+        found = json.loads(text.decode("utf-8-sig"))
+    except (ValueError, RecursionError) as error:
+        reason = " ".join(str(error).split())[:200]
+        raise MeshError(f"cannot be read: it is not glTF, or damaged ({reason})") from None
+    if not isinstance(found, dict):
+        raise MeshError("cannot be read: it is not glTF: its JSON is no object")
+    return found
+
+
+def _embedded(uri: str) -> bytes:
+    head, _, body = uri.partition(",")
+    content = unquote_to_bytes(body)
+    if not head.lower().endswith(";base64"):
+        return content
+    try:
+        return base64.b64decode(content)
+    except ValueError:
+        raise MeshError("cannot be read: a data: URI in it is damaged") from None

@@ -1,0 +1,173 @@
+"""Materials, textures and colours of a glTF file, as trimesh holds them."""
+
+from __future__ import annotations
+
+import io
+import warnings
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.core.extras import missing_packages
+from taichi_soft.meshing.arrays import FloatArray
+from taichi_soft.meshing.gltf.document import Document, Entry
+from taichi_soft.meshing.gltf.nodes import extension
+from taichi_soft.meshing.gltf.primitives import Primitive
+
+NUMBERS = ("baseColorFactor", "metallicFactor", "roughnessFactor", "emissiveFactor", "alphaCutoff")
+WORDS = ("name", "alphaMode", "doubleSided")
+TEXTURES = (
+    "baseColorTexture",
+    "metallicRoughnessTexture",
+    "normalTexture",
+    "occlusionTexture",
+    "emissiveTexture",
+)
+
+SOURCES = ("EXT_texture_webp", "EXT_texture_avif", "MSFT_texture_dds")
+"""Extensions that name the image of a texture in another format."""
+
+GLOSS = "KHR_materials_pbrSpecularGlossiness"
+TRANSFORM = "KHR_texture_transform"
+READ = (GLOSS, TRANSFORM, *SOURCES)
+ALL_SOURCES = (*SOURCES, "KHR_texture_basisu")  # whose format pillow may not read
+
+
+class Looks:
+    """Visuals of the primitives of a file.
+
+    Attributes:
+        notes: sentences on images and materials that were not read.
+    """
+
+    def __init__(self, document: Document) -> None:
+        self.document = document
+        self.notes: list[str] = []
+        self._materials: dict[int, Any] = {}
+        self._images: dict[int, Any] = {}
+
+    def of(self, primitive: Primitive) -> Any:
+        """Return trimesh's TextureVisuals or ColorVisuals, or None without material and colours."""
+        number = primitive.entry.get("material")
+        uv = self._texture_coordinates(primitive)
+        colors = _colors(primitive)
+        if number is None and uv is None and colors is None:
+            return None
+        from trimesh.visual import (
+            ColorVisuals,
+            TextureVisuals,
+        )  # half a second that a plain file need not wait for
+
+        if number is None and uv is None:
+            return ColorVisuals(vertex_colors=colors)
+        visual = TextureVisuals(uv=uv, material=self._material(number))
+        if colors is not None:
+            visual.vertex_attributes["color"] = colors
+        return visual
+
+    def _texture_coordinates(self, primitive: Primitive) -> FloatArray | None:
+        """Where the vertices lie on the base colour's texture, (n, 2), v upwards."""
+        number = primitive.entry.get("material")
+        material = {} if number is None else self.document.named("materials", number)
+        used = _flat(material).get("baseColorTexture", {})
+        change = extension(used, TRANSFORM)
+        uv = primitive.values(f"TEXCOORD_{change.get('texCoord', used.get('texCoord', 0))}", "VEC2")
+        if uv is None:
+            return None
+        if change:
+            turn = float(change.get("rotation", 0.0))
+            scaled = uv * np.asarray(change.get("scale", (1.0, 1.0)), dtype=np.float64)
+            rotation = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
+            uv = scaled @ rotation.T + np.asarray(change.get("offset", (0.0, 0.0)), dtype=np.float64)
+        uv[:, 1] = 1.0 - uv[:, 1]
+        return uv
+
+    def _material(self, number: int | None) -> Any:
+        from trimesh.visual.material import PBRMaterial
+
+        if number is None:
+            return PBRMaterial()
+        if number not in self._materials:
+            try:
+                self._materials[number] = PBRMaterial(
+                    **self._arguments(self.document.named("materials", number))
+                )
+            except (TypeError, ValueError) as error:
+                self.notes.append(
+                    f"material {number} is damaged and is not read ({' '.join(str(error).split())})"
+                )
+                self._materials[number] = PBRMaterial()
+        return self._materials[number]
+
+    def _arguments(self, material: Entry) -> dict[str, Any]:
+        flat = _flat(material)
+        found = {name: np.asarray(flat[name], dtype=np.float64) for name in NUMBERS if name in flat}
+        found.update({name: flat[name] for name in WORDS if name in flat})
+        found.update({name: self._image(flat[name]) for name in TEXTURES if name in flat})
+        return found
+
+    def _image(self, used: Entry) -> Any:
+        """pillow's image of a texture, or None with a note."""
+        texture = self.document.named("textures", used.get("index"))
+        sources = [texture.get("source"), *(extension(texture, name).get("source") for name in ALL_SOURCES)]
+        reasons = []
+        for number in (each for each in sources if each is not None):
+            if number not in self._images:
+                self._images[number] = self._opened(number)
+            if not isinstance(self._images[number], str):
+                return self._images[number]
+            reasons.append(self._images[number])
+        self._say(reasons[0] if reasons else f"texture {used.get('index')} has no image")
+        return None
+
+    def _opened(self, number: int) -> Any:
+        """pillow's image, or what to say of one that is not read."""
+        if missing_packages("film", "PIL"):
+            return "texture images are not read without pillow: run pip install 'taichi-soft[film]'"
+        from PIL import Image, UnidentifiedImageError
+
+        entry = self.document.named("images", number)
+        uri = str(entry.get("uri", "data:"))
+        name = f"image {number}" if uri[:5].lower() == "data:" else repr(uri[:60])
+        try:
+            data = (
+                self.document.view(entry["bufferView"])[0]
+                if "bufferView" in entry
+                else self.document.fetch(uri)
+            )
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+                opened = Image.open(io.BytesIO(data))
+                opened.load()  # a damaged one fails here, and not while a frame is drawn
+            return opened
+        except UnidentifiedImageError:
+            return f"texture {name} is not read: its format is unknown to pillow. Save it as .png or .jpg"
+        except Exception as error:  # pillow raises whatever the reader of a format does
+            return f"texture {name} is not read ({' '.join(str(error).split())[:150]})"
+
+    def _say(self, note: str) -> None:
+        if note not in self.notes:
+            self.notes.append(note)
+
+
+def _colors(primitive: Primitive) -> NDArray[np.uint8] | None:
+    """Red, green, blue and alpha of the vertices up to 255, (n, 4)."""
+    rows = primitive.values("COLOR_0", "VEC3", "VEC4")
+    if rows is None:
+        return None
+    whole = np.full((len(rows), 4), 255, dtype=np.uint8)
+    whole[:, : rows.shape[1]] = np.rint(np.clip(np.nan_to_num(rows), 0.0, 1.0) * 255.0)
+    return whole
+
+
+def _flat(material: Entry) -> Entry:
+    """All properties of a material in one object. Specular and glossiness become what is nearest to them."""
+    gloss = extension(material, GLOSS)
+    flat = {**material, **(material.get("pbrMetallicRoughness") or {})}
+    if gloss and "pbrMetallicRoughness" not in material:
+        flat.update(metallicFactor=0.0, roughnessFactor=1.0 - float(gloss.get("glossinessFactor", 1.0)))
+        for old, new in (("diffuseFactor", "baseColorFactor"), ("diffuseTexture", "baseColorTexture")):
+            if old in gloss:
+                flat[new] = gloss[old]
+    return flat

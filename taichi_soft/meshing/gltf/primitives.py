@@ -1,0 +1,177 @@
+"""Primitives of a glTF mesh: vertices, attributes and triangles, compressed by Draco or not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.core.errors import MeshError
+from taichi_soft.core.extras import missing_packages
+from taichi_soft.meshing.arrays import FloatArray
+from taichi_soft.meshing.gltf.document import (
+    COLUMNS,
+    Document,
+    Entry,
+    component_type,
+    copy_command,
+    decoded,
+    whole,
+)
+from taichi_soft.meshing.gltf.nodes import extension
+
+DRACO = "KHR_draco_mesh_compression"
+
+TRIANGLES, STRIP, FAN = 4, 5, 6
+"""Modes of primitives with triangles; others have points or lines."""
+
+
+class Primitive:
+    """One primitive of a mesh.
+
+    Attributes:
+        entry: its JSON.
+        name: of its mesh and its number there, for errors.
+    """
+
+    def __init__(self, document: Document, entry: Entry, name: str) -> None:
+        self.document, self.entry, self.name = document, entry, name
+        self._attributes: Entry = document.entry("attributes", entry)
+        self._faces, self._compressed = self._decompress()
+
+    @property
+    def has_triangles(self) -> bool:
+        """True if it is more than points and lines."""
+        return "POSITION" in self._attributes and self.entry.get("mode", TRIANGLES) in (TRIANGLES, STRIP, FAN)
+
+    def values(self, attribute: str, *types: str) -> FloatArray | None:
+        """Read an attribute as real numbers, (n, columns); None where there is none."""
+        rows = self.rows(attribute, *types)
+        return (
+            None
+            if rows is None
+            else decoded(rows, self.document.named("accessors", self._attributes[attribute]))
+        )
+
+    def rows(self, attribute: str, *types: str) -> NDArray[Any] | None:
+        """Read an attribute as it is stored, (n, columns); None where there is none.
+
+        Raises: MeshError unless it has a row for every vertex.
+        """
+        if attribute not in self._attributes:
+            return None
+        found = self._compressed.get(attribute)
+        if found is None:
+            found = self.document.rows(self._attributes[attribute], *types)
+        if len(found) != self.vertex_count:
+            raise MeshError(
+                f"cannot be read: {self.name} has {len(found):,} rows of {attribute} for "
+                f"{self.vertex_count:,} vertices"
+            )
+        return found
+
+    @property
+    def vertex_count(self) -> int:
+        """Number of rows of its positions."""
+        if "POSITION" in self._compressed:
+            return len(self._compressed["POSITION"])
+        number = self._attributes["POSITION"]
+        return whole(self.document.named("accessors", number), "count", f"accessor {number}")
+
+    def vertices(self, weights: Sequence[float]) -> tuple[FloatArray, FloatArray | None]:
+        """Positions (n, 3) and normals (n, 3) or None, with the morph targets blended in.
+
+        Args:
+            weights: of the morph targets. Missing ones are 0.
+        """
+        positions, normals = self.values("POSITION", "VEC3"), self.values("NORMAL", "VEC3")
+        assert positions is not None
+        for weight, target in zip(weights, self.entry.get("targets", ()), strict=False):
+            for name, rows in (("POSITION", positions), ("NORMAL", normals)):
+                if weight == 0.0 or rows is None or name not in target:
+                    continue
+                moved = self.document.values(target[name], "VEC3")
+                if len(moved) != len(rows):
+                    raise MeshError(f"cannot be read: a morph target of {self.name} has {len(moved):,} rows")
+                rows += weight * moved
+        return positions, normals
+
+    def triangles(self, count: int) -> NDArray[np.int64]:
+        """Indices of the corners of its triangles, (m, 3).
+
+        Args:
+            count: of the vertices.
+        Raises: MeshError for an index that is not below it, and for corners that are no whole triangles.
+        """
+        if self._faces is not None:
+            corners = self._faces.astype(np.int64).reshape(-1)
+        elif "indices" in self.entry:
+            corners = self.document.rows(self.entry["indices"], "SCALAR")[:, 0].astype(np.int64)
+        else:
+            corners = np.arange(count)
+        if len(corners) and not 0 <= corners.min() <= corners.max() < count:
+            raise MeshError(f"cannot be read: {self.name} refers to vertex {corners.max():,} of {count:,}")
+        mode = TRIANGLES if self._faces is not None else self.entry.get("mode", TRIANGLES)
+        if mode == TRIANGLES:
+            if len(corners) % 3:
+                raise MeshError(
+                    f"cannot be read: {self.name} has {len(corners):,} corners of triangles, no multiple of 3"
+                )
+            return corners.reshape(-1, 3)
+        return _strip(corners) if mode == STRIP else _fan(corners)
+
+    def _decompress(self) -> tuple[NDArray[Any] | None, dict[str, NDArray[Any]]]:
+        """Triangles and attributes that Draco has compressed; None and none where it has not.
+
+        Raises: MeshError for damaged data, and without DracoPy unless the file has an uncompressed copy.
+        """
+        told = extension(self.entry, DRACO)
+        if not told:
+            return None, {}
+        if missing_packages("io", "DracoPy"):
+            if all(
+                "bufferView" in self.document.named("accessors", each) for each in self._attributes.values()
+            ):
+                return None, {}
+            raise MeshError(
+                f"is compressed with {DRACO}, which DracoPy decodes: run pip install 'taichi-soft[io]'. "
+                f"Or {copy_command(self.document.path)}"
+            )
+        import DracoPy
+
+        data, _ = self.document.view(told.get("bufferView"))
+        try:
+            mesh = DracoPy.decode(bytes(data))
+        except Exception as error:  # whatever the package raises for damaged data
+            reason = " ".join(str(error).split())[:100]
+            raise MeshError(
+                f"cannot be read: the {DRACO} data of {self.name} is damaged ({reason})"
+            ) from None
+        found = {each["unique_id"]: each["data"] for each in mesh.attributes}
+        numbers = self.document.entry("attributes", told)
+        lost = [name for name, number in numbers.items() if number not in found]
+        if lost:
+            raise MeshError(f"cannot be read: the {DRACO} data of {self.name} lacks {', '.join(lost)}")
+        rows = {}
+        for name, number in numbers.items():  # DracoPy gives integers as reals: the accessor has their type
+            accessor = self.document.named("accessors", self._attributes.get(name))
+            rows[name] = found[number].reshape(len(found[number]), -1).astype(component_type(accessor, name))
+            if rows[name].shape[1] != COLUMNS.get(accessor.get("type", "")):
+                raise MeshError(f"cannot be read: the {DRACO} data of {self.name} is no {name}")
+        return getattr(mesh, "faces", np.zeros((0, 3), np.int64)), rows
+
+
+def _strip(corners: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Triangles of a strip, (m, 3). Triangles that repeat a corner only connect strips, and are left out."""
+    found = np.stack([corners[:-2], corners[1:-1], corners[2:]], axis=1)
+    found[1::2] = found[1::2, [1, 0, 2]]
+    a, b, c = found.T
+    return np.asarray(found[(a != b) & (b != c) & (c != a)])
+
+
+def _fan(corners: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Triangles that share the first corner."""
+    rim = corners[1:]
+    return np.stack([np.broadcast_to(corners[:1], max(len(rim) - 1, 0)), rim[:-1], rim[1:]], axis=1)

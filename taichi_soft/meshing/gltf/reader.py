@@ -1,0 +1,306 @@
+"""Surfaces of .glb and .gltf files, posed as the file's nodes, skins and morph targets rest."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.core.errors import MeshError
+from taichi_soft.meshing.arrays import FloatArray
+from taichi_soft.meshing.gltf import looks, nodes
+from taichi_soft.meshing.gltf.document import MESHOPT, Document, Entry, copy_command
+from taichi_soft.meshing.gltf.looks import Looks
+from taichi_soft.meshing.gltf.nodes import INSTANCING, VISIBILITY
+from taichi_soft.meshing.gltf.primitives import DRACO, Primitive
+from taichi_soft.meshing.surface import Surface, surface_of
+
+READ = (DRACO, "KHR_mesh_quantization", INSTANCING, VISIBILITY, *looks.READ)
+"""Extensions that are read."""
+
+SHAPELESS = (
+    "KHR_technique",
+    "KHR_materials_",
+    "KHR_texture_",
+    "EXT_texture_",
+    "MSFT_texture_",
+    "KHR_lights_",
+    "EXT_lights_",
+    "KHR_animation_",
+)
+"""Beginnings of the names of extensions that change no shape: a file that requires one of these is read."""
+
+MOST_ROWS = 5_000_000
+"""Vertices or triangles of all parts. Many nodes can show one mesh: a small file could ask for any memory."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """One primitive where the scene shows it, with all its instances, in the file's own axes."""
+
+    name: str
+    vertices: FloatArray  # (n, 3) [m]
+    triangles: NDArray[np.int64]  # (m, 3)
+    normals: FloatArray | None  # (n, 3), of any length; None where the file has none
+    visual: Any  # trimesh's, or None
+
+
+def read_gltf(path: Path) -> list[Surface]:
+    """Read the default scene of a .glb or .gltf file. Animations are not played.
+
+    Skins are posed by their joints, and morph targets are blended by their default weights: glTF 2.0
+    specification, sections 3.7.2 and 3.7.3.
+    Raises: MeshError, in one line without the file's name, for a damaged file, for one that requires an
+        extension that is not read, and for one without triangles.
+    """
+    try:
+        with np.errstate(all="ignore"):  # what overflows is refused as a vertex that is not finite
+            return _Reader(Document(path)).surfaces()
+    except MeshError:
+        raise
+    except OSError as error:
+        raise MeshError(f"cannot be read ({error.strerror or error})") from None
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+        reason = " ".join(f"{type(error).__name__}: {error}".split())[:200]
+        raise MeshError(f"cannot be read: it is damaged ({reason})") from None
+
+
+class _Reader:
+    def __init__(self, document: Document) -> None:
+        self.document, self.looks = document, Looks(document)
+        self.counts: Counter[str] = Counter()  # of what the notes tell
+        self.joints: set[int] = set()
+        self.primitives: dict[tuple[int, int], Primitive] = {}
+        self.room = MOST_ROWS
+        self._require_extensions()
+
+    def surfaces(self) -> list[Surface]:
+        worlds = nodes.world_matrices(self.document)
+        shown = nodes.shown_nodes(self.document)
+        found: list[_Part] = []
+        for number in shown:
+            node = self.document.named("nodes", number)
+            if "mesh" in node:
+                found.extend(self._of_node(node, worlds, worlds[number]))
+        if not self.document.entries("nodes"):  # a library of meshes
+            for number in range(len(self.document.entries("meshes"))):
+                found.extend(self._of_node({"mesh": number}, worlds, np.eye(4)))
+        notes = self._notes(shown)
+        if not found:
+            raise MeshError("; ".join(["there are no triangles in it", *notes]))
+        return [
+            surface_of(
+                name, part.vertices, part.triangles, normals=part.normals, visual=part.visual, notes=notes
+            )
+            for part, name in zip(found, _unique(found), strict=True)
+        ]
+
+    def _of_node(self, node: Entry, worlds: FloatArray, world: FloatArray) -> Iterator[_Part]:
+        mesh = self.document.named("meshes", node["mesh"])
+        name = str(node.get("name") or mesh.get("name") or f"mesh {node['mesh']}")
+        weights: Any = node.get("weights", mesh.get("weights", ()))
+        instances = nodes.instance_matrices(self.document, node)
+        if instances is not None:
+            self.counts["instances"] += len(instances)
+        for order, entry in enumerate(mesh["primitives"]):
+            if entry.get("targets"):
+                self.counts["morphed"] += 1
+                self.counts["blended"] += any(weights)
+            primitive = self._primitive(node["mesh"], order, entry)
+            if not primitive.has_triangles:
+                self.counts["left out"] += 1
+                continue
+            positions, normals = primitive.vertices(weights)
+            triangles = primitive.triangles(len(positions))
+            self._take_room(
+                max(len(positions), len(triangles)) * (1 if instances is None else len(instances))
+            )
+            skinned = self._skin_matrices(node, primitive, worlds, len(positions))
+            if skinned is not None and instances is not None:
+                raise MeshError(
+                    f"has {INSTANCING} on the skinned mesh {name!r}: remove the skin or the instances"
+                )
+            if skinned is not None:
+                poses = skinned[None]
+            else:
+                poses = (world[None] if instances is None else world @ instances)[:, None]
+            if len(triangles) and len(poses):
+                part = _Part(name, positions, triangles, normals, self.looks.of(primitive))
+                yield _posed(part, poses)
+
+    def _primitive(self, mesh: int, order: int, entry: Entry) -> Primitive:
+        """The same object for all nodes of a mesh: it is decompressed once."""
+        key = mesh, order
+        if key not in self.primitives:
+            self.primitives[key] = Primitive(self.document, entry, f"primitive {order} of mesh {mesh}")
+        return self.primitives[key]
+
+    def _skin_matrices(
+        self, node: Entry, primitive: Primitive, worlds: FloatArray, count: int
+    ) -> FloatArray | None:
+        """Matrices from the vertices to the file's axes by a skin, (n, 4, 4), or None without a skin."""
+        joints, weights = _influences(primitive)
+        if "skin" not in node or not len(joints):
+            return None
+        skin = self.document.named("skins", node["skin"])
+        for joint in skin["joints"]:
+            self.document.named("nodes", joint)
+        self.counts["skinned"] += 1
+        self.joints.update(skin["joints"])
+        matrices = worlds[skin["joints"]]
+        if "inverseBindMatrices" in skin:
+            inverse = self.document.values(skin["inverseBindMatrices"], "MAT4")
+            if len(inverse) < len(matrices):
+                raise MeshError(
+                    f"cannot be read: skin {node['skin']} has {len(inverse)} of {len(matrices)} matrices"
+                )
+            matrices = matrices @ inverse[: len(matrices)].reshape(-1, 4, 4).transpose(
+                0, 2, 1
+            )  # columns first
+        used = joints[weights > 0.0]
+        if len(used) and used.max() >= len(matrices):
+            raise MeshError(
+                f"cannot be read: {primitive.name} refers to joint {used.max()} of {len(matrices)}"
+            )
+        totals = weights.sum(axis=1, keepdims=True)
+        weights = np.where(
+            totals > 0.0, weights / np.where(totals > 0.0, totals, 1.0), np.eye(1, weights.shape[1])
+        )
+        blended = np.zeros((count, 4, 4))
+        for column in range(joints.shape[1]):
+            rows = np.flatnonzero(weights[:, column])
+            blended[rows] += weights[rows, column, None, None] * matrices[joints[rows, column]]
+        return blended
+
+    def _take_room(self, rows: int) -> None:
+        self.room -= rows
+        if self.room < 0:
+            raise MeshError(f"has more than {MOST_ROWS:,} vertices or triangles: simplify it")
+
+    def _require_extensions(self) -> None:
+        required = [str(name) for name in self.document.entries("extensionsRequired")]
+        for name in required:
+            if name in MESHOPT:
+                raise MeshError(f"is compressed with {name}: {copy_command(self.document.path)}")
+            if name not in READ and not name.startswith(SHAPELESS):
+                raise MeshError(f"requires the extension {name}, which is not read: export it without")
+
+    def _notes(self, shown: list[int]) -> tuple[str, ...]:
+        json, counts = self.document, self.counts
+        found = []
+        animations = [str(each.get("name", number)) for number, each in enumerate(json.entries("animations"))]
+        if counts["skinned"]:
+            found.append(
+                f"{_many(counts['skinned'], 'primitive')} with a skin, {_many(len(self.joints), 'joint')} in "
+                "all: posed as the file's joints rest"
+            )
+        if counts["morphed"]:
+            how = (
+                "blended by the file's default weights"
+                if counts["blended"]
+                else "not applied: their default weights are 0"
+            )
+            found.append(f"{_many(counts['morphed'], 'primitive')} with morph targets, {how}")
+        if animations:
+            names = ", ".join(animations[:5]) + (", ..." if len(animations) > 5 else "")
+            found.append(f"{_many(len(animations), 'animation')} ({names[:200]}): not played")
+        if counts["instances"]:
+            found.append(
+                f"{_many(counts['instances'], 'instance')} by {INSTANCING}: read, as one mesh for each node"
+            )
+        if counts["left out"]:
+            found.append(
+                f"{_many(counts['left out'], 'primitive')} without triangles (points or lines): left out"
+            )
+        hidden = sum("mesh" in each for each in json.entries("nodes")) - sum(
+            "mesh" in json.named("nodes", number) for number in shown
+        )
+        if hidden:
+            found.append(f"{_many(hidden, 'node')} with a mesh outside the default scene or hidden: left out")
+        extensions = [str(name) for name in json.entries("extensionsUsed")]
+        if extensions:
+            ignored = [name for name in extensions if name not in READ]
+            words = (
+                [", ".join(name for name in extensions if name in READ) + " (read)"]
+                if len(ignored) < len(extensions)
+                else []
+            )
+            words += [", ".join(ignored) + " (ignored)"] if ignored else []
+            found.append(f"extensions: {'; '.join(words)}")
+        return (*found, *self.looks.notes)
+
+
+def _posed(part: _Part, poses: FloatArray) -> _Part:
+    """The instances of a part, as one part.
+
+    Args:
+        poses: matrices to the file's axes, (instances, 1 or vertices, 4, 4).
+    """
+    linear, count = poses[..., :3, :3], len(part.vertices)
+    vertices = np.einsum("...ij,...j->...i", linear, part.vertices) + poses[..., :3, 3]
+    turned = np.asarray(np.linalg.det(linear) < 0.0)  # mirrored
+    normals = None
+    if part.normals is not None:  # by the inverse transpose, but for the length
+        cofactors = np.cross(linear[..., [1, 2, 0], :], linear[..., [2, 0, 1], :])
+        moved = np.einsum("...ij,...j->...i", cofactors, part.normals)
+        normals = np.where(turned[..., None], -moved, moved).reshape(-1, 3)
+    mirrored = np.broadcast_to(turned, vertices.shape[:2])[:, part.triangles].all(axis=2, keepdims=True)
+    triangles = np.where(mirrored, part.triangles[:, [0, 2, 1]], part.triangles)
+    return replace(
+        part,
+        vertices=vertices.reshape(-1, 3),
+        triangles=(triangles + count * np.arange(len(poses))[:, None, None]).reshape(-1, 3),
+        normals=normals,
+        visual=_repeated(part.visual, len(poses)),
+    )
+
+
+def _repeated(visual: Any, count: int) -> Any:
+    """A visual for some copies of its vertices."""
+    if visual is None or count == 1:
+        return visual
+    if visual.kind == "vertex":
+        return type(visual)(vertex_colors=np.tile(visual.vertex_colors, (count, 1)))
+    uv = None if visual.uv is None else np.tile(visual.uv, (count, 1))
+    made = type(visual)(uv=uv, material=visual.material)
+    for name, rows in visual.vertex_attributes.items():
+        if name != "uv":
+            made.vertex_attributes[name] = np.tile(rows, (count, 1))
+    return made
+
+
+def _influences(primitive: Primitive) -> tuple[NDArray[np.int64], FloatArray]:
+    """Numbers of joints and their weights, (n, 4 k) each; no columns without any."""
+    joints, weights = [], []
+    for group in range(16):
+        numbers = primitive.rows(f"JOINTS_{group}", "VEC4")
+        shares = primitive.values(f"WEIGHTS_{group}", "VEC4")
+        if numbers is None or shares is None:
+            break
+        joints.append(numbers.astype(np.int64))
+        weights.append(np.maximum(shares, 0.0))
+    if not joints:
+        return np.zeros((0, 0), np.int64), np.zeros((0, 0))
+    return np.concatenate(joints, axis=1), np.concatenate(weights, axis=1)
+
+
+def _unique(parts: list[_Part]) -> list[str]:
+    """Their names, with a number behind those that are there already."""
+    found: dict[str, None] = {}
+    last: Counter[str] = Counter()
+    for part in parts:
+        name = part.name
+        while name in found:
+            last[part.name] += 1
+            name = f"{part.name} {last[part.name] + 1}"
+        found[name] = None
+    return list(found)
+
+
+def _many(count: int, noun: str) -> str:
+    return f"{count:,} {noun}{'' if count == 1 else 's'}"
