@@ -1,4 +1,4 @@
-"""Make the pictures of the README and the stills of the gallery.
+"""Make the pictures of the README and the pages, and the stills of the gallery.
 
 `python docs/make_pictures.py` makes all, in some minutes; with names of demos, only their stills.
 """
