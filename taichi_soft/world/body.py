@@ -139,7 +139,8 @@ class Body(BodyControl, BodyMeasures):
     def watch_stress(self, threshold: float | None) -> None:
         """Record a `StressExceeded` in every step in which tetrahedra come over a stress.
 
-        One that stays over it, or has not been below 0.9 of it since, is not named again.
+        One that stays over it, or has not been below 0.9 of it since, is not named again. The first call in a
+        world compiles, for many seconds with an empty cache, unless `World.warm_up` has done so.
         Args:
             threshold: of `tet_stress` [Pa]; None for no longer.
         Raises: OptionError if it is not above 0; MeshError for a body without tetrahedra; StateError before

