@@ -12,6 +12,7 @@ from taichi_soft.bodies.render_mesh import RenderMesh, surface_render_mesh
 from taichi_soft.bodies.skin_mesh import SkinMesh, skin_meshes
 from taichi_soft.bodies.stability import StableStep
 from taichi_soft.control.attachments import Attachment
+from taichi_soft.control.easing import Easings
 from taichi_soft.control.frames import Frames
 from taichi_soft.core.checks import as_array, as_positive
 from taichi_soft.core.handles import recorded
@@ -104,7 +105,8 @@ class Body(BodyControl, BodyMeasures):
 
     @recorded
     def set_motion(self, positions: ArrayLike, velocities: ArrayLike) -> None:
-        """Put the body into a given state between two steps; a frozen body is active again.
+        """Put the body into a given state between two steps; a frozen body is active again, and a change of
+        material that is eased in is at its end.
 
         Args:
             positions: (n, 3) [m].
@@ -114,6 +116,7 @@ class Body(BodyControl, BodyMeasures):
         shape = (self.vertex_count, 3)
         x, v = as_array(positions, "positions", shape, "m"), as_array(velocities, "velocities", shape, "m/s")
         self._context.built.write_motion(self, x, v)
+        self._context.of(Easings).finish(self)
         self._record.frozen_in = self._record.failure = None
 
     @recorded
