@@ -123,6 +123,13 @@ class Easings(Slice):
                 self.let_go(body)
             self.context.built.change(body.index, _write, body, self._place(body), arrays, rate, seconds)
 
+    def finish(self, body: SoftBody) -> None:
+        """End a change at once: the body was put into another state, whose deformation is the caller's."""
+        if body in self.by_body:
+            self.let_go(body)
+            arrays, place = self._arrays(body), self._place(body)
+            self.context.built.change(body.index, _write, body, place, arrays, 0.0, 1.0)
+
     def _arrays(self, body: SoftBody) -> BodyArrays:
         return self.context.layout.bodies[body.index]
 

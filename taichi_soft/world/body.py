@@ -12,6 +12,7 @@ from taichi_soft.bodies.render_mesh import RenderMesh, surface_render_mesh
 from taichi_soft.bodies.skin_mesh import SkinMesh, skin_meshes
 from taichi_soft.bodies.stability import StableStep
 from taichi_soft.control.attachments import Attachment
+from taichi_soft.control.easing import Easings
 from taichi_soft.control.frames import Frames
 from taichi_soft.core.checks import as_array, as_positive
 from taichi_soft.core.handles import recorded
@@ -108,7 +109,8 @@ class Body(BodyControl, BodyMeasures):
 
     @recorded
     def set_motion(self, positions: ArrayLike, velocities: ArrayLike) -> None:
-        """Put the body into a given state between two steps; a frozen body is active again.
+        """Put the body into a given state between two steps; a frozen body is active again, and a change of
+        material that is eased in is at its end.
 
         Args:
             positions: (n, 3) [m].
@@ -118,6 +120,7 @@ class Body(BodyControl, BodyMeasures):
         shape = (self.vertex_count, 3)
         x, v = as_array(positions, "positions", shape, "m"), as_array(velocities, "velocities", shape, "m/s")
         self._context.built.write_motion(self, x, v)
+        self._context.of(Easings).finish(self)
         self._record.frozen_in = self._record.failure = None
 
     @recorded
@@ -143,7 +146,8 @@ class Body(BodyControl, BodyMeasures):
     def watch_stress(self, threshold: float | None) -> None:
         """Record a `StressExceeded` in every step in which tetrahedra come over a stress.
 
-        One that stays over it, or has not been below 0.9 of it since, is not named again.
+        One that stays over it, or has not been below 0.9 of it since, is not named again. The first call in a
+        world compiles, for many seconds with an empty cache, unless `World.warm_up` has done so.
         Args:
             threshold: of `tet_stress` [Pa]; None for no longer.
         Raises: OptionError if it is not above 0; MeshError for a body without tetrahedra; StateError before

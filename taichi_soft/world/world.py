@@ -285,9 +285,9 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
         """Compile all that a game may call, behind its loading screen, so that nothing stops it later.
 
         Without it each kind of call compiles where it is made first: for 0.1 to 1 s with an empty cache, for
-        less in a later process; a first step with contact, for many seconds. A terminal is told what is being
-        compiled. The world stays as it is, to the bit. `Body.failure` of a body that froze is left out: every
-        start would pay for what hardly any body needs.
+        less in a later process; a first step with contact and a first `Body.watch_stress`, for many seconds.
+        A terminal is told what is being compiled. The world stays as it is, to the bit. `Body.failure` of a
+        body that froze is left out: every start would pay for what hardly any body needs.
         Raises: StateError before `build`.
         """
         warm_up(self._context)

@@ -62,12 +62,12 @@ def row_of(integrator):
 
 @pytest.fixture(scope="module", params=["leapfrog", "implicit_euler"])
 def scene(request):
-    """Cubes that their weight has flattened in three seconds, by 7 % and more."""
+    """Cubes that their weight has flattened in three seconds."""
     world = row_of(request.param)
     for _ in range(180):
         world.step(DT)
     for body in world.bodies:
-        assert np.ptp(body.positions()[:, 2]) < 0.93 * SIDE
+        assert np.ptp(body.positions()[:, 2]) < 0.98 * SIDE
     return world, world.snapshot()
 
 
@@ -101,7 +101,7 @@ def test_a_cube_that_its_weight_has_flattened_rises_and_does_not_jump(scene):
         height = np.ptp(body.positions()[:, 2])
         sag = DENSITY * G * SIDE**2 / (2 * STIFF)
         assert SIDE - 4 * sag < height < SIDE + 1e-5
-        assert np.abs(body.velocities()).max() < 5e-3
+        assert body.kinetic_energy() < 1e-3 * body.masses.sum()
         assert body.flipped_count() == 0 if len(body.tets) else True
 
 
@@ -154,28 +154,28 @@ def test_a_body_that_nothing_deforms_is_stiffer_at_once_and_any_body_softer(scen
         assert body.elastic_energy() == pytest.approx(expected, rel=0.02)
 
 
-def test_what_is_read_on_the_way_is_between(scene):
-    """Energy and stress are those of the constants that act, from the old ones to the new ones."""
+def test_what_is_read_on_the_way_is_of_the_constants_that_act(scene):
+    """The stiffness of springs, from their energy: its compliance falls as a parabola, for half a second. A
+    body that is put elsewhere has the new one at once."""
     world = begin(scene)
-    body, rest = neo_hookean(world), CUBE.vertices
-    stretched = rest * (1.05, 1, 1) + np.array([0, 0, 3])
-    seen = []
-    body.set_motion(stretched, 0 * rest)
-    before = body.elastic_energy(), body.tet_stress().mean()
-    body.set_material(jelly(STIFF))
-    for _ in range(40):
-        body.set_motion(stretched, 0 * rest)
-        seen.append((body.elastic_energy(), body.tet_stress().mean()))
+    body, rest = world.bodies[-1], LATTICE.vertices
+
+    def stiffness():
+        ends = body.positions()[LATTICE.edges].astype(float)
+        grown = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) - LATTICE.edge_lengths
+        return body.elastic_energy() / (0.5 * (grown**2).sum())
+
+    old, new = (springs(young).stiffness for young in (SOFT, STIFF))
+    body.set_material(springs(STIFF))
+    for k in range(40):
+        expected = old * (1 - (1 - np.sqrt(old / new)) * min(k * DT / 0.5, 1)) ** -2
+        assert stiffness() == pytest.approx(expected, rel=1e-3)
         world.step(DT)
-    body.set_motion(stretched, 0 * rest)
-    seen.append((body.elastic_energy(), body.tet_stress().mean()))
-    ratios = np.array(seen) / before
-    assert ratios[0] == pytest.approx([1, 1], rel=1e-6)
-    assert (np.diff(ratios, axis=0) >= -1e-9 * STIFF / SOFT).all()
-    assert ratios[-1] == pytest.approx([STIFF / SOFT] * 2, rel=1e-3)
-    middle = ratios[15]  # a parabola of the compliance
-    expected = (1 - (1 - np.sqrt(SOFT / STIFF)) * 15 * DT / 0.5) ** -2
-    assert middle == pytest.approx([expected] * 2, rel=1e-3)
+    world = begin(scene)
+    body.set_material(springs(STIFF))
+    world.step(DT)
+    body.set_motion(1.1 * rest + np.array([0, 0, 3]), 0 * rest)
+    assert stiffness() == pytest.approx(new, rel=1e-3)
 
 
 def test_a_change_under_way_goes_on_after_restore_bit_for_bit(scene):

@@ -54,7 +54,7 @@ KINDS = {
         {"law": "springs"},
         SHEET,
         SpringMaterial(500.0, 0.1),
-        SpringMaterial(np.linspace(200, 900, len(SHEET.edges)), 0.3, 0.9 * SHEET.edge_lengths),
+        SpringMaterial(np.linspace(200, 500, len(SHEET.edges)), 0.3, 0.9 * SHEET.edge_lengths),
     ),
 }
 
