@@ -30,7 +30,9 @@ def stage() -> Stage:
     )
     actor = Actor(body, paint=_stress)
     title = f"bars, {len(mesh.tets)} tetrahedra"
-    return Stage(title, world, [actor], camera, FixedStep(dt=1 / 50), seconds=6.0, scale=STRESS)
+    return Stage(
+        title, world, [actor], camera, FixedStep(dt=1 / 50), seconds=6.0, scale=STRESS, backdrop="paper"
+    )
 
 
 def _tilt(angle: float) -> NDArray[np.float64]:

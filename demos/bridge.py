@@ -64,7 +64,7 @@ def stage() -> Stage:
     actors += [Actor(body, PALETTE[i]) for i, body in enumerate(world.bodies[1:])]
     box_seen = (-0.8, -0.8, 0.2), (LENGTH + 1.1, 0.8, HEIGHT + 1.2)
     camera = Camera.framing(*box_seen, aspect=16 / 9, azimuth=-76, elevation=14, margin=1.0)
-    return Stage("a rope bridge", world, actors, camera, STEP, 8.0, act=Carriers(holds))
+    return Stage("a rope bridge", world, actors, camera, STEP, 8.0, act=Carriers(holds), backdrop="dusk")
 
 
 def _bridge() -> TetMesh:

@@ -22,7 +22,7 @@ def stage() -> Stage:
     world = World(integrator="implicit_euler")
     corners = [0, CELLS[1]]
     material = SpringMaterial(stiffness, damping=0.05)
-    body = world.add_body(mesh, material, law="springs", pinned=corners, position=(0, -SIDE / 2, 2.4))
+    body = world.add_body(mesh, material, law="springs", pinned=corners, position=(SIDE / 2, 0, 2.4))
     world.build()
     camera = Camera.framing(
         (-0.9, -1.0, 0.4), (1.5, 1.0, 2.5), aspect=16 / 9, azimuth=-50, elevation=8, margin=1.05

@@ -39,7 +39,9 @@ def stage() -> Stage:
     seen = (left, -DEPTH * (rows - 1) - 1.4, 0.0), (right + 1.8 * (right - left), 1.0, 2.8)
     camera = Camera.framing(*seen, aspect=16 / 9, azimuth=-90, elevation=38, margin=1.0)
     legend = [(COLORS[i], f"{law}  {_cost(mesh, law):.2f} ms") for i, law in enumerate(LAWS)]
-    return Stage("every law, time of a step", world, actors, camera, STEP, seconds=6.0, legend=legend)
+    return Stage(
+        "every law, time of a step", world, actors, camera, STEP, seconds=6.0, legend=legend, backdrop="paper"
+    )
 
 
 def _cost(mesh: TetMesh, law: str) -> float:

@@ -4,19 +4,26 @@ The upper part springs up once the weight below it is gone. Both parts are close
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from engine_adapter import FixedStep
-from taichi_soft import Body, BoxShape, Frame, Material, SoftBodyAsset, World, box
+from taichi_soft import Body, BoxShape, Frame, Material, SoftBodyAsset, TetMesh, World, box
 from taichi_soft.cli import main
 from taichi_soft.render import PALETTE, Camera
+from taichi_soft.render.colors import Color
 from taichi_soft.render.film import Actor, Stage
 from taichi_soft.render.props import Prop
+from taichi_soft.render.stage import Paint
 
 MATERIAL = Material(young=1.2e5, poisson=0.3, density=1000.0, damping_ratio=0.3)
 SIZE = (0.6, 0.6, 2.0)  # of the bar [m]
-HEIGHT = 2.4  # of its middle [m]
-CUT = np.array([0.0, 0.0, 2.05])  # where the blade crosses the middle [m]
-ALONG = np.array([1.0, 0.0, 0.1]) / np.hypot(1.0, 0.1)  # its way
+HEIGHT = 2.05  # of its middle [m]
+SEAM, SLOPE = (
+    -0.3,
+    0.1,
+)  # height of the layer's edge over the middle that the blade follows [m], and its slope
+CUT = np.array([0.0, 0.0, 1.53])  # where the blade crosses the middle of the stretched bar [m]
+ALONG = np.array([1.0, 0.0, SLOPE]) / np.hypot(1.0, SLOPE)  # its way
 ASIDE = np.array([0.0, 1.0, 0.0])  # its edge
 WAY, WIDTH = 2.6, 0.3  # how far it goes, and from its edge to its back [m]
 BEGIN, PASSING = 0.9, 0.5  # when it sets out, and how long it takes [s]
@@ -45,7 +52,8 @@ class Knife:
             self.below = _mass_below(self.bar)
             (self.fallen,) = self.bar.cut(plane=(CUT, np.cross(ALONG, ASIDE)))
             self.parted = world.time
-            self.stage.actors.append(Actor(self.fallen, PALETTE[1]))
+            self.stage.actors[0].paint = _flesh(PALETTE[0])
+            self.stage.actors.append(Actor(self.fallen, paint=_flesh(PALETTE[1])))
 
     def caption(self) -> str:
         """For the picture."""
@@ -55,9 +63,9 @@ class Knife:
 
 def stage() -> Stage:
     """The bar at rest by its upper end, not stretched yet."""
-    mesh = box(SIZE, (6, 6, 20))
+    mesh = _leaning(box(SIZE, (8, 8, 20)))
     top = np.flatnonzero(mesh.vertices[:, 2] > SIZE[2] / 2 - 1e-6)
-    asset = SoftBodyAsset(mesh, MATERIAL, pinned=top, spare_vertices=400)
+    asset = SoftBodyAsset(mesh, MATERIAL, pinned=top, spare_vertices=600)
     world = World()
     world.reserve(asset, 2)
     bar = world.spawn(asset, position=(0.0, 0.0, HEIGHT))
@@ -70,11 +78,30 @@ def stage() -> Stage:
         Prop((plate[0] + (0, 0, 0.06), plate[1]), ceiling),
         Prop(steel, blade, color=(0.95, 0.93, 0.88)),
     ]
-    camera = Camera.framing((-1.4, -0.6, 0.0), (1.4, 0.6, 4.6), aspect=16 / 9, azimuth=-66, elevation=8)
-    found = Stage("cut in two", world, [Actor(bar)], camera, STEP, 7.0, props=props)
+    camera = Camera.framing((-1.5, -0.6, 0.0), (1.5, 0.6, 3.15), aspect=16 / 9, azimuth=-66, elevation=14)
+    found = Stage("cut in two", world, [Actor(bar)], camera, STEP, 7.0, props=props, backdrop="paper")
     found.act = knife = Knife(blade, found)
     found.caption = knife.caption
     return found
+
+
+def _leaning(bar: TetMesh) -> TetMesh:
+    """With layers that lean as the blade does where it passes: it parts them and leaves smooth faces."""
+    x, y, z = bar.vertices.T
+    nearness = np.clip(1.0 - np.abs(z - SEAM) / 0.6, 0.0, 1.0)
+    return TetMesh(np.stack([x, y, z + SLOPE * x * nearness], axis=1), bar.tets)
+
+
+def _flesh(color: Color) -> Paint:
+    """Paler where the blade went."""
+
+    def paint(body: Body) -> NDArray[np.float32]:
+        x, y, z = body.mesh.vertices.T
+        is_within = (np.abs(x) < 0.49 * SIZE[0]) & (np.abs(y) < 0.49 * SIZE[1])
+        is_cut = is_within & (np.abs(z - SEAM - SLOPE * x) < 1e-4)
+        return np.where(is_cut[:, None], 0.35 * np.array(color) + 0.65, color).astype(np.float32)
+
+    return paint
 
 
 def _mass_below(body: Body) -> float:

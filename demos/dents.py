@@ -30,7 +30,16 @@ def stage() -> Stage:
     camera = Camera.framing((-3.0, -1.6, -0.3), (3.0, 1.2, 4.5), aspect=16 / 9, azimuth=-90.0, elevation=9.0)
     legend = [(FLIPPED, "flipped")]
     step = FixedStep(dt=1 / 50, substeps=14)
-    return Stage("E = 0.2 MPa, 6 m/s downwards", world, actors, camera, step, seconds=5.0, legend=legend)
+    return Stage(
+        "E = 0.2 MPa, 6 m/s downwards",
+        world,
+        actors,
+        camera,
+        step,
+        seconds=5.0,
+        legend=legend,
+        backdrop="studio",
+    )
 
 
 def _mark_flips(color: tuple[float, float, float]):  # type: ignore[no-untyped-def]

@@ -51,7 +51,7 @@ def stage() -> Stage:
     material = SpringMaterial(
         cloth_constants(mesh, CELLS, tensile=400.0, shear=100.0, bend=1.0), damping=0.05
     )
-    place = (-SIDE / 2 + 0.1, -SIDE / 2, HEIGHT + RADIUS + FALL)  # a little aside, as thrown
+    place = (0.1, 0.0, HEIGHT + RADIUS + FALL)  # a little aside, as thrown
     body = world.add_body(mesh, material, law="springs", position=place)
     world.build()
     camera = Camera.framing(

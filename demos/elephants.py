@@ -74,7 +74,7 @@ def stage() -> Stage:
         (-1.3, -2.75, 0.0), (1.3, -0.4, 2.0), aspect=16 / 9, azimuth=-76, elevation=13, margin=1.0
     )
     actors = [Actor(body) for body in world.bodies]
-    return Stage("toy elephants", world, actors, camera, STEP, 5.0, collider_colors=colors)
+    return Stage("toy elephants", world, actors, camera, STEP, 5.0, collider_colors=colors, backdrop="meadow")
 
 
 def ear_span(body: Body) -> float:

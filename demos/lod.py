@@ -49,7 +49,9 @@ def stage() -> Stage:
     actors = [Actor(body, paint=paint) for body in world.bodies]
     legend = [(color, f"{cells} cells") for color, cells in zip(COLORS, CELLS, strict=True)]
     title = "levels of detail"
-    return Stage(title, world, actors, camera, STEP, 4.5, act=choice, caption=caption, legend=legend)
+    return Stage(
+        title, world, actors, camera, STEP, 4.5, act=choice, caption=caption, legend=legend, backdrop="studio"
+    )
 
 
 class Choice:

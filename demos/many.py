@@ -32,7 +32,9 @@ def stage() -> Stage:
     seen = (-edge, -edge, 0.0), (edge, edge, 5.0)
     camera = Camera.framing(*seen, aspect=16 / 9, azimuth=-80.0, elevation=25.0, margin=1.0)
     title = f"{len(actors)} spheres, {len(actors) * len(mesh.tets):,} tetrahedra"
-    return Stage(title, world, actors, camera, FixedStep(dt=1 / 50, substeps=14), seconds=6.0)
+    return Stage(
+        title, world, actors, camera, FixedStep(dt=1 / 50, substeps=14), seconds=6.0, backdrop="dusk"
+    )
 
 
 def proof(stage: Stage) -> float:

@@ -111,7 +111,15 @@ def stage() -> Stage:
         (-4.0, -2.4, 0.0), (3.9, 2.0, 8.4), aspect=16 / 9, azimuth=-74, elevation=20, margin=1.0
     )
     return Stage(
-        "a course of colliders", world, actors, camera, STEP, 8.0, act=course, collider_colors=course.colors
+        "a course of colliders",
+        world,
+        actors,
+        camera,
+        STEP,
+        8.0,
+        act=course,
+        collider_colors=course.colors,
+        backdrop="meadow",
     )
 
 

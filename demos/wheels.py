@@ -14,7 +14,7 @@ from taichi_soft.render.colors import Color
 from taichi_soft.render.film import Actor, Stage
 from taichi_soft.render.stage import Paint
 
-STIFFNESSES = (4e4, 1e5, 4e5)  # Young's moduli, from the softest wheel to the firmest [Pa]
+STIFFNESSES = (1.6e4, 4e4, 4e5)  # Young's moduli, from the softest wheel to the firmest [Pa]
 RADIUS, WIDTH, HUB = 0.5, 0.7, 0.2  # of the wheels; radius of what the motor drives [m]
 SPEED, TORQUE = 3.0, 1500.0  # [rad/s] and [N m]
 LANE, ASIDE = 1.4, 0.3  # from wheel to wheel, and how much wider than these the steps are on each side [m]
@@ -23,6 +23,7 @@ FOOT, TOP = 1.4, 2.8  # where the first step begins, and how long the last one i
 GOAL = FOOT + (STEPS - 1) * TREAD + TOP / 2 - 0.2  # where the motors brake [m]
 BEGIN = 0.4  # when they set out [s]
 DRAG = 2.0  # [1/s] of a wheel that brakes, or it would rock to and fro about its hub
+SMOOTHING = 0.04  # of the torques that are shown, per step
 STEP = FixedStep(dt=1 / 50)
 
 
@@ -32,9 +33,11 @@ class Drivers:
     def __init__(self, motors: list[Motor]) -> None:
         """Waiting."""
         self.motors = motors
+        self.torques = np.zeros(len(motors))  # running means [N m]
 
     def __call__(self, world: World) -> None:
         """Before a step."""
+        self.torques += SMOOTHING * ([motor.effort for motor in self.motors] - self.torques)
         for motor in self.motors:
             is_there = motor.body.center_of_mass()[0] > GOAL
             speed = SPEED if world.time >= BEGIN and not is_there else 0.0
@@ -44,7 +47,7 @@ class Drivers:
 
     def caption(self) -> str:
         """For the picture."""
-        return "torque " + "  ".join(f"{motor.effort:6.0f}" for motor in self.motors) + " N m"
+        return "torque " + "  ".join(f"{10 * round(t / 10):5.0f}" for t in self.torques) + " N m"
 
 
 def stage() -> Stage:
@@ -77,11 +80,11 @@ def stage() -> Stage:
         world.add_motor(body, hub, (0.0, 0.0, 1.0), speed=0.0, max_torque=TORQUE, is_fixed=True)
     drivers = Drivers(motors)
     camera = Camera.framing(
-        (-0.4, -2.3, 0.0), (5.9, 1.9, 2.2), aspect=16 / 9, azimuth=-112, elevation=26, margin=1.0
+        (-0.5, -2.2, 0.0), (5.8, 1.8, 1.9), aspect=16 / 9, azimuth=-106, elevation=20, margin=1.0
     )
     legend = [(PALETTE[i], f"E = {young / 1e3:.0f} kPa") for i, young in enumerate(STIFFNESSES)]
     found = Stage("wheels driven at their hubs", world, actors, camera, STEP, 7.0, act=drivers)
-    found.caption, found.legend = drivers.caption, legend
+    found.caption, found.legend, found.backdrop = drivers.caption, legend, "dusk"
     return found
 
 

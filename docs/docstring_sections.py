@@ -1,17 +1,25 @@
 """Docstrings of this code base as mkdocstrings understands them: a Griffe extension.
 
-Ours write `Args:` without an empty line before it, and `Returns:` and `Raises:` as one sentence each. What a
-field of a dataclass is, they say in a comment beside it.
+Ours write `Args:` without an empty line before it, `Returns:` and `Raises:` as one sentence each, and code
+under `Example:`. A comment beside a field of a dataclass describes it. Signatures print the values of
+constants. A class that only a world makes has no signature.
 """
 
 from __future__ import annotations
 
+import math
 import re
+import sys
+from dataclasses import fields, is_dataclass
+from enum import Enum
 from typing import Any
 
 import griffe
 
+import taichi_soft  # noqa: F401 - the modules that hold the values of constants
+
 LIST = re.compile(r"^(Args|Attributes):$")
+EXAMPLE = "Example:"
 SENTENCE = re.compile(r"^(Returns|Raises|Warns): ?(.*)$")
 COMMENT = re.compile(r"\s#\s(?!noqa|type:)(.*)$")
 
@@ -21,6 +29,16 @@ def sectioned(text: str) -> str:
     lines: list[str] = []
     section = ""  # that the present line belongs to
     for line in text.splitlines():
+        if line == EXAMPLE:
+            section = EXAMPLE
+            lines += ["", "**Example:**", "", "```python"]
+            continue
+        if section == EXAMPLE and line.startswith("    "):
+            lines.append(line[4:])
+            continue
+        if section == EXAMPLE:
+            section = ""
+            lines.append("```")
         if found := LIST.match(line) or SENTENCE.match(line):
             section = found[1]
             lines.append("")
@@ -31,10 +49,24 @@ def sectioned(text: str) -> str:
         elif section in ("Returns", "Raises", "Warns"):
             line = line.strip()
         lines.append(line)
-    return "\n".join(lines)
+    return "\n".join([*lines, "```"] if section == EXAMPLE else lines)
 
 
-def fields(cls: griffe.Class) -> list[str]:
+def value_of(default: griffe.Expr, module: str) -> str | None:
+    """A default as the value that its names stand for; None where it reads best as it is."""
+    names = [part.name for part in default.iterate(flat=True) if isinstance(part, griffe.ExprName)]
+    if not names or module not in sys.modules:
+        return None
+    value = eval(str(default), vars(sys.modules[module]))
+    if isinstance(value, Enum):
+        return repr(value.value)
+    if is_dataclass(value) and all(getattr(value, each.name) == each.default for each in fields(value)):
+        return f"{type(value).__name__}()"
+    is_infinite = isinstance(value, float) and math.isinf(value)
+    return None if is_infinite or "<" in repr(value) else repr(value)
+
+
+def described_fields(cls: griffe.Class) -> list[str]:
     """What a dataclass says of its fields in comments beside them; where it says nothing, their types."""
     lines = []
     for name, member in cls.members.items():
@@ -54,12 +86,23 @@ class DocstringSections(griffe.Extension):
         if obj.docstring is not None:
             obj.docstring.value = sectioned(obj.docstring.value)
 
+    def on_function(self, *, func: griffe.Function, **_: Any) -> None:
+        """Print the values of constants."""
+        for parameter in func.parameters:
+            if isinstance(parameter.default, griffe.Expr):
+                parameter.default = value_of(parameter.default, func.module.path) or parameter.default
+
     def on_class(self, *, cls: griffe.Class, **_: Any) -> None:
-        """List the fields of a dataclass that does not do so in its docstring."""
-        doc = cls.docstring
+        """List the fields of a dataclass whose docstring does not; hide how a world makes its handles."""
+        doc, init = cls.docstring, cls.members.get("__init__")
+        if init is not None and init.docstring is not None and init.docstring.value.startswith("Made by"):
+            del cls.members["__init__"]
+        for member in cls.members.values():
+            if member.is_attribute and "dataclass" in cls.labels and isinstance(member.value, griffe.Expr):
+                member.value = value_of(member.value, cls.module.path) or member.value
         if (
             doc is not None
             and "dataclass" in cls.labels
             and not re.search(r"^(Args|Attributes):", doc.value, re.M)
         ):
-            doc.value = "\n".join([*doc.value.splitlines(), "", "Attributes:", *fields(cls)])
+            doc.value = "\n".join([*doc.value.splitlines(), "", "Attributes:", *described_fields(cls)])

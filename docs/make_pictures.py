@@ -15,7 +15,7 @@ FOLDER = Path(__file__).parent / "pictures"
 FILMS = {"jelly": 3.0, "bounce": 3.8}
 """How much of them is shown [s]."""
 
-MOMENTS = {"dents": 0.44, "bars": 1.06, "tower": 0.6, "drape": 2.6, "bridge": 1.6, "bowl": 3.0}
+MOMENTS = {"dents": 0.44, "bars": 1.06, "tower": 1.7, "drape": 2.6, "bridge": 1.6, "bowl": 3.0}
 """That show what each demo is about [s]."""
 
 

@@ -41,6 +41,12 @@ class EngineAdapter:
             they are.
     Raises: StateError if the world is not built; OptionError if `fixed_step` is not a FixedStep, or
         `before_step` cannot be called.
+    Example:
+        game = EngineAdapter(world, FixedStep(dt=1 / 60))
+        vertices = np.empty((body.vertex_count, 3), np.float32)
+        for frame in range(3):
+            game.advance(1 / 75)  # seconds since the last frame
+            game.positions(body, out=vertices)  # between the last two steps
     """
 
     def __init__(
@@ -153,6 +159,8 @@ class EngineAdapter:
     def see_from(self, viewer: ArrayLike) -> None:
         """Say where the camera is, (3,) [m]: a budget takes from the farthest bodies first.
 
+        Args:
+            viewer: place of the camera, (3,) [m].
         Raises: OptionError for what is no place; StateError without `budget_ms`.
         """
         self._required_budget.see_from(viewer)
@@ -177,6 +185,8 @@ class EngineAdapter:
 
         `alpha` stays: make the steps again by `step`, with the inputs as they should have been, and the
         picture goes on where it was.
+        Args:
+            steps: number of fixed steps, from 1 to `rewind_ticks`.
         Raises: OptionError for more steps than `rewind_ticks`, or than were made since the last `restore`;
             StateError where nothing is kept.
         """
@@ -195,6 +205,8 @@ class EngineAdapter:
     def restore(self, data: bytes) -> None:
         """Load a state: as `World.restore`, with `alpha` 0, and `rewind` as far as to here.
 
+        Args:
+            data: made by `snapshot`, of this world or one that was built of the same things.
         Raises: as `World.restore`, with nothing changed.
         """
         self._world.restore(data)

@@ -9,15 +9,6 @@ from taichi_soft.core.checks import as_count
 class Rollback:
     """Snapshots of the last steps of a world.
 
-        rollback = Rollback(world, ticks=30)
-        while running:
-            if late_input is not None:
-                rollback.rewind_to(late_input.step)
-                # and the inputs and steps from there on once more, up to now
-            rollback.save()
-            apply_inputs()
-            world.step(dt, substeps)
-
     What is kept is one course of events. Where others call `World.restore`, to load a game say, it is not
     what led to the present state: `steps` is empty then, and `save` begins anew.
 
@@ -25,6 +16,12 @@ class Rollback:
         world: built.
         ticks: how many steps it is possible to go back, 1 or more. Each takes the size of a snapshot.
     Raises: OptionError for what is no world or no count; StateError if the world is not built.
+    Example:
+        rollback = Rollback(world, ticks=30)
+        for tick in range(10):
+            rollback.save()
+            world.step(1 / 60, substeps=8)
+        rollback.rewind_to(rollback.steps[4])  # an input of that tick arrived late
     """
 
     def __init__(self, world: World, ticks: int) -> None:
@@ -61,6 +58,8 @@ class Rollback:
     def rewind_to(self, step: int) -> None:
         """Put the world back to where `save` was called at that step count; what was saved later is dropped.
 
+        Args:
+            step: one of `steps`.
         Raises: OptionError for a step that is not among `steps`, with nothing changed.
         """
         wanted = as_count(step, "step", 0)

@@ -1,6 +1,7 @@
 """Real-time soft bodies from real material parameters."""
 
 import logging
+from typing import TYPE_CHECKING
 
 from taichi_soft.core import signals  # noqa: F401 - first: it watches while the rest is imported
 
@@ -101,6 +102,19 @@ from taichi_soft.queries import ClosestPoint, Overlap, RayHit, RayHits
 from taichi_soft.world.body import Body
 from taichi_soft.world.world import World
 
+if TYPE_CHECKING:
+    from engine_adapter import EngineAdapter, FixedStep, GivenUp, Rollback
+else:
+
+    def __getattr__(name):
+        """Import the names of `engine_adapter` when one is asked for: that package imports this one."""
+        if name not in ("EngineAdapter", "FixedStep", "GivenUp", "Rollback"):
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        import engine_adapter
+
+        return getattr(engine_adapter, name)
+
+
 __all__ = [
     "LAWS",
     "PRESETS",
@@ -119,13 +133,16 @@ __all__ = [
     "Device",
     "DeviceError",
     "DroppedEventsWarning",
+    "EngineAdapter",
     "Event",
     "Failure",
     "Feel",
     "FellAsleep",
+    "FixedStep",
     "Frame",
     "Froze",
     "FrozenBodyWarning",
+    "GivenUp",
     "Grab",
     "HeightFieldShape",
     "Joint",
@@ -147,6 +164,7 @@ __all__ = [
     "RayHits",
     "Released",
     "RenderMesh",
+    "Rollback",
     "Settings",
     "Shape",
     "SkinMesh",

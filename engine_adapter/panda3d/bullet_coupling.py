@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 class BulletState:
     """Where rigid bodies were and how they moved. Made by `BulletCoupling.snapshot`."""
 
-    rows: tuple[tuple[Any, ...], ...]
+    rows: tuple[tuple[Any, ...], ...]  # one for each rigid body
 
 
 class _Rigid:
@@ -113,7 +113,12 @@ class BulletCoupling:
         return colliders
 
     def remove(self, path: Any) -> None:
-        """Remove the colliders of a rigid body. Raises: OptionError for one that was not added."""
+        """Remove the colliders of a rigid body.
+
+        Args:
+            path: node path of the rigid body, as `add` was given it.
+        Raises: OptionError for one that was not added.
+        """
         for each in self._rigid:
             if each.path == path:
                 for one in each.colliders:
@@ -127,6 +132,8 @@ class BulletCoupling:
 
         Rigid bodies first get what soft ones gave them in the last step. Colliders then go where Bullet took
         their bodies.
+        Args:
+            dt: length of the step [s].
         """
         for each in self._rigid:
             each.push()
@@ -152,6 +159,8 @@ class BulletCoupling:
     def restore(self, state: BulletState) -> None:
         """Put the rigid bodies back, after `World.restore` has put their colliders back.
 
+        Args:
+            state: made by `snapshot`.
         Raises: OptionError where others were added or removed since, with nothing changed.
         """
         if [row[0] for row in state.rows] != [each.path for each in self._rigid]:

@@ -65,6 +65,8 @@ class MouseGrab:
     def press(self, x: float, y: float) -> bool:
         """Take hold of what is seen at a point of the window, -1 to 1 from left to right and from below.
 
+        Args:
+            x, y: point of the window, from (-1, -1) at the lower left to (1, 1) at the upper right.
         Returns: whether there was a body.
         Raises: as `World.grab`.
         """
@@ -84,7 +86,11 @@ class MouseGrab:
         return self._grab is not None
 
     def move(self, x: float, y: float) -> None:
-        """Pull to where the ray through a point of the window meets the plane; nothing where it does not."""
+        """Pull to where the ray through a point of the window meets the plane; nothing where it does not.
+
+        Args:
+            x, y: point of the window, from (-1, -1) at the lower left to (1, 1) at the upper right.
+        """
         if self.grab is None:
             return
         near, far = self.ray(x, y)
@@ -103,6 +109,8 @@ class MouseGrab:
     def ray(self, x: float, y: float) -> tuple[Floats, Floats]:
         """Where the line of sight through a point of the window begins and ends, (3,) [m] each.
 
+        Args:
+            x, y: point of the window, from (-1, -1) at the lower left to (1, 1) at the upper right.
         Raises: OptionError where the camera's lens knows no such line.
         """
         ends = core.LPoint3(), core.LPoint3()

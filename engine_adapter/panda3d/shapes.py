@@ -36,7 +36,11 @@ class PlacedShape:
     rotation: Floats
 
     def pose(self, path: Any) -> tuple[Floats, Floats]:
-        """Position (3,) [m] and rotation (3, 3) in the world, with its node where its NodePath is."""
+        """Position (3,) [m] and rotation (3, 3) in the world, with its node where its NodePath is.
+
+        Args:
+            path: NodePath of the node.
+        """
         place, turn = pose_of(path)
         return place + turn @ self.position, turn @ self.rotation
 

@@ -28,9 +28,9 @@ MEGABYTE = 1e6
 class BakeReport:
     """What was written."""
 
-    path: Path
-    frames: int
-    fps: float
+    path: Path  # of the file or folder
+    frames: int  # of the clip
+    fps: float  # frames per second of the clip
     meshes: tuple[str, ...]  # their names
     vertices: int  # of all meshes
     size: int  # of all files [bytes]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 class Room:
     """What a bake will take."""
 
-    frames: int
+    frames: int  # of the clip
     vertices: int  # of all meshes that are there
     size: int  # of positions and normals [bytes]; what does not move takes less
 

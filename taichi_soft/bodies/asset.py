@@ -42,7 +42,7 @@ from taichi_soft.elements.materials import AnisotropicMaterial, AnyMaterial, Mat
 from taichi_soft.meshing import BodyMesh, ParticleMesh, TetMesh
 from taichi_soft.meshing.arrays import read_only
 from taichi_soft.meshing.cage_mesh import CageMesh
-from taichi_soft.meshing.surfaces import Up, read_surfaces
+from taichi_soft.meshing.surfaces import Up, assumed_up, read_surfaces
 
 _log = logging.getLogger(__name__)
 
@@ -90,6 +90,10 @@ class SoftBodyAsset:
         coarser: the same thing of fewer and fewer tetrahedra, as `with_coarser` makes it: levels of detail
             for `Body.set_level`. Takes no spare vertices and no plasticity.
     Raises: MeshError, MaterialError or OptionError for bad input.
+    Example:
+        crate = SoftBodyAsset(box((0.4, 0.4, 0.4), (3, 3, 3)), jelly, contact=Contact(friction=0.8))
+        arena = World()
+        arena.reserve(crate, 10)  # room for ten of them
     """
 
     mesh: BodyMesh
@@ -193,6 +197,8 @@ class SoftBodyAsset:
 
         Their constants are such that they weigh as much and vibrate as fast in the slowest modes. Takes
         seconds for each.
+        Args:
+            meshes: rest shapes of fewer and fewer tetrahedra.
         Raises: MeshError for a mesh that is not coarser; MaterialError for another material than one with a
             number for each constant; OptionError for a body that is cut, tears, is bent for good, or whose
             law looks at edges. All of them before that work begins.
@@ -260,11 +266,11 @@ class SoftBodyAsset:
         time_limit: float | None = None,
         refine: int | None = None,
         up: Up | None = None,
+        center: bool = False,
+        scale: float = 1.0,
         **options: Any,
     ) -> SoftBodyAsset:
         """A body from an artist's mesh: a cage of tetrahedra that carries the mesh as its skin.
-
-            duck = SoftBodyAsset.from_surface("duck.glb", Material(2e5, 0.4, 900.0), cells=10)
 
         The surface may have holes, faces turned round, walls within and parts that overlap: see
         `taichi_soft.cages`. Mass, centre and inertia are those of the solid that it encloses.
@@ -285,14 +291,25 @@ class SoftBodyAsset:
                 left out, thinner than about a sixteenth of a cell: 0 to 3, and 1 if None. Each time halves
                 the substep. What stays left out is drawn, but neither bends nor touches anything. Both is
                 logged, with the `cell_size` that keeps it.
-            up: axis that points up in the file; None takes "y" for .glb and .gltf, as their format has it,
-                and "z" for all else.
+            up: axis that points up in the file, "y" or "z"; None takes "y" for .glb, .gltf and .obj, and "z"
+                for all else, which is what most programs write.
+            center: move the middle of the box round it to the origin, as a file needs that lies kilometres
+                away from it (geographic coordinates): positions are 32-bit numbers.
+            scale: factor from the unit of the file to metres: 0.001 for millimetres.
             options: further arguments of `SoftBodyAsset`. A `skin` is drawn in place of the surface.
+        What was assumed, repaired or left out of the file is logged (logger `taichi_soft`).
         Raises: MeshError for a surface that cannot be read or encloses nothing, with the way out, and for a
             process that crashes or takes too long; OptionError for cells out of range, with the memory that
             they would take; MissingExtraError without the package of the method.
+        Example:
+            duck = SoftBodyAsset.from_surface("duck.glb", jelly, cells=8)
+            print(duck.mesh.quality.summary())
         """
-        surfaces = read_surfaces(surface, up)
+        surfaces = read_surfaces(surface, up, center=center, scale=scale)
+        if up is None and (assumed := assumed_up(surface)):
+            _log.info("%s", assumed)
+        for note in dict.fromkeys(note for each in surfaces for note in each.notes):
+            _log.warning("%s", note)
         numbers: list[Any] = [cells]
         if isinstance(cells, (tuple, list, np.ndarray)):
             numbers = [as_count(number, "cells", 1, 1_000_000) for number in cells]
@@ -342,7 +359,11 @@ class SoftBodyAsset:
         return replace(arrays, hull=HullArrays(carriers, hull.weights, hull.triangles))
 
     def touching_points(self, x: Floats) -> Floats:
-        """Where the points are by which it touches colliders, of vertices at `x` (n, 3) [m]."""
+        """Where the points are by which it touches colliders, of vertices at `x` (n, 3) [m].
+
+        Args:
+            x: positions of the vertices, (n, 3) [m].
+        """
         hull = self.bound_hull
         if hull is None:
             return x[outer_vertices(self.mesh)]
@@ -364,6 +385,8 @@ class SoftBodyAsset:
         [1/s], and after what time at most they are damped again [s].
 
         Of another material the frequency goes with the root of its mean stiffness over its mass.
+        Args:
+            body: description of that body.
         """
         material = body.material
         if isinstance(material, SpringMaterial) or material.damping_ratio * self.first_frequency == 0.0:
@@ -411,7 +434,9 @@ class SoftBodyAsset:
     ) -> Floats32:
         """Position, velocity, inverse mass and mass of each vertex of a body that begins there, (n, 8).
 
-        Args: as `World.spawn` takes them, and the height of the floor [m].
+        Args:
+            position, rotation, velocity, angular_velocity: as `World.spawn` takes them.
+            floor: height of the floor [m], or None.
         Raises: OptionError for bad values, a vertex that is too fast, and a place out of reach or below the
             floor, which would crush the body.
         """

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 class Failure:
     """Why a body was frozen."""
 
-    body: int
+    body: int  # its slot
     tetrahedron: int | None  # that broke first, in the caller's order; None if it cannot be told
     step: int  # of the world, counted from 0, which was undone for this body
     substep: int | None  # within that step, or the finest attempt at it

@@ -27,18 +27,14 @@ FEWEST_SHARED = 4000
 class RenderMesh:
     """The surface of one body as a renderer takes it. Made by `Body.render_mesh`, and read-only.
 
-        skin = duck.render_mesh(crease=40.0)
-        vertices = np.empty((skin.vertex_count, 3), np.float32)
-        normals = np.empty_like(vertices)
-        index_buffer = skin.triangles
-        while running:
-            game.advance(seconds_since_last_frame)
-            if skin.is_outdated:
-                ...  # the body was cut, or changed its level: make mesh and buffers anew
-            game.render_mesh(skin, vertices, normals)
-
     It has the vertices on the surface only, one copy for each side of a sharp edge. It stays as it is: a cut
     body has other vertices, so its mesh is outdated, and is made anew.
+    Example:
+        skin = body.render_mesh(crease=40)  # skin.triangles is the index buffer
+        vertices = np.empty((skin.vertex_count, 3), np.float32)
+        normals = np.empty_like(vertices)
+        game.advance(1 / 60)
+        game.render_mesh(skin, vertices, normals)
     """
 
     def __init__(self, body: SoftBody, vertices: NDArray[np.int64], triangles: Ints32) -> None:

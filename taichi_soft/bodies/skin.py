@@ -24,7 +24,7 @@ from taichi_soft.bodies.kernels.skin import in_lanes
 from taichi_soft.meshing import TetMesh
 from taichi_soft.meshing.arrays import read_only
 from taichi_soft.meshing.locating import Locator
-from taichi_soft.meshing.surfaces import Surface
+from taichi_soft.meshing.surface import Surface
 
 Floats = NDArray[np.float64]
 Floats32 = NDArray[np.float32]

@@ -93,6 +93,10 @@ def stable_step(mesh: BodyMesh, material: AnyMaterial, model: ElementModel) -> S
     It holds for motion about the rest shape. A body under strong compression is stiffer and a flattened
     tetrahedron has no bound at all, which is why `recommended` leaves a margin. Pins are not counted: they
     make it longer, if anything.
+    Args:
+        mesh: rest shape.
+        material: constants that fit the mesh.
+        model: made by `element_model`.
     Raises: MeshError, MaterialError or OptionError for what does not fit together.
     """
     if not isinstance(model, ElementModel):

@@ -18,7 +18,8 @@ from taichi_soft.core.checks import as_count
 from taichi_soft.core.errors import MeshError, OptionError
 from taichi_soft.core.serialisation import serialised
 from taichi_soft.meshing.arrays import FloatArray, as_indices, as_points, read_only
-from taichi_soft.meshing.surfaces import Surface, joined, read_surfaces
+from taichi_soft.meshing.surface import Surface, joined
+from taichi_soft.meshing.surfaces import read_surfaces
 
 Ints = NDArray[np.int64]
 

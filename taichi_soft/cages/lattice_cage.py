@@ -16,7 +16,7 @@ from taichi_soft.cages.thin import LeftOut, Thin, far_points, left_out, solid_po
 from taichi_soft.cages.voxels import fine_voxel_edge, require_solid, volume_within, voxel_edge
 from taichi_soft.core.errors import OptionError
 from taichi_soft.meshing.arrays import FloatArray
-from taichi_soft.meshing.surfaces import Surface, joined
+from taichi_soft.meshing.surface import Surface, joined
 
 Ints = NDArray[np.int64]
 

@@ -11,11 +11,11 @@ from taichi_soft.cages.lattice_cage import lattice_cage
 from taichi_soft.cages.mesher import TIME_LIMIT, mesher_mesh
 from taichi_soft.cages.refinement import REFINE
 from taichi_soft.cages.thin import MOST_REFINE
-from taichi_soft.core.checks import as_count, as_positive
+from taichi_soft.core.checks import as_count, as_positive, choose_one_of
 from taichi_soft.core.errors import OptionError
 from taichi_soft.core.types import CageMethodName
 from taichi_soft.meshing import TetMesh
-from taichi_soft.meshing.surfaces import Surface, joined
+from taichi_soft.meshing.surface import Surface, joined
 
 METHODS = get_args(CageMethodName)
 
@@ -43,7 +43,7 @@ def tetrahedra_of(
     Arguments and errors: `SoftBodyAsset.from_surface`.
     """
     if method not in METHODS:
-        raise OptionError(f"unknown method {method!r}: choose one of {', '.join(map(repr, METHODS))}")
+        raise OptionError(f"unknown method {method!r}: {choose_one_of(METHODS, method)}")
     if method == "lattice" and time_limit is not None:
         raise OptionError(f"time_limit={time_limit!r}: method 'lattice' takes none, it ends by itself")
     if method != "lattice" and refine is not None:

@@ -15,6 +15,7 @@ from taichi_soft.cli.demo import demo
 from taichi_soft.cli.doctor import doctor
 from taichi_soft.cli.drop_test import drop_test
 from taichi_soft.cli.export import export
+from taichi_soft.cli.film import film
 from taichi_soft.cli.info import info
 from taichi_soft.cli.live import live
 from taichi_soft.cli.profile import profile
@@ -28,11 +29,13 @@ app = typer.Typer(
     help="Real-time soft bodies from real material parameters.",
     no_args_is_help=True,
     add_completion=False,
+    rich_markup_mode=None,  # it would take units in brackets, such as [s], for markup
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for _command in (demo, live, info, doctor, bake, export, replay, profile, drop_test, report, warm):
-    app.command()(_command)
+for _command in (demo, film, live, info, doctor, bake, export, replay, profile, drop_test, report, warm):
+    summary = (_command.__doc__ or "").split("\n\n")[0]
+    app.command(short_help=" ".join(summary.split()))(_command)
 
 
 def run(*arguments: str) -> None:

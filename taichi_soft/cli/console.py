@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from importlib.metadata import PackageNotFoundError, version
 from typing import Annotated, Any
 
 import typer
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from taichi_soft.core.compilation import shown_by
 from taichi_soft.core.runtime import Device
 from taichi_soft.core.types import ArchName
 
@@ -31,6 +35,21 @@ def progress_bar() -> Progress:
     """How far something is, on a terminal only."""
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
     return Progress(*columns, console=errors, disable=not errors.is_terminal)
+
+
+@contextmanager
+def filming(name: str) -> Iterator[Callable[[int, int], None]]:
+    """Show how far a film is, and what compiles: a bar on a terminal, one line elsewhere.
+
+    Yields a function of (frames made, frames in all).
+    """
+    if not errors.is_terminal:
+        say(f"filming {escape(name)}")
+    label = escape(name)
+    with progress_bar() as bar:
+        task = bar.add_task(label, total=None)
+        with shown_by(lambda text: bar.update(task, description=escape(text) or label)):
+            yield lambda done, total: bar.update(task, description=label, completed=done, total=total)
 
 
 def device_facts(device: Device) -> dict[str, Any]:

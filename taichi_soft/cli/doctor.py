@@ -22,7 +22,12 @@ def doctor(
     material: Annotated[str, typer.Option(help="A preset; `taichi-soft info` lists them.")] = "gelatine",
     cells: Annotated[int | None, typer.Option(help="Of the cage, along the longest side; 10.")] = None,
     method: Annotated[str, typer.Option(help="Of meshing: lattice, ftetwild or tetgen.")] = "lattice",
-    up: Annotated[str | None, typer.Option(help="Axis that points up in the file: y or z.")] = None,
+    up: Annotated[
+        str | None,
+        typer.Option(
+            help="Axis that points up in the file, y or z. If not given, the usual one of its format."
+        ),
+    ] = None,
     fix: Annotated[
         Path | None,
         typer.Option(help="Write the surface here, without useless triangles, all facing outwards."),

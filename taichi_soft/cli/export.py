@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import runpy
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
@@ -13,7 +10,7 @@ import typer
 from rich.markup import escape
 
 from taichi_soft.cli.console import Threads, progress_bar, say
-from taichi_soft.cli.named_function import function_of
+from taichi_soft.cli.named_function import function_of, variables_of
 from taichi_soft.core.errors import OptionError
 from taichi_soft.core.runtime import init
 
@@ -60,11 +57,7 @@ def _found_in(scene: str) -> tuple[Any, dict[Any, str]]:
     from taichi_soft import World
 
     if scene.endswith(".py"):
-        sys.path[:0] = [str(Path(scene).parent.resolve()), os.getcwd()]
-        try:
-            made = runpy.run_path(scene, run_name="taichi_soft_scene")
-        except OSError as error:
-            raise OptionError(f"cannot read {scene}: {error.strerror}") from error
+        made = variables_of(scene)
         worlds = {id(each): each for each in made.values() if isinstance(each, World)}
         if len(worlds) != 1:
             raise OptionError(f"{scene} must make one World in a variable of its own, and has {len(worlds)}")

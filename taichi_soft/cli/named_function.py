@@ -1,4 +1,4 @@
-"""A function of a user's file or module, named on the command line: `game.py:make_world`."""
+"""A script of a user, or a function of it or of a module, named on the command line: `game.py:make_world`."""
 
 from __future__ import annotations
 
@@ -31,6 +31,19 @@ def function_of(text: str, what: str) -> Callable[[], Any]:
     if not callable(function):
         raise OptionError(f"{place!r} has no function {name!r}")
     return function  # type: ignore[no-any-return]
+
+
+def variables_of(script: str) -> dict[str, Any]:
+    """Run a script, with its folder and the current one on the path. Returns: its variables, by name.
+
+    Raises: OptionError for a file that cannot be read, and what the script raises.
+    """
+    try:
+        Path(script).read_bytes()
+    except OSError as error:
+        raise OptionError(f"cannot read {script}: {error.strerror}") from error
+    sys.path[:0] = [str(Path(script).parent.resolve()), os.getcwd()]
+    return runpy.run_path(script, run_name="taichi_soft_scene")
 
 
 def _names_in(place: str) -> dict[str, Any]:

@@ -192,6 +192,8 @@ class Collider(Handle):
     def set_friction(self, friction: float) -> None:
         """Change Coulomb's coefficient, from the next step on; bodies that sleep near it wake.
 
+        Args:
+            friction: Coulomb's coefficient, 0 or more.
         Raises: OptionError for a number out of range; StateError once it was removed.
         """
         colliders, coefficient = self._colliders(), as_friction(friction)
@@ -215,7 +217,12 @@ class Collider(Handle):
 
     @recorded
     def set_velocity(self, linear: ArrayLike, angular: ArrayLike = (0.0, 0.0, 0.0)) -> None:
-        """Move on like this until told otherwise: (3,) [m/s] and (3,) [rad/s] about its position."""
+        """Move on like this until told otherwise: (3,) [m/s] and (3,) [rad/s] about its position.
+
+        Args:
+            linear: velocity of its origin, (3,) [m/s].
+            angular: turn about its origin, (3,) [rad/s]; zero by default.
+        """
         colliders, row = self._colliders(), self._row
         velocity = as_vector(linear, "linear", "m/s", VELOCITY_LIMIT)
         spin = as_vector(angular, "angular", "rad/s", FASTEST_SPIN)
@@ -224,7 +231,12 @@ class Collider(Handle):
 
     @recorded
     def teleport(self, position: ArrayLike, rotation: ArrayLike | None = None) -> None:
-        """Be there at once, without pushing anything on the way; what it then covers is pressed out."""
+        """Be there at once, without pushing anything on the way; what it then covers is pressed out.
+
+        Args:
+            position: where its origin goes, (3,) [m].
+            rotation: matrix (3, 3) or quaternion (x, y, z, w); None keeps the present one.
+        """
         colliders, row = self._colliders(), self._row
         pose = self._pose(position, rotation)
         colliders.on_jump(*row.box)

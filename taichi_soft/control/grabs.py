@@ -71,7 +71,12 @@ class Grab(Handle):
 
     @recorded
     def move(self, point: ArrayLike) -> None:
-        """Pull to `point`, (3,) [m], from now on. Raises: StateError once released."""
+        """Pull to `point`, (3,) [m], from now on.
+
+        Args:
+            point: target of the grabbed point, (3,) [m].
+        Raises: StateError once released.
+        """
         target = as_vector(point, "point", "m")
         self._require_held()
         change(self.body, write_grab_target, self._number, numbers(target))

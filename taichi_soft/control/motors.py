@@ -112,6 +112,8 @@ class Motor(Handle):
     def set_speed(self, speed: float) -> None:
         """Drive towards another speed from now on [rad/s], or [m/s] where it pushes.
 
+        Args:
+            speed: about the axis [rad/s], or along it [m/s] where it pushes. Negative values reverse it.
         Raises: OptionError for a number out of range; StateError once removed.
         """
         self._set(_as_speed(speed, self._drive.turns), self.limit)
@@ -120,6 +122,8 @@ class Motor(Handle):
     def set_limit(self, limit: float) -> None:
         """Allow another torque [N m] or force [N] from now on; with 0 the particles coast.
 
+        Args:
+            limit: largest torque [N m], or force [N] where it pushes; 0 or more.
         Raises: as `set_speed`.
         """
         self._set(self.speed, _as_limit(limit, "limit"))

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -56,6 +58,14 @@ def as_count(value: Any, name: str, low: int = 1, high: int = LARGEST_COUNT) -> 
     if not is_whole or not low <= value <= high:
         raise OptionError(f"{name} must be a whole number from {low} to {high}, got {value!r}")
     return int(value)
+
+
+def choose_one_of(names: Iterable[str], given: Any) -> str:
+    """End an error about an unknown name: list the known names, and name the closest one."""
+    known = list(names)
+    close = get_close_matches(given, known, n=1) if isinstance(given, str) else []
+    guess = f". Did you mean {close[0]!r}?" if close else ""
+    return f"choose one of {', '.join(map(repr, known))}{guess}"
 
 
 def as_flag(value: Any, name: str) -> bool:

@@ -20,8 +20,8 @@ class Settings:
     gravity: NDArray[np.float64]  # (3,) [m/s^2], read-only
     floor: float | None  # height [m]
     restitution: float | None  # of the floor; None for that of the bodies
-    friction: float
-    integrator: Integrator
+    friction: float  # of the floor
+    integrator: Integrator  # of all bodies
     tolerance: float  # of implicit solves: residual over right-hand side
     most_iterations: int  # of an implicit solve
     retries: int  # how often a step that fails is made again, twice as fine each time

@@ -9,6 +9,7 @@ import re
 from enum import Enum
 from typing import Literal, TypeAlias, TypeVar
 
+from taichi_soft.core.checks import choose_one_of
 from taichi_soft.core.errors import OptionError
 
 
@@ -21,9 +22,9 @@ class Choice(str, Enum):
         try:
             return cls(value)
         except ValueError:
-            names = ", ".join(repr(member.value) for member in cls)
+            names = [member.value for member in cls]
             option = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", cls.__name__).lower()
-            raise OptionError(f"unknown {option} {value!r}: choose one of {names}") from None
+            raise OptionError(f"unknown {option} {value!r}: {choose_one_of(names, value)}") from None
 
 
 ChoiceT = TypeVar("ChoiceT", bound=Choice)

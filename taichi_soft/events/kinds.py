@@ -33,25 +33,28 @@ class Released(Event):
     It happens before a step: `step` is the coming one, and `time` is that at its beginning.
     """
 
-    body: SoftBody
+    body: SoftBody  # whose level of detail changes
     handles: tuple[Attachment | Joint | Motor, ...]  # which are dead now
 
 
 @dataclass(frozen=True, eq=False)
 class ContactBegan(Event):
-    """A body has begun to touch a collider (the floor is one) or another body."""
+    """A body has begun to touch a collider (the floor is one) or another body.
 
-    a: SoftBody
-    b: Collider | SoftBody  # of two bodies the one with the larger index
+    `a` is always a soft body. `isinstance(event.b, Collider)` tells what it touches.
+    """
+
+    a: SoftBody  # the body; of two bodies the one with the smaller index
+    b: Collider | SoftBody  # the collider, or the other body
     impulse: Floats  # (3,) that `a` gave `b` in that step [N s]; a hit may go on in the next one
 
 
 @dataclass(frozen=True, eq=False)
 class ContactEnded(Event):
-    """They have not touched for `CONTACT_PAUSE`, or one of them was removed."""
+    """A body and a collider, or two bodies, have not touched for 0.05 s, or one of them was removed."""
 
-    a: SoftBody
-    b: Collider | SoftBody
+    a: SoftBody  # as in `ContactBegan`
+    b: Collider | SoftBody  # as in `ContactBegan`
     impulse: Floats  # (3,) that `a` gave `b` from beginning to end [N s]; what sleeps gives none
     duration: float  # [s] from the start of the first step with one to the end of the last, or of sleep
 
@@ -63,7 +66,7 @@ class StressExceeded(Event):
     Of a body that `watch_stress` was not called for nothing is told.
     """
 
-    body: SoftBody
+    body: SoftBody  # that the tetrahedra belong to
     tetrahedra: Ints  # (k,) those that were not over it before, ascending
     stress: Floats  # (k,) von Mises, as `Body.tet_stress` [Pa]
 
@@ -75,7 +78,7 @@ class TearCandidates(Event):
     Of a body that `watch_tearing` was not called for nothing is told. Nothing tears by it: see `Torn`.
     """
 
-    body: SoftBody
+    body: SoftBody  # that the tetrahedra belong to
     tetrahedra: Ints  # (k,) those that were not before, ascending
     stress: Floats  # (k,) largest principal stress [Pa]
     normals: Floats  # (k, 3) its direction, which is the normal of the tear; either sign
@@ -85,21 +88,21 @@ class TearCandidates(Event):
 class FellAsleep(Event):
     """A body has come to rest, and is not moved until something wakes it."""
 
-    body: SoftBody
+    body: SoftBody  # that sleeps
 
 
 @dataclass(frozen=True, eq=False)
 class Woke(Event):
     """A sleeping body moves again."""
 
-    body: SoftBody
+    body: SoftBody  # that moves again
 
 
 @dataclass(frozen=True, eq=False)
 class Froze(Event):
     """A body went non-finite and was put back to where it was before the step."""
 
-    body: SoftBody
+    body: SoftBody  # that is frozen
 
     @property
     def failure(self) -> Failure | None:
@@ -112,9 +115,7 @@ class Torn(Event):
     """A body with `Tearing` has torn after that step; whoever calls `Body.cut` knows without being told."""
 
     body: SoftBody  # what is left of it; see `Body.topology_version`
-    pieces: tuple[
-        SoftBody, ...
-    ]  # new bodies that fell off, the largest first; none where it still holds together
+    pieces: tuple[SoftBody, ...]  # new bodies that fell off, the largest first; () if it holds together
 
 
 KINDS: tuple[type[Event], ...] = (

@@ -32,9 +32,9 @@ WORLD, KERNELS = "world.tsw", "kernels"
 class ExportReport:
     """What was written."""
 
-    path: Path
+    path: Path  # of the folder
     size: int  # of all files [bytes]
-    kernels: int
+    kernels: int  # number of them
     names: dict[str, list[str]]  # of bodies, assets, colliders, frames and meshes
 
 
@@ -49,6 +49,7 @@ def export_world(
         axes: of the engine, see `AXES`.
         names: of bodies, assets, colliders and frames, by which the game finds them; others get one with
             their number, such as body3.
+        world: built, at the state in which the game starts.
     Raises: StateError for a world that is not built; OptionError for a path that is taken or cannot be
         written, and for what the native library does not run, by name.
     """

@@ -66,7 +66,7 @@ class Behaviour:
 class Feel:
     """What `material_from_feel` found."""
 
-    material: Material
+    material: Material  # for `World.add_body`
     gravity_scale: float  # for `Body.set_gravity_scale`; 1 unless both sag and wobble_hz were wished for
     predicted: Behaviour  # by its statics, and by its slowest mode
     simulated: Behaviour  # as in a game: put down on a floor, and ringing in the air
@@ -98,6 +98,9 @@ def material_from_feel(
         law: of the body, as `SoftBodyAsset` takes it.
     Raises: OptionError for wishes that are out of range or cannot be met together, with the nearest that
         can; MeshError and MaterialError as `SoftBodyAsset`.
+    Example:
+        feel = material_from_feel(sphere(radius=0.3), sag=0.05, settle_s=0.8)
+        print(feel.material)
     """
     if not isinstance(mesh, TetMesh):
         raise OptionError(f"mesh must be a TetMesh, such as asset.mesh, got {mesh!r}")

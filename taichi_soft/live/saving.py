@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import io
+import os
 import zipfile
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -49,6 +51,9 @@ def packed(script: str, snapshot: bytes, source: SceneSource) -> bytes:
 
 FILM_FPS = 30.0
 
+LOW_PRIORITY = 10
+"""Of 0 to 19, what a film is drawn at [nice value]."""
+
 
 def film_frames(path: Path, recent: Sequence[tuple[float, int, Any]], drawn: Drawn, scene: Scene) -> None:
     """Write what `film_file` draws: pictures of one version of the meshes, and the meshes."""
@@ -75,11 +80,17 @@ def film_frames(path: Path, recent: Sequence[tuple[float, int, Any]], drawn: Dra
 
 
 def film_file(frames: str, path: str, fps: float, size: tuple[int, int] = (854, 480)) -> int:
-    """Draw a film of what `film_frames` wrote. Returns: how many pictures it has."""
+    """Draw a film of what `film_frames` wrote, at low priority: a live world is stepped meanwhile.
+
+    Lowers the priority of the whole process, which must have nothing else to do.
+    Returns: number of its frames.
+    """
     from taichi_soft import init
     from taichi_soft.render import Camera, Renderer, Surface, VideoWriter
     from taichi_soft.render.props import SLATE
 
+    with suppress(AttributeError):  # Windows has none
+        os.nice(LOW_PRIORITY)
     init("cpu")
     with np.load(frames) as held:
         data = {name: held[name] for name in held.files}

@@ -12,6 +12,7 @@ import numpy as np
 
 from engine_adapter import EngineAdapter, FixedStep
 from taichi_soft import World
+from taichi_soft.core.checks import choose_one_of
 from taichi_soft.core.errors import OptionError
 from taichi_soft.render import PALETTE, Camera
 from taichi_soft.render.colors import Color
@@ -178,5 +179,5 @@ def found_source(text: str | None) -> SceneSource:
     if path.is_file():
         return SceneSource(meshes=(str(path.resolve()),))
     raise OptionError(
-        f"{text!r} is no demo, no script and no mesh: choose one of {', '.join(demo_names())}, or name a file"
+        f"{text!r} is no demo, no script and no mesh: name a file, or {choose_one_of(demo_names(), text)}"
     )

@@ -18,23 +18,21 @@ WIDTH, HEIGHT = 480, 120  # of a plot [pixels]
 
 @dataclass(frozen=True)
 class StressRow:
-    """One body: its slot, its law, and of its tetrahedra the largest and the mean stress by volume, von Mises
-    [Pa], the largest strain, and how many are inside out.
-    """
+    """Stress of one body."""
 
-    body: int
-    law: str
-    largest: float
-    mean: float
-    strain: float
-    flipped: int
+    body: int  # its slot
+    law: str  # its force law
+    largest: float  # von Mises stress of a tetrahedron [Pa]
+    mean: float  # von Mises stress, by volume [Pa]
+    strain: float  # largest of a tetrahedron
+    flipped: int  # tetrahedra that are inside out
 
 
 @dataclass(frozen=True)
 class StressTable:
     """Made by `stress_table`. A notebook shows it as a table, with volume over stress as bars beneath it."""
 
-    rows: tuple[StressRow, ...]
+    rows: tuple[StressRow, ...]  # one for each body
     edges: NDArray[np.float64]  # of the bars [Pa], (BARS + 1,)
     volumes: NDArray[np.float64]  # of the material within each [m^3], (BARS,)
 
@@ -69,6 +67,8 @@ class StressTable:
 def stress_table(world: World) -> StressTable:
     """Stress of all bodies of tetrahedra, as they are now.
 
+    Args:
+        world: built, with at least one body of tetrahedra.
     Raises: StateError for a world that is not built, or has no such body.
     """
     if not world.is_built:

@@ -64,16 +64,28 @@ class BodyMesh(ABC):
         return np.stack([self.vertices.min(axis=0), self.vertices.max(axis=0)])
 
     def translated(self: Self, offset: ArrayLike) -> Self:
-        """A copy moved by `offset` (3,) [m]. Raises: OptionError if it is not three finite numbers."""
+        """A copy moved by `offset` (3,) [m].
+
+        Args:
+            offset: (3,) [m].
+        Raises: OptionError if it is not three finite numbers.
+        """
         return self._with_vertices(self.vertices + as_array(offset, "offset", (3,), "m"))
 
     def scaled(self: Self, factor: float) -> Self:
-        """A copy `factor` times as large about the origin. Raises: OptionError if factor is not positive."""
+        """A copy `factor` times as large about the origin.
+
+        Args:
+            factor: above 0.
+        Raises: OptionError if factor is not positive.
+        """
         return self._with_vertices(self.vertices * as_positive(factor, "factor", "(one number)"))
 
     def rotated(self: Self, rotation: ArrayLike) -> Self:
         """A copy turned about the origin by a matrix (3, 3) or a quaternion (x, y, z, w).
 
+        Args:
+            rotation: matrix (3, 3) or quaternion (x, y, z, w).
         Raises: OptionError if it is no rotation.
         """
         return self._with_vertices(self.vertices @ as_rotation(rotation).T)

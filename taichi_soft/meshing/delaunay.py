@@ -53,6 +53,8 @@ def require_delaunay(mesh: TetMesh) -> None:
 def delaunay_mesh(mesh: TetMesh) -> TetMesh:
     """The same vertices in the same body, connected so that all circumspheres are empty.
 
+    Args:
+        mesh: tetrahedra whose surface stays as it is.
     Raises: MeshError where the surface of the body cannot be kept: it then needs more vertices.
     """
     if not isinstance(mesh, TetMesh):

@@ -31,6 +31,9 @@ def box(
         cells: number of cells along x, y and z; five tetrahedra in each. The smallest dihedral angle is
             54.7 degrees with cubic cells.
     Raises: OptionError for sizes that are not positive or counts below 1.
+    Example:
+        brick = box((0.4, 0.2, 0.1), cells=(8, 4, 2))
+        print(len(brick.tets), brick.volume)
     """
     lengths = _lengths("size", size)
     counts = [as_count(value, f"cells[{axis}]") for axis, value in enumerate(_three("cells", cells))]

@@ -30,7 +30,7 @@ from taichi_soft.meshing.tetgen import read_tetgen, write_elements, write_nodes
 
 SUFFIXES = (".npz", ".node", ".ele", *FORMATS)
 SURFACES = (".stl", ".obj", ".ply", ".off", ".glb", ".gltf")
-"""Triangles only, which trimesh reads by itself."""
+"""Triangles only, which `SoftBodyAsset.from_surface` reads."""
 
 
 def load_mesh(path: str | os.PathLike[str], *, fix_orientation: bool = True) -> TetMesh:
@@ -73,8 +73,14 @@ def save_mesh(mesh: TetMesh, path: str | os.PathLike[str]) -> None:
 
     The file appears whole or not at all: one that was there before stays until the new one is complete.
     Naming either of TetGen's two files writes both.
+    Args:
+        mesh: tetrahedra.
+        path: of the file. Its suffix is one of those that `load_mesh` reads.
     Raises: MeshError for an unknown suffix, something that is not a TetMesh, a place that cannot be written
         to, or if meshio is needed and missing; OptionError for a path that names no file.
+    Example:
+        save_mesh(box(), "crate.npz")
+        crate = load_mesh("crate.npz")
     """
     if not isinstance(mesh, TetMesh):
         raise MeshError(f"save_mesh got a {type(mesh).__name__}: only a TetMesh has a file format")

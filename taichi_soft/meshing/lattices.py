@@ -18,15 +18,19 @@ KINDS = {"tensile": ((1, 0), (0, 1)), "shear": ((1, 1), (1, -1)), "bend": ((2, 0
 
 
 def rope(length: float, segments: int, mass: float) -> ParticleMesh:
-    """A chain of particles along x, from the origin.
+    """A chain of particles along x, centred at the origin. Vertex 0 is the end at the lowest x.
 
     Args:
         length: of the whole [m].
         segments: number of springs.
         mass: of the whole [kg]; the ends weigh half.
+    Example:
+        arena = World(floor=0.0)
+        line = rope(length=2.0, segments=20, mass=0.5)
+        arena.add_body(line, SpringMaterial(stiffness=2000, damping=0.2), position=(0, 0, 3), pinned=[0])
     """
     count = as_count(segments, "segments")
-    x = np.linspace(0.0, as_positive(length, "length", "m"), count + 1)
+    x = (np.arange(count + 1) - count / 2) * (as_positive(length, "length", "m") / count)
     weights = np.full(count + 1, as_positive(mass, "mass", "kg") / count)
     weights[[0, -1]] /= 2
     numbers = np.arange(count)
@@ -37,9 +41,9 @@ def rope(length: float, segments: int, mass: float) -> ParticleMesh:
 def cloth(
     size: ArrayLike, cells: tuple[int, int], mass: float, *, springs: tuple[str, ...] = tuple(KINDS)
 ) -> ParticleMesh:
-    """A rectangle of cloth in the x-y plane, one corner at the origin.
+    """A rectangle of cloth in the x-y plane, centred at the origin.
 
-    Vertex i (cells[1] + 1) + j lies at column i and row j.
+    Vertex i (cells[1] + 1) + j lies at column i and row j. Vertex 0 is the corner at the lowest x and y.
     Args:
         size: (2,) along x and y [m].
         cells: meshes along x and y.
@@ -54,7 +58,7 @@ def cloth(
     if not isinstance(springs, (tuple, list)) or not set(springs) <= set(KINDS) or not springs:
         raise OptionError(f"springs must be some of {', '.join(map(repr, KINDS))}, got {springs!r}")
     i, j = (grid.ravel() for grid in np.meshgrid(np.arange(nx + 1), np.arange(ny + 1), indexing="ij"))
-    vertices = np.stack([i * (width / nx), j * (height / ny), np.zeros(len(i))], axis=1)
+    vertices = np.stack([(i - nx / 2) * (width / nx), (j - ny / 2) * (height / ny), 0.0 * i], axis=1)
     pairs = []
     for di, dj in (step for kind in springs for step in KINDS[kind]):
         fits = (i + di <= nx) & (j + dj <= ny) & (j + dj >= 0)
@@ -78,6 +82,10 @@ def cloth_constants(mesh: ParticleMesh, cells: tuple[int, int], **values: float)
         cells: as given to it.
         values: tensile=, shear= and bend=, each of the kinds that the cloth has; 0 for none.
     Raises: OptionError for an unknown kind or one that is missing; MeshError for a mesh of other cells.
+    Example:
+        sheet = cloth((1.0, 1.0), (10, 10), mass=0.3)
+        stiffness = cloth_constants(sheet, (10, 10), tensile=200, shear=100, bend=5)  # N/m
+        threads = SpringMaterial(stiffness, damping=0.3)
     """
     unknown = set(values) - set(KINDS)
     if unknown:
@@ -125,6 +133,7 @@ def edges_as_particles(mesh: TetMesh, density: float | NDArray[np.float64]) -> P
 
     Args:
         density: [kg/m^3], one number or one per tetrahedron.
+        mesh: tetrahedra, whose vertices become the particles.
     Raises: MeshError for what is no TetMesh; OptionError for a density that is not positive or does not fit.
     """
     if not isinstance(mesh, TetMesh):

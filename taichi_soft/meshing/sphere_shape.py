@@ -31,6 +31,9 @@ def sphere(radius: float = 0.5, resolution: int = 4) -> TetMesh:
         resolution: pieces along each edge; 20 * resolution**3 tetrahedra. The smallest dihedral angle is
             44 degrees at the default resolution and falls slowly, to 39.8 at 10.
     Raises: OptionError for a radius that is not positive or a resolution below 1.
+    Example:
+        apple = sphere(radius=0.04, resolution=3)
+        print(len(apple.tets), apple.quality.summary())
     """
     radius, resolution = as_positive(radius, "radius", "m"), as_count(resolution, "resolution")
     require_tet_count(20 * resolution**3)

@@ -60,6 +60,8 @@ class VoronoiGraph:
 def voronoi_graph(mesh: TetMesh) -> VoronoiGraph:
     """The clipped Voronoi graph: made once for a mesh, in about a second for 1,000 tetrahedra.
 
+    Args:
+        mesh: Delaunay tetrahedra, as of `delaunay_mesh`.
     Raises: MeshError if the mesh is not Delaunay; OptionError without scipy.
     """
     if not isinstance(mesh, TetMesh):

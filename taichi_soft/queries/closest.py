@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 class ClosestPoint:
     """The point of all surfaces that is nearest to a given one."""
 
-    body: SoftBody
+    body: SoftBody  # that has the point
     triangle: int | None  # row of body.surface; None for a body without triangles
     vertices: NDArray[np.int32]  # (3,) of that triangle, or the nearest vertex three times
     barycentrics: Floats  # (3,) weights of these vertices; their sum is 1

@@ -22,7 +22,7 @@ from taichi_soft.queries.query import as_chosen
 class Overlap:
     """A body that touches a shape."""
 
-    body: SoftBody
+    body: SoftBody  # that touches the shape
     vertices: NDArray[np.int32]  # that lie in the shape, ascending; none where a face or the whole body does
 
 

@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 class RayHit:
     """Where a ray meets a surface first."""
 
-    body: SoftBody
+    body: SoftBody  # that is hit
     triangle: int  # row of body.surface
     vertices: NDArray[np.int32]  # (3,) of that triangle
     barycentrics: Floats  # (3,) weights of these vertices; their sum is 1

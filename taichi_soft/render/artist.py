@@ -1,4 +1,4 @@
-"""Pictures of a stage, with what the steps cost written beside it."""
+"""Frames of a stage, with its words written on them."""
 
 from __future__ import annotations
 
@@ -38,21 +38,25 @@ def speed_of(times: Sequence[float], fps: float) -> str:
 
 
 class Artist:
-    """Draws a take and writes beside it what the steps cost.
+    """Draws a take and writes the words of its stage on it.
 
     Args:
         size: width and height [pixels].
         rate: frames per second of the world.
         slow: how many times slower than the world the film is.
+        stats: write the time of the world and the speed of the last steps, too.
 
     Attributes:
         times: that drawing each frame took [s].
     """
 
-    def __init__(self, take: Take, size: tuple[int, int], rate: float, slow: float) -> None:
+    def __init__(self, take: Take, size: tuple[int, int], rate: float, slow: float, stats: bool) -> None:
         self.take = take
-        self.rate, self.slow = rate, slow
-        self.renderer = Renderer(*size, camera=take.camera(), floor=take.stage.world.settings.floor)
+        self.rate, self.slow, self.stats = rate, slow, stats
+        stage = take.stage
+        self.renderer = Renderer(
+            *size, camera=take.camera(), floor=stage.world.settings.floor, backdrop=stage.backdrop
+        )
         self.times: list[float] = []
         self._spent = 0.0
         self._surfaces: dict[tuple[int, int], list[Surface]] = {}  # by actor and version of its topology
@@ -85,8 +89,10 @@ class Artist:
         picture = mean_picture(pictures)
         stage = self.take.stage
         self._draw_labels(picture)
-        told = f"t = {self.take.adapter.time:.2f} s   {speed_of(self.take.times, self.rate)}".rstrip()
-        lines = [stage.title, told]
+        lines = [stage.title]
+        if self.stats:
+            speed = speed_of(self.take.times, self.rate)
+            lines.append(f"t = {self.take.adapter.time:.2f} s   {speed}".rstrip())
         if self.slow > 1.0:
             lines.append(f"shown {self.slow:g} x slower")
         if stage.caption:

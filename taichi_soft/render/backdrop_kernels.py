@@ -50,6 +50,10 @@ def paint_backdrop(
     has_floor: ti.i32,
     check: ti.f32,
     fade: ti.f32,
+    horizon: vec3,
+    zenith: vec3,
+    bright: vec3,
+    dark: vec3,
     encode: reals,
     out: image,
     plain: picture,
@@ -61,6 +65,7 @@ def paint_backdrop(
         target: the checks fade with the distance from it [m].
         check: edge of a check [m].
         fade: distance at which the floor has become air [m].
+        horizon, zenith, bright, dark: as `BackdropColors` has them.
         out: (height, width, 4), linear light and the share of it that is floor.
         plain: (height, width, 3), that light as sRGB.
     """
@@ -68,9 +73,7 @@ def paint_backdrop(
         ray = pixel_ray(rays, x + 0.5, y + 0.5)
         up = ray.z / ray.norm()
         # Brightest at the horizon, deeper upwards; below it, where the floor has faded, it stays bright.
-        color = lighting.HORIZON + (lighting.ZENITH - lighting.HORIZON) * smoothstep(
-            -0.05, 0.65, ti.sqrt(ti.max(up, 0.0))
-        )
+        color = horizon + (zenith - horizon) * smoothstep(-0.05, 0.65, ti.sqrt(ti.max(up, 0.0)))
         share = 0.0
         depth = (floor - eye.z) / ti.select(ti.abs(ray.z) > 1e-9, ray.z, 1e-9)
         if has_floor != 0 and depth > 0.0 and eye.z > floor:
@@ -86,7 +89,7 @@ def paint_backdrop(
             wave = check_average(at.x / check, wide_x) * check_average(at.y / check, wide_y)
             # Checks that are hardly larger than a pixel would shimmer.
             wave *= 1.0 - smoothstep(0.15, 0.7, ti.max(wide_x, wide_y))
-            tiles = lighting.FLOOR_DARK + (lighting.FLOOR_BRIGHT - lighting.FLOOR_DARK) * (0.5 + 0.5 * wave)
+            tiles = dark + (bright - dark) * (0.5 + 0.5 * wave)
             far = ti.sqrt((at.x - target.x) ** 2 + (at.y - target.y) ** 2) / fade
             tiles *= 1.0 + lighting.POOL * ti.exp(-16.0 * far * far)
             share = ti.exp(-2.5 * far * far) * smoothstep(0.0, 0.10, -steep / ray.norm())

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 from types import ModuleType
 
+from taichi_soft.core.checks import choose_one_of
 from taichi_soft.core.errors import OptionError
 from taichi_soft.core.package_data import DEMOS
 
@@ -19,7 +20,7 @@ def load_demo(name: str) -> ModuleType:
     """The demo of that name, a module with `stage()` and `proof(stage)`. Raises: OptionError."""
     names = demo_names()
     if name not in names:
-        raise OptionError(f"unknown demo {name!r}: choose one of {', '.join(names)}")
+        raise OptionError(f"unknown demo {name!r}: {choose_one_of(names, name)}")
     spec = importlib.util.spec_from_file_location(f"taichi_soft_demo_{name}", DEMOS / f"{name}.py")
     assert spec is not None
     assert spec.loader is not None

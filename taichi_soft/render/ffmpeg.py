@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import subprocess
 import sys
 import tempfile
@@ -18,7 +17,6 @@ from taichi_soft.core.errors import VideoError
 from taichi_soft.core.extras import require_extra
 
 QUIET = ("-hide_banner", "-nostdin", "-nostats", "-v", "error", "-y")
-LOWEST_PRIORITY = 19
 
 
 def find_ffmpeg() -> str:
@@ -42,7 +40,8 @@ class Ffmpeg:
     """A run of ffmpeg that takes frames.
 
     It reads them from a pipe. The pipe ends with this process, however that ends, and ffmpeg with the pipe.
-    Ctrl-C of a terminal does not reach it: whoever started it decides. It gives way to the steps of a world.
+    Ctrl-C of a terminal does not reach it: the process that started it decides. It has the priority of that
+    process.
     """
 
     def __init__(self, arguments: Sequence[str | Path]) -> None:
@@ -63,10 +62,6 @@ class Ffmpeg:
         except OSError as error:
             self._complaints.close()
             raise VideoError(f"cannot start {command[0]}: {error.strerror or error}") from error
-        with contextlib.suppress(OSError, AttributeError):  # AttributeError: on Windows
-            os.setpriority(os.PRIO_PROCESS, self._process.pid, LOWEST_PRIORITY)
-        with contextlib.suppress(OSError):  # Linux weighs sessions first, and then what is in one
-            Path(f"/proc/{self._process.pid}/autogroup").write_text(str(LOWEST_PRIORITY))
 
     def write(self, frame: NDArray[np.uint8]) -> None:
         """Give it a frame. Raises: VideoError where it has ended."""

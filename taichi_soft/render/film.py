@@ -12,17 +12,18 @@ from numpy.typing import NDArray
 
 from taichi_soft.core.checks import LARGEST_COUNT, as_count, as_number, as_positive
 from taichi_soft.core.errors import OptionError
-from taichi_soft.render import VideoWriter
-from taichi_soft.render.artist import Artist, speed_of
+from taichi_soft.render import Camera, VideoWriter
+from taichi_soft.render.artist import Artist
+from taichi_soft.render.camera_moves import Follow, Orbit
 from taichi_soft.render.film_html import film_html
 from taichi_soft.render.motion_blur import shutter_times
-from taichi_soft.render.props import Scenery
+from taichi_soft.render.props import Prop, Scenery
 from taichi_soft.render.stage import Actor, Stage
 from taichi_soft.render.take import Take
 from taichi_soft.world.warm_up import warm_up_step
 from taichi_soft.world.world import context_of_world
 
-__all__ = ["Actor", "FilmReport", "Stage", "film", "speed_of"]
+__all__ = ["Actor", "Camera", "FilmReport", "Follow", "Orbit", "Prop", "Stage", "film"]
 
 Progress = Callable[[int, int], None]
 
@@ -73,6 +74,7 @@ def film(
     seconds: float | None = None,
     slow: float = 1.0,
     blur: int = 1,
+    stats: bool = False,
     on_frame: Progress | None = None,
 ) -> FilmReport:
     """Run a stage and write what it shows.
@@ -86,6 +88,7 @@ def film(
         slow: how many times longer the film is than what it shows, 1 to 1000. The world makes the same steps;
             between two of them bodies are drawn on the straight way from one to the other.
         blur: how many pictures within the time of the shutter are averaged to one, 1 to 64; 1 is sharp.
+        stats: write the time of the world [s] and the speed of this machine on each frame, too.
         on_frame: called with (frames made, frames in all) after each.
     Raises: VideoError or OptionError, before anything moves where the arguments are wrong.
     """
@@ -111,7 +114,7 @@ def film(
     take.play(0.0)
     take.camera()
     with nullcontext() if path is None else VideoWriter(path, fps=fps, size=size) as writer:
-        artist = Artist(take, writer.size, rate, slow) if writer else None
+        artist = Artist(take, writer.size, rate, slow, stats) if writer else None
         _warm_up(stage, take, artist)
         for number in range(count):
             pictures = []

@@ -165,8 +165,8 @@ def matte_glow(color, normal, view, sun, around, key, lit, rim, openness):
 
 
 @ti.func
-def jelly_glow(color, normal, view, sun, around, lit, rim, openness):
-    """Light goes in and comes out beside where it went in."""
+def jelly_glow(color, normal, view, sun, around, lit, rim, openness, behind):
+    """Light goes in and comes out beside where it went in, and some comes straight through from behind."""
     facing = normal.dot(sun)
     # Thick parts are deeper in colour than those at the rim.
     inner = color * ((0.62 + 0.38 * color) * (1.0 - rim * rim) + 1.25 * rim * rim)
@@ -175,6 +175,8 @@ def jelly_glow(color, normal, view, sun, around, lit, rim, openness):
     # Light that went in at the lit side comes out opposite, where the body is dark otherwise.
     through = lighting.JELLY_THROUGH * ti.max(0.25 - facing, 0.0) * (0.4 + 0.6 * rim)
     total = inner * (lighting.SUN * (wrapped * kept + through) + dimmed(around, color, openness))
+    clear = lighting.JELLY_CLEAR * (1.0 - rim * rim)
+    total = (1.0 - clear) * total + clear * (0.25 + 0.75 * color) * behind
     shine = mirrored(normal, view, sun, 7) + 0.12 * mirrored(normal, view, sun, 4)
     total += lighting.SUN * (lighting.JELLY_HIGHLIGHT * shine * lit)
     mirror = lighting.JELLY_RIM * fifth_power(rim) * (0.6 + 0.4 * normal.z) * openness
@@ -196,7 +198,7 @@ def cloth_glow(look, color, normal, sun, around, key, rim, openness):
 
 
 @ti.func
-def glow(look, color, normal, view, sun, lit, above, openness):
+def glow(look, color, normal, view, sun, lit, above, openness, behind):
     """Light that a point of a body sends to the eye.
 
     Args:
@@ -206,6 +208,7 @@ def glow(look, color, normal, view, sun, lit, above, openness):
         lit: share of the key that reaches the side of it that faces the key.
         above: see `surroundings`.
         openness: share of its surroundings that it sees, 0 to 1.
+        behind: light from behind the body, where it lets some through.
     """
     around = surroundings(normal, sun, above)
     key = lighting.SUN * (lit * (0.45 + 0.55 * openness))
@@ -214,7 +217,7 @@ def glow(look, color, normal, view, sun, lit, above, openness):
     if look == MATTE:
         total = matte_glow(color, normal, view, sun, around, key, lit, rim, openness)
     elif look == JELLY:
-        total = jelly_glow(color, normal, view, sun, around, lit, rim, openness)
+        total = jelly_glow(color, normal, view, sun, around, lit, rim, openness, behind)
     else:
         total = cloth_glow(look, color, normal, sun, around, key, rim, openness)
     return total

@@ -26,6 +26,10 @@ JELLY_RIM = 0.55
 JELLY_WRAP = 0.55
 JELLY_KEPT = 0.45
 JELLY_THROUGH = 0.42
+# The share of what is seen of a jelly that is behind it, straight on; and how far its surface shifts what is
+# seen through it [heights of the picture].
+JELLY_CLEAR = 0.60
+JELLY_BEND = 0.09
 # Cloth: what its fibres throw back at grazing angles, what comes through, and how its back differs: so much
 # of its colour is that of unbleached thread.
 CLOTH_SHEEN = 0.22
@@ -33,10 +37,7 @@ CLOTH_THROUGH = 0.42
 CLOTH_PLAIN = 0.62
 THREAD = vec3(0.62, 0.58, 0.52)
 
-HORIZON = vec3(0.93, 0.94, 0.95)
-ZENITH = vec3(0.21, 0.37, 0.58)
-FLOOR_BRIGHT = vec3(0.66, 0.635, 0.595)
-FLOOR_DARK = vec3(0.52, 0.50, 0.47)
+HORIZON = vec3(0.93, 0.94, 0.95)  # what a rim mirrors
 POOL = 0.14  # the floor is brighter by this share where the camera looks
 
 # Direction to the key when seen from the camera: over its left shoulder. The fill comes from the right.

@@ -11,17 +11,19 @@ from numpy.typing import NDArray
 from taichi_soft.core.checks import as_count, as_number
 from taichi_soft.core.errors import OptionError
 from taichi_soft.core.runtime import init, is_initialized, ti
+from taichi_soft.render.backdrop import COLORS, Backdrop, BackdropName
 from taichi_soft.render.backdrop_kernels import paint_backdrop
 from taichi_soft.render.camera import Camera
 from taichi_soft.render.colors import to_linear
 from taichi_soft.render.floor_tiles import FloorTiles
+from taichi_soft.render.look import Look
 from taichi_soft.render.occlusion import REACH, Occlusion
 from taichi_soft.render.raster import NOTHING_BEHIND, ROTATED_GRID, Raster
 from taichi_soft.render.scene import SceneArrays
 from taichi_soft.render.shade_kernels import shade
 from taichi_soft.render.shadows import ShadowMaps
 from taichi_soft.render.surface import Surface
-from taichi_soft.render.tone import encode_table
+from taichi_soft.render.tone import encode_table, light_table
 
 LARGEST = 8192  # pixels along a picture; beyond it sample numbers leave 32 bits
 
@@ -38,6 +40,7 @@ class Renderer:
             shoulder at first and stays there in the world.
         floor: height of the floor [m], or None for bodies in empty air.
         check: edge of a check of the floor [m]; None takes a round number that suits the camera's distance.
+        backdrop: sky and floor, see `Backdrop`.
     Raises: OptionError for arguments out of range.
 
     Starts Taichi if nothing has started it, as a `World` does; the kernels are made for the processor. The
@@ -53,6 +56,7 @@ class Renderer:
         camera: Camera,
         floor: float | None = 0.0,
         check: float | None = None,
+        backdrop: Backdrop | BackdropName = Backdrop.DAY,
     ) -> None:
         self.width = as_count(width, "width", 16, LARGEST)
         self.height = as_count(height, "height", 16, LARGEST)
@@ -70,7 +74,8 @@ class Renderer:
         self._occlusion = Occlusion(self._raster, REACH * self._scale)
         self._backdrop = np.empty((self.height, self.width, 4), dtype=np.float32)
         self._plain = np.empty((self.height, self.width, 3), dtype=np.uint8)
-        self._encode = encode_table()
+        self._encode, self._light_of_byte = encode_table(), light_table()
+        self._backdrop_colors = COLORS[Backdrop.parse(backdrop)]
         self._decode = to_linear(np.arange(256, dtype=np.float32) / 255.0)
         self._camera: Camera | None = None
         self.camera = camera
@@ -97,6 +102,7 @@ class Renderer:
         rays = np.linalg.inv(self._to_picture[:3, :3])
         self._rays, self._lens = rays.astype(np.float32), self._to_picture[:3, :3].astype(np.float32)
         self._tiles = FloorTiles(self.width, self.height, rays, np.array(camera.eye), self.floor)
+        colors = self._backdrop_colors
         paint_backdrop(
             self._rays,
             ti.Vector(camera.eye),
@@ -105,6 +111,10 @@ class Renderer:
             int(self.floor is not None),
             self.check,
             3.0 * camera.distance,
+            ti.Vector(colors.horizon),
+            ti.Vector(colors.zenith),
+            ti.Vector(colors.bright),
+            ti.Vector(colors.dark),
             self._encode,
             self._backdrop,
             self._plain,
@@ -119,11 +129,19 @@ class Renderer:
     def render(self, surfaces: Sequence[Surface]) -> NDArray[np.uint8]:
         """The picture of these surfaces, sRGB, uint8 (height, width, 3); an array of its own every time.
 
+        Through a jelly all is seen that is behind it, other jellies excepted.
         Raises: OptionError for anything that is not a `Surface`.
         """
         scene = SceneArrays.of(surfaces)
+        self._shadows.update(scene, self.camera)
+        opaque = [surface for surface in surfaces if surface.look is not Look.JELLY]
+        if len(opaque) == len(surfaces):
+            return self._draw(scene, self._plain)
+        return self._draw(scene, self._draw(SceneArrays.of(opaque), self._plain))
+
+    def _draw(self, scene: SceneArrays, opaque: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """The picture of a scene in the shadows that were found last; `opaque` is seen through jellies."""
         camera = self.camera
-        self._shadows.update(scene, camera)
         behind = self._floor_depth()
         self._raster.draw(scene, self._to_picture, camera.near, behind, keep_empty_tiles=True)
         focal = min(self.width, self.height) / (2.0 * math.tan(math.radians(camera.fov_degrees) / 2.0))
@@ -146,6 +164,8 @@ class Renderer:
             maps.contact_matrix,
             self._backdrop,
             self._plain,
+            opaque,
+            self._light_of_byte,
             scene.positions,
             scene.normals,
             scene.colors,

@@ -3,6 +3,7 @@
 """Samples to colours, every frame: bodies in their light, and shadows on the floor behind them."""
 
 from taichi_soft.core.runtime import ti
+from taichi_soft.render import lighting
 from taichi_soft.render.backdrop_kernels import pixel_ray, smoothstep, write_pixel
 from taichi_soft.render.kernel_types import (
     TILE,
@@ -18,7 +19,7 @@ from taichi_soft.render.kernel_types import (
     vec3,
 )
 from taichi_soft.render.light_funcs import bilinear, floor_shadow, glow, light_place, sunlight
-from taichi_soft.render.look import CLOTH
+from taichi_soft.render.look import CLOTH, JELLY
 from taichi_soft.render.occlusion_kernels import openness_at
 from taichi_soft.render.texture_funcs import texture_light
 
@@ -55,6 +56,18 @@ def place_on_texture(uvs: ti.template(), triangles: ti.template(), planes: ti.te
     return weights.x * a + weights.y * b + weights.z * c
 
 
+@ti.func
+def seen_through(opaque: ti.template(), light_of_byte: ti.template(), rays: ti.template(), normal, x, y):
+    """Light of the picture behind pixel (x, y), shifted as a surface with that normal bends it."""
+    size = ti.Vector([opaque.shape[1], opaque.shape[0]])
+    right = ti.Vector([rays[k, 0] for k in ti.static(range(3))]).normalized()
+    down = ti.Vector([rays[k, 1] for k in ti.static(range(3))]).normalized()
+    shift = -lighting.JELLY_BEND * size.y * ti.Vector([normal.dot(right), normal.dot(down)])
+    u = ti.math.clamp(x + ti.i32(ti.round(shift.x)), 0, size.x - 1)
+    v = ti.math.clamp(y + ti.i32(ti.round(shift.y)), 0, size.y - 1)
+    return ti.Vector([light_of_byte[ti.i32(opaque[v, u, k])] for k in ti.static(range(3))])
+
+
 @ti.kernel
 def shade(
     rays: rows,
@@ -72,6 +85,8 @@ def shade(
     contact_place: rows,
     backdrop: image,
     plain: picture,
+    opaque: picture,
+    light_of_byte: reals,
     positions: rows,
     normals: rows,
     colors: rows,
@@ -105,6 +120,8 @@ def shade(
         decode: linear light of sRGB 0 to 255.
         tile_shadowed: 0 for tiles whose floor no shadow reaches.
         backdrop, plain: what `paint_backdrop` painted.
+        opaque: this picture without what lets light through, which is seen through that.
+        light_of_byte: as `tone.light_table` has it.
         out: (height, width, 3).
     """
     width = out.shape[1]
@@ -157,7 +174,10 @@ def shade(
                             above *= 1.0 - 0.6 * bilinear(contact, contact.shape[0], spot.x, spot.y)
                             q = planes[t, 9] * (x + 0.5) + planes[t, 10] * (y + 0.5) + planes[t, 11]
                             openness = openness_at(q_map, hidden, x, y, q)
-                            last = glow(look, c, n, view, sun, lit, above, openness)
+                            behind = ti.Vector([0.0, 0.0, 0.0])
+                            if look == JELLY:
+                                behind = seen_through(opaque, light_of_byte, rays, n, x, y)
+                            last = glow(look, c, n, view, sun, lit, above, openness, behind)
                         total += last
                 shadow = ti.Vector([0.0, 0.0, 0.0])
                 if open_samples > 0 and tile_shadowed[tile] != 0 and backdrop[y, x, 3] > 0.004:

@@ -1,4 +1,4 @@
-"""What a film shows: a world, its bodies and how they look, and who looks at them."""
+"""The content of a film: a world, its bodies and their looks, and the camera."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from engine_adapter import FixedStep
 from taichi_soft.contact.collider import Collider
+from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.render import PALETTE, Camera, ColorScale, Look
+from taichi_soft.render.backdrop import Backdrop, BackdropName
 from taichi_soft.render.camera_moves import Follow, Orbit
 from taichi_soft.render.colors import Color
 from taichi_soft.render.look import LookName
@@ -20,36 +22,87 @@ from taichi_soft.world.world import World
 
 Paint = Callable[[Body], NDArray[np.float32]]
 
+ROOM = 1.3
+"""Room round the bodies where a stage of a world begins."""
+
 
 @dataclass
 class Actor:
-    """A body and how it is drawn."""
+    """A body of a stage, and how it is drawn.
+
+        Actor(body, (0.9, 0.3, 0.2), look="jelly", label="25 kPa")
+
+    A body made by `SoftBodyAsset.from_surface` is drawn as the artist's mesh, in the colours and with the
+    texture of its file where it has any.
+    """
 
     body: Body
-    color: Color = PALETTE[0]
-    paint: Paint | None = None  # vertex colours (n, 3) after the last step, instead of `color`
-    label: str = ""  # on the floor in front of the body
-    world: World | None = None  # that it lives in, where that is not the stage's
-    shift: ArrayLike = (0.0, 0.0, 0.0)  # from where it is to where it is drawn, (3,) [m]
-    look: Look | LookName = Look.MATTE  # what it seems to be made of
+    color: Color = PALETTE[0]  # sRGB from 0 to 1; the first colour of `PALETTE` by default
+    paint: Paint | None = None  # function that returns colours (n, 3) of all vertices, instead of `color`
+    label: str = ""  # caption on the floor in front of the body, plain ASCII
+    world: World | None = None  # world of the body; None for the stage's
+    shift: ArrayLike = (0.0, 0.0, 0.0)  # by which the body is drawn away from its place, (3,) [m]
+    look: Look | LookName = Look.MATTE  # "matte", "jelly" or "cloth"
 
 
 @dataclass
 class Stage:
-    """A built world, how it is stepped and how it is seen. Its colliders are drawn without being named.
+    """A built world, how it is stepped and how it is seen: what `film` takes.
 
-    Words stand in the corners, and are short: they have to be legible in a film of 480 pixels.
+        stage = Stage.of(world, seconds=4.0)
+        stage.camera = Orbit(stage.camera, period=8.0)
+        film(stage, "balls.mp4")
+
+    Colliders are drawn without being named, and level floors as a chequered plane. All texts are plain ASCII,
+    and short enough for a film of 480 pixels.
     """
 
-    title: str
-    world: World
-    actors: list[Actor]  # `act` may add pieces that fell off
-    camera: Camera | Orbit | Follow
-    step: FixedStep
-    seconds: float  # of the world that a film of it shows
-    act: Callable[[World], object] | None = None  # before every fixed step: moves colliders, grabs, throws
-    props: list[Prop] = field(default_factory=list)
-    caption: Callable[[], str] | None = None  # a further line in the corner, after the last step
-    scale: ColorScale | None = None  # what the colours of bodies mean, shown as a bar
-    legend: list[tuple[Color, str]] = field(default_factory=list)  # colours of bodies and what these are
-    collider_colors: dict[Collider, Color] = field(default_factory=dict)  # of those that are to stand out
+    title: str  # text in the corner
+    world: World  # built
+    actors: list[Actor]  # bodies that are drawn; `act` may add some
+    camera: Camera | Orbit | Follow  # fixed, going round a place, or going with a body
+    step: FixedStep  # length of a step, its substeps, and the most steps of a frame
+    seconds: float  # time of the world that a film shows [s]
+    act: Callable[[World], object] | None = None  # called before every step: to move colliders, grab, throw
+    props: list[Prop] = field(default_factory=list)  # solid things that go with colliders or frames
+    caption: Callable[[], str] | None = None  # function that returns a further line of text for each frame
+    scale: ColorScale | None = None  # meaning of the colours of bodies, drawn as a bar
+    legend: list[tuple[Color, str]] = field(default_factory=list)  # colours and what they stand for
+    collider_colors: dict[Collider, Color] = field(default_factory=dict)  # of colliders that are to stand out
+    backdrop: Backdrop | BackdropName = Backdrop.DAY  # sky and floor
+
+    @classmethod
+    def of(
+        cls,
+        world: World,
+        *,
+        title: str = "",
+        seconds: float = 5.0,
+        step: FixedStep | None = None,
+        act: Callable[[World], object] | None = None,
+    ) -> Stage:
+        """A stage of a world as it stands: its bodies in different colours, seen whole.
+
+        Change what it returns as you like, before a film begins.
+        Args:
+            world: built. Bodies without triangles, such as ropes, are not drawn.
+            title: text in the corner; none by default.
+            seconds: time of the world that a film shows [s].
+            step: length of a step; `FixedStep()`, which has 1/60 s, by default.
+            act: called with the world before every step.
+        Raises: OptionError for what is no world or has no body to draw; StateError before `build`.
+        """
+        if not isinstance(world, World):
+            raise OptionError(f"world must be a taichi_soft.World, got {type(world).__name__}")
+        if not world.is_built:
+            raise StateError("the world is not built: call world.build() before Stage.of(world)")
+        drawn = [body for body in world.bodies if len(body.mesh.surface)]
+        if not drawn:
+            raise OptionError("no body of the world has triangles to draw: add one with a surface")
+        actors = [Actor(body, PALETTE[i % len(PALETTE)]) for i, body in enumerate(drawn)]
+        rows = np.concatenate([body.positions() for body in drawn]).astype(np.float64)
+        low, high = rows.min(axis=0), rows.max(axis=0)
+        floor = world.settings.floor
+        low[2] = low[2] if floor is None else min(low[2], floor)
+        camera = Camera.framing(low, high, aspect=16 / 9, margin=ROOM)
+        return cls(title, world, actors, camera, FixedStep() if step is None else step, seconds, act)

@@ -42,5 +42,14 @@ def _shoulder(x: NDArray[np.float64] | np.float64) -> NDArray[np.float64]:
 def encode_table() -> Floats:
     """sRGB, 0 to 255, of light from 0 to `WHITE`, `STEPS` of them: even steps of its square root, as the eye
     tells dark tones apart better than bright ones."""
+    return np.asarray(255.0 * to_srgb(tone_map(_table_light())), dtype=np.float32)
+
+
+def light_table() -> Floats:
+    """Linear light that a picture shows as sRGB 0 to 255, (256,): the inverse of `encode_table`."""
+    return np.asarray(np.interp(np.arange(256), encode_table(), _table_light()), dtype=np.float32)
+
+
+def _table_light() -> NDArray[np.float64]:
     root = np.linspace(0.0, 1.0, STEPS)
-    return np.asarray(255.0 * to_srgb(tone_map(WHITE * root * root)), dtype=np.float32)
+    return np.asarray(WHITE * root * root)

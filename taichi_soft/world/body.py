@@ -62,6 +62,10 @@ class Body(BodyControl, BodyMeasures):
             `spare_vertices`; StateError where room or slots run out, for a body that is frozen, grabbed,
             joined to another or driven by a motor, and before `build`.
             Nothing is changed then.
+        Example:
+            pieces = body.cut(plane=((0, 0, 0.25), (1, 0, 0)))
+            world.step(1 / 60)
+            print(len(pieces), "bodies fell off")
         """
         return cast("tuple[Body, ...]", cut(self, plane, triangle))
 

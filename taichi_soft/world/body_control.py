@@ -46,7 +46,11 @@ class BodyControl(SoftBody):
 
     @recorded
     def set_gravity_scale(self, scale: float) -> None:
-        """Multiply the world's gravity for this body, from now on: 0 floats, -1 rises."""
+        """Multiply the world's gravity for this body, from now on: 0 floats, -1 rises.
+
+        Args:
+            scale: factor of the world's gravity; 1 at first.
+        """
         set_gravity_scale(self, scale)
 
     @recorded
@@ -54,6 +58,8 @@ class BodyControl(SoftBody):
         """Change the friction of its `Contact`, which counts between bodies, from the next step on.
 
         What it finds on a floor or another collider is theirs: `World.set_friction`, `Collider.set_friction`.
+        Args:
+            friction: Coulomb's coefficient, 0 or more.
         Raises: OptionError for a number out of range; StateError before `build`, and in a world without
             `soft_contact`, where bodies do not touch each other.
         """
@@ -76,13 +82,19 @@ class BodyControl(SoftBody):
     def set_linear_damping(self, rate: float) -> None:
         """Let all velocities fade by exp(-rate t), from now on, against the world at rest [1/s].
 
+        Args:
+            rate: [1/s], 0 or more; 0 at first.
         Raises: OptionError for a negative rate; StateError before `build` and under schedule "flat".
         """
         set_linear_damping(self, rate)
 
     @recorded
     def set_sheltered(self, is_sheltered: bool) -> None:
-        """True keeps the wind of `World.set_wind` off this body, from now on."""
+        """True keeps the wind of `World.set_wind` off this body, from now on.
+
+        Args:
+            is_sheltered: False at first.
+        """
         set_sheltered(self, is_sheltered)
 
     @recorded
@@ -93,6 +105,8 @@ class BodyControl(SoftBody):
             impulse: total, (3,) [N s]. What falls to pinned particles goes to what holds them.
             particles: that it acts on; None means all.
         Raises: OptionError for bad numbers or vertices; StateError before `build`. So do all that follow.
+        Example:
+            body.apply_impulse((0, 0, 2.0 * body.masses.sum()))  # 2 m/s upwards
         """
         apply_impulse(self, impulse, particles)
 
@@ -136,12 +150,25 @@ class BodyControl(SoftBody):
 
     @recorded
     def pin(self, particles: ArrayLike) -> None:
-        """Hold particles where they are, from now on."""
+        """Hold particles where they are, from now on.
+
+        Args:
+            particles: vertices of this body.
+        Example:
+            left = np.flatnonzero(body.mesh.vertices[:, 0] < -0.24)
+            body.pin(left)
+            world.step(1 / 60)
+            body.unpin(left)
+        """
         pin(self, particles)
 
     @recorded
     def unpin(self, particles: ArrayLike | None = None) -> None:
-        """Let pinned particles go, all if None, with the velocity that they were moved with last."""
+        """Let pinned particles go, all if None, with the velocity that they were moved with last.
+
+        Args:
+            particles: vertices of this body; None, the default, means all.
+        """
         unpin(self, particles)
 
     @recorded
@@ -149,6 +176,9 @@ class BodyControl(SoftBody):
         """Move pinned particles by hand: in the coming step they go straight to `positions`, (n, 3) [m].
 
         After it they stand still, unless they are given new targets.
+        Args:
+            particles: pinned vertices, (n,).
+            positions: where they go, (n, 3) [m].
         Raises: OptionError for shapes that do not fit; StateError for a particle that is not pinned.
         """
         set_targets(self, particles, positions)
@@ -184,6 +214,12 @@ class BodyControl(SoftBody):
         Raises: OptionError for what is no other body, for bad vertices, and without `onto` for those that are
             too far away; StateError before `build`, in a world without contact, under implicit Euler, and
             where the world's 64 joints, or the 2,048 particles that they may hold, are all in use.
+        Example:
+            rider = world.spawn(ball, position=(0, 0, 0.8))
+            lowest = rider.positions()[:, 2].argsort()[:4]
+            joint = rider.attach_to(body, lowest)
+            world.step(1 / 60)
+            joint.release()
         """
         return self._context.of(Joints).join(self, other, particles, onto)
 
@@ -220,6 +256,8 @@ class BodyControl(SoftBody):
         Args:
             material: of the type that the body has, fit for its law and mesh.
         Raises: MaterialError for another type, or constants that do not fit; StateError before `build`.
+        Example:
+            body.set_material(Material(young=2e5, poisson=0.4, density=1000))  # four times as stiff
         """
         set_material(self, material)
 
@@ -227,6 +265,8 @@ class BodyControl(SoftBody):
     def set_damping(self, damping: float | NDArray[np.float64]) -> None:
         """Change the material's damping b [N s/m], from now on, one number or one per element.
 
+        Args:
+            damping: [N s/m], 0 or more: one number, or one for each element.
         Raises: as `set_material`.
         """
         set_damping(self, damping)

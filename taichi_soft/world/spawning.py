@@ -11,8 +11,9 @@ from taichi_soft.bodies.soft_body import lives_in, present_asset, record_of, req
 from taichi_soft.contact.clearance import free_points, require_clear
 from taichi_soft.control.frictions import give_friction
 from taichi_soft.control.materials import set_material
-from taichi_soft.core.checks import as_count
+from taichi_soft.core.checks import as_count, as_flag, as_rotation, as_vector
 from taichi_soft.core.errors import OptionError, StateError
+from taichi_soft.core.math.rotations import turned
 from taichi_soft.core.serialisation import digest_of
 from taichi_soft.fracture.cutting import refill_slot, write_surface
 from taichi_soft.fracture.tearing import Tears
@@ -42,11 +43,13 @@ def add_body(
     position: ArrayLike,
     rotation: ArrayLike | None,
     velocity: ArrayLike,
+    on_floor: bool,
 ) -> Body:
     """As `World.add_body`, of an asset made for it; copies share the first one."""
     key = _content(new)
     asset = context.slots.added.get(key, new)
-    rows = asset.placed(position, rotation, velocity, (0.0, 0.0, 0.0), context.settings.floor)
+    place = _place(context, asset, position, rotation, on_floor)
+    rows = asset.placed(place, rotation, velocity, (0.0, 0.0, 0.0), context.settings.floor)
     _add_slot(context, asset)
     context.slots.added[key] = asset
     return enter(context, asset, rows)
@@ -90,14 +93,39 @@ def spawn(
     rotation: ArrayLike | None,
     velocity: ArrayLike,
     angular_velocity: ArrayLike,
+    on_floor: bool,
 ) -> Body:
     """As `World.spawn`."""
     _require_asset(asset)
     context.slots.next_slot(asset)
-    rows = asset.placed(position, rotation, velocity, angular_velocity, context.settings.floor)
+    place = _place(context, asset, position, rotation, on_floor)
+    rows = asset.placed(place, rotation, velocity, angular_velocity, context.settings.floor)
     if context.fields is not None:
         require_clear(context.colliders.handles, asset, free_points(asset, rows), "the body")
     return enter(context, asset, rows)
+
+
+def _place(
+    context: WorldContext,
+    asset: SoftBodyAsset,
+    position: ArrayLike,
+    rotation: ArrayLike | None,
+    on_floor: bool,
+) -> ArrayLike:
+    """Position of the mesh's origin, (3,) [m]; `on_floor` counts its height from where the body stands.
+
+    Raises: OptionError for bad values, and for `on_floor` in a world without a floor.
+    """
+    if not as_flag(on_floor, "on_floor"):
+        return position
+    floor = context.settings.floor
+    if floor is None:
+        raise OptionError(
+            "on_floor is True, but the world has no floor: make it with World(floor=0.0), or omit on_floor"
+        )
+    x, y, z = as_vector(position, "position", "m")
+    points = asset.touching_points(turned(asset.mesh.vertices, as_rotation(rotation)))
+    return (x, y, z + floor - float(points[:, 2].min()))
 
 
 def despawn(context: WorldContext, body: Body) -> None:

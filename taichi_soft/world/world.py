@@ -76,6 +76,13 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
             `save_recording`.
         record_to: file that it writes when a body freezes, the first time that this happens.
     Raises: OptionError for a value out of range or a name that is not known.
+    Example:
+        arena = World(floor=0.0)
+        cube = arena.add_body(box(), jelly, position=(0, 0, 2))
+        arena.build()
+        for frame in range(60):
+            arena.step(1 / 60)
+            vertices = cube.positions()  # draw them
     """
 
     def __init__(
@@ -203,6 +210,8 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
         count with an estimate of their own after each change, which takes some 35 ms for 5,000 tetrahedra and
         several times as much with `damping`: give substeps where that is too long. 1 for implicit Euler,
         which needs none; with `soft_contact` so many that they last no longer than 1/240 s.
+        Args:
+            dt: length of the fixed step [s], above 0.
         """
         return self._context.substeps.stable_count(dt)
 
@@ -214,10 +223,16 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
         the step again with up to eight times the substeps, by `World(retries=3)`.
         Ctrl-C lets a step of less than about 0.03 s end first. It ends a longer one within a second, and the
         world is as before that step.
+        Args:
+            dt: length of the fixed step [s], above 0.
+            substeps: number of equal substeps, 1 or more; None chooses it by `stable_substeps`.
         Warns: FrozenBodyWarning; UnstableStepWarning for substeps longer than the stable step of the stiffest
             asset; SlowStepWarning as `build`, once in a world; SolverWarning, of implicit Euler.
         Raises: OptionError if dt is not a positive number or substeps not a positive whole one, and where
             there are more than `max_substeps`; StateError before `build`.
+        Example:
+            world.step(1 / 60)  # as many substeps as stability needs
+            world.step(1 / 60, substeps=10)  # the same cost in every frame
         """
         simulation = self._context.fields or self._built  # which raises
         seconds, count, h = self._context.substeps.choose(dt, substeps)

@@ -52,6 +52,7 @@ class WorldBodies(WorldParts):
         position: ArrayLike = (0.0, 0.0, 0.0),
         rotation: ArrayLike | None = None,
         velocity: ArrayLike = (0.0, 0.0, 0.0),
+        on_floor: bool = False,
         pinned: ArrayLike = (),
         contact: Contact = DEFAULT_CONTACT,
         plasticity: Plasticity | None = None,
@@ -62,11 +63,33 @@ class WorldBodies(WorldParts):
 
         Copies, of the same mesh and material with the same options, share the asset.
         Args:
-            mesh, material, law, strain, flips, damping_model, pinned, contact, plasticity, spare_vertices,
-                tearing: as `SoftBodyAsset` takes them. Or an asset in place of the mesh, which has them all.
-            position, rotation, velocity: as `spawn` takes them.
+            mesh: rest shape [m], or a `SoftBodyAsset`, which has all options of a kind of body: then give
+                `position`, `rotation`, `velocity` and `on_floor` only.
+            material: constants in SI units; a `SpringMaterial` for a rope or cloth. Required with a mesh.
+            law: how strain becomes force, a key of `LAWS`; None takes "neo_hookean", or what the material
+                and the options below ask for.
+            strain: "linear" or "exact", for laws that take it; None takes the default of the law.
+            flips: what an inverted tetrahedron does: "tolerant", "recover" or "off"; None takes the default
+                of the law.
+            damping_model: "edge" damps along edges, "tet_mean" towards the mean of each tetrahedron.
+            position: where the origin of the mesh goes, (3,) [m]. Built-in shapes have it in their centre,
+                an artist's mesh where its file has it.
+            rotation: about the origin of the mesh, matrix (3, 3) or quaternion (x, y, z, w); None for none.
+            velocity: of all vertices that are not pinned, (3,) [m/s].
+            on_floor: True stands the body on the floor: z of `position` is then the gap below its lowest
+                vertex, or below the lowest point of its hull [m].
+            pinned: numbers of the vertices that stay where they are.
+            contact: friction, thickness and groups of its surface.
+            plasticity: how it is bent for good; None for never.
+            spare_vertices: room for the vertices that `Body.cut` adds, about n^(2/3) for a cut through n
+                vertices; 0 for a body that is not cut.
+            tearing: where it tears by itself, into its spare vertices; None for nowhere.
         Returns: a handle.
         Raises: MeshError, MaterialError or OptionError for bad input; StateError after `build`.
+        Example:
+            arena = World(floor=0.0)
+            table = arena.add_body(box((2, 1, 0.2), (8, 4, 1)), jelly, on_floor=True)
+            bowling = arena.add_body(ball, position=(-2, 0, 0.4), velocity=(5, 0, 0))
         """
         require_open(self._context)
         options: dict[str, Any] = {
@@ -87,12 +110,15 @@ class WorldBodies(WorldParts):
         )
         if asset is mesh:
             _require_defaults(material, options)
-        return add_body(self._context, asset, position, rotation, velocity)
+        return add_body(self._context, asset, position, rotation, velocity, on_floor)
 
     def reserve(self, asset: SoftBodyAsset, count: int) -> None:
         """Make room for `count` more bodies of an asset, before `build`; `spawn` fills it.
 
         Empty slots take memory, and no time in a step.
+        Args:
+            asset: kind of body.
+            count: number of bodies, 1 or more.
         Raises: OptionError for what is no asset or no count;
             StateError after `build`.
         """
@@ -107,25 +133,35 @@ class WorldBodies(WorldParts):
         rotation: ArrayLike | None = None,
         velocity: ArrayLike = (0.0, 0.0, 0.0),
         angular_velocity: ArrayLike = (0.0, 0.0, 0.0),
+        on_floor: bool = False,
     ) -> Body:
         """Put a body into the lowest free slot of its asset, before `build` or between two steps.
 
         Args:
             asset: one that `reserve` made room for, or the `asset` of a body that was added.
-            position: where the mesh's origin goes, (3,) [m].
-            rotation: about the mesh's origin, matrix (3, 3) or quaternion (x, y, z, w).
+            position: where the origin of the mesh goes, (3,) [m]. Built-in shapes have it in their centre,
+                an artist's mesh where its file has it.
+            rotation: about the origin of the mesh, matrix (3, 3) or quaternion (x, y, z, w); None for none.
             velocity: of the centre of mass, (3,) [m/s].
             angular_velocity: about the centre of mass, (3,) [rad/s]. Pinned vertices rest.
+            on_floor: True stands the body on the floor: z of `position` is then the gap below its lowest
+                vertex, or below the lowest point of its hull [m].
         Returns: a new handle.
         Raises: OptionError for a value out of range, or a place out of reach, below the floor or inside a
             collider; StateError for an asset without a pool in this world, or whose pool is full.
+        Example:
+            shot = world.spawn(ball, position=(-2, 0, 1), velocity=(6, 0, 1))
+            world.step(1 / 60)
+            world.despawn(shot)
         """
-        return spawn(self._context, asset, position, rotation, velocity, angular_velocity)
+        return spawn(self._context, asset, position, rotation, velocity, angular_velocity, on_floor)
 
     @recorded
     def despawn(self, body: Body) -> None:
         """Take a body out of the world: its slot is free, and its handle dead.
 
+        Args:
+            body: of this world.
         Raises: OptionError for what is no body of this world; StateError for one that was removed before.
         """
         despawn(self._context, body)
@@ -164,6 +200,8 @@ class WorldBodies(WorldParts):
     def stable_step(self, body: Body) -> StableStep:
         """Estimate of the largest stable substep of a body; bodies of one asset share it until they are cut.
 
+        Args:
+            body: made by a world.
         Raises: OptionError for what is no body.
         """
         if not isinstance(body, Body):
@@ -175,6 +213,10 @@ class WorldBodies(WorldParts):
 
         The first read after a step copies all bodies at once; further bodies at the same alpha come from
         that copy, because calling a kernel costs more than copying a thousand vertices.
+        Args:
+            body: of this world.
+            alpha: from 0 to 1.
+            out: C-contiguous float32 array (n, 3) to fill and return; None makes a new one.
         Raises: OptionError for a body of another world, an alpha out of range or an `out` that does not
             fit; StateError before `build`.
         """
@@ -200,6 +242,7 @@ class WorldBodies(WorldParts):
             mesh: of a body of this world, see `Body.render_mesh`; a body stands for the first of its
                 `render_meshes`.
             positions, normals: C-contiguous float32 arrays (k, 3) to fill; None makes a new one.
+            alpha: from 0 to 1.
         Returns: both: positions of the render vertices [m], and their normals of unit length, outward.
         Raises: OptionError for a body of another world, an alpha out of range or a buffer that does not
             fit; StateError for a body that was removed, or cut since the mesh was made, and before `build`.

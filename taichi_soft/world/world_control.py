@@ -97,6 +97,11 @@ class WorldControl(WorldParts):
                 group.
         Returns: a handle, to move it and to read the impulse on it.
         Raises: OptionError for bad values; StateError where there is no room left.
+        Example:
+            lift = world.add_collider(BoxShape((1, 1, 0.1)), position=(3, 0, 0.2))
+            lift.move_to((3, 0, 0.25))  # where it is after the next step
+            world.step(1 / 60)
+            print(lift.impulse)  # from the bodies on it [N s]
         """
         if self._context.fields is not None and self._context.fields.colliders is None:
             raise StateError(
@@ -124,6 +129,12 @@ class WorldControl(WorldParts):
             position: of its origin, (3,) [m].
             rotation: matrix (3, 3) or quaternion (x, y, z, w).
         Raises: OptionError for bad numbers.
+        Example:
+            hand = world.add_frame(position=(0, 0, 0.5))
+            hold = body.attach(np.flatnonzero(body.positions()[:, 2] > 0.45), hand, two_way=True)
+            hand.move_to((0, 0, 0.52))  # where it is after the next step
+            world.step(1 / 60)
+            print(hold.force)  # on the hand [N]
         """
         frame = Frame(self._context.of(Frames), position, rotation)
         self._handles.enlist(frame)
@@ -150,6 +161,12 @@ class WorldControl(WorldParts):
         Returns: a handle to move and release it with, or None where the ray hits nothing.
         Raises: OptionError for numbers out of range or a body of another world; StateError before `build`,
             under schedule "flat", or where all grabs are in use.
+        Example:
+            hand = world.grab(origin=(0, 0, 5), direction=(0, 0, -1))  # from the camera through the mouse
+            if hand is not None:
+                hand.move((0, 0, 1))
+                world.step(1 / 60)
+                hand.release()
         """
         as_pull(frequency, max_force)  # also where the ray hits nothing
         state, slots = self._built.state, self._context.slots.slots

@@ -37,6 +37,11 @@ class WorldEvents(WorldParts):
             function: takes the event.
         Returns: what `remove` ends it with.
         Raises: as `record_events`; OptionError for what cannot be called.
+        Example:
+            listener = world.on(ContactBegan, lambda event: print(event.a, "touches", event.b))
+            world.step(1 / 60)
+            world.drain_events()  # calls the listeners
+            listener.remove()
         """
         return self._built.events.on(kind, function)
 

@@ -48,6 +48,10 @@ class WorldQueries(WorldParts):
         Returns: the hit, or None.
         Raises: OptionError for numbers that are not finite, a direction or max_distance of zero, a negative
             max_distance or a body of another world; StateError before `build`.
+        Example:
+            hit = world.raycast(origin=(0, 0, 5), direction=(0, 0, -1), max_distance=10)
+            if hit is not None:
+                print(hit.body, hit.distance, hit.normal)
         """
         state, slots = self._built.state, self._context.slots.slots
         return cast_ray(state, slots, origin, direction, max_distance, bodies, cull_back)

@@ -20,6 +20,10 @@ class WorldStates(WorldParts):
         events recorded it has what goes on, such as contacts. It holds numbers only, no code. The first call
         compiles, some seconds at most.
         Raises: StateError before `build`.
+        Example:
+            before = world.snapshot()  # bytes: keep them in a file, or send them
+            world.step(1 / 60)
+            world.restore(before)
         """
         data = take_snapshot(self._context)
         if self._recorder is not None:
@@ -34,6 +38,8 @@ class WorldStates(WorldParts):
         new ones. A force field stays as it is. Those who listen to events go on to; watched stress is as it
         was, and what else is watched now stays so. Events of undone steps that wait are dropped: when the
         steps are made again, they come again, and so do those that were drained before.
+        Args:
+            data: made by `snapshot`, of this world or one that was built of the same things.
         Raises: SnapshotError for what is damaged, or of a world that was built of other things, with the
             first that differs; OptionError for what is not bytes; StateError before `build`.
         """
@@ -63,6 +69,8 @@ class WorldStates(WorldParts):
         not kept here, the recording begins again there.
         `taichi-soft replay FILE` makes it again anywhere, bit by bit on a machine like this one. The file
         holds the assets and shapes as well, and the accelerations that a force field gave, but no code.
+        Args:
+            path: of the file to write.
         Returns: the path.
         Raises: StateError without `record` or before `build`; SnapshotError where the file cannot be written.
         """

@@ -57,7 +57,7 @@ def test_a_cloth_without_bending_springs_hangs_by_its_threads_and_meshes_alone(i
     world = World(floor=None, integrator=integrator)
     down = [[0, 0, 1], [0, 1, 0], [-1, 0, 0]]
     body = world.add_body(
-        mesh, SpringMaterial(stiffness, 0.5), pinned=[0, 6], position=(0, 0, 2), rotation=down
+        mesh, SpringMaterial(stiffness, 0.5), pinned=[0, 6], position=(0, 0, 1.5), rotation=down
     )
     world.build()
     threads = cloth((1.0, 1.0), cells, 0.3, springs=("tensile", "shear"))
@@ -90,7 +90,7 @@ def test_ropes_and_solids_of_every_kind_of_law_share_a_world(schedule):
     ball, material = sphere(0.4, 1), Material(2e5, 0.2, 1000.0, 10.0)
     every = [((ball, material), {"law": law, "position": (2.0 * i, 0, 0.7)}) for i, law in enumerate(KINDS)]
     chain = rope(1.0, 5, 0.2), SpringMaterial(50.0, 0.1)
-    every.append((chain, {"law": "springs", "pinned": [0], "position": (0, 3, 2)}))
+    every.append((chain, {"law": "springs", "pinned": [0], "position": (0.5, 3, 2)}))
 
     def moved(*bodies):
         world = World(schedule=schedule)

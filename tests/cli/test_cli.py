@@ -7,8 +7,11 @@ from importlib.metadata import version
 
 import cv2
 import pytest
+from typer.main import get_command
+from typer.testing import CliRunner
 
 from taichi_soft import LAWS
+from taichi_soft.cli.app import app
 from taichi_soft.lab.profiling import LawCost, Spread, find_compiler
 from taichi_soft.lab.profiling.law_costs import kinds_of
 from taichi_soft.lab.profiling.report import law_table
@@ -32,6 +35,42 @@ def test_every_command_explains_itself(command):
     assert done.returncode == 0
     assert "Usage" in done.stdout
     assert done.stderr == ""
+
+
+COMMANDS = list(get_command(app).commands.items())
+
+
+@pytest.mark.parametrize(("name", "command"), COMMANDS, ids=[name for name, _ in COMMANDS])
+def test_help_shows_every_description_whole_and_no_type_of_a_switch(name, command):
+    """A unit in brackets is no markup, and what takes no value asks for none."""
+    shown = " ".join(CliRunner().invoke(app, [name, "--help"]).output.split())
+    for parameter in command.params:
+        assert parameter.help
+        assert " ".join(parameter.help.split()) in shown
+    assert "bool" not in shown
+    summary = command.help.split("\n\n")[0]
+    overview = " ".join(CliRunner().invoke(app, ["--help"]).output.split())
+    assert f"{name} {' '.join(summary.split())}" in overview
+
+
+@pytest.mark.parametrize(
+    ("arguments", "meant"),
+    [
+        (("dmeo",), "demo"),
+        (("demo", "jely"), "jelly"),
+        (("live", "jely"), "jelly"),
+        (("demo", "bounce", "--secnds", "2"), "--seconds"),
+        (("info", "--law", "viral"), "virial"),
+        (("doctor", "duck.glb", "--material", "gelatin"), "gelatine"),
+        (("report", "fig-6.44"), "fig-6.4"),
+    ],
+)
+def test_a_misspelt_name_is_answered_with_the_one_that_was_meant(arguments, meant, tmp_path):
+    done = run(*arguments, cwd=tmp_path)
+    assert done.returncode in (1, 2)
+    last = done.stderr.strip().splitlines()[-1]
+    assert "Did you mean" in last or "Possible options" in last
+    assert meant in last.rpartition("(" if "(" in last else "Did you mean")[2]
 
 
 def test_an_unknown_device_is_refused_with_those_there_are():

@@ -55,7 +55,7 @@ def hanging_stage():
     material = SpringMaterial(
         cloth_constants(mesh, (6, 6), tensile=400.0, shear=150.0, bend=3.0), damping=0.05
     )
-    world.add_body(mesh, material, law="springs", pinned=[0, 6], position=(0.0, -0.5, 2.0))
+    world.add_body(mesh, material, law="springs", pinned=[0, 6], position=(0.5, 0.0, 2.0))
     world.build()
     camera = Camera.framing((-0.5, -0.6, 0.8), (1.1, 0.6, 2.2), aspect=16 / 9)
     return Stage("a cloth", world, [Actor(world.bodies[0], BLUE)], camera, FixedStep(1 / 60, 1), 0.5)

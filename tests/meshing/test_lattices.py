@@ -51,8 +51,15 @@ def test_a_cloth_weighs_by_the_area_round_each_particle():
 
 def test_the_particles_of_a_cloth_stand_in_columns_and_rows_as_far_apart_as_its_sides_say():
     mesh = cloth((3.0, 1.0), (2, 5), 6.0)
-    expected = [(1.5 * i, 0.2 * j, 0.0) for i in range(3) for j in range(6)]
+    expected = [(1.5 * i - 1.5, 0.2 * j - 0.5, 0.0) for i in range(3) for j in range(6)]
     np.testing.assert_allclose(mesh.vertices, expected, atol=1e-15)
+
+
+@pytest.mark.parametrize("number", [1, 2, 5])
+def test_ropes_and_cloths_are_centred_at_the_origin_as_solids_are(number):
+    for mesh in (rope(0.7, number, 1.0), cloth((0.7, 3.1), (number, 3), 1.0)):
+        np.testing.assert_allclose(mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0), 0.0, atol=1e-15)
+        np.testing.assert_array_equal(mesh.vertices[0], mesh.vertices.min(axis=0))
 
 
 def test_a_cloth_can_be_seen_from_both_sides():

@@ -1,13 +1,16 @@
 """Surfaces read as their artist made them: order, axes, parts, texture; and what is no surface."""
 
 import logging
+import subprocess
+import sys
+import textwrap
 
 import numpy as np
 import pytest
 import trimesh
 
 from taichi_soft import MeshError, OptionError
-from taichi_soft.meshing.surfaces import read_surfaces
+from taichi_soft.meshing.surfaces import assumed_up, read_surfaces
 
 
 def textured():
@@ -102,6 +105,138 @@ def test_normals_are_those_of_the_file_where_it_has_any(tmp_path, turn):
     np.testing.assert_allclose(found.vertices, ball.vertices @ node[:3, :3].T, atol=1e-5)
 
 
+def test_normals_that_point_away_from_all_their_triangles_are_computed_anew(tmp_path):
+    """Those of a third of a ball's vertices, which the file has the wrong way round; others stay, though they
+    lean by 60 degrees."""
+    ball = trimesh.creation.icosphere(subdivisions=3)
+    given = ball.vertices.copy()
+    is_turned = np.arange(len(given)) % 3 == 0
+    given[is_turned] *= -1.0
+    aside = np.cross(ball.vertices, [0.3, 0.5, 0.8])
+    aside /= np.linalg.norm(aside, axis=1, keepdims=True)
+    leaning = 0.5 * ball.vertices + np.sqrt(0.75) * aside
+    given[~is_turned] = leaning[~is_turned]
+    lines = [f"v {x:.9f} {y:.9f} {z:.9f}" for x, y, z in ball.vertices]
+    lines += [f"vn {x:.9f} {y:.9f} {z:.9f}" for x, y, z in given]
+    lines += ["f " + " ".join(f"{i + 1}//{i + 1}" for i in face) for face in ball.faces]
+    (tmp_path / "ball.obj").write_text("\n".join(lines))
+    (found,) = read_surfaces(tmp_path / "ball.obj", up="z")
+    np.testing.assert_allclose(found.normals[is_turned], ball.vertices[is_turned], atol=0.02)
+    np.testing.assert_allclose(found.normals[~is_turned], leaning[~is_turned], atol=1e-8)
+    assert [note for note in found.notes if f"{is_turned.sum()} of its {len(given)} normals" in note]
+    inside_out = trimesh.Trimesh(
+        ball.vertices, ball.faces[:, ::-1], vertex_normals=ball.vertices, process=False
+    )
+    (found,) = read_surfaces(inside_out)
+    np.testing.assert_allclose(found.normals, ball.vertices, atol=1e-12)
+    assert "triangles face inwards" in found.notes[0]
+
+
+@pytest.mark.parametrize("suffix", ["obj", "ply", "stl", "off"])
+def test_the_axis_that_points_up_is_the_formats_unless_said(tmp_path, suffix):
+    path = tmp_path / f"crate.{suffix}"
+    trimesh.creation.box((1.0, 2.0, 3.0)).export(path)
+    heights = {up: np.ptp(read_surfaces(path, up)[0].vertices[:, 2]) for up in ("y", "z", None)}
+    assumed = "y" if suffix == "obj" else "z"
+    assert heights == {"y": pytest.approx(2.0), "z": pytest.approx(3.0), None: heights[assumed]}
+    assert assumed_up(path).startswith(f"{assumed} is taken as up")
+    assert f"up={'z' if assumed == 'y' else 'y'!r}" in assumed_up(path)
+
+
+def test_no_axis_is_assumed_of_what_says_its_own():
+    assert assumed_up("duck.glb") == assumed_up(trimesh.creation.box()) == assumed_up("x.npz") == ""
+
+
+FAR = np.array([500_000.0, 4_649_776.0, 312.0])
+"""As of UTM coordinates [m], where float32 is 0.5 m apart."""
+
+
+def test_what_lies_far_away_is_moved_to_the_origin_before_anything_is_rounded(tmp_path):
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.5)
+    near = [f"v {x:.9f} {y:.9f} {z:.9f}" for x, y, z in ball.vertices + FAR]
+    faces = ["f " + " ".join(str(i + 1) for i in face) for face in ball.faces]
+    (tmp_path / "far.obj").write_text("\n".join(near + faces))
+    (found,) = read_surfaces(tmp_path / "far.obj", up="z", center=True, scale=2.0)
+    np.testing.assert_allclose(found.vertices, 2.0 * ball.vertices, atol=1e-8)
+    assert "(1000000, 9299552, 624) m" in found.notes[0]
+    (left,) = read_surfaces(tmp_path / "far.obj", up="z")
+    assert "0.5 m apart: center=True" in left.notes[0]
+    assert read_surfaces((left,)) == (left,)
+    parts = read_surfaces((ball, ball.copy().apply_translation((3.0, 0.0, 0.0))), center=True)
+    assert [each.vertices.mean(axis=0).round(9).tolist() for each in parts] == [[-1.5, 0, 0], [1.5, 0, 0]]
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({"scale": 0.0}, "scale"),
+        ({"scale": "mm"}, "scale"),
+        ({"scale": np.nan}, "scale"),
+        ({"center": 1}, "center"),
+    ],
+)
+def test_a_place_or_a_size_that_is_none_is_refused(options, text):
+    with pytest.raises(OptionError, match=text):
+        read_surfaces(trimesh.creation.box(), **options)
+
+
+def test_every_format_is_read_with_the_packages_of_the_core_alone(tmp_path):
+    """A texture that takes pillow is left out, with a note on the extra."""
+    for suffix in ("obj", "ply", "stl", "off", "glb"):
+        trimesh.creation.box().export(tmp_path / f"plain.{suffix}")
+    cut = (tmp_path / "plain.obj").read_text().splitlines()
+    cut = ["mtllib x.mtl", "vt 0 0", "usemtl a", *(line.replace("f ", "f 1/1 ", 1) for line in cut)]
+    (tmp_path / "textured.obj").write_text("\n".join(cut))
+    (tmp_path / "x.mtl").write_text("newmtl a\nmap_Kd x.png\n")
+    (tmp_path / "x.png").write_bytes(b"a picture")
+    (tmp_path / "odd.stl").write_bytes(
+        b"solid caf\xe9\nfacet outer loop vertex 0 0 0 vertex 1 0 0 vertex 0 1 0 endloop endfacet\n"
+    )
+    script = """
+        import re, sys
+        from importlib.metadata import packages_distributions, requires
+        from pathlib import Path
+
+        core, found = set(), ["taichi-soft", "taichi", "numpy", "trimesh"]
+        while found:  # and what these need, without extras
+            name = re.sub("[-_.]+", "-", found.pop()).lower()
+            if name not in core:
+                core.add(name)
+                needed = requires(name) or [] if name != "taichi-soft" else []
+                found += [re.match("[A-Za-z0-9._-]+", each)[0] for each in needed if ";" not in each]
+        others = {
+            module
+            for module, owners in packages_distributions().items()
+            if not {re.sub("[-_.]+", "-", owner).lower() for owner in owners} & core
+        }
+
+        class Missing:
+            def find_spec(self, name, path=None, target=None):
+                if name.partition(".")[0] in others:
+                    raise ModuleNotFoundError(f"No module named {name!r}")
+
+        sys.meta_path.insert(0, Missing())
+        from taichi_soft.meshing.surfaces import read_surfaces
+        for path in sorted(Path(sys.argv[1]).glob("*.*")):
+            if path.suffix not in (".mtl", ".png"):
+                for surface in read_surfaces(path):
+                    print(path.name, len(surface.triangles), *surface.notes)
+    """
+    done = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(script), str(tmp_path)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    assert [line.split()[0] for line in done.stdout.splitlines()] == sorted(
+        path.name for path in tmp_path.glob("*.*") if path.suffix not in (".mtl", ".png")
+    )
+    assert "texture x.png is not read: it takes pillow" in done.stdout
+    assert "taichi-soft[film]" in done.stdout
+
+
 @pytest.mark.parametrize(
     ("name", "content", "text"),
     [
@@ -110,6 +245,8 @@ def test_normals_are_those_of_the_file_where_it_has_any(tmp_path, turn):
         ("words.obj", b"these are words", "no triangles|cannot be read"),
         ("empty.stl", b"", "cannot be read|no triangles"),
         ("duck.fbx", b"", "unknown surface format"),
+        ("pointer.obj", b"version https://git-lfs.github.com/spec/v1\noid sha256:0", "git lfs pull"),
+        ("page.stl", b"<!DOCTYPE html><html></html>", "web page"),
     ],
 )
 def test_a_file_that_is_no_surface_is_refused_by_its_name(tmp_path, name, content, text):

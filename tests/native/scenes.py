@@ -191,7 +191,7 @@ def drape():
     world = World(integrator="implicit_euler", collider_room=1)
     mesh = cloth((1.2, 1.2), (8, 8), 0.3)
     constants = cloth_constants(mesh, (8, 8), tensile=400.0, shear=100.0, bend=1.0)
-    world.add_body(mesh, SpringMaterial(constants, damping=0.05), position=(-0.6, -0.6, 1.0))
+    world.add_body(mesh, SpringMaterial(constants, damping=0.05), position=(0.0, 0.0, 1.0))
     world.add_collider(SphereShape(0.3), position=(0.0, 0.0, 0.5))
     world.build()
     return world

@@ -26,8 +26,8 @@ def crowd(jelly):
         (ball, wavy),
         (block, block.vertices * [-1, 1, 1] + [1.5, 0, 0]),
         (block, 0.5 * block.vertices[:, :1] * [1, 1, 0] + [0, 1.5, 0]),
-        (sheet, np.add(sheet.vertices, [-2.5, -0.5, 0])),
-        (line, np.add(line.vertices, [0, 0, 2])),
+        (sheet, np.add(sheet.vertices, [-2, 0, 0])),
+        (line, np.add(line.vertices, [0.75, 0, 2])),
         (ball, wavy + FAR),
         (block, np.add(block.vertices, [0, -2, 0])),
     )

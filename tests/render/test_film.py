@@ -7,10 +7,21 @@ import trimesh
 from PIL import Image
 
 from engine_adapter import FixedStep
-from taichi_soft import BoxShape, Material, OptionError, SoftBodyAsset, VideoError, World, box
+from taichi_soft import (
+    BoxShape,
+    Material,
+    OptionError,
+    SoftBodyAsset,
+    SpringMaterial,
+    StateError,
+    VideoError,
+    World,
+    box,
+    rope,
+)
 from taichi_soft.render import Camera, ColorScale, Renderer, VideoWriter
-from taichi_soft.render.camera_moves import Follow
-from taichi_soft.render.film import Actor, Stage, film, speed_of
+from taichi_soft.render.artist import speed_of
+from taichi_soft.render.film import Actor, Follow, Stage, film
 from taichi_soft.render.props import SLATE, Scenery
 
 
@@ -71,7 +82,7 @@ def test_the_time_in_the_picture_is_that_of_the_body_in_it(tmp_path, monkeypatch
         return original(self, surfaces)
 
     monkeypatch.setattr(Renderer, "render", watched)
-    film(falling_box(), tmp_path / "b.png", seconds=0.5, size=(160, 120))
+    film(falling_box(), tmp_path / "b.png", seconds=0.5, size=(160, 120), stats=True)
     times = np.array([float(line.split()[2]) for line in told])
     assert times[-1] == pytest.approx(0.46)  # of 0.48 put in: one step behind, to interpolate
     np.testing.assert_allclose(drawn, 3.5 - 0.5 * 9.81 * times**2, atol=1e-5)
@@ -173,7 +184,7 @@ def test_what_is_slowed_says_so(monkeypatch, tmp_path):
     told = []
     monkeypatch.setattr("taichi_soft.render.artist.draw_text", lambda picture, lines: told.append(lines))
     film(falling_box(), tmp_path / "s.png", seconds=0.04, size=(160, 120), slow=2.5)
-    assert told[-1][2] == "shown 2.5 x slower"
+    assert told[-1] == ["box", "shown 2.5 x slower"]
 
 
 def test_a_blurred_film_shows_the_time_of_the_shutter_and_the_world_makes_the_same_steps(
@@ -304,3 +315,43 @@ def test_colliders_have_another_colour_than_the_floor():
     picture = Renderer(160, 120, camera=Camera.framing((-1, -1, 0), (1, 1, 1))).render([])
     floor = picture[-10:].reshape(-1, 3) / 255.0
     assert np.abs(floor - np.array(SLATE)).max(axis=1).min() > 0.15
+
+
+def test_a_stage_of_a_world_shows_every_body_with_triangles_and_goes_on_from_where_it_stands(tmp_path):
+    world = World(floor=-0.5)
+    places = [(-3.0, 0.0, 1.0), (0.0, 2.0, 0.1), (1.0, -1.0, 2.5)]
+    for place in places:
+        world.add_body(box((1, 1, 1), (2, 2, 2)), Material(1e5, 0.2, 1000, 10), position=place)
+    world.add_body(rope(1.0, 4, 0.2), SpringMaterial(1000.0, 1.0), position=(90, 0, 5))
+    world.build()
+    calls = []
+    stage = Stage.of(world, title="mine", seconds=0.1, step=FixedStep(dt=1 / 50), act=calls.append)
+    assert [actor.body for actor in stage.actors] == list(world.bodies[:3])
+    assert len({actor.color for actor in stage.actors}) == 3
+    seen = np.concatenate([*(actor.body.positions() for actor in stage.actors), [[-3.0, 0.0, -0.5]]])
+    pixels = stage.camera.project(seen, 1280, 720)[:, :2]
+    assert ((pixels > 0) & (pixels < (1280, 720))).all()
+    report = film(stage, tmp_path / "w.png", size=(160, 120))
+    assert report.frames == 5
+    assert calls == 4 * [world]
+    assert world.bodies[2].center_of_mass()[2] < 2.5
+
+
+def built_rope():
+    world = World()
+    world.add_body(rope(1.0, 4, 0.2), SpringMaterial(1000.0, 1.0), position=(0, 0, 5))
+    world.build()
+    return world
+
+
+@pytest.mark.parametrize(
+    ("world", "error", "said"),
+    [
+        (lambda: "world", OptionError, "must be a taichi_soft.World, got str"),
+        (World, StateError, r"call world\.build\(\) before Stage\.of"),
+        (built_rope, OptionError, "no body of the world has triangles"),
+    ],
+)
+def test_a_stage_is_made_of_a_built_world_with_something_to_see(world, error, said):
+    with pytest.raises(error, match=said):
+        Stage.of(world())

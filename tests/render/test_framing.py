@@ -68,3 +68,26 @@ def test_a_camera_that_moves_by_itself_is_not_framed():
     view = Camera((0.0, -6.0, 5.0), (0.0, 0.0, 4.0))
     with pytest.raises(OptionError, match="Orbit"):
         framed(lambda: thrown(Orbit(view)))
+
+
+@pytest.mark.parametrize("period", [2.0, -0.7])
+def test_a_camera_that_goes_round_sees_bodies_from_all_sides_and_is_as_near_as_it_can_be(period):
+    stage = framed(thrown, aspect=16 / 9, orbit=period)
+    game = EngineAdapter(stage.world, stage.step)
+    reach = []
+    for _ in range(49):  # a film shows the states between the last step and the one before
+        rows = stage.actors[0].body.positions()
+        for turn in np.linspace(0.0, 1.0, 24, endpoint=False):
+            camera = stage.camera.at(turn * period, None)
+            pixels = camera.project(rows, 1280, 720)
+            reach.append(np.abs(pixels[:, :2] / (640, 360) - 1.0).max())
+        game.step()
+    assert stage.camera.period == period
+    assert 0.75 < max(reach) < 1.0
+
+
+def test_a_camera_that_would_never_come_round_is_refused_before_anything_moves():
+    made = []
+    with pytest.raises(OptionError, match="period"):
+        framed(lambda: made.append(thrown()) or made[-1], orbit=0.0)
+    assert made == []

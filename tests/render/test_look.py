@@ -16,7 +16,7 @@ SHEET = cloth((1.4, 1.4), (6, 6), 1.0)
 HALF = len(SHEET.surface) // 2
 FRONT = SHEET.surface[:HALF]
 # In the x-z plane, its front to the camera.
-UPRIGHT = (SHEET.vertices - (0.7, 0.7, 0.0)) @ np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]])
+UPRIGHT = SHEET.vertices @ np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]])
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -1,6 +1,7 @@
 """Whole pictures: light, shadows, smooth outlines, the same bits every time, refusals."""
 
 import hashlib
+import itertools
 import subprocess
 import sys
 import textwrap
@@ -12,6 +13,7 @@ from taichi_soft import init
 from taichi_soft.core.errors import OptionError
 from taichi_soft.meshing import box, sphere
 from taichi_soft.render import Camera, Renderer, Surface
+from taichi_soft.render.backdrop import Backdrop
 from taichi_soft.render.colors import to_linear
 
 SIZE = (320, 180)
@@ -243,6 +245,40 @@ def test_camera_may_move(renderer, empty):
     renderer.camera = CAMERA
     assert (moved != fresh).any()
     np.testing.assert_array_equal(renderer.render([]), empty)
+
+
+def test_what_stands_behind_a_jelly_shines_through_it_in_its_colour_and_behind_rubber_does_not(renderer):
+    """Light of a red ball reaches the eye through the middle of a slab, and only what the slab lets pass."""
+    slab = box((1.6, 0.2, 1.2), (2, 1, 2))
+    slab = slab.translated(-np.mean(slab.bounds, axis=0))
+    eye, target = np.array(CAMERA.eye), np.array(CAMERA.target)
+    view = (eye - target) / np.linalg.norm(eye - target)
+    across = np.cross((0.0, 0.0, 1.0), view)
+    axes = np.stack([across / np.linalg.norm(across), -view, np.cross(-view, -across)], axis=1)
+    axes /= np.linalg.norm(axes, axis=0)
+    place = slab.vertices @ axes.T + target + 0.9 * view
+    behind = ball(*target, color=(1.0, 0.1, 0.1))
+    row, column = pixel(target)
+    change = {}
+    for look, color in (("jelly", (0.9, 0.9, 0.9)), ("jelly", (0.05, 0.9, 0.9)), ("matte", (0.9, 0.9, 0.9))):
+        front = Surface(place, slab.surface, color=color, look=look)
+        with_ball, without = (
+            to_linear(renderer.render(surfaces)[row, column].astype(np.float32) / 255.0)
+            for surfaces in ([front, behind], [front])
+        )
+        change[look, color[0]] = with_ball - without
+    assert change["jelly", 0.9][0] > change["jelly", 0.9][1] + 0.05  # redder
+    assert change["jelly", 0.9][1] < -0.05  # a ball that is not green is in front of a floor that is
+    assert abs(change["jelly", 0.05][0]) < 0.5 * abs(change["jelly", 0.9][0] - change["jelly", 0.9][1])
+    assert np.abs(change["matte", 0.9]).max() < 0.01
+
+
+def test_every_backdrop_looks_different():
+    pictures = [Renderer(*SIZE, camera=CAMERA, backdrop=each).render([]) for each in Backdrop]
+    for one, other in itertools.combinations(pictures, 2):
+        assert np.abs(one.astype(int) - other).max() > 20
+    with pytest.raises(OptionError, match=r"unknown backdrop 'noon'.*'dusk'"):
+        Renderer(*SIZE, camera=CAMERA, backdrop="noon")
 
 
 def test_floor_height_and_no_floor():

@@ -3,7 +3,7 @@
 import numpy as np
 
 from taichi_soft.render.colors import to_linear
-from taichi_soft.render.tone import KNEE, STEPS, WHITE, encode_table, tone_map
+from taichi_soft.render.tone import KNEE, STEPS, WHITE, encode_table, light_table, tone_map
 
 LIGHT = np.linspace(0.0, WHITE, 20001)
 
@@ -42,3 +42,8 @@ def test_the_table_holds_the_curve_at_even_steps_of_the_root_of_light():
     light = WHITE * (roots / (STEPS - 1)) ** 2
     np.testing.assert_allclose(to_linear(table[roots] / 255.0), tone_map(light), atol=1e-5)
     assert np.diff(table).max() < 0.5  # no step of it is seen
+
+
+def test_light_of_a_byte_is_shown_as_that_byte():
+    table, root = encode_table(), np.sqrt(light_table() / WHITE)
+    np.testing.assert_allclose(np.interp(root, np.linspace(0, 1, STEPS), table), np.arange(256), atol=0.02)

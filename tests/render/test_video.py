@@ -274,6 +274,14 @@ def processes_that_name(folder):
     return found
 
 
+def encoder_of(folder):
+    """Number of the process that encodes a film there. Linux shows its command a moment after its start."""
+    end = time.monotonic() + 20
+    while not (found := processes_that_name(folder)) and time.monotonic() < end:
+        time.sleep(0.01)
+    return found[0]
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
 @pytest.mark.parametrize("suffix", [".mp4", ".webm", ".gif", ".png"])
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
@@ -331,10 +339,22 @@ def write_many(video):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
+def test_a_film_is_encoded_at_the_priority_of_the_process_that_makes_it(tmp_path):
+    """A busy machine gives almost no time to a process of low priority, or to a session of low priority."""
+    with VideoWriter(tmp_path / "film.mp4", fps=25, size=(WIDTH, HEIGHT)) as video:
+        video.write(frame(COLORS[0]))
+        child = encoder_of(tmp_path)
+        assert os.getpriority(os.PRIO_PROCESS, child) == os.getpriority(os.PRIO_PROCESS, 0)
+        session = Path(f"/proc/{child}/autogroup")
+        if session.exists():  # the kernel may be built without
+            assert session.read_text().endswith("nice 0\n")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
 def test_a_crash_of_ffmpeg_in_the_middle_is_an_error_and_no_file(tmp_path):
     video = VideoWriter(tmp_path / "film.mp4", fps=25, size=(WIDTH, HEIGHT))
     video.write(frame(COLORS[0]))
-    (child,) = processes_that_name(tmp_path)
+    child = encoder_of(tmp_path)
     os.kill(child, signal.SIGSEGV)
     with pytest.raises(VideoError, match="ffmpeg ended"):
         write_many(video)

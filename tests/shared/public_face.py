@@ -457,12 +457,12 @@ CALLS: dict[str, dict[str, Call]] = {
         "add_body": Call({
             "mesh": choice(BLOCK), "material": choice(SOFT), "law": choice("virial"), "strain": choice(None),
             "flips": choice(None), "damping_model": choice("edge"), "position": PLACE, "rotation": ROTATION,
-            "velocity": SPEED, "pinned": choice(()), "contact": choice(Contact()), "plasticity": choice(None),
+            "velocity": SPEED, "on_floor": FLAG, "pinned": choice(()), "contact": choice(Contact()), "plasticity": choice(None),
             "spare_vertices": choice(0), "tearing": choice(None),
         }, always),
         "reserve": Call({"asset": ASSET, "count": choice(1)}, always),
         "build": Call({}, always),
-        "spawn": Call({"asset": ASSET, "position": PLACE, "rotation": ROTATION, "velocity": SPEED, "angular_velocity": SPIN}, _is_full),
+        "spawn": Call({"asset": ASSET, "position": PLACE, "rotation": ROTATION, "velocity": SPEED, "angular_velocity": SPIN, "on_floor": FLAG}, _is_full),
         "despawn": Call({"body": BODY}),
         "add_collider": Call({
             "shape": SHAPE, "position": POINT, "rotation": ROTATION, "friction": number(0.0, 1.0, below=-0.1),

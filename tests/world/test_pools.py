@@ -5,6 +5,7 @@ import inspect
 
 import numpy as np
 import pytest
+import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -236,6 +237,43 @@ def test_a_spinning_body_has_the_momentum_and_the_spin_that_were_asked_for(empty
     about = np.cross(arm, m[:, None] * body.velocities()).sum(axis=0)
     np.testing.assert_allclose(body.momentum(), m.sum() * speed, rtol=1e-5, atol=1e-3)
     np.testing.assert_allclose(about, inertia @ spin, rtol=1e-5, atol=1e-4)
+
+
+def test_a_body_that_is_put_on_the_floor_touches_it_however_it_is_turned():
+    """Added or spawned, from a mesh far from its origin, by the points of its hull; z is the gap below it."""
+    world, rng = World(floor=1.0, soft_contact=True), np.random.default_rng(5)
+    off_centre = SoftBodyAsset(MESH.translated((3.0, -2.0, 7.0)), JELLY)
+    hulled = SoftBodyAsset(BALL, JELLY, skin=trimesh.creation.icosphere(subdivisions=3, radius=0.6), hull=100)
+    for asset in (off_centre, hulled):
+        world.reserve(asset, 3)
+    placed = []
+    for built in (False, True):
+        if built:
+            build(world)
+        for place, asset in enumerate((off_centre, hulled)):
+            turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+            turn *= np.linalg.det(turn)
+            where = {"position": (5.0 * place, 9.0 * built, 0.25 * place), "rotation": turn, "on_floor": True}
+            bodies = [world.spawn(asset, **where)]
+            if not built:
+                bodies.append(
+                    world.add_body(asset, **where | {"position": (5.0 * place, -9.0, 0.25 * place)})
+                )
+            placed += [(body, place, turn) for body in bodies]
+    for body, place, turn in placed:
+        x = body.positions().astype(float)
+        if body.asset is hulled:
+            hull = hulled.bound_hull
+            touching = (hull.weights[:, :, None] * x[hull.vertices]).sum(axis=1)
+            assert np.abs(np.linalg.norm(touching - x.mean(axis=0), axis=1) - 0.6).max() < 0.01
+        else:
+            touching = x
+        assert touching[:, 2].min() == pytest.approx(1.0 + 0.25 * place, abs=1e-5)
+        np.testing.assert_allclose(
+            x - x.mean(axis=0), (body.mesh.vertices - body.mesh.vertices.mean(axis=0)) @ turn.T, atol=1e-5
+        )
+        origin = x.mean(axis=0) - turn @ body.mesh.vertices.mean(axis=0)
+        assert origin[0] == pytest.approx(5.0 * place, abs=1e-5)
 
 
 def test_pinned_vertices_stay_where_a_moving_body_was_put(empty):

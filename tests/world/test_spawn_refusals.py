@@ -38,6 +38,8 @@ SPAWNS = {
     "fast": ({"velocity": (0, 2e4, 0)}, "velocity must lie within"),
     "whirling": ({"angular_velocity": (0, 5e4, 0)}, "makes a vertex as fast as"),
     "whirling nan": ({"angular_velocity": (0, NAN, 0)}, "angular_velocity must be finite"),
+    "on no floor": ({"on_floor": True}, r"no floor: make it with World\(floor=0.0\)"),
+    "on floor text": ({"on_floor": "yes"}, "on_floor must be"),
     "spinning text": ({"angular_velocity": "fast"}, "angular_velocity must be numbers"),
 }
 

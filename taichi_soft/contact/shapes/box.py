@@ -43,7 +43,11 @@ class BoxShape(Shape):
         return about_origin(np.asarray(self.size) / 2)
 
     def depths(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """How deep points (n, 3) in its frame lie inside, (n,) [m], below 0 outside: to the nearest face."""
+        """How deep points (n, 3) in its frame lie inside, (n,) [m], below 0 outside: to the nearest face.
+
+        Args:
+            points: in the frame of the shape, (n, 3) [m].
+        """
         depths: NDArray[np.float64] = (np.asarray(self.size) / 2 - np.abs(points)).min(axis=1)
         return depths
 

@@ -40,7 +40,11 @@ class CapsuleShape(Shape):
         return about_origin([self.radius, self.radius, self.length / 2 + self.radius])
 
     def depths(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """How deep points (n, 3) in its frame lie inside, (n,) [m], below 0 outside."""
+        """How deep points (n, 3) in its frame lie inside, (n,) [m], below 0 outside.
+
+        Args:
+            points: in the frame of the shape, (n, 3) [m].
+        """
         half = self.length / 2
         beside = points - np.clip(points, (0.0, 0.0, -half), (0.0, 0.0, half))
         depths: NDArray[np.float64] = self.radius - np.linalg.norm(beside, axis=1)

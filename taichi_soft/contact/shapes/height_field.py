@@ -82,7 +82,11 @@ class HeightFieldShape(Shape):
         return corners
 
     def depths(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """How deep points (n, 3) in its frame lie inside, (n,) [m], below 0 outside; no more than that."""
+        """How deep points (n, 3) in its frame lie inside, (n,) [m], below 0 outside; no more than that.
+
+        Args:
+            points: in the frame of the shape, (n, 3) [m].
+        """
         heights = np.asarray(self.heights, dtype=np.float64)
         last = np.array(heights.shape) - 1
         u = points[:, :2] / self.spacing + last / 2

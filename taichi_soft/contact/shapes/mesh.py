@@ -88,7 +88,11 @@ class MeshShape(Shape):
         return corners
 
     def depths(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """How deep points (n, 3) in its frame lie inside, (n,) [m], below 0 outside; from its grid."""
+        """How deep points (n, 3) in its frame lie inside, (n,) [m], below 0 outside; from its grid.
+
+        Args:
+            points: in the frame of the shape, (n, 3) [m].
+        """
         resolution = np.array(self.resolution)
         distances = self._samples.reshape(self.resolution)
         u = (points - self._grid.origin) / self.cell

@@ -45,12 +45,20 @@ class PlaneShape(Shape):
         return about_origin((np.inf, np.inf, np.inf))
 
     def depths(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """How deep points (n, 3) in its frame lie inside, (n,) [m], below 0 outside."""
+        """How deep points (n, 3) in its frame lie inside, (n,) [m], below 0 outside.
+
+        Args:
+            points: in the frame of the shape, (n, 3) [m].
+        """
         depths: NDArray[np.float64] = -points @ np.asarray(self.normal)
         return depths
 
     def surface(self, size: float = 20.0) -> Triangles:
-        """A square of edge `size` [m] about the origin."""
+        """A square of edge `size` [m] about the origin.
+
+        Args:
+            size: edge of the square [m]; 20 m by default.
+        """
         half = as_length(size, "size") / 2
         normal = np.asarray(self.normal)
         across = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])

@@ -62,7 +62,11 @@ class Shape(ABC):
 
     @abstractmethod
     def depths(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """How deep points (n, 3) in its frame lie inside, (n,) [m], below 0 outside: about the way out."""
+        """How deep points (n, 3) in its frame lie inside, (n,) [m], below 0 outside: about the way out.
+
+        Args:
+            points: in the frame of the shape, (n, 3) [m].
+        """
 
     @abstractmethod
     def surface(self) -> Triangles:

@@ -15,7 +15,12 @@ from taichi_soft.core.serialisation import serialised
 @serialised("radius")
 @dataclass(frozen=True, eq=False)
 class SphereShape(Shape):
-    """A ball about the origin of `radius` [m]. Raises: OptionError."""
+    """A ball about the origin.
+
+    Args:
+        radius: [m], above 0.
+    Raises: OptionError for a radius out of range.
+    """
 
     kind = ShapeKind.SPHERE
     radius: float
@@ -32,7 +37,11 @@ class SphereShape(Shape):
         return about_origin([self.radius] * 3)
 
     def depths(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """How deep points (n, 3) in its frame lie inside, (n,) [m], below 0 outside."""
+        """How deep points (n, 3) in its frame lie inside, (n,) [m], below 0 outside.
+
+        Args:
+            points: in the frame of the shape, (n, 3) [m].
+        """
         depths: NDArray[np.float64] = self.radius - np.linalg.norm(points, axis=1)
         return depths
 

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from functools import partial
 
+from taichi_soft.core.checks import choose_one_of
 from taichi_soft.core.errors import MaterialError, MeshError, OptionError
 from taichi_soft.core.types import (
     ChoiceT,
@@ -137,10 +138,15 @@ def element_model(
 ) -> ElementModel:
     """The model that these names choose; None takes the law's own.
 
+    Args:
+        law: a key of `LAWS`, such as "neo_hookean".
+        strain: "linear" or "exact"; None takes the default of the law.
+        flips: "tolerant", "recover" or "off"; None takes the default of the law.
+        damping_model: "edge", the default, or "tet_mean".
     Raises: OptionError for a name that is not known or that the law does not take.
     """
     if not isinstance(law, str) or law not in LAWS:
-        raise OptionError(f"unknown law {law!r}: choose one of {', '.join(map(repr, LAWS))}")
+        raise OptionError(f"unknown law {law!r}: {choose_one_of(LAWS, law)}")
     chosen = LAWS[law]
     damping = DampingModel.parse(damping_model)
     if isinstance(chosen, BondLaw) and damping is not DampingModel.EDGE:

@@ -22,6 +22,7 @@ def plane_angles(mesh: TetMesh, law: str, *, is_split: bool = False) -> NDArray[
         law: one of chapter 4, such as "cmpm2" or "best_fitting_plane".
         is_split: for "best_fitting_plane": the cheap normals that section 4.4.2 thinks of instead, across
             the lines between the means of the halves of a ring that is split twice.
+        mesh: rest shape.
     Raises: OptionError for another law; MeshError for what is no TetMesh, or not Delaunay for "cmpm".
     """
     if not isinstance(mesh, TetMesh):

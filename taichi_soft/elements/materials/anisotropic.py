@@ -75,12 +75,20 @@ class AnisotropicMaterial:
     def per_tet(self, name: str, tet_count: int) -> Array:
         """`density` or `damping` of each of `tet_count` tetrahedra.
 
+        Args:
+            name: "density" or "damping".
+            tet_count: number of tetrahedra.
         Raises: MaterialError if it is an array of another length.
         """
         return spread(getattr(self, name), name, "tetrahedra", tet_count)
 
     def require_count(self, tet_count: int) -> None:
-        """Raises: MaterialError if a constant or the frame is given for another number of tetrahedra."""
+        """Check that every constant and the frame fit a number of tetrahedra.
+
+        Args:
+            tet_count: number of tetrahedra.
+        Raises: MaterialError if a constant or the frame is given for another number of them.
+        """
         self.per_tet("density", tet_count)
         self.per_tet("damping", tet_count)
         if np.ndim(self.frame) == 3 and len(self.frame) != tet_count:
@@ -94,7 +102,11 @@ class AnisotropicMaterial:
             )
 
     def of_tets(self, rows: NDArray[np.int64]) -> AnisotropicMaterial:
-        """The material of some of the tetrahedra."""
+        """The material of some of the tetrahedra.
+
+        Args:
+            rows: numbers of the tetrahedra, (k,).
+        """
         lists = {"density": 1, "damping": 1, "frame": 3}
         given = {
             name: getattr(self, name) for name, ndim in lists.items() if np.ndim(getattr(self, name)) == ndim
@@ -107,6 +119,8 @@ class AnisotropicMaterial:
     def stiffness_matrices(self, tet_count: int) -> Array:
         """Stiffness of each tetrahedron in the axes of the mesh, (m, 6, 6) [Pa], as `Stiffness.matrix`.
 
+        Args:
+            tet_count: number of tetrahedra m.
         Raises: MaterialError if there are frames for another number of tetrahedra.
         """
         self.require_count(tet_count)

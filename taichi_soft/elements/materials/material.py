@@ -48,6 +48,8 @@ class Material:
             rigid motion does not. However large, it takes no more substeps. `damping` comes on top.
         shear_damping: b_m of eq. 4.5 [N s/m] of the same laws, across the edges; None is `damping`.
     Raises: MaterialError with the first value out of range.
+    Example:
+        rubber = Material(young=1e6, poisson=0.45, density=1100, damping_ratio=0.1)
     """
 
     young: float | Array
@@ -95,18 +97,29 @@ class Material:
     def per_tet(self, name: str, tet_count: int) -> Array:
         """One value of a constant or Lame parameter for each of `tet_count` tetrahedra.
 
+        Args:
+            name: "young", "poisson", "density", "damping", "lame_lambda" or "lame_mu".
+            tet_count: number of tetrahedra.
         Raises: MaterialError if the constant is an array of another length.
         """
         tet_count = as_count(tet_count, "tet_count", high=2**31 - 1)
         return spread(getattr(self, name), name, "tetrahedra", tet_count)
 
     def of_tets(self, rows: NDArray[np.int64]) -> Material:
-        """The material of some of the tetrahedra."""
+        """The material of some of the tetrahedra.
+
+        Args:
+            rows: numbers of the tetrahedra, (k,).
+        """
         given = {name: getattr(self, name) for name in CONSTANTS}
         return replace(self, **{name: value[rows] for name, value in given.items() if np.ndim(value) == 1})
 
     def stiffness_matrices(self, tet_count: int) -> Array:
-        """Stiffness of each tetrahedron, (m, 6, 6) [Pa], as `Stiffness.matrix`."""
+        """Stiffness of each tetrahedron, (m, 6, 6) [Pa], as `Stiffness.matrix`.
+
+        Args:
+            tet_count: number of tetrahedra m.
+        """
         lame_lambda, lame_mu = (self.per_tet(name, tet_count) for name in ("lame_lambda", "lame_mu"))
         matrices = np.zeros((tet_count, 6, 6))
         matrices[:, :3, :3] = lame_lambda[:, None, None]

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from typing import Literal, TypeAlias
 
+from taichi_soft.core.checks import choose_one_of
 from taichi_soft.core.errors import OptionError
 from taichi_soft.elements.materials.material import Material
 
@@ -26,7 +27,12 @@ PRESETS: dict[PresetName, Material] = {
 
 
 def preset(name: PresetName) -> Material:
-    """The material of that name. Raises: OptionError with the names there are."""
+    """The material of that name.
+
+    Args:
+        name: one of `PRESETS`, such as "gelatine".
+    Raises: OptionError with the names there are.
+    """
     if not isinstance(name, str) or name not in PRESETS:
-        raise OptionError(f"unknown material {name!r}: choose one of {', '.join(map(repr, PRESETS))}")
+        raise OptionError(f"unknown material {name!r}: {choose_one_of(PRESETS, name)}")
     return PRESETS[name]

@@ -92,6 +92,10 @@ class SpringMaterial:
     def per_edge(self, name: str, edge_count: int, default: Array | None = None) -> Array:
         """One value of a constant for each of `edge_count` edges; `default` where it is None.
 
+        Args:
+            name: "stiffness", "damping" or "rest_length".
+            edge_count: number of edges.
+            default: value of each edge, (edge_count,), for a constant that is None.
         Raises: MaterialError if it is an array of another length.
         """
         given = getattr(self, name)

@@ -99,7 +99,12 @@ class Stiffness:
 
     @classmethod
     def isotropic(cls, young: float, poisson: float) -> Stiffness:
-        """The same in all directions: 2 constants (thesis eq. 2.35). young [Pa], poisson from -1 to 0.5."""
+        """The same in all directions: 2 constants (thesis eq. 2.35). young [Pa], poisson from -1 to 0.5.
+
+        Args:
+            young: Young's modulus [Pa], above 0.
+            poisson: Poisson's ratio, above -1 and below 0.5.
+        """
         nu = _as_ratio(poisson, "poisson")
         E = as_positive(young, "young", "Pa")
         return cls.orthotropic((E,) * 3, (nu,) * 3, (E / (2 * (1 + nu)),) * 3)
@@ -171,7 +176,11 @@ class Stiffness:
 
     @classmethod
     def from_thesis(cls, matrix: ArrayLike) -> Stiffness:
-        """From eq. 2.25 as the thesis writes it: order xx, yy, zz, xy, xz, yz, with tensor shear strain."""
+        """From eq. 2.25 as the thesis writes it: order xx, yy, zz, xy, xz, yz, with tensor shear strain.
+
+        Args:
+            matrix: (6, 6) [Pa].
+        """
         rows = as_array(matrix, "stiffness", (6, 6), "Pa")[np.ix_(THESIS_ORDER, THESIS_ORDER)]
         rows[:, 3:] /= 2  # gamma = 2 eps
         return cls(rows)
@@ -199,11 +208,19 @@ class Stiffness:
         return np.asarray(np.linalg.inv(self.matrix))
 
     def rotated(self, rotation: ArrayLike) -> Stiffness:
-        """The stiffness of the material turned by a matrix (3, 3) or a quaternion (x, y, z, w)."""
+        """The stiffness of the material turned by a matrix (3, 3) or a quaternion (x, y, z, w).
+
+        Args:
+            rotation: matrix (3, 3) or quaternion (x, y, z, w).
+        """
         return Stiffness(turned(self.matrix, as_rotation(rotation)[None])[0])
 
     def young_along(self, direction: ArrayLike) -> float:
-        """Young's modulus of a bar cut out along `direction` (3,) [Pa]."""
+        """Young's modulus of a bar cut out along `direction` (3,) [Pa].
+
+        Args:
+            direction: axis of the bar, (3,), of any length but zero.
+        """
         n = as_array(direction, "direction", (3,))
         length = float(np.linalg.norm(n))
         if length == 0.0:

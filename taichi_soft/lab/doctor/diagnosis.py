@@ -21,7 +21,7 @@ from taichi_soft.elements.materials import Material
 from taichi_soft.lab.doctor.surface import SurfaceFacts, facts_of
 from taichi_soft.meshing import TetMesh, load_mesh
 from taichi_soft.meshing.io import SURFACES
-from taichi_soft.meshing.surfaces import Up, read_surfaces
+from taichi_soft.meshing.surfaces import Up, assumed_up, read_surfaces
 from taichi_soft.world.world import World
 
 FRAME = 1 / 60
@@ -107,6 +107,8 @@ def diagnose(
     found = Diagnosis(path.name)
     if path.suffix.lower() in SURFACES:
         surfaces = read_surfaces(path, up)
+        if up is None and (assumed := assumed_up(path)):
+            found.say(Grade.GOOD, assumed)
         for note in dict.fromkeys(note for each in surfaces for note in each.notes):
             found.say(Grade.NOTE, note)
         found.surface = facts_of(surfaces)

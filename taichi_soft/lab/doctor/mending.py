@@ -13,7 +13,8 @@ from taichi_soft.core.errors import MeshError
 from taichi_soft.lab.doctor.surface import NO_AREA
 from taichi_soft.meshing.arrays import FloatArray
 from taichi_soft.meshing.io import SURFACES
-from taichi_soft.meshing.surfaces import Surface, joined
+from taichi_soft.meshing.surface import Surface, joined
+from taichi_soft.meshing.surfaces import UP
 
 VOXELS = 96
 """Along the longest side, by which inside and outside are told apart."""
@@ -25,9 +26,9 @@ PROBES = (1.0, 2.0, 4.0, 8.0)
 
 
 def write_mended(surfaces: tuple[Surface, ...], path: Path) -> tuple[int, int]:
-    """Write surfaces without triangles of no area and copies of triangles, all facing outwards. z is up.
+    """Write surfaces without triangles of no area and copies of triangles, all facing outwards.
 
-    Vertices stay as they are, and so do holes.
+    Vertices stay as they are, and so do holes. That axis points up which does in most files of the format.
     Returns: how many triangles were left out, and how many turned.
     Raises: MeshError for a path that trimesh cannot write to.
     """
@@ -43,10 +44,12 @@ def write_mended(surfaces: tuple[Surface, ...], path: Path) -> tuple[int, int]:
     for _ in range(ROUNDS):  # what is inside is told the better the fewer face the wrong way
         inward = _faces_inward(vertices[faces], solid_of(vertices, faces, size / VOXELS))
         faces[inward], turned = faces[inward][:, ::-1], turned ^ inward
+    up = UP[path.suffix.lower()]
     scene, owner = trimesh.Scene(), np.searchsorted(starts, faces[:, 0], side="right") - 1
     for number, surface in enumerate(surfaces):
         mine = faces[owner == number] - starts[number]
-        mesh = trimesh.Trimesh(surface.vertices, mine, process=False, visual=surface.visual)
+        points = surface.vertices if up == "z" else surface.vertices[:, [0, 2, 1]] * (1.0, 1.0, -1.0)
+        mesh = trimesh.Trimesh(points, mine, process=False, visual=surface.visual)
         scene.add_geometry(mesh, node_name=surface.name or f"mesh {number}")
     whole = scene if path.suffix.lower() in (".glb", ".gltf") else scene.to_geometry()
     temporary = path.with_name(f".{os.getpid()}.{path.name}")

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from taichi_soft.cages.connected import components
 from taichi_soft.cages.welding import places_of
-from taichi_soft.meshing.surfaces import Surface, joined
+from taichi_soft.meshing.surface import Surface, joined
 
 Ints = NDArray[np.int64]
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.markup import escape
 
+from taichi_soft.core.checks import choose_one_of
 from taichi_soft.core.errors import OptionError
 from taichi_soft.core.types import ArchName
 from taichi_soft.lab.experiments import (
@@ -45,7 +46,7 @@ def choose_experiments(names: Sequence[str]) -> list[Experiment]:
     """Experiments in the order of the report, all of them where no name is given. Raises: OptionError."""
     for name in names:
         if name not in EXPERIMENTS:
-            raise OptionError(f"unknown experiment {name!r}: choose from {', '.join(EXPERIMENTS)}")
+            raise OptionError(f"unknown experiment {name!r}: {choose_one_of(EXPERIMENTS, name)}")
     return [experiment for name, experiment in EXPERIMENTS.items() if name in names or not names]
 
 

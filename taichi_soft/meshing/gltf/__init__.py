@@ -1,5 +1,5 @@
 """Surfaces from .glb and .gltf files."""
 
-from taichi_soft.meshing.gltf.reader import Part, read_gltf
+from taichi_soft.meshing.gltf.reader import read_gltf
 
-__all__ = ["Part", "read_gltf"]
+__all__ = ["read_gltf"]

@@ -1,0 +1,313 @@
+"""Polygon files (.ply), text or binary: vertices with normals, colours and texture coordinates, and faces."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.core.errors import MeshError
+from taichi_soft.meshing.arrays import FloatArray, as_points
+from taichi_soft.meshing.corners import Attribute, require_vertices, split
+from taichi_soft.meshing.surface import Surface, surface_of, vertex_normals
+from taichi_soft.meshing.text import decoded, numbers
+from taichi_soft.meshing.triangulation import triangulated
+from taichi_soft.meshing.visuals import Look, find_beside, read_picture, visual_of
+
+Ints = NDArray[np.int64]
+
+ORDERS = {b"ascii": "", b"binary_little_endian": "<", b"binary_big_endian": ">"}
+
+TYPES = {
+    **{b"char": "i1", b"uchar": "u1", b"short": "i2", b"ushort": "u2", b"int": "i4", b"uint": "u4"},
+    **{b"int8": "i1", b"uint8": "u1", b"int16": "i2", b"uint16": "u2", b"int32": "i4", b"uint32": "u4"},
+    **{b"float": "f4", b"float32": "f4", b"double": "f8", b"float64": "f8"},
+}
+
+COLORS = (("red", "green", "blue"), ("diffuse_red", "diffuse_green", "diffuse_blue"), ("r", "g", "b"))
+PLACES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texture_s", "texture_t"), ("s0", "t0"))
+"""Names that programs give to texture coordinates."""
+
+
+@dataclass
+class _Property:
+    name: str
+    kind: str  # of its numbers, as NumPy has it
+    count_kind: str = ""  # of a list: that of its length
+
+
+@dataclass
+class _Element:
+    name: str
+    count: int
+    properties: list[_Property] = field(default_factory=list)
+
+
+@dataclass(frozen=True, eq=False)
+class _List:
+    """A list of each row: their numbers in turn, and how many each has."""
+
+    values: FloatArray
+    counts: Ints
+
+
+Columns = dict[str, Any]  # by name: (n,) or a _List
+
+
+def read_ply(path: Path) -> list[Surface]:
+    """The surface of a .ply file, in its own axes and units.
+
+    Raises: MeshError for a file that is cut short, or of another kind, and for numbers that are none.
+    """
+    data = path.read_bytes()
+    order, elements, textures, body = _header(data)
+    read = {}
+    rest = _Text(body) if order == "" else _Binary(body, order)
+    for element in elements:
+        read[element.name] = rest.read(element)
+        if element.name in ("face", "tristrips"):
+            break  # what is behind belongs to no triangle
+    vertices, faces = read.get("vertex", {}), read.get("face", {})
+    corners = next((faces[name] for name in ("vertex_indices", "vertex_index") if name in faces), None)
+    strips = read.get("tristrips", {}).get("vertex_indices")
+    if corners is None and isinstance(strips, _List):
+        corners, faces = _unwound(strips), {}
+    if not isinstance(corners, _List) or len(corners.values) == 0:
+        return []
+    if not all(axis in vertices for axis in "xyz"):
+        raise MeshError("its vertices have no x, y and z")
+    notes: list[str] = []
+    look = _look(path, textures, notes)
+    return [_surface(path.name, vertices, faces, corners, look, tuple(notes))]
+
+
+def _surface(
+    name: str, vertices: Columns, faces: Columns, corners: _List, look: Look | None, notes: tuple[str, ...]
+) -> Surface:
+    points = as_points(np.stack([vertices[axis] for axis in "xyz"], axis=1))
+    at = corners.values.astype(np.int64)
+    require_vertices(at, corners.counts, len(points))
+    triangles, face = triangulated(points[at], corners.counts)
+    attributes = []
+    uv, colors = _table(vertices, PLACES), _colors(vertices)
+    places, shades = faces.get("texcoord"), _colors(faces) if colors is None else None
+    has_places = False
+    if isinstance(places, _List) and np.array_equal(places.counts, 2 * corners.counts):
+        has_places = True
+        attributes.append(Attribute(places.values.reshape(-1, 2).astype(np.float64), triangles))
+    if shades is not None:
+        attributes.append(Attribute(shades, np.repeat(face[:, None], 3, axis=1)))
+    made = split(len(points), at[triangles], tuple(attributes), keep=True)
+    normals = _table(vertices, (("nx", "ny", "nz"),))
+    if normals is None:
+        normals = vertex_normals(points, at[triangles])
+    uv = made.attributes[0] if has_places else None if uv is None else uv[made.vertex]
+    if shades is not None:
+        colors = np.nan_to_num(made.attributes[-1], nan=1.0)
+    elif colors is not None:
+        colors = colors[made.vertex]
+    visual = visual_of(uv=uv, colors=colors, look=look)
+    return surface_of(
+        name, points[made.vertex], made.triangles, normals=normals[made.vertex], visual=visual, notes=notes
+    )
+
+
+def _unwound(strips: _List) -> _List:
+    """Triangles of strips: each vertex makes one with the two before it, of which every other one is turned
+    round. -1 ends a strip."""
+    ends = np.cumsum(strips.counts)
+    values = np.insert(strips.values.astype(np.int64), ends[:-1], -1)
+    three = (
+        np.stack([values[:-2], values[1:-1], values[2:]], axis=1)
+        if len(values) > 2
+        else np.zeros((0, 3), int)
+    )
+    at = np.arange(len(values))
+    start = np.maximum.accumulate(np.where(values == -1, at + 1, 0))
+    is_odd = (at - start)[: len(three)] % 2 == 1
+    three[is_odd] = three[is_odd][:, [1, 0, 2]]
+    kept = three[(three >= 0).all(axis=1) & (np.diff(np.sort(three, axis=1), axis=1) > 0).all(axis=1)]
+    return _List(kept.ravel().astype(np.float64), np.full(len(kept), 3))
+
+
+def _table(columns: Columns, choices: tuple[tuple[str, ...], ...]) -> FloatArray | None:
+    for names in choices:
+        if all(isinstance(columns.get(name), np.ndarray) for name in names):
+            return np.stack([columns[name] for name in names], axis=1).astype(np.float64)
+    return None
+
+
+def _colors(columns: Columns) -> FloatArray | None:
+    """From 0 to 1: whole numbers go up to the greatest of their kind."""
+    for names in COLORS:
+        if all(isinstance(columns.get(name), np.ndarray) for name in names):
+            kind = columns[names[0]].dtype
+            rows = np.stack([columns[name] for name in names], axis=1).astype(np.float64)
+            if kind.kind in "iu":
+                return rows / (65535.0 if kind.itemsize == 2 else 255.0)
+            return rows / (255.0 if rows.max(initial=0.0) > 1.0 else 1.0)
+    return None
+
+
+def _look(path: Path, textures: list[str], notes: list[str]) -> Look | None:
+    if not textures:
+        return None
+    file = find_beside(path, textures[0])
+    if file is None:
+        notes.append(f"the texture {textures[0]} is not read: there is no such file beside it")
+        return None
+    if len(textures) > 1:
+        notes.append(f"of its {len(textures)} textures the first one lies on all of it")
+    try:
+        return Look("", None, read_picture(textures[0], file.read_bytes()))
+    except (MeshError, OSError) as error:
+        notes.append(str(error))
+        return None
+
+
+def _header(data: bytes) -> tuple[str, list[_Element], list[str], bytes]:
+    """Byte order ("" for text), elements, files of textures, and what is behind."""
+    start = re.match(rb"ply[ \t]*(\r\n|\n|\r)", data)
+    end = (
+        re.search(start[1] + rb"end_header[ \t]*" + (b"\r" if start[1] == b"\r" else b"\r?\n"), data)
+        if start
+        else None
+    )
+    if start is None or end is None:
+        raise MeshError("it does not begin as a .ply file does: download or export it anew")
+    order, elements, textures = None, list[_Element](), list[str]()
+    for line in data[start.end() : end.start()].split(start[1]):
+        words = line.split()
+        if words[:1] == [b"format"] and len(words) > 1:
+            order = ORDERS.get(words[1])
+        elif words[:2] == [b"comment", b"TextureFile"]:
+            textures.append(decoded(b" ".join(words[2:])))
+        elif words[:1] == [b"element"] and len(words) == 3 and words[2].isdigit():
+            elements.append(_Element(decoded(words[1]), int(words[2])))
+        elif words[:1] == [b"property"]:
+            if not elements:
+                raise MeshError("a property stands before its element: the header is damaged")
+            elements[-1].properties.append(_property(words))
+    if order is None:
+        raise MeshError(f"its format is none of {', '.join(map(decoded, ORDERS))}")
+    return order, elements, textures, data[end.end() :]
+
+
+def _property(words: list[bytes]) -> _Property:
+    kinds = [TYPES.get(word.lower(), "") for word in words[1:-1] if word != b"list"]
+    is_list = words[1:2] == [b"list"]
+    if len(kinds) != 1 + is_list or not all(kinds):
+        raise MeshError(f"the header is damaged: '{decoded(b' '.join(words))[:60]}' is no property")
+    return _Property(decoded(words[-1]), kinds[-1], kinds[0] if is_list else "")
+
+
+class _Text:
+    """Numbers of a text, element after element."""
+
+    def __init__(self, body: bytes) -> None:
+        self._values = numbers([[word] for word in body.split()], 1, "number")[:, 0]
+        self._at = 0
+
+    def read(self, element: _Element) -> Columns:
+        if not any(each.count_kind for each in element.properties):
+            rows = self._take(element.count * len(element.properties)).reshape(
+                element.count, len(element.properties)
+            )
+            return {
+                each.name: column.astype(each.kind if each.kind[0] == "u" else "f8")
+                for each, column in zip(element.properties, rows.T, strict=True)
+            }
+        found: dict[str, list[Any]] = {each.name: [] for each in element.properties}
+        for _ in range(element.count):
+            for each in element.properties:
+                if each.count_kind:
+                    found[each.name].append(self._take(int(self._take(1)[0])))
+                else:
+                    found[each.name].append(self._take(1)[0])
+        return _gathered(element, found)
+
+    def _take(self, count: int) -> FloatArray:
+        part = self._values[self._at : self._at + count]
+        if len(part) != count:
+            raise _cut_short()
+        self._at += count
+        return part
+
+
+class _Binary:
+    """Numbers of bytes, element after element."""
+
+    def __init__(self, body: bytes, order: str) -> None:
+        self._body, self._order, self._at = body, order, 0
+
+    def read(self, element: _Element) -> Columns:
+        lists = [each for each in element.properties if each.count_kind]
+        lengths = self._first_lengths(element) if element.count else [0] * len(lists)
+        kinds: list[Any] = []
+        remaining = iter(lengths)
+        for each in element.properties:
+            if each.count_kind:
+                kinds.append((f"#{each.name}", self._order + each.count_kind))
+                kinds.append((each.name, self._order + each.kind, (next(remaining),)))
+            else:
+                kinds.append((each.name, self._order + each.kind))
+        row = np.dtype(kinds)
+        if len(self._body) - self._at >= row.itemsize * element.count:
+            rows = np.frombuffer(self._body, row, element.count, self._at)
+            if all((rows[f"#{each.name}"] == n).all() for each, n in zip(lists, lengths, strict=True)):
+                self._at += row.itemsize * element.count
+                return {
+                    each.name: _List(rows[each.name].ravel(), rows[f"#{each.name}"].astype(np.int64))
+                    if each.count_kind
+                    else rows[each.name]
+                    for each in element.properties
+                }
+        elif not lists:
+            raise _cut_short()
+        found: dict[str, list[Any]] = {each.name: [] for each in element.properties}
+        for _ in range(element.count):
+            for each in element.properties:
+                if each.count_kind:
+                    found[each.name].append(self._take(each.kind, int(self._take(each.count_kind, 1)[0])))
+                else:
+                    found[each.name].append(self._take(each.kind, 1)[0])
+        return _gathered(element, found)
+
+    def _first_lengths(self, element: _Element) -> list[int]:
+        """Of the lists of the first row."""
+        start, lengths = self._at, []
+        for each in element.properties:
+            count = 1
+            if each.count_kind:
+                count = int(self._take(each.count_kind, 1)[0])
+                lengths.append(count)
+            self._take(each.kind, count)
+        self._at = start
+        return lengths
+
+    def _take(self, kind: str, count: int) -> NDArray[Any]:
+        size = np.dtype(kind).itemsize * count
+        if not 0 <= size <= len(self._body) - self._at:
+            raise _cut_short()
+        self._at += size
+        return np.frombuffer(self._body, self._order + kind, count, self._at - size)
+
+
+def _gathered(element: _Element, found: dict[str, list[Any]]) -> Columns:
+    columns: Columns = {}
+    for each in element.properties:
+        rows = found[each.name]
+        if each.count_kind:
+            counts = np.array([len(row) for row in rows], dtype=np.int64)
+            columns[each.name] = _List(np.concatenate([np.zeros(0), *rows]), counts)
+        else:
+            columns[each.name] = np.array(rows, dtype=each.kind)
+    return columns
+
+
+def _cut_short() -> MeshError:
+    return MeshError("it is cut short: it has fewer numbers than its header says. Download or export it anew")

@@ -1,0 +1,80 @@
+"""A surface: triangles with what belongs to them, as a file or a program has them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taichi_soft.meshing.arrays import FloatArray, IntArray, as_indices, as_points, read_only
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """One mesh of a file, or what a program made."""
+
+    name: str
+    vertices: FloatArray  # (n, 3) [m]
+    triangles: IntArray  # (m, 3)
+    normals: FloatArray  # (n, 3), of unit length
+    visual: Any = None  # trimesh's: texture coordinates, material, colours; None where there are none
+    notes: tuple[str, ...] = ()  # sentences on what the reader assumed, repaired or left out
+
+
+def surface_of(
+    name: str,
+    vertices: ArrayLike,
+    triangles: ArrayLike,
+    *,
+    normals: FloatArray | None = None,
+    visual: Any = None,
+    notes: tuple[str, ...] = (),
+) -> Surface:
+    """A surface of checked copies.
+
+    Args:
+        normals: (n, 3), of any length; None, NaN and 0 take those of the triangles round each vertex.
+    Raises: MeshError for vertices or triangles that are none.
+    """
+    points = as_points(vertices)
+    corners = as_indices(triangles, "triangles", 3, len(points), "triangle", may_repeat=True)
+    if normals is None:
+        rows = vertex_normals(points, corners)
+    else:
+        with np.errstate(over="ignore"):
+            lengths = np.linalg.norm(normals, axis=1)
+        is_missing = ~((lengths > 0.0) & np.isfinite(lengths))
+        rows = np.where(is_missing[:, None], 1.0, normals)
+        if is_missing.any():
+            rows[is_missing] = vertex_normals(points, corners)[is_missing]
+        rows = unit(rows)
+    return Surface(name, read_only(points), read_only(corners), read_only(rows), visual, notes)
+
+
+def joined(surfaces: tuple[Surface, ...]) -> tuple[FloatArray, NDArray[np.int64]]:
+    """Vertices (n, 3) [m] and triangles (m, 3) of all of them, as of one."""
+    starts = np.cumsum([0, *(len(each.vertices) for each in surfaces)])[:-1]
+    triangles = [
+        each.triangles.astype(np.int64) + start for each, start in zip(surfaces, starts, strict=True)
+    ]
+    return np.concatenate([each.vertices for each in surfaces]), np.concatenate(triangles)
+
+
+def vertex_normals(points: FloatArray, triangles: NDArray[Any]) -> FloatArray:
+    """Means of the normals of the triangles round each vertex, weighted by their angles there, (n, 3)."""
+    corners = points[triangles]
+    ahead, back = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
+    across = np.cross(ahead, back)  # along the normal, at each corner
+    size = np.linalg.norm(across, axis=2)
+    angles = np.where(size > 0.0, np.arctan2(size, np.einsum("tcx,tcx->tc", ahead, back)), 0.0)
+    weighed = (angles[:, :, None] * unit(across)).reshape(-1, 3)
+    sums = [np.bincount(triangles.ravel(), weighed[:, k], len(points)) for k in range(3)]
+    return unit(np.stack(sums, axis=1))
+
+
+def unit(rows: NDArray[Any]) -> FloatArray:
+    """Rows divided by their length; (0, 0, 1) for those of no length."""
+    lengths = np.linalg.norm(rows, axis=-1, keepdims=True)
+    return np.where(lengths > 0, rows / np.where(lengths > 0, lengths, 1.0), [0.0, 0.0, 1.0])

@@ -1,0 +1,100 @@
+"""Libraries of materials (.mtl) that an .obj file names: colour and texture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from taichi_soft.core.errors import MeshError
+from taichi_soft.meshing.text import as_ascii, decoded, is_number
+from taichi_soft.meshing.visuals import Look, find_beside, read_picture
+
+MOST_ARGUMENTS = {b"-mm": 2, b"-o": 3, b"-s": 3, b"-t": 3}
+"""Of the options of a texture; others have one."""
+
+
+def read_materials(path: Path, libraries: list[bytes], wanted: set[str]) -> tuple[dict[str, Look], list[str]]:
+    """Materials by name, and sentences on what is not there.
+
+    Args:
+        path: of the .obj file.
+        libraries: what its statements `mtllib` say.
+        wanted: names of the materials that it uses.
+    """
+    looks: dict[str, Look] = {}
+    notes: list[str] = []
+    pictures: dict[Path, object] = {}
+    for library in dict.fromkeys(libraries):
+        found = find_beside(path, decoded(library))
+        files = [found] if found else [find_beside(path, decoded(name)) for name in library.split()]
+        if not any(files):
+            notes.append(f"its materials are not read: there is no file {decoded(library)!r} beside it")
+        for file in filter(None, files):
+            for name, (color, texture) in _materials(file.read_bytes()).items():
+                if name in wanted and name not in looks:
+                    picture = _picture(path, texture, pictures, notes) if texture else None
+                    looks[name] = Look(name, color, picture)
+    lost = sorted(wanted - set(looks))
+    if lost and looks:
+        names = ", ".join(lost[:5]) + (", ..." if len(lost) > 5 else "")
+        notes.append(f"its libraries have no material {names}")
+    return looks, notes
+
+
+def _picture(path: Path, texture: bytes, pictures: dict[Path, object], notes: list[str]) -> object:
+    name = decoded(texture)
+    file = find_beside(path, name)
+    if file is None:
+        notes.append(f"the texture {name} is not read: there is no such file beside it")
+        return None
+    if file not in pictures:
+        pictures[file] = None
+        try:
+            pictures[file] = read_picture(name, file.read_bytes())
+        except (MeshError, OSError) as error:
+            notes.append(str(error))
+    return pictures[file]
+
+
+def _materials(data: bytes) -> dict[str, tuple[tuple[float, float, float, float] | None, bytes]]:
+    """Colour and file of the texture of each material."""
+    found: dict[str, dict[bytes, list[bytes]]] = {}
+    current: dict[bytes, list[bytes]] = {}
+    for line in as_ascii(data).split(b"\n"):
+        words = line.split()
+        if len(words) > 1:
+            head = words[0].lower()
+            if head == b"newmtl":
+                current = found.setdefault(decoded(b" ".join(words[1:])), {})
+            elif head == b"map_kd":
+                current[head] = [_file(line)]
+            else:
+                current[head] = words[1:]
+    return {name: (_color(said), said.get(b"map_kd", [b""])[0]) for name, said in found.items()}
+
+
+def _color(said: dict[bytes, list[bytes]]) -> tuple[float, float, float, float] | None:
+    try:
+        rows = [float(word) for word in said[b"kd"][:3]]
+        opacity = 1.0
+        if b"d" in said:
+            opacity = float(said[b"d"][-1])
+        elif b"tr" in said:
+            opacity = 1.0 - float(said[b"tr"][-1])
+    except (KeyError, ValueError):  # no colour, or a spectrum
+        return None
+    red, green, blue = (rows * 3)[:3] if len(rows) == 1 else (rows + rows[-1:] * 2)[:3]
+    clipped = [min(max(part, 0.0), 1.0) for part in (red, green, blue, opacity)]
+    return clipped[0], clipped[1], clipped[2], clipped[3]
+
+
+def _file(line: bytes) -> bytes:
+    """The name behind the options of a texture. It may have spaces."""
+    rest = line.split(None, 1)[1].strip()
+    while rest.startswith(b"-") and b" " in rest:
+        option, rest = rest.split(None, 1)
+        for _ in range(MOST_ARGUMENTS.get(option.lower(), 1)):
+            word, _, behind = rest.partition(b" ")
+            if option.lower() in (b"-o", b"-s", b"-t") and not is_number(word):
+                break
+            rest = behind.lstrip()
+    return rest
