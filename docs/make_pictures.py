@@ -1,4 +1,4 @@
-"""Makes the pictures of the README: `python docs/make_pictures.py`, in some minutes."""
+"""Make the pictures of the README and the pages: `python docs/make_pictures.py`, in some minutes."""
 
 import tempfile
 from pathlib import Path
@@ -12,9 +12,6 @@ from taichi_soft.render.demos import load_demo
 from taichi_soft.render.film import film
 
 FOLDER = Path(__file__).parent / "pictures"
-FILMS = {"jelly": 3.0, "bounce": 3.8}
-"""How much of them is shown [s]."""
-
 MOMENTS = {"dents": 0.44, "bars": 1.06, "tower": 1.7, "drape": 2.6, "bridge": 1.6, "bowl": 3.0}
 """That show what each demo is about [s]."""
 
@@ -28,8 +25,6 @@ def still(name: str, moment: float, size: tuple[int, int] = (520, 292)) -> np.nd
 
 def main() -> None:
     """Write all pictures."""
-    for name, seconds in FILMS.items():
-        film(load_demo(name).stage(), FOLDER / f"{name}.gif", fps=25, size=(560, 316), seconds=seconds)
     stills = [still(name, moment) for name, moment in MOMENTS.items()]
     rows = [np.hstack(stills[i : i + 2]) for i in range(0, len(stills), 2)]
     cv2.imwrite(str(FOLDER / "demos.png"), np.vstack(rows))

@@ -1,4 +1,4 @@
-"""What the documentation site takes from elsewhere: files above this folder, and the kept report.
+"""What the documentation site takes from elsewhere: address, version, files above this folder, the report.
 
 MkDocs calls these functions by their names (mkdocs.yml, `hooks`).
 """
@@ -12,6 +12,8 @@ from typing import Any
 
 import markdown
 from mkdocs.structure.files import File, Files
+
+from taichi_soft.core.version import VERSION
 
 ROOT = Path(__file__).parents[1]
 REPORT = ROOT / "docs" / "report"
@@ -43,6 +45,15 @@ main img {{ max-width: 100%; height: auto; background: #fff; }}
 </body>
 </html>
 """
+
+
+def on_config(config: Any) -> Any:
+    """Show the repository of pyproject.toml, and the version of the library."""
+    address = re.search(r'^Homepage = "(.*)"$', (ROOT / "pyproject.toml").read_text(encoding="utf-8"), re.M)
+    assert address is not None
+    config.repo_url, config.repo_name = address[1], config.site_name
+    config.extra["version_text"] = VERSION
+    return config
 
 
 def on_files(files: Files, config: Any) -> Files:

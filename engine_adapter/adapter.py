@@ -118,19 +118,30 @@ class EngineAdapter:
     def step(self) -> None:
         """Make exactly one fixed step, past the accumulator: for replays, tests and servers.
 
-        Raises: what `before_step` and `World.step` raise.
+        Raises: what `before_step` and `World.step` raise. If the step was not made, nothing has changed but
+            what `before_step` itself has done.
         """
         if self._before_step is not None:
             self._before_step(self._world)
         if self._budget is None:
             self._world.step(self._fixed_step.dt, self._fixed_step.substeps)
         else:
-            self._budget.prepare(self._rewind_ticks)
-            start = perf_counter()
-            self._world.step(self._fixed_step.dt, self._fixed_step.substeps)
-            self._budget.note(perf_counter() - start)
+            self._step_within(self._budget)
         if self._rollback is not None:
             self._rollback.save()
+
+    def _step_within(self, budget: Budget) -> None:
+        """Make a step for which a budget chooses what is given up."""
+        step = self._world.step_count
+        try:
+            budget.prepare(self._rewind_ticks)
+            start = perf_counter()
+            self._world.step(self._fixed_step.dt, self._fixed_step.substeps)
+            budget.note(perf_counter() - start)
+        except BaseException:
+            if self._world.step_count == step:
+                budget.take_back()
+            raise
 
     @one_thread
     def advance(self, frame_dt: float) -> int:

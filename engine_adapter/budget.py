@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from engine_adapter.skips import Skips
 from taichi_soft import Body, StateError, World
 from taichi_soft.core.checks import as_positive, as_vector
-from taichi_soft.core.handles import serial_of
+from taichi_soft.core.handles import keep, serial_of, undo
 
 TIGHT, FULL, ROOMY = 0.98, 0.86, 0.7
 """Of the budget: what a long step is expected to take where something is given up, until it is expected to
@@ -72,6 +72,7 @@ class Budget:
         self._skips = Skips(world, self._from_near)
         self._decided: dict[int, _Decision] = {}  # by step
         self._newest = -1  # step that was decided last
+        self._before: bytes | None = None  # the world before the present choice, where it may be taken back
 
     def see_from(self, viewer: ArrayLike) -> None:
         """Where distances are measured from, (3,) [m]."""
@@ -100,7 +101,7 @@ class Budget:
         A step that was made before and is made again, after `rewind`, gets the levels that it had then: the
         clock decides once.
         """
-        step = self._world.step_count
+        step, self._before = self._world.step_count, None
         if step <= self._newest:
             self._repeat(self._decided.get(step))
             return
@@ -115,6 +116,20 @@ class Budget:
         for old in [each for each in self._decided if each < step - ticks]:
             del self._decided[old]
 
+    def take_back(self) -> None:
+        """Undo what the last `prepare` changed: its step was refused, and is chosen for anew."""
+        if self._before is not None:
+            undo(self._world, self._before)
+        step = self._world.step_count
+        if step == self._newest:
+            self._newest -= 1
+            self._decided.pop(step, None)
+
+    def _keep(self) -> None:
+        """Before a change: keep the world as it is, where the coming step may be refused."""
+        if self._before is None:
+            self._before = keep(self._world)
+
     def restart(self) -> None:
         """The world was put to another state: what was decided belongs to another course of events."""
         self._decided.clear()
@@ -127,12 +142,13 @@ class Budget:
         if decision is not None:
             for serial, level in decision.levels:
                 if serial in bodies:  # with other inputs something may hold it now
-                    _has_changed(bodies[serial], level)
+                    self._has_changed(bodies[serial], level)
             skipping = [bodies[serial] for serial in decision.skipping if serial in bodies]
         self._let_skip(skipping)
 
     def _let_skip(self, skipping: list[Body]) -> None:
         if skipping:
+            self._keep()
             self._world.skip_step(skipping)
         self._load = self._tets() - sum(len(body.tets) for body in skipping)
 
@@ -176,7 +192,7 @@ class Budget:
             if self._long(load) <= FULL * self.seconds or (changes and self._is_late(start)):
                 break
             before = len(body.tets)
-            if not body.is_asleep and _has_changed(body, body.level + 1):
+            if not body.is_asleep and self._has_changed(body, body.level + 1):
                 load -= before - len(body.tets)
                 changes.append((body, body.level))
         self._waits = 0 if changes else TRY_AGAIN
@@ -190,7 +206,7 @@ class Budget:
             more = len(body.asset.levels[finer].mesh.tets) - len(body.tets)
             if self._long(load + more) > ROOMY * self.seconds or (changes and self._is_late(start)):
                 break
-            if _has_changed(body, finer):
+            if self._has_changed(body, finer):
                 load += more
                 changes.append((body, finer))
         self._calm = 0
@@ -211,16 +227,16 @@ class Budget:
         apart = [float(np.linalg.norm(body.center_of_mass() - self._viewer)) for body in bodies]
         return [bodies[i] for i in np.argsort(apart, kind="stable")]
 
+    def _has_changed(self, body: Body, level: int) -> bool:
+        """Change the level of a body, unless something bars it: see `Body.set_level`.
 
-def _has_changed(body: Body, level: int) -> bool:
-    """Change the level of a body, unless something bars it: see `Body.set_level`.
-
-    What is held gets no coarser: a player may have it in hand.
-    """
-    if body.is_held and level > body.level:
-        return False
-    try:
-        body.set_level(level)
-    except StateError:
-        return False
-    return True
+        What is held gets no coarser: a player may have it in hand.
+        """
+        if body.is_held and level > body.level:
+            return False
+        self._keep()
+        try:
+            body.set_level(level)
+        except StateError:
+            return False
+        return True

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from taichi_soft.bodies.calibration import calibrated
 from taichi_soft.bodies.contact import DEFAULT_CONTACT, THIN, Contact
 from taichi_soft.bodies.description import BodyDescription, outer_vertices, require_size
-from taichi_soft.bodies.first_mode import first_frequency
+from taichi_soft.bodies.first_mode import first_frequency, guessed_frequency
 from taichi_soft.bodies.hull import BoundHull, bind
 from taichi_soft.bodies.layout import BodyArrays, HullArrays, arrange, room_of
 from taichi_soft.bodies.plasticity import Plasticity
@@ -42,6 +42,7 @@ from taichi_soft.elements.materials import AnisotropicMaterial, AnyMaterial, Mat
 from taichi_soft.meshing import BodyMesh, ParticleMesh, TetMesh
 from taichi_soft.meshing.arrays import read_only
 from taichi_soft.meshing.cage_mesh import CageMesh
+from taichi_soft.meshing.surface import Surface
 from taichi_soft.meshing.surfaces import Up, assumed_up, read_surfaces
 
 _log = logging.getLogger(__name__)
@@ -161,6 +162,10 @@ class SoftBodyAsset:
                 raise OptionError(f"level {level} must have the law and the contact of the finest")
             if each.hull is not self.hull and digest_of(each.hull) != digest_of(self.hull):
                 raise OptionError(f"level {level} must have the hull of the finest")
+            if not _are_same(each.skin, self.skin):
+                raise OptionError(
+                    f"level {level} must have the skin of the finest: with_coarser gives it that"
+                )
             if self.description.bonds is not None:
                 raise OptionError(f"law {self.law!r} has no levels of detail: it looks at edges")
             self._require_coarser((self, *coarser)[level - 1], each, level)
@@ -380,6 +385,11 @@ class SoftBodyAsset:
         than a fifth; 0 for ropes and cloth, which bend freely."""
         return 0.0 if isinstance(self.mesh, ParticleMesh) else first_frequency(self.description)
 
+    @cached_property
+    def guessed_frequency(self) -> float:
+        """About the same, sooner found; 0 also for pairwise laws."""
+        return guessed_frequency(self.description)
+
     def vibration_row(self, body: BodyDescription) -> tuple[float, float]:
         """How vibrations of a body of this asset fade, which may be cut or of another material: at what rate
         [1/s], and after what time at most they are damped again [s].
@@ -472,6 +482,14 @@ class SoftBodyAsset:
                 f"the body starts {depth:.4g} m below the floor: position=({origin[0]:g}, {origin[1]:g}, "
                 f"{origin[2] + depth:.6g}) puts it on the floor, World(floor=None) has none"
             )
+
+
+def _are_same(skin: tuple[Surface, ...], other: tuple[Surface, ...]) -> bool:
+    """True if two skins have the same vertices and triangles."""
+    return len(skin) == len(other) and all(
+        a is b or (np.array_equal(a.vertices, b.vertices) and np.array_equal(a.triangles, b.triangles))
+        for a, b in zip(skin, other, strict=True)
+    )
 
 
 def _mean_stiffness(body: BodyDescription) -> float:

@@ -32,6 +32,17 @@ def first_frequency(body: BodyDescription) -> float:
     return first_mode(body)[0]
 
 
+def guessed_frequency(body: BodyDescription) -> float:
+    """The same of a body of tetrahedra by Ritz's method with polynomials, from above and soon found."""
+    if body.bonds is not None:
+        return 0.0
+    _, bent = _polynomials(body)
+    if bent.shape[1] == 0:
+        return 0.0
+    _, _, value = _ritz(bent, _applied(vibration_of(body), bent), 1)
+    return float(np.sqrt(max(value[0], 0.0)))
+
+
 def first_mode(body: BodyDescription, change: float = _CHANGE) -> tuple[float, Floats]:
     """The slowest vibration of a body that nothing holds: angular frequency [rad/s], and shape (n, 3), the
     largest entry being 1; 0 and zeros where it has none.

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies.pose import Pose, best_fitting_pose
+from taichi_soft.bodies.present import edge_constants_of, lame_of, stiffness_of
 from taichi_soft.bodies.soft_body import SoftBody, context_of, record_of, require_alive, rest_inverses_of
 from taichi_soft.core.checks import as_vector
 from taichi_soft.core.errors import MeshError, OptionError
@@ -80,11 +81,11 @@ def elastic_energy(body: SoftBody) -> float:
     law = model.law
     if bonds is not None and law.name == "springs":
         ends = positions_of(body)[body.mesh.edges]
-        growth = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) - bonds.constants[:, 0]
-        return float(0.5 * bonds.constants[:, 1] @ growth**2)
+        constants = edge_constants_of(body)
+        growth = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) - constants[:, 0]
+        return float(0.5 * constants[:, 1] @ growth**2)
     if isinstance(law, EnergyLaw) and not model.is_anisotropic:
-        constants = (record_of(body).description.per_tet(name) for name in ("lame_lambda", "lame_mu"))
-        return float(law.energy_density(deformations(body), *constants) @ tet_mesh(body).volumes)
+        return float(law.energy_density(deformations(body), *lame_of(body).T) @ tet_mesh(body).volumes)
     strain, stress = green_strain_and_stress(body)
     return float(0.5 * np.einsum("mab,mab->m", strain, stress) @ tet_mesh(body).volumes)
 
@@ -96,15 +97,14 @@ def green_strain_and_stress(body: SoftBody) -> tuple[Floats, Floats]:
     """
     F = deformations(body)
     strain = 0.5 * (np.swapaxes(F, 1, 2) @ F - np.eye(3))
-    return strain, voigt_stress(record_of(body).description.stiffness_matrices(), strain)
+    return strain, voigt_stress(stiffness_of(body), strain)
 
 
 def tet_stresses(body: SoftBody) -> Floats:
     """As `Body.stresses`."""
     F = deformations(body)
     stress = np.empty_like(F)
-    description = record_of(body).description
-    compute_stress(description.model, F, description.stiffness_matrices(), stress)
+    compute_stress(record_of(body).description.model, F, stiffness_of(body), stress)
     return stress
 
 

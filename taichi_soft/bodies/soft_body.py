@@ -96,6 +96,9 @@ class Built(Protocol):
     def was_cut(self, body: SoftBody) -> None:
         """Take note that a body has other vertices."""
 
+    def was_placed(self, body: SoftBody) -> None:
+        """Look for bodies that a body overlaps, in the next step."""
+
     def become(self, settings: Settings) -> None:
         """Have other gravity, or another friction of the floor."""
 
@@ -203,6 +206,7 @@ class BodyRecord:
 
     description: BodyDescription  # as added, or as set or cut since
     first_step: int
+    present: BodyArrays | None = None  # with constants on the way to those, while a material is eased in
     removed_in: int | None = None  # step
     frozen_in: FailedStep | None = None
     failure: Failure | None = None  # once it was asked for

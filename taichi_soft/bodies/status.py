@@ -11,3 +11,7 @@ grab pulls at it; a joint holds it to another."""
 
 PLACED = -1000
 """`body_patience` of a body that was put where it is, perhaps wrecked."""
+
+CLEAR, JUST_PLACED, OVERLAPPING = range(3)
+"""Overlap of a body with others, in a world where bodies touch each other: none; to be looked for in the next
+step, since the body was placed; some, of which the body is being moved out."""

@@ -24,6 +24,9 @@ OFFSET = np.array([0.4142, 0.3183, 0.3679])
 """Of the first voxel's corner before the surface, in voxels: no line runs along faces that are at round
 numbers."""
 
+ONCE = 1.0 + 1e-6
+"""Winding number, up to rounding, above which something is inside of more than one part of the surface."""
+
 CHUNK = 1 << 20
 """Triangles times lines that are looked at together."""
 
@@ -67,12 +70,17 @@ def solid_of(vertices: FloatArray, triangles: Ints, spacing: float) -> Solid:
     shape = tuple(int(n) for n in size)
     sums, lines, open_lines = np.zeros((*shape, 3)), 0, 0
     total = int(np.prod(shape))
-    rows = []
+    rows, deepest = [], 0.0
     for axis in range(3):
         points, signs = _crossings(places, triangles, axis)
         voxel = np.minimum(points.astype(np.int64), size - 1)
         flat = np.ravel_multi_index(tuple(voxel.T), shape)
-        row = _Lines(axis, shape, flat, signs, points[:, axis] - voxel[:, axis])
+        behind = points[:, axis] - voxel[:, axis]
+        row = _Lines(axis, shape, flat, signs, behind)
+        deepest = max(deepest, float(np.abs(row.winding).max()))
+        if np.abs(row.winding).max() > ONCE:
+            outer = _outer(points, voxel, signs, axis)
+            row = _Lines(axis, shape, flat, np.where(row.is_whole.ravel()[flat], outer, signs), behind)
         rows.append(row)
         is_met = row.crossings.any(axis=axis)
         lines += int(is_met.sum())
@@ -83,8 +91,7 @@ def solid_of(vertices: FloatArray, triangles: Ints, spacing: float) -> Solid:
     with np.errstate(invalid="ignore"):
         surface = origin + spacing * (sums / crossings[..., None])
     fill, center = _fill(rows)
-    deepest = max(float(np.abs(row.winding).max()) for row in rows)
-    is_simple = open_lines == 0 and deepest < 1.0 + 1e-6
+    is_simple = open_lines == 0 and deepest <= ONCE
     return Solid(origin, spacing, fill, center, surface, open_lines / max(lines, 1), is_simple)
 
 
@@ -118,6 +125,24 @@ class _Lines:
         with np.errstate(invalid="ignore", divide="ignore"):
             center = (0.5 * before + moments) / (before + beyond)
         self.center = np.clip(np.nan_to_num(center, nan=0.5), 0.0, 1.0)
+
+
+def _outer(points: FloatArray, voxel: Ints, signs: FloatArray, axis: int) -> FloatArray:
+    """Signs (k,) of the crossings at which a line enters or leaves the solid, and 0 of those within it.
+
+    So what is inside of several parts of the surface counts once.
+    """
+    across = [(axis + 1) % 3, (axis + 2) % 3]
+    order = np.lexsort((points[:, axis], voxel[:, across[0]], voxel[:, across[1]]))
+    line = voxel[order][:, across]
+    is_first = np.r_[True, (line[1:] != line[:-1]).any(axis=1)]
+    sums = np.cumsum(signs[order])
+    before = sums - signs[order]
+    depth = sums - before[is_first][np.cumsum(is_first) - 1]
+    is_in, was_in = np.abs(depth) > 0.5, np.abs(depth - signs[order]) > 0.5
+    found = np.empty(len(signs))
+    found[order] = is_in.astype(np.float64) - was_in
+    return found
 
 
 def _fill(rows: list[_Lines]) -> tuple[FloatArray, FloatArray]:

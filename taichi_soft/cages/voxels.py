@@ -28,7 +28,8 @@ FLATTEST = 1e-6
 
 def volume_within(corners: FloatArray) -> float:
     """Of a closed surface of triangles (m, 3, 3), by the divergence theorem [m^3]."""
-    return float(np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))) / 6.0
+    a, b, c = np.moveaxis(corners - corners[0, 0], 1, 0)  # far from the origin, only differences have digits
+    return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6.0
 
 
 def voxel_edge(corners: FloatArray, cell_size: float) -> float:

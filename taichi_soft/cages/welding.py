@@ -18,7 +18,7 @@ def places_of(vertices: FloatArray, size: float) -> Ints:
 
     Args: size: longest side of the box round those in use [m].
     """
-    places = np.round(vertices / max(WELD * size, 1e-300)).astype(np.int64)
+    places = np.round(vertices / (WELD * size if size > 0.0 else 1.0)) + 0.0  # -0.0 is 0.0
     return np.unique(places, axis=0, return_inverse=True)[1].reshape(-1)
 
 

@@ -17,6 +17,7 @@ from taichi_soft.contact.collider_entries import entry_of, read_row
 from taichi_soft.contact.fields import NO_COLLIDER, ContactCapacity, ContactFields
 from taichi_soft.contact.kernels.collider_rows import (
     MOTION_WIDTH,
+    forget_collider,
     sum_collider_impulses,
     write_collider_motion,
     write_samples,
@@ -159,7 +160,7 @@ class Colliders(Slice):
 
     def load(self, contact: ContactFields, body_count: int) -> None:
         """Fill the fields with what was added before `build`."""
-        self._contact, self._body_count = contact, body_count
+        self._contact, self._body_count, self._impulses = contact, body_count, None
         if contact.capacity.samples:
             write_samples(contact, 0, np.zeros(1, dtype=np.float32))  # compiles
         begin = 0
@@ -175,6 +176,9 @@ class Colliders(Slice):
         if self._contact is None:
             return
         row = self._rows[index]
+        if row.is_alive:
+            forget_collider(self._contact, self._body_count, index)
+        self._impulses = None
         self._write_samples(row)
         self._write_constants()
         self._is_dirty = True
@@ -311,7 +315,8 @@ class Colliders(Slice):
         if self._contact is None:
             return
         added: Collider | None = None
-        with contextlib.suppress(StateError):  # there is no room for it, nor will there be
+        forget_collider(self._contact, self._body_count, 0)  # also where there is no room for another now
+        with contextlib.suppress(StateError):  # there is no room for it
             added = self.add(
                 SphereShape(1.0),
                 position=(0.0, 0.0, 0.0),

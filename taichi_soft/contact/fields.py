@@ -20,6 +20,9 @@ PAIR_ROWS = 32
 """Pairs of bodies whose impulses can be recorded, per body of an island: room for all pairs of 65 bodies, and
 for each of more to touch 64 others."""
 
+MAX_PARTNERS = 32
+"""Bodies from which one is parted at a time. One that overlaps more touches no other body meanwhile."""
+
 NO_CONTACT = 1e30
 """Gap of a candidate that is out of reach."""
 
@@ -168,7 +171,18 @@ class SoftContactFields:
         self.pair_bodies = ti.Vector.field(2, ti.i32, bodies * PAIR_ROWS)
         self.pair_impulse = ti.Vector.field(3, ti.f32, bodies * PAIR_ROWS)  # on the second in a step [N s]
         self.pairs_lost = ti.field(ti.i32, ())  # 1 where some had no row
+        # Bodies placed inside each other: see `kernels/parting.py`.
+        self.overlap = ti.field(ti.i32, bodies)  # CLEAR, JUST_PLACED or OVERLAPPING
+        self.partner_count = ti.field(ti.i32, bodies)  # bodies that each overlaps in this step
+        self.partner = ti.field(ti.i32, bodies * MAX_PARTNERS)
+        self.center = ti.Vector.field(3, ti.f32, bodies)  # of mass, after the step [m]
+        self.displacement = ti.Vector.field(3, ti.f32, bodies)  # of the centre in the step [m]
+        self.mean_velocity = ti.Vector.field(3, ti.f32, bodies)  # of the centre [m/s]
+        self.size = ti.field(ti.f32, bodies)  # largest side [m]
+        self.mobility = ti.field(ti.f32, bodies)  # inverse mass; 0 where pinned or not moving [1/kg]
+        self.parting_shift = ti.Vector.field(3, ti.f32, bodies)  # displacement that all partners ask for [m]
+        self.parting_kick = ti.Vector.field(3, ti.f32, bodies)  # change of velocity [m/s]
 
-    def carried(self) -> list[Any]:
-        """What the next step depends on, of each particle."""
-        return [self.kept_triangle, self.kept_normal_impulse, self.kept_friction_impulse]
+    def carried(self) -> list[list[Any]]:
+        """What the next step depends on: of each particle, each body."""
+        return [[self.kept_triangle, self.kept_normal_impulse, self.kept_friction_impulse], [self.overlap]]

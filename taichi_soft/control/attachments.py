@@ -17,6 +17,7 @@ from taichi_soft.core.errors import StateError
 from taichi_soft.core.handles import Handle, recorded, serial_of
 from taichi_soft.core.math.rotations import turned
 from taichi_soft.core.serialisation import below, indices_below
+from taichi_soft.core.types import Schedule
 
 
 class Attachment(Handle):
@@ -116,9 +117,11 @@ class Attachments(Slice):
             return
         frame = Frame(self._frames, np.zeros(3), None)
         self.context.handles.enlist(frame)
-        held = attach(body, free[:1], frame, two_way=True)
+        is_felt = self.context.settings.schedule is not Schedule.FLAT
+        held = attach(body, free[:1], frame, two_way=is_felt)
         step()
-        _ = held.force, held.torque
+        if is_felt:
+            _ = held.force, held.torque
         held.release()
         frame.remove()
 

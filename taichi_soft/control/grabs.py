@@ -107,7 +107,9 @@ class Grabs(Numbered[Grab]):
             grab.release()
 
     def warm_up(self, body: SoftBody, other: SoftBody | None, step: Callable[[], None]) -> None:
-        """Take hold of a body, move it and let go."""
+        """Take hold of a body that has a surface, move it and let go."""
+        if len(body.surface) == 0:
+            return
         with contextlib.suppress(StateError):  # all are in use, which compiles them too
             grab = grab_at(body, 0, (1 / 3, 1 / 3, 1 / 3), None, 5.0, None)
             grab.move(grab.point)

@@ -69,7 +69,7 @@ class DroppedEventsWarning(UserWarning):
 
 
 class SolverWarning(UserWarning):
-    """An implicit solve stopped before it was as exact as asked for."""
+    """An implicit solve stopped before it was as exact as asked for, or tetrahedra stay inside out."""
 
 
 class SkippedCellsWarning(UserWarning):

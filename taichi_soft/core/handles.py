@@ -33,6 +33,12 @@ class Handle:
     _handles: Handles
     _serial: int
 
+    def _keep(self) -> bytes | None:
+        raise NotImplementedError
+
+    def _undo(self, data: bytes) -> None:
+        raise NotImplementedError
+
     def __init_subclass__(cls) -> None:
         """Guard the public methods."""
         for name, method in list(vars(cls).items()):
@@ -72,6 +78,19 @@ def serial_of(handle: Handle) -> int:
 def handles_of(handle: Handle) -> Handles:
     """All handles of the same world."""
     return handle._handles
+
+
+def keep(world: Handle) -> bytes | None:
+    """A snapshot for `undo`, before changes for a step; None if no step of this world may be refused."""
+    return world._keep()
+
+
+def undo(world: Handle, data: bytes) -> None:
+    """Put a world back to what it was since `keep`, where no step was made since.
+
+    Unlike `World.restore` that keeps the events that wait, and does not count as another past.
+    """
+    world._undo(data)
 
 
 def recorded(method: Method) -> Method:

@@ -69,6 +69,13 @@ class Schedule(Choice):
     FLAT = "flat"  # all tetrahedra of all bodies in parallel, substep by substep
 
 
+class Overlap(Choice):
+    """What becomes of a body that is placed inside others."""
+
+    PART = "part"  # they are moved apart over the next steps
+    REFUSE = "refuse"  # it is not placed
+
+
 StrainName: TypeAlias = Strain | Literal["linear", "exact"]
 FlipsName: TypeAlias = Flips | Literal["tolerant", "recover", "off"]
 DampingModelName: TypeAlias = DampingModel | Literal["edge", "tet_mean"]
@@ -76,6 +83,7 @@ IntegratorName: TypeAlias = (
     Integrator | Literal["explicit_euler", "leapfrog", "lazy_leapfrog", "implicit_euler"]
 )
 ScheduleName: TypeAlias = Schedule | Literal["auto", "per_body", "flat"]
+OverlapName: TypeAlias = Overlap | Literal["part", "refuse"]
 ArchName: TypeAlias = Literal["auto", "cpu", "cuda", "vulkan", "metal"]
 CageMethodName: TypeAlias = Literal["lattice", "tetgen", "ftetwild"]
 LawName: TypeAlias = Literal[

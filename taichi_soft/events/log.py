@@ -123,11 +123,14 @@ class EventLog:
         """What the events of coming steps depend on."""
         return self._observer.remember(self._kinds)
 
-    def recall(self, memory: Memory, step: int, known: Known) -> None:
-        """The world was put back to a state of that step count: what waits of later steps never happened."""
+    def forget_since(self, step: int) -> None:
+        """Drop the events that wait from that step on: it was undone."""
         while self._waiting and self._waiting[-1].step >= step:
             self._waiting.pop()
         self._heard = min(self._heard, len(self._waiting))
+
+    def recall(self, memory: Memory, step: int, known: Known) -> None:
+        """Look at the world, which was put back to a state of that step count, as after that step."""
         self._observer.recall(self._kinds, memory, step, known)
 
     def collect(self, step: int, time: float, dt: float) -> str:

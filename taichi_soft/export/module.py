@@ -7,7 +7,7 @@ from inspect import signature
 from typing import Any
 
 from taichi_soft.bodies.kernels.readout import read_positions
-from taichi_soft.contact.kernels.collider_rows import sum_collider_impulses
+from taichi_soft.contact.kernels.collider_rows import forget_collider, sum_collider_impulses
 from taichi_soft.contact.kernels.touches import read_touches
 from taichi_soft.control.kernels.drives import add_push
 from taichi_soft.control.kernels.impulses import add_impulse_near, add_radial_impulse, add_velocity
@@ -52,6 +52,7 @@ def kernels_of(context: WorldContext, meshes: Sequence[ExportedMesh]) -> Kernels
     found = {name: _example(kernel, state=state) for name, kernel in _SERIAL.items()}
     if program.has_contact:
         found["step"] = _example(step_islands, state=state, program=program)
+        found["forget_collider"] = _example(forget_collider, contact=state.contact)
         found["sum_collider_impulses"] = _example(sum_collider_impulses, contact=state.contact)
     elif len(context.slots.slots) == 1 or device().threads == 1:
         found["step"] = _example(step_in_turn, state=state, program=program)

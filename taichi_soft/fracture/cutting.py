@@ -24,6 +24,7 @@ from taichi_soft.bodies.status import ABSENT, ACTIVE
 from taichi_soft.bodies.tet_constants import write_tet_constants
 from taichi_soft.contact.hull_fields import touching_rows
 from taichi_soft.control.attachments import share_attachments
+from taichi_soft.control.easing import Easings
 from taichi_soft.control.frictions import give_friction
 from taichi_soft.core.checks import as_array, as_vector
 from taichi_soft.core.errors import OptionError, StateError
@@ -189,11 +190,11 @@ def _settle(context: Context, body: SoftBody, pieces: list[_Piece], slots: list[
     state = built.state
     motion = np.empty((body.vertex_count, MOTION_WIDTH), dtype=np.float32)
     read_motion(state, body.index, motion)
-    inverses = None
+    inverses, tet_order = None, context.layout.bodies[body.index].tet_order
     if state.capacity.plastic:
         inverses = np.empty((len(body.tets), 3, 3), dtype=np.float32)
         read_rest_inverses(state, body.index, inverses)
-        inverses = inverses[np.argsort(context.layout.bodies[body.index].tet_order)]
+        inverses = inverses[np.argsort(tet_order)]
     for slot, piece in zip([body.index, *slots], pieces, strict=False):
         rows = motion[piece.vertices]
         free = rows[:, 12] > 0.0
@@ -215,6 +216,9 @@ def _settle(context: Context, body: SoftBody, pieces: list[_Piece], slots: list[
             give_friction(state, each, body.friction)
     share_attachments(
         body, [(each, piece.vertices) for each, piece in zip((body, *fallen), pieces, strict=True)]
+    )
+    context.of(Easings).share(
+        body, tet_order, [(each, piece.tets) for each, piece in zip((body, *fallen), pieces, strict=True)]
     )
     built.was_cut(body)
     return fallen

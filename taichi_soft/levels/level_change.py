@@ -70,6 +70,7 @@ def set_level(body: SoftBody, level: Any, release: Any) -> tuple[Handle, ...]:
     status = int(state.body_status[body.index])
     write_slot(context, state, body.index, arrays, rows.astype(np.float32), status, body.index, None)
     write_surface(context, state, body.index, target)
+    context.built.was_placed(body)
     record_of(body).become(None, wanted)
     redescribe(body, target.description, arrays)
     if record_of(body).friction is not None:

@@ -39,6 +39,7 @@ from taichi_soft.live.scene import SceneSource
 from taichi_soft.live.tints import QUANTITIES
 from taichi_soft.live.uploads import require_mesh
 from taichi_soft.live.wishes import wish_of
+from taichi_soft.meshing.surfaces import Up, assumed_up
 
 UNSEEN = 2
 """Pictures on their way to a visitor: more wait until it has shown one of these, and are then left out."""
@@ -69,7 +70,7 @@ class Visitor:
     seen: int = 0  # that it has told to be shown
     last: dict[int, tuple[int, int, int]] = field(default_factory=dict)  # by pane: runner, version, number
     told: list[str] = field(default_factory=list)  # words that wait to be sent
-    upload: str | None = None  # name of the file that comes next
+    upload: tuple[str, Up | None] | None = None  # name and upward axis of the file that comes next
     wake: asyncio.Event = field(default_factory=asyncio.Event)
 
 
@@ -345,7 +346,7 @@ class LiveServer:
         elif self.attached is not None and do not in VIEWED:
             raise OptionError("the program that steps this world decides that")
         elif do == "upload":
-            visitor.upload = wish["name"]
+            visitor.upload = wish["name"], wish["up"]
         elif do in ("choose", "compare"):
             self._choose(do, wish)
         elif do == "alone":
@@ -421,24 +422,25 @@ class LiveServer:
 
     def _take_upload(self, visitor: Visitor, content: bytes) -> None:
         """A visitor's mesh: looked at in a process of its own, and then a world with room for it is made."""
-        name, visitor.upload = visitor.upload, None
-        if name is None:
+        upload, visitor.upload = visitor.upload, None
+        if upload is None:
             raise OptionError("a file came without its name")
         if self._is_reading:
             raise OptionError("another file is being read: wait until it is there")
         if len(self._source(0).meshes) >= MOST_MESHES:
             raise OptionError(f"{MOST_MESHES} meshes were added: that is what there is room for")
         self._is_reading = True
-        task = self._loop.create_task(self._add_mesh(visitor, name, content))
+        task = self._loop.create_task(self._add_mesh(visitor, *upload, content))
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 
-    async def _add_mesh(self, visitor: Visitor, name: str, content: bytes) -> None:
-        self._tell(visitor, f"looking at {name}")
+    async def _add_mesh(self, visitor: Visitor, name: str, up: Up | None, content: bytes) -> None:
+        assumed = assumed_up(Path(name).name) if up is None else ""
+        self._tell(visitor, f"looking at {name}" + (f": {assumed}" if assumed else ""))
         taken = {*SHAPES, *(Path(each).stem for each in self._source(0).meshes)}
         folder = Path(self._folder.name) / f"mesh{secrets.token_hex(4)}"
         try:
-            path = await asyncio.to_thread(require_mesh, folder, name, content, taken)
+            path = await asyncio.to_thread(require_mesh, folder, name, content, taken, up)
         except TaichiSoftError as error:
             self._put(visitor, refused=str(error))
             return

@@ -10,8 +10,11 @@ from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from pathlib import Path
 
+from taichi_soft.bake.axes import y_up
 from taichi_soft.core.errors import MeshError, OptionError
 from taichi_soft.live.guard import LARGEST_UPLOAD
+from taichi_soft.meshing.surface import Surface
+from taichi_soft.meshing.surfaces import UP, Up
 
 KINDS = (".glb", ".obj", ".ply", ".stl", ".off")
 """Files of one piece. A .gltf names others, which a visitor could choose."""
@@ -22,13 +25,16 @@ MOST_SECONDS = 60.0
 MOST_TRIANGLES = 200_000
 
 
-def require_mesh(folder: Path, name: str, content: bytes, taken: Collection[str] = ()) -> Path:
+def require_mesh(
+    folder: Path, name: str, content: bytes, taken: Collection[str] = (), up: Up | None = None
+) -> Path:
     """Keep a visitor's file in a new folder, once it is known to make a body.
 
     Args:
         folder: is made, for this file alone.
         name: as the visitor calls it: what is no letter, digit, - or _ is left out, folders too.
         taken: names that others have, by which bodies are told apart: a number is put behind one of these.
+        up: axis that points up in it. If that is not the usual one of its format, it is kept as .glb.
     Raises: OptionError for a file that is too large or of another kind; MeshError for one that makes no body.
     """
     suffix = Path(name).suffix.lower()
@@ -43,7 +49,7 @@ def require_mesh(folder: Path, name: str, content: bytes, taken: Collection[str]
     path.write_bytes(content)
     spawning = get_context("spawn")
     mine, theirs = spawning.Pipe(duplex=False)
-    process = spawning.Process(target=_look_at, args=(str(path), theirs), daemon=True)
+    process = spawning.Process(target=_look_at, args=(str(path), up, theirs), daemon=True)
     process.start()
     theirs.close()
     try:
@@ -55,22 +61,44 @@ def require_mesh(folder: Path, name: str, content: bytes, taken: Collection[str]
     if words:
         shutil.rmtree(folder, ignore_errors=True)
         raise MeshError(f"{name!r} makes no body: {words}")
-    return path
+    turned = path.with_suffix(".glb")
+    return turned if turned.is_file() else path
 
 
-def _look_at(path: str, connection: Connection) -> None:
-    """Make a body of it. Sends: "" or what is wrong."""
+def _look_at(path: str, up: Up | None, connection: Connection) -> None:
+    """Make a body of it, and write it as .glb if another axis points up than the usual one of its format.
+
+    Sends: "" or what is wrong.
+    """
     from taichi_soft.bodies.asset import SoftBodyAsset
     from taichi_soft.live.choices import VISITOR
 
     try:
-        asset = SoftBodyAsset.from_surface(Path(path), VISITOR)
+        asset = SoftBodyAsset.from_surface(Path(path), VISITOR, up=up)
         triangles = sum(len(skin.surface.triangles) for skin in asset.skins)
         if triangles > MOST_TRIANGLES:
             connection.send(f"it has {triangles:,} triangles, and {MOST_TRIANGLES:,} are taken")
         elif max(asset.mesh.bounds[1] - asset.mesh.bounds[0]) > 20.0:
             connection.send("it is larger than 20 m: scale it to metres")
         else:
+            if up not in (None, UP[Path(path).suffix]):
+                _write_glb(asset.skin, Path(path).with_suffix(".glb"))
             connection.send("")
     except Exception as error:
         connection.send(str(error) or type(error).__name__)
+
+
+def _write_glb(surfaces: tuple[Surface, ...], path: Path) -> None:
+    import trimesh  # half a second that a server need not wait for
+
+    scene = trimesh.Scene()
+    for number, each in enumerate(surfaces):
+        mesh = trimesh.Trimesh(
+            y_up(each.vertices),
+            each.triangles,
+            vertex_normals=y_up(each.normals),
+            visual=each.visual,
+            process=False,
+        )
+        scene.add_geometry(mesh, node_name=f"mesh {number}")
+    path.write_bytes(scene.export(file_type="glb", include_normals=True))

@@ -113,6 +113,10 @@ def _choose(said: dict[str, Any]) -> dict[str, Any]:
     }
 
 
+def _upload(said: dict[str, Any]) -> dict[str, Any]:
+    return {**_name(said), "up": _one_of(said, "up", ("y", "z"))}
+
+
 def _save(said: dict[str, Any]) -> dict[str, Any]:
     what = _one_of(said, "what", SAVED)
     if what is None:
@@ -136,6 +140,6 @@ _CHECKS = {
     "compare": _choose,
     "alone": _nothing,
     "save": _save,
-    "upload": _name,
+    "upload": _upload,
 }
 """By what a message asks for."""

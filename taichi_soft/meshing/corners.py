@@ -15,6 +15,9 @@ Ints = NDArray[np.int64]
 NONE = -1
 """Row of a corner that lacks an attribute."""
 
+BEYOND = 1 << 40
+"""Row of an index that counts back beyond the first row: none has it."""
+
 
 @dataclass(frozen=True, eq=False)
 class Attribute:
@@ -78,9 +81,10 @@ def require_vertices(corners: Ints, counts: Ints, vertex_count: int) -> None:
     if outside.any():
         at = int(np.argmax(outside))
         face = int(np.searchsorted(np.cumsum(counts), at, side="right"))
+        named = f"vertex {int(corners[at])}" if 0 <= corners[at] < BEYOND else "a vertex before the first one"
         raise MeshError(
-            f"face {face} names vertex {int(corners[at])}, and there are {vertex_count}, counted from 0: the "
-            "file is cut short or damaged, export it anew"
+            f"face {face} names {named}, and there are {vertex_count:,}, counted from 0: the file is cut "
+            "short or damaged, export it anew"
         )
 
 

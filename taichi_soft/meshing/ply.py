@@ -65,11 +65,11 @@ def read_ply(path: Path) -> list[Surface]:
     """
     data = path.read_bytes()
     order, elements, textures, body = _header(data)
-    read = {}
+    read: dict[str, Columns] = {}
     rest = _Text(body) if order == "" else _Binary(body, order)
     for element in elements:
         read[element.name] = rest.read(element)
-        if element.name in ("face", "tristrips"):
+        if "vertex" in read and ("face" in read or "tristrips" in read):
             break  # what is behind belongs to no triangle
     vertices, faces = read.get("vertex", {}), read.get("face", {})
     corners = next((faces[name] for name in ("vertex_indices", "vertex_index") if name in faces), None)

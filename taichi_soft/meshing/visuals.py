@@ -83,17 +83,19 @@ def read_picture(name: str, content: bytes) -> Any:
     return image
 
 
-def find_beside(path: Path, name: str) -> Path | None:
+def find_beside(path: Path, name: str, folder: Path | None = None) -> Path | None:
     """The file that another one names, or None.
 
-    What a visitor of a server sends must not read what is elsewhere: it is looked for by its path from the
-    folder of the file, then by its name in that folder, and never outside of the folder above.
+    It is looked for by its path from `folder` and from the folder of the file, then by its name in that
+    folder, whatever its case; never outside of the folder above, as visitors of a server send such files.
     """
     parts = [part for part in name.strip().strip('"').replace("\\", "/").split("/") if part not in ("", ".")]
     if not parts:
         return None
     allowed = path.resolve().parent.parent
-    for candidate in (path.parent.joinpath(*parts), path.parent / parts[-1]):
+    alike = (each for each in sorted(path.parent.iterdir()) if each.name.lower() == parts[-1].lower())
+    folders = (path.parent if folder is None else folder, path.parent)
+    for candidate in (*(each.joinpath(*parts) for each in folders), *alike):
         try:
             found = candidate.resolve()
             if found.is_file() and found.is_relative_to(allowed):

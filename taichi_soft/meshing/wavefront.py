@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from taichi_soft.core.errors import MeshError
 from taichi_soft.meshing.arrays import FloatArray, as_points
-from taichi_soft.meshing.corners import NONE, Attribute, require_vertices, split
+from taichi_soft.meshing.corners import BEYOND, NONE, Attribute, require_vertices, split
 from taichi_soft.meshing.surface import Surface, surface_of, vertex_normals
 from taichi_soft.meshing.text import as_ascii, decoded, numbers
 from taichi_soft.meshing.triangulation import triangulated
@@ -26,9 +26,6 @@ Ints = NDArray[np.int64]
 
 LEFT_OUT = {b"l": "lines", b"p": "points", b"curv": "curves", b"curv2": "curves", b"surf": "curved surfaces"}
 """Statements that make no triangles."""
-
-BEYOND = 1 << 40
-"""Row of an index that counts back beyond the first row: none has it."""
 
 
 @dataclass
@@ -46,6 +43,12 @@ class _Content:
     objects: set[str] = field(default_factory=set)
     left_out: dict[str, int] = field(default_factory=dict)
 
+    def name_of(self, material: str, is_one: bool) -> str:
+        """Name of the surface of a material: the object's, if it is the only one of the file."""
+        if not is_one:
+            return material
+        return next(iter(self.objects)) if len(self.objects) == 1 else ""
+
 
 def read_obj(path: Path) -> list[Surface]:
     """Surfaces of a .obj file, in its own axes and units.
@@ -53,7 +56,6 @@ def read_obj(path: Path) -> list[Surface]:
     Raises: MeshError for numbers that are none, and for faces of vertices that are not there.
     """
     said = _statements(path.read_bytes())
-    notes = [f"{count:,} {what} are left out" for what, count in said.left_out.items()]
     if not said.counts:
         return []
     points, colors = _points(said.vertices)
@@ -61,42 +63,50 @@ def read_obj(path: Path) -> list[Surface]:
     normals = numbers(said.normals, 3, "normal", may_lack=True)
     rows, counts = np.array(said.corners, dtype=np.int64), np.array(said.counts, dtype=np.int64)
     require_vertices(rows[:, 0], counts, len(points))
-    for column, table, what in ((1, places, "texture coordinates"), (2, normals, "normals")):
-        is_missing = rows[:, column] >= len(table)
-        rows[is_missing, column] = NONE
-        if is_missing.any():
-            count = int(is_missing.sum())
-            who = "1 corner of a face names" if count == 1 else f"{count:,} corners of faces name"
-            notes.append(f"{who} {what} that are not there")
+    points = as_points(points)
+    looks, notes = read_materials(path, said.libraries, set(said.materials) - {""})
+    notes += [f"{count:,} {what} are left out" for what, count in said.left_out.items()]
+    notes += _without_missing(rows, len(places), len(normals))
     triangles, face = triangulated(points[rows[:, 0]], counts)
-    corners = rows[triangles]
+    corners, material = rows[triangles], np.array(said.material)[face]
     smooth = vertex_normals(points, corners[..., 0])
-    looks, told = read_materials(path, said.libraries, set(said.materials) - {""})
-    material, names = np.array(said.material)[face], list(said.materials)
-    numbers_used, first = np.unique(material, return_index=True)
-    is_one = len(numbers_used) == 1
+    used, first = np.unique(material, return_index=True)
     surfaces = []
-    for number in numbers_used[np.argsort(first)]:
+    for number in used[np.argsort(first)]:
         vertex, place, normal = np.moveaxis(corners[material == number], 2, 0)
         attributes = Attribute(places, place), Attribute(normals, normal)
-        made = split(len(points), vertex, attributes, keep=is_one)
+        made = split(len(points), vertex, attributes, keep=len(used) == 1)
         uv, own = made.attributes
-        name = (next(iter(said.objects)) if len(said.objects) == 1 else "") if is_one else names[number]
+        name = list(said.materials)[number]
+        shades = None if colors is None else colors[made.vertex]
         surfaces.append(
             surface_of(
-                name or path.name,
+                said.name_of(name, len(used) == 1) or path.name,
                 points[made.vertex],
                 made.triangles,
                 normals=np.where(np.isnan(own), smooth[made.vertex], own),
-                visual=visual_of(
-                    uv=uv,
-                    colors=None if colors is None else colors[made.vertex],
-                    look=looks.get(names[number]),
-                ),
-                notes=(*notes, *told),
+                visual=visual_of(uv=uv, colors=shades, look=looks.get(name)),
+                notes=tuple(notes),
             )
         )
     return surfaces
+
+
+def _without_missing(rows: Ints, places: int, normals: int) -> list[str]:
+    """Take texture coordinates and normals that are not there from corners (k, 3), and say how many.
+
+    Args:
+        places, normals: how many there are.
+    """
+    notes = []
+    for column, length, what in ((1, places, "texture coordinates"), (2, normals, "normals")):
+        is_missing = rows[:, column] >= length
+        rows[is_missing, column] = NONE
+        count = int(is_missing.sum())
+        if count:
+            who = "1 corner of a face names" if count == 1 else f"{count:,} corners of faces name"
+            notes.append(f"{who} {what} that are not there")
+    return notes
 
 
 def _statements(data: bytes) -> _Content:
@@ -175,7 +185,7 @@ def _row(index: bytes, length: int) -> int:
 
 def _points(rows: list[list[bytes]]) -> tuple[FloatArray, FloatArray | None]:
     """Vertices (n, 3), and their colours (n, 3) where all have some behind."""
-    points = as_points(numbers(rows, 3, "vertex"))
+    points = numbers(rows, 3, "vertex")
     if rows and all(len(row) >= 6 for row in rows):
         return points, numbers([row[3:6] for row in rows], 3, "colour of vertex")
     return points, None

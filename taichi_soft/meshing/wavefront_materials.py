@@ -31,7 +31,7 @@ def read_materials(path: Path, libraries: list[bytes], wanted: set[str]) -> tupl
         for file in filter(None, files):
             for name, (color, texture) in _materials(file.read_bytes()).items():
                 if name in wanted and name not in looks:
-                    picture = _picture(path, texture, pictures, notes) if texture else None
+                    picture = _picture(path, file, texture, pictures, notes) if texture else None
                     looks[name] = Look(name, color, picture)
     lost = sorted(wanted - set(looks))
     if lost and looks:
@@ -40,9 +40,11 @@ def read_materials(path: Path, libraries: list[bytes], wanted: set[str]) -> tupl
     return looks, notes
 
 
-def _picture(path: Path, texture: bytes, pictures: dict[Path, object], notes: list[str]) -> object:
+def _picture(
+    path: Path, library: Path, texture: bytes, pictures: dict[Path, object], notes: list[str]
+) -> object:
     name = decoded(texture)
-    file = find_beside(path, name)
+    file = find_beside(path, name, library.parent)
     if file is None:
         notes.append(f"the texture {name} is not read: there is no such file beside it")
         return None

@@ -42,7 +42,7 @@ from taichi_soft.persistence.world_structure import require_structure, structure
 from taichi_soft.solver.context import WorldContext
 from taichi_soft.solver.state import State
 
-MARK, VERSION = b"TSOFTSNP", 11
+MARK, VERSION = b"TSOFTSNP", 12
 
 Words = NDArray[np.int32]
 
@@ -88,8 +88,11 @@ def carried_rows(context: WorldContext) -> list[int]:
     return rows
 
 
-def restore_snapshot(context: WorldContext, data: Any) -> None:
-    """As `World.restore`."""
+def restore_snapshot(context: WorldContext, data: Any, *, keeps_events: bool = False) -> None:
+    """As `World.restore`.
+
+    Args: keeps_events: no step was made since, so the events that wait are not undone.
+    """
     state = context.built.state
     structure, content, rows, remembered = _four(unseal(data, MARK, VERSION, "snapshot"))
     require_structure(bytes(structure), _structure(context))
@@ -117,6 +120,8 @@ def restore_snapshot(context: WorldContext, data: Any) -> None:
     context.handles.count = manifest.handles
     find = context.handles.find
     known = Known(lambda serial: find(serial, SoftBody), lambda serial: find(serial, Collider))
+    if not keeps_events:
+        context.built.events.forget_since(manifest.steps)
     context.built.events.recall(memory, manifest.steps, known)
 
 

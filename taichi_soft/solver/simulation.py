@@ -18,12 +18,14 @@ from taichi_soft.bodies.soft_body import SoftBody, present_asset, record_of
 from taichi_soft.bodies.status import ASLEEP, FROZEN
 from taichi_soft.contact.clearance import require_clear
 from taichi_soft.contact.colliders import Colliders
+from taichi_soft.contact.kernels.parting import mark_placed
+from taichi_soft.control.easing import Easings
 from taichi_soft.control.frames import Frames
 from taichi_soft.control.joints import Joints
 from taichi_soft.control.pins import pinned_vertices
 from taichi_soft.core.clock import Clock
 from taichi_soft.core.constants import POSITION_LIMIT, VELOCITY_LIMIT
-from taichi_soft.core.errors import DroppedEventsWarning, OptionError, SolverWarning, StateError
+from taichi_soft.core.errors import OptionError, SolverWarning, StateError
 from taichi_soft.core.settings import Settings
 from taichi_soft.events import EventLog
 from taichi_soft.fracture.tearing import Tears
@@ -34,6 +36,7 @@ from taichi_soft.solver.kernels.skipping import begin_skips, end_skips, skip_bod
 from taichi_soft.solver.kernels.sleep import wake_body, wake_near
 from taichi_soft.solver.kernels.spawn import despawn_body, spawn_body
 from taichi_soft.solver.kernels.step import ALL_SLEEP
+from taichi_soft.solver.kernels.untangling import REPORTED
 from taichi_soft.solver.program import StepProgram
 from taichi_soft.solver.readout import Readout
 from taichi_soft.solver.schedules import Launch
@@ -49,6 +52,7 @@ class Simulation:
     scene: Scene
     clock: Clock
     frames: Frames
+    easings: Easings
     joints: Joints
     colliders: Colliders | None  # None in a world without contact
     sleeps: bool  # whether bodies fall asleep
@@ -59,10 +63,12 @@ class Simulation:
     events: EventLog
     tears: Tears
     readout: Readout = field(init=False)
-    troubled: int = 0  # bodies that failed in the last step, or whose solves were not exact
+    loss: str = ""  # why the last step lost events, the first time since a drain
+    troubled: int = 0  # bodies that failed in the last step, stay inside out, or whose solves were not exact
     _skips: bool = True  # somebody may stand still in the coming step
     _is_still: bool = False  # none was awake after the last step, and nothing was changed since
     _warned: set[int] = field(default_factory=set)  # slots of bodies with such solves
+    _inverted: set[int] = field(default_factory=set)  # slots of bodies that were reported as inside out
 
     def __post_init__(self) -> None:
         self.readout = Readout(self.settings, self.state, self.program, self.scene, self.joints)
@@ -70,6 +76,8 @@ class Simulation:
     def step(self, seconds: float, substeps: int, h: float) -> list[str]:
         """Make one fixed step of `seconds`, in substeps of `h` [s]. Returns a line for each body it froze."""
         clock, colliders = self.clock, self.colliders
+        if self.easings.by_body:
+            self.easings.advance(seconds)
         self.frames.aim(self.state, len(self.pools.slots), seconds)
         goes_on = not self._is_still or self.frames.has_work
         if colliders is not None:
@@ -86,9 +94,7 @@ class Simulation:
         clock.steps += 1
         clock.time += seconds
         clock.last_dt = seconds
-        loss = self.events.collect(clock.steps - 1, clock.time, seconds)
-        if loss:
-            warnings.warn(loss, DroppedEventsWarning, stacklevel=4)
+        self.loss = self.events.collect(clock.steps - 1, clock.time, seconds)
         if self._skips:
             skipped = end_skips(self.state, len(self.pools.slots))
             self._is_still, self._skips = self._is_still and not skipped, False
@@ -105,6 +111,7 @@ class Simulation:
         self.launch(1, seconds)
         end_skips(self.state, len(self.pools.slots))
         self.state.body_status.to_numpy()  # as where a body fails
+        self.state.body_patience.to_numpy()  # as where a body stays inside out
 
     def _note_failures(self, substeps: int, h: float) -> list[str]:
         """Mark the bodies that the last step froze; a line about each."""
@@ -138,6 +145,22 @@ class Simulation:
             )
         return "Use more substeps or a softer material"
 
+    def check_shapes(self) -> None:
+        """Warn of bodies that keep tetrahedra inside out, once of each."""
+        patience = self.state.body_patience.to_numpy()
+        for body in self.pools.living:
+            index = body.index
+            if patience[index] < REPORTED or index in self._inverted or body.is_frozen:
+                continue
+            self._inverted.add(index)
+            warnings.warn(
+                f"body {index} has tetrahedra that stay inside out, as where its weight folds it. "
+                "body.flipped_tets() lists them. Take a larger Young's modulus, a coarser mesh or "
+                "mesh.improved()",
+                SolverWarning,
+                stacklevel=4,
+            )
+
     def check_solves(self) -> None:
         """Warn of bodies whose implicit solves were not exact in the last step, once of each."""
         if not self.settings.is_implicit:
@@ -165,6 +188,7 @@ class Simulation:
     def empty(self, slot: int) -> None:
         """Take the body in a slot out of the fields."""
         self._warned.discard(slot)
+        self._inverted.discard(slot)
         self._is_still = False
         despawn_body(self.state, slot)
 
@@ -240,6 +264,7 @@ class Simulation:
                 raise OptionError(f"{name} must lie within {limit:g} of zero")
         left = self.box_of(body)
         write_motion(self.state, body.index, x, v)
+        self.was_placed(body)
         self.rouse(body.index)
         self.wake_near(*left)
 
@@ -273,6 +298,11 @@ class Simulation:
         """Have other gravity, or another friction of the floor."""
         self.settings = self.readout.settings = settings
         self.state.write_surroundings(settings)
+
+    def was_placed(self, body: SoftBody) -> None:
+        """Look for bodies that a body overlaps, in the next step."""
+        if self.program.has_soft_contact:
+            mark_placed(self.state, body.index)
 
     def was_cut(self, body: SoftBody) -> None:
         """Take note that a body has other vertices."""

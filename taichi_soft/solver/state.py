@@ -71,7 +71,8 @@ class State(BodyFields):
         if self.capacity.has_contact:
             groups["joints"], groups["colliders"] = self.joints.carried(), self.contact.carried()
         if self.capacity.contact.soft:
-            groups["colliders"][0] += self.soft.carried()
+            for group, fields in zip(groups["colliders"], self.soft.carried(), strict=False):
+                group += fields
         if self.capacity.contact.hull:
             groups["colliders"][0] += self.hull.carried()
         return groups
@@ -118,5 +119,7 @@ class State(BodyFields):
             fill(self.soft.kept_normal_impulse, np.zeros(0))
             fill(self.soft.records_touches, np.zeros(0))
             fill(self.soft.pairs_lost, np.zeros(0))
+            fill(self.soft.overlap, np.zeros(0))
+            fill(self.soft.partner_count, np.zeros(0))
             fill(self.soft.pair_bodies, np.zeros((0, 2)))
             fill(self.soft.pair_impulse, np.zeros((0, 3)))

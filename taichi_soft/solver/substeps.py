@@ -54,6 +54,11 @@ class Substeps:
         self._warned: set[float] = set()
         self._most, self._is_said = most, False
 
+    @property
+    def has_limit(self) -> bool:
+        """True if a step that needs too many is refused."""
+        return self._most is not None
+
     def stable_step(self, body: SoftBody) -> StableStep:
         """As `World.stable_step`."""
         described = record_of(body).description

@@ -250,7 +250,10 @@ class BodyControl(SoftBody):
     def set_material(self, material: AnyMaterial) -> None:
         """Make the body of another material of the same kind, from now on, as if it had been added with it.
 
-        Positions and velocities stay, so another density changes its momentum. `World.stable_substeps` and
+        Positions and velocities stay, so another density changes its momentum. A stiffer law would find more
+        strain energy in a deformed body and throw it. So if the body becomes stiffer by that, the change is
+        eased in over half a second, or 1.3 periods of its slowest vibration where that is longer, and
+        vibrations fade meanwhile; `material` is the new one at once. `World.stable_substeps` and
         steps without given substeps reflect it at once, at the price of a new estimate (some 0.2 s for 5,000
         tetrahedra); with substeps given nothing is estimated, and nothing warns of too few.
         Args:

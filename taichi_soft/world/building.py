@@ -16,6 +16,7 @@ from taichi_soft.contact.clearance import free_points, require_clear
 from taichi_soft.contact.colliders import ignore
 from taichi_soft.contact.fields import ContactCapacity
 from taichi_soft.contact.shapes import PlaneShape
+from taichi_soft.control.easing import Easings
 from taichi_soft.control.frames import Frames
 from taichi_soft.control.joints import Joints
 from taichi_soft.core.constants import ALL_GROUPS
@@ -84,6 +85,7 @@ def build(context: WorldContext) -> Simulation:
         scene,
         context.clock,
         context.of(Frames),
+        context.of(Easings),
         context.of(Joints),
         colliders if has_contact else None,
         contact.sleep_speed > 0.0,

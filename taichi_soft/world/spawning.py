@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from taichi_soft.bodies.asset import Floats32, SoftBodyAsset
 from taichi_soft.bodies.soft_body import lives_in, present_asset, record_of, require_alive
 from taichi_soft.contact.clearance import free_points, require_clear
+from taichi_soft.contact.overlap import Placed, require_apart
+from taichi_soft.control.constants import write_constants
 from taichi_soft.control.frictions import give_friction
-from taichi_soft.control.materials import set_material
 from taichi_soft.core.checks import as_count, as_flag, as_rotation, as_vector
 from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.core.math.rotations import turned
 from taichi_soft.core.serialisation import digest_of
+from taichi_soft.core.types import Overlap, OverlapName
 from taichi_soft.fracture.cutting import refill_slot, write_surface
 from taichi_soft.fracture.tearing import Tears
 from taichi_soft.solver.context import WorldContext
@@ -44,12 +47,14 @@ def add_body(
     rotation: ArrayLike | None,
     velocity: ArrayLike,
     on_floor: bool,
+    overlap: OverlapName,
 ) -> Body:
     """As `World.add_body`, of an asset made for it; copies share the first one."""
-    key = _content(new)
+    rule, key = Overlap.parse(overlap), _content(new)
     asset = context.slots.added.get(key, new)
     place = _place(context, asset, position, rotation, on_floor)
     rows = asset.placed(place, rotation, velocity, (0.0, 0.0, 0.0), context.settings.floor)
+    _require_apart(context, asset, rows, rule)
     _add_slot(context, asset)
     context.slots.added[key] = asset
     return enter(context, asset, rows)
@@ -94,14 +99,17 @@ def spawn(
     velocity: ArrayLike,
     angular_velocity: ArrayLike,
     on_floor: bool,
+    overlap: OverlapName,
 ) -> Body:
     """As `World.spawn`."""
     _require_asset(asset)
+    rule = Overlap.parse(overlap)
     context.slots.next_slot(asset)
     place = _place(context, asset, position, rotation, on_floor)
     rows = asset.placed(place, rotation, velocity, angular_velocity, context.settings.floor)
     if context.fields is not None:
         require_clear(context.colliders.handles, asset, free_points(asset, rows), "the body")
+    _require_apart(context, asset, rows, rule)
     return enter(context, asset, rows)
 
 
@@ -128,6 +136,26 @@ def _place(
     return (x, y, z + floor - float(points[:, 2].min()))
 
 
+def _require_apart(context: WorldContext, asset: SoftBodyAsset, rows: Floats32, rule: Overlap) -> None:
+    """Raises: OptionError where a body that begins as `rows` overlaps others, if `rule` says so."""
+    if rule is Overlap.REFUSE and context.contact.soft:
+        mesh, starts = asset.mesh, context.slots.starts
+        others = (
+            Placed(
+                f"body {body.index}",
+                present_asset(body),
+                body.tets,
+                body.surface,
+                np.asarray(
+                    body.positions() if context.fields else starts[body.index][:, :3], dtype=np.float64
+                ),
+            )
+            for body in context.slots.living
+        )
+        place = rows[:, :3].astype(np.float64)
+        require_apart(Placed("the body", asset, mesh.tets, mesh.surface, place), others)
+
+
 def despawn(context: WorldContext, body: Body) -> None:
     """As `World.despawn`."""
     require_own(context, body)
@@ -147,7 +175,7 @@ def _let_go(context: WorldContext, body: Body) -> None:
         each.let_go(body)
     present = present_asset(body)
     if record_of(body).description is not present.description and not body.is_cut:
-        set_material(body, present.material)
+        context.built.change(body.index, write_constants, body, present.description)
     if record_of(body).friction is not None:
         give_friction(context.built.state, body, None)
 

@@ -18,6 +18,7 @@ from taichi_soft.control.drives import push_bodies, set_wind
 from taichi_soft.control.frictions import give_friction
 from taichi_soft.control.impulses import apply_radial_impulse
 from taichi_soft.control.rigid_transform import carry
+from taichi_soft.core.types import Schedule
 from taichi_soft.levels.level_change import bar_to_levels
 from taichi_soft.levels.passage import prepare
 from taichi_soft.persistence.snapshot import restore_snapshot, state_hash, take_snapshot
@@ -39,7 +40,7 @@ def warm_up_step(context: WorldContext) -> None:
     try:
         context.built.trial_step(SHORTEST)
     finally:
-        restore_snapshot(context, before)
+        restore_snapshot(context, before, keeps_events=True)
     _find_stable_step(context)
 
 
@@ -49,9 +50,11 @@ def warm_up(context: WorldContext) -> None:
     try:
         context.built.trial_step(SHORTEST)
         _fill_pools(context)
-        living = cast("tuple[Body, ...]", context.slots.living)
-        bodies = [body for body in living if not body.is_frozen]
-        set_wind(context, (1.0, 0.0, 0.0), 1.2, 1.0)
+        bodies = cast("tuple[Body, ...]", context.slots.living)
+        for body in bodies:
+            _free(context, body)
+        if _has_drives(context):
+            set_wind(context, (1.0, 0.0, 0.0), 1.2, 1.0)
         context.built.skip([body.index for body in bodies])
         context.built.trial_step(SHORTEST)
         push_bodies([(body, np.ones_like(body.positions())) for body in bodies])
@@ -68,7 +71,7 @@ def warm_up(context: WorldContext) -> None:
         context.built.trial_step(SHORTEST)
         context.built.events.warm_up()
     finally:
-        restore_snapshot(context, before)
+        restore_snapshot(context, before, keeps_events=True)
     state_hash(context)
     _find_stable_step(context)
 
@@ -90,16 +93,31 @@ def _fill_pools(context: WorldContext) -> None:
                 enter(context, asset, asset.placed(above * UP, None, 0.0 * UP, 0.0 * UP, None))
 
 
+def _has_drives(context: WorldContext) -> bool:
+    """True if the schedule has a place for forces, wind and damping."""
+    return context.settings.schedule is not Schedule.FLAT
+
+
+def _free(context: WorldContext, body: Body) -> None:
+    """Release a body from whatever holds it; one that is frozen begins anew."""
+    for each in context.slices:
+        each.let_go(body)
+    if len(body.pinned):
+        body.unpin()
+    if body.is_frozen:
+        body.set_motion(body.mesh.vertices, 0.0 * body.mesh.vertices)
+
+
 def _control(context: WorldContext, body: Body, other: Body | None) -> None:
     """Push, set, pin and hold a body in every way."""
-    place, free = body.center_of_mass(), np.setdiff1d(np.arange(body.vertex_count), body.pinned)
-    body.apply_force(UP)
-    body.apply_force(UP, free[:1])
+    place = body.center_of_mass()
+    if _has_drives(context):
+        body.apply_force(UP)
+        body.set_linear_damping(0.1)
     body.apply_impulse(0.0 * UP)
     body.apply_impulse_at_point(0.0 * UP, place, 1e6)
     body.set_velocity(0.0 * UP)
     body.set_gravity_scale(body.gravity_scale)
-    body.set_linear_damping(0.1)
     body.set_sheltered(True)
     if body.asset.coarser and not bar_to_levels(body):
         level, version = body.level, body.topology_version
@@ -108,14 +126,13 @@ def _control(context: WorldContext, body: Body, other: Body | None) -> None:
         record_of(body).topology_version = version  # what was drawn of it is as it was
     body.set_material(body.material)
     give_friction(context.built.state, body, record_of(body).friction)
-    body.pin(free[:1])
-    body.set_targets(free[:1], body.positions()[free[:1]])
+    body.pin([0])
+    body.set_targets([0], body.positions()[:1])
     context.built.trial_step(SHORTEST)
-    body.unpin(free[:1])
+    body.unpin([0])
     for each in context.slices:
         each.warm_up(body, other, partial(context.built.trial_step, SHORTEST))
-    if not body.is_held and not len(body.pinned):
-        carry([body], np.eye(3), place, place + 100.0 * UP, keep=True)  # as `teleport`, whatever is there
+    carry([body], np.eye(3), place, place, keep=True)  # as `teleport`, whatever is there
     body.set_motion(body.positions(), body.velocities())
 
 

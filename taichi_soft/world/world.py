@@ -16,7 +16,7 @@ from taichi_soft.control.drives import ForceField, push_by_field, require_field
 from taichi_soft.core.checks import as_count, as_flag, as_friction, as_gravity, as_number, as_path
 from taichi_soft.core.clock import Clock
 from taichi_soft.core.constants import GRAVITY_EARTH, VELOCITY_LIMIT
-from taichi_soft.core.errors import FrozenBodyWarning, OptionError, StateError
+from taichi_soft.core.errors import DroppedEventsWarning, FrozenBodyWarning, OptionError, StateError
 from taichi_soft.core.handles import Handles, recorded, serial_of
 from taichi_soft.core.settings import ContactSettings, Settings
 from taichi_soft.core.signals import Whole
@@ -227,7 +227,8 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
             dt: length of the fixed step [s], above 0.
             substeps: number of equal substeps, 1 or more; None chooses it by `stable_substeps`.
         Warns: FrozenBodyWarning; UnstableStepWarning for substeps longer than the stable step of the stiffest
-            asset; SlowStepWarning as `build`, once in a world; SolverWarning, of implicit Euler.
+            asset; SlowStepWarning as `build`, once in a world; SolverWarning of inexact solves by implicit
+            Euler, and once of a body that has had tetrahedra inside out for 120 steps.
         Raises: OptionError if dt is not a positive number or substeps not a positive whole one, and where
             there are more than `max_substeps`; StateError before `build`.
         Example:
@@ -246,7 +247,10 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
             reports += self._recorder.note_step(self._context, seconds, count, is_broken=bool(reports))
         if reports:
             warnings.warn("; ".join(reports), FrozenBodyWarning, stacklevel=3)
+        if simulation.loss:
+            warnings.warn(simulation.loss, DroppedEventsWarning, stacklevel=3)
         if simulation.troubled:
+            simulation.check_shapes()
             simulation.check_solves()
 
     def _push(self) -> None:
@@ -256,6 +260,16 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
             if self._recorder is not None:
                 self._recorder.pushes = [(serial_of(body), accelerations) for body, accelerations in rows]
 
+    def _keep(self) -> bytes | None:
+        if self._force_field is None and not self._context.substeps.has_limit:
+            return None
+        return self.snapshot()
+
+    def _undo(self, data: bytes) -> None:
+        restore_snapshot(self._context, data, keeps_events=True)
+        if self._recorder is not None:
+            self._recorder.go_back(self._context, data)
+
     def _make_long_step(self, simulation: Simulation, seconds: float, substeps: int, h: float) -> list[str]:
         """One that Ctrl-C may end, and then all is as before."""
         before = take_snapshot(self._context)
@@ -263,7 +277,7 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
             self._push()
             return simulation.step(seconds, substeps, h)
         except KeyboardInterrupt:
-            restore_snapshot(self._context, before)
+            restore_snapshot(self._context, before, keeps_events=True)
             raise
 
     @recorded

@@ -19,7 +19,15 @@ from taichi_soft.bodies.tearing import Tearing
 from taichi_soft.core.checks import as_number
 from taichi_soft.core.errors import OptionError
 from taichi_soft.core.handles import recorded
-from taichi_soft.core.types import DampingModel, DampingModelName, FlipsName, LawName, StrainName
+from taichi_soft.core.types import (
+    DampingModel,
+    DampingModelName,
+    FlipsName,
+    LawName,
+    Overlap,
+    OverlapName,
+    StrainName,
+)
 from taichi_soft.elements.materials import AnyMaterial
 from taichi_soft.meshing import BodyMesh
 from taichi_soft.world.body import Body
@@ -58,13 +66,14 @@ class WorldBodies(WorldParts):
         plasticity: Plasticity | None = None,
         spare_vertices: int = 0,
         tearing: Tearing | None = None,
+        overlap: OverlapName = Overlap.PART,
     ) -> Body:
         """Add a body before `build`: an asset of its own, one slot for it, and a body in that.
 
         Copies, of the same mesh and material with the same options, share the asset.
         Args:
             mesh: rest shape [m], or a `SoftBodyAsset`, which has all options of a kind of body: then give
-                `position`, `rotation`, `velocity` and `on_floor` only.
+                `position`, `rotation`, `velocity`, `on_floor` and `overlap` only.
             material: constants in SI units; a `SpringMaterial` for a rope or cloth. Required with a mesh.
             law: how strain becomes force, a key of `LAWS`; None takes "neo_hookean", or what the material
                 and the options below ask for.
@@ -78,6 +87,8 @@ class WorldBodies(WorldParts):
             velocity: of all vertices that are not pinned, (3,) [m/s].
             on_floor: True stands the body on the floor: z of `position` is then the gap below its lowest
                 vertex, or below the lowest point of its hull [m].
+            overlap: "part" or "refuse": with `soft_contact`, a body that starts inside another is moved apart
+                from it in the first steps, or it is refused.
             pinned: numbers of the vertices that stay where they are.
             contact: friction, thickness and groups of its surface.
             plasticity: how it is bent for good; None for never.
@@ -110,7 +121,7 @@ class WorldBodies(WorldParts):
         )
         if asset is mesh:
             _require_defaults(material, options)
-        return add_body(self._context, asset, position, rotation, velocity, on_floor)
+        return add_body(self._context, asset, position, rotation, velocity, on_floor, overlap)
 
     def reserve(self, asset: SoftBodyAsset, count: int) -> None:
         """Make room for `count` more bodies of an asset, before `build`; `spawn` fills it.
@@ -134,6 +145,7 @@ class WorldBodies(WorldParts):
         velocity: ArrayLike = (0.0, 0.0, 0.0),
         angular_velocity: ArrayLike = (0.0, 0.0, 0.0),
         on_floor: bool = False,
+        overlap: OverlapName = Overlap.PART,
     ) -> Body:
         """Put a body into the lowest free slot of its asset, before `build` or between two steps.
 
@@ -146,15 +158,18 @@ class WorldBodies(WorldParts):
             angular_velocity: about the centre of mass, (3,) [rad/s]. Pinned vertices rest.
             on_floor: True stands the body on the floor: z of `position` is then the gap below its lowest
                 vertex, or below the lowest point of its hull [m].
+            overlap: "part" or "refuse": with `soft_contact`, a body that starts inside another is moved apart
+                from it over the next steps, or it is refused.
         Returns: a new handle.
-        Raises: OptionError for a value out of range, or a place out of reach, below the floor or inside a
-            collider; StateError for an asset without a pool in this world, or whose pool is full.
+        Raises: OptionError for a value out of range, or a place out of reach, below the floor, inside a
+            collider or, with "refuse", inside another body; StateError for an asset without a pool in this
+            world, or whose pool is full.
         Example:
             shot = world.spawn(ball, position=(-2, 0, 1), velocity=(6, 0, 1))
             world.step(1 / 60)
             world.despawn(shot)
         """
-        return spawn(self._context, asset, position, rotation, velocity, angular_velocity, on_floor)
+        return spawn(self._context, asset, position, rotation, velocity, angular_velocity, on_floor, overlap)
 
     @recorded
     def despawn(self, body: Body) -> None:

@@ -14,6 +14,7 @@ from taichi_soft.contact.colliders import Colliders
 from taichi_soft.contact.shapes import Shape
 from taichi_soft.control.attachments import Attachments
 from taichi_soft.control.drives import set_gravity, set_wind
+from taichi_soft.control.easing import Easings
 from taichi_soft.control.frames import Frame, Frames
 from taichi_soft.control.frictions import set_floor_friction
 from taichi_soft.control.grabs import Grab, Grabs, as_pull
@@ -29,7 +30,7 @@ from taichi_soft.world.body import Body
 from taichi_soft.world.spawning import require_own
 from taichi_soft.world.world_parts import WorldParts
 
-SLICES: tuple[type[Slice], ...] = (Colliders, Frames, Attachments, Grabs, Joints, Motors, Tears)
+SLICES: tuple[type[Slice], ...] = (Colliders, Frames, Attachments, Grabs, Joints, Motors, Tears, Easings)
 """What a game switches on, in the order in which a snapshot puts it back: what hangs comes after what it
 hangs from."""
 

@@ -20,6 +20,7 @@ from taichi_soft import (
     sphere,
 )
 from taichi_soft.bodies import skin_mesh
+from taichi_soft.lab.doctor.surface import facts_of
 from taichi_soft.render.replay import replay
 
 JELLY = Material(1e5, 0.3, 1000.0)
@@ -198,6 +199,58 @@ def test_a_rope_takes_no_skin_and_springs_no_cage():
         SoftBodyAsset(rope(1.0, 4, mass=0.1), SpringMaterial(500.0, 0.2), skin=ball())
     with pytest.raises(OptionError, match="takes no cage"):
         SoftBodyAsset.from_surface(ball(), JELLY, cells=4, law="springs")
+
+
+def with_seams(mesh):
+    """Text of an .obj file in which each corner has a texture coordinate of its own, and a facet's normal."""
+    lines = [f"v {x:.9f} {y:.9f} {z:.9f}" for x, y, z in mesh.vertices]
+    lines += [f"vt {i / 7 % 1:.9f} {i / 11 % 1:.9f}" for i in range(3 * len(mesh.faces))]
+    lines += [f"vn {x:.9f} {y:.9f} {z:.9f}" for x, y, z in mesh.face_normals]
+    for i, face in enumerate(mesh.faces):
+        lines.append("f " + " ".join(f"{v + 1}/{3 * i + k + 1}/{i + 1}" for k, v in enumerate(face)))
+    return "\n".join(lines)
+
+
+def test_vertices_that_are_split_at_seams_make_the_same_body_and_stay_together(tmp_path):
+    bar = trimesh.creation.box((3.0, 0.6, 0.6)).subdivide().subdivide()
+    (tmp_path / "bar.obj").write_text(with_seams(bar))
+    split = SoftBodyAsset.from_surface(tmp_path / "bar.obj", JELLY, cells=6, up="z", hull=200)
+    whole = SoftBodyAsset.from_surface(bar, JELLY, cells=6, hull=200)
+    np.testing.assert_allclose(split.mesh.vertices, whole.mesh.vertices, atol=1e-8)
+    np.testing.assert_array_equal(split.mesh.tets, whole.mesh.tets)
+    np.testing.assert_allclose(split.hull.points, whole.hull.points, atol=1e-8)
+    (skin,) = split.skins
+    assert skin.vertex_count == 3 * len(bar.faces)
+    facts = facts_of(split.skin)
+    assert (facts.open_edges, facts.crowded_edges, facts.parts) == (0, 0, 1)
+    world = World(floor=None, gravity=(0, 0, 0))
+    body = world.add_body(split)
+    world.build()
+    places = body.positions() + 0.1 * np.sin(3.0 * body.positions()[:, [1, 2, 0]])  # bent and twisted
+    put(body, places)
+    drawn, _ = world.read_render_mesh(body.render_meshes[0], 1.0)
+    _, place = np.unique(skin.surface.vertices, axis=0, return_inverse=True)
+    for number in np.unique(place):
+        copies = drawn[place.reshape(-1) == number]
+        assert (copies == copies[0]).all()
+
+
+def test_what_was_assumed_and_repaired_of_a_file_is_logged(tmp_path, caplog):
+    crate = trimesh.creation.box()
+    lines = with_seams(crate).replace("vn ", "vn -").replace("vn --", "vn ")  # all of x the wrong way
+    (tmp_path / "crate.obj").write_text("mtllib gone.mtl\n" + lines)
+    with caplog.at_level("INFO", logger="taichi_soft"):
+        SoftBodyAsset.from_surface(tmp_path / "crate.obj", JELLY, cells=3, center=True)
+    warned = [record.message for record in caplog.records if record.levelname == "WARNING"]
+    told = " ".join(warned)
+    assert "no file 'gone.mtl' beside it" in told
+    assert "12 of its 36 normals point away" in told
+    assert "is the origin now" in told
+    assert "y is taken as up, as in most .obj files" in caplog.text
+    caplog.clear()
+    with caplog.at_level("INFO", logger="taichi_soft"):
+        SoftBodyAsset.from_surface(tmp_path / "crate.obj", JELLY, cells=3, up="y")
+    assert "taken as up" not in caplog.text
 
 
 def test_an_asset_and_options_of_its_own_do_not_go_together():

@@ -6,6 +6,7 @@ import trimesh
 from surfaces import ball, joined, lens_volume, turned, with_some_turned, with_triangles, without
 
 from taichi_soft.cages.solid import solid_of
+from taichi_soft.cages.voxels import volume_within
 
 BALL = ball()
 
@@ -53,6 +54,32 @@ def test_a_closed_surface_holds_its_volume_and_centre(name):
 def test_what_is_wrong_with_triangles_changes_the_solid_little(name):
     mesh, volume = FAULTY[name]
     assert solid(mesh).volume == pytest.approx(volume, rel=0.02)
+
+
+BRICK = trimesh.creation.box((1.0, 0.7, 0.4))
+
+
+@pytest.mark.parametrize(
+    ("mesh", "volume"),
+    [
+        (joined(BALL, BALL), BALL.volume),
+        (turned(joined(BRICK, BRICK, BRICK)), 0.28),
+        (turned(joined(BRICK, BRICK.subdivide())), 0.28),  # cut in other triangles
+        (joined(BALL, ball(0.999)), BALL.volume),
+        (turned(joined(BRICK, BRICK.copy().apply_translation((0.5, 0.0, 0.0)))), 0.42),
+        (joined(*(with_triangles(BALL, BALL.faces[:, ::-1]) for _ in range(2))), BALL.volume),
+    ],
+    ids=["twice", "three times", "cut otherwise", "nearly twice", "overlapping", "twice inside out"],
+)
+def test_what_is_inside_of_several_parts_counts_once(mesh, volume):
+    """In voxels as coarse as those of ten cells, of which many lie at the surface."""
+    assert solid(mesh, 40).volume == pytest.approx(volume, rel=5e-3)
+
+
+def test_the_volume_is_the_same_far_from_the_origin():
+    """At 5,000 km, where the cubes of coordinates have no digit left for a cubic metre."""
+    away = np.array([500_000.0, 4_649_776.0, 312.0])
+    assert volume_within(BALL.triangles + away) == pytest.approx(BALL.volume, rel=1e-6)
 
 
 def test_second_moments_are_those_of_the_solid():

@@ -18,8 +18,10 @@ from taichi_soft import (
     OptionError,
     PlaneShape,
     SphereShape,
+    SpringMaterial,
     World,
     box,
+    cloth,
     sphere,
 )
 
@@ -173,6 +175,30 @@ def test_a_turntable_carries_what_lies_on_it_on_a_circle():
     x, y, _ = body.center_of_mass()
     assert np.hypot(x, y) == pytest.approx(1.0, abs=0.01)
     assert np.arctan2(y, x) == pytest.approx(3.0, abs=0.02)
+
+
+@pytest.mark.parametrize("integrator", ["implicit_euler", "leapfrog"])
+def test_a_sheet_and_a_cloth_on_a_turning_ball_turn_as_fast_as_its_surface(integrator):
+    """What lies still on the ball has its velocity, omega x r. Draped, both are under compression as well."""
+    speed, side = 3.0, 0.8
+    world = room(integrator=integrator)
+    sheet = box((side, side, 0.02), (8, 8, 1)), Material(1e5, 0.3, 500.0, damping_ratio=0.2)
+    draped = cloth((side, side), (10, 10), 0.3), SpringMaterial(400.0, 0.5)
+    for number, (mesh, material) in enumerate((sheet, draped)):
+        ball = world.add_collider(SphereShape(1.0), friction=0.5, **alone(number))
+        ball.set_velocity((0, 0, 0), (0, 0, speed))
+        corner = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
+        add(world, number, mesh, material, position=(0, 0, 1.02) - corner)
+    world.build()
+    run(world, 1.5)
+    taken = np.zeros(2)
+    for _ in range(60):
+        world.step(DT)
+        for number, body in enumerate(world.bodies):
+            x, v = body.positions().astype(float), body.velocities().astype(float)
+            spin = body.masses @ np.cross(x, v)[:, 2] / (body.masses @ (x[:, :2] ** 2).sum(axis=1))
+            taken[number] += spin / 60
+    assert taken == pytest.approx(speed, rel=0.01)
 
 
 def test_a_lying_body_falls_when_what_it_lies_on_goes():

@@ -36,7 +36,7 @@ CODE = {
 }
 PUBLIC = (
     *("taichi_soft", "taichi_soft.bake", "taichi_soft.export", "taichi_soft.live"),
-    *("engine_adapter", "engine_adapter.panda3d"),
+    *("engine_adapter", "engine_adapter.panda3d", "taichi_soft.render", "taichi_soft.render.film"),
 )
 """Modules of which a page may import the public names."""
 LINK = re.compile(r"\]\(([^)\s]+)\)")
@@ -104,7 +104,7 @@ def help_of(*command):
 def test_every_command_and_option_of_a_page_exists(name):
     text = PAGES[name]
     for command, rest in re.findall(
-        r"taichi-soft (bake|demo|info|profile|drop-test|report|replay)\b([^`\n|]*)", text
+        r"taichi-soft (bake|demo|film|info|profile|drop-test|report|replay)\b([^`\n|]*)", text
     ):
         for option in re.findall(r"(?<!\S)--[a-z-]+", rest):
             assert option in help_of(command), f"{name}: taichi-soft {command} {option}"
@@ -121,6 +121,14 @@ def test_every_public_name_is_on_a_page_of_the_reference_once(package):
     listed = re.findall(rf"^::: {package.__name__}\.(\w+)$", text, re.MULTILINE)
     elsewhere = engine_adapter.__all__ if package is taichi_soft else ()
     assert sorted(listed) == sorted(set(package.__all__) - set(elsewhere))
+
+
+def test_every_public_name_for_films_is_in_the_reference_once():
+    modules = [importlib.import_module(name) for name in ("taichi_soft.render", "taichi_soft.render.film")]
+    listed = re.findall(
+        r"^::: taichi_soft\.render\.(?:film\.)?(\w+)$", PAGES["reference/films.md"], re.MULTILINE
+    )
+    assert sorted(listed) == sorted({name for module in modules for name in module.__all__})
 
 
 @pytest.mark.parametrize(

@@ -182,7 +182,7 @@ def test_text_is_read_however_it_is_written(tmp_path, odd):
     ("line", "text"),
     [
         ("f 1 2 9", "face 6 names vertex 8, and there are 8"),
-        ("f 1 2 -9", "face 6 names vertex"),
+        ("f 1 2 -9", "face 6 names a vertex before the first one"),
         ("f 1 2 0", "whole numbers from 1"),
         ("f 1 2 1.5", "whole numbers from 1"),
         ("v 1 2", "vertex 8 is '1 2': wanted are 3 numbers"),
@@ -213,33 +213,33 @@ Kd 1 0 0
 d 0.5
 newmtl lost
 map_Kd gone.png
+newmtl ink
+map_Kd INK.png
 newmtl bare
 """
 
 
 def test_materials_have_their_colour_and_texture_or_a_note(tmp_path):
-    (tmp_path / "models").mkdir()
-    (tmp_path / "models" / "pictures").mkdir()
-    Image.fromarray(np.full((4, 4, 3), (10, 200, 30), np.uint8)).save(
-        tmp_path / "models" / "pictures" / "my wood.png"
-    )
-    (tmp_path / "models" / "my looks.mtl").write_bytes(LIBRARY.encode("latin-1"))
-    lines = CRATE.splitlines()
-    at = next(i for i, line in enumerate(lines) if line.startswith("f "))
-    for name in ("nowhere", "bare", "lost", "red", "wood \u00e9"):
-        lines.insert(at + 1, f"usemtl {name}")
-        at += 1 if name == "nowhere" else 2
-    text = "mtllib my looks.mtl\n" + "\n".join(lines)
-    surfaces = {
-        each.name: each
-        for each in read_surfaces(written(tmp_path / "models" / "x.obj", text.encode("latin-1")))
-    }
-    wood = surfaces["wood \u00e9"].visual.material
-    assert wood.baseColorTexture.getpixel((0, 0)) == (10, 200, 30)
-    assert wood.baseColorFactor is None  # as Blender reads it: the texture takes the place of the colour
-    assert surfaces["red"].visual.material.baseColorFactor.tolist() == [255, 0, 0, 128]
-    assert surfaces["bare"].visual.material.baseColorFactor is None
-    notes = " ".join(surfaces["red"].notes)
+    """Textures lie beside their library or beside the .obj file, in the case that Windows does not mind."""
+    looks, crates = tmp_path / "looks", tmp_path / "crates"
+    for folder in (looks / "pictures", crates):
+        folder.mkdir(parents=True)
+    Image.new("RGB", (4, 4), (10, 200, 30)).save(looks / "pictures" / "my wood.png")
+    Image.new("RGB", (4, 4), (9, 8, 7)).save(crates / "Ink.PNG")
+    (looks / "my looks.mtl").write_bytes(LIBRARY.encode("latin-1"))
+    used = ["wood \u00e9", "nowhere", "bare", "lost", "ink", "red"]
+    faces = [line for line in CRATE.splitlines() if line.startswith("f ")]
+    lines = ["mtllib ../looks/my looks.mtl", *(line for line in CRATE.splitlines() if line not in faces)]
+    lines += [f"usemtl {name}\n{face}" for name, face in zip(used, faces, strict=True)]
+    surfaces = read_surfaces(written(crates / "x.obj", "\n".join(lines).encode("latin-1")))
+    assert [each.name for each in surfaces] == used
+    material = {each.name: each.visual.material for each in surfaces}
+    assert material["wood \u00e9"].baseColorTexture.getpixel((0, 0)) == (10, 200, 30)
+    assert material["wood \u00e9"].baseColorFactor is None  # as Blender has it: in place of the colour
+    assert material["ink"].baseColorTexture.getpixel((0, 0)) == (9, 8, 7)
+    assert material["red"].baseColorFactor.tolist() == [255, 0, 0, 128]
+    assert material["bare"].baseColorFactor is None
+    notes = " ".join(surfaces[0].notes)
     assert "the texture gone.png is not read: there is no such file beside it" in notes
     assert "no material nowhere" in notes
 

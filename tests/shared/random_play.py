@@ -256,12 +256,17 @@ ACTIONS = (
 )  # fmt: skip
 
 
-def act(world, cube, seed):
-    """What a player does before the coming step: often nothing. Follows from the step count and the seed."""
+def act(world, cube, seed, *, actions=ACTIONS, look=None):
+    """What a player does before the coming step: often nothing. Follows from the step count and the seed.
+
+    Args: look: called after each action, with its name.
+    """
     rng = np.random.default_rng([seed, world.step_count])
-    for number in rng.integers(0, 2 * len(ACTIONS), 3).tolist():
-        if number < len(ACTIONS):
-            ACTIONS[number](world, cube, rng)
+    for number in rng.integers(0, 2 * len(actions), 3).tolist():
+        if number < len(actions):
+            actions[number](world, cube, rng)
+            if look is not None:
+                look(actions[number].__name__)
 
 
 def play(world, cube, ticks, seed):

@@ -2,12 +2,13 @@
 
 import contextlib
 import dataclasses
+import inspect
 import warnings
 
 import numpy as np
 from public_face import READERS
 
-from taichi_soft import MeshError
+from taichi_soft import MeshError, StateError
 
 UP = np.array([0.01, 0.02, 3.0])
 NOT_NUMBERS = {"settings", "asset", "material", "mesh", "function"}
@@ -77,3 +78,38 @@ def leave(body):
     """One step ends beyond the farthest coordinate there is."""
     rows = np.ones((body.vertex_count, 3))
     body.set_motion(9.9999e6 * rows, 1.9e4 * rows)
+
+
+CHANGING = {"build", "step", "save", "drain_events", "remove"}
+"""Methods that need no argument, are not recorded, and yet do something."""
+
+
+def readouts(handle):
+    """Names of all that a handle tells without being given anything, found by reflection."""
+    kind, names = type(handle), {"__repr__"}
+    for name in dir(kind):
+        found = inspect.getattr_static(kind, name)
+        if isinstance(found, property):
+            names.add(name)
+        elif inspect.isfunction(found) and name not in CHANGING and not hasattr(found, "is_recorded"):
+            parameters = list(inspect.signature(found).parameters.values())[1:]
+            if all(each.default is not each.empty for each in parameters):
+                names.add(name)
+    names = {name for name in names if not name.startswith("_") or name == "__repr__"}
+    return sorted(names | {name for name in vars(handle) if not name.startswith("_")} - {"function", "kind"})
+
+
+def misread(handle):
+    """Of a handle: what gives neither a value nor a StateError, with what it raises. What a body without
+    tetrahedra or surface does not have is a MeshError."""
+    wrong = []
+    for name in readouts(handle):
+        try:
+            found = getattr(handle, name)
+            if callable(found):
+                found()
+        except (StateError, MeshError):
+            pass
+        except Exception as error:
+            wrong.append(f"{type(handle).__name__}.{name}: {type(error).__name__}: {error}")
+    return wrong

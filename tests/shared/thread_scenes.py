@@ -85,6 +85,18 @@ def heap():
     return motion(world)
 
 
+def inside():
+    """Six bodies placed inside each other, which are moved apart."""
+    world = World(soft_contact=True)
+    for i in range(6):
+        place = (0.04 * i, 0.02 * i * i, 0.26 + 0.1 * (i % 2))
+        world.add_body(box((0.5,) * 3, (2, 2, 2)), Material(2e5, 0.3, 1000.0, 40.0), position=place)
+    world.build()
+    for _ in range(60):
+        world.step(DT)
+    return motion(world)
+
+
 def joined(options):
     """Two stacks of three whose bodies are joined, one of them pulled aside; the last joint's force too."""
     world = World(**options)
@@ -167,6 +179,7 @@ def hulled():
 SCENES = {
     "crowd": crowd,
     "heap": heap,
+    "inside": inside,
     "joined, touching": lambda: joined({"soft_contact": True}),
     "joined, passing": lambda: joined({"collider_room": 1}),
     "fallen, per body": lambda: fallen("per_body"),

@@ -1,9 +1,12 @@
 """A body comes back from anything: by default, and by the thesis's law with flips driven back."""
 
+import warnings
+
 import numpy as np
 import pytest
+import trimesh
 
-from taichi_soft import Material, World, box, sphere
+from taichi_soft import Material, SoftBodyAsset, SolverWarning, World, box, sphere
 from taichi_soft.lab.drop_test.robustness.foreign_meshes import sliver_lattice
 
 BALL = sphere(1.0, 2)
@@ -109,3 +112,53 @@ def test_slivers_that_a_blow_turned_inside_out_do_not_tremble_on(seed):
         caught.append(body.flipped_count())
     assert not body.is_frozen
     assert np.mean(caught) <= 0.0005 * len(mesh.tets)
+
+
+def table():
+    """One metre wide, with legs that E = 50 kPa lets fold under it."""
+    at = trimesh.transformations.translation_matrix
+    parts = [trimesh.creation.box((1.0, 0.6, 0.4))]
+    for x in (-0.4, 0.4):
+        for y in (-0.2, 0.2):
+            parts.append(trimesh.creation.box((0.16, 0.16, 0.7), transform=at((x, y, -0.45))))
+    return trimesh.util.concatenate(parts)
+
+
+def total_energy(body):
+    """In motion, deformation and height [J]."""
+    return body.kinetic_energy() + body.elastic_energy() + body.gravitational_energy()
+
+
+def test_no_rescue_goes_below_the_floor_or_adds_energy_and_one_that_fails_is_reported_once():
+    """Tables that fold under their own weight, and wrecks that lie on the floor, in a plain world."""
+    rng, mesh = np.random.default_rng(0), sphere(0.5, 2)
+    world = World()
+    tables = [
+        world.add_body(
+            SoftBodyAsset.from_surface(table(), Material(young, 0.4, 1000), cells=8), position=(x, 0, 1.3)
+        )
+        for x, young in ((0.0, 5e4), (3.0, 1e5))
+    ]
+    wrecks = ["scrambled", "flattened", "drawn into a line", "shrunk to a point"]
+    balls = [
+        world.add_body(mesh, Material(1e6, 0.3, 1000), position=(2 * k, 3, 1)) for k in range(len(wrecks))
+    ]
+    world.build()
+    for ball, wreck in zip(balls, wrecks, strict=True):
+        start = crumpled(mesh, wreck, rng)
+        start += (*ball.center_of_mass()[:2], 0.02 - start[:, 2].min())
+        ball.set_motion(start, np.zeros_like(start))
+    lowest, energies = [], []
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always", SolverWarning)
+        for _ in range(300):
+            world.step(1 / 60)
+            lowest.append(min(body.positions()[:, 2].min() for body in world.bodies))
+            energies.append([total_energy(body) for body in tables])
+    assert min(lowest) > -1e-6
+    energies = np.array(energies)
+    assert (np.diff(energies, axis=0) < 1e-3 * energies[0]).all()
+    caught = [body.index for body in tables if body.flipped_count()]
+    assert caught == [0]
+    reported = [str(each.message) for each in said if each.category is SolverWarning]
+    assert [message.split(" has ")[0] for message in reported] == ["body 0"]

@@ -23,6 +23,7 @@ int32_t World::add_collider(const Collider& row) {
   const uint32_t serial = colliders_.rows[size_t(number)].serial + 1;
   colliders_.rows[size_t(number)] = row;
   colliders_.rows[size_t(number)].serial = serial;
+  machine_->launch("forget_collider", {Machine::whole(scene_->slot_count), Machine::whole(number)});
   write_colliders();
   double speed;
   wake_near(row.way(0.0, &speed));

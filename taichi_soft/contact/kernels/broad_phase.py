@@ -16,6 +16,7 @@ from taichi_soft.contact.kernels.candidates import (
 )
 from taichi_soft.contact.kernels.filters import may_touch
 from taichi_soft.contact.kernels.hull import is_held
+from taichi_soft.contact.kernels.parting import are_parting
 from taichi_soft.contact.kernels.vertex_grid import MOST_EDGES, boxes_overlap, cell_of, fill_grid, find_box
 from taichi_soft.control.kernels.joints import are_joined
 from taichi_soft.core.constants import LANES, ROW_BITS
@@ -147,6 +148,8 @@ def search_body(state: ti.template(), body: ti.i32, island: ti.i32):
             wanted = may_touch(state, body, other) and boxes_overlap(
                 lower - margin, upper + margin, their_lower, their_upper
             )
+            if wanted:
+                wanted = are_parting(state, body, other) == 0
         if wanted:
             _search_pair(state, body, other, margin, thickness)
     list_candidates(state, body, thickest)

@@ -51,3 +51,14 @@ def sum_collider_impulses(
         for i in ti.static(range(3)):
             out[c, i] = linear[i]
             out[c, 3 + i] = angular[i]
+
+
+@ti.kernel
+def forget_collider(contact: ti.template(), body_count: ti.i32, c: ti.i32):
+    """Clear what bodies gave a collider and how fast they may leave it: its row is another collider's now."""
+    ti.loop_config(serialize=True)
+    for body in range(body_count):
+        row = body * contact.capacity.colliders + c
+        contact.impulse[row] = ti.Vector.zero(ti.f32, 3)
+        contact.angular_impulse[row] = ti.Vector.zero(ti.f32, 3)
+        contact.rebound[row] = 0.0

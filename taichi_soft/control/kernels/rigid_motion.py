@@ -1,5 +1,6 @@
 """A whole body moved or set in motion as a rigid one, between two steps."""
 
+from taichi_soft.bodies.status import JUST_PLACED
 from taichi_soft.control.kernels.pins import TO_TARGET
 from taichi_soft.core.constants import POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.core.math.rows import row_behind
@@ -109,3 +110,5 @@ def jump(
                 if ti.static(state.capacity.implicit):
                     state.particle_contact[p] = 0
                 p = row_behind(p)
+            if ti.static(state.capacity.contact.soft):
+                state.soft.overlap[body] = JUST_PLACED

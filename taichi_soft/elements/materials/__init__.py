@@ -1,7 +1,7 @@
 """What bodies are made of: numbers only, no Taichi."""
 
 from taichi_soft.elements.materials.anisotropic import AnisotropicMaterial, frames_along
-from taichi_soft.elements.materials.material import CONSTANTS, Material
+from taichi_soft.elements.materials.material import CONSTANTS, Material, isotropic_stiffness
 from taichi_soft.elements.materials.presets import PRESETS, preset
 from taichi_soft.elements.materials.springs import SpringMaterial
 from taichi_soft.elements.materials.stiffness import Stiffness, voigt_stress
@@ -18,6 +18,7 @@ __all__ = [
     "SpringMaterial",
     "Stiffness",
     "frames_along",
+    "isotropic_stiffness",
     "preset",
     "voigt_stress",
 ]

@@ -30,6 +30,14 @@ DAMPING_RATIO = 0.05
 CONSTANTS = ("young", "poisson", "density", "damping", "shear_modulus", "shear_damping")
 
 
+def isotropic_stiffness(lame_lambda: Array, lame_mu: Array) -> Array:
+    """Stiffness by Lame's constants (m,) [Pa], (m, 6, 6) [Pa], as `Stiffness.matrix`."""
+    matrices = np.zeros((len(lame_mu), 6, 6))
+    matrices[:, :3, :3] = lame_lambda[:, None, None]
+    matrices[:, range(6), range(6)] += lame_mu[:, None] * np.array([2.0, 2, 2, 1, 1, 1])
+    return matrices
+
+
 @serialised("young", "poisson", "density", "damping", "shear_modulus", "shear_damping", "damping_ratio")
 @dataclass(frozen=True, eq=False)
 class Material:
@@ -120,8 +128,4 @@ class Material:
         Args:
             tet_count: number of tetrahedra m.
         """
-        lame_lambda, lame_mu = (self.per_tet(name, tet_count) for name in ("lame_lambda", "lame_mu"))
-        matrices = np.zeros((tet_count, 6, 6))
-        matrices[:, :3, :3] = lame_lambda[:, None, None]
-        matrices[:, range(6), range(6)] += lame_mu[:, None] * np.array([2.0, 2, 2, 1, 1, 1])
-        return matrices
+        return isotropic_stiffness(*(self.per_tet(name, tet_count) for name in ("lame_lambda", "lame_mu")))

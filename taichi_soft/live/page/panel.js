@@ -104,7 +104,7 @@ export class Panel {
     const file = at("upload").files[0];
     if (!file) return;
     if (file.size > limit) this.refuse(`${file.name} has ${file.size.toLocaleString()} bytes: ${limit.toLocaleString()} are taken`);
-    else { this.wish({ do: "upload", name: file.name }); this.wish(await file.arrayBuffer()); }
+    else { this.wish({ do: "upload", name: file.name, up: at("up").value || null }); this.wish(await file.arrayBuffer()); }
     at("upload").value = "";
   }
 

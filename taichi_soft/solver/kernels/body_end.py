@@ -34,7 +34,7 @@ def _freeze_if_broken(state: ti.template(), body):
 
 @ti.func
 def _end_active_body(state: ti.template(), program: ti.template(), body, substeps, h):
-    """Returns 1 where it failed, or was not solved as exactly as asked."""
+    """Returns 1 where it failed, stays inside out, or was not solved as exactly as asked."""
     if ti.static(program.integrator == Integrator.LEAPFROG):
         push_particles(state, body, 0.5 * h)
     failed = _freeze_if_broken(state, body)
@@ -43,11 +43,11 @@ def _end_active_body(state: ti.template(), program: ti.template(), body, substep
         state.body_drives[body] = state.body_drives[body] & ~PUSHED
         if ti.static(program.has_plasticity):
             flow_body(state, body, substeps * h)
-        untangle_body(state, program, body, substeps * h)
+        failed = untangle_body(state, program, body, substeps * h)
         if ti.static(state.capacity.contact.hull):
             note_way_of_hulled(state, body, substeps * h)
         if ti.static(program.integrator == Integrator.IMPLICIT_EULER):
-            failed = int(state.body_residual[body] > state.solver[None][0])
+            failed = failed | int(state.body_residual[body] > state.solver[None][0])
     elif ti.static(program.has_contact):
         forget_contacts(state, body)  # it was put back: nothing has touched it
     return failed
@@ -59,7 +59,7 @@ def end_body(
 ) -> ti.i32:
     """After the last of so many substeps of `h` [s]: drives end, plasticity flows, what is caught is freed.
 
-    Returns: whether the body failed, or was not solved as exactly as asked (1).
+    Returns: whether the body failed, stays inside out, or was not solved as exactly as asked (1).
     """
     failed = 0
     if state.body_status[body] == ACTIVE:

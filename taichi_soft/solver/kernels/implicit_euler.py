@@ -1,14 +1,17 @@
 """Implicit Euler (thesis section 3.5.3, eq. 3.26) of one body: one linear solve per substep.
 
-(M + h D + h^2 K) dv = h (f + m g - h K v): forces of the old positions, and how they change on the way. Where
-that is too far a way for them to change evenly, the step is made in pieces. Particles that lie on the floor
-are held at its height within the solve, until it would have to pull them down.
+(M + h D + h^2 K) dv = h (R f + m g) - h K u: R is the rotation of the body's rigid motion within the step. It
+turns the forces of the old positions, and u = h v - (R - 1) r is what deforms the body. h^2 K v alone would
+brake every rotation of a compressed body: K is projected, and no longer turns forces with the body. Where
+forces change too unevenly on the path, the step is made in pieces. Particles that lie on the floor are held
+at its height within the solve, until it would have to pull them down.
 """
 
 from taichi_soft.bodies.kernels.particles import gravity_on
 from taichi_soft.bodies.status import FEELS_REACTION
 from taichi_soft.contact.distances.floor import resolve_floor
 from taichi_soft.control.kernels.grabs import add_grabs
+from taichi_soft.core.math.quaternion import spun, turned
 from taichi_soft.core.math.tensors import widened
 from taichi_soft.core.runtime import ti
 from taichi_soft.elements.kernels.internal_forces import accumulate_forces
@@ -20,6 +23,7 @@ from taichi_soft.elements.kernels.linear_system import (
     multiply_system,
 )
 from taichi_soft.solver.kernels.conjugate_gradient import invert_blocks, solve_system
+from taichi_soft.solver.kernels.vibration import rigid_motion
 
 FARTHEST = 0.5
 """Change of an edge in one piece of a step, over its length, beyond which the piece is halved."""
@@ -32,17 +36,37 @@ MOST_PIECES = 32
 
 
 @ti.func
+def _split_off_rotation(state: ti.template(), program: ti.template(), body, h):
+    """Write the velocities that deform a body within `h` [s], relative to its rigid motion, to `solution`.
+
+    The rigid motion follows an arc: its velocities are the mean ones, along the chords.
+
+    Returns: the rotation of the body within that time, a quaternion.
+    """
+    particles = state.body_particles[body]
+    x0, v0 = state.particle_position[particles[0]], state.particle_velocity[particles[0]]
+    center, velocity, angular_velocity = rigid_motion(state, program, body, 0.0, 0.0, 0, x0, v0)
+    turn = spun(ti.Vector([0.0, 0.0, 0.0, 1.0]), h * angular_velocity)
+    for p in range(particles[0], particles[1]):
+        arm = state.particle_position[p] - x0 - center
+        chord = (turned(turn, arm) - arm) / h
+        state.solution[p] = state.particle_velocity[p] - v0 - velocity - chord
+    return turn
+
+
+@ti.func
 def assemble(state: ti.template(), program: ti.template(), body, h):
     """Fill the blocks, and `residual` with the right-hand side, kept in `particle_force` as well."""
     particles = state.body_particles[body]
     clear_system(state, body)
     add_stiffness(state, program, body, h * h)
-    multiply_system(state, body, state.particle_velocity, state.image)
+    turn = _split_off_rotation(state, program, body, h)
+    multiply_system(state, body, state.solution, state.image)
     gravity = gravity_on(state, body)
     for p in range(particles[0], particles[1]):
         inv_mass = state.particle_inv_mass[p]
         weight = gravity / ti.max(inv_mass, 1e-30) * ti.select(inv_mass > 0.0, 1.0, 0.0)
-        rhs = h * (state.particle_force[p].xyz + weight) - state.image[p]
+        rhs = h * (turned(turn, state.particle_force[p].xyz) + weight) - state.image[p]
         state.residual[p] = rhs
         state.particle_force[p] = widened(rhs)
     add_grabs(state, body, h)

@@ -1,7 +1,7 @@
 """Bodies come and go: one slot is written, the rest of the world is left alone."""
 
 from taichi_soft.bodies.kernels.plasticity import restore_shape
-from taichi_soft.bodies.status import ABSENT, ACTIVE
+from taichi_soft.bodies.status import ABSENT, ACTIVE, JUST_PLACED
 from taichi_soft.contact.kernels.collide import forget_contacts
 from taichi_soft.contact.kernels.hull_colliders import forget_held
 from taichi_soft.core.math.rows import row_behind
@@ -58,6 +58,8 @@ def spawn_body(state: ti.template(), body: ti.i32, rows: ti.types.ndarray(dtype=
             if ti.static(state.capacity.contact.hull and state.capacity.contact.soft):
                 for point in range(state.hull.body_points[body][0], state.hull.body_points[body][1]):
                     state.soft.kept_normal_impulse[point] = 0.0
+        if ti.static(state.capacity.contact.soft):
+            state.soft.overlap[body] = JUST_PLACED
         state.body_status[body] = ACTIVE
 
 

@@ -9,6 +9,7 @@ A long step is made in several calls, so that Ctrl-C can come between: each isla
 """
 
 from taichi_soft.bodies.status import ACTIVE
+from taichi_soft.contact.kernels.parting import find_overlaps, part_bodies
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 from taichi_soft.solver.kernels.attempts import (
@@ -77,6 +78,8 @@ def _begin(state: ti.template(), program: ti.template(), island):
         is_awake = wake_island(state, island)
         if is_awake == 1:
             each_body(state, program, island, Job(phase=BEGIN))
+            if ti.static(program.has_soft_contact):
+                find_overlaps(state, island)
     else:
         is_awake = int(state.body_status[island] == ACTIVE)
         begin_body(state, program, island)
@@ -144,6 +147,8 @@ def _end(state: ti.template(), program: ti.template(), island, run: ti.template(
         while row < state.contact.island_first[island + 1]:
             failed += state.contact.has_failed[state.contact.island_body[row]]
             row = row_behind(row)
+        if ti.static(program.has_soft_contact):
+            part_bodies(state, island, substeps * h)
     else:
         failed = end_body(state, program, island, substeps, h)
     brake_island(state, program, island, 0)

@@ -1,11 +1,10 @@
 """What brings back a body that is caught inside out.
 
-Forces drive nearly all tetrahedra that are turned inside out back by themselves. A few may hold each other:
-in a coarse mesh they find a balance that is not the rest shape; and what has shrunk to a point has no
-direction in which to open. So every `PATIENCE` steps it is looked whether any is flat or inside out. Where
-that was so the time before, too, its corners go half of the way to where they lie in the rest shape, as that
-fits best to all of the body now. Until a look finds none, vibrations fade. Of a body that is wrecked
-altogether all of it goes there, within a second.
+Forces drive nearly all tetrahedra that are turned inside out back by themselves. So every `PATIENCE` steps
+the body is checked for tetrahedra that are flat or inside out, and its vibrations fade until a check finds
+none. A body that its own weight folds may keep a few for ever, as their forces balance. Such a body is
+reported after `REPORTED` steps, and left as it is. A body that is wrecked altogether has no shape to go back
+to: its particles move to where the rest shape fits best to them, within a second.
 """
 
 from taichi_soft.bodies.status import PLACED
@@ -20,6 +19,9 @@ from taichi_soft.elements.kernels.elastic import particles_of, rest_inverse_of
 
 PATIENCE = 15
 """Fixed steps between two looks: a quarter of a second."""
+
+REPORTED = 8 * PATIENCE
+"""Fixed steps after which a body with such tetrahedra is reported: two seconds."""
 
 WRECKED = 0.1
 """Part of a body's tetrahedra from which on, caught before a step that was made again, it is a wreck."""
@@ -95,45 +97,28 @@ def _best_fit(state: ti.template(), body):
 
 
 @ti.func
-def _pull(state: ti.template(), program: ti.template(), p, fit: ti.template(), share, seconds):
-    """Move a particle a share of the way to where it fits best; a pinned one stays.
-
-    Among colliders, which may be in the way, it is thrown there in the coming step, of so many seconds, which
-    begins by taking its share of that.
-    """
-    rest, now, rows = fit
-    if state.particle_inv_mass[p] > 0.0:
-        r = state.rest_position[p] - rest
-        goal = now + ti.Vector([rows[0].dot(r), rows[1].dot(r), rows[2].dot(r)])
-        way = share * (goal - state.particle_position[p])
-        if ti.static(program.has_contact):
-            state.particle_velocity[p] = state.particle_velocity[p] + way / (CALMING * seconds)
-        else:
-            state.particle_position[p] = state.particle_position[p] + way
-
-
-@ti.func
-def _free(state: ti.template(), program: ti.template(), body):
-    """Move the corners of what is caught half of the way."""
-    fit = _best_fit(state, body)
-    blocks = state.body_blocks[body]
-    row = blocks[0] * LANES
-    while row < blocks[1] * LANES:
-        block, lane = row // LANES, row % LANES
-        if _is_caught(state, state.particle_position, block, lane) == 1:
-            for corner in ti.static(range(4)):
-                _pull(state, program, particles_of(state, block, lane)[corner], fit, 0.5, 1.0)
-        row = row_behind(row)
-
-
-@ti.func
 def _raise(state: ti.template(), program: ti.template(), body, steps_left, seconds):
-    """Move all of a wreck a part of the way, in the last step all of it."""
-    fit = _best_fit(state, body)
+    """Move all particles of a wreck a part of the way to where they fit best, in the last step all of it.
+
+    Pinned particles stay, and the floor stops the others. Among colliders, which may be in the way, particles
+    get a velocity instead, with which they arrive in the coming step of so many seconds. That step begins by
+    taking its share of this velocity.
+    """
+    rest, now, rows = _best_fit(state, body)
     particles = state.body_particles[body]
     p = particles[0]
     while p < particles[1]:
-        _pull(state, program, p, fit, 1.0 / steps_left, seconds)
+        if state.particle_inv_mass[p] > 0.0:
+            r = state.rest_position[p] - rest
+            goal = now + ti.Vector([rows[0].dot(r), rows[1].dot(r), rows[2].dot(r)])
+            way = (goal - state.particle_position[p]) / steps_left
+            if ti.static(program.has_contact):
+                state.particle_velocity[p] = state.particle_velocity[p] + way / (CALMING * seconds)
+            else:
+                x = state.particle_position[p] + way
+                if ti.static(program.has_floor):
+                    x.z = ti.max(x.z, ti.min(state.floor[None].x, state.particle_position[p].z))
+                state.particle_position[p] = x
         p = row_behind(p)
 
 
@@ -159,8 +144,12 @@ def kept_while_caught(state: ti.template(), body, seconds):
 
 
 @ti.real_func
-def untangle_body(state: ti.template(), program: ti.template(), body: ti.i32, seconds: ti.f32):
-    """At the end of a step, of so many seconds: look after what is caught, where the law brings it back."""
+def untangle_body(state: ti.template(), program: ti.template(), body: ti.i32, seconds: ti.f32) -> ti.i32:
+    """At the end of a step, of so many seconds: look after what is caught, where the law brings it back.
+
+    Returns: whether some has been caught for so long that the body is to be reported (1).
+    """
+    is_reported = 0
     if _recovers(state, program, body) == 1:
         before = state.body_patience[body]
         age = ti.max(before, -RAISING_STEPS - 1) + 1
@@ -169,14 +158,12 @@ def untangle_body(state: ti.template(), program: ti.template(), body: ti.i32, se
                 age = -RAISING_STEPS
             elif before == PLACED:
                 age = 0
-        is_look = age >= 0 and age % PATIENCE == 0
-        if is_look:
+        if age >= 0 and age % PATIENCE == 0:
             if _caught_count(state, state.particle_position, body) == 0:
                 age = 0
+            is_reported = int(age == REPORTED)
         if age < 0:
             _raise(state, program, body, -age, seconds)
-        elif is_look and age >= 2 * PATIENCE:
-            if ti.static(not program.has_contact):
-                _free(state, program, body)
         state.body_patience[body] = age
         state.body_jolted[body] = 0
+    return is_reported

@@ -74,6 +74,35 @@ def test_a_sound_file_would_simulate_and_its_body_is_told(tmp_path):
     assert {each.grade for each in found.findings} == {Grade.GOOD}
 
 
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+@pytest.mark.parametrize("size", [0.0, 1e-30, 1e-9, 1e9, 1e25])
+@pytest.mark.parametrize("place", [0.0, 5.0, 1e15, 1e29])
+def test_nothing_is_divided_by_zero_or_too_large_whatever_the_size_and_place(size, place):
+    """NumPy would print warnings beside what the doctor says."""
+    cube = trimesh.creation.box()
+    found = facts_of(read_surfaces((size * cube.vertices + place, cube.faces)))
+    assert found.triangles == 12
+
+
+def test_the_axis_that_was_assumed_is_named_with_the_other_one(tmp_path):
+    file = tmp_path / "x.obj"
+    file.write_text(3 * "v 5 5 5\n" + "f 1 2 3\n")
+    told = " ".join(each.text for each in diagnose(file, RUBBER).findings)
+    assert "y is taken as up" in told
+    assert "up='z'" in told
+    assert "taken as up" not in " ".join(each.text for each in diagnose(file, RUBBER, up="z").findings)
+
+
+@pytest.mark.parametrize("suffix", ["obj", "ply", "glb"])
+def test_a_mended_file_stands_as_its_broken_one_does(tmp_path, suffix):
+    tall = trimesh.creation.box((1.0, 2.0, 3.0))
+    write_mended(read_surfaces(tall), tmp_path / f"tall.{suffix}")
+    surfaces = read_surfaces(tmp_path / f"tall.{suffix}")
+    np.testing.assert_allclose(np.ptp(surfaces[0].vertices, axis=0), (1.0, 2.0, 3.0), atol=1e-6)
+    a, b, c = np.moveaxis(surfaces[0].vertices[surfaces[0].triangles], 1, 0)
+    assert np.einsum("ij,ij->", a, np.cross(b, c)) / 6 == pytest.approx(6.0)
+
+
 @pytest.mark.parametrize("name", REFUSED)
 def test_what_makes_no_body_is_bad(tmp_path, name):
     found = diagnose(written(REFUSED[name], tmp_path / "x.ply"), RUBBER)

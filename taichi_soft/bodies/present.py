@@ -1,0 +1,43 @@
+"""Constants of the law of a body as they are now: on their way, while another material is eased in."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.bodies.soft_body import SoftBody, record_of
+from taichi_soft.elements.materials import isotropic_stiffness
+
+Floats = NDArray[np.float64]
+
+
+def lame_of(body: SoftBody) -> Floats:
+    """Lame's lambda and mu of each tetrahedron, (m, 2) [Pa]; zero for an anisotropic material."""
+    record = record_of(body)
+    if record.present is None:
+        return record.description.lame
+    return record.present.lame[np.argsort(record.present.tet_order)]
+
+
+def stiffness_of(body: SoftBody) -> Floats:
+    """C of Hooke's law of each tetrahedron, (m, 6, 6) [Pa]."""
+    record = record_of(body)
+    if record.present is None:
+        return record.description.stiffness_matrices()
+    if not record.present.stiffness.any():
+        return isotropic_stiffness(*lame_of(body).T)
+    upper = record.present.stiffness[np.argsort(record.present.tet_order)]
+    matrices = np.zeros((len(upper), 6, 6))
+    rows, columns = np.triu_indices(6)
+    matrices[:, rows, columns] = matrices[:, columns, rows] = upper
+    return matrices
+
+
+def edge_constants_of(body: SoftBody) -> Floats:
+    """`Bonds.constants` of each edge, (k, 4), of a pairwise law."""
+    record = record_of(body)
+    bonds, present = record.description.bonds, record.present
+    if present is not None and present.bonds is not None:
+        return present.bonds.constants[np.argsort(present.edge_order)]
+    assert bonds is not None
+    return bonds.constants

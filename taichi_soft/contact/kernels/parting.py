@@ -1,0 +1,339 @@
+"""Bodies that were placed inside each other: moved apart before they touch.
+
+Contact keeps a vertex on its side of a surface. Bodies placed inside each other would be held there for good.
+So each step first looks for bodies that the placed ones overlap. Bodies that overlap do not touch. The end of
+the step moves them apart as rigid bodies, at a limited speed. Their velocities stay as they are, except for
+the relative velocity with which they approach. Bodies that are clear of each other touch again.
+"""
+
+from taichi_soft.bodies.status import ACTIVE, CLEAR, JUST_PLACED, OVERLAPPING
+from taichi_soft.contact.distances.distance import signed_distance
+from taichi_soft.contact.fields import MAX_PARTNERS, NO_COLLIDER
+from taichi_soft.contact.kernels.collide import in_frame
+from taichi_soft.contact.kernels.filters import may_touch
+from taichi_soft.contact.kernels.hull import motion_of, place_points
+from taichi_soft.contact.kernels.vertex_grid import boxes_overlap
+from taichi_soft.control.kernels.joints import are_joined
+from taichi_soft.core.math.quaternion import spun, turned
+from taichi_soft.core.math.rows import row_behind
+from taichi_soft.core.runtime import ti
+
+PARTING_RATE = 2.0
+"""Relative speed at which two bodies part [1/s], over the largest side of the smaller one."""
+
+INSET = 0.02
+"""Depth [mean edges] beyond which a body overlaps another. Contact itself moves shallower bodies apart."""
+
+OUTSET = 0.5
+"""Thicknesses by which overlapping bodies must be clear of each other before they touch: then contact has
+next to nothing to push out."""
+
+PULL = 0.05
+"""Part of the way to its middle by which a triangle's corners are drawn in to look for overlap."""
+
+SAME_PLACE = 1e-3
+"""Distance of two centres, over the largest side, below which the slots choose the direction of parting."""
+
+
+@ti.func
+def _is_joined_or_filtered(state: ti.template(), a, b):
+    """Whether two bodies may overlap by design (1)."""
+    return int(not may_touch(state, a, b)) | are_joined(state, a, b)
+
+
+@ti.func
+def _mobility(state: ti.template(), body):
+    """Inverse mass of a body that can move as a whole [1/kg]; 0 where it is pinned or does not move."""
+    particles = state.body_particles[body]
+    mass, is_free, p = ti.cast(0.0, ti.f32), int(state.body_status[body] == ACTIVE), particles[0]
+    while p < particles[1]:
+        mass += state.particle_mass[p]
+        is_free = is_free & int(state.particle_inv_mass[p] > 0.0)
+        p = row_behind(p)
+    return is_free / ti.max(mass, 1e-30)
+
+
+@ti.func
+def _side_of_edge(p, q, a, b):
+    """The side of an edge from a to b on which the origin of a plane is: 1 or -1.
+
+    Both triangles of an edge compute the same product, by the numbers `p` and `q` of its particles, and get
+    opposite answers. So a ray passes through one of the two, whatever the rounding.
+    """
+    is_turned = p > q
+    first, second = ti.select(is_turned, b, a), ti.select(is_turned, a, b)
+    side = ti.select(first.x * second.y - first.y * second.x >= 0.0, 1, -1)
+    return ti.select(is_turned, -side, side)
+
+
+@ti.real_func
+def _encloses(state: ti.template(), body: ti.i32, x: ti.math.vec3) -> ti.i32:
+    """Whether the surface of a body goes round a point (1): a ray leaves it more often than it enters."""
+    right, up = ti.Vector([0.8164966, -0.5773503, 0.0]), ti.Vector([0.4082483, 0.5773503, -0.7071068])
+    triangles, leaves = state.touching.body_triangles[body], 0
+    t = triangles[0]
+    while t < triangles[1]:
+        corners = state.touching.triangle_vertices[t]
+        a = state.particle_position[corners[0]] - x
+        b = state.particle_position[corners[1]] - x
+        c = state.particle_position[corners[2]] - x
+        # As seen along the ray.
+        u = ti.Vector([right.dot(a), up.dot(a)])
+        v = ti.Vector([right.dot(b), up.dot(b)])
+        w = ti.Vector([right.dot(c), up.dot(c)])
+        side = _side_of_edge(corners[0], corners[1], u, v)
+        meets = side == _side_of_edge(corners[1], corners[2], v, w)
+        meets = meets and side == _side_of_edge(corners[2], corners[0], w, u)
+        if meets and side * a.dot(b.cross(c)) > 0.0:
+            leaves += side
+        t = row_behind(t)
+    return int(leaves != 0)
+
+
+@ti.real_func
+def _reaches_into(state: ti.template(), body: ti.i32, other: ti.i32, depth: ti.f32) -> ti.i32:
+    """Whether what is `depth` [m] below the surface of a body, or above where negative, is in another (1).
+
+    Sheets and ropes have no inside: their particles themselves count.
+    """
+    found = 0
+    blocks, triangles = state.body_blocks[body], state.touching.body_triangles[body]
+    lower, upper = state.contact.body_lower[other], state.contact.body_upper[other]
+    if state.body_blocks[other][0] < state.body_blocks[other][1]:
+        if blocks[0] < blocks[1]:
+            t = triangles[0]
+            while t < triangles[1] and found == 0:
+                corners = state.touching.triangle_vertices[t]
+                a = state.particle_position[corners[0]]
+                b = state.particle_position[corners[1]]
+                c = state.particle_position[corners[2]]
+                across = (b - a).cross(c - a)
+                middle = (a + b + c) / 3.0 - depth / ti.max(across.norm(), 1e-30) * across
+                for i in range(4):
+                    x = middle
+                    if i < 3:
+                        x += (1.0 - PULL) * (state.particle_position[corners[i]] - (a + b + c) / 3.0)
+                    if found == 0 and boxes_overlap(x, x, lower, upper):
+                        found = _encloses(state, other, x)
+                t = row_behind(t)
+        else:
+            outer = state.touching.body_outer[body]
+            k = outer[0]
+            while k < outer[1] and found == 0:
+                x = state.particle_position[state.touching.outer_particle[k]]
+                if boxes_overlap(x, x, lower, upper):
+                    found = _encloses(state, other, x)
+                k = row_behind(k)
+    return found
+
+
+@ti.func
+def _overlap(state: ti.template(), a, b):
+    """Whether two bodies overlap (1): by more than a little, or once they are being parted, at all."""
+    depth = INSET * ti.min(state.soft.body_surface[a].z, state.soft.body_surface[b].z)
+    if state.soft.overlap[a] == OVERLAPPING or state.soft.overlap[b] == OVERLAPPING:
+        depth = -OUTSET * 0.5 * (state.soft.body_surface[a].y + state.soft.body_surface[b].y)
+    found = _reaches_into(state, a, b, depth)
+    if found == 0:
+        found = _reaches_into(state, b, a, depth)
+    return found
+
+
+@ti.func
+def _add_partner(soft: ti.template(), body, other):
+    count = soft.partner_count[body]
+    if count < MAX_PARTNERS:
+        soft.partner[body * MAX_PARTNERS + count] = other
+    soft.partner_count[body] = count + 1
+
+
+@ti.real_func
+def _find_partners(state: ti.template(), island: ti.i32, body: ti.i32):
+    """Find the bodies that one which was just placed, or is being parted, overlaps."""
+    mobility = _mobility(state, body)
+    lower, upper = state.contact.body_lower[body], state.contact.body_upper[body]
+    for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
+        other = state.contact.island_body[i]
+        is_new = other > body or (other < body and state.soft.overlap[other] == CLEAR)
+        if is_new and _is_joined_or_filtered(state, body, other) == 0:
+            their_lower, their_upper = state.contact.body_lower[other], state.contact.body_upper[other]
+            if boxes_overlap(lower, upper, their_lower, their_upper):
+                if mobility + _mobility(state, other) > 0.0 and _overlap(state, body, other) == 1:
+                    _add_partner(state.soft, body, other)
+                    _add_partner(state.soft, other, body)
+
+
+@ti.real_func
+def find_overlaps(state: ti.template(), island: ti.i32):
+    """Find the overlapping bodies of an island, before its step."""
+    first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
+    placed, row = 0, first
+    while row < last:
+        body = state.contact.island_body[row]
+        placed += int(state.soft.overlap[body] != CLEAR)
+        if state.soft.partner_count[body] != 0:
+            state.soft.partner_count[body] = 0
+        row = row_behind(row)
+    if placed > 0:
+        for i in range(first, last):
+            place_points(state, state.contact.island_body[i])
+        for i in range(first, last):
+            if state.soft.overlap[state.contact.island_body[i]] != CLEAR:
+                _find_partners(state, island, state.contact.island_body[i])
+        for i in range(first, last):
+            body = state.contact.island_body[i]
+            if state.soft.overlap[body] != CLEAR:
+                overlaps = state.soft.partner_count[body] > 0
+                state.soft.overlap[body] = ti.select(overlaps, OVERLAPPING, CLEAR)
+
+
+@ti.func
+def are_parting(state: ti.template(), body, other):
+    """Whether two bodies overlap and do not touch yet (1). One with too many partners touches no body."""
+    count = state.soft.partner_count[body]
+    found = int(ti.max(count, state.soft.partner_count[other]) > MAX_PARTNERS)
+    for k in range(ti.min(count, MAX_PARTNERS)):
+        found |= int(state.soft.partner[body * MAX_PARTNERS + k] == other)
+    return found
+
+
+@ti.func
+def _measure(state: ti.template(), body):
+    """Write where the centre of a body is and was, its velocity, and its largest side."""
+    particles, outer = state.body_particles[body], state.body_outer[body]
+    x0 = state.particle_position[particles[0]]
+    mass = ti.cast(0.0, ti.f32)
+    center, before = ti.Vector.zero(ti.f32, 3), ti.Vector.zero(ti.f32, 3)
+    momentum = ti.Vector.zero(ti.f32, 3)
+    for p in range(particles[0], particles[1]):
+        m = state.particle_mass[p]
+        mass += m
+        center += m * (state.particle_position[p] - x0)
+        before += m * (state.prev_position[p] - x0)
+        momentum += m * state.particle_velocity[p]
+    lower, upper = x0, x0
+    for k in range(outer[0], outer[1]):
+        x = state.particle_position[state.outer_particle[k]]
+        lower, upper = ti.min(lower, x), ti.max(upper, x)
+    state.soft.center[body] = x0 + center / mass
+    state.soft.displacement[body] = (center - before) / mass
+    state.soft.mean_velocity[body] = momentum / mass
+    state.soft.size[body] = (upper - lower).max()
+    state.soft.mobility[body] = _mobility(state, body)
+    state.soft.parting_shift[body] = ti.Vector.zero(ti.f32, 3)
+    state.soft.parting_kick[body] = ti.Vector.zero(ti.f32, 3)
+    state.contact.calm[body] = 0.0
+
+
+@ti.func
+def _place_of_slot(body):
+    """A point of a square for each slot, no two alike: Roberts' sequence R2."""
+    u, v = 0.7548777 * body, 0.5698403 * body
+    return ti.Vector([u - ti.floor(u), v - ti.floor(v), 0.0])
+
+
+@ti.func
+def _parting_direction(soft: ti.template(), a, b):
+    """From the centre of one body to that of another; of two at one place by their slots, level."""
+    away = soft.center[a] - soft.center[b]
+    if away.norm() < SAME_PLACE * ti.min(soft.size[a], soft.size[b]):
+        away = _place_of_slot(a) - _place_of_slot(b)
+    return away / ti.max(away.norm(), 1e-30)
+
+
+@ti.func
+def _part_pair(soft: ti.template(), a, b, gravity, dt):
+    """Add what one pair needs to the displacements and velocities of both. Momentum stays."""
+    n = _parting_direction(soft, a, b)
+    mine, total = soft.mobility[a], soft.mobility[a] + soft.mobility[b]
+    share = mine / total
+    wanted = PARTING_RATE * ti.min(soft.size[a], soft.size[b]) * dt
+    missing = ti.max(wanted - (soft.displacement[a] - soft.displacement[b]).dot(n), 0.0)
+    # What rises against gravity does so alone: the lower one may lie on something.
+    up = -gravity / ti.max(gravity.norm(), 1e-30)
+    rise = missing * n.dot(up)
+    upper_share = share
+    if mine > 0.0 and mine < total:
+        upper_share = ti.select(rise > 0.0, 1.0, 0.0)
+    level = missing * n - rise * up
+    soft.parting_shift[a] = soft.parting_shift[a] + share * level + upper_share * rise * up
+    soft.parting_shift[b] = soft.parting_shift[b] - (1.0 - share) * level - (1.0 - upper_share) * rise * up
+    v = soft.mean_velocity[a] + soft.parting_kick[a] - soft.mean_velocity[b] - soft.parting_kick[b]
+    kick = ti.max(-v.dot(n), 0.0)
+    soft.parting_kick[a] = soft.parting_kick[a] + share * kick * n
+    soft.parting_kick[b] = soft.parting_kick[b] - (1.0 - share) * kick * n
+
+
+@ti.real_func
+def _shift_beside_colliders(
+    state: ti.template(), body: ti.i32, shift: ti.math.vec3, dt: ti.f32
+) -> ti.math.vec3:
+    """The part of a displacement [m] that brings no particle of a body deeper into a collider."""
+    s = shift
+    for c in range(state.contact.collider_count[None]):
+        mine, theirs = state.contact.body_filter[body], state.contact.collider_filter[c]
+        touches = (mine[0] & theirs[1]) != 0 and (theirs[0] & mine[1]) != 0
+        if touches and state.contact.collider_kind[c] != NO_COLLIDER:
+            rotation = spun(state.contact.collider_rotation[c], state.contact.collider_spin[c] * dt)
+            for k in range(state.touching.body_outer[body][0], state.touching.body_outer[body][1]):
+                x, _ = motion_of(state, state.touching.outer_particle[k])
+                before, _ = _distance(state, c, x, dt)
+                after, normal = _distance(state, c, x + s, dt)
+                s += ti.max(ti.min(before, 0.0) - after, 0.0) * turned(rotation, normal)
+    return s
+
+
+@ti.func
+def _distance(state: ti.template(), c, x, time):
+    """Distance of a point from a collider's skin [m], and the normal in the collider's frame."""
+    distance, normal = signed_distance(
+        state.contact.samples,
+        state.contact.collider_kind[c],
+        state.contact.collider_parameters[c],
+        state.contact.collider_resolution[c],
+        state.contact.collider_offset[c],
+        in_frame(state.contact, c, x, time),
+    )
+    return distance - state.contact.collider_surface[c].z, normal
+
+
+@ti.real_func
+def _move_body(state: ti.template(), body: ti.i32, dt: ti.f32):
+    count = state.soft.partner_count[body]
+    if count > 0 and state.soft.mobility[body] > 0.0:
+        wanted = state.soft.parting_shift[body] / ti.min(count, MAX_PARTNERS)
+        shift = _shift_beside_colliders(state, body, wanted, dt)
+        kick = state.soft.parting_kick[body]
+        for p in range(state.body_particles[body][0], state.body_particles[body][1]):
+            state.particle_position[p] = state.particle_position[p] + shift
+            state.particle_velocity[p] = state.particle_velocity[p] + kick
+
+
+@ti.real_func
+def part_bodies(state: ti.template(), island: ti.i32, dt: ti.f32):
+    """Move the overlapping bodies of an island apart, after its step of `dt` [s]."""
+    first, last = state.contact.island_first[island], state.contact.island_first[island + 1]
+    overlapping, row = 0, first
+    while row < last:
+        overlapping += state.soft.partner_count[state.contact.island_body[row]]
+        row = row_behind(row)
+    if overlapping > 0:
+        for i in range(first, last):
+            body = state.contact.island_body[i]
+            if state.soft.partner_count[body] > 0:
+                _measure(state, body)
+        for i in range(first, last):
+            body = state.contact.island_body[i]
+            for k in range(ti.min(state.soft.partner_count[body], MAX_PARTNERS)):
+                other = state.soft.partner[body * MAX_PARTNERS + k]
+                if body < other:
+                    _part_pair(state.soft, body, other, state.gravity[None], dt)
+        for i in range(first, last):
+            _move_body(state, state.contact.island_body[i], dt)
+
+
+@ti.kernel
+def mark_placed(state: ti.template(), body: ti.i32):
+    """Let the next step look for bodies that a body overlaps, where bodies touch each other."""
+    if ti.static(state.capacity.contact.soft):
+        state.soft.overlap[body] = JUST_PLACED

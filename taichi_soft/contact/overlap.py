@@ -1,0 +1,97 @@
+"""Whether a body starts inside another: for those who would rather be told than have the two moved apart."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.core.errors import OptionError
+from taichi_soft.meshing.locating import nearest_points
+
+if TYPE_CHECKING:
+    from taichi_soft.bodies.asset import SoftBodyAsset
+
+Floats = NDArray[np.float64]
+
+INSET = 0.02
+"""Depth over the mean edge from which bodies overlap; contact moves shallower ones apart by itself."""
+
+RAY = np.array([[2**0.5, -1, 0], [1, 2**0.5, -(3**0.5)], [1, 2**0.5, 3**0.5]]) / np.sqrt([[3], [6], [6]])
+"""Axes: a ray along the third decides what is inside. It meets no edge of a usual mesh, and no vertex."""
+
+CHUNK = 1 << 19
+"""Pairs of points and triangles that are looked at together."""
+
+
+class Placed(NamedTuple):
+    """A body where it is."""
+
+    name: str
+    asset: SoftBodyAsset
+    tets: NDArray[np.int32]  # (m, 4)
+    surface: NDArray[np.int32]  # (f, 3)
+    positions: Floats  # (n, 3) [m]
+
+    @property
+    def corners(self) -> Floats:
+        """Triangles by which it touches others, (t, 3, 3) [m]."""
+        hull = self.asset.bound_hull
+        if hull is not None:
+            return np.asarray(self.asset.touching_points(self.positions)[hull.triangles])
+        return np.asarray(self.positions[self.surface])
+
+
+def require_apart(body: Placed, others: Iterable[Placed]) -> None:
+    """Check that a body starts outside of all others that it may touch.
+
+    Raises: OptionError with the body that it overlaps deepest, and the depth.
+    """
+    deepest, which = 0.0, None
+    for other in others:
+        mine, theirs = body.asset.contact, other.asset.contact
+        if mine.group & theirs.mask and theirs.group & mine.mask:
+            depth = max(_depth(body, other), _depth(other, body))
+            if depth > INSET * min(body.asset.surface_row[2], other.asset.surface_row[2]) and depth > deepest:
+                deepest, which = depth, other
+    if which is not None:
+        raise OptionError(
+            f"{body.name} starts {deepest:.4g} m inside {which.name}: place it elsewhere, keep the two apart "
+            'by group and mask, or use overlap="part", which moves them apart'
+        )
+
+
+def _depth(body: Placed, other: Placed) -> float:
+    """Depth of the deepest vertex, or middle of a tetrahedron, of a body in another [m]; 0 for none."""
+    if not len(other.tets):
+        return 0.0
+    corners = other.corners
+    points = np.concatenate([body.positions, body.positions[body.tets].mean(axis=1)])
+    if body.asset.bound_hull is not None:
+        points = body.asset.touching_points(body.positions)
+    near = ((points > corners.min(axis=(0, 1))) & (points < corners.max(axis=(0, 1)))).all(axis=1)
+    deepest, size = 0.0, max(1, CHUNK // len(corners))
+    points = points[near]
+    for first in range(0, len(points), size):
+        few = points[first : first + size]
+        few = few[_is_inside(few, corners)]
+        pairs = np.repeat(few, len(corners), axis=0), np.tile(corners, (len(few), 1, 1))
+        away = np.linalg.norm(nearest_points(*pairs) - pairs[0], axis=1).reshape(len(few), len(corners))
+        deepest = max(deepest, float(away.min(axis=1).max(initial=0.0)))
+    return deepest
+
+
+def _is_inside(points: Floats, corners: Floats) -> NDArray[np.bool_]:
+    """Whether a ray from each point leaves a closed surface more often than it enters it."""
+    seen = corners @ RAY.T - (points @ RAY.T)[:, None, None]
+    x, y, z = np.moveaxis(seen, -1, 0)
+    areas = np.roll(x, -1, axis=-1) * np.roll(y, -2, axis=-1) - np.roll(x, -2, axis=-1) * np.roll(
+        y, -1, axis=-1
+    )
+    total = areas.sum(axis=-1)
+    side = np.sign(total)
+    meets = (areas * side[..., None] > 0.0).all(axis=-1)
+    ahead = (areas * z).sum(axis=-1) * side > 0.0
+    return np.asarray((side * (meets & ahead)).sum(axis=-1) != 0.0)

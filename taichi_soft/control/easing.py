@@ -1,0 +1,264 @@
+"""Another material for a body that moves, eased in so that a stiffer law adds no energy.
+
+A stiffer law finds more strain energy in a deformed body, which would throw it. So constants go from those
+before to those after along k(t) = k0 / (1 - (1 - sqrt(k0 / k1)) t / T)^2: the compliance falls as a parabola,
+and what is pressed by a load goes to its new shape at an even deceleration. While k grows, vibrations fade
+like k^-`FADING`: of each mode that is faster than the change that leaves E ~ k^(1/2 - FADING).
+"""
+
+from __future__ import annotations
+
+import base64
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taichi_soft.bodies.kernels.constant_rows import write_numbers
+from taichi_soft.bodies.layout import BodyArrays
+from taichi_soft.bodies.measures import elastic_energy
+from taichi_soft.bodies.soft_body import Slice, SoftBody, present_asset, record_of
+from taichi_soft.control.constants import write_constants, write_stiffness
+from taichi_soft.core.constants import GRAVITY_EARTH
+from taichi_soft.core.serialisation import below
+
+Floats = NDArray[np.float64]
+
+SHORTEST, PERIODS = 0.5, 8.0
+"""A change takes this long [s], or as many times the slowest mode's period over 2 pi, whichever is longer."""
+
+HELD = 6.4
+"""How much slower a beam vibrates that is held at one end than a free one (roots of the bending equation,
+(4.730 / 1.875)^2)."""
+
+FADING = 2.0
+"""Power of the stiffness with which vibrations fade meanwhile: the slowest mode is then damped critically."""
+
+TIMES_A_STEP = 8.0
+"""How often vibrations fade in a step, at least: see `kept_vibration`."""
+
+LIFT = 1e-4
+"""A change that adds less than it takes to lift the body by this [m] is made at once."""
+
+LARGEST_RATIO = 1e12
+"""Of stiffnesses: what was not stiff at all is eased in from here."""
+
+
+@dataclass(eq=False)
+class Easing:
+    """A change that is under way."""
+
+    constants: Floats  # that the fields have now: see `_constants`
+    ratio: float  # of the stiffness after to that before, the largest of all elements
+    seconds: float  # that it takes
+    passed: float = 0.0  # [s]
+
+    @property
+    def plain(self) -> list[Any]:
+        """As plain data."""
+        content = base64.b64encode(self.constants.tobytes()).decode()
+        return [self.ratio, self.seconds, self.passed, content]
+
+    def stiffness(self, passed: float) -> float:
+        """Of the element that changes most after a time [s], over that before the change."""
+        part = min(passed / self.seconds, 1.0)
+        compliance = 1.0 - (1.0 - 1.0 / math.sqrt(self.ratio)) * part
+        return 1.0 / (compliance * compliance)
+
+
+class Easings(Slice):
+    """All changes of material that are under way in one world."""
+
+    name, bars_cuts, bars_levels = "easings", False, False
+
+    def __init__(self, context: Any) -> None:
+        """None yet."""
+        super().__init__(context)
+        self.by_body: dict[SoftBody, Easing] = {}
+        self._left: list[SoftBody] = []  # by what a snapshot is about to overwrite
+
+    def begin(self, body: SoftBody, material: Any) -> None:
+        """Let a body become of a material."""
+        record, built = record_of(body), self.context.built
+        before, energy = record.present or self._arrays(body), elastic_energy(body)
+        self.let_go(body)
+        built.change(body.index, write_constants, body, replace(record.description, material=material))
+        ratio = _growth(before, self._arrays(body))
+        added = elastic_energy(body) - energy
+        if ratio > 1.0 and added > LIFT * GRAVITY_EARTH * float(body.masses.sum()):
+            self._go_on(body, Easing(_constants(before), ratio, self._duration(body, before)))
+
+    def _go_on(self, body: SoftBody, easing: Easing) -> None:
+        """Let a change be under way."""
+        arrays = _with(self._arrays(body), easing.constants)
+        self.by_body[body], record_of(body).present = easing, arrays
+        write_stiffness(self.context.built.state, self._place(body), arrays)
+
+    def _duration(self, body: SoftBody, before: BodyArrays) -> float:
+        """How long a change takes [s] that begins with these constants."""
+        asset = present_asset(body)
+        softer = _mean_modulus(asset.arrays) / max(_mean_modulus(before), 1e-30)
+        heavier = float(before.mass.mean() / asset.arrays.mass.mean())
+        if asset.guessed_frequency == 0.0:
+            return SHORTEST
+        slower = HELD if len(body.pinned) or body.is_held else 1.0
+        return max(SHORTEST, PERIODS * slower * math.sqrt(softer * heavier) / asset.guessed_frequency)
+
+    def advance(self, seconds: float) -> None:
+        """Go on with all changes in the coming step of `seconds` [s]."""
+        for body, easing in list(self.by_body.items()):
+            before = easing.stiffness(easing.passed)
+            easing.passed += seconds
+            now, arrays = easing.stiffness(easing.passed), self._arrays(body)
+            rate = 0.0
+            if easing.passed < easing.seconds:
+                part = (now - before) / (easing.ratio - before)
+                easing.constants = easing.constants + part * (_constants(arrays) - easing.constants)
+                arrays = record_of(body).present = _with(arrays, easing.constants)
+                rate = FADING * (now - before) / (now * seconds)
+            else:
+                self.let_go(body)
+            self.context.built.change(body.index, _write, body, self._place(body), arrays, rate, seconds)
+
+    def _arrays(self, body: SoftBody) -> BodyArrays:
+        return self.context.layout.bodies[body.index]
+
+    def _place(self, body: SoftBody) -> Any:
+        return self.context.layout.ranges[body.index]
+
+    def let_go(self, body: SoftBody) -> None:
+        """As `Slice.let_go`."""
+        self.by_body.pop(body, None)
+        record_of(body).present = None
+
+    def share(self, body: SoftBody, order: Any, pieces: Sequence[tuple[SoftBody, NDArray[np.int64]]]) -> None:
+        """Go on in what a cut has left of a body.
+
+        Args:
+            order: of its tetrahedra in the fields before.
+            pieces: what it has become, with the tetrahedron of the body before that each one is, (m,).
+        """
+        easing = self.by_body.get(body)
+        self.let_go(body)
+        if easing is None or self._arrays(body).bonds is not None:
+            return
+        rows = easing.constants.reshape(len(order), -1)[np.argsort(order)]
+        for piece, tets in pieces:
+            self._go_on(piece, replace(easing, constants=rows[tets][self._arrays(piece).tet_order].ravel()))
+
+    def warm_up(self, body: SoftBody, other: SoftBody | None, step: Callable[[], None]) -> None:
+        """Write what a step of a change writes."""
+        _ = present_asset(body).guessed_frequency
+        _write(self.context.built.state, body, self._place(body), self._arrays(body), 0.0, 1.0)
+
+    def entries(self) -> list[list[Any]]:
+        """Body, how stiff it becomes, how long that takes, how much of it has passed, constants now."""
+        eased = sorted(self.by_body.items(), key=lambda item: item[0].index)
+        return [[body.index, *easing.plain] for body, easing in eased]
+
+    def serials(self, entries: list[list[Any]]) -> list[int]:
+        """None: there are no handles."""
+        return []
+
+    def read(
+        self, entries: list[list[Any]], vertex_counts: Sequence[int], earlier: dict[str, Any]
+    ) -> list[tuple[int, Easing]]:
+        """Rows of `entries`. Raises: ValueError for a change of nobody, or to what is not finite."""
+        found = []
+        for slot, ratio, seconds, passed, content in entries:
+            if not vertex_counts[below(slot, len(vertex_counts))]:
+                raise ValueError("a material changes of no body")
+            constants = np.frombuffer(base64.b64decode(content, validate=True), dtype=np.float64)
+            easing = Easing(constants, float(ratio), float(seconds), float(passed))
+            if not (1.0 < easing.ratio <= LARGEST_RATIO and 0.0 <= easing.passed < easing.seconds < math.inf):
+                raise ValueError("a change of material is out of range")
+            if not np.abs(constants).max(initial=0.0) < 1e30:
+                raise ValueError("a material is not finite")
+            found.append((int(slot), easing))
+        return found
+
+    def clear(self) -> None:
+        """As `Slice.clear`."""
+        self._left = list(self.by_body)
+        for body in self._left:
+            self.let_go(body)
+
+    def restore(self, read: Any) -> None:
+        """Go on with the changes that were `read`."""
+        slots, state = self.context.slots.slots, self.context.built.state
+        for body in self._left:
+            if slots[body.index] is body:
+                write_stiffness(state, self._place(body), self._arrays(body))
+        for slot, easing in read:
+            body = slots[slot]
+            if body is not None and len(easing.constants) == len(_constants(self._arrays(body))):
+                self._go_on(body, easing)
+
+
+def _write(state: Any, body: SoftBody, place: Any, arrays: BodyArrays, rate: float, seconds: float) -> None:
+    """Not a kernel, but called like one: constants, and the rate at which vibrations fade in a step [1/s]."""
+    write_stiffness(state, place, arrays)
+    own, interval = present_asset(body).vibration_row(record_of(body).description)
+    if rate > 0.0:
+        interval = min(interval, seconds / TIMES_A_STEP)
+    write_numbers(state.body_fading, body.index, np.array([own + rate], dtype=np.float32))
+    write_numbers(state.body_fading_interval, body.index, np.array([interval], dtype=np.float32))
+
+
+def _parts(arrays: BodyArrays) -> list[Floats]:
+    """What a law multiplies with a deformation, and what a pairwise law knows of its edges."""
+    parts = [arrays.lame]
+    if arrays.stiffness.any():
+        parts.append(arrays.stiffness)
+    if arrays.bonds is not None:
+        parts += [arrays.bonds.constants, arrays.bonds.weights]
+        if arrays.bonds.expansion_modulus is not None:
+            parts.append(arrays.bonds.expansion_modulus)
+    return parts
+
+
+def _constants(arrays: BodyArrays) -> Floats:
+    """All of `_parts` in a row; of a law on tetrahedra tetrahedron by tetrahedron."""
+    parts = _parts(arrays)
+    if arrays.bonds is None:
+        return np.concatenate(parts, axis=1).ravel()
+    return np.concatenate([part.ravel() for part in parts])
+
+
+def _with(arrays: BodyArrays, constants: Floats) -> BodyArrays:
+    """A body with other constants."""
+    parts = _parts(arrays)
+    if arrays.bonds is None:
+        rows = constants.reshape(len(arrays.lame), -1)
+        stiffness = rows[:, 2:] if len(parts) > 1 else arrays.stiffness
+        return replace(arrays, lame=rows[:, :2], stiffness=stiffness)
+    ends = np.cumsum([part.size for part in parts])[:-1]
+    shaped = [row.reshape(part.shape) for row, part in zip(np.split(constants, ends), parts, strict=True)]
+    modulus = shaped.pop() if arrays.bonds.expansion_modulus is not None else None
+    bonds = replace(arrays.bonds, constants=shaped[-2], weights=shaped[-1], expansion_modulus=modulus)
+    return replace(arrays, lame=shaped[0], bonds=bonds)
+
+
+def _moduli(arrays: BodyArrays) -> Floats:
+    """Numbers by which elements are compared, (m, k): bulk and shear modulus, or stiffness along an edge;
+    of an anisotropic material the diagonal."""
+    if not len(arrays.lame):
+        assert arrays.bonds is not None
+        return arrays.bonds.constants[:, 1:2]
+    if arrays.stiffness.any():
+        return arrays.stiffness[:, [0, 6, 11, 15, 18, 20]]
+    return np.asarray(arrays.lame @ np.array([[3.0, 0.0], [2.0, 1.0]]))
+
+
+def _mean_modulus(arrays: BodyArrays) -> float:
+    return float(_moduli(arrays)[:, -1].mean())
+
+
+def _growth(before: BodyArrays, after: BodyArrays) -> float:
+    """How many times as stiff a body becomes, the largest of all its elements; at least 1."""
+    old, new = _moduli(before), _moduli(after)
+    grown = new > old
+    return float(np.minimum(new[grown] / np.maximum(old[grown], 1e-300), LARGEST_RATIO).max(initial=1.0))
