@@ -518,7 +518,7 @@ def test_a_small_file_that_asks_for_many_vertices_is_refused_before_memory_is_ta
     message = refusal(path)
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
-    assert "more than 5,000,000 vertices" in message
+    assert "more than 10,000,000 vertices" in message
     assert peak < 30_000_000
 
 

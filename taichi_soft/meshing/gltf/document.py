@@ -31,7 +31,7 @@ COMPONENTS: dict[Any, np.dtype[Any]] = {
 }
 COLUMNS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
-MOST_IMPLICIT_ROWS = 10_000_000
+MOST_IMPLICIT_ROWS = 2_000_000
 """Rows of an accessor without a buffer view: its zeros take memory, and no byte of the file backs them."""
 
 MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")

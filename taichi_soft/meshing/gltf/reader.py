@@ -35,8 +35,8 @@ SHAPELESS = (
 )
 """Beginnings of the names of extensions that change no shape: a file that requires one of these is read."""
 
-MOST_ROWS = 5_000_000
-"""Vertices or triangles of all parts. Many nodes can show one mesh: a small file could ask for any memory."""
+MOST_ROWS = 10_000_000
+"""Vertices and triangles in all. Many nodes can show one mesh: a small file could ask for any memory."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,9 +117,8 @@ class _Reader:
                 continue
             positions, normals = primitive.vertices(weights)
             triangles = primitive.triangles(len(positions))
-            self._take_room(
-                max(len(positions), len(triangles)) * (1 if instances is None else len(instances))
-            )
+            copies = 1 if instances is None else len(instances)
+            self._take_room(copies * (len(positions) + len(triangles)))
             skinned = self._skin_matrices(node, primitive, worlds, len(positions))
             if skinned is not None and instances is not None:
                 raise MeshError(
@@ -159,18 +158,15 @@ class _Reader:
                 raise MeshError(
                     f"cannot be read: skin {node['skin']} has {len(inverse)} of {len(matrices)} matrices"
                 )
-            matrices = matrices @ inverse[: len(matrices)].reshape(-1, 4, 4).transpose(
-                0, 2, 1
-            )  # columns first
+            columns_first = inverse[: len(matrices)].reshape(-1, 4, 4)
+            matrices = matrices @ columns_first.transpose(0, 2, 1)
         used = joints[weights > 0.0]
         if len(used) and used.max() >= len(matrices):
             raise MeshError(
                 f"cannot be read: {primitive.name} refers to joint {used.max()} of {len(matrices)}"
             )
-        totals = weights.sum(axis=1, keepdims=True)
-        weights = np.where(
-            totals > 0.0, weights / np.where(totals > 0.0, totals, 1.0), np.eye(1, weights.shape[1])
-        )
+        weights[weights.sum(axis=1) <= 0.0, 0] = 1.0  # a vertex of no joint follows its first
+        weights /= weights.sum(axis=1, keepdims=True)
         blended = np.zeros((count, 4, 4))
         for column in range(joints.shape[1]):
             rows = np.flatnonzero(weights[:, column])
@@ -180,7 +176,7 @@ class _Reader:
     def _take_room(self, rows: int) -> None:
         self.room -= rows
         if self.room < 0:
-            raise MeshError(f"has more than {MOST_ROWS:,} vertices or triangles: simplify it")
+            raise MeshError(f"has more than {MOST_ROWS:,} vertices and triangles: simplify it")
 
     def _require_extensions(self) -> None:
         required = [str(name) for name in self.document.entries("extensionsRequired")]
@@ -191,48 +187,40 @@ class _Reader:
                 raise MeshError(f"requires the extension {name}, which is not read: export it without")
 
     def _notes(self, shown: list[int]) -> tuple[str, ...]:
-        json, counts = self.document, self.counts
-        found = []
-        animations = [str(each.get("name", number)) for number, each in enumerate(json.entries("animations"))]
-        if counts["skinned"]:
-            found.append(
-                f"{_many(counts['skinned'], 'primitive')} with a skin, {_many(len(self.joints), 'joint')} in "
-                "all: posed as the file's joints rest"
-            )
-        if counts["morphed"]:
-            how = (
-                "blended by the file's default weights"
-                if counts["blended"]
-                else "not applied: their default weights are 0"
-            )
-            found.append(f"{_many(counts['morphed'], 'primitive')} with morph targets, {how}")
-        if animations:
-            names = ", ".join(animations[:5]) + (", ..." if len(animations) > 5 else "")
-            found.append(f"{_many(len(animations), 'animation')} ({names[:200]}): not played")
-        if counts["instances"]:
-            found.append(
-                f"{_many(counts['instances'], 'instance')} by {INSTANCING}: read, as one mesh for each node"
-            )
-        if counts["left out"]:
-            found.append(
-                f"{_many(counts['left out'], 'primitive')} without triangles (points or lines): left out"
-            )
-        hidden = sum("mesh" in each for each in json.entries("nodes")) - sum(
-            "mesh" in json.named("nodes", number) for number in shown
+        counts, entries = self.counts, self.document.entries
+        animations = [str(each.get("name", number)) for number, each in enumerate(entries("animations"))]
+        names = ", ".join(animations[:5]) + (", ..." if len(animations) > 5 else "")
+        blended = "blended by the file's default weights"
+        unblended = "not applied: their default weights are 0"
+        hidden = sum("mesh" in each for each in entries("nodes"))
+        hidden -= sum("mesh" in entries("nodes")[number] for number in shown)
+        notes = (
+            (
+                counts["skinned"],
+                "primitive",
+                f" with a skin, {_many(len(self.joints), 'joint')} in all: posed as the file's joints rest",
+            ),
+            (
+                counts["morphed"],
+                "primitive",
+                f" with morph targets, {blended if counts['blended'] else unblended}",
+            ),
+            (len(animations), "animation", f" ({names[:200]}): not played"),
+            (counts["instances"], "instance", f" by {INSTANCING}: read, as one mesh for each node"),
+            (counts["left out"], "primitive", " without triangles (points or lines): left out"),
+            (hidden, "node", " with a mesh outside the default scene or hidden: left out"),
         )
-        if hidden:
-            found.append(f"{_many(hidden, 'node')} with a mesh outside the default scene or hidden: left out")
-        extensions = [str(name) for name in json.entries("extensionsUsed")]
-        if extensions:
-            ignored = [name for name in extensions if name not in READ]
-            words = (
-                [", ".join(name for name in extensions if name in READ) + " (read)"]
-                if len(ignored) < len(extensions)
-                else []
-            )
-            words += [", ".join(ignored) + " (ignored)"] if ignored else []
-            found.append(f"extensions: {'; '.join(words)}")
-        return (*found, *self.looks.notes)
+        found = [_many(count, noun) + text for count, noun, text in notes if count]
+        return (*found, *_extension_notes(entries("extensionsUsed")), *self.looks.notes)
+
+
+def _extension_notes(names: list[Any]) -> list[str]:
+    lists = (
+        ("read", [str(name) for name in names if name in READ]),
+        ("ignored", [str(name) for name in names if name not in READ]),
+    )
+    words = [f"{', '.join(each)} ({what})" for what, each in lists if each]
+    return [f"extensions: {'; '.join(words)}"] if words else []
 
 
 def _posed(part: _Part, poses: FloatArray) -> _Part:
