@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 INSET = 0.02
-"""Depth over the mean edge from which bodies overlap; contact moves shallower ones apart by itself."""
+"""Depth over the mean edge from which bodies overlap. Contact itself moves shallower bodies apart."""
 
 RAY = np.array([[2**0.5, -1, 0], [1, 2**0.5, -(3**0.5)], [1, 2**0.5, 3**0.5]]) / np.sqrt([[3], [6], [6]])
 """Axes: a ray along the third decides what is inside. It meets no edge of a usual mesh, and no vertex."""

@@ -13,6 +13,7 @@ from taichi_soft.contact.kernels.collide import in_frame
 from taichi_soft.contact.kernels.filters import may_touch
 from taichi_soft.contact.kernels.hull import motion_of, place_points
 from taichi_soft.contact.kernels.vertex_grid import boxes_overlap
+from taichi_soft.contact.overlap import INSET
 from taichi_soft.control.kernels.joints import are_joined
 from taichi_soft.core.math.quaternion import spun, turned
 from taichi_soft.core.math.rows import row_behind
@@ -20,9 +21,6 @@ from taichi_soft.core.runtime import ti
 
 PARTING_RATE = 2.0
 """Relative speed at which two bodies part [1/s], over the largest side of the smaller one."""
-
-INSET = 0.02
-"""Depth [mean edges] beyond which a body overlaps another. Contact itself moves shallower bodies apart."""
 
 OUTSET = 0.5
 """Thicknesses by which overlapping bodies must be clear of each other before they touch: then contact has
