@@ -105,7 +105,10 @@ class Camera:
     ) -> Camera:
         """A camera that looks the same way with the same angle, from just far enough to see the whole box.
 
-        Args: see `framing`.
+        Args:
+            lower, upper: opposite corners of the box [m].
+            margin: room round the box, 1 (none) to 10.
+            aspect: width over height of the picture.
         Raises: as `framing`. One that looked straight up or down looks a little aside.
         """
         x, y, z = np.subtract(self.eye, self.target)
@@ -136,6 +139,8 @@ class Camera:
         """(3, 4) that takes (x, y, z, 1) to (u d, v d, d): pixel u to the right, v down, and depth d [m].
 
         The first pixel covers u and v from 0 to 1.
+        Args:
+            width, height: of the picture [pixels].
         """
         width, height = as_count(width, "width"), as_count(height, "height")
         focal = min(width, height) / (2.0 * math.tan(math.radians(self.fov_degrees) / 2.0))
@@ -145,7 +150,11 @@ class Camera:
         return matrix
 
     def project(self, points: ArrayLike, width: int, height: int) -> NDArray[np.float64]:
-        """Where points (n, 3) [m] lie in a picture: pixel right, pixel down and depth [m], (n, 3).
+        """Where points lie in a picture: pixel right, pixel down and depth [m], (n, 3).
+
+        Args:
+            points: (n, 3) [m].
+            width, height: of the picture [pixels].
 
         Points nearer than `near` or behind the camera have no place in the picture: their pixels are NaN.
         """

@@ -40,7 +40,12 @@ class Orbit:
             raise OptionError(f"period must be finite and not 0, got {self.period!r}")
 
     def at(self, time: float, box_of: BoxOf) -> Camera:
-        """Where it is at a time of the world [s]."""
+        """Where it is at a time.
+
+        Args:
+            time: of the world [s].
+            box_of: not used.
+        """
         angle = 2.0 * math.pi * time / self.period
         c, s = math.cos(angle), math.sin(angle)
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
@@ -73,7 +78,12 @@ class Follow:
         self._target = np.zeros(3)
 
     def at(self, time: float, box_of: BoxOf) -> Camera:
-        """Where it is at a time of the world [s]. A time before the last one begins anew."""
+        """Where it is at a time. A time before the last one begins anew.
+
+        Args:
+            time: of the world [s].
+            box_of: function that returns the lower and the upper corner of a body as it is drawn, (2, 3) [m].
+        """
         middle = np.asarray(box_of(self.body)).mean(axis=0)
         passed = time - self._time
         if passed < 0.0:

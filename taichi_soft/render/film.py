@@ -35,9 +35,9 @@ class FilmReport:
     What `Stage.act` alone calls compiles where it calls it first, in a film as in a game.
     """
 
-    path: Path | None
-    frames: int
-    fps: float
+    path: Path | None  # of the film; None where nothing was written
+    frames: int  # number of frames
+    fps: float  # frames per second
     simulated: float  # time that passed in the world [s]
     step_times: NDArray[np.float64]  # of stepping and reading each frame but the first [s]
     draw_times: NDArray[np.float64]  # of drawing each frame [s]; empty where nothing is drawn

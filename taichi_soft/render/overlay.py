@@ -43,6 +43,7 @@ def draw_text(picture: Picture, lines: Sequence[str], *, corner: Corner | str = 
     Args:
         picture: uint8 (height, width, 3).
         lines: of plain ASCII text; none at all draws nothing.
+        corner: "top left", "top right", "bottom left" or "bottom right".
     Raises: OptionError for another picture, text or corner.
     """
     _check(picture, lines)
@@ -60,6 +61,7 @@ def draw_legend(
     Args:
         picture: uint8 (height, width, 3), changed in place.
         entries: sRGB from 0 to 1, and plain ASCII text.
+        corner: "top left", "top right", "bottom left" or "bottom right".
     Raises: OptionError for another picture, colour, text or corner.
     """
     colors = [as_color(color, "color of the legend") for color, _ in entries]
@@ -83,6 +85,8 @@ def draw_color_scale(
 
     Args:
         picture: uint8 (height, width, 3), changed in place.
+        scale: whose colours, ends and quantity are shown.
+        corner: "top left", "top right", "bottom left" or "bottom right".
     Raises: OptionError for another picture, scale or corner.
     """
     if not isinstance(scale, ColorScale):

@@ -130,6 +130,8 @@ class Renderer:
         """The picture of these surfaces, sRGB, uint8 (height, width, 3); an array of its own every time.
 
         Through a jelly all is seen that is behind it, other jellies excepted.
+        Args:
+            surfaces: what is drawn, where their positions are now.
         Raises: OptionError for anything that is not a `Surface`.
         """
         scene = SceneArrays.of(surfaces)

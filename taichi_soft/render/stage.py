@@ -36,7 +36,7 @@ class Actor:
     texture of its file where it has any.
     """
 
-    body: Body
+    body: Body  # of a built world
     color: Color = PALETTE[0]  # sRGB from 0 to 1; the first colour of `PALETTE` by default
     paint: Paint | None = None  # function that returns colours (n, 3) of all vertices, instead of `color`
     label: str = ""  # caption on the floor in front of the body, plain ASCII

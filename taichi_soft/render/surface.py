@@ -30,7 +30,7 @@ class Surface:
         texture: a picture on it, which is multiplied by `color`: give that as white, to see it as it is.
         uv: (n, 2), where the vertices lie on the texture: (0, 0) at its lower left, (1, 1) at its upper
             right; beyond that it repeats.
-        look: what it is made of, see `Look`.
+        look: what it is made of: "matte", "jelly" or "cloth".
             Where a cloth has each triangle twice, once from either side, the first of both is its front.
     Raises: OptionError for wrong shapes, an unknown look, a texture without `uv` or the reverse, positions
         that are not finite (a picture of an exploded body shows nothing) or colours out of range; MeshError
@@ -90,6 +90,10 @@ class Surface:
     ) -> Surface:
         """The surface of a mesh, at rest until its `positions` are set.
 
+        Args:
+            mesh: a `TetMesh`, or a `ParticleMesh` with triangles.
+            color: sRGB from 0 to 1, (3,) or one per vertex (n, 3).
+            look: "matte", "jelly" or "cloth".
         Raises: MeshError for a `ParticleMesh` without triangles, such as a rope.
         """
         if not isinstance(mesh, (TetMesh, ParticleMesh)):

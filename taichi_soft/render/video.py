@@ -62,7 +62,12 @@ class VideoWriter:
             raise
 
     def write(self, frame: NDArray[np.uint8]) -> None:
-        """Add a frame, sRGB, uint8 (height, width, 3). Raises: VideoError for any other."""
+        """Add a frame.
+
+        Args:
+            frame: sRGB, uint8 (height, width, 3).
+        Raises: VideoError for any other.
+        """
         if self._closed:
             raise StateError(f"{self.path} is closed: no frame can be added")
         wanted = (self.size[1], self.size[0], 3)
