@@ -91,8 +91,8 @@ async def _serve(server: object, opens: bool) -> None:
         while not ended.is_set():
             with suppress(asyncio.TimeoutError):
                 await asyncio.wait_for(ended.wait(), 1.0)
-            if server.trouble not in (None, told):
-                told = server.trouble
+            if server.audience.trouble not in (None, told):
+                told = server.audience.trouble
                 errors.print(f"[bold red]error:[/] {escape(told)}", soft_wrap=True, highlight=False)
     finally:
         await server.close()
