@@ -21,7 +21,8 @@ EVERYWHERE = ("0.0.0.0", "::")
 """Addresses that stand for all of a machine."""
 
 PUBLIC = (
-    *("/live.css", "/live.js", "/picture.js", "/panel.js"),
+    *("/live.css", "/live.js", "/view.js", "/room.js", "/panel.js", "/slider.js", "/plot.js"),
+    *("/quantity.js", "/activities.js"),
     *(f"/three/{name}.js" for name in ("three.module", "three.core", "OrbitControls")),
 )
 """Files of the page."""

@@ -102,11 +102,11 @@ class Runner:
             self._process.kill()
 
     def end(self) -> None:
-        """Wait until it has ended, for a second or two."""
+        """Wait until it has ended: as it ends, it writes its kernels for later starts."""
         self.stop()
         if self._process is None:
             return
-        self._process.join(2.0)
+        self._process.join(10.0)
         if self._process.is_alive():
             self._process.kill()
             self._process.join(2.0)

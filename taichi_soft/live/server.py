@@ -104,7 +104,9 @@ class LiveServer:
 
     async def close(self) -> None:
         """End all processes and connections."""
-        for runner in self.worlds.runners():
+        for runner in self.worlds.coming.values():
+            runner.kill()  # it reads no messages while it compiles
+        for runner in self.worlds.panes.values():
             runner.stop()
         self.downloads.stop()
         if self._listening is not None:

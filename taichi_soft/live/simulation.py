@@ -214,10 +214,10 @@ class Simulation:
             self.controls.record(before.sliders)
         self._renew_adapter()
 
-    def do_settle(self) -> None:
-        """Start with an empty history. A world that has not moved yet resets to its present state."""
+    def do_settle(self, is_first: bool) -> None:
+        """Start with an empty history; the first world of a pane resets to its present state."""
         self.history.clear()
-        if self.world.step_count == 0 and not self.controls.given:
+        if is_first and not self.controls.given:
             self.first = self.world.snapshot()
 
     def do_pause(self, is_paused: bool) -> None:

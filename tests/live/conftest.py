@@ -49,6 +49,7 @@ def visitor(served):
     with Visitor(served.address) as visitor:
         visitor.ready()
         visitor.say("pause", is_paused=False)
+        visitor.say("preset", name=None)
         visitor.say("reset")
         visitor.until(lambda: visitor.states[0]["time"] < 1.0 and not visitor.states[0]["is_paused"])
         yield visitor

@@ -19,11 +19,11 @@ from taichi_soft.live.server import LiveServer
 class Runner:
     """A world that accepts every request, unless it is busy."""
 
-    def __init__(self, *, is_busy=False, source=SceneSource(), state=None):
+    def __init__(self, *, is_busy=False, source=None, state=None):
         self.is_over = self.is_killed = self.is_lost = self.is_asked = self.is_fresh = False
         self.keeps_sliders = False
         self.is_busy, self.requests = is_busy, []
-        self.source, self.state, self.drawn = source, state, None
+        self.source, self.state = source or SceneSource(), state
 
     def send(self, *message, sender=0, key=None):
         self.requests.append(message)
