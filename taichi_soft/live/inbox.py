@@ -17,7 +17,7 @@ MOST_WAITING = 64
 SHARE = 0.25
 """Largest fraction of the time that the requests of all visitors together take."""
 
-BURST = 0.4
+BURST = 2.0
 """A visitor's time that is not used is kept for so long [s]: a few requests after a pause do not wait."""
 
 LONGEST_WAIT = 1.0

@@ -25,7 +25,8 @@ def run(connection: Connection, folder: str, source: SceneSource, given: Given) 
 
     def show(text: str) -> None:
         if text:
-            connection.send(("progress", "compiling", BURST.made + BURST.found))
+            step = "compiling" if BURST.made else "loading"
+            connection.send(("progress", step, BURST.made + BURST.found))
 
     warnings.simplefilter("always")
     try:

@@ -37,10 +37,13 @@ class Served:
 def served():
     """The playground, ready."""
     served = Served()
-    with Visitor(served.address) as visitor:
-        visitor.ready()
-    yield served
-    assert served.end() == 0
+    try:
+        with Visitor(served.address) as visitor:
+            visitor.ready()
+        yield served
+    finally:
+        code = served.end()
+    assert code == 0
 
 
 @pytest.fixture

@@ -232,7 +232,7 @@ def test_until_there_is_a_world_nothing_can_be_chosen_and_the_page_says_what_is_
         )
         words = activity.locator(".step").text_content()
         assert re.fullmatch(
-            r"(starting|building bodies|compiling( kernel \d+( of about 70)?)?) · \d+ s", words
+            r"(starting|building bodies|(compiling|loading)( kernel \d+( of about 70)?)?) · \d+ s", words
         )
         page.wait_for_timeout(3000)
     playwright.expect(page.locator("#pause")).to_be_enabled(timeout=4 * PATIENCE)

@@ -131,7 +131,7 @@ class Visitor:
 
     def ready(self):
         """Wait for a world and a picture of it."""
-        return self.until(lambda: self.states.get(0) and self.pictures.get(0))
+        return self.until(lambda: self.states.get(0) and self.pictures.get(0), 300.0)
 
     def body(self, number, pane=0):
         """Vertices of a body in the last picture, (n, 3) [m]."""
