@@ -12,7 +12,7 @@ from taichi_soft.live.controls import Given
 MOST_CHANGES = 20
 """Changes that can be undone."""
 
-DRAG = 1.0
+DRAG = 2.0
 """Values of a slider that follow each other within this time count as one change [s]."""
 
 

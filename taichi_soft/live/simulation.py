@@ -27,11 +27,11 @@ from taichi_soft.live.saving import Recent, film_frames, saved_script
 from taichi_soft.live.scene import Scene, SceneSource, adapter_of
 from taichi_soft.live.tints import Tints
 
-PICTURES = 60.0
-"""Pictures a second, at most."""
+FRAMES = 60.0
+"""Largest number of frames a second."""
 
 TOLD = 5.0
-"""How often numbers are told in a second."""
+"""Reports of numbers a second."""
 
 SHARE = 0.05
 """Largest fraction of the time for colours."""
@@ -67,9 +67,9 @@ class Simulation:
         self.versions = 0
         self.drawn: Drawn
         self.frames: FrameFile
-        self._due = {"picture": 0.0, "told": 0.0, "tints": 0.0}
+        self._due = {"frame": 0.0, "told": 0.0, "tints": 0.0}
         self._steps_seen = 0
-        self._pulls: dict[int, tuple[int, int]] = {}  # by visitor: a move that no picture shows, the step
+        self._pulls: dict[int, tuple[int, int]] = {}  # by visitor: a move that no frame shows, the step
         self._alpha: float | None = None  # of a world that somebody else steps
 
     def start(self, given: Given) -> None:
@@ -223,7 +223,7 @@ class Simulation:
     def do_pause(self, is_paused: bool) -> None:
         """Stop, or go on."""
         self.is_playing = not is_paused
-        self._pulls.clear()  # how long it stood is not how late a picture is
+        self._pulls.clear()  # a pause is no latency
         self._due["told"] = 0.0
 
     def do_step(self) -> None:
@@ -332,7 +332,7 @@ class Simulation:
     # What is told.
 
     def draw(self, now: float, is_moving: bool) -> None:
-        """Write a picture, where it is time for one and something moved."""
+        """Write a frame if it is time for one and something moved."""
         if self.drawn.is_outdated:
             self.describe()
             is_moving = True
@@ -340,7 +340,7 @@ class Simulation:
             self.tints.renew(self.world)
             self._due["tints"] = now + (time.perf_counter() - now) / SHARE
             is_moving = True
-        if not is_moving or now < self._due["picture"]:
+        if not is_moving or now < self._due["frame"]:
             return
         frame = self.frames.begin()
         alpha = self.adapter.alpha if self._alpha is None else self._alpha
@@ -352,7 +352,7 @@ class Simulation:
         self._pulls = {each: pull for each, pull in self._pulls.items() if each not in pulls}
         self.connection.send(("frame", number, pulls))
         self.recent.add(now, moment, self.drawn, frame)
-        self._due["picture"] = now + 1.0 / PICTURES - 0.001
+        self._due["frame"] = now + 1.0 / FRAMES - 0.001
         self.is_moving = False
 
     def describe(self) -> None:
