@@ -176,7 +176,7 @@ def test_the_cursor_shows_what_can_be_grabbed_and_what_is_held(open_page, visito
     picture, box = picture_of(page)
     (x, y), _ = coral(picture)
     view = page.locator("#view")
-    for place, cursor in (((15, 15), "default"), ((x, y), "grab"), ((15, 15), "default"), ((x, y), "grab")):
+    for place, cursor in (((15, 15), "auto"), ((x, y), "grab"), ((15, 15), "auto"), ((x, y), "grab")):
         page.mouse.move(box["x"] + place[0], box["y"] + place[1])
         playwright.expect(view).to_have_css("cursor", cursor)
     page.mouse.down()
@@ -184,7 +184,7 @@ def test_the_cursor_shows_what_can_be_grabbed_and_what_is_held(open_page, visito
     page.mouse.move(box["x"] + 15, box["y"] + 15)
     playwright.expect(view).to_have_css("cursor", "grabbing")
     page.mouse.up()
-    playwright.expect(view).to_have_css("cursor", "default")
+    playwright.expect(view).to_have_css("cursor", "auto")
     visitor.say("pause", is_paused=False)
 
 
@@ -248,7 +248,7 @@ def test_a_law_that_is_refused_or_cannot_be_had_is_not_shown_as_chosen(open_page
     strain.select_option("exact")  # springs have no strain
     page.wait_for_timeout(2500)
     assert law.input_value() == "springs", "what is not used yet stays"
-    page.get_by_role("button", name="Use").click()
+    page.get_by_role("button", name="Use", exact=True).click()
     playwright.expect(page.locator("#said")).to_contain_text("springs", timeout=PATIENCE)
     playwright.expect(law).to_have_value("")
     playwright.expect(strain).to_have_value("")

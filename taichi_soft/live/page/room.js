@@ -63,7 +63,7 @@ function sky() {
   const material = new THREE.MeshBasicMaterial({ vertexColors: true, side: THREE.BackSide, fog: false, toneMapped: false, depthWrite: false });
   const mesh = new THREE.Mesh(geometry, material);
   mesh.frustumCulled = false;
-  mesh.renderOrder = -1;
+  mesh.renderOrder = 1; // only where nothing hides it
   return mesh;
 }
 
