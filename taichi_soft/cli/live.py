@@ -54,15 +54,15 @@ def _measure() -> None:
         costs = measure(lambda words: progress.update(task, description=words))
     table = Table("spheres", *(str(each.spheres) for each in costs), title="a live view, for one visitor")
     table.add_row("triangles", *(f"{each.triangles:,}" for each in costs))
-    table.add_row("bytes a picture", *(f"{each.packet:,}" for each in costs))
-    table.add_row("pictures a second", *(f"{each.pictures:.0f}" for each in costs))
+    table.add_row("bytes a frame", *(f"{each.packet:,}" for each in costs))
+    table.add_row("FPS", *(f"{each.pictures:.0f}" for each in costs))
     table.add_row("latency p50, p95 (ms)", *(_numbers(each.latency_ms, 1) for each in costs))
     table.add_row("step p50, p99 (ms), no visitor", *(_numbers(each.alone_ms, 1) for each in costs))
     table.add_row("step p50, p99 (ms), one visitor", *(_numbers(each.visited_ms, 1) for each in costs))
     middle = [(each.ratios[0], each.ratios[len(each.ratios) // 2], each.ratios[-1]) for each in costs]
     table.add_row("ratio of p99: least, median, most", *(_numbers(three, 2) for three in middle))
     console.print(table)
-    say("latency: from a move of the hand to the first picture with it, at the socket; drawing comes on top")
+    say("latency: from a move of the hand to the first frame with it, at the socket; drawing is not included")
     say("step: median of turns without and with a visitor; the ratio is that of one turn's p99")
 
 
@@ -91,8 +91,8 @@ async def _serve(server: object, opens: bool) -> None:
         while not ended.is_set():
             with suppress(asyncio.TimeoutError):
                 await asyncio.wait_for(ended.wait(), 1.0)
-            if server.trouble not in (None, told):
-                told = server.trouble
+            if server.audience.trouble not in (None, told):
+                told = server.audience.trouble
                 errors.print(f"[bold red]error:[/] {escape(told)}", soft_wrap=True, highlight=False)
     finally:
         await server.close()

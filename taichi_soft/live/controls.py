@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from taichi_soft import Body, Material, SoftBodyAsset, World
+from taichi_soft import PRESETS, Body, Material, SoftBodyAsset, World
 from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.live.choices import palette_of
 from taichi_soft.solver.substeps import SOFT_CONTACT_STEP
@@ -53,6 +53,35 @@ SLIDERS = {
 }
 """By name."""
 
+MATERIAL = ("young", "poisson", "damping")
+"""Sliders that change the materials of bodies."""
+
+PRESET_SLIDERS: dict[str, dict[str, float]] = {
+    name: {"young": each.young, "poisson": each.poisson, "damping": each.damping_ratio}
+    for name, each in PRESETS.items()
+    if isinstance(each.young, float)
+    and isinstance(each.poisson, float)
+    and SLIDERS["poisson"].low <= each.poisson <= SLIDERS["poisson"].high
+}
+"""Values of the sliders of the material for each preset that they can show."""
+
+
+@dataclass(frozen=True)
+class Given:
+    """Values that visitors gave to sliders, and the preset that they chose."""
+
+    values: dict[str, float] = field(default_factory=dict)
+    preset: str | None = None
+
+    def with_preset(self, name: str | None) -> Given:
+        """Return these values with those of a preset; None: the materials of the scene."""
+        others = {name: value for name, value in self.values.items() if name not in MATERIAL}
+        return Given({**others, **PRESET_SLIDERS.get(name or "", {})}, name)
+
+    def at_reset(self) -> Given:
+        """Return the values that a reset goes back to: those of the preset, or none."""
+        return Given().with_preset(self.preset)
+
 
 def checked_value(name: Any, value: Any) -> float:
     """The value of a slider. Raises: OptionError for a slider that is none, and a value out of its range."""
@@ -71,15 +100,18 @@ class Controls:
     def __init__(self, world: World, dt: float, substeps: int | None) -> None:
         self.world, self.dt = world, dt
         self.given: dict[str, float] = {}
+        self.preset: str | None = None
         self._own_substeps = substeps
         self._own = {body.index: body.material for body in world.bodies}
+        self._own_gravity = np.asarray(world.settings.gravity, dtype=np.float64)
+        self._own_friction = world.settings.friction
+        self._own_frictions = {each.index: each.friction for each in world.colliders}
         self._first = next((each for each in self._own.values() if isinstance(each, Material)), None)
         self._first_stable = world.stable_substeps(dt)
         assets = {id(body.asset): body.asset for body in world.bodies}
         self._assets = [*assets.values(), *palette_of(world).values()]
-        self._down = np.asarray(world.settings.gravity, dtype=np.float64)
-        length = float(np.linalg.norm(self._down))
-        self._down = self._down / length if length else np.array([0.0, 0.0, -1.0])
+        length = float(np.linalg.norm(self._own_gravity))
+        self._down = self._own_gravity / length if length else np.array([0.0, 0.0, -1.0])
 
     @property
     def stable_substeps(self) -> int:
@@ -126,25 +158,40 @@ class Controls:
         }
         return {**own, **self.given}
 
-    def set(self, name: str, value: float) -> None:
-        """Give a slider a value, checked before, and let the world have it."""
+    @property
+    def sliders(self) -> Given:
+        """The values that were given, and the preset."""
+        return Given(dict(self.given), self.preset)
+
+    def set_value(self, name: str, value: float) -> None:
+        """Give a slider a value, checked before, and apply it to the world."""
         self.given[name] = value
-        if name in ("young", "poisson", "damping"):
+        self._apply({name})
+
+    def give(self, sliders: Given) -> None:
+        """Replace all values that were given. A slider without one returns to the scene's value."""
+        changed = {*self.given, *sliders.values}
+        self.given, self.preset = dict(sliders.values), sliders.preset
+        self._apply(changed)
+
+    def record(self, sliders: Given) -> None:
+        """Record what a restored world was given: it has these values already."""
+        self.given, self.preset = dict(sliders.values), sliders.preset
+
+    def _apply(self, names: set[str]) -> None:
+        """Apply the current values of sliders to the world: one change for each of its properties."""
+        if names & set(MATERIAL):
             for body in self.world.bodies:
                 self._give_material(body)
-        elif name == "gravity":
-            self.world.set_gravity(value * self._down)
-        elif name == "friction":
-            self._give_friction(value)
-
-    def give_all(self) -> None:
-        """Let the world have all that was given: after a restore, or in a world made anew."""
-        for name, value in list(self.given.items()):
-            self.set(name, value)
+        if "gravity" in names:
+            given = self.given.get("gravity")
+            self.world.set_gravity(self._own_gravity if given is None else given * self._down)
+        if "friction" in names:
+            self._give_friction(self.given.get("friction"))
 
     def greet(self, body: Body) -> None:
-        """Let a body that came have what the others have."""
-        if {"young", "poisson", "damping"} & set(self.given):
+        """Apply the values that were given to a new body."""
+        if set(MATERIAL) & set(self.given):
             self._give_material(body)
         if "friction" in self.given:
             _set_friction(body, self.given["friction"])
@@ -157,13 +204,16 @@ class Controls:
             given = {names[name]: value for name, value in self.given.items() if name in names}
             body.set_material(replace(material, **given))
 
-    def _give_friction(self, value: float) -> None:
-        if self.world.settings.floor is not None:
-            self.world.set_friction(value)
-        for collider in self.world.colliders:
-            collider.set_friction(value)
+    def _give_friction(self, value: float | None) -> None:
+        """Set the friction of everything; None: to the values of the scene."""
         for body in self.world.bodies:
-            _set_friction(body, value)
+            _set_friction(body, body.asset.contact.friction if value is None else value)
+        floor = self._own_friction if value is None else value
+        if self.world.settings.floor is not None:
+            self.world.set_friction(floor)
+        for collider in self.world.colliders:
+            own = self._own_frictions.get(collider.index, floor)
+            collider.set_friction(own if value is None else value)
 
 
 def _set_friction(body: Body, value: float) -> None:

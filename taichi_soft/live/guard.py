@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hmac
+import re
 import secrets
 import socket
 import time
@@ -20,13 +21,18 @@ EVERYWHERE = ("0.0.0.0", "::")
 """Addresses that stand for all of a machine."""
 
 PUBLIC = (
-    *("/live.css", "/live.js", "/picture.js", "/panel.js"),
+    *("/live.css", "/live.js", "/view.js", "/room.js", "/panel.js", "/slider.js", "/plot.js"),
+    *("/quantity.js", "/activities.js"),
     *(f"/three/{name}.js" for name in ("three.module", "three.core", "OrbitControls")),
 )
 """Files of the page."""
 
 MESSAGES, BURST = 240.0, 480.0
 """Of one visitor: messages a second, and how many at once. A hand that is moved sends 60."""
+
+_HOST = re.compile(
+    r"(?:\[(?P<address>[0-9A-Fa-f:.]+)\]|(?P<name>[A-Za-z0-9._-]+))(?::(?P<port>[0-9]{1,5}))?", re.ASCII
+)
 
 LARGEST_UPLOAD = 16 * 2**20
 """Of a visitor's mesh file [bytes]."""
@@ -64,13 +70,14 @@ class Guard:
     def refusal(self, path: str, host: str | None, origin: str | None) -> tuple[HTTPStatus, str] | None:
         """Why a request is refused, or None. The page's scripts hold no secret, and ask for no token.
 
-        A page of another origin may not open a connection, also not one whose name a name server has turned
-        to this machine: so the name in `Host` counts, and `Origin` has to agree.
+        A page of another origin may not open a connection, not even if a name server resolves its name to
+        this machine. So `Host` must name this server, and `Origin` must agree with it.
         Args:
             path: with its query.
             host, origin: headers of those names.
         """
-        if self.token is None and not self._is_mine(host):
+        place = host_and_port(host)
+        if place is None or (self.token is None and not self._is_mine(*place)):
             return HTTPStatus.FORBIDDEN, f"this world is served for {self.host}:{self.port}, not for {host!r}"
         if origin is not None and origin not in (f"http://{host}", f"https://{host}"):
             return HTTPStatus.FORBIDDEN, f"a page of {origin!r} may not touch this world"
@@ -80,13 +87,20 @@ class Guard:
                 return HTTPStatus.UNAUTHORIZED, "this address needs its token: open the one that was printed"
         return None
 
-    def _is_mine(self, host: str | None) -> bool:
-        try:
-            parts = urlsplit(f"//{host or ''}")
-            name, port = parts.hostname, parts.port
-        except ValueError:
-            return False
-        return name is not None and is_loopback(name) and (port or 80) == self.port
+    def _is_mine(self, name: str, port: int) -> bool:
+        return is_loopback(name) and port == self.port
+
+
+def host_and_port(host: str | None) -> tuple[str, int] | None:
+    """Return the name and port in a `Host` header, port 80 if it has none; None if the header is malformed.
+
+    A browser sends a bare name or address and a port. Anything else, such as `user@name`, is malformed.
+    """
+    found = _HOST.fullmatch(host or "")
+    if found is None:
+        return None
+    name, port = found["address"] or found["name"], found["port"]
+    return name.lower(), 80 if port is None else int(port)
 
 
 def is_loopback(host: str) -> bool:

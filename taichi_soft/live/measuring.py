@@ -79,9 +79,9 @@ async def _measured(on_part: Callable[[str], object]) -> list[LiveCost]:
             server = LiveServer(SceneSource("script", str(path)), port=0)
             await server.open()
             try:
-                while not server.panes:
-                    if server.trouble is not None:
-                        raise StateError(server.trouble)
+                while not server.worlds.panes:
+                    if server.audience.trouble is not None:
+                        raise StateError(server.audience.trouble)
                     await asyncio.sleep(0.1)
                 found.append(await _cost(server, count))
             finally:
@@ -119,7 +119,7 @@ def _pair(numbers: np.ndarray) -> tuple[float, float]:
 
 def _step_times(server: LiveServer) -> tuple[float, float]:
     """What a step took at its 50th and 99th percentile, in the last 600 steps [ms]."""
-    state = server.panes[0].state
+    state = server.worlds.panes[0].state
     assert state is not None
     return state["step_ms"][0], state["step_ms"][1]
 

@@ -5,28 +5,26 @@ from __future__ import annotations
 import asyncio
 import multiprocessing
 import threading
-from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
+from taichi_soft.live.controls import Given
 from taichi_soft.live.frame_file import FrameFile
+from taichi_soft.live.inbox import SERVER, Inbox
 from taichi_soft.live.packets import picture_packet
 from taichi_soft.live.scene import SceneSource
 
 Heard = Callable[["Runner", tuple[Any, ...]], None]
 
-MOST_WAITING = 256
-"""Wishes that wait for a world that is busy; more are refused."""
-
 
 class Runner:
     """A world in another process, with a thread for each direction.
 
-    Neither side waits for the other: wishes wait in a list, where a newer value of a slider takes the place
-    of an older one, and what the world tells is taken as soon as it comes.
+    Neither side waits for the other: requests wait in an `Inbox`, and messages of the world are read as they
+    arrive.
     """
 
     def __init__(
@@ -49,9 +47,9 @@ class Runner:
         self.is_lost = False  # the other end is gone
         self.is_asked = False  # for whom the one that is shown was asked where its bodies are
         self.is_fresh = False  # begins at its beginning, whatever was shown before it
-        self._waiting: OrderedDict[Any, tuple[Any, ...]] = OrderedDict()
+        self.keeps_sliders = False  # takes no values of sliders from the world before it
+        self._inbox = Inbox()
         self._changed = threading.Condition()
-        self._count = 0
         for target in (self._listen, self._speak):
             threading.Thread(target=target, daemon=True).start()
 
@@ -61,11 +59,11 @@ class Runner:
         loop: asyncio.AbstractEventLoop,
         folder: Path,
         source: SceneSource,
-        given: dict[str, float],
+        given: Given,
         heard: Heard,
     ) -> Runner:
-        """A new process that runs `simulation.run`."""
-        from taichi_soft.live.simulation import run
+        """A new process that runs `running.run`."""
+        from taichi_soft.live.running import run
 
         folder.mkdir(parents=True, exist_ok=True)
         spawning = multiprocessing.get_context("spawn")
@@ -75,20 +73,17 @@ class Runner:
         theirs.close()
         return cls(loop, mine, source, heard, process)
 
-    def send(self, *message: Any, key: Any = None) -> bool:
-        """Let the world have a wish, soon.
+    def send(self, *message: Any, sender: int = SERVER, key: Hashable = None) -> bool:
+        """Send a request to the world soon.
 
         Args:
-            key: wishes of one key replace each other while they wait, unless one without a key lies between.
-        Returns: False where too many wait.
+            sender: the visitor who asks.
+            key: kind of the request, as `Inbox.put` takes it.
+        Returns: False if too many requests of this visitor wait.
         """
         with self._changed:
-            if key is None:
-                self._count += 1
-            key = key, self._count
-            if key not in self._waiting and len(self._waiting) >= MOST_WAITING and message[0] != "release":
+            if not self._inbox.put(sender, (key, message), key, is_kept=message[0] == "release"):
                 return False
-            self._waiting[key] = message
             self._changed.notify()
         return True
 
@@ -96,8 +91,8 @@ class Runner:
         """End the process."""
         self.is_over = True
         with self._changed:
-            self._waiting.clear()
-            self._waiting["stop"] = ("stop",)
+            self._inbox.clear()
+            self._inbox.put(SERVER, (None, ("stop",)))
             self._changed.notify()
 
     def kill(self) -> None:
@@ -107,11 +102,11 @@ class Runner:
             self._process.kill()
 
     def end(self) -> None:
-        """Wait until it has ended, for a second or two."""
+        """Wait until it has ended: as it ends, it writes its kernels for later starts."""
         self.stop()
         if self._process is None:
             return
-        self._process.join(2.0)
+        self._process.join(10.0)
         if self._process.is_alive():
             self._process.kill()
             self._process.join(2.0)
@@ -128,11 +123,11 @@ class Runner:
     def _speak(self) -> None:
         while True:
             with self._changed:
-                while not self._waiting:
+                while (taken := self._inbox.take()) is None:
                     self._changed.wait()
-                _, message = self._waiting.popitem(last=False)
+            sender, (key, message) = taken
             try:
-                self._connection.send(message)
+                self._connection.send((sender, key, message))
             except (OSError, ValueError):
                 return
             if message[0] == "stop":

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import os
 import zipfile
+from collections import deque
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -14,6 +15,7 @@ import numpy as np
 
 from taichi_soft.core.errors import StateError
 from taichi_soft.live.drawn import Drawn
+from taichi_soft.live.frame_file import Frame
 from taichi_soft.live.scene import Scene, SceneSource
 
 _RESTORED = """\
@@ -52,7 +54,41 @@ def packed(script: str, snapshot: bytes, source: SceneSource) -> bytes:
 FILM_FPS = 30.0
 
 LOW_PRIORITY = 10
-"""Of 0 to 19, what a film is drawn at [nice value]."""
+"""Nice value of the process that draws a film, of 0 to 19."""
+
+KEPT = 10.0
+"""Length of a film [s]."""
+
+MOST_KEPT = 2**28
+"""Largest size of the frames that are kept for a film [bytes]: with many vertices it is shorter."""
+
+
+class Recent:
+    """The frames of the last seconds, for a film."""
+
+    def __init__(self) -> None:
+        self._rows: deque[tuple[float, int, Any]] = deque()
+        self._due = 0.0
+
+    def add(self, now: float, moment: float, drawn: Drawn, frame: Frame) -> None:
+        """Keep a frame of the world's time `moment` [s], unless the last one is too recent."""
+        if now < self._due:
+            return
+        if self._rows and moment < self._rows[-1][0]:
+            self._rows.clear()  # the world went back to an earlier state
+        self._rows.append((moment, drawn.version, (frame.positions.copy(), frame.poses.copy())))
+        most = min(KEPT * FILM_FPS, MOST_KEPT / (12 * max(drawn.vertex_count, 1)))
+        while len(self._rows) > most:
+            self._rows.popleft()
+        self._due = now + 1.0 / FILM_FPS - 0.002
+
+    def clear(self) -> None:
+        """Drop all frames."""
+        self._rows.clear()
+
+    def rows(self) -> list[tuple[float, int, Any]]:
+        """Return the frames: time [s], version of the meshes, and positions and poses."""
+        return list(self._rows)
 
 
 def film_frames(path: Path, recent: Sequence[tuple[float, int, Any]], drawn: Drawn, scene: Scene) -> None:

@@ -17,7 +17,7 @@ async def _serve(place: str) -> None:
     connection = Client((host, int(port)), authkey=bytes.fromhex(os.environ.pop(VIEW_KEY)))
     server = LiveServer(SceneSource(), port=0, attached=connection)
     print(await server.open(), flush=True)
-    while not server.panes[0].is_lost:
+    while not server.worlds.panes[0].is_lost:
         await asyncio.sleep(0.2)
     await server.close()
 

@@ -37,10 +37,13 @@ class Served:
 def served():
     """The playground, ready."""
     served = Served()
-    with Visitor(served.address) as visitor:
-        visitor.ready()
-    yield served
-    assert served.end() == 0
+    try:
+        with Visitor(served.address) as visitor:
+            visitor.ready()
+        yield served
+    finally:
+        code = served.end()
+    assert code == 0
 
 
 @pytest.fixture
@@ -49,6 +52,7 @@ def visitor(served):
     with Visitor(served.address) as visitor:
         visitor.ready()
         visitor.say("pause", is_paused=False)
+        visitor.say("preset", name=None)
         visitor.say("reset")
         visitor.until(lambda: visitor.states[0]["time"] < 1.0 and not visitor.states[0]["is_paused"])
         yield visitor

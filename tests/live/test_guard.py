@@ -8,6 +8,17 @@ pytest.importorskip("websockets", reason="needs websockets: pip install 'taichi-
 
 from taichi_soft.live.guard import BURST, MESSAGES, Allowance, Guard
 
+MALFORMED = (
+    *("evil@127.0.0.1:8080", "evil:word@127.0.0.1:8080", "@127.0.0.1:8080", "evil%40127.0.0.1:8080"),
+    *("127.0.0.1:port", "127.0.0.1:8080:80", "127.0.0.1:80:8080", "127.0.0.1:+8080", "127.0.0.1:-8080"),
+    *("127.0.0.1:8080, 127.0.0.1:8080", "127.0.0.1:8080, evil.example:8080", "127.0.0.1:\u0668080"),
+    *("127.0.0.1.:8080", "localhost.:8080", "127.0.0.1:8080.", "127.0.0.1", "127.0.0.1:", ":8080"),
+    *("127.0.0.1:8080/", "127.0.0.1:8080?x", "127.0.0.1:8080#x", "http://127.0.0.1:8080", "127.1:8080"),
+    *(" 127.0.0.1:8080", "127.0.0.1:8080\n", "127.0.0.1 :8080", "[::1:8080", "::1:8080", "[", "0:8080"),
+    *("[::ffff:1.2.3.4]:8080", "[::1%25eth0]:8080", "\uff11\uff12\uff17.0.0.1:8080", "127.0.0.1:08080080"),
+)
+"""Values of a `Host` header that no browser sends for a page of this machine."""
+
 
 @pytest.mark.parametrize(
     ("host", "origin"),
@@ -16,6 +27,7 @@ from taichi_soft.live.guard import BURST, MESSAGES, Allowance, Guard
         ("localhost:8080", "http://localhost:8080"),
         ("[::1]:8080", "http://[::1]:8080"),
         ("127.0.0.1:8080", "http://127.0.0.1:8080"),
+        ("LocalHost:8080", None),
     ],
 )
 def test_this_machine_needs_no_token(host, origin):
@@ -34,8 +46,8 @@ def test_this_machine_needs_no_token(host, origin):
         ("127.0.0.1:8080", "http://127.0.0.1:9999"),
         ("127.0.0.1:8080", "null"),
         ("127.0.0.1:9999", None),
-        ("127.0.0.1:port", None),
-        ("[", None),
+        *((host, None) for host in MALFORMED),
+        *((f"evil.example@{host}", None) for host in ("localhost:8080", "[::1]:8080")),
     ],
 )
 def test_pages_of_other_origins_and_names_are_refused(host, origin):
@@ -53,6 +65,8 @@ def test_any_other_address_asks_for_its_token_which_is_new_every_time():
         assert status == 401
         assert guard.token not in words
     assert guard.refusal(f"/live?token={guard.token}", "box.local:8080", "http://evil.example")[0] == 403
+    for host in (None, "evil@box.local:8080", "box.local:8080, evil.example"):
+        assert guard.refusal(f"/live?token={guard.token}", host, None)[0] == 403
     assert guard.refusal("/live.js", "box.local:8080", None) is None  # what the page asks for by itself
     assert "0.0.0.0" not in guard.address()
 

@@ -7,7 +7,7 @@ pytest.importorskip("websockets", reason="needs websockets: pip install 'taichi-
 from engine_adapter import FixedStep
 from taichi_soft import sphere
 from taichi_soft.live import measuring
-from taichi_soft.live.simulation import STEPS
+from taichi_soft.live.meters import STEPS
 
 
 def test_a_measurement_counts_what_is_sent_and_orders_its_percentiles(monkeypatch):

@@ -1,12 +1,16 @@
 """A live world by its own protocol: what visitors do to it, and what they cannot do."""
 
+import contextlib
 import http.client
 import io
+import itertools
 import json
 import os
 import signal
 import subprocess
 import sys
+import threading
+import time
 import zipfile
 from pathlib import Path
 from urllib.parse import urlsplit
@@ -68,8 +72,8 @@ def paused(visitor):
 def test_bodies_fall_by_the_gravity_that_the_slider_says(visitor):
     for gravity in (3.0, 0.5):
         visitor.say("pause", is_paused=True)
-        visitor.say("set", name="gravity", value=gravity)
         visitor.say("reset")
+        visitor.say("set", name="gravity", value=gravity)
         visitor.until(lambda: visitor.states[0]["is_paused"] and visitor.pictures[0]["time"] <= 0.0)
         visitor.say("pause", is_paused=False)
         times, heights = [], []
@@ -113,8 +117,8 @@ def test_a_saved_script_goes_on_as_the_world_does_to_the_bit(visitor, tmp_path):
 
 
 def test_a_body_is_grabbed_by_a_ray_follows_the_hand_and_flies_on_with_its_speed(visitor):
-    visitor.say("set", name="gravity", value=0.0)
     visitor.say("reset")
+    visitor.say("set", name="gravity", value=0.0)
     visitor.until(lambda: visitor.states[0]["time"] < 0.3)
     start = visitor.body(0).mean(axis=0)
     eye = np.array([start[0], start[1] - 5.0, start[2]])
@@ -192,6 +196,128 @@ def test_a_flood_of_messages_ends_its_connection_and_nothing_else(visitor, serve
     visitor.until(lambda: visitor.counts["pictures"] > before + 20)
 
 
+def test_a_visitor_who_floods_the_world_with_allowed_requests_takes_no_frames_from_others(visitor, served):
+    stop = threading.Event()
+    cycle = itertools.cycle(
+        [
+            {"do": "set", "name": "young", "value": 2e5},
+            {"do": "spawn", "name": "ball"},
+            {"do": "set", "name": "poisson", "value": 0.3},
+            {"do": "spawn", "name": "block"},
+            {"do": "reset"},
+            {"do": "tint", "quantity": "stress"},
+        ]
+    )
+
+    def flood():
+        with Visitor(served.address) as other:
+            start, sent = time.monotonic(), 0
+            while not stop.is_set():
+                other.socket.send(json.dumps(next(cycle)))
+                sent += 1
+                while sent > 180 * (time.monotonic() - start):  # a second
+                    with contextlib.suppress(TimeoutError):
+                        other.hear(0.002)
+
+    flooding = threading.Thread(target=flood)
+    flooding.start()
+    try:
+        visitor.until(lambda: visitor.states[0]["bodies"] > 6)
+        before = visitor.counts["pictures"]
+        visitor.until(lambda: visitor.counts["pictures"] > before + 90, 30.0)
+        lifted = visitor.body(0).mean(axis=0)
+        visitor.say("grab", origin=[*lifted[:2], 9.0], direction=[0.0, 0.0, -1.0])  # is heard too
+        visitor.say("save", what="script")
+        visitor.until(lambda: visitor.made, 30.0)
+    finally:
+        stop.set()
+        flooding.join()
+    visitor.say("tint", quantity=None)
+
+
+def test_reset_takes_back_all_sliders_or_goes_to_the_preset_that_was_chosen(visitor):
+    scene = {name: visitor.states[0]["values"][name] for name in ("young", "poisson", "gravity", "friction")}
+    for preset, wanted in (
+        (None, scene),
+        ("gelatine", {**scene, "young": 1e5, "poisson": 0.45, "damping": 0.08}),
+        (None, scene),
+    ):
+        visitor.say("preset", name=preset)
+        for name, value in {
+            "young": 1e7,
+            "poisson": -0.2,
+            "gravity": 0.5,
+            "friction": 0.1,
+            "substeps": 90,
+        }.items():
+            visitor.say("set", name=name, value=value)
+        visitor.until(lambda: visitor.states[0]["values"]["substeps"] == 90)
+        visitor.say("reset")
+        visitor.until(lambda wanted=wanted: wanted.items() <= visitor.states[0]["values"].items())
+        assert visitor.states[0]["preset"] == preset
+        assert visitor.states[0]["values"]["substeps"] < 20
+        visitor.until(lambda: visitor.states[0]["time"] < 1.0)
+
+
+def test_undo_goes_back_to_before_a_slider_a_preset_a_spawn_a_removal_and_a_reset(visitor):
+    def state():
+        shown = visitor.states[0]
+        return shown["values"], shown["preset"], shown["bodies"], shown["hash"]
+
+    visitor.until(lambda: visitor.states[0]["time"] > 0.2)
+    paused(visitor)
+    changes = [
+        ("set", {"name": "young", "value": 1e6}, "Young's modulus"),
+        ("preset", {"name": "foam"}, "Preset"),
+        ("set", {"name": "gravity", "value": 1.0}, "Gravity"),
+        ("spawn", {"name": "drum"}, "Add drum"),
+        ("despawn", {}, "Remove last"),
+        ("reset", {}, "Reset"),
+    ]
+    visitor.until(lambda: visitor.states[0]["hash"])
+    before = [state()]
+    for do, rest, words in changes:
+        visitor.say(do, **rest)
+        visitor.until(lambda words=words: visitor.states[0]["undo"] == words)
+        changed = state()
+        visitor.say("step")
+        visitor.until(lambda changed=changed: state() != changed)
+        before.append(state())
+    # Each undo leads to the state that its change was made in.
+    for (*_, words), wanted in zip(reversed(changes), reversed(before[:-1]), strict=True):
+        assert visitor.states[0]["undo"] == words
+        visitor.say("undo")
+        visitor.until(lambda words=words: visitor.states[0]["undo"] != words)
+        assert state() == wanted
+    while visitor.states[0]["undo"]:
+        last = visitor.states[0]
+        visitor.say("undo")
+        visitor.until(
+            lambda last=last: (
+                visitor.states[0]["undo"] != last["undo"] or visitor.states[0]["hash"] != last["hash"]
+            )
+        )
+    visitor.say("undo")
+    assert "no change" in visitor.until(lambda: visitor.refused)[0]
+    visitor.say("pause", is_paused=False)
+
+
+def test_a_drag_of_a_slider_is_undone_as_a_whole_and_a_body_that_was_held_is_free(visitor):
+    visitor.until(lambda: visitor.states[0]["time"] > 0.2)
+    start = visitor.body(0).mean(axis=0)
+    visitor.say("grab", origin=[*start[:2], 9.0], direction=[0.0, 0.0, -1.0])
+    visitor.say("move", point=[*start[:2], 2.5])
+    visitor.until(lambda: visitor.body(0)[:, 2].mean() > 1.5)
+    values = np.geomspace(1.6e5, 1e6, 30)
+    for value in values:
+        visitor.say("set", name="young", value=float(value))
+        visitor.listen(0.02)
+    visitor.until(lambda: visitor.states[0]["values"]["young"] == values[-1])
+    visitor.say("undo")
+    visitor.until(lambda: visitor.states[0]["values"]["young"] == 1.5e5)
+    visitor.until(lambda: visitor.body(0)[:, 2].mean() < 1.0)
+
+
 def test_odd_messages_are_refused_with_the_reason_and_nothing_changes(visitor):
     before = dict(visitor.states[0]["values"])
     for text in ("", "{", '{"do": "stop"}', '{"do": "set", "name": "young", "value": -1}', "x" * 50_000):
@@ -199,7 +325,8 @@ def test_odd_messages_are_refused_with_the_reason_and_nothing_changes(visitor):
         visitor.socket.send(text)
         visitor.until(lambda count=count: len(visitor.refused) > count)
     visitor.say("spawn", name="castle")
-    visitor.until(lambda: any("castle" in words for words in visitor.said))
+    visitor.until(lambda: any("castle" in words for words in visitor.refused))
+    assert not any("castle" in words for words in visitor.said), "others do not hear of it"
     assert visitor.states[0]["values"] == before
 
 
@@ -243,6 +370,7 @@ def test_a_visitors_mesh_becomes_a_body_whatever_its_name_says(visitor):
     visitor.say("upload", name="../../etc/my crate.obj")
     visitor.socket.send("\n".join(lines).encode())
     visitor.until(lambda: "mycrate" in visitor.states[0]["palette"], 240.0)
+    assert any("mycrate falls in" in words for words in visitor.said)
     visitor.until(lambda: visitor.states[0]["bodies"] == 7)  # it is there by itself
     visitor.say("spawn", name="mycrate")
     visitor.until(lambda: visitor.states[0]["bodies"] == 8)
@@ -320,7 +448,9 @@ def test_a_scene_that_cannot_be_made_says_why_to_whoever_comes(serve, tmp_path):
     served = serve(str(tmp_path / "empty.py"))
     for _ in range(2):
         with Visitor(served.address) as visitor:
-            visitor.until(lambda visitor=visitor: any("must make one World" in each for each in visitor.said))
+            visitor.until(
+                lambda visitor=visitor: "must make one World" in (visitor.status.get("trouble") or "")
+            )
 
 
 def test_a_step_that_raises_stops_the_world_and_says_why(serve, tmp_path):

@@ -97,7 +97,7 @@ def test_how_late_a_picture_is_leaves_out_how_long_a_world_stood(world, window):
             if is_paused is not None:
                 simulation.do_pause(is_paused)
         world.step(1 / 60)
-        simulation._due["picture"] = 0.0
+        simulation._due["frame"] = 0.0
         window.update()
         simulation.do_release(99)
     finally:

@@ -57,7 +57,7 @@ class Visitor:
         self.is_slow = is_slow
         self.states, self.drawn, self.pictures, self.panes, self.chosen = {}, {}, {}, [], {}
         self.said, self.refused, self.made = [], [], []
-        self.hello = None
+        self.hello, self.status = None, {}
         self.counts = {"pictures": 0, "bytes": 0}
 
     def __enter__(self):
@@ -71,7 +71,7 @@ class Visitor:
         self._open.close()
 
     def say(self, do, **rest):
-        """Send a wish."""
+        """Send a request."""
         self.socket.send(json.dumps({"do": do, **rest}))
 
     def hear(self, timeout=60.0):
@@ -99,6 +99,8 @@ class Visitor:
             self.chosen[words["pane"]] = words["chosen"]
         elif "panes" in words:
             self.panes = words["panes"]
+        elif "status" in words:
+            self.status = words["status"]
         for name in ("said", "refused", "made"):
             if name in words:
                 getattr(self, name).append(words if name == "made" else words[name])
@@ -129,7 +131,7 @@ class Visitor:
 
     def ready(self):
         """Wait for a world and a picture of it."""
-        return self.until(lambda: self.states.get(0) and self.pictures.get(0))
+        return self.until(lambda: self.states.get(0) and self.pictures.get(0), 300.0)
 
     def body(self, number, pane=0):
         """Vertices of a body in the last picture, (n, 3) [m]."""

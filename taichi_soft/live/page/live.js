@@ -1,15 +1,25 @@
-// Keeps a connection, hands packets to the picture and words to the panel.
+// Keeps a connection, hands packets to the view and messages to the panel.
+import { Activities } from "./activities.js";
 import { Panel } from "./panel.js";
-import { Picture } from "./picture.js";
+import { View } from "./view.js";
 
-const DRAWN = 1, PICTURE = 2;
+const DRAWN = 1;
 const TYPES = { uint8: Uint8Array, uint32: Uint32Array, float32: Float32Array };
 const ARRAYS = { "<u4": "uint32", "<f4": "float32" };
 
 let tries = 0, socket = null, panel = null, waiting = [], shown = [];
-const wish = said => {
+const activities = new Activities(document.getElementById("activities"));
+const send = request => {
   if (socket?.readyState !== WebSocket.OPEN) return;
-  socket.send(said instanceof ArrayBuffer ? said : JSON.stringify(said));
+  socket.send(request instanceof ArrayBuffer ? request : JSON.stringify(request));
+};
+
+// Of the values that a slider takes between two frames of the screen, the newest is sent. Other requests wait for it.
+const values = new Map();
+const sendValues = () => { values.forEach(send); values.clear(); };
+const ask = request => {
+  if (request.do === "set") values.set(request.name, request);
+  else { sendValues(); send(request); }
 };
 
 // From a move of the hand to the frame after the one that first shows it [ms], of the last moves.
@@ -28,23 +38,23 @@ function arrived(pull) {
 // A hand moves at most 60 times a second: pointers tell more often.
 let moved = null, movedAt = 0, moves = 0;
 const hand = {
-  grab: (pane, origin, direction) => wish({ do: "grab", pane, origin, direction }),
+  grab: (pane, origin, direction) => ask({ do: "grab", pane, origin, direction }),
   move: (pane, point) => {
     if (!moved) begun.set(++moves, performance.now());
     moved = { do: "move", pane, point, number: moves };
   },
-  release: pane => { if (moved) wish(moved); moved = null; wish({ do: "release", pane }); },
+  release: pane => { if (moved) ask(moved); moved = null; ask({ do: "release", pane }); },
 };
 
-const canvas = document.getElementById("picture");
-let picture;
+const canvas = document.getElementById("view");
+let view;
 try {
-  picture = new Picture(canvas, hand);
+  view = new View(canvas, hand);
 } catch (error) {
   say("this browser has no WebGL to draw with: switch its hardware acceleration on, or take another browser");
   throw error;
 }
-picture.shot = () => canvas.toBlob(blob => panel.offer(URL.createObjectURL(blob), "live.png"));
+view.shot = () => canvas.toBlob(blob => panel.offer(URL.createObjectURL(blob), "live.png"));
 
 function connect() {
   const scheme = location.protocol === "https:" ? "wss" : "ws";
@@ -55,37 +65,42 @@ function connect() {
   socket.onclose = event => {
     waiting = [];
     tries += 1;
+    activities.show([]);
     say(event.code === 1008 ? "cut off: too many messages" : "there is no connection: it was refused, or the server has ended");
     setTimeout(connect, Math.min(1000 * 2 ** (tries - 1), 15000));
   };
 }
 
 function say(words) {
-  if (panel) panel.say(words);
+  if (panel) panel.stop(words);
   else document.getElementById("said").textContent = words;
 }
 
 function hear(message) {
   if (message.hello) {
-    if (!panel) panel = new Panel(message, wish, picture);
+    if (!panel) panel = new Panel(message, ask, view);
+    panel.stop(null);
     panel.say("");
+  }
+  else if (message.status) {
+    activities.show(message.status.activities);
+    panel.stop(message.status.trouble);
   }
   else if (message.pull) pull = message.pull;
   else if (message.said) panel.say(message.said);
-  else if (message.refused) panel.refuse(message.refused);
+  else if (message.refused) panel.say(message.refused, true);
   else if (message.made) panel.offer(message.made + location.search, message.name);
   else if (message.panes) show(message.panes);
   else if (message.state) {
-    panel.show(message.state, message.pane);
-    if (message.pane === 0) panel.chosen(message.chosen, message.tint);
+    panel.show(message);
     name(message.pane, message.chosen);
   }
 }
 
 function show(panes) {
   shown = panes;
-  picture.shown = panes.length ? panes : [0];
-  picture.isStale = true;
+  view.shown = panes.length ? panes : [0];
+  view.isStale = true;
   document.getElementById("alone").hidden = panes.length < 2;
   document.getElementById("names").replaceChildren();
 }
@@ -100,9 +115,9 @@ function name(pane, chosen) {
 }
 
 function take(buffer) {
-  const view = new DataView(buffer), pane = view.getUint8(1);
-  if (view.getUint8(0) === DRAWN) {
-    const length = view.getUint32(4, true);
+  const data = new DataView(buffer), pane = data.getUint8(1);
+  if (data.getUint8(0) === DRAWN) {
+    const length = data.getUint32(4, true);
     const header = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 8, length)));
     const arrays = {};
     let offset = 8 + length;
@@ -111,46 +126,48 @@ function take(buffer) {
       arrays[key] = new Kind(buffer, offset, count);
       offset += Math.ceil((count * Kind.BYTES_PER_ELEMENT) / 4) * 4;
     }
-    picture.draw(pane, header, arrays);
+    view.draw(pane, header, arrays);
+    document.body.classList.remove("empty");
     document.getElementById("title").textContent = header.title;
     document.title = `${header.title} – taichi-soft live`;
   } else waiting[pane] = buffer;
 }
 
-// The newest picture of each pane, once a frame of the screen.
+// The newest frame of each pane, once a frame of the screen.
 let counted = 0, since = performance.now();
 function frame() {
   requestAnimationFrame(frame);
-  if (moved && performance.now() - movedAt > 15) { wish(moved); moved = null; movedAt = performance.now(); }
+  if (moved && performance.now() - movedAt > 15) { ask(moved); moved = null; movedAt = performance.now(); }
   let number = 0;
   waiting.forEach((buffer, pane) => {
     if (!buffer) return;
     const one = read(buffer);
-    picture.move(pane, one);
+    view.move(pane, one);
     number = Math.max(number, one.number);
     waiting[pane] = null;
     counted += pane === 0;
   });
-  picture.render();
+  sendValues();
+  view.render();
   if (number && pull) { const done = pull; pull = 0; requestAnimationFrame(() => arrived(done)); }
-  if (number) wish({ do: "seen", number });
+  if (number) ask({ do: "seen", number });
   const now = performance.now();
   if (now - since > 1000) {
-    document.getElementById("fps").textContent = `${((1000 * counted) / (now - since)).toFixed(0)} /s`;
+    document.getElementById("fps").textContent = ((1000 * counted) / (now - since)).toFixed(0);
     counted = 0; since = now;
   }
 }
 
 function read(buffer) {
-  const view = new DataView(buffer), real = at => view.getFloat32(at, true);
-  const solids = picture.panes.get(view.getUint8(1))?.solids.length ?? 0;
-  const count = view.getUint32(12, true), normals = 48 + 48 * solids;
+  const data = new DataView(buffer), real = at => data.getFloat32(at, true);
+  const solids = view.panes.get(data.getUint8(1))?.solids.length ?? 0;
+  const count = data.getUint32(12, true), normals = 48 + 48 * solids;
   return {
-    isTinted: view.getUint8(2) === 1,
-    number: view.getUint32(4, true),
-    version: view.getUint32(8, true),
+    isTinted: data.getUint8(2) === 1,
+    number: data.getUint32(4, true),
+    version: data.getUint32(8, true),
     count,
-    time: view.getFloat64(16, true),
+    time: data.getFloat64(16, true),
     low: [real(24), real(28), real(32)],
     size: [real(36), real(40), real(44)],
     poses: new Float32Array(buffer, 48, 12 * solids),

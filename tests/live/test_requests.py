@@ -1,4 +1,4 @@
-"""What a page may say: checked, and refused with the reason."""
+"""Messages of a page: each becomes a request, or is refused with the reason."""
 
 import json
 
@@ -7,11 +7,11 @@ import pytest
 pytest.importorskip("websockets", reason="needs websockets: pip install 'taichi-soft[live]'")
 
 from taichi_soft.core.errors import OptionError
-from taichi_soft.live.wishes import wish_of
+from taichi_soft.live.requests import parse_request
 
 
 @pytest.mark.parametrize(
-    ("said", "wish"),
+    ("said", "request_"),
     [
         ({"do": "pause", "is_paused": True}, {"is_paused": True}),
         ({"do": "set", "name": "young", "value": 2e5}, {"name": "young", "value": 2e5}),
@@ -23,10 +23,13 @@ from taichi_soft.live.wishes import wish_of
         ({"do": "upload", "name": "a.obj"}, {"name": "a.obj", "up": None}),
         ({"do": "upload", "name": "a.obj", "up": "z"}, {"name": "a.obj", "up": "z"}),
         ({"do": "seen", "number": 3}, {"number": 3}),
+        ({"do": "preset", "name": "gelatine"}, {"name": "gelatine"}),
+        ({"do": "preset"}, {"name": None}),
+        ({"do": "undo", "name": "all"}, {}),
     ],
 )
-def test_a_wish_has_what_was_said_and_nothing_else(said, wish):
-    assert wish_of(json.dumps(said)) == {"do": said["do"], "pane": 0, **wish}
+def test_a_request_has_the_values_of_its_message_and_nothing_else(said, request_):
+    assert parse_request(json.dumps(said)) == {"do": said["do"], "pane": 0, **request_}
 
 
 @pytest.mark.parametrize(
@@ -54,6 +57,8 @@ def test_a_wish_has_what_was_said_and_nothing_else(said, wish):
         ('{"do": "choose", "law": "magic"}', "law is one of"),
         ('{"do": "choose", "law": ["virial"]}', "law is one of"),
         ('{"do": "upload", "name": "a.obj", "up": "x"}', "up is one of y, z"),
+        ('{"do": "preset", "name": "butter"}', "name is one of"),
+        ('{"do": "preset", "name": 1}', "name is one of"),
         ('{"do": "pause", "is_paused": 1}', "true or false"),
         ('{"do": "pause", "is_paused": true, "pane": 5}', "pane"),
         ('{"do": "save", "what": null}', "what is one of"),
@@ -63,6 +68,6 @@ def test_a_wish_has_what_was_said_and_nothing_else(said, wish):
         (json.dumps({"do": "spawn", "name": "x" * 10_000}), "4096"),
     ],
 )
-def test_what_is_no_wish_is_refused_with_the_reason(text, reason):
+def test_an_invalid_message_is_refused_with_the_reason(text, reason):
     with pytest.raises(OptionError, match=reason):
-        wish_of(text)
+        parse_request(text)

@@ -1,28 +1,32 @@
-"""What a visitor's page may say, checked: each message becomes a wish, or is refused with the reason."""
+"""Messages of a visitor's page: each is checked and becomes a request, or is refused with the reason."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Hashable
 from typing import Any
 
 from taichi_soft.core.errors import OptionError
 from taichi_soft.core.types import Flips, Strain
 from taichi_soft.elements.laws import LAWS
-from taichi_soft.live.controls import checked_value
+from taichi_soft.live.controls import PRESET_SLIDERS, checked_value
 from taichi_soft.live.guard import LARGEST_TEXT
 from taichi_soft.live.tints import QUANTITIES
 
 FARTHEST = 1e5
-"""From the origin that a hand reaches [m]."""
+"""Largest coordinate of a point or a direction [m]."""
 
 SAVED = ("script", "film")
-"""What can be made of a world for a visitor."""
+"""Files that a visitor can ask for."""
+
+NEWEST = ("pause", "tint", "preset", "reset", "save", "move")
+"""Requests that replace an earlier one of the same name while it waits."""
 
 
-def wish_of(text: str) -> dict[str, Any]:
-    """A message as a wish: `do`, and what belongs to it.
+def parse_request(text: str) -> dict[str, Any]:
+    """Return a message as a request: `do`, `pane`, and the values of that request.
 
-    Raises: OptionError for one that is too long, no JSON, or asks for what there is not.
+    Raises: OptionError for a message that is too long, is not JSON, or has an unknown or invalid request.
     """
     if len(text) > LARGEST_TEXT:
         raise OptionError(f"a message has at most {LARGEST_TEXT} characters, got {len(text)}")
@@ -36,6 +40,14 @@ def wish_of(text: str) -> dict[str, Any]:
     if pane not in (0, 1) or isinstance(pane, bool):
         raise OptionError(f"pane is 0 or 1, got {pane!r}")
     return {"do": said["do"], "pane": int(pane), **_CHECKS[said["do"]](said)}
+
+
+def merge_key(request: dict[str, Any]) -> Hashable:
+    """Return the kind of a request: a waiting one is replaced by the next of its kind. None: it is kept."""
+    do = request["do"]
+    if do == "set":
+        return do, request["name"]
+    return (do, request["pane"], request.get("what")) if do in NEWEST else None
 
 
 def _nothing(said: dict[str, Any]) -> dict[str, Any]:
@@ -117,6 +129,10 @@ def _upload(said: dict[str, Any]) -> dict[str, Any]:
     return {**_name(said), "up": _one_of(said, "up", ("y", "z"))}
 
 
+def _preset(said: dict[str, Any]) -> dict[str, Any]:
+    return {"name": _one_of(said, "name", PRESET_SLIDERS)}
+
+
 def _save(said: dict[str, Any]) -> dict[str, Any]:
     what = _one_of(said, "what", SAVED)
     if what is None:
@@ -127,6 +143,8 @@ def _save(said: dict[str, Any]) -> dict[str, Any]:
 _CHECKS = {
     "seen": _seen,
     "set": _set,
+    "preset": _preset,
+    "undo": _nothing,
     "grab": _grab,
     "move": _move,
     "release": _nothing,
@@ -142,4 +160,4 @@ _CHECKS = {
     "save": _save,
     "upload": _upload,
 }
-"""By what a message asks for."""
+"""Checks of the values of each request."""

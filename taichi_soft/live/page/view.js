@@ -1,5 +1,6 @@
-// The picture: bodies, colliders and floor in light and shadow; one view of each pane beside the other.
+// The view: bodies, colliders and floor in light and shadow; one pane beside the other.
 import * as THREE from "three";
+import { Room } from "./room.js";
 import { OrbitControls } from "./three/OrbitControls.js";
 
 const RAMP = [[77, 133, 204], [107, 191, 194], [242, 224, 133], [242, 145, 71], [204, 46, 56]].map(c => c.map(v => v / 255));
@@ -9,25 +10,14 @@ const toLinear = v => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4);
 class Pane {
   constructor() {
     this.scene = new THREE.Scene();
-    this.scene.background = new THREE.Color(0xc9d2dc);
-    this.scene.fog = new THREE.Fog(0xc9d2dc, 10, 60);
-    const sky = new THREE.HemisphereLight(0xeaf2ff, 0xc9bfb2, 1.7);
-    sky.position.set(0, 0, 1);
-    this.scene.add(sky);
-    this.sun = new THREE.DirectionalLight(0xfff1dd, 2.2);
-    this.sun.castShadow = true;
-    this.sun.shadow.mapSize.set(1024, 1024);
-    this.sun.shadow.bias = -0.0005;
-    this.sun.shadow.normalBias = 0.02;
-    this.scene.add(this.sun, this.sun.target);
+    this.room = new Room(this.scene);
     this.body = null;
     this.solids = [];
-    this.floor = null;
     this.header = null;
   }
 
   draw(header, arrays) {
-    for (const old of [this.body, ...this.solids, this.floor]) {
+    for (const old of [this.body, ...this.solids]) {
       if (old) { this.scene.remove(old); old.geometry.dispose(); old.material.dispose(); }
     }
     this.header = header;
@@ -46,8 +36,8 @@ class Pane {
     this.scene.add(this.body);
     this.isTinted = false;
     this.drawSolids(header, arrays);
-    this.drawFloor(header);
-    this.aim(header.camera.target, Math.max(3, 0.6 * distance(header.camera.eye, header.camera.target)));
+    this.room.drawFloor(header.floor);
+    this.room.aim(header.camera.target, Math.max(3, 0.6 * distance(header.camera.eye, header.camera.target)));
   }
 
   drawSolids(header, arrays) {
@@ -70,23 +60,11 @@ class Pane {
     });
   }
 
-  drawFloor(header) {
-    this.floor = null;
-    if (header.floor === null) return;
-    this.floor = new THREE.Mesh(new THREE.PlaneGeometry(400, 400), new THREE.MeshStandardMaterial({ color: 0xb7bcc2, roughness: 0.95 }));
-    this.floor.position.z = header.floor;
-    this.floor.receiveShadow = true;
-    this.scene.add(this.floor);
-  }
-
-  // The sun shines on what lies within `reach` of a point.
-  aim(target, reach) {
-    this.sun.target.position.set(...target);
-    this.sun.position.set(target[0] - 0.55 * reach, target[1] - 0.75 * reach, target[2] + 1.5 * reach);
-    const eye = this.sun.shadow.camera;
-    eye.left = eye.bottom = -reach; eye.right = eye.top = reach; eye.near = 0.1; eye.far = 5 * reach;
-    eye.updateProjectionMatrix();
-    this.scene.fog.near = 4 * reach; this.scene.fog.far = 16 * reach;
+  // The box of all bodies: its corners, or null without bodies.
+  box() {
+    const box = new THREE.Box3();
+    if (this.body) box.setFromBufferAttribute(this.body.geometry.attributes.position);
+    return box.isEmpty() ? null : box;
   }
 
   move(frame) {
@@ -124,7 +102,7 @@ const LADDER = Array.from({ length: 128 }, (_, i) => {
 
 const distance = (a, b) => Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
 
-export class Picture {
+export class View {
   constructor(canvas, hand) {
     this.canvas = canvas;
     this.hand = hand;
@@ -134,7 +112,7 @@ export class Picture {
     this.renderer.shadowMap.type = THREE.PCFShadowMap;
     this.renderer.toneMapping = THREE.NeutralToneMapping;
     this.renderer.autoClear = false;
-    this.camera = new THREE.PerspectiveCamera(40, 1, 0.02, 500);
+    this.camera = new THREE.PerspectiveCamera(40, 1, 0.02, 1000);
     this.camera.up.set(0, 0, 1);
     this.camera.position.set(3, -4, 2);
     this.controls = new OrbitControls(this.camera, canvas);
@@ -144,12 +122,15 @@ export class Picture {
     this.panes = new Map();
     this.shown = [0];
     this.isPlaced = false;
+    this.pointAt = 0;
     this.isStale = true;
     this.held = null;
+    this.pointer = null;
     for (const [name, call] of [["pointerdown", "press"], ["pointermove", "pull"], ["pointerup", "letGo"], ["pointercancel", "letGo"]]) {
       canvas.addEventListener(name, event => this[call](event), { capture: true });
     }
     canvas.addEventListener("keydown", event => this.key(event));
+    canvas.addEventListener("pointerleave", () => { this.pointer = null; });
   }
 
   pane(number) {
@@ -181,6 +162,7 @@ export class Picture {
   render() {
     const width = this.canvas.clientWidth, height = this.canvas.clientHeight;
     const size = this.renderer.getSize(new THREE.Vector2());
+    this.point();
     if (size.x !== width || size.y !== height) { this.renderer.setSize(width, height, false); this.isStale = true; }
     if (!this.isStale) return;
     this.isStale = false;
@@ -191,12 +173,14 @@ export class Picture {
     const half = Math.tan(((this.fov ?? 40) * Math.PI) / 360);
     this.camera.fov = (360 / Math.PI) * Math.atan(this.camera.aspect < 1 ? half / this.camera.aspect : half);
     this.camera.updateProjectionMatrix();
+    const away = this.camera.position.distanceTo(this.controls.target);
     this.shown.forEach((number, i) => {
       const pane = this.panes.get(number);
       if (!pane) return;
       this.renderer.setViewport(i * wide, 0, wide, height);
       this.renderer.setScissor(i * wide, 0, wide, height);
       this.renderer.clear();
+      pane.room.follow(this.camera, away);
       this.renderer.render(pane.scene, this.camera);
     });
   }
@@ -216,24 +200,39 @@ export class Picture {
     return { place: i, pane: this.shown[i], caster };
   }
 
+  // Where a ray hits a body that no collider hides, or null.
+  hit(pane, caster) {
+    const { body, solids } = this.panes.get(pane) ?? {};
+    if (!body) return null;
+    body.geometry.computeBoundingSphere();
+    const hit = caster.intersectObject(body)[0], solid = caster.intersectObjects(solids)[0];
+    return !hit || (solid && solid.distance < hit.distance) ? null : hit;
+  }
+
   press(event) {
     if (event.button !== 0 || this.held) return;
     const { place, pane, caster } = this.ray(event);
-    const mesh = this.panes.get(pane)?.body;
-    if (!mesh) return;
-    mesh.geometry.computeBoundingSphere();
-    const hit = caster.intersectObject(mesh)[0];
-    const solid = caster.intersectObjects(this.panes.get(pane).solids)[0];
-    if (!hit || (solid && solid.distance < hit.distance)) return;
+    const hit = this.hit(pane, caster);
+    if (!hit) return;
     event.stopImmediatePropagation();
     this.canvas.setPointerCapture(event.pointerId);
+    this.canvas.classList.add("holds");
     const normal = this.camera.getWorldDirection(new THREE.Vector3());
     this.held = { id: event.pointerId, place, pane, plane: new THREE.Plane().setFromNormalAndCoplanarPoint(normal, hit.point) };
     const { origin, direction } = caster.ray;
     this.hand.grab(pane, origin.toArray(), direction.toArray());
   }
 
+  // The cursor shows a body that can be grabbed: bodies move too, so it looks now and then.
+  point() {
+    if (this.held || performance.now() < this.pointAt) return;
+    this.pointAt = performance.now() + 60;
+    const { pane, caster } = this.pointer ? this.ray(this.pointer) : {};
+    this.canvas.classList.toggle("can-grab", Boolean(caster && this.hit(pane, caster)));
+  }
+
   pull(event) {
+    if (event.pointerType === "mouse") this.pointer = event.buttons && !this.held ? null : { clientX: event.clientX, clientY: event.clientY };
     if (!this.held || event.pointerId !== this.held.id) return;
     event.stopImmediatePropagation();
     const point = this.rayIn(event, this.held.place).caster.ray.intersectPlane(this.held.plane, new THREE.Vector3());
@@ -245,6 +244,26 @@ export class Picture {
     event.stopImmediatePropagation();
     this.hand.release(this.held.pane);
     this.held = null;
+    this.canvas.classList.remove("holds");
+  }
+
+  // All bodies, seen from where the camera looks now.
+  frameAll() {
+    const box = new THREE.Box3();
+    for (const number of this.shown) {
+      const own = this.panes.get(number)?.box();
+      if (own) box.union(own);
+    }
+    if (box.isEmpty()) return;
+    const ball = box.getBoundingSphere(new THREE.Sphere()), reach = Math.max(0.1, ball.radius);
+    const away = this.camera.position.clone().sub(this.controls.target).normalize();
+    const half = ((this.fov ?? 40) * Math.PI) / 360;
+    this.controls.target.copy(ball.center);
+    this.camera.position.copy(ball.center).addScaledVector(away, (1.05 * reach) / Math.sin(half));
+    this.camera.far = Math.max(1000, 10 * reach);
+    for (const pane of this.panes.values()) pane.room.aim(ball.center.toArray(), Math.max(3, 1.5 * reach));
+    this.controls.update();
+    this.isStale = true;
   }
 
   key(event) {
