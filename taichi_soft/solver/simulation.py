@@ -154,9 +154,8 @@ class Simulation:
                 continue
             self._inverted.add(index)
             warnings.warn(
-                f"body {index} has tetrahedra that stay inside out, as where its weight folds it. "
-                "body.flipped_tets() lists them. Take a larger Young's modulus, a coarser mesh or "
-                "mesh.improved()",
+                f"body {index} has tetrahedra that stay inside out: body.flipped_tets() lists them. Take a "
+                "larger Young's modulus, a coarser mesh or mesh.improved()",
                 SolverWarning,
                 stacklevel=4,
             )
