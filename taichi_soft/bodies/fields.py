@@ -127,7 +127,6 @@ class BodyFields:
         self.body_is_braked = ti.field(ti.i32, bodies)  # 1 while a step is made for the last time
         self.body_patience = ti.field(ti.i32, bodies)  # steps in trouble; see `untangling`
         self.body_jolted = ti.field(ti.i32, bodies)  # 1 where a step was too coarse
-        self.body_refinement = ti.field(real, bodies)  # substeps that its shape asks for, over those at rest
         self.body_edge = ti.field(real, bodies)  # mean edge of its surface [m]
         self.body_sound_speed = ti.field(real, bodies)  # [m/s]
         self.retries = ti.field(
@@ -205,7 +204,6 @@ class BodyFields:
         fill(self.body_is_braked, np.zeros(0))
         fill(self.body_jolted, np.zeros(0))
         fill(self.body_patience, np.zeros(0))
-        fill(self.body_refinement, np.ones(self.capacity.bodies))
         fill(self.rest_position, position)
         own = np.zeros((len(bodies), 4)) if kinds is None else kinds
         fill(self.body_edge, own[:, 0])

@@ -123,7 +123,6 @@ def write_body(
         state.body_gravity_scale[body] = state.body_gravity_scale[model_of]
         state.body_damping[body] = state.body_damping[model_of]
         state.body_patience[body] = state.body_patience[model_of]
-        state.body_refinement[body] = state.body_refinement[model_of]
         state.body_sound_speed[body] = state.body_sound_speed[model_of]
         state.body_fading[body] = state.body_fading[model_of]
         state.body_fading_interval[body] = state.body_fading_interval[model_of]

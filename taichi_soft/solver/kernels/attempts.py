@@ -1,10 +1,9 @@
 """A step is made in attempts: where bodies were before it, and whether an attempt was fine enough.
 
-Substeps are chosen for small deformation, and more of them for a shape that is found to be stiffer. An impact
-faster than sound flattens tetrahedra, and flat ones are stiffer. Where forces change a velocity by more than
-`JOLT` at once an attempt ends, or where it comes out non-finite. The island is put back, and makes the step
-again with twice as many substeps, and so on. The last attempt brakes vibrations sharply; momentum and spin
-stay.
+Substeps are chosen for small deformation. An impact faster than sound flattens tetrahedra, and flat ones are
+stiffer. Where forces change a velocity by more than `JOLT` at once an attempt ends, or where it comes out
+non-finite. The island is put back, and makes the step again with twice as many substeps, and so on. The last
+attempt brakes vibrations sharply; momentum and spin stay.
 """
 
 from taichi_soft.bodies.kernels.particles import particle_is_sound, remember_particle, restore_particle
@@ -20,7 +19,6 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.core.types import Integrator
 from taichi_soft.elements.kernels.internal_forces import clear_forces
 from taichi_soft.solver.kernels.implicit_euler import MOST_PIECES
-from taichi_soft.solver.kernels.untangling import MOST_REFINEMENT
 
 
 @ti.func
@@ -52,23 +50,6 @@ def attempts_of(state: ti.template(), program: ti.template()):
         halvings = ti.static(MOST_PIECES.bit_length() - 1 if program.has_contact else 0)
         last = halvings
     return halvings, last
-
-
-@ti.func
-def refined_substeps(state: ti.template(), program: ti.template(), island, substeps):
-    """Substeps of the first attempt: `substeps`, or as many as the shapes of an island's bodies ask for."""
-    refinement = ti.cast(1.0, ti.f32)
-    if ti.static(program.integrator != Integrator.IMPLICIT_EULER):
-        if state.retries[None] > 0:
-            first, end = rows_of(state, program, island)
-            row = first
-            while row < end:
-                body = body_at(state, program, row)
-                if state.body_status[body] == ACTIVE:
-                    refinement = ti.max(refinement, state.body_refinement[body])
-                row = row_behind(row)
-    refinement = ti.min(refinement, MOST_REFINEMENT)  # as a forged snapshot may say anything
-    return ti.max(substeps, ti.cast(ti.ceil(substeps * refinement), ti.i32))
 
 
 @ti.real_func

@@ -23,8 +23,8 @@ from taichi_soft.solver.kernels.untangling import kept_while_caught
 MOST_FADING = 0.43
 """What damping takes from a vibration in one substep, at most: exp(-0.43) = 0.65 is left, d below. The kick
 of what is pressed is no part of that vibration, so there a mode of stiffness k and mass 1 becomes d v + h a.
-That is stable for h^2 k < 2 (1 + d), here up to 0.9 of leapfrog's own longest step. A wreck loses
-more, once in a step."""
+That is stable for h^2 k < 2 (1 + d), here up to 0.9 of leapfrog's own longest step. What is caught inside out
+loses more, once in a step."""
 
 SHARP_BRAKE = 0.5
 """Of the vibration that a substep leaves where a step that failed is made for the last time."""
@@ -263,7 +263,8 @@ def damp_body(state: ti.template(), program: ti.template(), body, kick, h, s, su
     """As `damp_vibration`, where only CPUs run it. Each part is called here alone: LLVM puts it back, and its
     rounding does not depend on what else a world has."""
     keep = kept_vibration(state, body, h, s, substeps)
-    keep *= kept_while_caught(state, body, h, s == 0)
+    if s == 0:
+        keep *= kept_while_caught(state, body, substeps * h)
     if keep < 1.0:
         _fade_body(state, program, body, _to_positions(program, kick, h), h, keep)
     if state.body_is_braked[body] == 1:
