@@ -91,9 +91,9 @@ def test_a_sliding_block_is_as_fast_as_the_book_says(slides):
 
 
 def test_what_friction_holds_does_not_creep_while_it_is_shaken():
-    """In 3,840 substeps a second, each of which rounds its position.
+    """In 3,840 substeps a second, each of which rounds its position by up to 3e-8 m: 2e-4 m if that added up.
 
-    A corner that hardly bears anything slips by some micrometres in the first two seconds, and then no more.
+    A corner that bears next to no weight slips by a few micrometres, on some processors for four seconds.
     """
     tilt = turn(SLOPE, np.array([0.3, 1.0, 0.2]) / np.linalg.norm([0.3, 1.0, 0.2]))
     world = room()
@@ -112,7 +112,7 @@ def test_what_friction_holds_does_not_creep_while_it_is_shaken():
         world.step(DT, 64)
     ways = (body.positions() - before)[before @ tilt[:, 2] < 1e-3] @ tilt
     assert len(ways) == 9
-    assert np.abs(ways[:, :2]).max() < 5e-7
+    assert np.abs(ways[:, :2]).max() < 1e-5
 
 
 def test_a_moving_belt_carries_a_body_along_once_friction_has_brought_it_to_speed():
