@@ -11,7 +11,7 @@ EXTRAS = {
     "film": {"cv2": "opencv-python-headless", "imageio_ffmpeg": "imageio-ffmpeg", "PIL": "pillow"},
     "bake": {"PIL": "pillow", "pygltflib": "pygltflib"},
     "usd": {"pxr": "usd-core"},
-    "io": {"meshio": "meshio", "DracoPy": "DracoPy"},
+    "io": {"meshio": "meshio", "DracoPy": "dracopy"},
     "voronoi": {"scipy": "scipy"},
     "report": {
         "cv2": "opencv-python-headless",

@@ -176,7 +176,7 @@ def jelly_glow(color, normal, view, sun, around, lit, rim, openness, behind):
     through = lighting.JELLY_THROUGH * ti.max(0.25 - facing, 0.0) * (0.4 + 0.6 * rim)
     total = inner * (lighting.SUN * (wrapped * kept + through) + dimmed(around, color, openness))
     clear = lighting.JELLY_CLEAR * (1.0 - rim * rim)
-    total = (1.0 - clear) * total + clear * (0.25 + 0.75 * color) * behind
+    total = (1.0 - clear) * total + clear * (0.08 + 0.92 * color) * behind
     shine = mirrored(normal, view, sun, 7) + 0.12 * mirrored(normal, view, sun, 4)
     total += lighting.SUN * (lighting.JELLY_HIGHLIGHT * shine * lit)
     mirror = lighting.JELLY_RIM * fifth_power(rim) * (0.6 + 0.4 * normal.z) * openness

@@ -457,8 +457,8 @@ CALLS: dict[str, dict[str, Call]] = {
         "add_body": Call({
             "mesh": choice(BLOCK), "material": choice(SOFT), "law": choice("virial"), "strain": choice(None),
             "flips": choice(None), "damping_model": choice("edge"), "position": PLACE, "rotation": ROTATION,
-            "velocity": SPEED, "on_floor": FLAG, "overlap": choice("part"), "pinned": choice(()), "contact": choice(Contact()), "plasticity": choice(None),
-            "spare_vertices": choice(0), "tearing": choice(None),
+            "velocity": SPEED, "on_floor": FLAG, "pinned": choice(()), "contact": choice(Contact()), "plasticity": choice(None),
+            "spare_vertices": choice(0), "tearing": choice(None), "overlap": choice("part"),
         }, always),
         "reserve": Call({"asset": ASSET, "count": choice(1)}, always),
         "build": Call({}, always),
