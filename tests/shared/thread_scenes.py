@@ -41,7 +41,7 @@ def thrown(recorded=True):
     world = World(gravity=(0, 0, 0), floor=None, soft_contact=True)
     rng = np.random.default_rng(3)
     mesh, material = sphere(0.3, 2), Material(1e5, 0.2, 1000.0, 2.0)
-    ways = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 0, 1)]) * 0.5
+    ways = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 0, 1)]) * 0.7
     for way in ways:
         world.add_body(mesh, material, position=way + rng.normal(scale=0.02, size=3), velocity=-4 * way)
     world.build()
