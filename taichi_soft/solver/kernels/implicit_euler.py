@@ -39,18 +39,24 @@ MOST_PIECES = 32
 def _split_off_rotation(state: ti.template(), program: ti.template(), body, h):
     """Write the velocities that deform a body within `h` [s], relative to its rigid motion, to `solution`.
 
-    The rigid motion follows an arc: its velocities are the mean ones, along the chords.
+    The rigid motion follows an arc: its velocities are the mean ones, along the chords. Ropes and cloths have
+    none: each of their edges turns as it will, and forces that turn with the whole would add energy.
 
     Returns: the rotation of the body within that time, a quaternion.
     """
-    particles = state.body_particles[body]
-    x0, v0 = state.particle_position[particles[0]], state.particle_velocity[particles[0]]
-    center, velocity, angular_velocity = rigid_motion(state, program, body, 0.0, 0.0, 0, x0, v0)
-    turn = spun(ti.Vector([0.0, 0.0, 0.0, 1.0]), h * angular_velocity)
-    for p in range(particles[0], particles[1]):
-        arm = state.particle_position[p] - x0 - center
-        chord = (turned(turn, arm) - arm) / h
-        state.solution[p] = state.particle_velocity[p] - v0 - velocity - chord
+    particles, blocks = state.body_particles[body], state.body_blocks[body]
+    turn = ti.Vector([0.0, 0.0, 0.0, 1.0])
+    if blocks[0] == blocks[1]:
+        for p in range(particles[0], particles[1]):
+            state.solution[p] = state.particle_velocity[p]
+    else:
+        x0, v0 = state.particle_position[particles[0]], state.particle_velocity[particles[0]]
+        center, velocity, angular_velocity = rigid_motion(state, program, body, 0.0, 0.0, 0, x0, v0)
+        turn = spun(turn, h * angular_velocity)
+        for p in range(particles[0], particles[1]):
+            arm = state.particle_position[p] - x0 - center
+            chord = (turned(turn, arm) - arm) / h
+            state.solution[p] = state.particle_velocity[p] - v0 - velocity - chord
     return turn
 
 
