@@ -515,7 +515,7 @@ def test_a_notebook_of_this_machine_may_show_the_page_within_its_own(browser, se
 
 
 def test_two_pages_see_one_world_and_a_reload_or_a_close_disturbs_neither(open_page, visitor, served):
-    one, two = open_page(700, 500), open_page(700, 500)
+    one, two = open_page(900, 500), open_page(900, 500)
     one.get_by_role("button", name="add a ball").click()
     visitor.until(lambda: visitor.states[0]["bodies"] == 7)
     two.reload()
