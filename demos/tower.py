@@ -72,7 +72,7 @@ def stage() -> Stage:
 
 
 def _pose(angle: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Of the ball, and of the rope above it: place [m] and axes."""
+    """Return the place [m] and the axes of the ball and of the rope above it."""
     c, s = np.cos(angle), np.sin(angle)
     place = np.array([ROPE * s, 0.0, TOP - ROPE * c])
     return place, np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]])

@@ -184,5 +184,5 @@ class SoftContactFields:
         self.parting_kick = ti.Vector.field(3, ti.f32, bodies)  # change of velocity [m/s]
 
     def carried(self) -> list[list[Any]]:
-        """What the next step depends on: of each particle, each body."""
+        """Return the fields that the next step depends on: those of particles, and those of bodies."""
         return [[self.kept_triangle, self.kept_normal_impulse, self.kept_friction_impulse], [self.overlap]]

@@ -75,7 +75,7 @@ def _encloses(state: ti.template(), body: ti.i32, x: ti.math.vec3) -> ti.i32:
         a = state.particle_position[corners[0]] - x
         b = state.particle_position[corners[1]] - x
         c = state.particle_position[corners[2]] - x
-        # As seen along the ray.
+        # Projections along the ray.
         u = ti.Vector([right.dot(a), up.dot(a)])
         v = ti.Vector([right.dot(b), up.dot(b)])
         w = ti.Vector([right.dot(c), up.dot(c)])
@@ -247,7 +247,7 @@ def _part_pair(soft: ti.template(), a, b, gravity, dt):
     share = mine / total
     wanted = PARTING_RATE * ti.min(soft.size[a], soft.size[b]) * dt
     missing = ti.max(wanted - (soft.displacement[a] - soft.displacement[b]).dot(n), 0.0)
-    # What rises against gravity does so alone: the lower one may lie on something.
+    # Only the upper body rises against gravity: the lower one may lie on something.
     up = -gravity / ti.max(gravity.norm(), 1e-30)
     rise = missing * n.dot(up)
     upper_share = share
