@@ -135,7 +135,7 @@ def entries() -> str:
 
 
 def _entry(demo: Demo) -> str:
-    """What the page shows of a demo: its film, or else its still."""
+    """Return what the page shows of a demo: its film, or else its still."""
     named = {"name": demo.name, "alt": escape(demo.what, quote=True)}
     film = STILL.format(**named)
     if (FOLDER / f"{demo.name}.webm").is_file():

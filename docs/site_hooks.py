@@ -1,4 +1,4 @@
-"""What the documentation site takes from elsewhere: address, version, files above this folder, the report.
+"""Give the documentation site its address, its version, files above this folder and the report.
 
 MkDocs calls these functions by their names (mkdocs.yml, `hooks`).
 """

@@ -1,4 +1,4 @@
-"""What a body is made of, written to its fields."""
+"""Write the constants of a material to the fields of a body."""
 
 from __future__ import annotations
 

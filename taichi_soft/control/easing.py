@@ -44,7 +44,7 @@ LIFT = 1e-4
 """A change that adds less than it takes to lift the body by this [m] is made at once."""
 
 LARGEST_RATIO = 1e12
-"""Of stiffnesses: what was not stiff at all is eased in from here."""
+"""Largest ratio of the new stiffness to the one from which it is eased in: the old one may be zero."""
 
 
 @dataclass(eq=False)

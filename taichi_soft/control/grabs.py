@@ -107,7 +107,7 @@ class Grabs(Numbered[Grab]):
             grab.release()
 
     def warm_up(self, body: SoftBody, other: SoftBody | None, step: Callable[[], None]) -> None:
-        """Take hold of a body that has a surface, move it and let go."""
+        """Grab a body that has a surface, move it and release it."""
         if len(body.surface) == 0:
             return
         with contextlib.suppress(StateError):  # all are in use, which compiles them too

@@ -34,9 +34,11 @@ class Handle:
     _serial: int
 
     def _keep(self) -> bytes | None:
+        """Of a world only: as `keep`."""
         raise NotImplementedError
 
     def _undo(self, data: bytes) -> None:
+        """Of a world only: as `undo`."""
         raise NotImplementedError
 
     def __init_subclass__(cls) -> None:

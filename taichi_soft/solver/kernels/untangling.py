@@ -1,6 +1,6 @@
 """What brings back a body that is caught inside out.
 
-Forces drive nearly all tetrahedra that are turned inside out back by themselves. So every `PATIENCE` steps
+Forces alone turn nearly all tetrahedra that are inside out back again. Every `PATIENCE` steps
 the body is checked for tetrahedra that are flat or inside out, and its vibrations fade until a check finds
 none. A body that its own weight folds may keep a few for ever, as their forces balance. Such a body is
 reported after `REPORTED` steps, and left as it is. A body that is wrecked altogether has no shape to go back
