@@ -46,16 +46,27 @@ class Inbox:
     def __len__(self) -> int:
         return sum(len(each.waiting) for each in self._senders.values())
 
-    def put(self, sender: int, message: Message, key: Hashable = None, *, is_kept: bool = False) -> bool:
+    def put(
+        self,
+        sender: int,
+        message: Message,
+        key: Hashable = None,
+        *,
+        is_kept: bool = False,
+        is_last: bool = False,
+    ) -> bool:
         """Add a message.
 
         Args:
             key: kind of the message. It replaces a waiting one of its kind, unless a message without a key
                 lies between; None: it replaces nothing.
             is_kept: accept it however many wait.
+            is_last: the sender leaves: drop what it has waiting.
         Returns: False if too many of this sender wait.
         """
         mine = self._senders.setdefault(sender, _Sender())
+        if is_last:
+            mine.waiting.clear()
         if key is None or sender == SERVER:
             mine.segment += 1
         place = key, mine.segment

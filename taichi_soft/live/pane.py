@@ -82,7 +82,8 @@ class Runner:
         Returns: False if too many requests of this visitor wait.
         """
         with self._changed:
-            if not self._inbox.put(sender, (key, message), key, is_kept=message[0] == "release"):
+            ends = {"is_kept": message[0] == "release", "is_last": message[0] == "leave"}
+            if not self._inbox.put(sender, (key, message), key, **ends):
                 return False
             self._changed.notify()
         return True

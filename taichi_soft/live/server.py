@@ -169,7 +169,7 @@ class LiveServer:
             pass
         finally:
             del self.audience.visitors[visitor.number]
-            self.worlds.release(visitor.number)
+            self.worlds.leave(visitor.number)
             speaking.cancel()
 
     def _offered(self) -> dict[str, Any]:

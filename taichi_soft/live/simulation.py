@@ -110,7 +110,8 @@ class Simulation:
             sender, key, message = self.connection.recv()
             if message[0] == "stop":
                 return False
-            if not self.inbox.put(sender, message, key, is_kept=message[0] == "release"):
+            ends = {"is_kept": message[0] == "release", "is_last": message[0] == "leave"}
+            if not self.inbox.put(sender, message, key, **ends):
                 self._refuse(sender, "too many of your requests wait: this one is left out")
         end = time.perf_counter() + ANSWERING
         while (now := time.perf_counter()) < end:
@@ -269,6 +270,10 @@ class Simulation:
         grab = self.hands.pop(visitor, None)
         if grab is not None and grab.is_held:
             grab.release()
+
+    def do_leave(self, visitor: int) -> None:
+        """Let go of what a visitor held who has left."""
+        self.do_release(visitor)
 
     def do_release_all(self) -> None:
         """Let all go."""

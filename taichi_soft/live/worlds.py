@@ -115,10 +115,10 @@ class Worlds:
         runner = self.panes.get(pane)
         return runner is not None and bool((runner.state or {}).get("restarts"))
 
-    def release(self, visitor: int) -> None:
-        """Release what a visitor holds."""
+    def leave(self, visitor: int) -> None:
+        """Release what a visitor holds, and drop its waiting requests."""
         for runner in self.panes.values():
-            runner.send("release", visitor, sender=visitor)
+            runner.send("leave", visitor, sender=visitor)
 
     def runners(self) -> list[Runner]:
         """Return all worlds."""

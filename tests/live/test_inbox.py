@@ -57,6 +57,15 @@ def test_the_newest_of_each_kind_is_left_of_a_flood_and_what_cannot_be_merged_is
     assert inbox.put(2, ("spawn", 0)), "another visitor has room of its own"
 
 
+def test_what_a_visitor_has_waiting_goes_when_it_leaves():
+    inbox = Inbox()
+    for number in range(MOST_WAITING):
+        assert inbox.put(1, ("spawn", number))
+    assert inbox.put(2, ("step",))
+    assert inbox.put(1, ("leave",), is_last=True)
+    assert sorted(drained(inbox)) == [(1, ("leave",)), (2, ("step",))]
+
+
 def test_visitors_take_turns_whoever_sent_more_and_the_server_comes_first():
     inbox = Inbox()
     for number in range(50):

@@ -299,12 +299,10 @@ def test_a_slider_moved_by_keys_changes_the_world_by_the_value_that_it_shows(ope
             page.keyboard.press("ArrowLeft")
         shown = slider.get_attribute("aria-valuetext")
         name = about["name"]
-        visitor.until(lambda name=name, before=before: visitor.states[0]["values"][name] != before)
-        visitor.listen(0.5)
-        value, factor = visitor.states[0]["values"][name], 1.0
-        if about["unit"] == "Pa":
-            factor = {"kPa": 1e3, "MPa": 1e6, "Pa": 1.0}[shown.split()[1]]
-        assert float(shown.split()[0]) * factor == pytest.approx(value, rel=6e-3)
+        factor = {"kPa": 1e3, "MPa": 1e6, "Pa": 1.0}[shown.split()[1]] if about["unit"] == "Pa" else 1.0
+        wanted = pytest.approx(float(shown.split()[0]) * factor, rel=6e-3)
+        assert before != wanted
+        visitor.until(lambda name=name, wanted=wanted: visitor.states[0]["values"][name] == wanted)
     back = {"young": 1.5e5, "poisson": 0.4, "damping": 0.15, "gravity": 9.81, "friction": 0.5}
     for name, value in {**back, "substeps": 8, "speed": 1.0}.items():
         visitor.say("set", name=name, value=value)

@@ -49,7 +49,7 @@ def test_help_says_what_every_option_does(report):
 @pytest.mark.parametrize(
     ("arguments", "named"),
     [
-        (["nope"], "'nope': choose from squares, nothing"),
+        (["nope"], "'nope': choose one of 'squares', 'nothing'"),
         (["--list", "nope"], "'nope'"),
         (["--out", "/proc/nowhere"], "'/proc/nowhere'"),
         (["--out", "file"], "'file'"),
