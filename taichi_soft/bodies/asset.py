@@ -406,6 +406,13 @@ class SoftBodyAsset:
             frequency *= float(np.sqrt(_mean_stiffness(body) / _mean_stiffness(self.description)))
         return 2.0 * material.damping_ratio * frequency, DAMPING_INTERVAL / max(frequency, 1e-6)
 
+    def kind_row(self, *, is_implicit: bool) -> tuple[float, ...]:
+        """What `BodyFields.load` takes of a body of this asset: `body_edge`, `body_stride` (0 with implicit
+        Euler, which takes substeps of any length), `body_sound_speed` and `vibration_row`."""
+        speed = self.description.sound_speed
+        stride = 0.0 if is_implicit else self.stable_step.recommended * speed
+        return self.surface_row[2], stride, speed, *self.vibration_row(self.description)
+
     @cached_property
     def surface_row(self) -> tuple[float, float, float]:
         """Friction, thickness [m] and mean edge [m] of what touches: the hull, or the surface, or all edges

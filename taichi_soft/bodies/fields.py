@@ -127,7 +127,9 @@ class BodyFields:
         self.body_is_braked = ti.field(ti.i32, bodies)  # 1 while a step is made for the last time
         self.body_patience = ti.field(ti.i32, bodies)  # steps in trouble; see `untangling`
         self.body_jolted = ti.field(ti.i32, bodies)  # 1 where a step was too coarse
+        self.body_refinement = ti.field(real, bodies)  # substeps that its shape asks for, over those at rest
         self.body_edge = ti.field(real, bodies)  # mean edge of its surface [m]
+        self.body_stride = ti.field(real, bodies)  # way of sound in its longest stable substep at rest [m]
         self.body_sound_speed = ti.field(real, bodies)  # [m/s]
         self.retries = ti.field(
             ti.i32, ()
@@ -141,8 +143,8 @@ class BodyFields:
     def load(self, scene: Scene, models: list[int], kinds: NDArray[np.float64] | None = None) -> None:
         """Fill every field from `scene`, and those that `loader` has rows for already.
 
-        `models[i]` is the number of body i's force model, `kinds[i]` its `body_edge`, `body_sound_speed`,
-        `body_fading` and `body_fading_interval`.
+        `models[i]` is the number of body i's force model, `kinds[i]` its `body_edge`, `body_stride`,
+        `body_sound_speed`, `body_fading` and `body_fading_interval`.
 
         All bodies are absent, and their particles where their meshes are, until `spawn_body` places them.
         """
@@ -204,12 +206,14 @@ class BodyFields:
         fill(self.body_is_braked, np.zeros(0))
         fill(self.body_jolted, np.zeros(0))
         fill(self.body_patience, np.zeros(0))
+        fill(self.body_refinement, np.ones(self.capacity.bodies))
         fill(self.rest_position, position)
-        own = np.zeros((len(bodies), 4)) if kinds is None else kinds
+        own = np.zeros((len(bodies), 5)) if kinds is None else kinds
         fill(self.body_edge, own[:, 0])
-        fill(self.body_sound_speed, own[:, 1])
-        fill(self.body_fading, own[:, 2])
-        fill(self.body_fading_interval, own[:, 3])
+        fill(self.body_stride, own[:, 1])
+        fill(self.body_sound_speed, own[:, 2])
+        fill(self.body_fading, own[:, 3])
+        fill(self.body_fading_interval, own[:, 4])
         fill(self.wind, np.zeros((0, 4)))
         fill(self.body_gravity_scale, np.ones(self.capacity.bodies))
         fill(self.block_model, np.repeat(models, [r.blocks[1] - r.blocks[0] for r in ranges]))

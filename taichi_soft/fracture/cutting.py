@@ -251,8 +251,7 @@ def write_surface(context: Context, state: BodyFields, slot: int, asset: SoftBod
 
 
 def _write_kind(state: BodyFields, slot: int, asset: SoftBodyAsset) -> None:
-    described = asset.description
-    rows = [*asset.surface_row, described.sound_speed, *asset.vibration_row(described)]
+    rows = [*asset.surface_row[:2], *asset.kind_row(is_implicit=state.capacity.implicit)]
     write_kind(state, slot, np.array(rows, dtype=np.float32))
 
 

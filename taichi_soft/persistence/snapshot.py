@@ -171,6 +171,7 @@ def steering(state: State) -> list[tuple[int, Any]]:
     particle = [state.prev_position, state.prev_velocity, state.particle_mass, state.particle_inv_mass]
     particle += [state.particle_target, state.particle_push]
     body = [state.body_velocity_lag, state.body_gravity_scale, state.body_damping, state.body_sound_speed]
+    body += [state.body_refinement]
     shape = [state.tet_rest_inverse] if state.capacity.plastic else []
     owners = (PARTICLE, particle), (BODY, body), (SHAPE, shape)
     return [(owner, field) for owner, fields in owners for field in fields] + [(WORLD, state.wind)]

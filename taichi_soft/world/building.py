@@ -197,10 +197,8 @@ def _fill(context: WorldContext, state: State, program: StepProgram) -> None:
         fill(state.soft.body_surface, np.array([a.surface_row for a in assets]))
         fill(state.soft.body_touches_itself, np.array([a.contact.itself for a in assets]))
     models = [program.models.index(asset.description.model) for asset in assets]
-    kinds = np.array(
-        [(a.surface_row[2], a.description.sound_speed, *a.vibration_row(a.description)) for a in assets]
-    )
-    state.load(context.layout, models, kinds)
+    kinds = [asset.kind_row(is_implicit=state.capacity.implicit) for asset in assets]
+    state.load(context.layout, models, np.array(kinds))
 
 
 def _warm_up(context: WorldContext, state: State) -> None:

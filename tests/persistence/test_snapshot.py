@@ -371,7 +371,7 @@ def set_word(at, to):
     return change
 
 
-# From behind: grabs (16), wind (4), nine words for each of the two bodies.
+# From behind: grabs (16), wind (4), ten words for each of the two bodies.
 @pytest.mark.parametrize(
     "change",
     [
@@ -398,8 +398,8 @@ def set_word(at, to):
         set_word(0, np.float32(1e30).view(np.int32)),
         set_word(14, 77),
         set_word(-16, 99),
-        set_word(-16 - 4 - 18, 9),
-        set_word(-16 - 4 - 5, np.float32(np.nan).view(np.int32)),
+        set_word(-16 - 4 - 20, 9),
+        set_word(-16 - 4 - 6, np.float32(np.nan).view(np.int32)),
         set_word(-16 - 4 - 1, np.float32(np.nan).view(np.int32)),
     ],
 )

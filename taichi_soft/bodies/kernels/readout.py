@@ -59,4 +59,5 @@ def write_motion(
         i = row_behind(i)
     state.body_velocity_lag[body] = 0.0
     state.body_patience[body] = PLACED
+    state.body_refinement[body] = 1.0
     state.body_status[body] = ACTIVE

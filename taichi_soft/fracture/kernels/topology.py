@@ -123,6 +123,7 @@ def write_body(
         state.body_gravity_scale[body] = state.body_gravity_scale[model_of]
         state.body_damping[body] = state.body_damping[model_of]
         state.body_patience[body] = state.body_patience[model_of]
+        state.body_refinement[body] = state.body_refinement[model_of]
         state.body_sound_speed[body] = state.body_sound_speed[model_of]
         state.body_fading[body] = state.body_fading[model_of]
         state.body_fading_interval[body] = state.body_fading_interval[model_of]
@@ -163,10 +164,11 @@ def write_touching(
 
 @ti.kernel
 def write_kind(state: ti.template(), body: ti.i32, row: ti.types.ndarray(dtype=ti.f32, ndim=1)):
-    """Write `SoftBodyAsset.surface_row`, the speed of sound, and `SoftBodyAsset.vibration_row` of a body."""
+    """Write friction, thickness [m] and `SoftBodyAsset.kind_row` of a body."""
     state.body_edge[body] = row[2]
-    state.body_sound_speed[body] = row[3]
-    state.body_fading[body] = row[4]
-    state.body_fading_interval[body] = row[5]
+    state.body_stride[body] = row[3]
+    state.body_sound_speed[body] = row[4]
+    state.body_fading[body] = row[5]
+    state.body_fading_interval[body] = row[6]
     if ti.static(state.capacity.contact.soft):
         state.soft.body_surface[body] = ti.Vector([row[0], row[1], row[2]])

@@ -35,6 +35,7 @@ def carried(state: State, owner: int) -> list[tuple[Any, int, int]]:
     elif owner == BODY:
         fields += [state.body_status, state.body_velocity_lag, state.body_drives]
         fields += [state.body_gravity_scale, state.body_damping, state.body_patience]
+        fields += [state.body_refinement]
         fields += [state.body_fading, state.body_fading_interval, state.body_sound_speed]
         fields += [state.body_residual] if is_implicit else []
     elif owner == SHAPE:

@@ -1,9 +1,10 @@
 """A step is made in attempts: where bodies were before it, and whether an attempt was fine enough.
 
-Substeps are chosen for small deformation. An impact faster than sound flattens tetrahedra, and flat ones are
-stiffer. Where forces change a velocity by more than `JOLT` at once an attempt ends, or where it comes out
-non-finite. The island is put back, and makes the step again with twice as many substeps, and so on. The last
-attempt brakes vibrations sharply; momentum and spin stay.
+Substeps are chosen for small deformation, and more of them for a shape that is found to be stiffer. An impact
+faster than sound flattens tetrahedra, and flat ones are stiffer. Where forces change a velocity by more than
+`JOLT` at once an attempt ends, or where it comes out non-finite. The island is put back, and makes the step
+again with twice as many substeps, and so on. The last attempt brakes vibrations sharply; momentum and spin
+stay.
 """
 
 from taichi_soft.bodies.kernels.particles import particle_is_sound, remember_particle, restore_particle
@@ -19,6 +20,7 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.core.types import Integrator
 from taichi_soft.elements.kernels.internal_forces import clear_forces
 from taichi_soft.solver.kernels.implicit_euler import MOST_PIECES
+from taichi_soft.solver.kernels.untangling import MOST_REFINEMENT
 
 
 @ti.func
@@ -50,6 +52,26 @@ def attempts_of(state: ti.template(), program: ti.template()):
         halvings = ti.static(MOST_PIECES.bit_length() - 1 if program.has_contact else 0)
         last = halvings
     return halvings, last
+
+
+@ti.func
+def refined_substeps(state: ti.template(), program: ti.template(), island, substeps, dt):
+    """Substeps of the first attempt at a step of `dt` [s]: `substeps`, or as many as the shapes of an
+    island's bodies ask for."""
+    least = ti.cast(substeps, ti.f32)
+    if ti.static(program.integrator != Integrator.IMPLICIT_EULER):
+        if state.retries[None] > 0:
+            first, end = rows_of(state, program, island)
+            row = first
+            while row < end:
+                body = body_at(state, program, row)
+                if state.body_status[body] == ACTIVE and state.body_refinement[body] > 1.0:
+                    at_rest = dt * state.body_sound_speed[body] / state.body_stride[body]
+                    # A forged snapshot may say anything.
+                    refinement = ti.min(state.body_refinement[body], MOST_REFINEMENT)
+                    least = ti.max(least, ti.min(at_rest * refinement, MOST_REFINEMENT * substeps))
+                row = row_behind(row)
+    return ti.cast(ti.ceil(least), ti.i32)
 
 
 @ti.real_func

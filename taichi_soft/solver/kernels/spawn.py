@@ -42,6 +42,7 @@ def spawn_body(state: ti.template(), body: ti.i32, rows: ti.types.ndarray(dtype=
         state.body_gravity_scale[body] = 1.0
         state.body_damping[body] = 0.0
         state.body_patience[body] = 0
+        state.body_refinement[body] = 1.0
         if ti.static(state.capacity.implicit):
             state.body_residual[body] = 0.0
         if ti.static(state.capacity.plastic):

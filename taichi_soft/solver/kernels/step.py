@@ -18,6 +18,7 @@ from taichi_soft.solver.kernels.attempts import (
     brake_island,
     island_is_sound,
     put_back_island,
+    refined_substeps,
 )
 from taichi_soft.solver.kernels.body_end import end_body
 from taichi_soft.solver.kernels.islands import find_islands
@@ -46,15 +47,17 @@ def fixed_step(state: ti.template(), program: ti.template(), island, substeps, h
         _begin(state, program, island)
     run, left = state.progress[island], most
     halvings, last = attempts_of(state, program)
+    least = refined_substeps(state, program, island, substeps, substeps * h)
+    longest = h if least == substeps else substeps * h / least
     finer, is_good = 1, 0
     while run.attempt != DONE and is_good == 0 and left > 0:
         finer = 1 << ti.min(run.attempt, halvings)
-        count, first = finer * substeps, run.s
+        count, first = finer * least, run.s
         end = ti.min(first + left, count)
         if first == 0:
             _begin_attempt(state, program, island, run)
         is_last = int(run.attempt == last)
-        _make_substeps(state, program, island, end, count, h / finer, is_last, run)
+        _make_substeps(state, program, island, end, count, longest / finer, is_last, run)
         left -= run.s - first
         if is_last == 0 and run.is_stable == 0:
             _put_back(state, program, island, run, halvings)
@@ -64,7 +67,7 @@ def fixed_step(state: ti.template(), program: ti.template(), island, substeps, h
             else:
                 _put_back(state, program, island, run, halvings)
     if is_good == 1:
-        _end(state, program, island, run, finer * substeps, h / finer)
+        _end(state, program, island, run, finer * least, longest / finer)
         _settle(state, program, island, run, substeps * h)
     state.progress[island] = run
     return ti.select(run.attempt == DONE, run.failed, UNFINISHED), run.is_awake

@@ -5,6 +5,9 @@ the body is checked for tetrahedra that are flat or inside out, and its vibratio
 none. A body that its own weight folds may keep a few for ever, as their forces balance. Such a body is
 reported after `REPORTED` steps, and left as it is. A body that is wrecked altogether has no shape to go back
 to: its particles move to where the rest shape fits best to them, within a second.
+
+The same checks find bodies that are stiffer than at rest, because tetrahedra are stretched. The usual substep
+may be too long for these, and parts of them would tremble for ever. They get more substeps.
 """
 
 from taichi_soft.bodies.status import PLACED
@@ -12,7 +15,7 @@ from taichi_soft.core.constants import LANES
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.math.svd import nearest_rotation
 from taichi_soft.core.math.tensors import determinant
-from taichi_soft.core.math.tetrahedron import shape
+from taichi_soft.core.math.tetrahedron import area_vectors, shape
 from taichi_soft.core.runtime import ti
 from taichi_soft.core.types import Flips
 from taichi_soft.elements.kernels.elastic import particles_of, rest_inverse_of
@@ -33,6 +36,15 @@ about itself twice without being inside out anywhere would stay so otherwise."""
 FADING = 20.0
 """At what rate the vibration of a body fades of which some is caught [1/s]. Slivers that a blow turned inside
 out would keep each other trembling otherwise, light ones for seconds."""
+
+SPARE = 0.9
+"""Square of the substep that is chosen for a deformed body over that of its own limit, as estimated here."""
+
+MOST_REFINEMENT = 4.0
+"""Substeps over those at rest, at most: shorter ones are left to attempts."""
+
+RELAXING = 0.8
+"""Part of the additional substeps that remains at each look after the shape needs them no more."""
 
 FLAT = 1e-5
 """Volume over that at rest, from which down a tetrahedron counts as caught."""
@@ -55,6 +67,50 @@ def _caught_count(state: ti.template(), positions: ti.template(), body):
         caught += _is_caught(state, positions, row // LANES, row % LANES)
         row = row_behind(row)
     return caught
+
+
+@ti.func
+def _stiffness_of(state: ti.template(), block, lane):
+    """The square of a tetrahedron's highest frequency from its resistance to a change of volume [1/s^2].
+
+    In stable neo-Hookean material that force is (lambda + 5/6 mu) (J - a) dV/dx, so its stiffness grows with
+    the square of dV/dx, a third of an area vector. A stretched face makes it stiffer at any volume.
+    Returns: it now, and at rest.
+    """
+    ps = particles_of(state, block, lane)
+    inverse = rest_inverse_of(state, block, lane)
+    n = area_vectors(
+        shape(
+            state.particle_position[ps[0]],
+            state.particle_position[ps[1]],
+            state.particle_position[ps[2]],
+            state.particle_position[ps[3]],
+        )
+    )
+    a, b, c = inverse
+    r1, r2, r3 = ti.Vector([a.x, b.x, c.x]), ti.Vector([a.y, b.y, c.y]), ti.Vector([a.z, b.z, c.z])
+    r = (-(r1 + r2 + r3), r1, r2, r3)
+    determinant6 = ti.abs(determinant(inverse))  # over 1 / (6 V0)
+    row = block * 2 * LANES + lane
+    modulus = state.tet_lame[row] + state.tet_lame[row + LANES] * 5.0 / 6.0
+    now, rest = a.x * 0.0, a.x * 0.0
+    for corner in ti.static(range(4)):
+        inv_mass = state.particle_inv_mass[ps[corner]]
+        now += inv_mass * n[corner].dot(n[corner])
+        rest += inv_mass * r[corner].dot(r[corner])
+    return modulus * now * determinant6, modulus * rest / ti.max(determinant6, 1e-30)
+
+
+@ti.func
+def _refinement_of(state: ti.template(), body):
+    """Substeps that the present shape of a body asks for, over those at rest: 1 or more."""
+    now, rest = ti.cast(0.0, state.real), ti.cast(1e-30, state.real)
+    row, blocks = state.body_blocks[body][0] * LANES, state.body_blocks[body]
+    while row < blocks[1] * LANES:
+        stiffness, stiffness_at_rest = _stiffness_of(state, row // LANES, row % LANES)
+        now, rest = ti.max(now, stiffness), ti.max(rest, stiffness_at_rest)
+        row = row_behind(row)
+    return ti.max(1.0, ti.min(ti.sqrt(SPARE * now / rest), MOST_REFINEMENT))
 
 
 @ti.func
@@ -133,12 +189,26 @@ def _recovers(state: ti.template(), program: ti.template(), body):
 
 
 @ti.func
-def kept_while_caught(state: ti.template(), body, seconds):
-    """The share of its vibration that a body of which some is caught keeps in a step of so many seconds."""
+def _stiffens(state: ti.template(), program: ti.template(), body):
+    """Whether a body has the law for which `_refinement_of` holds (1)."""
+    stiffens = 0
+    for m, model in ti.static(enumerate(program.models)):
+        if ti.static(model.has_energy and model.flips == Flips.RECOVER):
+            stiffens = stiffens | int(state.body_model[body] == m)
+    return stiffens
+
+
+@ti.func
+def kept_while_caught(state: ti.template(), body, h, is_first):
+    """Part of its vibration that a body of which some is caught keeps in a substep of `h` [s].
+
+    In every substep: vibrations of twice the period of the steps never moved at their beginning, and went on
+    for ever when they were damped there only. A wreck is damped in the first substep of each step.
+    """
     age, keep = state.body_patience[body], 1.0
     if age >= PATIENCE:
-        keep = ti.exp(-FADING * seconds)
-    elif age >= -RAISING_STEPS and age < 0:
+        keep = ti.exp(-FADING * h)
+    elif is_first and age >= -RAISING_STEPS and age < 0:
         keep = CALMING
     return keep
 
@@ -158,7 +228,11 @@ def untangle_body(state: ti.template(), program: ti.template(), body: ti.i32, se
                 age = -RAISING_STEPS
             elif before == PLACED:
                 age = 0
-        if age >= 0 and age % PATIENCE == 0:
+        is_look = age >= 0 and age % PATIENCE == 0
+        if (is_look or state.body_jolted[body] == 1) and _stiffens(state, program, body) == 1:
+            kept = 1.0 + RELAXING * (state.body_refinement[body] - 1.0)
+            state.body_refinement[body] = ti.max(_refinement_of(state, body), kept)
+        if is_look:
             if _caught_count(state, state.particle_position, body) == 0:
                 age = 0
             is_reported = int(age == REPORTED)

@@ -23,8 +23,8 @@ from taichi_soft.solver.kernels.untangling import kept_while_caught
 MOST_FADING = 0.43
 """What damping takes from a vibration in one substep, at most: exp(-0.43) = 0.65 is left, d below. The kick
 of what is pressed is no part of that vibration, so there a mode of stiffness k and mass 1 becomes d v + h a.
-That is stable for h^2 k < 2 (1 + d), here up to 0.9 of leapfrog's own longest step. What is caught inside out
-loses more, once in a step."""
+That is stable for h^2 k < 2 (1 + d), here up to 0.9 of leapfrog's own longest step. A wreck loses
+more, once in a step."""
 
 SHARP_BRAKE = 0.5
 """Of the vibration that a substep leaves where a step that failed is made for the last time."""
@@ -60,7 +60,7 @@ def _kicked_velocity(state: ti.template(), p, gravity, kick):
 
 
 @ti.func
-def _felt_velocity(state: ti.template(), program: ti.template(), p, gravity, kick, h, is_held):
+def felt_velocity(state: ti.template(), program: ti.template(), p, gravity, kick, h, is_held):
     """The same with what will hold the particle in a substep of `h` [s], where that counts (`is_held` 1).
 
     What is pressed against something gains speed only to lose it. If that counted as vibration, what lies
@@ -90,7 +90,7 @@ def _column_sums(rows: ti.template()):
 
 @ti.func
 def rigid_motion(state: ti.template(), program: ti.template(), body, kick, h, is_held, x0, v0):
-    """Of a body after a kick of its forces [s], with what will hold it; `h` and `is_held` as `_felt_velocity`
+    """Of a body after a kick of its forces [s], with what will hold it; `h` and `is_held` as `felt_velocity`
     takes them.
 
     Returns: its centre beside x0 [m], velocity beside v0 [m/s] and angular velocity [rad/s].
@@ -110,7 +110,7 @@ def rigid_motion(state: ti.template(), program: ti.template(), body, kick, h, is
             is_own = block * LANES + lane < count
             mass = ti.select(is_own, state.particle_mass[p], 0.0)
             x = ti.select(is_own, state.particle_position[p], x0) - x0
-            felt = _felt_velocity(state, program, p, gravity, kick, h, is_held)
+            felt = felt_velocity(state, program, p, gravity, kick, h, is_held)
             v = ti.select(is_own, felt, v0) - v0
             arm, momentum = mass * x, mass * v
             turn = x.cross(momentum)
@@ -153,7 +153,7 @@ def fade_vibration(state: ti.template(), program: ti.template(), body, kick, h, 
             p = first + lane
             x = state.particle_position[p] - x0
             rigid = velocity + angular_velocity.cross(x - center)
-            change = (1.0 - keep) * (rigid + v0 - _felt_velocity(state, program, p, gravity, kick, h, 1))
+            change = (1.0 - keep) * (rigid + v0 - felt_velocity(state, program, p, gravity, kick, h, 1))
             for i in ti.static(range(3)):
                 changes[lane, i] = change[i]
         for lane in range(ti.min(LANES, count - block * LANES)):
@@ -224,7 +224,7 @@ def kept_vibration(state: ti.template(), body, h, s, substeps):
 
 
 @ti.func
-def _to_positions(program: ti.template(), kick, h):
+def to_positions(program: ti.template(), kick, h):
     """The part of a kick [s] that brings velocities to the time of the positions, in a substep of `h` [s]."""
     part = kick
     if ti.static(program.integrator in (Integrator.LEAPFROG, Integrator.LAZY_LEAPFROG)):
@@ -241,7 +241,7 @@ def damp_vibration(state: ti.template(), program: ti.template(), body, kick, h, 
     """
     keep = kept_vibration(state, body, h, s, substeps)
     if keep < 1.0:
-        fade_vibration(state, program, body, _to_positions(program, kick, h), h, keep)
+        fade_vibration(state, program, body, to_positions(program, kick, h), h, keep)
     if state.body_is_braked[body] == 1:
         _limit_vibration(state, program, body, kick, FARTHEST * state.body_edge[body] / h)
 
@@ -263,9 +263,8 @@ def damp_body(state: ti.template(), program: ti.template(), body, kick, h, s, su
     """As `damp_vibration`, where only CPUs run it. Each part is called here alone: LLVM puts it back, and its
     rounding does not depend on what else a world has."""
     keep = kept_vibration(state, body, h, s, substeps)
-    if s == 0:
-        keep *= kept_while_caught(state, body, substeps * h)
+    keep *= kept_while_caught(state, body, h, s == 0)
     if keep < 1.0:
-        _fade_body(state, program, body, _to_positions(program, kick, h), h, keep)
+        _fade_body(state, program, body, to_positions(program, kick, h), h, keep)
     if state.body_is_braked[body] == 1:
         _limit_body(state, program, body, kick, FARTHEST * state.body_edge[body] / h)

@@ -1,0 +1,74 @@
+"""What lets a body come to rest that is nearly there: fast vibrations fade, slow ones and rigid motion stay.
+
+Damping takes from every vibration at the rate of the slowest, so what is fast would hum on for half a minute
+in a floppy body. Here pairs of neighbours lose what they have of velocity along the edge between them, one
+pair after the other. That takes the more of a vibration the more its neighbours differ, and keeps momentum
+and angular momentum.
+"""
+
+from taichi_soft.bodies.kernels.particles import gravity_on
+from taichi_soft.core.math.rows import row_behind
+from taichi_soft.core.runtime import ti
+from taichi_soft.solver.kernels.vibration import felt_velocity
+
+CALMING = 0.5
+"""Part of the velocity along an edge that its ends lose in each step."""
+
+NEARLY = 5.0
+"""Root mean square speed over mass, in speeds of falling asleep, below which a body is nearly at rest."""
+
+
+@ti.func
+def _is_nearly_at_rest(state: ti.template(), body):
+    """Whether a damped body is slow as a whole, in a world in which bodies fall asleep (1)."""
+    is_near = 0
+    if state.contact.sleep_speed[None] > 0.0 and state.body_fading[body] > 0.0:
+        particles = state.body_particles[body]
+        fast, mass, motion = NEARLY * state.contact.sleep_speed[None], 0.0, 0.0
+        p = particles[0]
+        while p < particles[1]:
+            mass += state.particle_mass[p]
+            motion += state.particle_mass[p] * state.particle_velocity[p].norm_sqr()
+            p = row_behind(p)
+        is_near = int(motion <= fast * fast * mass)
+    return is_near
+
+
+@ti.func
+def calm_body(state: ti.template(), program: ti.template(), body, kick, h, s, substeps):
+    """In substep `s` of `substeps`: let the fast vibrations of a body fade that is nearly at rest.
+
+    `kick` and `h` are those of `fade_vibration`. Each edge has its turn once in a step, and the edges of a
+    particle at different times: one that vibrates once in a step would always be found standing still.
+    """
+    if s == 0:
+        is_slow = _is_nearly_at_rest(state, body)
+        if state.contact.is_slow[body] != is_slow:
+            state.contact.is_slow[body] = is_slow
+    if state.contact.is_slow[body] == 1:
+        _calm_edges(state, program, body, kick, h, s, substeps)
+
+
+@ti.real_func
+def _calm_edges(
+    state: ti.template(),
+    program: ti.template(),
+    body: ti.i32,
+    kick: ti.f32,
+    h: ti.f32,
+    s: ti.i32,
+    substeps: ti.i32,
+):
+    gravity, edges = gravity_on(state, body), state.body_edges[body]
+    e = edges[0] + s
+    while e < edges[1]:
+        p, q = state.edge_vertices[e][0], state.edge_vertices[e][1]
+        between = state.particle_position[q] - state.particle_position[p]
+        apart = felt_velocity(state, program, q, gravity, kick, h, 1)
+        apart -= felt_velocity(state, program, p, gravity, kick, h, 1)
+        shares = state.particle_inv_mass[p] + state.particle_inv_mass[q]
+        impulse = CALMING * apart.dot(between) / ti.max(between.norm_sqr() * shares, 1e-30) * between
+        change_p, change_q = state.particle_inv_mass[p] * impulse, state.particle_inv_mass[q] * impulse
+        state.particle_velocity[p] = state.particle_velocity[p] + change_p
+        state.particle_velocity[q] = state.particle_velocity[q] - change_q
+        e += substeps
