@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.bodies.description import BodyDescription
 from taichi_soft.bodies.vibration import Vibration, vibration_of
+from taichi_soft.cages.connected import components
 
 Floats = NDArray[np.float64]
 
@@ -117,23 +120,46 @@ def _orthonormal(directions: Floats) -> Floats:
 
 
 def _polynomials(body: BodyDescription) -> tuple[Floats, Floats]:
-    """Orthonormal rigid motions, and others of first and second order, times the root of masses."""
-    mass = body.masses
-    x = body.mesh.vertices - mass @ body.mesh.vertices / mass.sum()
-    x = x / (np.abs(x).max() + 1e-300)
-    one = np.ones(len(x))
+    """Orthonormal rigid motions, and others of first to third order, times the root of masses."""
+    x, one, root = _centred(body.mesh.vertices, body.masses), np.ones(len(body.masses)), np.sqrt(body.masses)
     first = [one, *x.T]
     second = [x[:, a] * x[:, b] for a in range(3) for b in range(a, 3)]
     third = [x[:, a] * x[:, b] * x[:, c] for a in range(3) for b in range(a, 3) for c in range(b, 3)]
-    root = np.sqrt(mass)
-
-    def moves(axis: int, amount: Floats) -> Floats:
-        rows = np.zeros((len(x), 3))
-        rows[:, axis] = root * amount
-        return rows.ravel()
-
-    turns = [moves(a, x[:, b]) - moves(b, x[:, a]) for a, b in ((0, 1), (1, 2), (2, 0))]
-    rigid = _orthonormal(np.stack([*(moves(a, one) for a in range(3)), *turns], axis=1))
-    all_moves = np.stack([moves(a, amount) for amount in (*first, *second, *third) for a in range(3)], axis=1)
+    all_moves = _moves([(a, root * amount) for amount in (*first, *second, *third) for a in range(3)])
+    rigid = _rigid_motions(body)
     beside = all_moves - rigid @ (rigid.T @ all_moves)
     return rigid, beside[:, np.linalg.norm(beside, axis=0) > 1e-6 * np.linalg.norm(all_moves, axis=0)]
+
+
+def _rigid_motions(body: BodyDescription) -> Floats:
+    """Orthonormal rigid motions (3n, k), times the root of masses: six for each of the parts that share no
+    vertex, as none of these strains anything."""
+    tets = body.mesh.tets
+    part = components(len(body.masses), np.concatenate([tets[:, [0, k]] for k in (1, 2, 3)]))
+    found = []
+    for number in range(part.max() + 1):
+        rows = part == number
+        mass = body.masses[rows]
+        x, root = _centred(body.mesh.vertices[rows], mass), np.sqrt(mass)
+        shifts = [_moves([(a, root)]) for a in range(3)]
+        turns = [
+            _moves([(a, root * x[:, b])]) - _moves([(b, root * x[:, a])]) for a, b in ((0, 1), (1, 2), (2, 0))
+        ]
+        motions = _orthonormal(np.hstack([*shifts, *turns]))
+        found.append(np.zeros((body.mesh.vertices.size, motions.shape[1]), order="F"))
+        found[-1][np.repeat(rows, 3)] = motions
+    return np.hstack(found)
+
+
+def _centred(x: Floats, mass: Floats) -> Floats:
+    """Places (n, 3) relative to their centre of mass, in units of the largest coordinate."""
+    x = x - mass @ x / mass.sum()
+    return np.asarray(x / (np.abs(x).max() + 1e-300))
+
+
+def _moves(amounts: Sequence[tuple[int, Floats]]) -> Floats:
+    """Displacements (3n, k), each by an amount (n,) along one axis."""
+    columns = np.zeros((len(amounts[0][1]), 3, len(amounts)))
+    for k, (axis, amount) in enumerate(amounts):
+        columns[:, axis, k] = amount
+    return columns.reshape(-1, len(amounts))

@@ -97,7 +97,7 @@ class Artist:
             lines.append(f"shown {self.slow:g} x slower")
         if stage.caption:
             lines.append(stage.caption())
-        draw_text(picture, lines)
+        draw_text(picture, [line for line in lines if line])
         if stage.scale:
             draw_color_scale(picture, stage.scale, corner="top right")
         if stage.legend:

@@ -187,6 +187,17 @@ def test_what_is_slowed_says_so(monkeypatch, tmp_path):
     assert told[-1] == ["box", "shown 2.5 x slower"]
 
 
+def test_an_empty_title_or_caption_leaves_no_panel_and_no_blank_line(monkeypatch, tmp_path):
+    told = []
+    monkeypatch.setattr("taichi_soft.render.artist.draw_text", lambda picture, lines: told.append(lines))
+    stage = falling_box()
+    stage.title, stage.caption = "", lambda: ""
+    film(stage, tmp_path / "s.png", seconds=0.04, size=(160, 120))
+    assert told[-1] == []
+    film(stage, tmp_path / "s.png", seconds=0.04, size=(160, 120), slow=2.5)
+    assert told[-1] == ["shown 2.5 x slower"]
+
+
 def test_a_blurred_film_shows_the_time_of_the_shutter_and_the_world_makes_the_same_steps(
     monkeypatch, tmp_path
 ):

@@ -10,7 +10,7 @@ import trimesh
 from mode_oracle import assembled_stiffness, first_mode, lumped_masses
 from random_meshes import scattered
 
-from taichi_soft import Material, SoftBodyAsset, World, beam, box, internal_forces, sphere
+from taichi_soft import Material, SoftBodyAsset, TetMesh, World, beam, box, internal_forces, sphere
 from taichi_soft.bodies.description import BodyDescription
 from taichi_soft.bodies.first_mode import first_frequency
 from taichi_soft.core.errors import MaterialError
@@ -88,6 +88,24 @@ def require_first_frequency(mesh):
     body = BodyDescription(mesh, material, fit_model(element_model("neo_hookean"), mesh, material))
     omega, _ = first_mode(assembled_stiffness(mesh, YOUNG, POISSON), lumped_masses(mesh, DENSITY))
     assert first_frequency(body) == pytest.approx(omega, rel=3e-3)
+
+
+def test_a_body_of_separate_parts_has_the_frequency_of_its_slowest_part():
+    """Rigid motion of one part against another strains nothing: its frequency is zero, and damps nothing."""
+    parts = [box((1.0, 0.3, 0.2), (6, 2, 2)), sphere(0.3, 2), box((0.1, 0.1, 0.1), (1, 1, 1))]
+    places = [(0.0, 0.0, 0.0), (0.0, 2.0, 0.0), (90.0, 0.0, 0.0)]
+    first = np.cumsum([0, *(len(part.vertices) for part in parts)])
+    mesh = TetMesh(
+        np.concatenate([part.vertices + np.array(place) for part, place in zip(parts, places, strict=True)]),
+        np.concatenate([part.tets + shift for part, shift in zip(parts, first, strict=False)]),
+    )
+    slowest = min(
+        first_mode(assembled_stiffness(part, YOUNG, POISSON), lumped_masses(part, DENSITY))[0]
+        for part in parts
+    )
+    asset = SoftBodyAsset(mesh, Material(YOUNG, POISSON, DENSITY))
+    assert 0.999 * slowest < asset.first_frequency < 1.12 * slowest
+    assert 0.999 * slowest < asset.guessed_frequency
 
 
 def differences(mesh, law):
