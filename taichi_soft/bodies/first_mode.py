@@ -28,6 +28,9 @@ _ROUND_OFF = 1e-9
 """Length of a direction, as a part of the longest, below which it is round-off: made longer it would be rigid
 motion as well. Bodies of few tetrahedra have no other directions left."""
 
+MOST_PARTS = 30
+"""Separate parts of a body whose rigid motions are set apart. With more it counts as undamped."""
+
 
 def first_frequency(body: BodyDescription) -> float:
     """Angular frequency of the slowest vibration of a body that nothing holds [rad/s], from above by less
@@ -133,11 +136,11 @@ def _polynomials(body: BodyDescription) -> tuple[Floats, Floats]:
 
 def _rigid_motions(body: BodyDescription) -> Floats:
     """Orthonormal rigid motions (3n, k), times the root of masses: six for each of the parts that share no
-    vertex, as none of these strains anything."""
+    vertex, as none of these strains anything; of the `MOST_PARTS` largest parts."""
     tets = body.mesh.tets
     part = components(len(body.masses), np.concatenate([tets[:, [0, k]] for k in (1, 2, 3)]))
     found = []
-    for number in range(part.max() + 1):
+    for number in np.argsort(-np.bincount(part), kind="stable")[:MOST_PARTS]:
         rows = part == number
         mass = body.masses[rows]
         x, root = _centred(body.mesh.vertices[rows], mass), np.sqrt(mass)
