@@ -67,7 +67,8 @@ def _calm_edges(
         apart = felt_velocity(state, program, q, gravity, kick, h, 1)
         apart -= felt_velocity(state, program, p, gravity, kick, h, 1)
         shares = state.particle_inv_mass[p] + state.particle_inv_mass[q]
-        impulse = CALMING * apart.dot(between) / ti.max(between.norm_sqr() * shares, 1e-30) * between
+        is_free = int(state.contact.particle_touches[p] + state.contact.particle_touches[q] == 0)
+        impulse = is_free * CALMING * apart.dot(between) / ti.max(between.norm_sqr() * shares, 1e-30) * between
         change_p, change_q = state.particle_inv_mass[p] * impulse, state.particle_inv_mass[q] * impulse
         state.particle_velocity[p] = state.particle_velocity[p] + change_p
         state.particle_velocity[q] = state.particle_velocity[q] - change_q
