@@ -85,6 +85,11 @@ class BodyFields:
             self.particle_block = ti.Matrix.field(3, 3, real, n)  # of the system, on its diagonal
             self.particle_block_inverse = ti.Matrix.field(3, 3, real, n)
             self.edge_block = ti.Matrix.field(3, 3, real, k)  # row of the first end, column of the second
+            # What `rigid_rotation` prepares: K W by particle, W^T K W, the centre beside the first particle.
+            self.particle_turning = ti.Matrix.field(3, 3, real, n)
+            self.body_turning = ti.Matrix.field(3, 3, real, bodies)
+            self.body_inverse_inertia = ti.Matrix.field(3, 3, real, bodies)  # [1/(kg m^2)]
+            self.body_center = ti.Vector.field(3, real, bodies)  # [m]
             self.solution = ti.Vector.field(3, real, n)  # change of velocity [m/s]
             self.residual = ti.Vector.field(3, real, n)
             self.direction = ti.Vector.field(3, real, n)

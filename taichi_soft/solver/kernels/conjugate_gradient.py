@@ -4,7 +4,7 @@ After Baraff and Witkin 1998, section 5: what is held is filtered out of every r
 """
 
 from taichi_soft.core.runtime import ti
-from taichi_soft.elements.kernels.linear_system import multiply_system
+from taichi_soft.solver.kernels.rigid_rotation import multiply
 
 
 @ti.func
@@ -54,7 +54,7 @@ def solve_system(state: ti.template(), body):
     tolerance, most_iterations = state.solver[None][0], ti.cast(state.solver[None][1], ti.i32)
     count = 0
     while count < most_iterations and left > tolerance * tolerance * first:
-        multiply_system(state, body, state.direction, state.image)
+        multiply(state, body, state.direction, state.image)
         curvature = ti.cast(0.0, ti.f64)
         for p in range(particles[0], particles[1]):
             state.image[p] = held(state, p, state.image[p])
