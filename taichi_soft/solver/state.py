@@ -49,8 +49,11 @@ class State(BodyFields):
             self.contact = ContactFields(capacity.contact, n, bodies)
             self.joints = JointFields(n)
             if capacity.implicit:
-                # Normal of the collider that holds it, and what that gave it before the solve [N s].
+                # Of particles on colliders, see `implicit_contact`: the normal and whether they stick, the
+                # velocity of the surface [m/s], friction on those that slide [N s].
                 self.particle_hold = ti.Vector.field(4, self.real, n)
+                self.hold_velocity = ti.Vector.field(3, self.real, n)
+                self.hold_friction = ti.Vector.field(3, self.real, n)
         if capacity.contact.soft:
             self.soft = SoftContactFields(n, bodies, capacity.outer, capacity.triangles)
         if capacity.contact.hull:

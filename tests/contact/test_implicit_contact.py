@@ -72,6 +72,28 @@ def test_a_block_slides_on_an_incline_at_and_only_at_the_angle_of_friction():
         assert (body.positions() @ tilt[:, 2]).min() > 0.0
 
 
+@pytest.mark.parametrize("dt", [1 / 60, 1 / 30])
+def test_a_belt_takes_a_block_along_by_mu_g_and_then_carries_it_at_its_speed(dt):
+    """Stiff, flat and tall ones: none is faster, sways by more than a few per cent, or stays behind."""
+    belt, tall = 3.0, box((0.5, 0.5, 1.0), (3, 3, 6))
+    world = room()
+    for number, (mesh, friction) in enumerate(((BLOCK, 0.5), (CUBE, 0.2), (tall, 0.2))):
+        options = {"position": (0, 0, -0.25), "friction": friction, **alone(number)}
+        world.add_collider(BoxShape((60, 4, 0.5)), **options).set_velocity((belt, 0, 0))
+        add(world, number, mesh, FIRM, position=(-8, 0, -mesh.bounds[0, 2]))
+    world.build()
+    speeds, times = [], np.arange(1, round(3.0 / dt) + 1) * dt
+    for _ in times:
+        world.step(dt)
+        speeds.append([body.momentum()[0] / body.masses.sum() for body in world.bodies])
+    for speed, friction in zip(np.array(speeds).T, (0.5, 0.2, 0.2), strict=True):
+        is_sliding = (times > 0.3) & (times < 0.9 * belt / (friction * G))
+        expected = friction * G * times[is_sliding]
+        np.testing.assert_allclose(speed[is_sliding], expected, atol=0.02)
+        assert np.abs(speed[times > belt / (friction * G) + 0.1] - belt).max() < 0.08
+        assert speed[-1] == pytest.approx(belt, abs=0.01)
+
+
 def test_what_is_dropped_comes_to_rest_on_a_skin_and_never_sinks_into_it():
     """As high as its own weight presses it: by rho g H^2 / 2 E on a flat top without friction."""
     skin = 0.01

@@ -34,7 +34,10 @@ MOST_PIECES = 32
 
 @ti.func
 def assemble(state: ti.template(), program: ti.template(), body, h):
-    """Fill the blocks, and `residual` with the right-hand side, kept in `particle_force` as well."""
+    """Fill the blocks, and `residual` with the right-hand side, kept in `particle_force` as well.
+
+    `solution` becomes zero.
+    """
     particles = state.body_particles[body]
     clear_system(state, body)
     add_stiffness(state, program, body, h * h)
@@ -47,6 +50,7 @@ def assemble(state: ti.template(), program: ti.template(), body, h):
         rhs = h * (state.particle_force[p].xyz + weight) - state.image[p]
         state.residual[p] = rhs
         state.particle_force[p] = widened(rhs)
+        state.solution[p] = ti.Vector.zero(state.real, 3)
     add_grabs(state, body, h)
     add_damping(state, program, body, h)
     add_masses(state, body)
@@ -61,7 +65,7 @@ def solve_body(state: ti.template(), program: ti.template(), body, h):
     """
     accumulate_forces(state, program, body)
     assemble(state, program, body, h)
-    residual = solve_system(state, body)
+    residual, _ = solve_system(state, body, ti.cast(0.0, ti.f64))
     multiply(state, body, state.solution, state.image)
     return residual
 
