@@ -2,11 +2,11 @@
 
 Contact after the solve could take from the particles that touch no more than their own momentum. A body would
 sink into itself until its solve threw them down fast enough, and would follow a belt only as fast as its
-lowest particles pull. So, as on a floor without colliders, the solve holds a particle that a collider stopped:
-it gets the velocity of the surface along the normal. If it sticks, it gets that velocity in all directions; if
-it slides, an impulse of friction. While impulses are off Coulomb's law the substep is solved again, from the
-last solution: what would have to be pulled leaves, what sticks beyond friction slides, and what friction would
-turn back sticks.
+lowest particles pull. So, as on a floor without colliders, the solve holds a particle that a collider
+stopped: it gets the velocity of the surface along the normal. If it sticks, it gets that velocity in all
+directions; if it slides, an impulse of friction. While impulses are off Coulomb's law the substep is solved
+again, from the last solution: what would have to be pulled leaves, what sticks beyond friction slides, and
+what friction would turn back sticks.
 """
 
 from taichi_soft.bodies.kernels.particles import gravity_on
