@@ -97,6 +97,11 @@ class BodyFields:
             # 1 where the floor holds it, or a collider's number plus 1.
             self.particle_contact = ti.field(ti.i32, n)
             self.prev_contact = ti.field(ti.i32, n)  # before a piece of a step that may be taken back
+            # Of particles that are held, see `held_particles`: the normal and whether they stick, velocity
+            # of the surface [m/s], friction on those that slide [N s].
+            self.particle_hold = ti.Vector.field(4, real, n)
+            self.hold_velocity = ti.Vector.field(3, real, n)
+            self.hold_friction = ti.Vector.field(3, real, n)
             self.body_residual = ti.field(real, bodies)  # largest of the last step, over the right-hand side
             self.solver = ti.Vector.field(2, real, ())  # tolerance, most iterations
         if capacity.parallel:

@@ -7,19 +7,16 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.solver.kernels.rigid_rotation import multiply
 
 SLIDES, STICKS = 0.0, 1.0
-"""What holds a particle on a collider: along the normal only, or in all directions."""
+"""What holds a particle on the floor or a collider: along the normal only, or in all directions."""
 
 
 @ti.func
 def held(state: ti.template(), p, v):
     """`v` without what a pin, or the floor or a collider under particle `p`, takes up."""
     kept = v * ti.select(state.particle_inv_mass[p] > 0.0, 1.0, 0.0)
-    if ti.static(state.capacity.has_contact):
-        if state.particle_contact[p] > 0:
-            hold = state.particle_hold[p]
-            kept -= ti.select(hold.w == STICKS, kept, kept.dot(hold.xyz) * hold.xyz)
-    else:
-        kept.z = ti.select(state.particle_contact[p] == 1, 0.0, kept.z)
+    if state.particle_contact[p] > 0:
+        hold = state.particle_hold[p]
+        kept -= ti.select(hold.w == STICKS, kept, kept.dot(hold.xyz) * hold.xyz)
     return kept
 
 

@@ -2,8 +2,8 @@
 
 (M + h D + h^2 K) dv = h (f + m g - h K v): the forces of the old positions, and how they change on the way.
 K is projected, and acts on what a body moves beside its rotation: see `rigid_rotation`. Where forces change
-too unevenly on the path, the step is made in pieces. Particles that lie on the floor are held at its height
-within the solve, until it would have to pull them down.
+too unevenly on the path, the step is made in pieces. The solve holds particles that lie on the floor at its
+height, until it would have to pull them down: see `held_particles`.
 """
 
 from taichi_soft.bodies.kernels.particles import gravity_on
@@ -19,7 +19,8 @@ from taichi_soft.elements.kernels.linear_system import (
     add_stiffness,
     clear_system,
 )
-from taichi_soft.solver.kernels.conjugate_gradient import invert_blocks, solve_system
+from taichi_soft.solver.kernels.conjugate_gradient import invert_blocks
+from taichi_soft.solver.kernels.held_particles import held_velocity, hold_particle, solve_held
 from taichi_soft.solver.kernels.rigid_rotation import multiply, split_off_rotation
 
 FARTHEST = 0.5
@@ -58,16 +59,26 @@ def assemble(state: ti.template(), program: ti.template(), body, h):
 
 
 @ti.func
-def solve_body(state: ti.template(), program: ti.template(), body, h):
-    """Changes of velocity in `solution`, and in `image` what the system makes of them [N s].
-
-    Returns: the residual left, over the first.
-    """
+def solve_body(state: ti.template(), program: ti.template(), body, h, held_count):
+    """Solve a body of which so many particles are held: see `solve_held`."""
     accumulate_forces(state, program, body)
     assemble(state, program, body, h)
-    residual, _ = solve_system(state, body, ti.cast(0.0, ti.f64))
-    multiply(state, body, state.solution, state.image)
-    return residual
+    return solve_held(state, body, held_count)
+
+
+@ti.func
+def _lay_on_floor(state: ti.template(), program: ti.template(), body, h):
+    """Hold particles that lie on the floor. Returns their number."""
+    count = 0
+    if ti.static(program.has_floor):
+        fall = h * gravity_on(state, body).norm()
+        particles = state.body_particles[body]
+        for p in range(particles[0], particles[1]):
+            if state.particle_contact[p] == 1 and state.particle_inv_mass[p] > 0.0:
+                up, still = ti.Vector([0.0, 0.0, 1.0]), ti.Vector.zero(state.real, 3)
+                hold_particle(state, p, up, state.particle_velocity[p], still, fall)
+                count += 1
+    return count
 
 
 @ti.func
@@ -82,13 +93,10 @@ def _move(state: ti.template(), program: ti.template(), p, h):
         x = state.particle_position[p] + h * v
         if ti.static(program.has_floor):
             if state.particle_contact[p] == 1:
-                push = state.image[p] - state.particle_force[p].xyz  # impulse of the floor [N s]
-                slide = ti.sqrt(v.x * v.x + v.y * v.y)
-                brake = state.floor[None].z * ti.max(push.z, 0.0) * state.particle_inv_mass[p]
-                keep = ti.select(slide > brake, 1.0 - brake / ti.max(slide, 1e-30), 0.0)
-                v.x, v.y, v.z = v.x * keep, v.y * keep, 0.0
+                velocity, pressing, _ = held_velocity(state, p)
+                v = velocity
                 x = state.particle_position[p] + h * v
-                if push.z < 0.0:
+                if pressing < 0.0:
                     state.particle_contact[p] = 0
             else:
                 falling = x.z < state.floor[None].x
@@ -194,7 +202,8 @@ def implicit_substep(state: ti.template(), program: ti.template(), body, h, is_f
     piece, left = h, 1
     largest = ti.cast(0.0, state.real)
     while left > 0:
-        residual = solve_body(state, program, body, piece)
+        held_count = _lay_on_floor(state, program, body, piece)
+        residual = solve_body(state, program, body, piece, held_count)
         _remember(state, body)
         particles = state.body_particles[body]
         for p in range(particles[0], particles[1]):

@@ -283,6 +283,25 @@ def test_friction_stops_a_sliding_box_after_the_distance_of_coulombs_law():
     assert np.abs(body.velocities()).max() < 0.01
 
 
+def test_a_cube_on_the_floor_slides_below_the_friction_of_a_slope_and_sticks_above_it():
+    """Gravity is slanted instead of the floor. The cube settles for a second, then has g (sin a - mu cos a)."""
+    slope, mesh = 0.3, box((0.5, 0.5, 0.5), (3, 3, 3))
+    gravity = 9.81 * np.array([np.sin(slope), 0.0, -np.cos(slope)])
+    for share in (0.5, 0.9, 1.1):
+        options = {"gravity": gravity, "friction": share * np.tan(slope)}
+        world, body = make_world(
+            mesh, Material(1e6, 0.2, 1000.0, 300.0), floor=0.0, position=(0, 0, 0.25), world=options
+        )
+        places = []
+        for _ in range(3):
+            for _ in range(90):
+                world.step(1 / 60)
+            places.append(body.center_of_mass()[0])
+        expected = max(0.0, 1 - share) * gravity[0]
+        assert np.diff(places, 2)[0] / 1.5**2 == pytest.approx(expected, abs=3e-3)
+        assert share < 1 or places[-1] - places[0] < 1e-3
+
+
 def test_momentum_is_kept_in_flight_and_ringing_fades():
     """By the system as well as by the forces; and implicit Euler takes energy where nothing damps."""
     mesh = sphere(0.5, 2)
