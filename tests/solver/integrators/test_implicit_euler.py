@@ -284,7 +284,7 @@ def test_friction_stops_a_sliding_box_after_the_distance_of_coulombs_law():
 
 
 def test_a_cube_on_the_floor_slides_below_the_friction_of_a_slope_and_sticks_above_it():
-    """Gravity is slanted instead of the floor. The cube settles for a second, then has g (sin a - mu cos a)."""
+    """Gravity is slanted instead of the floor. The cube settles, and then has g (sin a - mu cos a)."""
     slope, mesh = 0.3, box((0.5, 0.5, 0.5), (3, 3, 3))
     gravity = 9.81 * np.array([np.sin(slope), 0.0, -np.cos(slope)])
     for share in (0.5, 0.9, 1.1):
