@@ -16,7 +16,7 @@ from taichi_soft.core.runtime import ti
 from taichi_soft.elements.kernels.linear_system import multiply_system
 
 THIN = 1e-6
-"""Least moment of inertia, over the trace of the tensor."""
+"""Moment of inertia that is added about every axis, over the trace of the tensor."""
 
 
 @ti.func
