@@ -85,6 +85,11 @@ class BodyFields:
             self.particle_block = ti.Matrix.field(3, 3, real, n)  # of the system, on its diagonal
             self.particle_block_inverse = ti.Matrix.field(3, 3, real, n)
             self.edge_block = ti.Matrix.field(3, 3, real, k)  # row of the first end, column of the second
+            # What `rigid_rotation` prepares: K W by particle, W^T K W, the centre beside the first particle.
+            self.particle_turning = ti.Matrix.field(3, 3, real, n)
+            self.body_turning = ti.Matrix.field(3, 3, real, bodies)
+            self.body_inverse_inertia = ti.Matrix.field(3, 3, real, bodies)  # [1/(kg m^2)]
+            self.body_center = ti.Vector.field(3, real, bodies)  # [m]
             self.solution = ti.Vector.field(3, real, n)  # change of velocity [m/s]
             self.residual = ti.Vector.field(3, real, n)
             self.direction = ti.Vector.field(3, real, n)
@@ -92,6 +97,11 @@ class BodyFields:
             # 1 where the floor holds it, or a collider's number plus 1.
             self.particle_contact = ti.field(ti.i32, n)
             self.prev_contact = ti.field(ti.i32, n)  # before a piece of a step that may be taken back
+            # Of particles that are held, see `held_particles`: the normal and whether they stick, velocity
+            # of the surface [m/s], friction on those that slide [N s].
+            self.particle_hold = ti.Vector.field(4, real, n)
+            self.hold_velocity = ti.Vector.field(3, real, n)
+            self.hold_friction = ti.Vector.field(3, real, n)
             self.body_residual = ti.field(real, bodies)  # largest of the last step, over the right-hand side
             self.solver = ti.Vector.field(2, real, ())  # tolerance, most iterations
         if capacity.parallel:

@@ -14,7 +14,7 @@ from taichi_soft.contact.hull_fields import HullFields
 from taichi_soft.control.kernels.grabs import GrabFields
 from taichi_soft.control.kernels.joints import JointFields
 from taichi_soft.control.kernels.motors import MotorFields
-from taichi_soft.core.runtime import holds_fields, ti
+from taichi_soft.core.runtime import holds_fields
 from taichi_soft.core.settings import Settings
 from taichi_soft.solver.kernels.surroundings import write_surroundings
 from taichi_soft.solver.step_fields import JobFields, Progress
@@ -48,9 +48,6 @@ class State(BodyFields):
         if capacity.has_contact:
             self.contact = ContactFields(capacity.contact, n, bodies)
             self.joints = JointFields(n)
-            if capacity.implicit:
-                # Normal of the collider that holds it, and what that gave it before the solve [N s].
-                self.particle_hold = ti.Vector.field(4, self.real, n)
         if capacity.contact.soft:
             self.soft = SoftContactFields(n, bodies, capacity.outer, capacity.triangles)
         if capacity.contact.hull:

@@ -4,19 +4,19 @@ After Baraff and Witkin 1998, section 5: what is held is filtered out of every r
 """
 
 from taichi_soft.core.runtime import ti
-from taichi_soft.elements.kernels.linear_system import multiply_system
+from taichi_soft.solver.kernels.rigid_rotation import multiply
+
+SLIDES, STICKS = 0.0, 1.0
+"""What holds a particle on the floor or a collider: along the normal only, or in all directions."""
 
 
 @ti.func
 def held(state: ti.template(), p, v):
     """`v` without what a pin, or the floor or a collider under particle `p`, takes up."""
     kept = v * ti.select(state.particle_inv_mass[p] > 0.0, 1.0, 0.0)
-    if ti.static(state.capacity.has_contact):
-        if state.particle_contact[p] > 0:
-            n = state.particle_hold[p].xyz
-            kept -= kept.dot(n) * n
-    else:
-        kept.z = ti.select(state.particle_contact[p] == 1, 0.0, kept.z)
+    if state.particle_contact[p] > 0:
+        hold = state.particle_hold[p]
+        kept -= ti.select(hold.w == STICKS, kept, kept.dot(hold.xyz) * hold.xyz)
     return kept
 
 
@@ -36,25 +36,29 @@ def invert_blocks(state: ti.template(), body):
 
 
 @ti.func
-def solve_system(state: ti.template(), body):
-    """Solve blocks times solution = residual, as `solver` asks. Returns the residual left, over the first.
+def solve_system(state: ti.template(), body, so_far):
+    """Solve blocks times solution = right-hand side, as `solver` asks.
 
-    Both are measured in the norm of the preconditioner. `residual` holds the right-hand side and is used up.
+    `solution` is the initial guess, and `residual` its residual, which is used up. Residuals are measured in
+    the norm of the preconditioner.
+
+    Args:
+        so_far: square of an earlier residual. The tolerance is relative to the larger of the two.
+    Returns: the residual left, over that one; the square of that one.
     """
     particles = state.body_particles[body]
-    first = ti.cast(0.0, ti.f64)
+    left = ti.cast(0.0, ti.f64)
     for p in range(particles[0], particles[1]):
         r = held(state, p, state.residual[p])
         d = held(state, p, state.particle_block_inverse[p] @ r)
         state.residual[p] = r
         state.direction[p] = d
-        state.solution[p] = d * 0.0
-        first += _dot(r, d)
-    left = first
+        left += _dot(r, d)
+    first = ti.max(left, so_far)
     tolerance, most_iterations = state.solver[None][0], ti.cast(state.solver[None][1], ti.i32)
     count = 0
     while count < most_iterations and left > tolerance * tolerance * first:
-        multiply_system(state, body, state.direction, state.image)
+        multiply(state, body, state.direction, state.image)
         curvature = ti.cast(0.0, ti.f64)
         for p in range(particles[0], particles[1]):
             state.image[p] = held(state, p, state.image[p])
@@ -76,4 +80,4 @@ def solve_system(state: ti.template(), body):
             count += 1
         else:
             count = most_iterations  # rounding has left nothing to go along
-    return ti.sqrt(ti.cast(left / ti.max(first, 1e-300), state.real))
+    return ti.sqrt(ti.cast(left / ti.max(first, 1e-300), state.real)), first

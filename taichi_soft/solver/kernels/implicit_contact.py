@@ -1,10 +1,4 @@
-"""Implicit Euler among colliders: a solve gives new velocities, and holds what lies on a collider.
-
-Contact after the solve could take from the particles that touch no more than their own momentum, and a body
-would have to sink into itself until its solve threw them down fast enough. So, as on a floor without
-colliders, a particle that a collider stopped has the velocity of its surface along the normal in the solves
-to come, until it would have to be pulled. Friction acts after the solve, and takes no more than the sliding.
-"""
+"""Implicit Euler among colliders: which particles its solve holds on them, and what colliders feel."""
 
 from taichi_soft.bodies.kernels.particles import gravity_on
 from taichi_soft.contact.distances.distance import signed_distance
@@ -13,10 +7,8 @@ from taichi_soft.contact.fields import NO_COLLIDER
 from taichi_soft.contact.kernels.rebound import add_normal_impulse
 from taichi_soft.core.math.quaternion import spun, turned, turned_back
 from taichi_soft.core.runtime import ti
+from taichi_soft.solver.kernels.held_particles import held_velocity, hold_particle
 from taichi_soft.solver.kernels.implicit_euler import add_pin_reactions, keep_residual, solve_body
-
-HARDEST = 1e24
-"""Impulse [N s] from which the solve of a body torn to pieces has overflowed: a collider is told of none."""
 
 
 @ti.func
@@ -47,14 +39,15 @@ def _surface_below(contact: ti.template(), c, x, since):
 
 @ti.func
 def _lay_on_colliders(state: ti.template(), body, h, since):
-    """Give particles that lie on colliders the velocity of the surface along its normal; let others go.
+    """Hold particles that lie on colliders; release others.
 
-    One lies there as long as gravity alone would have it back within the substep.
+    A particle lies there while gravity alone would bring it back within the substep.
+
+    Returns: the number of particles that are held.
     """
-    fall = h * gravity_on(state, body).norm()
-    outer = state.body_outer[body]
-    for k in range(outer[0], outer[1]):
-        p = state.outer_particle[k]
+    count, fall = 0, h * gravity_on(state, body).norm()
+    particles = state.body_particles[body]
+    for p in range(particles[0], particles[1]):
         c = state.particle_contact[p] - 1
         state.particle_contact[p] = 0
         if c >= 0 and state.particle_inv_mass[p] > 0.0:
@@ -66,39 +59,32 @@ def _lay_on_colliders(state: ti.template(), body, h, since):
             is_near = distance + h * leaving <= TOUCHING + h * fall
             if state.contact.collider_kind[c] != NO_COLLIDER and (mine[0] & theirs[1]) != 0 and is_near:
                 if (theirs[0] & mine[1]) != 0:
-                    change = -ti.max(distance - TOUCHING, 0.0) / h - leaving
+                    velocity_so_far, _ = _surface_velocity(state.contact, c, x, since, -h)
                     state.particle_contact[p] = c + 1
-                    state.particle_velocity[p] = v + change * n
-                    state.particle_hold[p] = ti.Vector([n.x, n.y, n.z, state.particle_mass[p] * change])
+                    approach = ti.max(distance - TOUCHING, 0.0) / h
+                    hold_particle(state, p, n, v - velocity_so_far, surface_velocity - approach * n, fall)
+                    count += 1
+    return count
 
 
 @ti.func
-def _press(state: ti.template(), body, p, h, since, v):
-    """Velocity of a particle on a collider after the solve and friction; the collider feels both."""
-    c, mass, x = state.particle_contact[p] - 1, state.particle_mass[p], state.particle_position[p]
-    hold = state.particle_hold[p]
-    n = hold.xyz
-    normal_impulse = hold.w + n.dot(state.image[p] - state.particle_force[p].xyz)  # [N s]
-    if not ti.abs(normal_impulse) < HARDEST:
-        normal_impulse = 0.0
-    surface_velocity, arm = _surface_velocity(state.contact, c, x, since, h)
-    sliding = v - surface_velocity
-    sliding -= n.dot(sliding) * n
-    surface = state.contact.collider_surface[c]
-    brake = ti.min(surface.x * ti.max(normal_impulse, 0.0) / mass, sliding.norm())
-    change = -brake / ti.max(sliding.norm(), 1e-30) * sliding
-    impulse = normal_impulse * n + mass * change
+def _press(state: ti.template(), body, p, h, since):
+    """Velocity of a particle on a collider after the solve [m/s]; the collider feels its impulse."""
+    c, n = state.particle_contact[p] - 1, state.particle_hold[p].xyz
+    velocity, pressing, across = held_velocity(state, p)
+    surface_velocity, arm = _surface_velocity(state.contact, c, state.particle_position[p], since, h)
+    impulse = pressing * n + across
     row = body * state.contact.capacity.colliders + c
     state.contact.impulse[row] = state.contact.impulse[row] - impulse
     state.contact.angular_impulse[row] = state.contact.angular_impulse[row] - arm.cross(impulse)
-    if normal_impulse < 0.0:
+    if pressing < 0.0:
         state.particle_contact[p] = 0
     else:
         state.contact.particle_touches[p] = 1
-        if surface.y >= 0.0:
+        if state.contact.collider_surface[c].y >= 0.0:
             along = n.dot(surface_velocity)
-            add_normal_impulse(state.contact, row, normal_impulse, n, along, along)
-    return v + change
+            add_normal_impulse(state.contact, row, pressing, n, along, along)
+    return velocity
 
 
 @ti.func
@@ -110,8 +96,8 @@ def kick_implicitly(state: ti.template(), program: ti.template(), body, h, since
         is_first: 1 in the first substep of a step.
     Returns: the highest speed [m/s], and the highest beside the `common` velocity.
     """
-    _lay_on_colliders(state, body, h, since)
-    keep_residual(state, body, solve_body(state, program, body, h), is_first)
+    held_count = _lay_on_colliders(state, body, h, since)
+    keep_residual(state, body, solve_body(state, program, body, h, held_count), is_first)
     highest, highest_beside = ti.cast(0.0, state.real), ti.cast(0.0, state.real)
     particles = state.body_particles[body]
     for p in range(particles[0], particles[1]):
@@ -122,7 +108,7 @@ def kick_implicitly(state: ti.template(), program: ti.template(), body, h, since
         else:
             v += state.solution[p]
             if state.particle_contact[p] > 0:
-                v = _press(state, body, p, h, since, v)
+                v = _press(state, body, p, h, since)
         state.particle_velocity[p] = v
         state.direction[p] = state.particle_position[p]
         state.particle_force[p] = ti.Vector.zero(state.real, 4)

@@ -1,17 +1,15 @@
 """Implicit Euler (thesis section 3.5.3, eq. 3.26) of one body: one linear solve per substep.
 
-(M + h D + h^2 K) dv = h (R f + m g) - h K u: R is the rotation of the body's rigid motion within the step. It
-turns the forces of the old positions, and u = h v - (R - 1) r is what deforms the body. h^2 K v alone would
-brake every rotation of a compressed body: K is projected, and no longer turns forces with the body. Where
-forces change too unevenly on the path, the step is made in pieces. Particles that lie on the floor are held
-at its height within the solve, until it would have to pull them down.
+(M + h D + h^2 K) dv = h (f + m g - h K v): the forces of the old positions, and how they change on the way.
+K is projected, and acts on what a body moves beside its rotation: see `rigid_rotation`. Where forces change
+too unevenly on the path, the step is made in pieces. The solve holds particles that lie on the floor at its
+height, until it would have to pull them down: see `held_particles`.
 """
 
 from taichi_soft.bodies.kernels.particles import gravity_on
 from taichi_soft.bodies.status import FEELS_REACTION
 from taichi_soft.contact.distances.floor import resolve_floor
 from taichi_soft.control.kernels.grabs import add_grabs
-from taichi_soft.core.math.quaternion import spun, turned
 from taichi_soft.core.math.tensors import widened
 from taichi_soft.core.runtime import ti
 from taichi_soft.elements.kernels.internal_forces import accumulate_forces
@@ -20,10 +18,10 @@ from taichi_soft.elements.kernels.linear_system import (
     add_masses,
     add_stiffness,
     clear_system,
-    multiply_system,
 )
-from taichi_soft.solver.kernels.conjugate_gradient import invert_blocks, solve_system
-from taichi_soft.solver.kernels.vibration import rigid_motion
+from taichi_soft.solver.kernels.conjugate_gradient import invert_blocks
+from taichi_soft.solver.kernels.held_particles import held_velocity, hold_particle, solve_held
+from taichi_soft.solver.kernels.rigid_rotation import multiply, split_off_rotation
 
 FARTHEST = 0.5
 """Change of an edge in one piece of a step, over its length, beyond which the piece is halved."""
@@ -36,45 +34,24 @@ MOST_PIECES = 32
 
 
 @ti.func
-def _split_off_rotation(state: ti.template(), program: ti.template(), body, h):
-    """Write the velocities that deform a body within `h` [s], relative to its rigid motion, to `solution`.
-
-    The rigid motion follows an arc: its velocities are the mean ones, along the chords. Ropes and cloths have
-    none: each of their edges turns as it will, and forces that turn with the whole would add energy.
-
-    Returns: the rotation of the body within that time, a quaternion.
-    """
-    particles, blocks = state.body_particles[body], state.body_blocks[body]
-    turn = ti.Vector([0.0, 0.0, 0.0, 1.0])
-    if blocks[0] == blocks[1]:
-        for p in range(particles[0], particles[1]):
-            state.solution[p] = state.particle_velocity[p]
-    else:
-        x0, v0 = state.particle_position[particles[0]], state.particle_velocity[particles[0]]
-        center, velocity, angular_velocity = rigid_motion(state, program, body, 0.0, 0.0, 0, x0, v0)
-        turn = spun(turn, h * angular_velocity)
-        for p in range(particles[0], particles[1]):
-            arm = state.particle_position[p] - x0 - center
-            chord = (turned(turn, arm) - arm) / h
-            state.solution[p] = state.particle_velocity[p] - v0 - velocity - chord
-    return turn
-
-
-@ti.func
 def assemble(state: ti.template(), program: ti.template(), body, h):
-    """Fill the blocks, and `residual` with the right-hand side, kept in `particle_force` as well."""
+    """Fill the blocks, and `residual` with the right-hand side, kept in `particle_force` as well.
+
+    `solution` becomes zero.
+    """
     particles = state.body_particles[body]
     clear_system(state, body)
     add_stiffness(state, program, body, h * h)
-    turn = _split_off_rotation(state, program, body, h)
-    multiply_system(state, body, state.solution, state.image)
+    split_off_rotation(state, body, h)
+    multiply(state, body, state.particle_velocity, state.image)
     gravity = gravity_on(state, body)
     for p in range(particles[0], particles[1]):
         inv_mass = state.particle_inv_mass[p]
         weight = gravity / ti.max(inv_mass, 1e-30) * ti.select(inv_mass > 0.0, 1.0, 0.0)
-        rhs = h * (turned(turn, state.particle_force[p].xyz) + weight) - state.image[p]
+        rhs = h * (state.particle_force[p].xyz + weight) - state.image[p]
         state.residual[p] = rhs
         state.particle_force[p] = widened(rhs)
+        state.solution[p] = ti.Vector.zero(state.real, 3)
     add_grabs(state, body, h)
     add_damping(state, program, body, h)
     add_masses(state, body)
@@ -82,16 +59,26 @@ def assemble(state: ti.template(), program: ti.template(), body, h):
 
 
 @ti.func
-def solve_body(state: ti.template(), program: ti.template(), body, h):
-    """Changes of velocity in `solution`, and in `image` what the system makes of them [N s].
-
-    Returns: the residual left, over the first.
-    """
+def solve_body(state: ti.template(), program: ti.template(), body, h, held_count):
+    """Solve a body of which so many particles are held: see `solve_held`."""
     accumulate_forces(state, program, body)
     assemble(state, program, body, h)
-    residual = solve_system(state, body)
-    multiply_system(state, body, state.solution, state.image)
-    return residual
+    return solve_held(state, body, held_count)
+
+
+@ti.func
+def _lay_on_floor(state: ti.template(), program: ti.template(), body, h):
+    """Hold particles that lie on the floor. Returns their number."""
+    count = 0
+    if ti.static(program.has_floor):
+        fall = h * gravity_on(state, body).norm()
+        particles = state.body_particles[body]
+        for p in range(particles[0], particles[1]):
+            if state.particle_contact[p] == 1 and state.particle_inv_mass[p] > 0.0:
+                up, still = ti.Vector([0.0, 0.0, 1.0]), ti.Vector.zero(state.real, 3)
+                hold_particle(state, p, up, state.particle_velocity[p], still, fall)
+                count += 1
+    return count
 
 
 @ti.func
@@ -106,13 +93,10 @@ def _move(state: ti.template(), program: ti.template(), p, h):
         x = state.particle_position[p] + h * v
         if ti.static(program.has_floor):
             if state.particle_contact[p] == 1:
-                push = state.image[p] - state.particle_force[p].xyz  # impulse of the floor [N s]
-                slide = ti.sqrt(v.x * v.x + v.y * v.y)
-                brake = state.floor[None].z * ti.max(push.z, 0.0) * state.particle_inv_mass[p]
-                keep = ti.select(slide > brake, 1.0 - brake / ti.max(slide, 1e-30), 0.0)
-                v.x, v.y, v.z = v.x * keep, v.y * keep, 0.0
+                velocity, pressing, _ = held_velocity(state, p)
+                v = velocity
                 x = state.particle_position[p] + h * v
-                if push.z < 0.0:
+                if pressing < 0.0:
                     state.particle_contact[p] = 0
             else:
                 falling = x.z < state.floor[None].x
@@ -218,7 +202,8 @@ def implicit_substep(state: ti.template(), program: ti.template(), body, h, is_f
     piece, left = h, 1
     largest = ti.cast(0.0, state.real)
     while left > 0:
-        residual = solve_body(state, program, body, piece)
+        held_count = _lay_on_floor(state, program, body, piece)
+        residual = solve_body(state, program, body, piece, held_count)
         _remember(state, body)
         particles = state.body_particles[body]
         for p in range(particles[0], particles[1]):

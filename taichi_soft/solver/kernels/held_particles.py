@@ -1,0 +1,186 @@
+"""Particles that the floor or colliders hold within the solve of implicit Euler, with Coulomb's friction.
+
+Contact after the solve could take from the particles that touch no more than their own momentum. A body would
+sink into itself until its solve threw them down fast enough, and would follow a belt only as fast as its
+lowest particles pull. So the solve holds a particle that was stopped: it gets the velocity of the surface
+along the normal. If it sticks, it gets that velocity in all directions; if it slides, an impulse of friction.
+While impulses are off Coulomb's law the system is solved again, from the last solution: what would have to be
+pulled leaves, what sticks beyond friction slides, and what friction would turn back sticks.
+"""
+
+from taichi_soft.core.runtime import ti
+from taichi_soft.solver.kernels.conjugate_gradient import SLIDES, STICKS, solve_system
+from taichi_soft.solver.kernels.rigid_rotation import multiply
+
+HARDEST = 1e24
+"""Impulse [N s] from which the solve of a body torn to pieces has overflowed: it counts as none."""
+
+MOST_SOLVES = 6
+"""In one substep, to find which particles stick, slide and leave."""
+
+CLOSE = 0.003
+"""Error of the impulses by Coulomb's law, over their sum, at which a substep is not solved again."""
+
+GIVEN_BACK = 0.1
+"""Largest relative change of a sliding velocity where friction was too strong: a larger one keeps a body from
+coming to rest."""
+
+
+@ti.func
+def _friction_on(state: ti.template(), p):
+    """Coefficient of friction of what holds a particle."""
+    friction = state.floor[None].z
+    if ti.static(state.capacity.has_contact):
+        friction = state.contact.collider_surface[state.particle_contact[p] - 1].x
+    return friction
+
+
+@ti.func
+def hold_particle(state: ti.template(), p, n, sliding, surface_velocity, fall):
+    """Hold a particle for which `particle_contact` says by what.
+
+    It sticks in the first solve if it slides no faster than what gravity changes in a substep.
+
+    Args:
+        n: normal of the surface.
+        sliding: velocity relative to the surface before the substep [m/s]; its part along `n` is ignored.
+        surface_velocity: mean velocity of the surface in the substep [m/s].
+        fall: change of velocity by gravity in a substep [m/s].
+    """
+    across = sliding - n.dot(sliding) * n
+    sticks = ti.select(_friction_on(state, p) > 0.0 and across.norm() <= fall, STICKS, SLIDES)
+    state.particle_hold[p] = ti.Vector([n.x, n.y, n.z, sticks])
+    state.hold_velocity[p] = surface_velocity
+    state.hold_friction[p] = ti.Vector.zero(state.real, 3)
+
+
+@ti.func
+def _begin_solve(state: ti.template(), body):
+    """Write velocities of held particles to `solution`, and the residual of it to `residual`."""
+    particles = state.body_particles[body]
+    for p in range(particles[0], particles[1]):
+        if state.particle_contact[p] > 0:
+            hold = state.particle_hold[p]
+            missing = state.hold_velocity[p] - state.particle_velocity[p] - state.solution[p]
+            change = ti.select(hold.w == STICKS, missing, missing.dot(hold.xyz) * hold.xyz)
+            state.solution[p] = state.solution[p] + change
+    multiply(state, body, state.solution, state.image)
+    for p in range(particles[0], particles[1]):
+        rest = state.particle_force[p].xyz - state.image[p]
+        if state.particle_contact[p] > 0:
+            rest += state.hold_friction[p]
+        state.residual[p] = rest
+
+
+@ti.func
+def _impulse_of(state: ti.template(), p):
+    """Impulse of the last solve on a particle that is held.
+
+    Returns: its part along the normal [N s], its part across, the limit of that by friction, and the velocity
+    of the particle relative to the surface, without the part along the normal [m/s].
+    """
+    hold = state.particle_hold[p]
+    n = hold.xyz
+    impulse = state.image[p] - state.particle_force[p].xyz
+    pressing = n.dot(impulse)
+    across = ti.select(hold.w == STICKS, impulse - pressing * n, state.hold_friction[p])
+    sliding = state.particle_velocity[p] + state.solution[p] - state.hold_velocity[p]
+    sliding -= n.dot(sliding) * n
+    return pressing, across, _friction_on(state, p) * ti.max(pressing, 0.0), sliding
+
+
+@ti.func
+def _judge(state: ti.template(), body):
+    """Measure how far impulses are from Coulomb's law.
+
+    Returns: sums over all particles [N s]: of impulses, of those that pull, of what is beyond friction where
+    particles stick, and of the errors of friction where they slide.
+    """
+    total, pulling = ti.cast(0.0, state.real), ti.cast(0.0, state.real)
+    beyond, wrong = ti.cast(0.0, state.real), ti.cast(0.0, state.real)
+    particles = state.body_particles[body]
+    for p in range(particles[0], particles[1]):
+        if state.particle_contact[p] > 0:
+            pressing, across, most, sliding = _impulse_of(state, p)
+            size = across.norm()
+            total += ti.abs(pressing) + size
+            pulling += ti.max(-pressing, 0.0)
+            if state.particle_hold[p].w == STICKS:
+                beyond += ti.max(size - most, 0.0)
+            elif across.dot(sliding) > 0.0:
+                wrong += size
+            else:
+                wrong += ti.abs(most - size)
+    return total, pulling, beyond, wrong
+
+
+@ti.func
+def _correct(state: ti.template(), body, releases):
+    """Change what holds particles, and friction on them, after a solve.
+
+    Args:
+        releases: whether particles leave that would have to be pulled (1).
+    """
+    particles = state.body_particles[body]
+    for p in range(particles[0], particles[1]):
+        if state.particle_contact[p] > 0:
+            pressing, across, most, sliding = _impulse_of(state, p)
+            size = across.norm()
+            if pressing < 0.0 and releases == 1:
+                state.particle_contact[p] = 0
+            elif state.particle_hold[p].w == STICKS:
+                if size > most:
+                    state.particle_hold[p].w = SLIDES
+                    state.hold_friction[p] = most / size * across
+            elif across.dot(sliding) > 0.0:
+                state.particle_hold[p].w = STICKS
+            else:
+                state.hold_friction[p] = -most / ti.max(sliding.norm(), 1e-30) * sliding
+
+
+@ti.func
+def solve_held(state: ti.template(), body, held_count):
+    """Solve the system of a body of which so many particles are held.
+
+    Changes of velocity are in `solution`, and in `image` what the system makes of them [N s].
+
+    Returns: the residual left, over the first.
+    """
+    residual, first, solves = ti.cast(0.0, state.real), ti.cast(0.0, ti.f64), 0
+    while solves < MOST_SOLVES:
+        if held_count > 0:
+            _begin_solve(state, body)
+        residual, first = solve_system(state, body, first)
+        multiply(state, body, state.solution, state.image)
+        solves += 1
+        if held_count == 0:
+            solves = MOST_SOLVES
+        elif solves < MOST_SOLVES:
+            total, pulling, beyond, wrong = _judge(state, body)
+            if pulling + beyond + wrong > CLOSE * total:
+                _correct(state, body, int(beyond <= CLOSE * total))
+            else:
+                solves = MOST_SOLVES
+    return residual
+
+
+@ti.func
+def held_velocity(state: ti.template(), p):
+    """Velocity of a held particle after the solve.
+
+    Friction that the solves left too weak or too strong acts on the particle alone, and none does work on it.
+
+    Returns: the velocity [m/s], the impulse along the normal [N s], and that across.
+    """
+    pressing, across, most, sliding = _impulse_of(state, p)
+    if not ti.abs(pressing) + across.norm() < HARDEST:
+        pressing, across = ti.cast(0.0, state.real), ti.Vector.zero(state.real, 3)
+    elif state.particle_hold[p].w == SLIDES:
+        momentum = state.particle_mass[p] * sliding.norm()
+        brake = ti.min(ti.max(most - across.norm(), -GIVEN_BACK * momentum), momentum)
+        if across.dot(sliding) > 0.0:
+            brake = momentum
+        share = brake / ti.max(momentum, 1e-30)
+        across -= share * state.particle_mass[p] * sliding
+        sliding *= 1.0 - share
+    return state.hold_velocity[p] + sliding, pressing, across
