@@ -63,13 +63,15 @@ def _calm_edges(
     e = edges[0] + s
     while e < edges[1]:
         p, q = state.edge_vertices[e][0], state.edge_vertices[e][1]
-        between = state.particle_position[q] - state.particle_position[p]
-        apart = felt_velocity(state, program, q, gravity, kick, h, 1)
-        apart -= felt_velocity(state, program, p, gravity, kick, h, 1)
-        shares = state.particle_inv_mass[p] + state.particle_inv_mass[q]
-        is_free = int(state.contact.particle_touches[p] + state.contact.particle_touches[q] == 0)
-        impulse = is_free * CALMING * apart.dot(between) / ti.max(between.norm_sqr() * shares, 1e-30) * between
-        change_p, change_q = state.particle_inv_mass[p] * impulse, state.particle_inv_mass[q] * impulse
-        state.particle_velocity[p] = state.particle_velocity[p] + change_p
-        state.particle_velocity[q] = state.particle_velocity[q] - change_q
+        # What touches is left to its contacts: between pushes a weight on it would creep.
+        if state.contact.particle_touches[p] + state.contact.particle_touches[q] == 0:
+            between = state.particle_position[q] - state.particle_position[p]
+            apart = felt_velocity(state, program, q, gravity, kick, h, 1)
+            apart -= felt_velocity(state, program, p, gravity, kick, h, 1)
+            shares = state.particle_inv_mass[p] + state.particle_inv_mass[q]
+            part = CALMING * apart.dot(between) / ti.max(between.norm_sqr() * shares, 1e-30)
+            change_p = part * state.particle_inv_mass[p] * between
+            change_q = part * state.particle_inv_mass[q] * between
+            state.particle_velocity[p] = state.particle_velocity[p] + change_p
+            state.particle_velocity[q] = state.particle_velocity[q] - change_q
         e += substeps

@@ -89,7 +89,7 @@ def _column_sums(rows: ti.template()):
 
 
 @ti.func
-def rigid_motion(state: ti.template(), program: ti.template(), body, kick, h, is_held, x0, v0):
+def _rigid_motion(state: ti.template(), program: ti.template(), body, kick, h, is_held, x0, v0):
     """Of a body after a kick of its forces [s], with what will hold it; `h` and `is_held` as `felt_velocity`
     takes them.
 
@@ -144,7 +144,7 @@ def fade_vibration(state: ti.template(), program: ti.template(), body, kick, h, 
     of `h` [s]."""
     particles, gravity = state.body_particles[body], gravity_on(state, body)
     x0, v0 = state.particle_position[particles[0]], state.particle_velocity[particles[0]]
-    center, velocity, angular_velocity = rigid_motion(state, program, body, kick, h, 1, x0, v0)
+    center, velocity, angular_velocity = _rigid_motion(state, program, body, kick, h, 1, x0, v0)
     count = particles[1] - particles[0]
     for block in range((count + LANES - 1) // LANES):
         first = (particles[0] + block * LANES) & ROW_BITS
@@ -176,7 +176,7 @@ def _limit_vibration(state: ti.template(), program: ti.template(), body, kick, f
     x0, v0 = state.particle_position[particles[0]], state.particle_velocity[particles[0]]
     center, velocity, spin = x0 * 0.0, v0 * 0.0, v0 * 0.0
     for turn in range(2):  # first all are made slower, then they get back what that took of the rigid motion
-        center_now, velocity_now, spin_now = rigid_motion(state, program, body, kick, 0.0, 0, x0, v0)
+        center_now, velocity_now, spin_now = _rigid_motion(state, program, body, kick, 0.0, 0, x0, v0)
         if turn == 0:
             center, velocity, spin = center_now, velocity_now, spin_now
         p = particles[0]
