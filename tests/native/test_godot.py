@@ -167,11 +167,11 @@ def test_a_body_follows_a_frame_until_it_is_let_go(hands):
     assert hang["load"] == pytest.approx([0.0, -weight, 0.0], abs=0.01 * weight)
     assert "ended" in kinds(hang["told"], "rider")
     assert hang["removed"] == [True, False]
-    assert abs(hang["fell"]) < 0.05
+    assert abs(hang["fell"]) < 0.1  # of the 0.6 m that it was lifted, in whichever pose it lands
     assert "began" in kinds(hang["after"], "rider")
     assert hang["held"] == pytest.approx(0.2, abs=0.03)
     assert hang["detached"] == [True, False]
-    assert abs(hang["fell_again"]) < 0.05
+    assert abs(hang["fell_again"]) < 0.1
 
 
 def test_soft_bodies_that_meet_are_told(hands):
