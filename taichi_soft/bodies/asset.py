@@ -407,11 +407,11 @@ class SoftBodyAsset:
         return 2.0 * material.damping_ratio * frequency, DAMPING_INTERVAL / max(frequency, 1e-6)
 
     def kind_row(self, *, is_implicit: bool) -> tuple[float, ...]:
-        """What `BodyFields.load` takes of a body of this asset: `body_edge`, `body_stride`, `body_sound_speed` and
-        `vibration_row`.
+        """What `BodyFields.load` takes of a body of this asset: `body_edge`, `body_stride`,
+        `body_sound_speed` and `vibration_row`.
 
         Args:
-            is_implicit: its world steps by implicit Euler, which takes substeps of any length; the stride is 0.
+            is_implicit: its world steps by implicit Euler, whose substeps have any length: no stride.
         """
         speed = self.description.sound_speed
         stride = 0.0 if is_implicit else self.stable_step.recommended * speed
