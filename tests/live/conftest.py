@@ -51,9 +51,11 @@ def visitor(served):
     """One who has just come, and finds the world as it began."""
     with Visitor(served.address) as visitor:
         visitor.ready()
-        visitor.say("pause", is_paused=False)
+        visitor.say("pause", is_paused=True)
+        visitor.until(lambda: visitor.states[0]["is_paused"])  # so what follows is seen to be done
         visitor.say("preset", name=None)
         visitor.say("reset")
+        visitor.say("pause", is_paused=False)
         visitor.until(lambda: visitor.states[0]["time"] < 1.0 and not visitor.states[0]["is_paused"])
         yield visitor
 

@@ -42,13 +42,14 @@ def blocks(page, heading):
 def require_on_the_ground(middles, lowest):
     """It fell, lies on the ground, and hardly moves any more.
 
-    What is drawn is a skin on a cage, which dips into the ground when it hits it."""
+    What is drawn is a skin on a cage with cells of 0.11 m. It bends smoothly where they have corners, and so
+    dips into the ground: when it hits it, and at a foot that is bent over."""
     middles = np.array(middles)
     assert np.isfinite(middles).all()
     assert np.ptp(middles[:60, 1]) > 0.4
     assert middles[:, 1].min() > 0.05
     assert min(lowest) > -0.1
-    assert abs(lowest[-1]) < 0.03
+    assert abs(lowest[-1]) < 0.055
     assert 0.1 < middles[-1, 1] < 0.3  # it is half a metre high
     assert np.ptp(middles[-30:], axis=0).max() < 0.06  # in half a second
 

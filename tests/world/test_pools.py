@@ -22,7 +22,7 @@ from taichi_soft import (
     box,
     sphere,
 )
-from taichi_soft.core.runtime import ti
+from taichi_soft.core.first_launch import FirstLaunches
 from taichi_soft.core.types import Schedule
 from taichi_soft.solver.schedules import make_launch
 
@@ -300,13 +300,13 @@ def test_the_number_of_substeps_does_not_depend_on_who_lives(empty):
 
 def test_nothing_is_compiled_when_the_first_body_comes(monkeypatch):
     compiled = []
-    inner = ti.lang.kernel_impl._get_tree_and_ctx
+    prepare = FirstLaunches._prepare  # of a kernel, from its source or from what an earlier process kept
 
-    def noted(kernel, *args, **kwargs):
+    def noted(launches, kernel, *rest):
         compiled.append(kernel.func.__name__)
-        return inner(kernel, *args, **kwargs)
+        prepare(launches, kernel, *rest)
 
-    monkeypatch.setattr(ti.lang.kernel_impl, "_get_tree_and_ctx", noted)
+    monkeypatch.setattr(FirstLaunches, "_prepare", noted)
     monkeypatch.setattr("taichi_soft.bodies.fields._free", [])  # none that another test has used
     world, kinds = World(), (cube(), SoftBodyAsset(BALL, JELLY))
     for kind in kinds:

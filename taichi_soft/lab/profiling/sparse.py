@@ -6,6 +6,7 @@ equations in `laws.stiffness`, not from the kernels, so that agreement means som
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from taichi_soft.core.constants import GRAVITY_EARTH
 from taichi_soft.core.extras import require_extra
 from taichi_soft.elements.materials import Material
 from taichi_soft.meshing import TetMesh
+from taichi_soft.solver.kernels.rigid_rotation import THIN
 
 Floats = NDArray[np.float64]
 
@@ -59,13 +61,31 @@ class SparseBody:
         forces = forces.ravel() - damping @ v
         forces[2::3] -= GRAVITY_EARTH * self._masses
         masses = self._sparse.diags(np.repeat(self._masses, 3))
-        system = (masses + h * damping + h * h * stiffness).tocsr()
-        inverse = self._sparse.diags(1.0 / system.diagonal())
+        plain = (masses + h * damping).tocsr()
+        split_off, split_off_transposed = self._rotation_splits(h)
+
+        def stiffness_beside_rotation(change: Floats) -> Floats:
+            return split_off_transposed(stiffness @ split_off(change))
+
+        system = self._sparse.linalg.LinearOperator(
+            plain.shape, lambda change: plain @ change + h * h * stiffness_beside_rotation(change)
+        )
+        inverse = self._sparse.diags(1.0 / (plain.diagonal() + h * h * stiffness.diagonal()))
         change, _ = self._sparse.linalg.cg(
-            system, h * (forces - h * (stiffness @ v)), rtol=tolerance, M=inverse
+            system, h * (forces - h * stiffness_beside_rotation(v)), rtol=tolerance, M=inverse
         )
         self.velocities += change.reshape(-1, 3)
         self.positions += h * self.velocities
+
+    def _rotation_splits(self, h: float) -> tuple[Callable[[Floats], Floats], Callable[[Floats], Floats]]:
+        """Products with P = 1 - W J W^T M and with P^T, see `kernels.rigid_rotation`."""
+        mass, total = np.repeat(self._masses, 3), self._masses.sum()
+        arms = self.positions - self._masses @ self.positions / total
+        W = np.stack([np.cross(axis, arms).ravel() for axis in np.eye(3)], axis=1)
+        inertia = W.T @ (mass[:, None] * W)
+        added = THIN * np.trace(inertia) + total * (h * h * GRAVITY_EARTH) ** 2
+        J = np.linalg.inv(inertia + added * np.eye(3))
+        return lambda v: v - W @ (J @ (W.T @ (mass * v))), lambda f: f - mass * (W @ (J @ (W.T @ f)))
 
     def _deformations(self) -> Floats:
         corners = self.positions[self.mesh.tets]
