@@ -1,7 +1,8 @@
 """The same implicit steps by scipy: sparse assembly of every tetrahedron, and its conjugate gradients.
 
 Only for the virial law with the linear strain, upright or mirrored, in free fall. Written in numpy from the
-equations in `laws.stiffness`, not from the kernels, so that agreement means something.
+equations in `laws.stiffness` and `kernels.rigid_rotation`, not from kernels, so that agreement means
+something.
 """
 
 from __future__ import annotations
