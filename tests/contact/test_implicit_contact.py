@@ -125,7 +125,7 @@ def test_what_is_dropped_comes_to_rest_on_a_skin_and_never_sinks_into_it():
         if top == 0.5:
             pressed = 1000 * G * 0.5**2 / 2 / body.material.young
             assert np.ptp(body.positions()[:, 2]) == pytest.approx(0.5 - pressed, abs=0.2 * pressed)
-            assert np.abs(body.velocities()[:, 2]).max() < 1e-5
+            assert np.abs(body.velocities()[:, 2]).max() < 1e-3 * G * DT  # the solver's tolerance
 
 
 def test_what_lies_feels_the_collider_with_its_weight_and_leaves_when_it_is_thrown():

@@ -16,6 +16,7 @@ from taichi_soft.core.field_loader import Loader
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.math.tensors import widened
 from taichi_soft.core.runtime import holds_fields, ti
+from taichi_soft.elements.kernels.linear_system import add_inertia
 
 MOST_GRABS, PATCH_ROWS = 16, 128
 """Grabs of one world at a time, and particles that one of them holds."""
@@ -153,10 +154,7 @@ def add_grabs(state: ti.template(), body, h):
                                 wanted += force
                             else:
                                 _add_force(state, p, part * h * force)
-                                for i in ti.static(range(3)):
-                                    state.particle_block[p][i, i] = (
-                                        state.particle_block[p][i, i] + part * share * h * drag
-                                    )
+                                add_inertia(state, p, part * share * h * drag)
                     if turn == 0:
                         part = ti.min(1.0, state.grabs.limits[g].x / ti.max(wanted.norm(), 1e-30))
                 change = _rest_of_pull(state, g, wanted - h * drag * gravity, h, drag)

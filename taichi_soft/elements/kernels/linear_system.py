@@ -2,7 +2,9 @@
 
 K = - df/dx and D = - df/dv, both projected to be positive semi-definite. Only particles that share an edge
 act on each other, so every law fills the same blocks, and a product with the matrix is one pass over the
-edges.
+edges. Rows of K and D add up to zero: products need no more than the differences along edges and what only
+particles have, `particle_inertia`. The blocks on the diagonal serve the preconditioner. Multiplied with a
+velocity that all particles share, stiff blocks would leave nothing but rounding.
 """
 
 from taichi_soft.core.constants import LANES
@@ -40,6 +42,7 @@ def clear_system(state: ti.template(), body):
     particles, edges = state.body_particles[body], state.body_edges[body]
     for p in range(particles[0], particles[1]):
         state.particle_block[p] = ti.Matrix.zero(state.real, 3, 3)
+        state.particle_inertia[p] = 0.0
     for e in range(edges[0], edges[1]):
         state.edge_block[e] = ti.Matrix.zero(state.real, 3, 3)
 
@@ -264,24 +267,29 @@ def add_damping(state: ti.template(), program: ti.template(), body, scale):
 
 
 @ti.func
+def add_inertia(state: ti.template(), p, inertia):
+    """Add what resists every change of a particle's velocity [kg]."""
+    state.particle_inertia[p] = state.particle_inertia[p] + inertia
+    for i in ti.static(range(3)):
+        state.particle_block[p][i, i] = state.particle_block[p][i, i] + inertia
+
+
+@ti.func
 def add_masses(state: ti.template(), body):
     """Add the masses of one body to its diagonal; pinned particles, which have none, are not solved for."""
     particles = state.body_particles[body]
     for p in range(particles[0], particles[1]):
         inv_mass = state.particle_inv_mass[p]
         if inv_mass > 0.0:
-            for i in ti.static(range(3)):
-                state.particle_block[p][i, i] = state.particle_block[p][i, i] + 1.0 / inv_mass
+            add_inertia(state, p, 1.0 / inv_mass)
 
 
 @ti.func
-def multiply_system(state: ti.template(), body, source: ti.template(), target: ti.template()):
-    """target = blocks times source, for the particles of one body."""
-    particles, edges = state.body_particles[body], state.body_edges[body]
-    for p in range(particles[0], particles[1]):
-        target[p] = state.particle_block[p] @ source[p]
+def add_edge_products(state: ti.template(), body, source: ti.template(), target: ti.template()):
+    """Add K and D times `source` to `target`, for the particles of one body."""
+    edges = state.body_edges[body]
     for e in range(edges[0], edges[1]):
         p, q = state.edge_vertices[e][0], state.edge_vertices[e][1]
-        block = state.edge_block[e]
-        target[p] = target[p] + block @ source[q]
-        target[q] = target[q] + block.transpose() @ source[p]
+        block, difference = state.edge_block[e], source[q] - source[p]
+        target[p] = target[p] + block @ difference
+        target[q] = target[q] - block.transpose() @ difference

@@ -3,6 +3,7 @@
 After Baraff and Witkin 1998, section 5: what is held is filtered out of every residual and direction.
 """
 
+from taichi_soft.bodies.kernels.particles import gravity_on
 from taichi_soft.core.runtime import ti
 from taichi_soft.solver.kernels.rigid_rotation import multiply
 
@@ -36,16 +37,66 @@ def invert_blocks(state: ti.template(), body):
 
 
 @ti.func
-def solve_system(state: ti.template(), body, so_far):
-    """Solve blocks times solution = right-hand side, as `solver` asks.
+def _size(state: ti.template(), p, impulse):
+    """Square of an impulse on a particle in the norm of the preconditioner."""
+    return _dot(impulse, state.particle_block_inverse[p] @ impulse)
+
+
+@ti.func
+def square_of_loads(state: ti.template(), body, h):
+    """Square of what the residual has to be small against, in the norm of the preconditioner.
+
+    It is the larger of a body's weight and of all that acts on it, with what holds it up. The right-hand side
+    would not do: that of a body at rest is rounding.
+    """
+    weights, all_loads = ti.cast(0.0, ti.f64), ti.cast(0.0, ti.f64)
+    gravity = gravity_on(state, body)
+    particles = state.body_particles[body]
+    for p in range(particles[0], particles[1]):
+        if state.particle_inv_mass[p] > 0.0:
+            weights += _size(state, p, h * state.particle_mass[p] * gravity)
+            all_loads += _size(state, p, state.particle_force[p].xyz)
+    return ti.max(weights, all_loads)
+
+
+@ti.func
+def _move_together(state: ti.template(), body):
+    """Add the change of velocity that all particles should share to `solution`, and update `residual`.
+
+    A body that falls freely needs no other, which conjugate gradients would find late. And what they leave
+    open has no momentum after it: bodies would slide faster, or hang lower, by the tolerance.
+    """
+    particles = state.body_particles[body]
+    total, mass = ti.Vector.zero(state.real, 3), ti.cast(1e-30, state.real)
+    for p in range(particles[0], particles[1]):
+        total += held(state, p, state.residual[p])
+        mass += state.particle_mass[p]
+    for p in range(particles[0], particles[1]):
+        state.direction[p] = held(state, p, total / mass)
+    multiply(state, body, state.direction, state.image)
+    gain, curvature = ti.cast(0.0, ti.f64), ti.cast(0.0, ti.f64)
+    for p in range(particles[0], particles[1]):
+        gain += _dot(state.direction[p], state.residual[p])
+        curvature += _dot(state.direction[p], state.image[p])
+    if curvature > 0.0:
+        share = ti.cast(gain / curvature, state.real)
+        for p in range(particles[0], particles[1]):
+            state.solution[p] = state.solution[p] + share * state.direction[p]
+            state.residual[p] = state.residual[p] - share * state.image[p]
+
+
+@ti.func
+def solve_system(state: ti.template(), body, loads):
+    """Solve system times solution = right-hand side, as `solver` asks.
 
     `solution` is the initial guess, and `residual` its residual, which is used up. Residuals are measured in
     the norm of the preconditioner.
 
     Args:
-        so_far: square of an earlier residual. The tolerance is relative to the larger of the two.
-    Returns: the residual left, over that one; the square of that one.
+        loads: see `square_of_loads`. The tolerance is relative to these.
+    Returns: the residual left, over them.
     """
+    _move_together(state, body)
     particles = state.body_particles[body]
     left = ti.cast(0.0, ti.f64)
     for p in range(particles[0], particles[1]):
@@ -54,10 +105,9 @@ def solve_system(state: ti.template(), body, so_far):
         state.residual[p] = r
         state.direction[p] = d
         left += _dot(r, d)
-    first = ti.max(left, so_far)
     tolerance, most_iterations = state.solver[None][0], ti.cast(state.solver[None][1], ti.i32)
     count = 0
-    while count < most_iterations and left > tolerance * tolerance * first:
+    while count < most_iterations and left > tolerance * tolerance * loads:
         multiply(state, body, state.direction, state.image)
         curvature = ti.cast(0.0, ti.f64)
         for p in range(particles[0], particles[1]):
@@ -80,4 +130,5 @@ def solve_system(state: ti.template(), body, so_far):
             count += 1
         else:
             count = most_iterations  # rounding has left nothing to go along
-    return ti.sqrt(ti.cast(left / ti.max(first, 1e-300), state.real)), first
+    _move_together(state, body)
+    return ti.sqrt(ti.cast(left / ti.max(loads, 1e-300), state.real))

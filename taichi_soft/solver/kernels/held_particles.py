@@ -9,7 +9,7 @@ pulled leaves, what sticks beyond friction slides, and what friction would turn 
 """
 
 from taichi_soft.core.runtime import ti
-from taichi_soft.solver.kernels.conjugate_gradient import SLIDES, STICKS, solve_system
+from taichi_soft.solver.kernels.conjugate_gradient import SLIDES, STICKS, solve_system, square_of_loads
 from taichi_soft.solver.kernels.rigid_rotation import multiply
 
 HARDEST = 1e24
@@ -139,18 +139,19 @@ def _correct(state: ti.template(), body, releases):
 
 
 @ti.func
-def solve_held(state: ti.template(), body, held_count):
+def solve_held(state: ti.template(), body, held_count, h):
     """Solve the system of a body of which so many particles are held.
 
     Changes of velocity are in `solution`, and in `image` what the system makes of them [N s].
 
-    Returns: the residual left, over the first.
+    Returns: the residual left, over the loads.
     """
-    residual, first, solves = ti.cast(0.0, state.real), ti.cast(0.0, ti.f64), 0
+    loads = square_of_loads(state, body, h)
+    residual, solves = ti.cast(0.0, state.real), 0
     while solves < MOST_SOLVES:
         if held_count > 0:
             _begin_solve(state, body)
-        residual, first = solve_system(state, body, first)
+        residual = solve_system(state, body, loads)
         multiply(state, body, state.solution, state.image)
         solves += 1
         if held_count == 0:

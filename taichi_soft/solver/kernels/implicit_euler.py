@@ -63,7 +63,7 @@ def solve_body(state: ti.template(), program: ti.template(), body, h, held_count
     """Solve a body of which so many particles are held: see `solve_held`."""
     accumulate_forces(state, program, body)
     assemble(state, program, body, h)
-    return solve_held(state, body, held_count)
+    return solve_held(state, body, held_count, h)
 
 
 @ti.func

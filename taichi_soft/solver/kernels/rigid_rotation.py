@@ -13,7 +13,7 @@ of a radius h^2 g added. A little more lets J exist for bodies along a straight 
 
 from taichi_soft.bodies.kernels.particles import gravity_on
 from taichi_soft.core.runtime import ti
-from taichi_soft.elements.kernels.linear_system import multiply_system
+from taichi_soft.elements.kernels.linear_system import add_edge_products
 
 THIN = 1e-6
 """Moment of inertia that is added about every axis, over the trace of the tensor."""
@@ -66,8 +66,7 @@ def split_off_rotation(state: ti.template(), body, h):
 
 @ti.func
 def multiply(state: ti.template(), body, source: ti.template(), target: ti.template()):
-    """target = blocks times source for the particles of one body, with P^T K P in place of K."""
-    multiply_system(state, body, source, target)
+    """target = system times source for the particles of one body, with P^T K P in place of K."""
     particles = state.body_particles[body]
     spin, torque = ti.Vector.zero(state.real, 3), ti.Vector.zero(state.real, 3)
     for p in range(particles[0], particles[1]):
@@ -78,4 +77,5 @@ def multiply(state: ti.template(), body, source: ti.template(), target: ti.templ
     for p in range(particles[0], particles[1]):
         taken = state.particle_turning[p] @ spin
         taken += state.particle_mass[p] * turn.cross(_arm(state, body, p))
-        target[p] = target[p] - taken
+        target[p] = state.particle_inertia[p] * source[p] - taken
+    add_edge_products(state, body, source, target)
