@@ -9,29 +9,31 @@ and angular momentum.
 from taichi_soft.bodies.kernels.particles import gravity_on
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
-from taichi_soft.solver.kernels.vibration import felt_velocity
+from taichi_soft.solver.kernels.vibration import MOVES, felt_velocity
 
 CALMING = 0.5
 """Part of the velocity along an edge that its ends lose in each step."""
 
-NEARLY = 5.0
+NEARLY = 10.0
 """Root mean square speed over mass, in speeds of falling asleep, below which a body is nearly at rest."""
 
 
 @ti.func
-def _is_nearly_at_rest(state: ti.template(), body):
-    """Whether a damped body is slow as a whole, in a world in which bodies fall asleep (1)."""
-    is_near = 0
-    if state.contact.sleep_speed[None] > 0.0 and state.body_fading[body] > 0.0:
+def note_slowness(state: ti.template(), body):
+    """Write to `slowness` how near a damped body is to rest, in a world in which bodies fall asleep."""
+    slowness, sleep_speed = MOVES, state.contact.sleep_speed[None]
+    if sleep_speed > 0.0 and state.body_fading[body] > 0.0:
         particles = state.body_particles[body]
-        fast, mass, motion = NEARLY * state.contact.sleep_speed[None], 0.0, 0.0
+        mass, motion = 0.0, 0.0
         p = particles[0]
         while p < particles[1]:
             mass += state.particle_mass[p]
             motion += state.particle_mass[p] * state.particle_velocity[p].norm_sqr()
             p = row_behind(p)
-        is_near = int(motion <= fast * fast * mass)
-    return is_near
+        most = mass * sleep_speed * sleep_speed
+        slowness = int(motion <= NEARLY * NEARLY * most) + int(motion <= most)
+    if state.contact.slowness[body] != slowness:
+        state.contact.slowness[body] = slowness
 
 
 @ti.func
@@ -41,11 +43,7 @@ def calm_body(state: ti.template(), program: ti.template(), body, kick, h, s, su
     `kick` and `h` are those of `fade_vibration`. Each edge has its turn once in a step, and the edges of a
     particle at different times: one that vibrates once in a step would always be found standing still.
     """
-    if s == 0:
-        is_slow = _is_nearly_at_rest(state, body)
-        if state.contact.is_slow[body] != is_slow:
-            state.contact.is_slow[body] = is_slow
-    if state.contact.is_slow[body] == 1:
+    if state.contact.slowness[body] != MOVES:
         _calm_edges(state, program, body, kick, h, s, substeps)
 
 
