@@ -77,15 +77,16 @@ def test_a_body_that_bends_slowly_to_and_fro_falls_asleep_when_it_is_slow_as_a_w
     mesh = box((6.0, 0.2, 0.2), (60, 2, 2))
     along = mesh.vertices[:, 0] / mesh.vertices[:, 0].max()
     bending = 0.067 * (along**2 - 1 / 3)  # 0.02 m/s in the root mean square
-    bodies = []
+    worlds = []
     for sleep_speed in (SLEEP, 0.0):
         world = World(gravity=(0, 0, 0), floor=None, sleep_speed=sleep_speed)
-        bodies.append(world.add_body(mesh, Material(2e4, 0.3, 1000)))
+        body = world.add_body(mesh, Material(2e4, 0.3, 1000))
         world.build()
-        bodies[-1].set_motion(mesh.vertices, bending[:, None] * (0, 0, 1))
+        worlds.append(world)
+        body.set_motion(mesh.vertices, bending[:, None] * (0, 0, 1))
         for _ in range(120):
             world.step(DT)
-    sleeper, free = bodies
+    sleeper, free = (world.bodies[0] for world in worlds)
     assert sleeper.is_asleep
     assert np.abs(free.velocities()).max() > SLEEP
 
