@@ -32,7 +32,7 @@ func _iteration(_delta: float) -> bool:
         _rewind()
         _sleep_and_wake()
         _freeze()
-        _say("scene", {"rows": _rows, "slept": _slept.size(), "woke": _woke.size(), "froze": _froze.size()})
+        _say("scene", {"rows": _rows, "froze": _froze.count(_world.body("block"))})
         quit()
     return false
 
@@ -122,7 +122,7 @@ func _sleep_and_wake() -> void:
     _say("sleep", {"slept": body in _slept, "woke": body in _woke})
 
 
-# Spun far faster than steps of this length can follow.
+# Spun far faster than steps of this length can follow. Nor can an elephant that is awake follow them.
 func _freeze() -> void:
     _world.substeps = 1
     _world.native.set_velocity(_world.body("block"), Vector3(), Vector3(2000, 0, 2000))
