@@ -86,6 +86,9 @@ class BodyFields:
             self.particle_block_inverse = ti.Matrix.field(3, 3, real, n)
             self.particle_inertia = ti.field(real, n)  # [kg]: mass, and what grabs add
             self.edge_block = ti.Matrix.field(3, 3, real, k)  # row of the first end, column of the second
+            if capacity.rings:  # what the forces have found: see `bond_frame_of`
+                self.edge_normal = ti.Vector.field(3, real, k)
+                self.edge_compared = ti.Vector.field(3, real, k)  # [m]
             # What `rigid_rotation` prepares: K W by particle, W^T K W, the centre beside the first particle.
             self.particle_turning = ti.Matrix.field(3, 3, real, n)
             self.body_turning = ti.Matrix.field(3, 3, real, bodies)

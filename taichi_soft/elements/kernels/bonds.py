@@ -142,6 +142,17 @@ def bond_frame_of(state: ti.template(), law: ti.template(), e):
 
 
 @ti.func
+def kept_frame_of(state: ti.template(), law: ti.template(), e):
+    """The same where the forces were asked for last: to look round edges anew would cost as much as they."""
+    if ti.static(not state.capacity.implicit or law.ring == Ring.NONE or law.ring == Ring.EXPANSION):
+        return bond_frame_of(state, law, e)
+    else:
+        p, q = state.edge_vertices[e][0], state.edge_vertices[e][1]
+        r = state.particle_position[q] - state.particle_position[p]
+        return r, state.edge_normal[e], state.edge_compared[e]
+
+
+@ti.func
 def ring_tension(state: ti.template(), e):
     """Pull of the tetrahedra round an edge on its ends [N], gathered from their pressures."""
     pressure = state.edge_damping[e] * 0.0
@@ -157,6 +168,8 @@ def bond_force_of(state: ti.template(), law: ti.template(), e):
     p, q = state.edge_vertices[e][0], state.edge_vertices[e][1]
     relative_velocity = state.particle_velocity[q] - state.particle_velocity[p]
     _, n, compared = bond_frame_of(state, law, e)
+    if ti.static(state.capacity.implicit):
+        state.edge_normal[e], state.edge_compared[e] = n, compared
     constants = state.edge_bond[e]
     return bond_force(compared, n, constants) + bond_damping(
         compared, n, relative_velocity, state.edge_damping[e], constants.w

@@ -12,7 +12,7 @@ from taichi_soft.core.math.tensors import outer, product
 from taichi_soft.core.math.tetrahedron import shape
 from taichi_soft.core.runtime import ti
 from taichi_soft.core.types import DampingModel
-from taichi_soft.elements.kernels.bonds import bond_frame_of, ring_tension
+from taichi_soft.elements.kernels.bonds import kept_frame_of, ring_tension
 from taichi_soft.elements.kernels.elastic import elasticity_of, particles_of, rest_inverse_of
 from taichi_soft.elements.laws.anisotropic_stiffness import (
     held_stiffness,
@@ -177,7 +177,7 @@ def _add_volume_stiffness(state: ti.template(), body, scale):
 @ti.func
 def bond_stiffness(state: ti.template(), law: ti.template(), e, projected: ti.template()):
     """- d f_p / d p of a bond with its normal held [N/m], as columns; d f_p / d q is the opposite."""
-    r, n, _ = bond_frame_of(state, law, e)
+    r, n, _ = kept_frame_of(state, law, e)
     constants = state.edge_bond[e]
     if ti.static(law.ring == Ring.NONE or law.ring == Ring.EXPANSION):
         tension = spring_tension(r, constants)
@@ -216,7 +216,7 @@ def add_stiffness(state: ti.template(), program: ti.template(), body, scale):
 @ti.func
 def bond_damping_matrix(state: ti.template(), law: ti.template(), e):
     """- d f_p / d v_p of the damping of an edge [N s/m], as columns."""
-    _, n, compared = bond_frame_of(state, law, e)
+    _, n, compared = kept_frame_of(state, law, e)
     zero = state.edge_damping[e] * 0.0
     c0, c1, c2 = along_and_across(n, state.edge_damping[e], zero)
     if ti.static(not (law.ring == Ring.NONE or law.ring == Ring.EXPANSION)):
