@@ -86,7 +86,7 @@ class BodyFields:
             self.particle_block_inverse = ti.Matrix.field(3, 3, real, n)
             self.particle_inertia = ti.field(real, n)  # [kg]: mass, and what grabs add
             self.edge_block = ti.Matrix.field(3, 3, real, k)  # row of the first end, column of the second
-            if capacity.rings:  # what the forces have found: see `bond_frame_of`
+            if capacity.rings:  # as the last evaluation of forces found it
                 self.edge_normal = ti.Vector.field(3, real, k)
                 self.edge_compared = ti.Vector.field(3, real, k)  # [m]
             # What `rigid_rotation` prepares: K W by particle, W^T K W, the centre beside the first particle.
@@ -106,7 +106,7 @@ class BodyFields:
             self.particle_hold = ti.Vector.field(4, real, n)
             self.hold_velocity = ti.Vector.field(3, real, n)
             self.hold_friction = ti.Vector.field(3, real, n)
-            self.body_residual = ti.field(real, bodies)  # largest of the last step, over the forces
+            self.body_residual = ti.field(real, bodies)  # largest of the last step, over the load
             self.solver = ti.Vector.field(2, real, ())  # tolerance, most iterations
         if capacity.parallel:
             self.corner_force = ti.Vector.field(4, real, b * 4 * LANES)  # [N], corner by corner in each block

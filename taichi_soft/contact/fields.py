@@ -83,7 +83,7 @@ class ContactFields:
         self.body_upper = ti.Vector.field(3, ti.f32, bodies)
         self.sleep_speed = ti.field(ti.f32, ())  # [m/s] below which bodies fall asleep; 0 for never
         self.calm = ti.field(ti.f32, bodies)  # time since a body was faster [s]
-        self.slowness = ti.field(ti.i32, bodies)  # how near it is to rest: see `vibration`
+        self.rest_state = ti.field(ti.i32, bodies)  # MOVING, SLOW or RESTING of `vibration`
         self.is_exploding = ti.field(ti.i32, bodies)  # 1 where it must not take others with it
         self.body_filter = ti.Vector.field(2, ti.i32, bodies)  # group, mask
         self.is_stable = ti.field(ti.i32, bodies)  # 0 where forces changed a velocity by too much

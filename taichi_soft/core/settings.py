@@ -22,7 +22,7 @@ class Settings:
     restitution: float | None  # of the floor; None for that of the bodies
     friction: float  # of the floor
     integrator: Integrator  # of all bodies
-    tolerance: float  # of implicit solves: residual over loads
+    tolerance: float  # of implicit solves: residual over load
     most_iterations: int  # of an implicit solve
     retries: int  # how often a step that fails is made again, twice as fine each time
     schedule: Schedule  # as chosen by `World.build`; AUTO before where it is left open

@@ -104,7 +104,7 @@ class Body(BodyControl, BodyMeasures):
 
     @property
     def solve_residual(self) -> float | None:
-        """Largest residual of the last step's implicit solves, over the loads on the body; None before."""
+        """Largest residual of the last step's implicit solves, over the load on the body; None before."""
         return self._context.built.solve_residual(self)
 
     @recorded

@@ -57,7 +57,7 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
         integrator: "leapfrog", "lazy_leapfrog", "explicit_euler", or "implicit_euler": stable for every step,
             at the price of a linear solve in each and of damping that grows with its length. A step in which
             edges would change by more than half their length is made in 2 to 32 pieces.
-        tolerance: of implicit solves, residual over the loads on the body: 1e-6 to 0.5.
+        tolerance: of implicit solves, residual over the load on the body: 1e-6 to 0.5.
         most_iterations: of an implicit solve; one that needs more goes on as far as it came and is reported
             by a `SolverWarning`.
         schedule: "auto", "per_body" or "flat": in which loops the work runs; no effect on the physics.

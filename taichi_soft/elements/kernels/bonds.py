@@ -143,7 +143,7 @@ def bond_frame_of(state: ti.template(), law: ti.template(), e):
 
 @ti.func
 def kept_frame_of(state: ti.template(), law: ti.template(), e):
-    """The same where the forces were asked for last: to look round edges anew would cost as much as they."""
+    """`bond_frame_of` at the last evaluation of forces: to compute it anew costs as much as the forces."""
     if ti.static(not state.capacity.implicit or law.ring == Ring.NONE or law.ring == Ring.EXPANSION):
         return bond_frame_of(state, law, e)
     else:

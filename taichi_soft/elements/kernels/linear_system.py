@@ -2,9 +2,9 @@
 
 K = - df/dx and D = - df/dv, both projected to be positive semi-definite. Only particles that share an edge
 act on each other, so every law fills the same blocks, and a product with the matrix is one pass over the
-edges. Rows of K and D add up to zero: products need no more than the differences along edges and what only
-particles have, `particle_inertia`. The blocks on the diagonal serve the preconditioner. Multiplied with a
-velocity that all particles share, stiff blocks would leave nothing but rounding.
+edges. The rows of K and D sum to zero, so a product needs only `particle_inertia` and the differences of
+velocity along edges. A sum of stiff blocks times a velocity that all particles share would leave only
+rounding errors. The blocks on the diagonal serve the preconditioner.
 """
 
 from taichi_soft.core.constants import LANES
@@ -268,7 +268,7 @@ def add_damping(state: ti.template(), program: ti.template(), body, scale):
 
 @ti.func
 def add_inertia(state: ti.template(), p, inertia):
-    """Add what resists every change of a particle's velocity [kg]."""
+    """Add to what resists any change of velocity of a particle [kg]."""
     state.particle_inertia[p] = state.particle_inertia[p] + inertia
     for i in ti.static(range(3)):
         state.particle_block[p][i, i] = state.particle_block[p][i, i] + inertia

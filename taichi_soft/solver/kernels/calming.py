@@ -4,24 +4,27 @@ Damping takes from every vibration at the rate of the slowest, so what is fast w
 in a floppy body. Here pairs of neighbours lose what they have of velocity along the edge between them, one
 pair after the other. That takes the more of a vibration the more its neighbours differ, and keeps momentum
 and angular momentum.
+
+A body that is slower than `sleep_speed` as a whole loses its slow vibrations too, in `vibration`: one limb
+that swings would keep it awake.
 """
 
 from taichi_soft.bodies.kernels.particles import gravity_on
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
-from taichi_soft.solver.kernels.vibration import MOVES, felt_velocity
+from taichi_soft.solver.kernels.vibration import MOVING, felt_velocity
 
 CALMING = 0.5
 """Part of the velocity along an edge that its ends lose in each step."""
 
-NEARLY = 10.0
-"""Root mean square speed over mass, in speeds of falling asleep, below which a body is nearly at rest."""
+SLOW_FACTOR = 10.0
+"""Root mean square speed over mass, over `sleep_speed`, below which a body is slow."""
 
 
 @ti.func
-def note_slowness(state: ti.template(), body):
-    """Write to `slowness` how near a damped body is to rest, in a world in which bodies fall asleep."""
-    slowness, sleep_speed = MOVES, state.contact.sleep_speed[None]
+def update_rest_state(state: ti.template(), body):
+    """Write to `rest_state` whether a damped body is moving, slow or resting, if bodies can fall asleep."""
+    rest_state, sleep_speed = MOVING, state.contact.sleep_speed[None]
     if sleep_speed > 0.0 and state.body_fading[body] > 0.0:
         particles = state.body_particles[body]
         mass, motion = 0.0, 0.0
@@ -31,19 +34,19 @@ def note_slowness(state: ti.template(), body):
             motion += state.particle_mass[p] * state.particle_velocity[p].norm_sqr()
             p = row_behind(p)
         most = mass * sleep_speed * sleep_speed
-        slowness = int(motion <= NEARLY * NEARLY * most) + int(motion <= most)
-    if state.contact.slowness[body] != slowness:
-        state.contact.slowness[body] = slowness
+        rest_state = int(motion <= SLOW_FACTOR * SLOW_FACTOR * most) + int(motion <= most)
+    if state.contact.rest_state[body] != rest_state:
+        state.contact.rest_state[body] = rest_state
 
 
 @ti.func
 def calm_body(state: ti.template(), program: ti.template(), body, kick, h, s, substeps):
-    """In substep `s` of `substeps`: let the fast vibrations of a body fade that is nearly at rest.
+    """Damp the fast vibrations of a body that is slow, in substep `s` of `substeps`.
 
     `kick` and `h` are those of `fade_vibration`. Each edge has its turn once in a step, and the edges of a
     particle at different times: one that vibrates once in a step would always be found standing still.
     """
-    if state.contact.slowness[body] != MOVES:
+    if state.contact.rest_state[body] != MOVING:
         _calm_edges(state, program, body, kick, h, s, substeps)
 
 

@@ -37,34 +37,35 @@ def invert_blocks(state: ti.template(), body):
 
 
 @ti.func
-def _size(state: ti.template(), p, impulse):
-    """Square of an impulse on a particle in the norm of the preconditioner."""
+def _squared_norm(state: ti.template(), p, impulse):
+    """Square of the preconditioner's norm of an impulse on a particle."""
     return _dot(impulse, state.particle_block_inverse[p] @ impulse)
 
 
 @ti.func
-def square_of_loads(state: ti.template(), body, h):
-    """Square of what the residual has to be small against, in the norm of the preconditioner.
+def squared_load(state: ti.template(), body, h):
+    """Square of the impulse in a substep of `h` [s] to which the tolerance is relative.
 
-    It is the larger of a body's weight and of all that acts on it, with what holds it up. The right-hand side
-    would not do: that of a body at rest is rounding.
+    The impulse is the larger of the weight and of the right-hand side, including what floor and colliders
+    support. Without these, the right-hand side of a body at rest would be rounding errors alone.
     """
-    weights, all_loads = ti.cast(0.0, ti.f64), ti.cast(0.0, ti.f64)
+    weight, total = ti.cast(0.0, ti.f64), ti.cast(0.0, ti.f64)
     gravity = gravity_on(state, body)
     particles = state.body_particles[body]
     for p in range(particles[0], particles[1]):
         if state.particle_inv_mass[p] > 0.0:
-            weights += _size(state, p, h * state.particle_mass[p] * gravity)
-            all_loads += _size(state, p, state.particle_force[p].xyz)
-    return ti.max(weights, all_loads)
+            weight += _squared_norm(state, p, h * state.particle_mass[p] * gravity)
+            total += _squared_norm(state, p, state.particle_force[p].xyz)
+    return ti.max(weight, total)
 
 
 @ti.func
-def _move_together(state: ti.template(), body):
-    """Add the change of velocity that all particles should share to `solution`, and update `residual`.
+def _correct_common_velocity(state: ti.template(), body):
+    """Add to `solution` the change of velocity that all particles share, and update `residual`.
 
-    A body that falls freely needs no other, which conjugate gradients would find late. And what they leave
-    open has no momentum after it: bodies would slide faster, or hang lower, by the tolerance.
+    Each call corrects one direction. Before the iterations, that is all that a body in free fall needs;
+    conjugate gradients find it late. After them, it removes the momentum left in the residual, with which
+    bodies would slide faster or creep on slopes.
     """
     particles = state.body_particles[body]
     total, mass = ti.Vector.zero(state.real, 3), ti.cast(1e-30, state.real)
@@ -86,17 +87,17 @@ def _move_together(state: ti.template(), body):
 
 
 @ti.func
-def solve_system(state: ti.template(), body, loads):
+def solve_system(state: ti.template(), body, load):
     """Solve system times solution = right-hand side, as `solver` asks.
 
     `solution` is the initial guess, and `residual` its residual, which is used up. Residuals are measured in
     the norm of the preconditioner.
 
     Args:
-        loads: see `square_of_loads`. The tolerance is relative to these.
-    Returns: the residual left, over them.
+        load: as `squared_load` returns it. The tolerance is relative to it.
+    Returns: the residual left, over the load.
     """
-    _move_together(state, body)
+    _correct_common_velocity(state, body)
     particles = state.body_particles[body]
     left = ti.cast(0.0, ti.f64)
     for p in range(particles[0], particles[1]):
@@ -107,7 +108,7 @@ def solve_system(state: ti.template(), body, loads):
         left += _dot(r, d)
     tolerance, most_iterations = state.solver[None][0], ti.cast(state.solver[None][1], ti.i32)
     count = 0
-    while count < most_iterations and left > tolerance * tolerance * loads:
+    while count < most_iterations and left > tolerance * tolerance * load:
         multiply(state, body, state.direction, state.image)
         curvature = ti.cast(0.0, ti.f64)
         for p in range(particles[0], particles[1]):
@@ -130,5 +131,5 @@ def solve_system(state: ti.template(), body, loads):
             count += 1
         else:
             count = most_iterations  # rounding has left nothing to go along
-    _move_together(state, body)
-    return ti.sqrt(ti.cast(left / ti.max(loads, 1e-300), state.real))
+    _correct_common_velocity(state, body)
+    return ti.sqrt(ti.cast(left / ti.max(load, 1e-300), state.real))

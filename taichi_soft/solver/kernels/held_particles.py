@@ -9,7 +9,7 @@ pulled leaves, what sticks beyond friction slides, and what friction would turn 
 """
 
 from taichi_soft.core.runtime import ti
-from taichi_soft.solver.kernels.conjugate_gradient import SLIDES, STICKS, solve_system, square_of_loads
+from taichi_soft.solver.kernels.conjugate_gradient import SLIDES, STICKS, solve_system, squared_load
 from taichi_soft.solver.kernels.rigid_rotation import multiply
 
 HARDEST = 1e24
@@ -144,14 +144,14 @@ def solve_held(state: ti.template(), body, held_count, h):
 
     Changes of velocity are in `solution`, and in `image` what the system makes of them [N s].
 
-    Returns: the residual left, over the loads.
+    Returns: the residual left, over the load.
     """
-    loads = square_of_loads(state, body, h)
+    load = squared_load(state, body, h)
     residual, solves = ti.cast(0.0, state.real), 0
     while solves < MOST_SOLVES:
         if held_count > 0:
             _begin_solve(state, body)
-        residual = solve_system(state, body, loads)
+        residual = solve_system(state, body, load)
         multiply(state, body, state.solution, state.image)
         solves += 1
         if held_count == 0:

@@ -34,7 +34,7 @@ from taichi_soft.core.types import Integrator
 from taichi_soft.elements.kernels.internal_forces import accumulate_forces
 from taichi_soft.solver.kernels.attempts import begin_body
 from taichi_soft.solver.kernels.body_end import end_body
-from taichi_soft.solver.kernels.calming import calm_body, note_slowness
+from taichi_soft.solver.kernels.calming import calm_body, update_rest_state
 from taichi_soft.solver.kernels.drift import drift_body, has_drifted, is_clear
 from taichi_soft.solver.kernels.implicit_euler import implicit_substep, keeps_shape
 from taichi_soft.solver.kernels.jobs import OWNER, run_job
@@ -94,7 +94,7 @@ def advance_body(state: ti.template(), program: ti.template(), body, now, drifts
     if ti.static(program.has_contact):  # its code, even unused, takes others 5 % of their time
         run_motors(state, program, body, now.h, felt, int(now.s == 0))
         if now.s == 0:
-            note_slowness(state, body)
+            update_rest_state(state, body)
     damp_body(state, program, body, felt, now.h, now.s, now.substeps)
     if ti.static(program.has_contact and program.integrator != Integrator.IMPLICIT_EULER):
         calm_body(state, program, body, to_positions(program, felt, now.h), now.h, now.s, now.substeps)

@@ -26,11 +26,11 @@ of what is pressed is no part of that vibration, so there a mode of stiffness k 
 That is stable for h^2 k < 2 (1 + d), here up to 0.9 of leapfrog's own longest step. A wreck loses
 more, once in a step."""
 
-MOVES, NEARLY_RESTS, RESTS = range(3)
-"""How near a body is to rest as a whole: see `calming`."""
+MOVING, SLOW, RESTING = range(3)
+"""Rest states of a body by its speed as a whole: see `calming`."""
 
-RESTING = 2.0
-"""At what rate vibrations of a body fade that rests [1/s], if not faster."""
+RESTING_RATE = 2.0
+"""Least rate at which the vibrations of a resting body fade [1/s]."""
 
 SHARP_BRAKE = 0.5
 """Of the vibration that a substep leaves where a step that failed is made for the last time."""
@@ -220,8 +220,8 @@ def kept_vibration(state: ti.template(), body, h, s, substeps):
         keep = SHARP_BRAKE
     elif rate > 0.0:
         if ti.static(state.capacity.has_contact):
-            if state.contact.slowness[body] == RESTS:
-                rate = ti.max(rate, RESTING)
+            if state.contact.rest_state[body] == RESTING:
+                rate = ti.max(rate, RESTING_RATE)
         whole = substeps * h
         wanted = ti.ceil(whole * ti.max(1.0 / interval, rate / MOST_FADING))
         times = ti.min(substeps, ti.cast(ti.min(wanted, 1e6), ti.i32))
