@@ -34,11 +34,12 @@ from taichi_soft.core.cores import (
 )
 from taichi_soft.core.errors import DeviceError, OptionError
 from taichi_soft.core.first_launch import FIRST_LAUNCHES
+from taichi_soft.core.float_environment import with_usual_floats
 from taichi_soft.core.kernel_cache import await_lock, folder_of
 from taichi_soft.core.known_kernels import KnownKernels
-from taichi_soft.core.subnormals import learn
 from taichi_soft.core.taichi_patches import (
     check_real_functions,
+    choose_by_comparison,
     code_options,
     has_pending_fields,
     keep_kernels_apart,
@@ -52,6 +53,7 @@ from taichi_soft.core.taichi_patches import (
 from taichi_soft.core.threads import in_turn, leave_behind
 from taichi_soft.core.types import ArchName
 from taichi_soft.core.version import VERSION
+from taichi_soft.core.worker_floats import give_workers_usual_floats
 
 __all__ = [
     "Device",
@@ -179,12 +181,14 @@ def init(arch: ArchName = "auto", threads: int | None = None, cores: Sequence[in
     wanted = tuple(there) if is_left_to_us else bound
     try:
         start = functools.partial(_start, chosen, reason, count, wanted, is_left_to_us)
-        _at_home(functools.partial(learn, start), chosen)
+        _at_home(with_usual_floats(start), chosen)
     except RuntimeError as error:
         if isinstance(error, DeviceError):
             raise
         raise DeviceError(f"cannot start Taichi on {chosen!r}: {error}. Use init('cpu')") from error
     found = device()
+    if not found.is_gpu:
+        give_workers_usual_floats(found.threads)
     where = f", bound to cores {list(found.cores)}" if found.cores else ""
     _log.info("Taichi runs on %s with %d threads%s (%s)", found.arch, found.threads, where, found.reason)
     return found
@@ -208,6 +212,7 @@ def _start(arch: ArchName, reason: str, threads: int, cores: tuple[int, ...], is
             cpu_max_num_threads=threads,
             default_fp=ti.f32,
             default_ip=ti.i32,
+            fast_math=False,  # would let each processor choose an order of sums, and so the last bits
             debug=is_checked,
             offline_cache=True,
             offline_cache_max_size_of_files=1
@@ -348,6 +353,7 @@ if ti.__version__[:2] == (1, 7):
     remember_sources()
     let_threads_in(_lay_out)
     let_any_number_of_threads_run()
+    choose_by_comparison()
     FIRST_LAUNCHES.install()
 
 

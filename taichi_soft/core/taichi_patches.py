@@ -23,11 +23,12 @@ with warnings.catch_warnings():
     warnings.simplefilter("ignore", SyntaxWarning)  # Python 3.12 and later, of a docstring of Taichi's
     import taichi as ti
 
-from taichi_soft.core.subnormals import without_subnormals
+from taichi_soft.core.float_environment import with_usual_floats
 from taichi_soft.core.threads import in_turn
 
 __all__ = [
     "check_real_functions",
+    "choose_by_comparison",
     "code_options",
     "has_pending_fields",
     "keep_kernels_apart",
@@ -107,7 +108,7 @@ def let_threads_in(lay_out_now: Callable[[Callable[[bool], None], bool], None]) 
     ti.lang.impl.PyTaichi.inside_kernel = property(
         lambda _: getattr(compiling, "is_on", False), lambda _, is_on: setattr(compiling, "is_on", is_on)
     )
-    ti.lang.kernel_impl.Kernel.__call__ = in_turn(without_subnormals(ti.lang.kernel_impl.Kernel.__call__))
+    ti.lang.kernel_impl.Kernel.__call__ = in_turn(with_usual_floats(ti.lang.kernel_impl.Kernel.__call__))
     make = accessor.__init__
 
     def make_in_turn(self: Any, snode: Any) -> None:
@@ -175,6 +176,35 @@ def limiting_threads(count: int) -> Iterator[None]:
         yield
     finally:
         config.cpu_max_num_threads = usual
+
+
+def choose_by_comparison() -> None:
+    """Taichi 1.7 leaves the lesser of two numbers to the processor. Which of -0 and 0 that is, and of a
+    number and NaN, differs from one kind to the next, and WebAssembly has no instruction for it. Here
+    `ti.min` and `ti.max` compare and select, which is one instruction as well. Of equal numbers, or if one is
+    NaN, they take the second, or the constant where one is constant."""
+    ops = ti.lang.ops
+
+    def choosing(plain: Callable[..., Any], comes_first: Callable[..., Any]) -> Callable[..., Any]:
+        @functools.wraps(plain)  # or Taichi would warn of a function that is not its own
+        def choose(a: Any, b: Any) -> Any:
+            expressions = [each for each in (a, b) if ops.is_taichi_expr(each)]
+            if not any(_is_real(each) for each in expressions):
+                return plain(a, b)
+            first, second = (a, b) if ops.is_taichi_expr(a) else (b, a)
+            # Kept under a name, as Taichi computes an expression wherever it stands.
+            first, second = ti.lang.impl.expr_init(first), ti.lang.impl.expr_init(second)
+            return ops.select(comes_first(first, second), first, second)
+
+        return choose
+
+    ops.min_impl = choosing(ops.min_impl, ops.cmp_lt)
+    ops.max_impl = choosing(ops.max_impl, ops.cmp_gt)
+
+
+def _is_real(expression: Any) -> bool:
+    kind = expression.ptr.get_rvalue_type()
+    return bool(ti._lib.core.is_real(kind.element_type() if expression.is_tensor() else kind))
 
 
 def tree_of(kernel: Any, arguments: Any, features: Any) -> tuple[Any, Any]:

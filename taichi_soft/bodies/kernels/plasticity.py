@@ -7,6 +7,7 @@ determinant 1. P is taken from it, so nothing but `tet_rest_inverse` changes. Se
 from taichi_soft.bodies.status import ACTIVE
 from taichi_soft.core.constants import LANES
 from taichi_soft.core.math.eigen import from_axes, symmetric_eigen
+from taichi_soft.core.math.elementary import exp, exp_each, log_each
 from taichi_soft.core.math.tensors import (
     cofactor,
     determinant,
@@ -53,7 +54,7 @@ def _excess(logarithms, limit):
     mean = logarithms - deviator
     kept = logarithms.x * 0.0 + 1.0
     for _ in range(_ROUNDS):
-        strain = _equivalent(_deviator(0.5 * ti.exp(2.0 * (mean + kept * deviator))))
+        strain = _equivalent(_deviator(0.5 * exp_each(2.0 * (mean + kept * deviator))))
         kept = ti.min(kept * limit / ti.max(strain, 1e-30), 1.0)
     return 1.0 - kept
 
@@ -65,9 +66,9 @@ def _limited(columns, maximum):
     M is that matrix and a turn behind it, which means nothing to an isotropic material.
     """
     squares, axes = symmetric_eigen(outer_square(columns))
-    logarithms = _deviator(0.5 * ti.log(ti.max(squares, 1e-30)))
+    logarithms = _deviator(0.5 * log_each(ti.max(squares, 1e-30)))
     strain = _equivalent(logarithms)
-    return from_axes(ti.exp(logarithms * ti.min(1.0, maximum / ti.max(strain, 1e-30))), axes)
+    return from_axes(exp_each(logarithms * ti.min(1.0, maximum / ti.max(strain, 1e-30))), axes)
 
 
 @ti.func
@@ -83,9 +84,9 @@ def _flow_tet(state: ti.template(), block, lane, plasticity, dt):
     limit = plasticity[1] + plasticity[0] / (3.0 * ti.max(shear, 1e-30))
     if strain > limit and strain < _WIDEST and determinant(B) > 0.0:
         squares, axes = symmetric_eigen(square)
-        logarithms = 0.5 * ti.log(ti.max(squares, 1e-12))
-        part = _excess(logarithms, limit) * (1.0 - ti.exp(-plasticity[2] * dt))
-        flowed = product(inverse, from_axes(ti.exp(-part * _deviator(logarithms)), axes))
+        logarithms = 0.5 * log_each(ti.max(squares, 1e-12))
+        part = _excess(logarithms, limit) * (1.0 - exp(-plasticity[2] * dt))
+        flowed = product(inverse, from_axes(exp_each(-part * _deviator(logarithms)), axes))
         original = _original_inverse_of(state, block, lane)
         scale = 1.0 / determinant(original)
         rest = transposed(cofactor(original))  # A0 over `scale`

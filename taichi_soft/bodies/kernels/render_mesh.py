@@ -107,7 +107,7 @@ def write_render_mesh(
         for lane in range(LANES):
             j = lane & (LANES - 1)
             square = nx[j] * nx[j] + ny[j] * ny[j] + nz[j] * nz[j]
-            scale = ti.rsqrt(ti.max(square, NO_LENGTH))
+            scale = 1.0 / ti.sqrt(ti.max(square, NO_LENGTH))
             is_sound = square > NO_LENGTH
             nx[j] = ti.select(is_sound, nx[j] * scale, 0.0)
             ny[j] = ti.select(is_sound, ny[j] * scale, 0.0)

@@ -94,7 +94,7 @@ def write_skin(
             n = floats[at + 3 * LANES] * b.cross(c) + floats[at + 4 * LANES] * c.cross(a)
             n += floats[at + 5 * LANES] * a.cross(b)
             square = n.dot(n)
-            scale = ti.rsqrt(ti.max(square, NO_LENGTH))
+            scale = 1.0 / ti.sqrt(ti.max(square, NO_LENGTH))
             has_length = square > NO_LENGTH
             for k in ti.static(range(3)):
                 drawn[LANES * k + lane] = x[k]

@@ -7,6 +7,7 @@ are between.
 
 from taichi_soft.bodies.kernels.particles import gravity_on
 from taichi_soft.bodies.status import ACTIVE, DAMPED, FEELS_REACTION, PUSHED, SHELTERED, SKIPPING
+from taichi_soft.core.math.elementary import exp
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 
@@ -16,7 +17,7 @@ def push_particles(state: ti.template(), body, seconds):
     """Change the velocities of one body by what pushes and linear damping do in `seconds`."""
     drives = state.body_drives[body]
     if drives & (PUSHED | DAMPED) != 0:
-        keep = ti.exp(-seconds * state.body_damping[body])
+        keep = exp(-seconds * state.body_damping[body])
         lasting = ti.select(drives & PUSHED != 0, seconds, 0.0)
         particles = state.body_particles[body]
         for p in range(particles[0], particles[1]):

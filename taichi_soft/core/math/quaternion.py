@@ -1,5 +1,6 @@
 """Unit quaternions (x, y, z, w)."""
 
+from taichi_soft.core.math.elementary import cos_sin
 from taichi_soft.core.runtime import ti
 
 
@@ -26,8 +27,8 @@ def spun(q, rotation):
     result = q
     if angle2 > 0.0:
         angle = ti.sqrt(angle2)
-        axis = rotation * (ti.sin(0.5 * angle) / angle)
-        w = ti.cos(0.5 * angle)
+        w, sine = cos_sin(0.5 * angle)
+        axis = rotation * (sine / angle)
         turn = axis * q.w + q.xyz * w + axis.cross(q.xyz)
         result = ti.Vector([turn.x, turn.y, turn.z, w * q.w - axis.dot(q.xyz)])
     return result

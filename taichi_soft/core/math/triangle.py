@@ -1,5 +1,6 @@
 """Geometry of one triangle: what is nearest, what a line of sight meets, how much of the view it fills."""
 
+from taichi_soft.core.math.elementary import atan2
 from taichi_soft.core.runtime import ti
 
 _TINY = 1e-37
@@ -69,7 +70,7 @@ def solid_angle(a, b, c):
     """
     la, lb, lc = a.norm(), b.norm(), c.norm()
     down = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb
-    return 2.0 * ti.atan2(a.dot(b.cross(c)), down)
+    return 2.0 * atan2(a.dot(b.cross(c)), down)
 
 
 @ti.func

@@ -2,6 +2,7 @@
 
 from taichi_soft.core.constants import LANES
 from taichi_soft.core.math.eigen import symmetric_eigen
+from taichi_soft.core.math.elementary import acos, cos_sin
 from taichi_soft.core.math.tensors import determinant, product, scaled_plus_identity, trace
 from taichi_soft.core.runtime import ti
 from taichi_soft.elements.kernels.elastic import BLOCK_BITS, elasticity_of, particles_of, rest_inverse_of
@@ -36,7 +37,8 @@ def _largest_principal(mean, squares, determinant):
     """
     radius = ti.sqrt(squares / 6.0)
     cosine = 0.5 * determinant / ti.max(radius * radius * radius, 1e-30)
-    return mean + 2.0 * radius * ti.cos(ti.acos(ti.max(ti.min(cosine, 1.0), -1.0)) / 3.0)
+    third, _ = cos_sin(acos(ti.max(ti.min(cosine, 1.0), -1.0)) / 3.0)
+    return mean + 2.0 * radius * third
 
 
 @ti.func

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from taichi_soft.core.math.elementary import atan2, cos_sin
 from taichi_soft.core.runtime import ti
 from taichi_soft.elements.laws.bonds import Bonds, Floats, columns, member_columns
 from taichi_soft.elements.laws.cmpm import moduli
@@ -37,7 +38,7 @@ def tilt(axis, arm, height, rest_angle, weight):
     across = arm - axis * rise
     distance = ti.max(ti.sqrt(across.dot(across)), 1e-30)
     # By a name: within a vector's expression a real function would ask for the angle once per component.
-    angle = ti.atan2(rise - height, distance)
+    angle = atan2(rise - height, distance)
     return across * (weight * (angle - rest_angle) / distance)
 
 
@@ -45,7 +46,7 @@ def tilt(axis, arm, height, rest_angle, weight):
 def tilted_normal(axis, push):
     """The unit vector `axis` turned away from `push` by an angle of its length."""
     angle = ti.sqrt(push.dot(push))
-    cosine, sine = ti.cos(angle), ti.sin(angle)
+    cosine, sine = cos_sin(angle)
     return axis * cosine - push * ti.select(angle > 1e-6, sine / ti.max(angle, 1e-6), 1.0)
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from taichi_soft.bodies.layout import BodyArrays, BondArrays
 from taichi_soft.core.constants import GRAVITY_EARTH
 from taichi_soft.core.errors import DeviceError
-from taichi_soft.core.subnormals import without_subnormals
+from taichi_soft.core.float_environment import with_usual_floats
 
 SOURCE = Path(__file__).with_name("baseline.cpp")
 RELAXED = (
@@ -77,7 +77,7 @@ class Baseline:
         tets = len(body.tet_vertices) if looks_at_tets else 0
         self._counts = [ctypes.c_int(n) for n in (len(body.mass), tets, len(body.edge_vertices))]
 
-    @without_subnormals
+    @with_usual_floats
     def step(self, substeps: int, h: float) -> None:
         """Make `substeps` substeps of `h` [s], in free fall."""
         pointers = [rows.ctypes.data_as(ctypes.c_void_p) for rows in self._arrays]

@@ -12,6 +12,7 @@ may be too long for these, and parts of them would tremble for ever. They get mo
 
 from taichi_soft.bodies.status import PLACED
 from taichi_soft.core.constants import LANES
+from taichi_soft.core.math.elementary import exp
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.math.svd import nearest_rotation
 from taichi_soft.core.math.tensors import determinant
@@ -207,7 +208,7 @@ def kept_while_caught(state: ti.template(), body, h, is_first):
     """
     age, keep = state.body_patience[body], 1.0
     if age >= PATIENCE:
-        keep = ti.exp(-FADING * h)
+        keep = exp(-FADING * h)
     elif is_first and age >= -RAISING_STEPS and age < 0:
         keep = CALMING
     return keep

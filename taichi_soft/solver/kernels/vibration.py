@@ -15,6 +15,7 @@ from taichi_soft.bodies.kernels.particles import gravity_on
 from taichi_soft.bodies.status import FEELS_REACTION
 from taichi_soft.contact.distances.floor import resolve_floor
 from taichi_soft.core.constants import LANES, ROW_BITS
+from taichi_soft.core.math.elementary import exp
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.runtime import ti
 from taichi_soft.core.types import Integrator
@@ -228,7 +229,7 @@ def kept_vibration(state: ti.template(), body, h, s, substeps):
         while times < substeps and substeps % times == 0:
             times += 1
         if (s + 1) * times // substeps > s * times // substeps:
-            keep = ti.exp(-ti.min(rate * whole / times, MOST_FADING))
+            keep = exp(-ti.min(rate * whole / times, MOST_FADING))
     return keep
 
 

@@ -1,0 +1,166 @@
+"""Elementary functions by arithmetic alone, so that every processor and system gives the same bits.
+
+A C library's `expf` and its like differ in their last bits from one system to the next. Here arguments are
+brought near 0, where Taylor's series are short. Results are within 4 ulps.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from taichi_soft.core.runtime import ti
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """A floating-point format, with what is found to its last place in it."""
+
+    real: Any
+    whole: Any  # integers of as many bits
+    fraction: int  # bits of the fraction
+    bias: int  # of the exponent
+    root_half: int  # bits of the square root of 1/2
+    largest: float  # whose power, and the reciprocal of that, is a normal number
+    ln2: tuple[float, float]  # log(2) in two parts, the first of which times any exponent is exact
+    terms: tuple[int, int, int, int]  # of the series of exp, log, cosine and sine, arctangent
+
+
+_SINGLE = _Kind(
+    real=ti.f32,
+    whole=ti.i32,
+    fraction=23,
+    bias=127,
+    root_half=0x3F3504F3,
+    largest=87.0,
+    ln2=(float.fromhex("0x1.62ep-1"), float.fromhex("0x1.0bfbe8e7bcd5ep-15")),
+    terms=(6, 5, 5, 9),
+)
+_DOUBLE = _Kind(
+    real=ti.f64,
+    whole=ti.i64,
+    fraction=52,
+    bias=1023,
+    root_half=0x3FE6A09E667F3BCD,
+    largest=708.0,
+    ln2=(float.fromhex("0x1.62e42feep-1"), float.fromhex("0x1.a39ef35793c76p-33")),
+    terms=(12, 11, 9, 21),
+)
+_LOG2_E, _TAN_EIGHTH = 1.0 / math.log(2.0), math.tan(math.pi / 8.0)
+_HALF_PI = float.fromhex("0x1.921fb544p+0"), float.fromhex("0x1.0b4611a626331p-34")
+"""pi / 2 in two parts, the first of which times any whole number below 2^20 is exact in 64 bits."""
+
+# Coefficients after the first terms: 1 + x of exp, 2 s of log, 1 and x of cosine and sine, x of arctangent.
+_EXP = [1.0 / math.factorial(k) for k in range(2, 14)]
+_LOG = [2.0 / (2 * k + 1) for k in range(1, 12)]
+_COS = [(-1.0) ** k / math.factorial(2 * k) for k in range(1, 10)]
+_SIN = [(-1.0) ** k / math.factorial(2 * k + 1) for k in range(1, 10)]
+_ATAN = [(-1.0) ** k / (2 * k + 1) for k in range(1, 22)]
+
+
+def _is_double(x: Any) -> bool:
+    """As Taichi compiles a kernel: whether a number in it has 64 bits."""
+    return bool(x.ptr.get_rvalue_type() == ti.f64)
+
+
+@ti.func
+def _series(coefficients: ti.template(), count: ti.template(), x, kind: ti.template()):
+    """Sum of the first coefficients[k] x^k. Constants are wrapped: Taichi takes a bare one for 32 bits."""
+    total = kind.real(coefficients[count - 1])
+    for k in ti.static(range(count - 2, -1, -1)):
+        total = total * x + kind.real(coefficients[k])
+    return total
+
+
+@ti.func
+def _exp(x, kind: ti.template()):
+    near = ti.min(ti.max(x, kind.real(-kind.largest)), kind.real(kind.largest))
+    times = ti.floor(near * kind.real(_LOG2_E) + kind.real(0.5))
+    rest = (near - times * kind.real(kind.ln2[0])) - times * kind.real(kind.ln2[1])
+    exponent = ti.cast(times, kind.whole) + kind.whole(kind.bias)
+    power = ti.bit_cast(exponent << kind.whole(kind.fraction), kind.real)  # 2^times
+    found = kind.real(1.0) + (rest + rest * rest * _series(_EXP, kind.terms[0], rest, kind))
+    return ti.select(x < kind.real(-kind.largest), kind.real(0.0), found * power)
+
+
+@ti.func
+def _log(x, kind: ti.template()):
+    # Without the cast Taichi 1.7 takes the bits of a parameter for a number to convert, and crashes.
+    bits = ti.bit_cast(ti.cast(x, kind.real), kind.whole)
+    # The fraction begins anew at the square root of 1/2, so that it is near 1 on both sides.
+    exponent = (bits - kind.whole(kind.root_half)) >> kind.whole(kind.fraction)
+    m = ti.bit_cast(bits - (exponent << kind.whole(kind.fraction)), kind.real)
+    s = (m - kind.real(1.0)) / (m + kind.real(1.0))
+    times, square = ti.cast(exponent, kind.real), s * s
+    found = kind.real(2.0) * s + s * square * _series(_LOG, kind.terms[1], square, kind)
+    return (found + times * kind.real(kind.ln2[1])) + times * kind.real(kind.ln2[0])
+
+
+@ti.func
+def _cos_sin(x, kind: ti.template()):
+    wide = ti.cast(x, ti.f64)
+    times = ti.floor(wide * ti.f64(2.0 / math.pi) + ti.f64(0.5))
+    rest = ti.cast((wide - times * ti.f64(_HALF_PI[0])) - times * ti.f64(_HALF_PI[1]), kind.real)
+    square = rest * rest
+    cosine = kind.real(1.0) + square * _series(_COS, kind.terms[2], square, kind)
+    sine = rest + rest * square * _series(_SIN, kind.terms[2], square, kind)
+    quarter = ti.cast(times, ti.i32) & 3
+    is_odd, is_back = (quarter & 1) == 1, quarter >= 2
+    along, across = ti.select(is_odd, -sine, cosine), ti.select(is_odd, cosine, sine)
+    return ti.select(is_back, -along, along), ti.select(is_back, -across, across)
+
+
+@ti.func
+def _atan2(y, x, kind: ti.template()):
+    up, along = ti.abs(y), ti.abs(x)
+    longer = ti.max(up, along)
+    t = ti.min(up, along) / ti.select(longer > 0, longer, kind.real(1.0))
+    is_steep = t > kind.real(_TAN_EIGHTH)
+    t = ti.select(is_steep, (t - kind.real(1.0)) / (t + kind.real(1.0)), t)
+    square = t * t
+    angle = t + t * square * _series(_ATAN, kind.terms[3], square, kind)
+    angle = ti.select(is_steep, kind.real(math.pi / 4.0) + angle, angle)
+    angle = ti.select(up > along, kind.real(math.pi / 2.0) - angle, angle)
+    angle = ti.select(x < 0, kind.real(math.pi) - angle, angle)
+    return ti.select(y < 0, -angle, angle)
+
+
+@ti.func
+def exp(x):
+    """e^x of a number. The largest is that of 87 (64 bits: 708), and below -87 (-708) it is 0."""
+    return _exp(x, _DOUBLE) if ti.static(_is_double(x)) else _exp(x, _SINGLE)
+
+
+@ti.func
+def log(x):
+    """Natural logarithm of a number that is normal, and above 0."""
+    return _log(x, _DOUBLE) if ti.static(_is_double(x)) else _log(x, _SINGLE)
+
+
+@ti.func
+def exp_each(v):
+    """`exp` of each component of a vec3."""
+    return ti.Vector([exp(v[0]), exp(v[1]), exp(v[2])])
+
+
+@ti.func
+def log_each(v):
+    """`log` of each component of a vec3."""
+    return ti.Vector([log(v[0]), log(v[1]), log(v[2])])
+
+
+@ti.func
+def cos_sin(x):
+    """Cosine and sine of an angle [rad] below 10^6: two numbers."""
+    return _cos_sin(x, _DOUBLE) if ti.static(_is_double(x)) else _cos_sin(x, _SINGLE)
+
+
+@ti.func
+def atan2(y, x):
+    """Angle [rad] from the x axis to (x, y), from -pi to pi; 0 for (0, 0)."""
+    return _atan2(y, x, _DOUBLE) if ti.static(_is_double(x)) else _atan2(y, x, _SINGLE)
+
+
+@ti.func
+def acos(x):
+    """Angle [rad] whose cosine is a number from -1 to 1."""
+    return atan2(ti.sqrt((1.0 - x) * (1.0 + x)), x)

@@ -1,0 +1,96 @@
+"""Kernels know subnormal numbers in every thread, whatever the thread that calls them does."""
+
+import ctypes
+import platform
+import threading
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+
+from taichi_soft import init
+from taichi_soft.core.runtime import ti
+
+ROWS = 4096
+SMALL, SMALLER = np.float32(1e-30), np.float32(1e-10)  # their product is subnormal: under 1.2e-38
+
+
+@ti.kernel
+def multiply_here(a: ti.types.ndarray(ndim=1), b: ti.f32, out: ti.types.ndarray(ndim=1)):
+    ti.loop_config(serialize=True)
+    for i in range(a.shape[0]):
+        out[i] = a[i] * b
+
+
+@ti.kernel
+def multiply_by_all(a: ti.types.ndarray(ndim=1), b: ti.f32, out: ti.types.ndarray(ndim=1)):
+    ti.loop_config(block_dim=16)
+    for i in range(a.shape[0]):
+        out[i] = a[i] * b
+
+
+@ti.kernel
+def choose(a: ti.types.ndarray(ndim=1), b: ti.types.ndarray(ndim=1), out: ti.types.ndarray(ndim=2)):
+    for i in range(a.shape[0]):
+        out[0, i] = ti.min(a[i], b[i])
+        out[1, i] = ti.max(a[i], b[i])
+        out[2, i] = ti.max(0.0, a[i])
+        out[3, i] = ti.min(ti.Vector([a[i], b[i]]), 0.0)[0]
+
+
+def products(kernel):
+    init()
+    found = np.ones(ROWS, np.float32)
+    kernel(np.full(ROWS, SMALL), SMALLER, found)
+    return found
+
+
+def has_subnormals():
+    return bool(np.all(np.full(16, SMALL) * SMALLER > 0.0))
+
+
+@contextmanager
+def taking_them_for_zero():
+    """As a library may have left a thread: with the bits of x86 for it set."""
+    c, environment, before = ctypes.CDLL(None), (ctypes.c_uint32 * 8)(), (ctypes.c_uint32 * 8)()
+    c.fegetenv(before)
+    c.fegetenv(environment)
+    environment[7] |= 0x8040  # of MXCSR: results, and what is read
+    c.fesetenv(environment)
+    try:
+        yield
+    finally:
+        c.fesetenv(before)
+
+
+@pytest.mark.parametrize("kernel", [multiply_here, multiply_by_all])
+def test_a_subnormal_product_is_one_in_whichever_thread_a_kernel_runs(kernel):
+    found = [products(kernel)]
+    other = threading.Thread(target=lambda: found.append(products(kernel)))
+    other.start()
+    other.join()
+    for rows in found:
+        np.testing.assert_array_equal(rows, SMALL * SMALLER)
+
+
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="another processor has other bits")
+@pytest.mark.parametrize("kernel", [multiply_here, multiply_by_all])
+def test_a_caller_that_takes_subnormal_numbers_for_zero_gets_the_same_and_stays_so(kernel):
+    with taking_them_for_zero():
+        assert not has_subnormals()
+        rows = products(kernel)
+        assert not has_subnormals()
+    np.testing.assert_array_equal(rows, SMALL * SMALLER)
+    assert has_subnormals()
+
+
+def test_of_two_zeros_and_of_a_number_and_nan_the_second_or_the_constant_is_taken():
+    init()
+    a = np.float32([0.0, -0.0, np.nan, 1.0, np.nan])
+    b = np.float32([-0.0, 0.0, 1.0, np.nan, np.nan])
+    found = np.zeros((4, 5), np.float32)
+    choose(a, b, found)
+    for rows, wanted in zip(found, [b, b, [0, 0, 0, 1, 0], [0, 0, 0, 0, 0]], strict=True):
+        np.testing.assert_array_equal(rows, np.float32(wanted))
+    assert np.signbit(found[:2, :2]).tolist() == [[True, False]] * 2
+    assert not np.signbit(found[2:, :2]).any()
