@@ -9,6 +9,9 @@ from taichi_soft.core.runtime import ti
 SWEEPS = 6
 """Convergence is quadratic once sorted out: four sweeps reach float32, six reach float64."""
 
+NOTHING = 1e-17
+"""What is smaller beside the diagonal, over the diagonal, changes nothing there, in float64 either."""
+
 
 @ti.func
 def symmetric_eigen(columns):
@@ -26,7 +29,7 @@ def symmetric_eigen(columns):
         for p, q in ti.static(((0, 1), (0, 2), (1, 2))):
             r = 3 - p - q
             apq = S[p, q]
-            if apq != 0.0:
+            if ti.abs(apq) > NOTHING * (ti.abs(S[p, p]) + ti.abs(S[q, q])):
                 theta = (S[q, q] - S[p, p]) / (2.0 * apq)
                 t = 1.0 / (ti.abs(theta) + ti.sqrt(theta * theta + 1.0))
                 if theta < 0.0:
