@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from taichi_soft.bodies.description import BodyDescription
 from taichi_soft.bodies.vibration import Vibration, vibration_of
 from taichi_soft.cages.connected import components
+from taichi_soft.core.residue import rounded
 
 Floats = NDArray[np.float64]
 
@@ -58,7 +59,7 @@ def first_mode(body: BodyDescription, change: float = _CHANGE) -> tuple[float, F
     frequencies, shapes = lowest_modes(body, 1, change)
     if len(frequencies) == 0:
         return 0.0, np.zeros_like(body.mesh.vertices)
-    return float(frequencies[0]), shapes[0] / np.abs(shapes[0]).max()
+    return rounded(float(frequencies[0])), shapes[0] / np.abs(shapes[0]).max()
 
 
 def lowest_modes(body: BodyDescription, count: int, change: float) -> tuple[Floats, Floats]:
@@ -74,6 +75,10 @@ def lowest_modes(body: BodyDescription, count: int, change: float) -> tuple[Floa
     if bent.shape[1] == 0:
         return np.zeros(0), np.zeros((0, *body.mesh.vertices.shape))
     scale, block = vibration.diagonal()[:, None], count + _MORE
+    # Modes that no polynomial has any part of would be found by way of round-off, sooner or later.
+    anything = np.random.default_rng(0).normal(size=(len(bent), 1))
+    anything -= rigid @ (rigid.T @ anything)
+    bent = np.hstack([bent, anything / np.linalg.norm(anything)])
     u, image, value = _ritz(bent, _applied(vibration, bent), block)
     conjugate = conjugate_image = np.zeros((len(u), 0))
     sums = [value[:count].sum()]

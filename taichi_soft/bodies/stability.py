@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from taichi_soft.bodies.description import BodyDescription
 from taichi_soft.bodies.vibration import TetVibration, Vibration, vibration_of
 from taichi_soft.core.errors import OptionError
+from taichi_soft.core.residue import rounded
 from taichi_soft.elements.laws import ElementModel, fit_model
 from taichi_soft.elements.laws.bonds import Bonds
 from taichi_soft.elements.materials import AnyMaterial
@@ -115,9 +116,11 @@ def stable_step(mesh: BodyMesh, material: AnyMaterial, model: ElementModel) -> S
     elif body.bonds is not None:
         stiffest_edge = _stiffest_edge(body, body.bonds)
     frequency2, u = largest_eigenvalue(vibration.apply, start)
-    frequency2 = min(frequency2, most)
+    frequency2 = rounded(min(frequency2, most))
     undamped = 2.0 / np.sqrt(frequency2)
-    limit = _damped_limit(vibration, undamped, u, start) if vibration.is_damped else undamped
+    limit = undamped
+    if vibration.is_damped:
+        limit = min(rounded(_damped_limit(vibration, undamped, u, start)), undamped)
     return StableStep(
         float(limit),
         stiffest_tet,

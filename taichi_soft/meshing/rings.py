@@ -97,5 +97,6 @@ class EdgeRings:
         angle = np.arctan2(
             np.einsum("ka,ka->k", np.cross(axis, first), arm), np.einsum("ka,ka->k", first, arm)
         )
-        order = np.lexsort((angle % (2 * np.pi), edge))
+        # Rounded, so that the first of an edge comes first: round-off may turn it to just below a full turn.
+        order = np.lexsort((np.round(angle, 9) % (2 * np.pi), edge))
         return edge[order], vertex[order]

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.core.checks import as_count, as_positive
+from taichi_soft.core.residue import without_residue
 from taichi_soft.meshing.arrays import FloatArray, require_tet_count
 from taichi_soft.meshing.tet_mesh import TetMesh
 
@@ -95,11 +96,11 @@ def _shells(face: FloatArray, lattice: NDArray[np.int64]) -> FloatArray:
     angle = np.arccos(face[0] @ face[1])
     # Sines of the parts of the angle, as along a great circle: even spacing, the same from both sides.
     weights = np.sin(lattice[:, :3] / np.maximum(step, 1)[:, None] * angle)
-    direction = weights @ face
+    direction = (weights[:, :, None] * face).sum(axis=1)  # in one order everywhere
     length = np.linalg.norm(direction, axis=1)
     radius = step / lattice.sum(axis=1)
     points: FloatArray = direction * (radius / np.where(length > 0, length, 1.0))[:, None]
-    return points
+    return without_residue(points)
 
 
 def _split(vertices: FloatArray, octahedra: NDArray[np.int64]) -> NDArray[np.int64]:

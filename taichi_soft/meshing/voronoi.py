@@ -229,8 +229,8 @@ Side = tuple[FloatArray, FloatArray, int, int]
 
 def _joined(parts: list[tuple[FloatArray, FloatArray, int]], scale: float) -> list[Side]:
     """Stretches of one straight side, each from one tetrahedron to another, end to end where they touch."""
-    direction = max((b - a for a, b, _ in parts), key=lambda d: float(d @ d))
-    parts = sorted(parts, key=lambda part: float(part[0] @ direction))
+    direction = max((b - a for a, b, _ in parts), key=lambda d: float((d * d).sum()))
+    parts = sorted(parts, key=lambda part: float((part[0] * direction).sum()))
     made: list[Side] = []
     for a, b, t in parts:
         if made and np.abs(made[-1][1] - a).max() < 1e-6 * scale:

@@ -8,6 +8,8 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
+from taichi_soft.core.residue import without_residue
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
@@ -46,6 +48,9 @@ class Bonds:
     normals: Floats | None = None
     masses: Floats | None = None
     expansion_modulus: Floats | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "ring_weights", without_residue(self.ring_weights, axis=0))
 
     @property
     def is_bond(self) -> NDArray[np.bool_]:

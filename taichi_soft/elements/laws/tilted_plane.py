@@ -72,7 +72,8 @@ def tilt_rows(rings: EdgeRings) -> tuple[Floats, Floats]:
 def _turn(axis: Floats, one: Floats, other: Floats) -> Floats:
     """Angle from `one` to `other` about `axis`, from 0 to 2 pi."""
     sine = np.einsum("sa,sa->s", axis, np.cross(one, other))
-    return np.asarray(np.arctan2(sine, np.einsum("sa,sa->s", one, other)) % (2 * np.pi))
+    angle = np.arctan2(sine, np.einsum("sa,sa->s", one, other))
+    return np.where(angle < -1e-9, angle + 2 * np.pi, np.maximum(angle, 0.0))
 
 
 def tilted_plane_bonds(mesh: TetMesh, material: Material, factor: float = 1.0) -> Bonds:

@@ -1,0 +1,26 @@
+"""What is left where numbers cancel: nothing but round-off, which differs from one processor to the next."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+SHARE = 1e-12
+"""Of the largest number, below which one is taken for round-off."""
+
+
+def rounded(value: float) -> float:
+    """A number found by iterations, to five digits: those that do not depend on round-off."""
+    return float(f"{value:.5g}")
+
+
+def without_residue(rows: Floats, axis: int | tuple[int, ...] = -1) -> Floats:
+    """Numbers, with zeros for those that are nothing beside the largest along some axes.
+
+    NumPy's products and inverses round in another order on another processor, so that what cancels is 0 here
+    and 1e-17 there. A 32-bit float keeps all digits of both.
+    """
+    size = np.abs(rows).max(axis=axis, keepdims=True, initial=0.0)
+    return np.where(np.abs(rows) > SHARE * size, rows, 0.0)
