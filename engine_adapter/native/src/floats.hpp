@@ -1,7 +1,7 @@
-// Subnormal numbers are zero to kernels, in whichever thread they run, and as they were to everybody else.
+// Kernels compute as IEEE 754 says, subnormal numbers included, in whichever thread they run and whatever the game
+// has its own threads do.
 #pragma once
 
-#include <cstdint>
 #if defined(__x86_64__) || defined(_M_X64)
 #include <xmmintrin.h>
 #endif
@@ -9,20 +9,20 @@
 namespace taichi_soft {
 
 #if defined(__x86_64__) || defined(_M_X64)
-class WithoutSubnormals {
+class WithUsualFloats {
  public:
-  WithoutSubnormals() : before_(_mm_getcsr()) { _mm_setcsr(before_ | 0x8040u); }
-  ~WithoutSubnormals() { _mm_setcsr(before_); }
-  WithoutSubnormals(const WithoutSubnormals&) = delete;
-  WithoutSubnormals& operator=(const WithoutSubnormals&) = delete;
+  WithUsualFloats() : before_(_mm_getcsr()) { _mm_setcsr(0x1F80u); }
+  ~WithUsualFloats() { _mm_setcsr(before_); }
+  WithUsualFloats(const WithUsualFloats&) = delete;
+  WithUsualFloats& operator=(const WithUsualFloats&) = delete;
 
  private:
   unsigned before_;
 };
 #else
-class WithoutSubnormals {
+class WithUsualFloats {
  public:
-  WithoutSubnormals() {}  // Taichi leaves other processors as they are
+  WithUsualFloats() {}
 };
 #endif
 

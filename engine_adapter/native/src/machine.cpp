@@ -69,7 +69,7 @@ TiArgument Machine::array(TiMemory memory, TiDataType type, uint32_t rows, uint3
 
 Machine::Machine(const Scene& scene, const std::string& kernels) {
   const std::lock_guard<std::mutex> lock(creation);
-  const WithoutSubnormals floats;  // threads that Taichi starts now compute so, too
+  const WithUsualFloats floats;  // threads that Taichi starts now compute so, too
   use_runtime_beside_library();
   runtime_ = ti_create_runtime(TI_ARCH_X64, 0);
   try {
@@ -106,7 +106,7 @@ TiMemory Machine::import(const void* data, size_t size) {
 }
 
 void Machine::launch(const char* kernel, const std::vector<TiArgument>& arguments) {
-  const WithoutSubnormals floats;
+  const WithUsualFloats floats;
   ti_launch_kernel(runtime_, kernels_.at(kernel), static_cast<uint32_t>(arguments.size()), arguments.data());
   ti_wait(runtime_);
   require_no_error("run a kernel");
