@@ -28,6 +28,7 @@ from taichi_soft.core.checks import as_count, as_indices, as_rotation, as_vector
 from taichi_soft.core.constants import POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.core.errors import MaterialError, MeshError, OptionError
 from taichi_soft.core.math.rotations import turned
+from taichi_soft.core.residue import weighted_sum
 from taichi_soft.core.serialisation import digest_of
 from taichi_soft.core.types import (
     CageMethodName,
@@ -433,7 +434,7 @@ class SoftBodyAsset:
     def center_of_mass(self) -> Floats:
         """Of its mesh, (3,) [m]."""
         masses = self.description.masses
-        return np.asarray(masses @ self.mesh.vertices / masses.sum())
+        return weighted_sum(masses, self.mesh.vertices) / masses.sum()
 
     @cached_property
     def rest_rows(self) -> Floats32:
@@ -512,4 +513,4 @@ def _mean_stiffness(body: BodyDescription) -> float:
         stiffness = body.per_tet("young")
     else:
         stiffness = np.trace(body.stiffness_matrices(), axis1=1, axis2=2)
-    return float(mesh.volumes @ stiffness / (mesh.volumes @ body.per_tet("density")))
+    return float((mesh.volumes * stiffness).sum() / (mesh.volumes * body.per_tet("density")).sum())

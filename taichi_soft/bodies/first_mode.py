@@ -47,7 +47,7 @@ def guessed_frequency(body: BodyDescription) -> float:
     if bent.shape[1] == 0:
         return 0.0
     _, _, value = _ritz(bent, _applied(vibration_of(body), bent), 1)
-    return float(np.sqrt(max(value[0], 0.0)))
+    return rounded(float(np.sqrt(max(value[0], 0.0))))
 
 
 def first_mode(body: BodyDescription, change: float = _CHANGE) -> tuple[float, Floats]:

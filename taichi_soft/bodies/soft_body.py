@@ -23,6 +23,7 @@ from taichi_soft.bodies.slots import Pools
 from taichi_soft.core.clock import Clock
 from taichi_soft.core.errors import StateError
 from taichi_soft.core.handles import Handle, Handles
+from taichi_soft.core.residue import weighted_sum
 from taichi_soft.core.settings import Settings
 from taichi_soft.core.threads import one_thread
 from taichi_soft.elements.materials import AnyMaterial
@@ -383,7 +384,8 @@ class SoftBody(Handle):
 
     def center_of_mass(self) -> Floats:
         """(3,) [m]."""
-        return np.asarray(self.masses @ self.positions().astype(np.float64) / self.masses.sum())
+        masses = self.masses
+        return weighted_sum(masses, self.positions().astype(np.float64)) / masses.sum()
 
 
 # What the library asks of a body, and no user does.

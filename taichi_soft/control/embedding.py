@@ -37,14 +37,14 @@ def places_at(body: SoftBody, points: Floats, names: list[str]) -> Places:
         )
     positions = body.positions().astype(np.float64)
     corners = positions[body.tets]
-    edges = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
-    is_solid = np.abs(np.linalg.det(edges)) > 1e-30
-    tets, starts, inverses = body.tets[is_solid], corners[is_solid, 0], np.linalg.inv(edges[is_solid])
+    a, b, c = np.moveaxis(corners[:, 1:] - corners[:, :1], 1, 0)
+    is_solid = np.abs((a * np.cross(b, c)).sum(axis=1)) > 1e-30
+    tets, corners = body.tets[is_solid], corners[is_solid]
     weights = np.empty((len(points), 4))
     chosen = np.zeros(len(points), dtype=np.int64)
     for i, point in enumerate(points):
-        rest = np.einsum("mab,mb->ma", inverses, point - starts)
-        least = np.minimum(rest.min(axis=1), 1.0 - rest.sum(axis=1)) if len(rest) else np.array([-np.inf])
+        found = barycentric(point, corners)
+        least = found.min(axis=1) if len(found) else np.array([-np.inf])
         chosen[i] = np.argmax(least)
         if not least[chosen[i]] >= FARTHEST:
             nearest = np.linalg.norm(positions - point, axis=1).min()
@@ -52,9 +52,17 @@ def places_at(body: SoftBody, points: Floats, names: list[str]) -> Places:
                 f"{names[i]} is too far from body {body.index}, {nearest:.4g} m from its nearest vertex: "
                 "bring the two together first, or name vertices by onto"
             )
-        weights[i] = [1.0 - rest[chosen[i]].sum(), *rest[chosen[i]]]
+        weights[i] = found[chosen[i]]
     weights[np.abs(weights) < 1e-4] = 0.0  # or neighbours would be held by what is none of theirs
     return Places(tets[chosen], weights / weights.sum(axis=1, keepdims=True))
+
+
+def barycentric(point: Floats, corners: Floats) -> Floats:
+    """Coordinates (m, 4) of a point (3,) in tetrahedra of corners (m, 4, 3), by Cramer's rule."""
+    a, b, c = np.moveaxis(corners[:, 1:] - corners[:, :1], 1, 0)
+    arm, across = point - corners[:, 0], np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
+    rest = (arm[:, None] * across).sum(axis=2) / (a * across[:, 0]).sum(axis=1)[:, None]
+    return np.concatenate([1.0 - rest.sum(axis=1, keepdims=True), rest], axis=1)
 
 
 def places_on(body: SoftBody, vertices: NDArray[np.int32]) -> Places:

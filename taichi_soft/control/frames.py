@@ -16,6 +16,7 @@ from taichi_soft.core.checks import as_flag, as_rotation, as_vector
 from taichi_soft.core.constants import POSITION_LIMIT
 from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.core.handles import Handle, recorded, serial_of
+from taichi_soft.core.math.rotations import turned
 from taichi_soft.core.serialisation import require_below, vector_of
 
 
@@ -219,8 +220,8 @@ class Frame(Handle):
                 raise StateError(
                     f"body {body.index} hangs from another frame as well: release it there before this jumps"
                 )
-        (axes, start), (turned, end) = _axes_and_place(present), _axes_and_place(pose)
-        turn = np.eye(3) if rotation is None else turned @ axes.T
+        (axes, start), (pose_axes, end) = _axes_and_place(present), _axes_and_place(pose)
+        turn = np.eye(3) if rotation is None else turned(pose_axes, axes)
         carry(bodies, turn, start, end, keep=keep)
         frames.present[self._number] = frames.coming[self._number] = pose
 

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies.soft_body import RowsOf, SoftBody, context_of, record_of
 from taichi_soft.control.change import change, mass_of, numbers, require_substeps, rows_of
+from taichi_soft.control.embedding import barycentric
 from taichi_soft.control.grab_patch import Patch, patch_round, point_between
 from taichi_soft.control.kernels.grabs import (
     CORNERS,
@@ -29,6 +30,7 @@ from taichi_soft.core.checks import as_array, as_count, as_number, as_vector
 from taichi_soft.core.constants import GRAVITY_EARTH
 from taichi_soft.core.errors import MeshError, OptionError, StateError
 from taichi_soft.core.handles import Handle, handles_of, recorded, serial_of
+from taichi_soft.core.residue import weighted_sum
 from taichi_soft.core.serialisation import below, require_below, require_finite, vector_of
 
 WEIGHTS = 10.0
@@ -212,7 +214,7 @@ def place_of(grab: Grab) -> NDArray[np.float64]:
     order = np.argsort(rows)
     vertices = order[np.searchsorted(rows, corners, sorter=order)]
     weights = row[PLACE].astype(np.float64)
-    return np.asarray(weights / weights.sum() @ body.mesh.vertices[vertices])
+    return weighted_sum(weights / weights.sum(), body.mesh.vertices[vertices])
 
 
 def hold_at(grab: Grab, place: NDArray[np.float64]) -> None:
@@ -247,9 +249,6 @@ def _tetrahedron_at(
 ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
     """Corners and barycentric coordinates of a point of the rest shape, (4,) each; of one outside in the
     tetrahedron that it is least outside of."""
-    ends = body.mesh.vertices[body.tets]
-    arms = np.swapaxes(ends[:, 1:] - ends[:, :1], 1, 2)
-    rest = np.linalg.solve(arms, (place - ends[:, 0])[..., None])[..., 0]
-    weights = np.concatenate([1.0 - rest.sum(axis=1, keepdims=True), rest], axis=1)
+    weights = barycentric(place, body.mesh.vertices[body.tets])
     best = weights.min(axis=1).argmax()
     return body.tets[best], weights[best]

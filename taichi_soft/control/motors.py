@@ -26,6 +26,8 @@ from taichi_soft.core.checks import as_flag, as_number, as_vector
 from taichi_soft.core.constants import VELOCITY_LIMIT
 from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.core.handles import Handle, handles_of, recorded, serial_of
+from taichi_soft.core.math.rotations import length_of
+from taichi_soft.core.residue import kept
 from taichi_soft.core.serialisation import below, indices_below, require_finite, vector_of
 
 LARGEST_LIMIT = 1e12
@@ -272,7 +274,7 @@ class Motors(Numbered[Motor]):
         limit = _as_limit(max_torque if turns else max_force, "max_torque" if turns else "max_force")
         wanted, stays = _as_speed(speed, turns), as_flag(is_fixed, "is_fixed")
         direction = as_vector(axis, "axis", "")
-        length = float(np.linalg.norm(direction))
+        length = length_of(direction)
         if not length > 0.0:
             raise OptionError(f"axis must have a direction, got {direction.tolist()}")
         if point is not None and not (turns and stays):
@@ -292,7 +294,7 @@ class Motors(Numbered[Motor]):
         if not stays:
             rest = body.mesh.vertices[vertices]
             _require_width(rest, masses)
-            drive.axis = best_fitting_pose(rest, positions, masses).rotation.T @ drive.axis
+            drive.axis = kept(best_fitting_pose(rest, positions, masses).rotation.T @ drive.axis)
         free = self.free_number()
         used = self.rows_in_use
         if used + len(vertices) > MOTOR_ROWS:

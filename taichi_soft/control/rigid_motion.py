@@ -16,6 +16,7 @@ from taichi_soft.control.rigid_transform import jump_to
 from taichi_soft.core.checks import as_flag, as_rotation, as_vector
 from taichi_soft.core.constants import POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.core.errors import OptionError
+from taichi_soft.core.math.rotations import turned
 
 
 def set_velocity(body: SoftBody, linear: ArrayLike, angular: ArrayLike) -> None:
@@ -42,7 +43,7 @@ def teleport(body: SoftBody, position: ArrayLike, rotation: Any, keep_velocity: 
     left = built.box_of(body)
     free = np.setdiff1d(outer_vertices(body.mesh), body.pinned)
     if len(free):
-        points = (body.positions()[free].astype(np.float64) - body.center_of_mass()) @ turn.T + target
+        points = turned(body.positions()[free].astype(np.float64) - body.center_of_mass(), turn) + target
         built.require_clear(body, points)
     lowest = -np.inf if floor is None else floor
     bottom, top, farthest = jump_to(body, target, turn, lowest=lowest, keep=keep)

@@ -12,6 +12,7 @@ from taichi_soft.control.change import attempt, rouse
 from taichi_soft.control.kernels.rigid_motion import jump
 from taichi_soft.core.constants import POSITION_LIMIT
 from taichi_soft.core.errors import OptionError
+from taichi_soft.core.math.rotations import turned
 
 Floats = NDArray[np.float64]
 
@@ -35,7 +36,7 @@ def carry(bodies: Sequence[SoftBody], turn: Floats, start: Floats, end: Floats, 
 
     Raises: OptionError, with nothing changed, where one of them would be out of reach.
     """
-    centers = [turn @ (body.center_of_mass() - start) + end for body in bodies]
+    centers = [turned((body.center_of_mass() - start)[None], turn)[0] + end for body in bodies]
     for body, center in zip(bodies, centers, strict=True):
         _, _, farthest = jump_to(body, center, turn, lowest=np.inf, keep=keep)  # only looks
         if not farthest < POSITION_LIMIT:

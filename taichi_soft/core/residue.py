@@ -24,3 +24,13 @@ def without_residue(rows: Floats, axis: int | tuple[int, ...] = -1) -> Floats:
     """
     size = np.abs(rows).max(axis=axis, keepdims=True, initial=0.0)
     return np.where(np.abs(rows) > SHARE * size, rows, 0.0)
+
+
+def weighted_sum(weights: Floats, rows: Floats) -> Floats:
+    """Sum of rows (n, 3), each times its weight (n,), made in one order."""
+    return np.asarray((weights[:, None] * rows).sum(axis=0))
+
+
+def kept(rows: Floats) -> Floats:
+    """Numbers with the digits of a 32-bit float, and without residue, as what a world remembers has to be."""
+    return without_residue(rows).astype(np.float32).astype(np.float64)

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cmath>
+#include <utility>
 
 namespace taichi_soft {
 
@@ -59,6 +60,34 @@ inline Quaternion multiplied(const Quaternion& second, const Quaternion& first) 
           w * u - (a * d + b * e + c * f)};
 }
 
+// Cosine and sine of an angle [rad]. C libraries disagree about last bits: this is as Python computes, too.
+inline std::pair<double, double> cos_sin(double angle) {
+  constexpr double whole = 6.283185307179586;
+  const double part = (angle - whole * std::floor(angle / whole + 0.5)) / 8.0, square = part * part;
+  double behind = 0.0, versine = 0.0;
+  for (int k = 16; k > 0; k -= 2) {
+    behind = (1.0 - behind) * square / (k * (k + 1));
+    versine = (1.0 - versine) * square / (k * (k - 1));
+  }
+  double sine = part * (1.0 - behind);
+  for (int i = 0; i < 3; ++i) {
+    const double before = sine;
+    sine = 2.0 * before * (1.0 - versine);
+    versine = 2.0 * before * before;
+  }
+  return {1.0 - versine, sine};
+}
+
+// The angle [rad] of a sine and a cosine of 0 or more.
+inline double angle_of(double sine, double cosine) {
+  double tangent = sine / (1.0 + cosine);
+  tangent = tangent / (1.0 + std::sqrt(1.0 + tangent * tangent));
+  const double square = tangent * tangent;
+  double behind = 0.0;
+  for (int k = 41; k > 1; k -= 2) behind = square * (1.0 / k - behind);
+  return 4.0 * tangent * (1.0 - behind);
+}
+
 // The shortest turn from one quaternion to another: axis times angle [rad].
 inline Vector rotation_vector(const Quaternion& start, const Quaternion& end) {
   Quaternion turn = multiplied(end, {-start[0], -start[1], -start[2], start[3]});
@@ -71,16 +100,17 @@ inline Vector rotation_vector(const Quaternion& start, const Quaternion& end) {
     for (double& each : axis) each = 2.0 * each;
     return axis;
   }
-  const double angle = 2.0 * std::atan2(sine, turn[3]);
+  const double angle = 2.0 * angle_of(sine, turn[3]);
   for (double& each : axis) each = each / sine * angle;
   return axis;
 }
 
 inline Quaternion turned_by(const Quaternion& quaternion, const Vector& vector) {
   const double angle = length_of(vector);
-  const double share = angle == 0.0 ? 0.5 : std::sin(0.5 * angle) / angle;
+  const auto [cosine, sine] = cos_sin(0.5 * angle);
+  const double share = angle == 0.0 ? 0.5 : sine / angle;
   Quaternion result =
-      multiplied({vector[0] * share, vector[1] * share, vector[2] * share, std::cos(0.5 * angle)}, quaternion);
+      multiplied({vector[0] * share, vector[1] * share, vector[2] * share, cosine}, quaternion);
   const double length = length_of(result);
   for (double& each : result) each = each / length;
   return result;

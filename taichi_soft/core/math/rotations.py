@@ -1,7 +1,7 @@
 """Rotations as unit quaternions (x, y, z, w), in float64.
 
 Each sum is written out in its order, so that another language gets the same bits: libraries of linear algebra
-round a dot product as they like.
+round a dot product as they like, and so do C libraries with sine and arctangent.
 """
 
 from __future__ import annotations
@@ -79,12 +79,37 @@ def rotation_vector(start: Floats, end: Floats) -> Floats:
     sine = length_of(turn[:3])
     if sine < 1e-12:
         return np.asarray(2.0 * turn[:3])
-    return np.asarray(turn[:3] / sine * (2.0 * math.atan2(sine, turn[3])))
+    return np.asarray(turn[:3] / sine * (2.0 * _angle(sine, turn[3])))
 
 
 def turned_by(quaternion: Floats, vector: Floats) -> Floats:
     """A quaternion turned further by a rotation vector [rad], of unit length."""
     angle = length_of(vector)
-    axis = vector * (0.5 if angle == 0.0 else math.sin(0.5 * angle) / angle)
-    result = multiplied(np.r_[axis, math.cos(0.5 * angle)], quaternion)
+    cosine, sine = _cos_sin(0.5 * angle)
+    axis = vector * (0.5 if angle == 0.0 else sine / angle)
+    result = multiplied(np.r_[axis, cosine], quaternion)
     return np.asarray(result / length_of(result))
+
+
+def _cos_sin(angle: float) -> tuple[float, float]:
+    """Taylor's series of an eighth of the angle [rad], which is doubled three times."""
+    part = (angle - math.tau * math.floor(angle / math.tau + 0.5)) / 8.0
+    square = part * part
+    behind = versine = 0.0  # the sine is part (1 - behind), the cosine is 1 - versine
+    for k in range(16, 0, -2):
+        behind = (1.0 - behind) * square / (k * (k + 1))
+        versine = (1.0 - versine) * square / (k * (k - 1))
+    sine = part * (1.0 - behind)
+    for _ in range(3):
+        sine, versine = 2.0 * sine * (1.0 - versine), 2.0 * sine * sine
+    return 1.0 - versine, sine
+
+
+def _angle(sine: float, cosine: float) -> float:
+    """Gregory's series of the tangent of a quarter. The cosine is 0 or more. Returns: radians."""
+    tangent = sine / (1.0 + cosine)
+    tangent = tangent / (1.0 + math.sqrt(1.0 + tangent * tangent))
+    square, behind = tangent * tangent, 0.0
+    for k in range(41, 1, -2):
+        behind = square * (1.0 / k - behind)
+    return 4.0 * tangent * (1.0 - behind)
