@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from taichi_soft.core.residue import kept
 from taichi_soft.meshing.arrays import FloatArray
 
 LEAST = 0.5
@@ -56,4 +57,4 @@ def fitted(
         else:
             break  # there are no such masses: these come near
         multipliers, masses, lacking = multipliers + part * step, tried, left
-    return np.asarray(masses * (mass / masses.sum()))
+    return kept(masses * (mass / masses.sum()))

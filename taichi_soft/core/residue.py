@@ -1,4 +1,4 @@
-"""What is left where numbers cancel: nothing but round-off, which differs from one processor to the next."""
+"""What NumPy finds, the same on every processor: sums in one order, and without what is but round-off."""
 
 from __future__ import annotations
 
@@ -32,5 +32,5 @@ def weighted_sum(weights: Floats, rows: Floats) -> Floats:
 
 
 def kept(rows: Floats) -> Floats:
-    """Numbers with the digits of a 32-bit float, and without residue, as what a world remembers has to be."""
+    """With the digits of a 32-bit float, and without residue: for what a world remembers in more digits."""
     return without_residue(rows).astype(np.float32).astype(np.float64)

@@ -31,6 +31,10 @@ OLD_PROCESSOR = {
 }
 """What NumPy and the C library look at to choose their code."""
 
+PRINT_BITS = (
+    "import sys; sys.path[:0] = {path!r}; from test_kept_bits import bits_of; print(bits_of({name!r}))"
+)
+
 
 def lines_of(name):
     """What a game tells, in lines. The one named "anything" has what cannot be exported, too."""
@@ -64,7 +68,7 @@ def test_a_game_has_the_bits_that_are_kept(name):
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="the names are those of x86")
 @pytest.mark.parametrize("name", ["held", "anything"])
 def test_a_world_has_the_same_bits_where_numpy_takes_code_for_an_older_processor(name):
-    program = f"import sys; sys.path[:0] = {sys.path!r}; from test_kept_bits import bits_of; print(bits_of({name!r}))"
+    program = PRINT_BITS.format(path=sys.path, name=name)
     done = subprocess.run(
         [sys.executable, "-c", program], env={**os.environ, **OLD_PROCESSOR}, capture_output=True, text=True
     )
