@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.core.errors import MeshError
-from taichi_soft.core.residue import without_residue
+from taichi_soft.core.math.barycentric import edge_inverses
 from taichi_soft.core.types import DampingModel
 from taichi_soft.elements.laws import BondLaw, ElementModel
 from taichi_soft.elements.laws.bonds import Bonds
@@ -145,9 +145,7 @@ def vertex_masses(mesh: TetMesh, density: Floats) -> Floats:
 
 def rest_inverses(mesh: BodyMesh) -> Floats:
     """A^-1 of thesis eq. 6.1 for every tetrahedron, (m, 3, 3) [1/m]."""
-    corners = mesh.vertices[mesh.tets]
-    shapes = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
-    return without_residue(np.linalg.inv(shapes), axis=(1, 2))
+    return edge_inverses(mesh.vertices[mesh.tets])
 
 
 def require_size(mesh: BodyMesh) -> None:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from taichi_soft.cages.hull import Hull
 from taichi_soft.core.errors import MeshError
+from taichi_soft.core.math.barycentric import barycentric
 from taichi_soft.meshing import TetMesh
 from taichi_soft.meshing.arrays import read_only
 from taichi_soft.meshing.locating import Locator
@@ -51,9 +52,7 @@ def bind(mesh: TetMesh, hull: Hull) -> BoundHull:
     """
     tets, nearest = Locator(mesh)(hull.points)
     corners = mesh.vertices[mesh.tets[tets]]
-    edges = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
-    rest = np.linalg.solve(edges, (hull.points - corners[:, 0])[..., None])[..., 0]
-    way = np.concatenate([1.0 - rest.sum(axis=1, keepdims=True), rest], axis=1) - nearest
+    way = barycentric(hull.points, corners) - nearest
     # As far along the way from the nearest point of the mesh as weights allow; float32 adds up to 1 later.
     with np.errstate(divide="ignore", invalid="ignore"):
         allowed = np.where(way < 0.0, (FARTHEST - nearest) / way, np.inf).min(axis=1)
@@ -66,5 +65,5 @@ def bind(mesh: TetMesh, hull: Hull) -> BoundHull:
         )
     weights = nearest + np.minimum(allowed, 1.0)[:, None] * way
     vertices = mesh.tets[tets].astype(np.int32)
-    points = np.einsum("hc,hcx->hx", weights, corners)
+    points = (weights[:, :, None] * corners).sum(axis=1)
     return BoundHull(read_only(vertices), read_only(weights), read_only(points), hull.triangles)

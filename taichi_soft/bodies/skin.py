@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.bodies.kernels.skin import in_lanes
+from taichi_soft.core.math.barycentric import edge_inverses
 from taichi_soft.meshing import TetMesh
 from taichi_soft.meshing.arrays import read_only
 from taichi_soft.meshing.locating import Locator
@@ -55,7 +56,7 @@ def bound(mesh: TetMesh, surfaces: tuple[Surface, ...]) -> tuple[Skin, ...]:
     for surface in surfaces:
         tets, shares = locator(surface.vertices)
         corners = mesh.tets[tets]
-        inside = np.einsum("kc,kcx->kx", shares, mesh.vertices[corners])
+        inside = (shares[:, :, None] * mesh.vertices[corners]).sum(axis=1)
         aims = 2.0 * surface.vertices - inside
         ints = np.concatenate([begins, neighbours, in_lanes(corners)]).astype(np.int32)
         rows_of_each = np.concatenate([shares, aims, surface.normals], axis=1)
@@ -68,8 +69,7 @@ def bound(mesh: TetMesh, surfaces: tuple[Surface, ...]) -> tuple[Skin, ...]:
 def slopes_of(mesh: TetMesh) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats]:
     """F of vertex i is the sum over its neighbours j of (x_j - x_i) times their row: neighbours (e,), where
     those of each vertex begin (n + 1,), and rows (e, 3) [1/m]."""
-    corners, n = mesh.vertices[mesh.tets], len(mesh.vertices)
-    inverses = np.linalg.inv(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2))
+    inverses, n = edge_inverses(mesh.vertices[mesh.tets]), len(mesh.vertices)
     gradients = np.concatenate([-inverses.sum(axis=1, keepdims=True), inverses], axis=1)
     weights = mesh.volumes
     round_each = np.bincount(mesh.tets.ravel(), np.repeat(weights, 4), n)

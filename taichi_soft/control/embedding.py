@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.core.errors import OptionError
+from taichi_soft.core.math.barycentric import barycentric
 
 Floats = NDArray[np.float64]
 
@@ -55,14 +56,6 @@ def places_at(body: SoftBody, points: Floats, names: list[str]) -> Places:
         weights[i] = found[chosen[i]]
     weights[np.abs(weights) < 1e-4] = 0.0  # or neighbours would be held by what is none of theirs
     return Places(tets[chosen], weights / weights.sum(axis=1, keepdims=True))
-
-
-def barycentric(point: Floats, corners: Floats) -> Floats:
-    """Coordinates (m, 4) of a point (3,) in tetrahedra of corners (m, 4, 3), by Cramer's rule."""
-    a, b, c = np.moveaxis(corners[:, 1:] - corners[:, :1], 1, 0)
-    arm, across = point - corners[:, 0], np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
-    rest = (arm[:, None] * across).sum(axis=2) / (a * across[:, 0]).sum(axis=1)[:, None]
-    return np.concatenate([1.0 - rest.sum(axis=1, keepdims=True), rest], axis=1)
 
 
 def places_on(body: SoftBody, vertices: NDArray[np.int32]) -> Places:

@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from taichi_soft.bodies.soft_body import RowsOf, SoftBody, context_of, record_of
 from taichi_soft.control.change import change, mass_of, numbers, require_substeps, rows_of
-from taichi_soft.control.embedding import barycentric
 from taichi_soft.control.grab_patch import Patch, patch_round, point_between
 from taichi_soft.control.kernels.grabs import (
     CORNERS,
@@ -30,6 +29,7 @@ from taichi_soft.core.checks import as_array, as_count, as_number, as_vector
 from taichi_soft.core.constants import GRAVITY_EARTH
 from taichi_soft.core.errors import MeshError, OptionError, StateError
 from taichi_soft.core.handles import Handle, handles_of, recorded, serial_of
+from taichi_soft.core.math.barycentric import barycentric
 from taichi_soft.core.residue import weighted_sum
 from taichi_soft.core.serialisation import below, require_below, require_finite, vector_of
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from taichi_soft.bodies.soft_body import SoftBody, context_of
 from taichi_soft.control.frames import Frames
+from taichi_soft.core.math.rotations import turned
 from taichi_soft.levels.passage import Passage
 
 Floats = NDArray[np.float64]
@@ -45,7 +46,8 @@ def hang_on(hanging: Hanging, motion: Floats, rows: Floats) -> None:
     """
     for attachment, particles in hanging:
         frame = attachment.frame
-        rows[particles, TARGET] = (rows[particles, POSITION] - frame.position) @ frame.rotation.astype(float)
+        arms, axes = rows[particles, POSITION] - frame.position, frame.rotation.astype(float)
+        rows[particles, TARGET] = turned(arms, axes.T)
         load = motion[attachment.particles, REACTION].sum(axis=0)
         rows[particles, REACTION] = load / len(particles)
 

@@ -27,6 +27,9 @@ from taichi_soft.control.numbered import Numbered
 from taichi_soft.core.checks import as_count, as_flag
 from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.core.handles import Handle
+from taichi_soft.core.math.barycentric import edge_inverses, shares_by
+from taichi_soft.core.math.rotations import turned
+from taichi_soft.core.residue import kept, weighted_sum
 from taichi_soft.fracture.cutting import write_slot, write_surface
 from taichi_soft.fracture.kernels.topology import MOTION_WIDTH, read_motion
 from taichi_soft.levels.hanging import Hanging, hang_on, hanging_at, let_hold
@@ -149,7 +152,7 @@ def _passed(over: Passage, motion: Floats, masses: Floats, held: Ints) -> Floats
     else:  # a body that is held shares its momentum with what holds it
         for x, v in ((POSITION, VELOCITY), (EARLIER_POSITION, EARLIER_VELOCITY)):
             _keep_momentum(motion[:, x], motion[:, v], old, rows[:, x], rows[:, v], masses)
-    center = old @ motion[:, POSITION] / old.sum()
+    center = weighted_sum(old, motion[:, POSITION]) / old.sum()
     push = motion[:, PUSH]
     torque = np.cross(motion[:, POSITION] - center, push).sum(axis=0)
     rows[:, PUSH] = masses[:, None] * _rigid(rows[:, POSITION] - center, masses, push.sum(axis=0), torque)
@@ -167,8 +170,9 @@ def _hold(over: Passage, motion: Floats, rows: Floats, held: Ints) -> None:
     before, after = over.places
     for part in (POSITION, EARLIER_POSITION):
         pose = best_fitting_pose(before[sources], motion[sources, part], np.ones(len(sources)))
-        beside = motion[nearest, part] - (before[nearest] @ pose.rotation.T + pose.position)
-        rows[held, part] = after[held] @ pose.rotation.T + pose.position + beside
+        turn, place = kept(pose.rotation), kept(pose.position)
+        beside = motion[nearest, part] - (turned(before[nearest], turn) + place)
+        rows[held, part] = turned(after[held], turn) + place + beside
     rows[held, INV_MASS] = 0.0
     rows[held, VELOCITY] = motion[nearest, VELOCITY]
     rows[held, AIM] = motion[nearest, AIM]
@@ -177,22 +181,23 @@ def _hold(over: Passage, motion: Floats, rows: Floats, held: Ints) -> None:
 
 def _keep_momentum(x: Floats, v: Floats, m: Floats, new_x: Floats, new_v: Floats, masses: Floats) -> None:
     """Move `new_x` and change `new_v`, so that centre, momentum and angular momentum are those of x and v."""
-    center = m @ x / m.sum()
-    new_x += center - masses @ new_x / masses.sum()
+    center = weighted_sum(m, x) / m.sum()
+    new_x += center - weighted_sum(masses, new_x) / masses.sum()
     arms = new_x - center
-    momentum = m @ v - masses @ new_v
+    momentum = weighted_sum(m, v) - weighted_sum(masses, new_v)
     new_v += _rigid(arms, masses, momentum, _spin(x - center, v, m) - _spin(arms, new_v, masses))
 
 
 def _rigid(arms: Floats, masses: Floats, momentum: Floats, spin: Floats) -> Floats:
     """Velocities of the rigid motion that has a momentum, and an angular momentum about the centre of mass;
     or accelerations, of a force and a torque. (n, 3), for places `arms` from about the centre."""
-    arms = arms - masses @ arms / masses.sum()
-    moments = (masses[:, None] * arms).T @ arms
-    inertia = np.trace(moments) * np.eye(3) - moments
-    a, b, c = np.linalg.lstsq(inertia, spin, rcond=1e-9)[0]
-    turning = np.array([[0, c, -b], [-c, 0, a], [b, -a, 0]])
-    return np.asarray(momentum / masses.sum() + arms @ turning)
+    arms = arms - weighted_sum(masses, arms) / masses.sum()
+    moments = _moments(masses, arms, arms)
+    # A little more, or there is none about the line on which all may lie.
+    inertia = np.trace(moments) * (1.0 + 1e-9) * np.eye(3) - moments
+    a, b, c = shares_by(edge_inverses(np.vstack([np.zeros(3), inertia])), spin)[1:]
+    turning = np.array([[0, -c, b], [c, 0, -a], [-b, a, 0]])  # spin x r = turning @ r
+    return np.asarray(momentum / masses.sum() + turned(arms, turning))
 
 
 def _held_at(body: SoftBody, level: int) -> Ints:
@@ -215,5 +220,10 @@ def _nearest_at(body: SoftBody, level: int) -> Ints:
 
 def _spin(arms: Floats, v: Floats, masses: Floats) -> Floats:
     """Sum of m r x v, (3,)."""
-    products = (masses[:, None] * arms).T @ v
+    products = _moments(masses, arms, v)
     return np.array([products[i - 2, i - 1] - products[i - 1, i - 2] for i in range(3)])
+
+
+def _moments(masses: Floats, arms: Floats, v: Floats) -> Floats:
+    """Sum of m r v^T, (3, 3)."""
+    return np.asarray((masses[:, None, None] * arms[:, :, None] * v[:, None, :]).sum(axis=0))

@@ -28,7 +28,7 @@ class Passage:
         assert isinstance(mesh, TetMesh)
         tets, shares = Locator(mesh)(aims)
         corners = mesh.tets[tets]
-        held = np.einsum("kc,kcx->kx", shares, mesh.vertices[corners])
+        held = (shares[:, :, None] * mesh.vertices[corners]).sum(axis=1)
         arms = (2.0 * aims - held)[:, None] - mesh.vertices[corners]
         self._sources, self._begins, self._weights = _weights(mesh, corners, shares, 0.5 * arms)
         self.places = source.mesh.vertices, aims  # of both, at rest
@@ -65,7 +65,7 @@ def _weights(
     counts = np.diff(first)[corner]
     pair = np.repeat(np.arange(len(corner)), counts)  # a corner of an aim, and a neighbour of that
     place = np.arange(len(pair)) - np.repeat(np.cumsum(counts) - counts, counts) + first[corner[pair]]
-    along = np.einsum("ex,ex->e", slopes[place], (shares[:, :, None] * arms).reshape(-1, 3)[pair])
+    along = (slopes[place] * (shares[:, :, None] * arms).reshape(-1, 3)[pair]).sum(axis=1)
     own = shares.ravel() - np.bincount(pair, along, len(corner))
     aim = np.repeat(np.arange(len(corners)), 4)
     keys, entry = np.unique(

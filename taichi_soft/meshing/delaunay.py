@@ -8,6 +8,7 @@ import numpy as np
 
 from taichi_soft.core.errors import MeshError
 from taichi_soft.core.extras import require_extra
+from taichi_soft.core.math.barycentric import edge_inverses, shares_by
 from taichi_soft.meshing.arrays import FloatArray
 from taichi_soft.meshing.quality import FLATTEST
 from taichi_soft.meshing.tet_mesh import TetMesh
@@ -83,11 +84,10 @@ def delaunay_mesh(mesh: TetMesh) -> TetMesh:
 def _is_inside(mesh: TetMesh, points: FloatArray) -> FloatArray:
     """Which of (p, 3) points lie in any tetrahedron."""
     corners = mesh.vertices[mesh.tets]
-    inverse = np.linalg.inv(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2))
+    inverses = edge_inverses(corners)
     found = np.zeros(len(points), dtype=bool)
     for start in range(0, len(points), 256):
         arm = points[start : start + 256, None] - corners[None, :, 0]
-        inner = np.einsum("mab,pmb->pma", inverse, arm)
-        outside = np.minimum(inner.min(axis=2), 1 - inner.sum(axis=2)) < -1e-9
+        outside = shares_by(inverses, arm).min(axis=2) < -1e-9
         found[start : start + 256] = ~outside.all(axis=1)
     return found

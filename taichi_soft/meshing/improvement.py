@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from taichi_soft.core.math.barycentric import edge_inverses, shares_by
 from taichi_soft.meshing import cavities as cavity
 from taichi_soft.meshing import patches
 from taichi_soft.meshing.arrays import FloatArray, IntArray
@@ -229,10 +230,8 @@ class _Work:
         removed = cavities.removed[real]
         i, j = patches.pairs(cavities.added_of[added], cavities.removed_of[real], cavities.total)
         corners = self.x[self.tets[removed]]
-        inverse = np.linalg.inv(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2))
         centre = self.x[cavities.added[added]].mean(axis=1)
-        share = np.einsum("kab,kb->ka", inverse[j], centre[i] - corners[j, 0])
-        depth = np.minimum(share.min(axis=1), 1 - share.sum(axis=1))
+        depth = shares_by(edge_inverses(corners)[j], centre[i] - corners[j, 0]).min(axis=1)
         order = np.lexsort((-depth, i))
         return np.asarray(self.source[removed[j[order[np.searchsorted(i, np.arange(len(added)))]]]])
 

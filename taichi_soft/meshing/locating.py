@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from taichi_soft.core.math.barycentric import edge_inverses, shares_by
 from taichi_soft.meshing.arrays import FloatArray
 from taichi_soft.meshing.tet_mesh import TetMesh
 from taichi_soft.meshing.topology import LOCAL_FACES, shared_faces
@@ -30,7 +31,7 @@ class Locator:
     def __init__(self, mesh: TetMesh) -> None:
         """Prepare to look for points."""
         self._corners = mesh.vertices[mesh.tets]
-        self._inverses = np.linalg.inv(np.swapaxes(self._corners[:, 1:] - self._corners[:, :1], 1, 2))
+        self._inverses = edge_inverses(self._corners)
         self._neighbours = _neighbours(mesh.tets)
         self._tet, self._face = np.nonzero(self._neighbours < 0)
         self._triangles = self._corners[self._tet[:, None], LOCAL_FACES[self._face]]
@@ -63,8 +64,7 @@ class Locator:
         shares[rows] = np.where(is_in[:, None], behind, beside)
 
     def _shares(self, points: FloatArray, tet: Ints) -> FloatArray:
-        rest = np.einsum("kij,kj->ki", self._inverses[tet], points - self._corners[tet, 0])
-        return np.concatenate([1.0 - rest.sum(axis=1, keepdims=True), rest], axis=1)
+        return shares_by(self._inverses[tet], points - self._corners[tet, 0])
 
     def _walk(self, points: FloatArray, start: Ints) -> tuple[Ints, FloatArray]:
         """Through the face that a point is farthest beyond, until it is reached or there is no neighbour."""

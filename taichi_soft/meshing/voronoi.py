@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.core.errors import MeshError
+from taichi_soft.core.math.barycentric import barycentric
 from taichi_soft.meshing.arrays import FloatArray
 from taichi_soft.meshing.delaunay import require_delaunay, scipy_spatial
 from taichi_soft.meshing.polygons import Polygons
@@ -218,10 +219,7 @@ def _outlines(
         points += [x for x, _ in path]
     tets = np.asarray(corner_tet, dtype=np.int64)
     corners = mesh.vertices[mesh.tets[tets]]
-    arms = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
-    inner = np.linalg.solve(arms, (np.asarray(points) - corners[:, 0])[:, :, None])[:, :, 0]
-    weights = np.concatenate([1 - inner.sum(axis=1, keepdims=True), inner], axis=1)
-    return np.asarray(corner_edge, dtype=np.int64), tets, weights
+    return np.asarray(corner_edge, dtype=np.int64), tets, barycentric(np.asarray(points), corners)
 
 
 Side = tuple[FloatArray, FloatArray, int, int]

@@ -1,0 +1,29 @@
+"""Where points lie in tetrahedra, in NumPy: LAPACK would round otherwise on another processor."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+def edge_inverses(corners: Floats) -> Floats:
+    """A^-1 of thesis eq. 6.1 by Cramer's rule, (..., 3, 3) [1/m], of corners (..., 4, 3) [m].
+
+    Rows are the gradients of the barycentric coordinates of corners 1 to 3.
+    """
+    a, b, c = (corners[..., i, :] - corners[..., 0, :] for i in (1, 2, 3))
+    normals = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=-2)
+    return np.asarray(normals / (a * normals[..., 0, :]).sum(axis=-1)[..., None, None])
+
+
+def barycentric(points: Floats, corners: Floats) -> Floats:
+    """Coordinates (..., 4) of points (..., 3) [m], each in its tetrahedron."""
+    return shares_by(edge_inverses(corners), points - corners[..., 0, :])
+
+
+def shares_by(inverses: Floats, arms: Floats) -> Floats:
+    """The same by what `edge_inverses` has found, of arms (..., 3) [m] from the first corners."""
+    rest = (inverses * arms[..., None, :]).sum(axis=-1)
+    return np.concatenate([1.0 - rest.sum(axis=-1, keepdims=True), rest], axis=-1)
