@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ from taichi_soft.core.runtime import export_kernels
 from taichi_soft.export.archive import words, written
 from taichi_soft.export.axes import axes_of
 from taichi_soft.export.description import description_of
+from taichi_soft.export.machine_code import compile_kernels, platforms_of
 from taichi_soft.export.meshes import meshes_of
 from taichi_soft.export.module import kernels_of
 from taichi_soft.export.refusals import require_native
@@ -39,7 +40,12 @@ class ExportReport:
 
 
 def export_world(
-    world: World, path: str | Path, *, axes: str = "z-up", names: Mapping[Any, str] | None = None
+    world: World,
+    path: str | Path,
+    *,
+    axes: str = "z-up",
+    names: Mapping[Any, str] | None = None,
+    platforms: Sequence[str] | None = None,
 ) -> ExportReport:
     """Write a built world, as it is now, as a folder that the native library loads.
 
@@ -49,11 +55,12 @@ def export_world(
         axes: of the engine, see `AXES`.
         names: of bodies, assets, colliders and frames, by which the game finds them; others get one with
             their number, such as body3.
+        platforms: some of `PLATFORMS`, that the world is to run on; by default the one of this machine.
         world: built, at the state in which the game starts.
     Raises: StateError for a world that is not built; OptionError for a path that is taken or cannot be
         written, and for what the native library does not run, by name.
     """
-    path, matrix = Path(path), axes_of(axes)
+    path, matrix, platforms = Path(path), axes_of(axes), platforms_of(platforms)
     if not world.is_built:
         raise StateError("the world is not built: call world.build() before it is exported")
     context = context_of_world(world)
@@ -68,7 +75,7 @@ def export_world(
     except OSError as error:
         raise OptionError(f"cannot write {path}: {error.strerror}") from error
     try:
-        return _written(context, path, part, matrix, dict(names or {}))
+        return _written(context, path, part, matrix, dict(names or {}), platforms)
     finally:
         part.remove()
 
@@ -82,7 +89,12 @@ def _told_apart(names: list[str]) -> list[str]:
 
 
 def _written(
-    context: WorldContext, path: Path, part: PartFolder, matrix: Any, given: dict[Any, str]
+    context: WorldContext,
+    path: Path,
+    part: PartFolder,
+    matrix: Any,
+    given: dict[Any, str],
+    platforms: Sequence[str],
 ) -> ExportReport:
     assets = context.slots.kinds
     names = {
@@ -105,8 +117,10 @@ def _written(
     new = part.path / path.name
     folder = new / KERNELS
     folder.mkdir(parents=True)
-    export_kernels(folder, kernels, [each.particle_position for each in made_fields()])
-    files = sorted(each for each in folder.iterdir() if each.is_file())
+    texts = part.path / "texts"
+    texts.mkdir()
+    export_kernels(texts, kernels, [each.particle_position for each in made_fields()])
+    files = compile_kernels(texts, list(kernels), platforms, folder)
     contents = [each.read_bytes() for each in files]
     arrays["kernels/names"] = words(list(kernels))
     arrays["kernels/files"] = words([each.name for each in files])

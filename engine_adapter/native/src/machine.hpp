@@ -1,63 +1,67 @@
-// A Taichi runtime with the kernels of a world file and memory for its fields: what a world runs on.
+// The memory of one world, and calls of its kernels.
 #pragma once
 
-#include <taichi/taichi.h>
-
+#include <cstdint>
 #include <map>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "kernels.hpp"
+#include "threads.hpp"
+
 namespace taichi_soft {
 
 class Scene;
 
-// Memory that kernels are given: it grows, and stays where it is otherwise.
+// Memory that kernels are given: it grows.
 class Buffer {
  public:
   template <typename Number>
-  Number* room(TiRuntime runtime, size_t count) {
-    return reinterpret_cast<Number*>(reserve(runtime, count * sizeof(Number)));
+  Number* room(size_t count) {
+    const size_t words = (count * sizeof(Number) + 7) / 8;
+    if (words > words_.size()) words_.resize(2 * words);
+    return reinterpret_cast<Number*>(words_.data());
   }
-  TiMemory memory() const { return memory_; }
+  const void* data() const { return words_.data(); }
 
  private:
-  char* reserve(TiRuntime runtime, size_t size);
+  std::vector<double> words_;
+};
 
-  std::vector<std::unique_ptr<double[]>> blocks_;  // outgrown ones too: Taichi cannot be told to forget them
-  size_t size_ = 0;
-  TiMemory memory_ = nullptr;
+struct Argument {
+  enum { kWhole, kReal, kArray } kind;
+  int32_t whole;
+  float real;
+  const void* data;
+  int32_t rows, width;  // the latter 0 in arrays of one dimension
 };
 
 class Machine {
  public:
-  Machine(const Scene& scene, const std::string& kernels);
-  ~Machine();
-  Machine(const Machine&) = delete;
-  Machine& operator=(const Machine&) = delete;
+  explicit Machine(const Scene& scene);
 
-  char* root() const { return root_; }
-  TiRuntime runtime() const { return runtime_; }
+  char* root() const { return root_; }  // where the fields begin
 
   // Arguments of kernels, in their order.
-  static TiArgument whole(int32_t value);
-  static TiArgument real(double value);
-  static TiArgument array(TiMemory memory, TiDataType type, uint32_t rows, uint32_t width = 0);
-  void launch(const char* kernel, const std::vector<TiArgument>& arguments);
-
-  TiMemory ints_of(size_t mesh) const { return ints_[mesh]; }
-  TiMemory floats_of(size_t mesh) const { return floats_[mesh]; }
+  static Argument whole(int32_t value) { return {Argument::kWhole, value, 0.0f, nullptr, 0, 0}; }
+  static Argument real(double value) { return {Argument::kReal, 0, float(value), nullptr, 0, 0}; }
+  static Argument array(const void* data, uint32_t rows, uint32_t width = 0) {
+    return {Argument::kArray, 0, 0.0f, data, int32_t(rows), int32_t(width)};
+  }
+  static Argument array(const Buffer& buffer, uint32_t rows, uint32_t width = 0) {
+    return array(buffer.data(), rows, width);
+  }
+  void launch(const char* kernel, const std::vector<Argument>& arguments);
 
   Buffer numbers, rows, found, vertices, frames, positions, normals;
 
  private:
-  TiMemory import(const void* data, size_t size);
-
-  TiRuntime runtime_ = nullptr;
-  TiAotModule module_ = nullptr;
-  std::map<std::string, TiKernel> kernels_;
-  std::vector<TiMemory> ints_, floats_;
-  char* root_ = nullptr;
+  const Scene& scene_;
+  std::vector<char> fields_, temporaries_, packed_;
+  char* root_;
+  std::unique_ptr<Runtime> runtime_;
+  Threads threads_;
 };
 
 }  // namespace taichi_soft

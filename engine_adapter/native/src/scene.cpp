@@ -92,14 +92,6 @@ Scene::Scene(const std::string& folder)
       axes(archive.rows<double>("host_axes", 3).count == 9 ? archive.get<double>("host_axes").data
                                                            : (out_of_order("axes"), nullptr)),
       folder_(folder) {
-  // Kernels of another Taichi would be given arguments that they do not know.
-  const std::vector<std::string> package = archive.texts("package");  // of taichi-soft and of Taichi
-  unsigned major = 0, minor = 0;
-  const bool is_told = package.size() == 2 && std::sscanf(package[1].c_str(), "%u.%u", &major, &minor) == 2;
-  if (!is_told || ti_get_version() / 1000 != major * 1000 + minor) {
-    fail(TS_ERROR_VERSION, "the world file was exported with Taichi %s, and the library runs %u.%u: export it again",
-         is_told ? package[1].c_str() : "of no version", ti_get_version() / 1000000, ti_get_version() / 1000 % 1000);
-  }
   for (int kind = 0; kind < 5; ++kind) names_[kind] = archive.texts(kKinds[kind]);
   const auto flags = archive.get<int32_t>("world/flags"), counts = archive.get<int32_t>("world/counts");
   const auto stable = archive.get<double>("world/stable"), limits = archive.get<double>("world/limits");
@@ -133,18 +125,12 @@ Scene::Scene(const std::string& folder)
   read_fields();
   read_assets();
   read_meshes();
-  // Taichi ends the process where its files are damaged, so they are looked at here.
-  const std::filesystem::path kernels = std::filesystem::u8path(folder) / "kernels";
-  const auto files = archive.texts("kernels/files");
   const auto sums = archive.rows<int64_t>("kernels/sums", 2);
+  const auto files = archive.texts("kernels/files");
   if (sums.count != 2 * files.size()) out_of_order("kernels");
-  for (size_t i = 0; i < files.size(); ++i) {
-    const std::vector<char> bytes = read_file((kernels / files[i]).u8string());
-    if (int64_t(bytes.size()) != sums[2 * i] || int64_t(checksum(bytes.data(), bytes.size())) != sums[2 * i + 1]) {
-      fail(TS_ERROR_FILE, "the world file is damaged: kernels/%s is not what was exported. Export it again",
-           files[i].c_str());
-    }
-  }
+  code_ = std::make_unique<Kernels>((std::filesystem::u8path(folder) / "kernels").u8string(), files,
+                                    std::vector<int64_t>(sums.begin(), sums.end()));
+  for (const std::string& name : archive.texts("kernels/names")) kernels_[name] = code_->find(name);
   // A level that is exported anew as it was takes the snapshots of before.
   for (const char* name : {"fields/carried", "fields/places"}) {
     const auto rows = archive.get<int64_t>(name);
@@ -154,7 +140,6 @@ Scene::Scene(const std::string& folder)
     code = code * 31 +
            checksum(reinterpret_cast<const char*>(asset.rest_rows.data), asset.rest_rows.count * sizeof(float));
   }
-  give_back(std::make_unique<Machine>(*this, kernels.u8string()));
 }
 
 void Scene::read_fields() {
@@ -253,21 +238,10 @@ Place Scene::place(const std::string& field, size_t count, size_t width) const {
   out_of_order(("the field " + field + " is missing, or too short").c_str());
 }
 
-std::unique_ptr<Machine> Scene::take_machine() {
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    if (!idle_.empty()) {
-      std::unique_ptr<Machine> found = std::move(idle_.back());
-      idle_.pop_back();
-      return found;
-    }
-  }
-  return std::make_unique<Machine>(*this, (std::filesystem::u8path(folder_) / "kernels").u8string());
-}
-
-void Scene::give_back(std::unique_ptr<Machine> machine) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  idle_.push_back(std::move(machine));
+Kernels::Kernel Scene::kernel(const std::string& name) const {
+  const auto found = kernels_.find(name);
+  if (found == kernels_.end()) out_of_order("kernels");
+  return found->second;
 }
 
 }  // namespace taichi_soft

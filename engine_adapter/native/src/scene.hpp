@@ -1,14 +1,14 @@
 // A world file in memory: all that the worlds made of it share.
 #pragma once
 
+#include <map>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <vector>
 
 #include "archive.hpp"
 #include "axes.hpp"
-#include "machine.hpp"
+#include "kernels.hpp"
 
 namespace taichi_soft {
 
@@ -55,9 +55,7 @@ class Scene {
   // Fails where the field is missing, or has fewer elements or numbers in each.
   Place place(const std::string& field, size_t count = 0, size_t width = 1) const;
 
-  // One that no world uses, or a new one.
-  std::unique_ptr<Machine> take_machine();
-  void give_back(std::unique_ptr<Machine> machine);
+  Kernels::Kernel kernel(const std::string& name) const;
 
   Archive archive;
   Axes axes;
@@ -85,8 +83,8 @@ class Scene {
   std::vector<std::string> names_[5];
   std::vector<std::string> field_names_;
   std::vector<Place> places_;
-  std::mutex mutex_;
-  std::vector<std::unique_ptr<Machine>> idle_;
+  std::unique_ptr<Kernels> code_;
+  std::map<std::string, Kernels::Kernel> kernels_;
 };
 
 }  // namespace taichi_soft

@@ -17,10 +17,8 @@ const char* const kColliderFields[] = {"position", "rotation", "velocity", "spin
 
 }  // namespace
 
-World::World(std::shared_ptr<Scene> scene) : scene_(std::move(scene)), machine_(scene_->take_machine()) {
+World::World(std::shared_ptr<Scene> scene) : scene_(std::move(scene)), machine_(std::make_unique<Machine>(*scene_)) {
   const Archive& archive = scene_->archive;
-  const auto image = archive.get<unsigned char>("fields/image");
-  std::memcpy(machine_->root(), image.data, image.count);
   const auto clock = archive.get<double>("world/clock");
   const auto steps = archive.get<int64_t>("world/steps");
   const auto poses = archive.get<float>("frames/poses");
@@ -43,10 +41,6 @@ World::World(std::shared_ptr<Scene> scene) : scene_(std::move(scene)), machine_(
   grab_generations_.assign(kMostGrabs, 1);
   bind();
   require_image();
-}
-
-World::~World() {
-  if (machine_) scene_->give_back(std::move(machine_));
 }
 
 void World::bind() {
@@ -138,10 +132,10 @@ bool World::aim_pins(double dt) {
   present_ = coming_;
   if (!has_work_) return false;
   const uint32_t frames = static_cast<uint32_t>(coming_.size() / 12);
-  float* rows = machine_->frames.room<float>(machine_->runtime(), coming_.size());
+  float* rows = machine_->frames.room<float>(coming_.size());
   std::copy(coming_.begin(), coming_.end(), rows);
   machine_->launch("aim_pinned", {Machine::whole(scene_->slot_count), Machine::real(dt),
-                                  Machine::array(machine_->frames.memory(), TI_DATA_TYPE_F32, frames, 12)});
+                                  Machine::array(machine_->frames, frames, 12)});
   has_work_ = false;
   for (int32_t slot = 0; slot < scene_->slot_count; ++slot) {
     has_work_ = has_work_ || (body_drives_(slot) & kMovesPins) != 0;
@@ -195,7 +189,7 @@ void World::step(double dt, int32_t substeps) {
 
 void World::launch_step(int32_t substeps, double h) {
   const int32_t bodies = scene_->slot_count;
-  std::vector<TiArgument> arguments = {Machine::whole(bodies)};
+  std::vector<Argument> arguments = {Machine::whole(bodies)};
   if (scene_->has_contact) arguments.push_back(Machine::whole(std::min(scene_->threads, bodies) - 1));
   arguments.insert(arguments.end(),
                    {Machine::whole(substeps), Machine::real(h), Machine::whole(kAll), Machine::whole(0)});
@@ -253,10 +247,10 @@ void World::wake_slot(int32_t slot) {
 
 void World::wake_near(const Box& box) {
   if (!scene_->sleeps) return;
-  float* numbers = machine_->numbers.room<float>(machine_->runtime(), 6);
+  float* numbers = machine_->numbers.room<float>(6);
   for (int k = 0; k < 3; ++k) numbers[k] = as_float(box.lower[k]), numbers[3 + k] = as_float(box.upper[k]);
   machine_->launch("wake_near", {Machine::whole(scene_->slot_count),
-                                 Machine::array(machine_->numbers.memory(), TI_DATA_TYPE_F32, 6)});
+                                 Machine::array(machine_->numbers, 6)});
   is_still_ = false;
 }
 

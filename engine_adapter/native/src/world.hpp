@@ -8,6 +8,7 @@
 
 #include "colliders.hpp"
 #include "events.hpp"
+#include "machine.hpp"
 #include "scene.hpp"
 #include "taichi_soft.h"
 
@@ -59,7 +60,6 @@ struct SnapshotHead;
 class World {
  public:
   explicit World(std::shared_ptr<Scene> scene);
-  ~World();
   World(const World&) = delete;
   World& operator=(const World&) = delete;
 

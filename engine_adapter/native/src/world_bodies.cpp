@@ -87,9 +87,8 @@ ts_body World::spawn(int32_t asset, const Vector& place, const Quaternion& turn,
          scene_->assets[asset].slot_count, asset);
   }
   const std::vector<float> rows = place_rows(scene_->assets[asset], place, turn, drift, spin);
-  std::copy(rows.begin(), rows.end(), machine_->rows.room<float>(machine_->runtime(), rows.size()));
-  machine_->launch("spawn_body", {Machine::whole(slot), Machine::array(machine_->rows.memory(), TI_DATA_TYPE_F32,
-                                                                       uint32_t(rows.size() / 8), 8)});
+  std::copy(rows.begin(), rows.end(), machine_->rows.room<float>(rows.size()));
+  machine_->launch("spawn_body", {Machine::whole(slot), Machine::array(machine_->rows, uint32_t(rows.size() / 8), 8)});
   generations_[slot] = (generations_[slot] + 1) & 0xFFFFFF;
   is_still_ = false;
   rows_at_ = -1.0;
@@ -119,10 +118,10 @@ void World::read_positions(int32_t slot, double alpha, float* rows) {
     }
   } else {
     const uint32_t count = uint32_t(scene_->particle_count);
-    const float* all = machine_->positions.room<float>(machine_->runtime(), 3 * count);
+    const float* all = machine_->positions.room<float>(3 * count);
     if (rows_at_ != alpha) {
       machine_->launch("read_positions", {Machine::real(alpha),
-                                          Machine::array(machine_->positions.memory(), TI_DATA_TYPE_F32, count, 3)});
+                                          Machine::array(machine_->positions, count, 3)});
       rows_at_ = alpha;
     }
     std::copy(all + 3 * begin_of(slot), all + 3 * (begin_of(slot) + n), rows);
@@ -133,21 +132,20 @@ void World::read_positions(int32_t slot, double alpha, float* rows) {
 void World::read_mesh(int32_t slot, int32_t number, float* positions, float* normals) {
   const Mesh& mesh = scene_->meshes[number];
   const uint32_t count = uint32_t(mesh.vertex_count);
-  const TiRuntime runtime = machine_->runtime();
-  const float* x = machine_->vertices.room<float>(runtime, 3 * count);
-  const float* n = machine_->normals.room<float>(runtime, 3 * count);
+  const float* x = machine_->vertices.room<float>(3 * count);
+  const float* n = machine_->normals.room<float>(3 * count);
   std::string kernel = mesh.is_skin ? "write_skin" : "write_render_mesh";
   if (!mesh.is_serial) kernel += "_shared";
-  const TiArgument ints = Machine::array(machine_->ints_of(number), TI_DATA_TYPE_I32, uint32_t(mesh.ints.count));
-  const TiArgument x_out = Machine::array(machine_->vertices.memory(), TI_DATA_TYPE_F32, 3 * count);
-  const TiArgument n_out = Machine::array(machine_->normals.memory(), TI_DATA_TYPE_F32, 3 * count);
+  const Argument ints = Machine::array(mesh.ints.data, uint32_t(mesh.ints.count));
+  const Argument x_out = Machine::array(machine_->vertices, 3 * count);
+  const Argument n_out = Machine::array(machine_->normals, 3 * count);
   if (mesh.is_skin) {
     const uint32_t vertices = uint32_t(asset_of(slot).vertex_count());
-    machine_->rows.room<float>(runtime, 12 * vertices);
+    machine_->rows.room<float>(12 * vertices);
     machine_->launch(kernel.c_str(),
                      {Machine::whole(slot), Machine::whole(int32_t(vertices)), Machine::real(picture_), ints,
-                      Machine::array(machine_->floats_of(number), TI_DATA_TYPE_F32, uint32_t(mesh.floats.count)),
-                      Machine::array(machine_->rows.memory(), TI_DATA_TYPE_F32, 12 * vertices), x_out, n_out});
+                      Machine::array(mesh.floats.data, uint32_t(mesh.floats.count)),
+                      Machine::array(machine_->rows, 12 * vertices), x_out, n_out});
   } else {
     machine_->launch(kernel.c_str(), {Machine::whole(slot), Machine::real(picture_), ints, x_out, n_out});
   }
@@ -185,7 +183,7 @@ std::vector<int32_t> World::checked(int32_t slot, Vertices which, bool may_be_al
 }
 
 void World::give_rows(int32_t slot, const std::vector<int32_t>& vertices) {
-  int32_t* rows = machine_->rows.room<int32_t>(machine_->runtime(), vertices.size());
+  int32_t* rows = machine_->rows.room<int32_t>(vertices.size());
   for (size_t i = 0; i < vertices.size(); ++i) rows[i] = int32_t(particle(slot, size_t(vertices[i])));
 }
 
@@ -204,12 +202,12 @@ double World::mass_of(int32_t slot, const std::vector<int32_t>& vertices) const 
 }
 
 void World::set_velocity(int32_t slot, const Vector& linear, const Vector& spin) {
-  float* motion = machine_->numbers.room<float>(machine_->runtime(), 6);
+  float* motion = machine_->numbers.room<float>(6);
   for (int k = 0; k < 3; ++k) motion[k] = as_float(linear[k]), motion[3 + k] = as_float(spin[k]);
-  const float* fastest = machine_->found.room<float>(machine_->runtime(), 1);
+  const float* fastest = machine_->found.room<float>(1);
   machine_->launch("write_rigid_velocity",
-                   {Machine::whole(slot), Machine::array(machine_->numbers.memory(), TI_DATA_TYPE_F32, 6),
-                    Machine::array(machine_->found.memory(), TI_DATA_TYPE_F32, 1)});
+                   {Machine::whole(slot), Machine::array(machine_->numbers, 6),
+                    Machine::array(machine_->found, 1)});
   if (!(*fastest < scene_->velocity_limit)) {
     fail(TS_ERROR_ARGUMENT, "some vertices would be %.4g m/s fast: keep below %g", double(*fastest),
          scene_->velocity_limit);
@@ -222,15 +220,15 @@ void World::teleport(int32_t slot, const Vector& center, const Quaternion& turn,
   const Box left = box_of(slot);
   const double lowest = scene_->has_floor ? scene_->floor : -std::numeric_limits<double>::infinity();
   const Matrix rows = matrix_of(turn);
-  double* place = machine_->numbers.room<double>(machine_->runtime(), 5);
-  double* matrix = machine_->rows.room<double>(machine_->runtime(), 9);
-  const double* found = machine_->found.room<double>(machine_->runtime(), 3);
+  double* place = machine_->numbers.room<double>(5);
+  double* matrix = machine_->rows.room<double>(9);
+  const double* found = machine_->found.room<double>(3);
   std::copy(center.begin(), center.end(), place);
   place[3] = lowest, place[4] = keeps_velocity ? 1.0 : 0.0;
   for (int i = 0; i < 9; ++i) matrix[i] = rows[i / 3][i % 3];
-  machine_->launch("jump", {Machine::whole(slot), Machine::array(machine_->numbers.memory(), TI_DATA_TYPE_F64, 5),
-                            Machine::array(machine_->rows.memory(), TI_DATA_TYPE_F64, 3, 3),
-                            Machine::array(machine_->found.memory(), TI_DATA_TYPE_F64, 3)});
+  machine_->launch("jump", {Machine::whole(slot), Machine::array(machine_->numbers, 5),
+                            Machine::array(machine_->rows, 3, 3),
+                            Machine::array(machine_->found, 3)});
   if (!(found[2] < scene_->position_limit)) {
     fail(TS_ERROR_ARGUMENT, "center puts the body beyond %g m: stay nearer the origin", scene_->position_limit);
   }
@@ -250,18 +248,18 @@ void World::apply_impulse(int32_t slot, const Vector& impulse, Vertices which) {
          scene_->velocity_limit);
   }
   give_rows(slot, vertices);
-  float* numbers = machine_->numbers.room<float>(machine_->runtime(), 3);
+  float* numbers = machine_->numbers.room<float>(3);
   for (int k = 0; k < 3; ++k) numbers[k] = as_float(change[k]);
   machine_->launch("add_velocity",
-                   {Machine::array(machine_->rows.memory(), TI_DATA_TYPE_I32, uint32_t(vertices.size())),
-                    Machine::array(machine_->numbers.memory(), TI_DATA_TYPE_F32, 3)});
+                   {Machine::array(machine_->rows, uint32_t(vertices.size())),
+                    Machine::array(machine_->numbers, 3)});
   rouse(slot);
 }
 
 void World::apply_force(int32_t slot, const Vector& force, Vertices which) {
   const std::vector<int32_t> vertices = checked(slot, which, true);
   const double mass = mass_of(slot, vertices);
-  float* numbers = machine_->numbers.room<float>(machine_->runtime(), 3);
+  float* numbers = machine_->numbers.room<float>(3);
   for (int k = 0; k < 3; ++k) {
     const double acceleration = force[k] / mass;
     if (!(std::fabs(acceleration) < scene_->push_limit)) {
@@ -272,20 +270,20 @@ void World::apply_force(int32_t slot, const Vector& force, Vertices which) {
   }
   give_rows(slot, vertices);
   machine_->launch("add_push", {Machine::whole(slot),
-                                Machine::array(machine_->rows.memory(), TI_DATA_TYPE_I32, uint32_t(vertices.size())),
-                                Machine::array(machine_->numbers.memory(), TI_DATA_TYPE_F32, 3)});
+                                Machine::array(machine_->rows, uint32_t(vertices.size())),
+                                Machine::array(machine_->numbers, 3)});
   rouse(slot);
 }
 
 void World::impulse_at(int32_t slot, const Vector& impulse, const Vector& point, double radius) {
   if (!(radius >= 1e-9 && radius <= 1e9)) fail(TS_ERROR_ARGUMENT, "radius is %g m: give 1e-9 to 1e9", radius);
-  float* place = machine_->numbers.room<float>(machine_->runtime(), 7);
+  float* place = machine_->numbers.room<float>(7);
   for (int k = 0; k < 3; ++k) place[k] = as_float(point[k]), place[4 + k] = as_float(impulse[k]);
   place[3] = as_float(radius);
-  const double* found = machine_->found.room<double>(machine_->runtime(), 2);
+  const double* found = machine_->found.room<double>(2);
   machine_->launch("add_impulse_near",
-                   {Machine::whole(slot), Machine::array(machine_->numbers.memory(), TI_DATA_TYPE_F32, 7),
-                    Machine::array(machine_->found.memory(), TI_DATA_TYPE_F64, 2)});
+                   {Machine::whole(slot), Machine::array(machine_->numbers, 7),
+                    Machine::array(machine_->found, 2)});
   if (!(found[1] < scene_->velocity_limit)) {
     fail(TS_ERROR_ARGUMENT, "impulse would change velocities by %.4g m/s: keep below %g", found[1],
          scene_->velocity_limit);
@@ -319,7 +317,7 @@ void World::pin(int32_t slot, Vertices which) {
   require_unattached(slot, vertices);
   give_rows(slot, vertices);
   machine_->launch("pin_particles",
-                   {Machine::array(machine_->rows.memory(), TI_DATA_TYPE_I32, uint32_t(vertices.size()))});
+                   {Machine::array(machine_->rows, uint32_t(vertices.size()))});
   rouse(slot);
 }
 
@@ -337,7 +335,7 @@ void World::unpin(int32_t slot, Vertices which) {
   }
   give_rows(slot, vertices);
   machine_->launch("free_particles",
-                   {Machine::array(machine_->rows.memory(), TI_DATA_TYPE_I32, uint32_t(vertices.size()))});
+                   {Machine::array(machine_->rows, uint32_t(vertices.size()))});
   rouse(slot);
 }
 
@@ -352,18 +350,18 @@ void World::set_targets(int32_t slot, Vertices which, const float* targets) {
     }
   }
   require_unattached(slot, vertices);
-  float* ordered = machine_->vertices.room<float>(machine_->runtime(), rows.size());
+  float* ordered = machine_->vertices.room<float>(rows.size());
   for (size_t i = 0; i < which.count; ++i) {
     const size_t place =
         size_t(std::lower_bound(vertices.begin(), vertices.end(), which.numbers[i]) - vertices.begin());
     std::copy(rows.begin() + 3 * i, rows.begin() + 3 * i + 3, ordered + 3 * place);
   }
   give_rows(slot, vertices);
-  const int32_t* loose = machine_->found.room<int32_t>(machine_->runtime(), 1);
+  const int32_t* loose = machine_->found.room<int32_t>(1);
   const uint32_t count = uint32_t(vertices.size());
-  machine_->launch("write_targets", {Machine::array(machine_->rows.memory(), TI_DATA_TYPE_I32, count),
-                                     Machine::array(machine_->vertices.memory(), TI_DATA_TYPE_F32, count, 3),
-                                     Machine::array(machine_->found.memory(), TI_DATA_TYPE_I32, 1)});
+  machine_->launch("write_targets", {Machine::array(machine_->rows, count),
+                                     Machine::array(machine_->vertices, count, 3),
+                                     Machine::array(machine_->found, 1)});
   if (*loose >= 0) fail(TS_ERROR_STATE, "vertex %d is not pinned: call ts_body_pin first", vertices[size_t(*loose)]);
   rouse(slot);
   has_work_ = true;
@@ -389,13 +387,13 @@ void World::set_wind(const Vector& velocity, double density, double drag) {
 void World::radial_impulse(const Vector& center, double impulse, double radius) {
   if (!(radius >= 1e-9 && radius <= 1e9)) fail(TS_ERROR_ARGUMENT, "radius is %g m: give 1e-9 to 1e9", radius);
   if (!(std::fabs(impulse) <= scene_->impulse_limit)) fail(TS_ERROR_ARGUMENT, "impulse is %g N s, too much", impulse);
-  float* place = machine_->numbers.room<float>(machine_->runtime(), 5);
+  float* place = machine_->numbers.room<float>(5);
   for (int k = 0; k < 3; ++k) place[k] = as_float(center[k]);
   place[3] = as_float(radius), place[4] = as_float(impulse);
-  const float* highest = machine_->found.room<float>(machine_->runtime(), 1);
+  const float* highest = machine_->found.room<float>(1);
   machine_->launch("add_radial_impulse",
-                   {Machine::whole(scene_->slot_count), Machine::array(machine_->numbers.memory(), TI_DATA_TYPE_F32, 5),
-                    Machine::array(machine_->found.memory(), TI_DATA_TYPE_F32, 1)});
+                   {Machine::whole(scene_->slot_count), Machine::array(machine_->numbers, 5),
+                    Machine::array(machine_->found, 1)});
   if (!(*highest < scene_->velocity_limit)) {
     fail(TS_ERROR_ARGUMENT, "impulse would change velocities by %.4g m/s: keep below %g", double(*highest),
          scene_->velocity_limit);

@@ -17,15 +17,14 @@ Present World::present() const {
 // Who touched whom in the last step, which is forgotten, and who sleeps.
 std::map<Pair, std::array<float, 3>> World::look() {
   const uint32_t numbers = uint32_t(events_.status.size()), rows = uint32_t(events_.touch_rows);
-  const TiRuntime runtime = machine_->runtime();
-  int32_t* status = machine_->numbers.room<int32_t>(runtime, numbers);
-  const int32_t* who = machine_->rows.room<int32_t>(runtime, 3 * rows);
-  const float* impulses = machine_->found.room<float>(runtime, 3 * rows);
+  int32_t* status = machine_->numbers.room<int32_t>(numbers);
+  const int32_t* who = machine_->rows.room<int32_t>(3 * rows);
+  const float* impulses = machine_->found.room<float>(3 * rows);
   std::copy(events_.status.begin(), events_.status.end(), status);
   machine_->launch("read_touches", {Machine::whole(scene_->slot_count),
-                                    Machine::array(machine_->numbers.memory(), TI_DATA_TYPE_I32, numbers),
-                                    Machine::array(machine_->rows.memory(), TI_DATA_TYPE_I32, rows, 3),
-                                    Machine::array(machine_->found.memory(), TI_DATA_TYPE_F32, rows, 3)});
+                                    Machine::array(machine_->numbers, numbers),
+                                    Machine::array(machine_->rows, rows, 3),
+                                    Machine::array(machine_->found, rows, 3)});
   std::copy(status, status + numbers, events_.status.begin());
   std::map<Pair, std::array<float, 3>> touches;
   for (int32_t i = 0; i < status[numbers - 1]; ++i) {

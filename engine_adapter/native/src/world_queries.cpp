@@ -8,7 +8,7 @@ namespace taichi_soft {
 
 // The slots of all who live, into a buffer. Returns how many.
 uint32_t World::give_living() {
-  int32_t* slots = machine_->rows.room<int32_t>(machine_->runtime(), size_t(scene_->slot_count));
+  int32_t* slots = machine_->rows.room<int32_t>(size_t(scene_->slot_count));
   uint32_t count = 0;
   for (int32_t slot = 0; slot < scene_->slot_count; ++slot) {
     if (body_status_(slot) != kAbsent) slots[count++] = slot;
@@ -50,30 +50,30 @@ Hit World::first_hit(const Vector& origin, const Vector& direction, double farth
   const Vector scaled = {direction[0] / largest, direction[1] / largest, direction[2] / largest};
   const double length = length_of(scaled);
   const uint32_t count = give_living();
-  float* ray = machine_->numbers.room<float>(machine_->runtime(), 8);
-  float* hit = machine_->found.room<float>(machine_->runtime(), 12);
+  float* ray = machine_->numbers.room<float>(8);
+  float* hit = machine_->found.room<float>(12);
   for (int k = 0; k < 3; ++k) ray[k] = as_float(origin[k]), ray[3 + k] = as_float(scaled[k] / length);
   ray[6] = just_beyond(farthest), ray[7] = 1.0f;
   std::fill(hit, hit + 12, -1.0f);
   if (count > 0) {
-    machine_->launch("find_hits", {Machine::array(machine_->rows.memory(), TI_DATA_TYPE_I32, count),
-                                   Machine::array(machine_->numbers.memory(), TI_DATA_TYPE_F32, 1, 8),
-                                   Machine::array(machine_->found.memory(), TI_DATA_TYPE_F32, 1, 12)});
+    machine_->launch("find_hits", {Machine::array(machine_->rows, count),
+                                   Machine::array(machine_->numbers, 1, 8),
+                                   Machine::array(machine_->found, 1, 12)});
   }
   return hit_from(hit);
 }
 
 Hit World::closest(const Vector& point, double farthest) {
   const uint32_t count = give_living();
-  float* asked = machine_->numbers.room<float>(machine_->runtime(), 4);
-  float* hit = machine_->found.room<float>(machine_->runtime(), 13);
+  float* asked = machine_->numbers.room<float>(4);
+  float* hit = machine_->found.room<float>(13);
   for (int k = 0; k < 3; ++k) asked[k] = as_float(point[k]);
   asked[3] = just_beyond(farthest * farthest);
   std::fill(hit, hit + 13, -1.0f);
   if (count > 0) {
-    machine_->launch("find_closest", {Machine::array(machine_->rows.memory(), TI_DATA_TYPE_I32, count),
-                                      Machine::array(machine_->numbers.memory(), TI_DATA_TYPE_F32, 4),
-                                      Machine::array(machine_->found.memory(), TI_DATA_TYPE_F32, 1, 13)});
+    machine_->launch("find_closest", {Machine::array(machine_->rows, count),
+                                      Machine::array(machine_->numbers, 4),
+                                      Machine::array(machine_->found, 1, 13)});
   }
   Hit nearest = hit_from(hit);
   nearest.is_inside = hit[12] != 0.0f;
@@ -83,10 +83,9 @@ Hit World::closest(const Vector& point, double farthest) {
 std::vector<int32_t> World::overlaps(bool is_box, const Pose& pose, const Vector& size) {
   const uint32_t count = give_living(), slots = uint32_t(scene_->slot_count);
   const uint32_t particles = uint32_t(scene_->particle_count);
-  const TiRuntime runtime = machine_->runtime();
-  float* shape = machine_->numbers.room<float>(runtime, 15);
-  int32_t* first = machine_->found.room<int32_t>(runtime, slots);
-  machine_->vertices.room<int32_t>(runtime, particles);  // which of them lie inside: nobody asks
+  float* shape = machine_->numbers.room<float>(15);
+  int32_t* first = machine_->found.room<int32_t>(slots);
+  machine_->vertices.room<int32_t>(particles);  // which of them lie inside: nobody asks
   const Matrix turn = matrix_of(pose.rotation);
   for (int k = 0; k < 3; ++k) {
     shape[k] = as_float(pose.position[k]);
@@ -96,10 +95,10 @@ std::vector<int32_t> World::overlaps(bool is_box, const Pose& pose, const Vector
   std::fill(first, first + slots, -1);
   if (count > 0) {
     machine_->launch("find_overlaps",
-                     {Machine::whole(is_box ? 1 : 0), Machine::array(machine_->rows.memory(), TI_DATA_TYPE_I32, count),
-                      Machine::array(machine_->numbers.memory(), TI_DATA_TYPE_F32, 5, 3),
-                      Machine::array(machine_->found.memory(), TI_DATA_TYPE_I32, slots),
-                      Machine::array(machine_->vertices.memory(), TI_DATA_TYPE_I32, particles)});
+                     {Machine::whole(is_box ? 1 : 0), Machine::array(machine_->rows, count),
+                      Machine::array(machine_->numbers, 5, 3),
+                      Machine::array(machine_->found, slots),
+                      Machine::array(machine_->vertices, particles)});
   }
   std::vector<int32_t> found;
   for (uint32_t slot = 0; slot < slots; ++slot) {

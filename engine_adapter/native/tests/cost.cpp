@@ -32,12 +32,10 @@ int main(int count, char** arguments) {
   const auto scene = std::make_shared<Scene>(arguments[1]);
   std::printf("loaded in %.2f s\n", microseconds_since(start) * 1e-6);
   World world(scene);
-  // The same kernel on another machine, launched with nothing round it.
-  const auto machine = scene->take_machine();
-  const auto image = scene->archive.get<unsigned char>("fields/image");
-  std::memcpy(machine->root(), image.data, image.count);
+  // The same kernel with memory of its own, launched with nothing round it.
+  const auto machine = std::make_unique<Machine>(*scene);
   const int32_t substeps = world.stable_substeps(kDt), bodies = scene->slot_count;
-  std::vector<TiArgument> call = {Machine::whole(bodies)};
+  std::vector<Argument> call = {Machine::whole(bodies)};
   if (scene->has_contact) call.push_back(Machine::whole(std::min(scene->threads, bodies) - 1));
   call.insert(call.end(), {Machine::whole(substeps), Machine::real(kDt / substeps), Machine::whole(2147483647),
                            Machine::whole(0)});

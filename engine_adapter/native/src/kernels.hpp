@@ -1,0 +1,57 @@
+// The machine code of a world: what `taichi-soft export` compiled its kernels to, and how they are called.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace taichi_soft {
+
+struct Runtime;
+
+// As Taichi 1.7 lays them out in the kernels' code.
+struct Context {
+  void* arguments;  // a struct of them, in their order
+  Runtime* runtime;
+  int32_t thread;
+  int64_t* result;
+};
+
+using Task = void (*)(void* closure, int32_t thread, int32_t number);
+
+struct Runtime {
+  struct {
+    char *begin, *end;
+    int64_t size;
+  } chunks[2];
+  void* functions[4];
+  void* unused;
+  char* roots[512];  // of layouts of fields: a world file has one
+  int64_t root_sizes[512];
+  void* pool;
+  // Runs tasks 0 to count - 1, in any threads; task 0 begins no later than the others.
+  void (*parallel_for)(void* pool, int32_t count, int32_t threads, void* closure, Task task);
+  void* lists[3][1024];
+  char* temporaries;  // what one part of a kernel leaves for the next
+  void* rest[512];
+};
+
+class Kernels {
+ public:
+  using Kernel = void (*)(Context* context);
+
+  // The file of this platform among those in a folder. Fails where there is none, or where it is not the one that was
+  // exported, whose length and checksum are given for each.
+  Kernels(const std::string& folder, const std::vector<std::string>& files, const std::vector<int64_t>& sums);
+  ~Kernels();
+  Kernels(const Kernels&) = delete;
+  Kernels& operator=(const Kernels&) = delete;
+
+  Kernel find(const std::string& name) const;
+
+ private:
+  void* library_;
+};
+
+}  // namespace taichi_soft
