@@ -45,10 +45,10 @@ test-all: $(VENV)/.dev
 test-bounds: $(VENV)/.test
 	@TAICHI_SOFT_DEBUG=1 $(BIN)/python -m pytest tests/bounds
 
-native: $(VENV)/.demo
+native: $(VENV)/.export
 	@for tool in cmake g++; do command -v $$tool > /dev/null || { echo "make native needs $$tool: install it first"; exit 1; }; done
 	@mkdir -p out
-	@cmake -S engine_adapter/native -B out/native -DTAICHI_DIR="$$($(BIN)/python -c 'import importlib.util as u; print(u.find_spec("taichi").submodule_search_locations[0])')" > out/native.log || { cat out/native.log; exit 1; }
+	@cmake -S engine_adapter/native -B out/native > out/native.log || { cat out/native.log; exit 1; }
 	@cmake --build out/native
 	@$(BIN)/taichi-soft export engine_adapter/native/sample/game.py --out out/game.softworld
 	@echo "try it: out/native/game out/game.softworld"

@@ -22,6 +22,14 @@ def export(
     ],
     out: Annotated[Path, typer.Option(help="Folder to write: game.softworld.")],
     axes: Annotated[str, typer.Option(help="Of the engine: z-up, y-up (Godot), unity, unreal.")] = "z-up",
+    for_: Annotated[
+        str | None,
+        typer.Option(
+            "--for",
+            help="Platforms: linux-x64, windows-x64, linux-arm64, macos-arm64, with commas between them, or "
+            "all. This machine's by default.",
+        ),
+    ] = None,
     threads: Threads = None,
 ) -> None:
     """Write a world with its kernels, which a C library steps in an engine without Python.
@@ -31,13 +39,14 @@ def export(
     """
     init("cpu", threads)
     world, names = _found_in(scene)
-    from taichi_soft.export import export_world
+    from taichi_soft.export import PLATFORMS, export_world
 
+    platforms = None if for_ is None else list(PLATFORMS) if for_ == "all" else for_.split(",")
     with progress_bar() as progress:
         task = progress.add_task("compiling", total=None)
         if not world.is_built:
             world.build()
-        report = export_world(world, out, axes=axes, names=names)
+        report = export_world(world, out, axes=axes, names=names, platforms=platforms)
         progress.update(task, description="done")
     counts = ", ".join(f"{len(each)} {kind}{'' if len(each) == 1 else 's'}" for kind, each in _plural(report))
     say(

@@ -2,5 +2,6 @@
 
 from taichi_soft.export.axes import AXES
 from taichi_soft.export.exporting import ExportReport, export_world
+from taichi_soft.export.machine_code import PLATFORMS
 
-__all__ = ["AXES", "ExportReport", "export_world"]
+__all__ = ["AXES", "PLATFORMS", "ExportReport", "export_world"]

@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import platform
 import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import ModuleType
 
 from taichi_soft.core.errors import OptionError
@@ -62,6 +64,12 @@ void *memcpy(void *to, const void *from, __SIZE_TYPE__ size) {
 """
 """What compilers call, for files that are linked with nothing."""
 
+_WINDOWS = """
+int _fltused = 0;
+int DllMainCRTStartup(void *library, unsigned reason, void *reserved) { return 1; }
+"""
+"""What Windows wants of a library besides."""
+
 
 def platforms_of(names: Sequence[str] | None) -> list[str]:
     """Platforms by name, each once; that of this machine for None. Raises: OptionError for others."""
@@ -91,12 +99,11 @@ def compile_kernels(texts: Path, names: Sequence[str], platforms: Sequence[str],
     sources = [_source_of(name, (texts / f"{name}.ll").read_text()) for name in names]
     files = []
     for target in (each for name in platforms for each in PLATFORMS[name]):
-        file = folder / target.file
-        object_file = file.with_suffix(".o")
-        object_file.write_bytes(_object_of(llvm, sources, target))
-        _link(target, object_file, file, [PREFIX + name for name in names])
-        object_file.unlink()
-        files.append(file)
+        with TemporaryDirectory() as scratch:
+            code = Path(scratch) / "kernels.o"
+            code.write_bytes(_object_of(llvm, sources, target))
+            linked = _linked(target, code, [PREFIX + name for name in names])
+            files.append(Path(shutil.move(linked, folder / target.file)))
     return files
 
 
@@ -139,18 +146,20 @@ def _object_of(llvm: ModuleType, sources: Sequence[str], target: Platform) -> by
     return bytes(machine.emit_object(whole))
 
 
-def _link(target: Platform, object_file: Path, file: Path, symbols: Sequence[str]) -> None:
-    memory = file.with_suffix(".c")
-    memory.write_text(_MEMORY)
+def _linked(target: Platform, code: Path, symbols: Sequence[str]) -> Path:
+    """A library made of an object file, beside it."""
+    linked, memory = code.with_name(target.file), code.with_name("memory.c")
+    is_windows = target.target.endswith("windows-gnu")
+    memory.write_text(_MEMORY + (_WINDOWS if is_windows else ""))
     command = [
         *(sys.executable, "-m", "ziglang", "cc", "-target", target.target, "-shared", "-nostdlib", "-O2"),
-        *("-fno-builtin", "-fno-sanitize=all", "-s", "-o", str(file), str(object_file), str(memory)),
+        *("-fno-builtin", "-fno-sanitize=all", "-s", "-o", str(linked), str(code), str(memory)),
     ]
-    if target.target.endswith("windows-gnu"):
-        definitions = file.with_suffix(".def")
+    if is_windows:
+        definitions = code.with_name("kernels.def")
         definitions.write_text("EXPORTS\n" + "".join(f"  {each}\n" for each in symbols))
-        command += [str(definitions), "-Wl,--entry=0"]
+        command.append(str(definitions))
     done = subprocess.run(command, capture_output=True, text=True)
-    memory.unlink()
     if done.returncode != 0:
-        raise OptionError(f"cannot link {file.name}: {done.stderr.strip() or 'zig has failed'}")
+        raise OptionError(f"cannot link {target.file}: {done.stderr.strip() or 'zig has failed'}")
+    return linked

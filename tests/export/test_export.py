@@ -1,10 +1,5 @@
 """What is refused before it is exported, by name, and that a refused export leaves nothing behind."""
 
-import os
-import re
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 
@@ -142,28 +137,3 @@ def test_entries_lie_at_multiples_of_8_bytes_so_that_they_are_read_where_they_li
     assert whole[:8] == b"TSOFTWLD"
     assert len(whole) % 8 == 0
     assert whole.index(rows.tobytes()) % 8 == 0
-
-
-ON_ONE_THREAD = """
-import sys
-from taichi_soft import Material, World, init, sphere
-from taichi_soft.export import export_world
-init("cpu", threads=1)
-world = World(soft_contact=True)
-for i in range(2):
-    ball = sphere(radius=0.3, resolution=2)
-    world.add_body(ball, Material(young=5e4, poisson=0.4, density=1000), position=(2 * i, 0, 1))
-world.build()
-world.step(1 / 60)
-export_world(world, sys.argv[1])
-"""
-
-
-def test_an_exported_step_takes_no_more_threads_than_the_process_that_exported_it(tmp_path):
-    """Also where its kernel is known from an earlier process, in which any number may run it."""
-    place = {**os.environ, "TI_OFFLINE_CACHE_FILE_PATH": str(tmp_path / "cache")}
-    for name in ("first", "second"):
-        subprocess.run([sys.executable, "-c", ON_ONE_THREAD, str(tmp_path / name)], env=place, check=True)
-        code = (tmp_path / name / "kernels" / "step.ll").read_text()
-        loops = re.findall(r"call void %\d+\(.*i32 noundef (\d+), .*@cpu_parallel_range_for_task", code)
-        assert loops == ["1"]
