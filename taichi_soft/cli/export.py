@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 from rich.markup import escape
 
-from taichi_soft.cli.console import Threads, progress_bar, say
+from taichi_soft.cli.console import progress_bar, say
 from taichi_soft.cli.named_function import function_of, variables_of
 from taichi_soft.core.errors import OptionError
 from taichi_soft.core.runtime import init
@@ -30,14 +30,13 @@ def export(
             "all. This machine's by default.",
         ),
     ] = None,
-    threads: Threads = None,
 ) -> None:
     """Write a world with its kernels, which a C library steps in an engine without Python.
 
     A script need not know of it: its world is taken as it leaves it, and built if it is not. Bodies, assets,
     colliders and frames are called as the script's variables are.
     """
-    init("cpu", threads)
+    init("cpu")
     world, names = _found_in(scene)
     from taichi_soft.export import PLATFORMS, export_world
 

@@ -46,7 +46,6 @@ from taichi_soft.core.taichi_patches import (
     let_any_number_of_threads_run,
     let_threads_in,
     let_whole_numbers_overflow,
-    limiting_threads,
     remember_sources,
     ti,
 )
@@ -294,8 +293,8 @@ def make_fields(function: Callable[[], Result]) -> Result:
 def export_kernels(folder: Path, kernels: Mapping[str, tuple[Any, dict[str, Any]]], fields: Any) -> None:
     """Write kernels for programs without Python: the last thing that this process does with Taichi.
 
-    They take no more threads than this process has. They are made from their source: where a file of a known
-    kernel is missing, its short body would be written here.
+    They are made from their source: where a file of a known kernel is missing, its short body would be
+    written here.
 
     Args:
         kernels: by name, each with its template arguments, and an array like each of the others.
@@ -307,7 +306,7 @@ def export_kernels(folder: Path, kernels: Mapping[str, tuple[Any, dict[str, Any]
         for number, field in enumerate([_first_field, *fields]):
             module.add_field(f"layout{number}", field)
         functions = {kernel for kernel, _ in kernels.values()}
-        with limiting_threads(device().threads), FIRST_LAUNCHES.making_anew(functions):
+        with FIRST_LAUNCHES.making_anew(functions):
             for name, (kernel, arguments) in kernels.items():
                 module.add_kernel(kernel, arguments, name)
             module.save(str(folder))

@@ -11,8 +11,7 @@ import types
 import warnings
 import weakref
 import zlib
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
@@ -35,7 +34,6 @@ __all__ = [
     "let_any_number_of_threads_run",
     "let_threads_in",
     "let_whole_numbers_overflow",
-    "limiting_threads",
     "remember_sources",
     "ti",
     "tree_of",
@@ -165,17 +163,6 @@ def code_options() -> str:
     names = [name for name in dir(config) if not name.startswith(("_", "offline_cache", "print_", "verbose"))]
     numbers = {name: getattr(config, name) for name in names if name != "num_compile_threads"}
     return str({name: value for name, value in numbers.items() if isinstance(value, (bool, int, float))})
-
-
-@contextmanager
-def limiting_threads(count: int) -> Iterator[None]:
-    """Compile kernels within for no more than so many threads."""
-    config = ti.lang.impl.current_cfg()
-    usual, config.cpu_max_num_threads = config.cpu_max_num_threads, count
-    try:
-        yield
-    finally:
-        config.cpu_max_num_threads = usual
 
 
 def choose_by_comparison() -> None:

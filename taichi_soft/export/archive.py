@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-MARK, VERSION = b"TSOFTWLD", 1
+MARK, VERSION = b"TSOFTWLD", 2
 
 TYPES = {np.dtype(name): code for code, name in enumerate(("u1", "<i4", "<i8", "<f4", "<f8"), start=1)}
 

@@ -21,7 +21,6 @@ from taichi_soft.control.impulses import LARGEST_IMPULSE
 from taichi_soft.control.kernels.grabs import PATCH_ROWS
 from taichi_soft.core.checks import LONGEST_STEP, SHORTEST_STEP
 from taichi_soft.core.constants import GRAVITY_EARTH, POSITION_LIMIT, VELOCITY_LIMIT
-from taichi_soft.core.runtime import device
 from taichi_soft.events.contacts import CONTACT_PAUSE
 from taichi_soft.events.log import MOST_EVENTS
 from taichi_soft.events.observer import touch_rows
@@ -64,7 +63,7 @@ def _of_world(context: WorldContext) -> Arrays:
         "world/flags": _ints(
             [built.program.has_contact, built.sleeps, room.soft, built.state.capacity.implicit]
         ),
-        "world/counts": _ints([len(context.slots.slots), context.layout.particle_count, device().threads]),
+        "world/counts": _ints([len(context.slots.slots), context.layout.particle_count]),
         "world/stable": _floats([share, longest]),
         "world/limits": _floats(
             [

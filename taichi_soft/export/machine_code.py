@@ -50,25 +50,11 @@ _TARGET_LINES = re.compile(r"^target (?:datalayout|triple).*\n", re.MULTILINE)
 _PROCESSOR = re.compile(r'"(?:target-cpu|target-features|tune-cpu)"="[^"]*"')
 _PART = re.compile(r"^define void @(\w+_kernel_(\d+)_\w+)\((%struct\.RuntimeContext[.\d]*\*)", re.MULTILINE)
 
-_MEMORY = """
-typedef unsigned char byte;
-void *memset(void *to, int value, __SIZE_TYPE__ size) {
-  for (byte *at = to, *end = at + size; at < end; ++at) *at = (byte)value;
-  return to;
-}
-void *memcpy(void *to, const void *from, __SIZE_TYPE__ size) {
-  const byte *source = from;
-  for (byte *at = to, *end = at + size; at < end; ++at, ++source) *at = *source;
-  return to;
-}
-"""
-"""What compilers call, for files that are linked with nothing."""
-
 _WINDOWS = """
 int _fltused = 0;
 int DllMainCRTStartup(void *library, unsigned reason, void *reserved) { return 1; }
 """
-"""What Windows wants of a library besides."""
+"""What Windows wants of a library."""
 
 
 def platforms_of(names: Sequence[str] | None) -> list[str]:
@@ -148,17 +134,17 @@ def _object_of(llvm: ModuleType, sources: Sequence[str], target: Platform) -> by
 
 def _linked(target: Platform, code: Path, symbols: Sequence[str]) -> Path:
     """A library made of an object file, beside it."""
-    linked, memory = code.with_name(target.file), code.with_name("memory.c")
-    is_windows = target.target.endswith("windows-gnu")
-    memory.write_text(_MEMORY + (_WINDOWS if is_windows else ""))
+    linked = code.with_name(target.file)
+    # What compilers call, to set memory and the like, comes with zig: nothing of a system is linked.
     command = [
-        *(sys.executable, "-m", "ziglang", "cc", "-target", target.target, "-shared", "-nostdlib", "-O2"),
-        *("-fno-builtin", "-fno-sanitize=all", "-s", "-o", str(linked), str(code), str(memory)),
+        *(sys.executable, "-m", "ziglang", "cc", "-target", target.target, "-shared", "-nostdlib"),
+        *("-lcompiler_rt", "-s", "-o", str(linked), str(code)),
     ]
-    if is_windows:
-        definitions = code.with_name("kernels.def")
+    if target.target.endswith("windows-gnu"):
+        start, definitions = code.with_name("start.c"), code.with_name("kernels.def")
+        start.write_text(_WINDOWS)
         definitions.write_text("EXPORTS\n" + "".join(f"  {each}\n" for each in symbols))
-        command.append(str(definitions))
+        command += ["-fno-sanitize=all", str(start), str(definitions)]
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode != 0:
         raise OptionError(f"cannot link {target.file}: {done.stderr.strip() or 'zig has failed'}")

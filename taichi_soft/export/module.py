@@ -13,7 +13,7 @@ from taichi_soft.control.kernels.drives import add_push
 from taichi_soft.control.kernels.impulses import add_impulse_near, add_radial_impulse, add_velocity
 from taichi_soft.control.kernels.pins import aim_pinned, free_particles, pin_particles, write_targets
 from taichi_soft.control.kernels.rigid_motion import jump, write_rigid_velocity
-from taichi_soft.core.runtime import device, ti
+from taichi_soft.core.runtime import ti
 from taichi_soft.export.kernels.root import read_root
 from taichi_soft.export.meshes import ExportedMesh
 from taichi_soft.queries.kernels import find_closest, find_hits, find_overlaps
@@ -54,7 +54,7 @@ def kernels_of(context: WorldContext, meshes: Sequence[ExportedMesh]) -> Kernels
         found["step"] = _example(step_islands, state=state, program=program)
         found["forget_collider"] = _example(forget_collider, contact=state.contact)
         found["sum_collider_impulses"] = _example(sum_collider_impulses, contact=state.contact)
-    elif len(context.slots.slots) == 1 or device().threads == 1:
+    elif len(context.slots.slots) == 1:
         found["step"] = _example(step_in_turn, state=state, program=program)
     else:
         found["step"] = _example(step_per_body, state=state, program=program)

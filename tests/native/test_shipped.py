@@ -84,7 +84,7 @@ def test_a_newcomer_plays_in_godot_with_the_zip_alone(engine, libraries, tmp_pat
     commands, _ = blocks(page, "From nothing to falling elephants")
     found = told(entered(commands))
     demo = place / package.stem
-    licences = {"LICENSE", "LICENSE-taichi", "LICENSE-godot-headers"}
+    licences = {"LICENSE", "LICENSE-godot-headers"}
     assert licences <= {path.name for path in (demo / "addons" / "taichi_soft").iterdir()}
     (dropped,) = set(found["middles"]) - {"Rider", "Block"}
     require_on_the_ground(found["middles"][dropped], found["lowest"][dropped])

@@ -517,7 +517,7 @@ namespace TaichiSoft
         private bool isDisposed;
         private ExceptionDispatchInfo thrown;
 
-        /// <summary>A world as it was exported: at once, but one beside others takes as long as loading.</summary>
+        /// <summary>A world as it was exported.</summary>
         public World(Scene scene)
         {
             found = new ulong[scene.GetInfo().SlotCount];
@@ -576,6 +576,13 @@ namespace TaichiSoft
                 structSize = Size<FixedStep>.Bytes, substeps = substeps, maxSteps = maxSteps, dt = dt
             };
             Native.Check(Native.ts_world_set_fixed_step(handle, ref step), this);
+        }
+
+        /// <summary>Threads of its own that a step may use, with the one that calls it, 1 to 256: by default as many
+        /// as the processor has. What comes out does not depend on it.</summary>
+        public void SetThreads(int count)
+        {
+            Native.Check(Native.ts_world_set_threads(handle, count), this);
         }
 
         /// <summary>One step of dt [s] in equal parts; 0 chooses as many as are stable.</summary>
@@ -1245,6 +1252,12 @@ namespace TaichiSoft
 
         [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_world_on_step(ulong world, BeforeStep function, IntPtr user);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_world_set_threads(ulong world, int count);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_world_set_job_system(ulong world, IntPtr function, IntPtr user);
 
         [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_world_step(ulong world, double dt, int substeps);

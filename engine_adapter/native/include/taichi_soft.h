@@ -128,12 +128,22 @@ typedef struct ts_clock {
 /* Called before each step of ts_world_advance: the place to move colliders and frames, and to push. */
 typedef void (*ts_before_step)(ts_world world, void* user);
 
-/* A world as it was exported: at once where it is the first or follows one that was destroyed. One beside others
- * compiles kernels of its own: takes as long as loading. */
+/* A job of a step. Jobs of one step may wait for those with lower numbers. */
+typedef void (*ts_job)(void* closure, int32_t number);
+/* A host's threads: call job(closure, number) for each number from 0 to count - 1, begun in this order, by as many
+ * threads as there are, and return when all have ended. One thread that calls them in turn will do. */
+typedef void (*ts_run_jobs)(void* user, int32_t count, ts_job job, void* closure);
+
+/* A world as it was exported. Worlds of one scene share their kernels: each takes its memory alone. */
 TS_API ts_result ts_world_create(ts_scene scene, ts_world* world);
 TS_API ts_result ts_world_destroy(ts_world world);
 TS_API ts_result ts_world_set_fixed_step(ts_world world, const ts_fixed_step* step);
 TS_API ts_result ts_world_on_step(ts_world world, ts_before_step function, void* user);
+/* Threads of its own that a step may use, with the one that calls it: 1 to 256, by default as many as the processor
+ * has. What comes out does not depend on it. */
+TS_API ts_result ts_world_set_threads(ts_world world, int32_t count);
+/* Let the host's threads make what a step can share, which must not call this world meanwhile; null for its own. */
+TS_API ts_result ts_world_set_job_system(ts_world world, ts_run_jobs function, void* user);
 /* One step of `dt` [s] in `substeps` equal parts; 0 chooses as many as are stable. */
 TS_API ts_result ts_world_step(ts_world world, double dt, int32_t substeps);
 /* Put in the time of a frame [s] and make the steps that are due. `clock` may be null. Where a step fails, those

@@ -144,6 +144,8 @@ class World {
     const ts_fixed_step step{sizeof(ts_fixed_step), substeps, max_steps, dt};
     check(ts_world_set_fixed_step(handle_, &step));
   }
+  // Of its own that a step may use, with the one that calls it.
+  void set_threads(int32_t count) { check(ts_world_set_threads(handle_, count)); }
   // Called before each step of `advance`. It must not throw, nor call this.
   void on_step(std::function<void()> function) {
     auto next = std::make_unique<std::function<void()>>(std::move(function));

@@ -399,6 +399,14 @@ ts_result ts_world_on_step(ts_world world, ts_before_step function, void* user) 
   return guarded([&] { Turn(world)->on_step(function, user); });
 }
 
+ts_result ts_world_set_threads(ts_world world, int32_t count) {
+  return guarded([&] { Turn(world)->set_threads(count); });
+}
+
+ts_result ts_world_set_job_system(ts_world world, ts_run_jobs function, void* user) {
+  return guarded([&] { Turn(world)->set_job_system(function, user); });
+}
+
 ts_result ts_world_step(ts_world world, double dt, int32_t substeps) {
   return guarded([&] { Turn(world)->step(dt, substeps); });
 }

@@ -12,7 +12,7 @@ namespace taichi_soft {
 namespace {
 
 constexpr char kMark[] = "TSOFTWLD";
-constexpr uint32_t kVersion = 1;
+constexpr uint32_t kVersion = 2;
 constexpr size_t kHead = 32;
 
 constexpr size_t kWidth[] = {0, 1, 4, 8, 4, 8};  // bytes of a number of each type

@@ -30,7 +30,7 @@ struct Runtime {
   char* roots[512];  // of layouts of fields: a world file has one
   int64_t root_sizes[512];
   void* pool;
-  // Runs tasks 0 to count - 1, in any threads; task 0 begins no later than the others.
+  // Runs tasks 0 to count - 1, in any threads, begun in this order. How many threads Taichi would take is of no interest.
   void (*parallel_for)(void* pool, int32_t count, int32_t threads, void* closure, Task task);
   void* lists[3][1024];
   char* temporaries;  // what one part of a kernel leaves for the next

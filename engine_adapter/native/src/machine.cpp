@@ -13,11 +13,7 @@ constexpr size_t kLine = 64;             // of the processor's cache [bytes], by
 constexpr size_t kTemporaries = 1 << 16;  // more than any kernel takes
 
 void run_on_threads(void* pool, int32_t count, int32_t, void* closure, Task task) {
-  if (count == 1) {
-    task(closure, 0, 0);
-  } else {
-    static_cast<Threads*>(pool)->run(count, closure, task);
-  }
+  static_cast<Threads*>(pool)->run(count, closure, task);
 }
 
 template <typename Number>
@@ -38,7 +34,7 @@ Machine::Machine(const Scene& scene) : scene_(scene), runtime_(std::make_unique<
   temporaries_.resize(kTemporaries);
   for (char*& root : runtime_->roots) root = root_;
   runtime_->temporaries = temporaries_.data();
-  runtime_->pool = &threads_;
+  runtime_->pool = &threads;
   runtime_->parallel_for = run_on_threads;
 }
 

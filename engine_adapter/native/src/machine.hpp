@@ -54,6 +54,7 @@ class Machine {
   }
   void launch(const char* kernel, const std::vector<Argument>& arguments);
 
+  Threads threads;
   Buffer numbers, rows, found, vertices, frames, positions, normals;
 
  private:
@@ -61,7 +62,6 @@ class Machine {
   std::vector<char> fields_, temporaries_, packed_;
   char* root_;
   std::unique_ptr<Runtime> runtime_;
-  Threads threads_;
 };
 
 }  // namespace taichi_soft

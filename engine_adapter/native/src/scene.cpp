@@ -98,7 +98,7 @@ Scene::Scene(const std::string& folder)
   const auto floors = archive.get<double>("world/floor");
   const auto assets_of = archive.get<int32_t>("slots/asset"), begins = archive.get<int32_t>("slots/begin");
   const auto grabs = archive.get<double>("grabs/limits");
-  if (flags.count != 4 || grabs.count != 5 || counts.count != 3 || stable.count != 2 || limits.count != 7)
+  if (flags.count != 4 || grabs.count != 5 || counts.count != 2 || stable.count != 2 || limits.count != 7)
     out_of_order("numbers");
   has_contact = flags[0] != 0;
   sleeps = flags[1] != 0;
@@ -109,7 +109,7 @@ Scene::Scene(const std::string& folder)
     if (!(each >= 0.0 && each <= 1e30)) out_of_order("grabs");
   }
   patch_rows = grabs[4] >= 1.0 && grabs[4] <= 1e6 ? size_t(grabs[4]) : 0;
-  slot_count = counts[0], particle_count = counts[1], threads = counts[2];
+  slot_count = counts[0], particle_count = counts[1];
   stable_share = stable[0], stable_step = stable[1];
   has_floor = floors.count == 1;
   floor = has_floor ? floors[0] : 0.0;
@@ -119,7 +119,7 @@ Scene::Scene(const std::string& folder)
   asset_of_slot.assign(assets_of.begin(), assets_of.end());
   begin_of_slot.assign(begins.begin(), begins.end());
   if (slot_count < 1 || size_t(slot_count) != asset_of_slot.size() || size_t(slot_count) != begin_of_slot.size() ||
-      size_t(slot_count) != names_[TS_BODY].size() || particle_count < 1 || threads < 1 || particle_count > (1 << 28)) {
+      size_t(slot_count) != names_[TS_BODY].size() || particle_count < 1 || particle_count > (1 << 28)) {
     out_of_order("slots");
   }
   read_fields();

@@ -1,8 +1,26 @@
 #include "threads.hpp"
 
+#include <algorithm>
+
 #include "floats.hpp"
 
 namespace taichi_soft {
+
+namespace {
+
+struct Loop {
+  void* closure;
+  Task task;
+};
+
+void run_job(void* loop, int32_t number) {
+  const WithUsualFloats floats;
+  static_cast<Loop*>(loop)->task(static_cast<Loop*>(loop)->closure, 0, number);
+}
+
+}  // namespace
+
+Threads::Threads() : most_(std::max(int32_t(std::thread::hardware_concurrency()), 1)) {}
 
 Threads::~Threads() {
   {
@@ -14,14 +32,26 @@ Threads::~Threads() {
 }
 
 void Threads::run(int32_t count, void* closure, Task task) {
+  if (count > 1 && host_ != nullptr) {
+    Loop loop = {closure, task};
+    host_(user_, count, run_job, &loop);
+  } else if (count > 1 && most_ > 1) {
+    run_on_workers(count, closure, task);
+  } else {
+    for (int32_t number = 0; number < count; ++number) task(closure, 0, number);
+  }
+}
+
+void Threads::run_on_workers(int32_t count, void* closure, Task task) {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    while (int32_t(workers_.size()) < count - 1) {
+    const int32_t helpers = std::min(count, most_) - 1;
+    while (int32_t(workers_.size()) < helpers) {
       workers_.emplace_back(&Threads::serve, this, int32_t(workers_.size()) + 1, round_);
     }
     closure_ = closure, task_ = task, count_ = count;
     next_ = 0;
-    busy_ = int32_t(workers_.size());
+    helpers_ = busy_ = helpers;
     round_ += 1;
   }
   begins_.notify_all();
@@ -41,6 +71,7 @@ void Threads::serve(int32_t thread, uint64_t done) {
     begins_.wait(lock, [&] { return is_over_ || round_ != done; });
     if (is_over_) return;
     done = round_;
+    if (thread > helpers_) continue;
     lock.unlock();
     take_tasks(thread);
     lock.lock();

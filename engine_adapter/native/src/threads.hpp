@@ -1,4 +1,4 @@
-// Threads of a world: they run the tasks of a loop beside the one that calls.
+// Who runs the tasks of a loop: the thread that calls, with threads of a world's own beside it, or the host's.
 #pragma once
 
 #include <atomic>
@@ -9,28 +9,39 @@
 #include <vector>
 
 #include "kernels.hpp"
+#include "taichi_soft.h"
 
 namespace taichi_soft {
 
 class Threads {
  public:
-  Threads() = default;
+  Threads();
   ~Threads();
   Threads(const Threads&) = delete;
   Threads& operator=(const Threads&) = delete;
 
-  // Runs tasks 0 to count - 1 and returns when all have ended. Threads are started as they are needed.
+  int32_t most() const { return most_; }  // that run at a time, with the one that calls
+  void set_most(int32_t count) { most_ = count; }
+  void use_host(ts_run_jobs function, void* user) { host_ = function, user_ = user; }
+
+  // Runs tasks 0 to count - 1, which are begun in this order, and returns when all have ended. Threads are started as
+  // they are needed.
   void run(int32_t count, void* closure, Task task);
 
  private:
+  void run_on_workers(int32_t count, void* closure, Task task);
   void serve(int32_t thread, uint64_t done);  // after the round that was done when it started
   void take_tasks(int32_t thread);
 
+  int32_t most_;
+  ts_run_jobs host_ = nullptr;
+  void* user_ = nullptr;
   std::vector<std::thread> workers_;
   std::mutex mutex_;
   std::condition_variable begins_, ends_;
-  uint64_t round_ = 0;  // that is run, or was last
-  int32_t busy_ = 0;    // workers that have not ended it
+  uint64_t round_ = 0;   // that is run, or was last
+  int32_t helpers_ = 0;  // workers that take part in it: the first ones
+  int32_t busy_ = 0;     // of these, that have not ended it
   bool is_over_ = false;
   void* closure_ = nullptr;
   Task task_ = nullptr;

@@ -11,6 +11,7 @@ namespace taichi_soft {
 namespace {
 
 constexpr double kRoundOff = 1e-9;  // of a step, as in engine_adapter/fixed_step.py
+constexpr int32_t kMostThreads = 256;
 constexpr int32_t kAll = std::numeric_limits<int32_t>::max();
 
 const char* const kColliderFields[] = {"position", "rotation", "velocity", "spin", "lower", "upper", "speed"};
@@ -187,10 +188,17 @@ void World::step(double dt, int32_t substeps) {
   take_down(dt, frozen);
 }
 
+void World::set_threads(int32_t count) {
+  if (count < 1 || count > kMostThreads) {
+    fail(TS_ERROR_ARGUMENT, "count is %d: give the number of threads, 1 to %d", count, kMostThreads);
+  }
+  machine_->threads.set_most(count);
+}
+
 void World::launch_step(int32_t substeps, double h) {
   const int32_t bodies = scene_->slot_count;
   std::vector<Argument> arguments = {Machine::whole(bodies)};
-  if (scene_->has_contact) arguments.push_back(Machine::whole(std::min(scene_->threads, bodies) - 1));
+  if (scene_->has_contact) arguments.push_back(Machine::whole(std::min(machine_->threads.most(), bodies) - 1));
   arguments.insert(arguments.end(),
                    {Machine::whole(substeps), Machine::real(h), Machine::whole(kAll), Machine::whole(0)});
   machine_->launch("step", arguments);

@@ -70,6 +70,8 @@ class World {
   // Steps.
   void set_fixed_step(double dt, int32_t substeps, int32_t max_steps);
   void on_step(ts_before_step function, void* user) { before_step_ = function, user_ = user; }
+  void set_threads(int32_t count);
+  void set_job_system(ts_run_jobs function, void* user) { machine_->threads.use_host(function, user); }
   int32_t stable_substeps(double dt) const;
   void step(double dt, int32_t substeps);
   int32_t steps_due(double seconds);   // puts in the time of a frame

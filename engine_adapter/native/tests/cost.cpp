@@ -36,7 +36,7 @@ int main(int count, char** arguments) {
   const auto machine = std::make_unique<Machine>(*scene);
   const int32_t substeps = world.stable_substeps(kDt), bodies = scene->slot_count;
   std::vector<Argument> call = {Machine::whole(bodies)};
-  if (scene->has_contact) call.push_back(Machine::whole(std::min(scene->threads, bodies) - 1));
+  if (scene->has_contact) call.push_back(Machine::whole(std::min(machine->threads.most(), bodies) - 1));
   call.insert(call.end(), {Machine::whole(substeps), Machine::real(kDt / substeps), Machine::whole(2147483647),
                            Machine::whole(0)});
   std::vector<double> ratios, own, whole;
