@@ -2,7 +2,7 @@
 # make test: set everything up, run the tests that take minutes; make test-all: those that take an hour, too
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-fast test-all test-bounds native test-native dist-native lint profile gallery docs clean
+.PHONY: help setup demo test test-fast test-all test-bounds native test-native test-platforms dist-native lint profile gallery docs clean
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -15,7 +15,8 @@ help:
 	@echo "make test-bounds  set up, run kernels with every index checked: takes minutes"
 	@echo "make native   set up, build the library for engines without Python and its sample, into out/native"
 	@echo "make test-native  set up, build it, play games in it and in Python"
-	@echo "make dist-native  build it, pack it with headers, wrappers and sample into dist; and a project for Godot 3"
+	@echo "make test-platforms  set up, build it for other platforms, play games on all that run here"
+	@echo "make dist-native  build it for all platforms, pack it with headers, wrappers and sample into dist; and a project for Godot 3"
 	@echo "make profile  set up, measure what a frame costs here"
 	@echo "make gallery  set up, film every demo for the documentation: takes minutes"
 	@echo "make docs     set up, build the documentation into out/docs"
@@ -53,14 +54,23 @@ native: $(VENV)/.export
 	@$(BIN)/taichi-soft export engine_adapter/native/sample/game.py --out out/game.softworld
 	@echo "try it: out/native/game out/game.softworld"
 
-test-native: $(VENV)/.test
+test-native: $(VENV)/.test $(VENV)/.export
 	@$(BIN)/python -m pytest tests/native
 
-# Two of them: for C, C++ and C#, and a project for Godot 3. GODOT_HEADERS= names a folder of Godot's headers, where
-# they cannot be fetched.
+test-platforms: $(VENV)/.test $(VENV)/.export
+	@$(BIN)/python tests/native/platforms.py
+
+# One for each platform, for C, C++ and C#; and a project for Godot 3. GODOT_HEADERS= names a folder of Godot's headers,
+# where they cannot be fetched.
 dist-native: native
 	@mkdir -p dist out/godot3
-	@cd out/native && cpack -B $(CURDIR)/dist > cpack.log || { cat cpack.log; exit 1; }
+	@for platform in linux-x64 linux-arm64 windows-x64 macos-arm64; do \
+	    echo "building for $$platform"; \
+	    { cmake -S engine_adapter/native -B out/$$platform -DPLATFORM=$$platform -DCMAKE_TOOLCHAIN_FILE=$(CURDIR)/engine_adapter/native/zig.cmake \
+	        -DZIG="$$($(BIN)/python -c 'import importlib.util as u; print(u.find_spec("ziglang").submodule_search_locations[0])')/zig" \
+	        && cmake --build out/$$platform && cd out/$$platform && cpack -B $(CURDIR)/dist && cd ../..; } > out/$$platform.log 2>&1 \
+	    || { cat out/$$platform.log; exit 1; }; \
+	done
 	@cmake -S engine_adapter/godot -B out/godot3 -DTAICHI_SOFT_DIR=$(CURDIR)/out/native -DGODOT_HEADERS="$(GODOT_HEADERS)" \
 	    -DTAICHI_SOFT_GODOT_WORLD=$(CURDIR)/out/godot3/demo.softworld > out/godot3/cmake.log 2>&1 \
 	    || { if grep -q "headers cannot be fetched" out/godot3/cmake.log; \
@@ -68,7 +78,7 @@ dist-native: native
 	         else cat out/godot3/cmake.log; fi; exit 1; }
 	@cmake --build out/godot3
 	@cp engine_adapter/godot/demo/world.py assets/elephant.glb out/godot3
-	@$(BIN)/taichi-soft export out/godot3/world.py --axes y-up --threads 2 --out out/godot3/demo.softworld
+	@$(BIN)/taichi-soft export out/godot3/world.py --axes y-up --out out/godot3/demo.softworld
 	@cd out/godot3 && cpack -B $(CURDIR)/dist > cpack.log || { cat cpack.log; exit 1; }
 	@ls -l dist/taichi-soft-*.zip
 

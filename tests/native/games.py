@@ -1,5 +1,6 @@
 """Games as lists of calls, one a line, that players in several languages play: here on a World of Python."""
 
+import hashlib
 import subprocess
 
 import numpy as np
@@ -49,6 +50,16 @@ def lines_of(command, game, **options):
     )
     assert done.returncode == 0, done.stderr
     return done.stdout.splitlines()
+
+
+def digests(lines, every=60):
+    """Hashes of what a game tells, of all lines up to each of some."""
+    digest, found = hashlib.sha256(), []
+    for number, each in enumerate(lines):
+        digest.update(each.encode())
+        if number % every == 0:
+            found.append(digest.hexdigest()[:16])
+    return [*found, digest.hexdigest()[:16]]
 
 
 class Player:

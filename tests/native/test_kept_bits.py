@@ -5,7 +5,6 @@ Whoever changes how bodies move has them written anew, which shows in the change
     TAICHI_SOFT_KEEP_BITS=1 .venv/bin/python -m pytest tests/native/test_kept_bits.py
 """
 
-import hashlib
 import json
 import os
 import platform
@@ -15,12 +14,11 @@ from pathlib import Path
 
 import pytest
 import random_play
-from games import Player
+from games import Player, digests
 from scenes import GAMES
 from test_same_bits import drawn
 
 KEPT = Path(__file__).with_name("kept_bits.json")
-EVERY = 60  # lines
 
 OLD_PROCESSOR = {
     "OPENBLAS_CORETYPE": "Nehalem",
@@ -36,7 +34,7 @@ PRINT_BITS = (
 )
 
 
-def lines_of(name):
+def told_by(name):
     """What a game tells, in lines. The one named "anything" has what cannot be exported, too."""
     if name == "anything":
         return map(str, random_play.play(*random_play.make_world(), ticks=600, seed=0))
@@ -46,13 +44,8 @@ def lines_of(name):
 
 
 def bits_of(name):
-    """Hashes of what a game tells, of all lines up to each of some."""
-    digest, found = hashlib.sha256(), []
-    for number, line in enumerate(lines_of(name)):
-        digest.update(line.encode())
-        if number % EVERY == 0:
-            found.append(digest.hexdigest()[:16])
-    return [*found, digest.hexdigest()[:16]]
+    """Hashes of what a game tells."""
+    return digests(told_by(name))
 
 
 @pytest.mark.parametrize("name", [*GAMES, "anything"])
