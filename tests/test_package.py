@@ -17,7 +17,7 @@ from taichi_soft.core.package_data import ASSETS, DEMOS
 ROOT = Path(__file__).resolve().parents[1]
 CORE = ("taichi", "numpy", "trimesh")
 MESHERS = ("tetgen", "ftetwild")
-APART = (*MESHERS, "peers")
+APART = (*MESHERS, "peers", "export")
 """Extras that are not in `all`."""
 
 
@@ -50,7 +50,7 @@ def test_an_extra_installs_the_packages_that_are_asked_for(extra):
 
 
 def test_what_a_game_is_shipped_with_holds_no_mesher_or_engine_of_others():
-    """TetGen is under the AGPL, and fTetWild has no wheels for some machines. Engines are large."""
+    """TetGen is under the AGPL, fTetWild has no wheels for some machines. Engines and compilers are large."""
     assert packages_of("all").isdisjoint(set().union(*map(packages_of, APART)))
 
 

@@ -11,6 +11,7 @@ EXTRAS = {
     "film": {"cv2": "opencv-python-headless", "imageio_ffmpeg": "imageio-ffmpeg", "PIL": "pillow"},
     "bake": {"PIL": "pillow", "pygltflib": "pygltflib"},
     "usd": {"pxr": "usd-core"},
+    "export": {"llvmlite": "llvmlite", "ziglang": "ziglang"},
     "io": {"meshio": "meshio", "DracoPy": "dracopy"},
     "voronoi": {"scipy": "scipy"},
     "report": {

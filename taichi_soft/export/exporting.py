@@ -13,6 +13,7 @@ import numpy as np
 from taichi_soft.bodies.fields import made_fields
 from taichi_soft.control.frames import Frames
 from taichi_soft.core.errors import OptionError, StateError
+from taichi_soft.core.extras import require_extra
 from taichi_soft.core.part_folder import PartFolder
 from taichi_soft.core.runtime import export_kernels
 from taichi_soft.export.archive import words, written
@@ -58,7 +59,8 @@ def export_world(
         platforms: some of `PLATFORMS`, that the world is to run on; by default the one of this machine.
         world: built, at the state in which the game starts.
     Raises: StateError for a world that is not built; OptionError for a path that is taken or cannot be
-        written, and for what the native library does not run, by name.
+        written, for an unknown platform, and for what the native library does not run, by name;
+        MissingExtraError without llvmlite or zig.
     """
     path, matrix, platforms = Path(path), axes_of(axes), platforms_of(platforms)
     if not world.is_built:
@@ -69,6 +71,7 @@ def export_world(
         raise OptionError("the native library does not run this world: it has a force field, in Python")
     if path.exists() and not (path / WORLD).is_file():
         raise OptionError(f"{path} is there and no world file: give another --out")
+    require_extra("export", "an export needs")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         part = PartFolder(path.parent)

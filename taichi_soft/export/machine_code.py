@@ -79,7 +79,6 @@ def compile_kernels(texts: Path, names: Sequence[str], platforms: Sequence[str],
         platforms: some of `PLATFORMS`.
         folder: for the files.
     Returns: the files, one or more for each platform.
-    Raises: OptionError where llvmlite or zig is missing.
     """
     llvm = _llvm()
     sources = [_source_of(name, (texts / f"{name}.ll").read_text()) for name in names]
@@ -94,10 +93,8 @@ def compile_kernels(texts: Path, names: Sequence[str], platforms: Sequence[str],
 
 
 def _llvm() -> ModuleType:
-    try:
-        import llvmlite.binding as llvm
-    except ImportError as error:
-        raise OptionError("export needs llvmlite: pip install 'taichi-soft[export]'") from error
+    import llvmlite.binding as llvm
+
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()
     return llvm
