@@ -30,6 +30,9 @@ def export(
             "all. This machine's by default.",
         ),
     ] = None,
+    static: Annotated[
+        bool, typer.Option("--static", help="Objects to link the game with, where it may open no code.")
+    ] = False,
 ) -> None:
     """Write a world with its kernels, which a C library steps in an engine without Python.
 
@@ -45,7 +48,7 @@ def export(
         task = progress.add_task("compiling", total=None)
         if not world.is_built:
             world.build()
-        report = export_world(world, out, axes=axes, names=names, platforms=platforms)
+        report = export_world(world, out, axes=axes, names=names, platforms=platforms, static=static)
         progress.update(task, description="done")
     counts = ", ".join(f"{len(each)} {kind}{'' if len(each) == 1 else 's'}" for kind, each in _plural(report))
     say(

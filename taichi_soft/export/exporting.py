@@ -47,6 +47,7 @@ def export_world(
     axes: str = "z-up",
     names: Mapping[Any, str] | None = None,
     platforms: Sequence[str] | None = None,
+    static: bool = False,
 ) -> ExportReport:
     """Write a built world, as it is now, as a folder that the native library loads.
 
@@ -57,6 +58,8 @@ def export_world(
         names: of bodies, assets, colliders and frames, by which the game finds them; others get one with
             their number, such as body3.
         platforms: some of `PLATFORMS`, that the world is to run on; by default the one of this machine.
+        static: write objects that the game is linked with, where it may open no code: see
+            `ts_scene_load_linked`.
         world: built, at the state in which the game starts.
     Raises: StateError for a world that is not built; OptionError for a path that is taken or cannot be
         written, for an unknown platform, and for what the native library does not run, by name;
@@ -78,7 +81,7 @@ def export_world(
     except OSError as error:
         raise OptionError(f"cannot write {path}: {error.strerror}") from error
     try:
-        return _written(context, path, part, matrix, dict(names or {}), platforms)
+        return _written(context, path, part, matrix, dict(names or {}), platforms, static)
     finally:
         part.remove()
 
@@ -98,6 +101,7 @@ def _written(
     matrix: Any,
     given: dict[Any, str],
     platforms: Sequence[str],
+    static: bool,
 ) -> ExportReport:
     assets = context.slots.kinds
     names = {
@@ -123,10 +127,11 @@ def _written(
     texts = part.path / "texts"
     texts.mkdir()
     export_kernels(texts, kernels, [each.particle_position for each in made_fields()])
-    files = compile_kernels(texts, list(kernels), platforms, folder)
-    contents = [each.read_bytes() for each in files]
+    compiled = compile_kernels(texts, list(kernels), platforms, folder, path.stem if static else None)
+    contents = [each.read_bytes() for each in compiled.files]
     arrays["kernels/names"] = words(list(kernels))
-    arrays["kernels/files"] = words([each.name for each in files])
+    arrays["kernels/stamp"] = words([compiled.stamp])
+    arrays["kernels/files"] = words([each.name for each in compiled.files])
     arrays["kernels/sums"] = np.array([(len(each), zlib.crc32(each)) for each in contents], dtype=np.int64)
     whole = written(arrays)
     (new / WORLD).write_bytes(whole)

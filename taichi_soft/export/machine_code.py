@@ -10,7 +10,8 @@ import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Sequence
+import zlib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -18,8 +19,8 @@ from types import ModuleType
 
 from taichi_soft.core.errors import OptionError
 
-PREFIX = "taichi_soft_kernel_"
-"""Of the functions that a file has, before the names of kernels."""
+TABLE = "taichi_soft_kernels"
+"""What a file has: rows of a name and a function, `ts_linked_kernel` of the C library."""
 
 
 @dataclass(frozen=True)
@@ -29,26 +30,34 @@ class Platform:
     triple: str  # of LLVM
     target: str  # of zig
     processor: str
-    file: str  # by which the library finds it
+    file: str  # without its end
+
+    @property
+    def end(self) -> str:
+        """Of the name of a library."""
+        return {"windows": ".dll", "macos": ".dylib"}.get(self.file.split("-")[0], ".so")
 
 
 PLATFORMS = {
     "linux-x64": (
-        Platform("x86_64-unknown-linux-gnu", "x86_64-linux-gnu", "x86-64-v2", "linux-x64.so"),
-        Platform("x86_64-unknown-linux-gnu", "x86_64-linux-gnu", "x86-64-v3", "linux-x64-v3.so"),
+        Platform("x86_64-unknown-linux-gnu", "x86_64-linux-gnu", "x86-64-v2", "linux-x64"),
+        Platform("x86_64-unknown-linux-gnu", "x86_64-linux-gnu", "x86-64-v3", "linux-x64-v3"),
     ),
     "windows-x64": (
-        Platform("x86_64-pc-windows-gnu", "x86_64-windows-gnu", "x86-64-v2", "windows-x64.dll"),
-        Platform("x86_64-pc-windows-gnu", "x86_64-windows-gnu", "x86-64-v3", "windows-x64-v3.dll"),
+        Platform("x86_64-pc-windows-gnu", "x86_64-windows-gnu", "x86-64-v2", "windows-x64"),
+        Platform("x86_64-pc-windows-gnu", "x86_64-windows-gnu", "x86-64-v3", "windows-x64-v3"),
     ),
-    "linux-arm64": (Platform("aarch64-unknown-linux-gnu", "aarch64-linux-gnu", "generic", "linux-arm64.so"),),
-    "macos-arm64": (Platform("arm64-apple-macosx11.0", "aarch64-macos", "apple-m1", "macos-arm64.dylib"),),
+    "linux-arm64": (Platform("aarch64-unknown-linux-gnu", "aarch64-linux-gnu", "generic", "linux-arm64"),),
+    "macos-arm64": (Platform("arm64-apple-macosx11.0", "aarch64-macos", "apple-m1", "macos-arm64"),),
 }
 """By the name that `taichi-soft export --for` takes."""
 
 _TARGET_LINES = re.compile(r"^target (?:datalayout|triple).*\n", re.MULTILINE)
 _PROCESSOR = re.compile(r'"(?:target-cpu|target-features|tune-cpu)"="[^"]*"')
 _PART = re.compile(r"^define void @(\w+_kernel_(\d+)_\w+)\((%struct\.RuntimeContext[.\d]*\*)", re.MULTILINE)
+
+_FUNCTION = "taichi_soft_kernel_"
+"""How functions begin that run all parts of a kernel."""
 
 _WINDOWS = """
 int _fltused = 0;
@@ -71,25 +80,42 @@ def platforms_of(names: Sequence[str] | None) -> list[str]:
     return list(dict.fromkeys(names))
 
 
-def compile_kernels(texts: Path, names: Sequence[str], platforms: Sequence[str], folder: Path) -> list[Path]:
+@dataclass(frozen=True)
+class CompiledKernels:
+    """What was compiled."""
+
+    stamp: str  # by which the library knows that world file and kernels belong together
+    files: list[Path]  # one or more for each platform
+
+
+def compile_kernels(
+    texts: Path, names: Sequence[str], platforms: Sequence[str], folder: Path, world: str | None
+) -> CompiledKernels:
     """Compile kernels for platforms.
 
     Args:
         texts: folder of a file NAME.ll for each kernel.
         platforms: some of `PLATFORMS`.
         folder: for the files.
-    Returns: the files, one or more for each platform.
+        world: None for libraries that are opened; a name for objects that a game is linked with, whose table
+            is called after it.
     """
     llvm = _llvm()
-    sources = [_source_of(name, (texts / f"{name}.ll").read_text()) for name in names]
+    sources = {name: _source_of(name, (texts / f"{name}.ll").read_text()) for name in names}
+    stamp = f"{zlib.crc32(''.join(sources.values()).encode()):08x}"
+    table = TABLE if world is None else f"{TABLE}_{re.sub(r'[^A-Za-z0-9_]', '_', world)}"
     files = []
     for target in (each for name in platforms for each in PLATFORMS[name]):
+        code = _object_of(llvm, sources, _table_of(table, stamp, names), target)
+        if world is not None:
+            files.append(folder / f"{target.file}.o")
+            files[-1].write_bytes(code)
+            continue
         with TemporaryDirectory() as scratch:
-            code = Path(scratch) / "kernels.o"
-            code.write_bytes(_object_of(llvm, sources, target))
-            linked = _linked(target, code, [PREFIX + name for name in names])
-            files.append(Path(shutil.move(linked, folder / target.file)))
-    return files
+            (Path(scratch) / "kernels.o").write_bytes(code)
+            linked = _linked(target, Path(scratch) / "kernels.o")
+            files.append(Path(shutil.move(linked, folder / linked.name)))
+    return CompiledKernels(stamp, files)
 
 
 def _llvm() -> ModuleType:
@@ -111,38 +137,55 @@ def _source_of(name: str, text: str) -> str:
     )
     context = parts[0][2]
     calls = "".join(f"  call void @{name}_part_{number}({context} %context)\n" for number, _, _ in parts)
-    return f"{text}\ndefine void @{PREFIX}{name}({context} %context) {{\n{calls}  ret void\n}}\n"
+    return f"{text}\ndefine void @{_FUNCTION}{name}({context} %context) {{\n{calls}  ret void\n}}\n"
 
 
-def _object_of(llvm: ModuleType, sources: Sequence[str], target: Platform) -> bytes:
+def _table_of(symbol: str, stamp: str, names: Sequence[str]) -> str:
+    """Rows of a name and a function, with the stamp in front and nothing at the end, as text for LLVM."""
+    lines, rows = [], []
+    for i, text in enumerate([stamp, *names]):
+        kind = f"[{len(text) + 1} x i8]"
+        lines.append(f'@name{i} = private constant {kind} c"{text}\\00"')
+        function = f"bitcast (void (i8*)* @{_FUNCTION}{text} to i8*)" if i else "null"
+        place = f"getelementptr inbounds ({kind}, {kind}* @name{i}, i64 0, i64 0)"
+        rows.append(f"{{ i8*, i8* }} {{ i8* {place}, i8* {function} }}")
+    rows.append("{ i8*, i8* } zeroinitializer")
+    lines += [f"declare void @{_FUNCTION}{name}(i8*)" for name in names]
+    lines.append(f"@{symbol} = constant [{len(rows)} x {{ i8*, i8* }}] [{', '.join(rows)}]")
+    return "\n".join(lines)
+
+
+def _object_of(llvm: ModuleType, sources: Mapping[str, str], table: str, target: Platform) -> bytes:
     machine = llvm.Target.from_triple(target.triple).create_target_machine(
         cpu=target.processor, opt=3, reloc="pic", codemodel="default"
     )
     whole = None
-    for source in sources:
+    for source in [*sources.values(), table]:
         module = llvm.parse_assembly(source)
         module.triple, module.data_layout = target.triple, str(machine.target_data)
         if whole is None:
             whole = module
         else:
             whole.link_in(module)
+    for name in sources:  # so that a game may have several worlds
+        whole.get_function(_FUNCTION + name).linkage = "internal"
     return bytes(machine.emit_object(whole))
 
 
-def _linked(target: Platform, code: Path, symbols: Sequence[str]) -> Path:
+def _linked(target: Platform, code: Path) -> Path:
     """A library made of an object file, beside it."""
-    linked = code.with_name(target.file)
+    linked = code.with_name(target.file + target.end)
     # What compilers call, to set memory and the like, comes with zig: nothing of a system is linked.
     command = [
         *(sys.executable, "-m", "ziglang", "cc", "-target", target.target, "-shared", "-nostdlib"),
         *("-lcompiler_rt", "-s", "-o", str(linked), str(code)),
     ]
-    if target.target.endswith("windows-gnu"):
+    if target.end == ".dll":
         start, definitions = code.with_name("start.c"), code.with_name("kernels.def")
         start.write_text(_WINDOWS)
-        definitions.write_text("EXPORTS\n" + "".join(f"  {each}\n" for each in symbols))
+        definitions.write_text(f"EXPORTS\n  {TABLE} DATA\n")
         command += ["-fno-sanitize=all", str(start), str(definitions)]
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode != 0:
-        raise OptionError(f"cannot link {target.file}: {done.stderr.strip() or 'zig has failed'}")
+        raise OptionError(f"cannot link {linked.name}: {done.stderr.strip() or 'zig has failed'}")
     return linked

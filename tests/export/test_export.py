@@ -103,7 +103,9 @@ def test_what_the_library_does_not_run_is_refused_by_name(make, reason, tmp_path
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_world_that_is_not_built_wrong_axes_an_unknown_platform_and_a_path_that_is_taken_are_refused(tmp_path):
+def test_a_world_that_is_not_built_wrong_axes_an_unknown_platform_and_a_path_that_is_taken_are_refused(
+    tmp_path,
+):
     with pytest.raises(StateError, match="not built"):
         export_world(plain(), tmp_path / "a")
     with pytest.raises(OptionError, match="no platform is called amiga: choose among linux-x64"):

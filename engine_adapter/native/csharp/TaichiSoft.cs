@@ -1217,6 +1217,9 @@ namespace TaichiSoft
         internal static extern int ts_scene_load(byte[] folder, out ulong scene);
 
         [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_scene_load_linked(byte[] world, UIntPtr size, IntPtr kernels, out ulong scene);
+
+        [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_scene_unload(ulong scene);
 
         [DllImport(Library, CallingConvention = C)]

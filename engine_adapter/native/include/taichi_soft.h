@@ -92,8 +92,16 @@ typedef struct ts_mesh_info {
   int32_t has_uv;
 } ts_mesh_info;
 
-/* Read a folder that `taichi-soft export` wrote, and compile its kernels: takes seconds. */
+/* Read a folder that `taichi-soft export` wrote, and open its kernels for this machine. */
 TS_API ts_result ts_scene_load(const char* folder, ts_scene* scene);
+/* Where a game may open no code, it is linked with it. `taichi-soft export --static` writes into the folder's `kernels`
+ * an object for each platform, which has the table `taichi_soft_kernels_NAME`, NAME being the folder's without its end.
+ * `world` is what its file world.tsw holds, `size` bytes; nothing is kept of it. */
+typedef struct ts_linked_kernel {
+  const char* name;
+  void (*run)(void* context);
+} ts_linked_kernel;
+TS_API ts_result ts_scene_load_linked(const void* world, size_t size, const ts_linked_kernel* kernels, ts_scene* scene);
 /* Its worlds go on; what it holds is given back with the last of them. */
 TS_API ts_result ts_scene_unload(ts_scene scene);
 TS_API ts_result ts_scene_get_info(ts_scene scene, ts_scene_info* info);

@@ -282,6 +282,15 @@ ts_result ts_scene_load(const char* folder, ts_scene* scene) {
   });
 }
 
+ts_result ts_scene_load_linked(const void* world, size_t size, const ts_linked_kernel* kernels, ts_scene* scene) {
+  return guarded([&] {
+    given(scene, "scene");
+    given(kernels, "kernels");
+    const char* bytes = static_cast<const char*>(given(world, "world"));
+    *scene = scenes().add(std::make_shared<Scene>(std::vector<char>(bytes, bytes + size), kernels));
+  });
+}
+
 ts_result ts_scene_unload(ts_scene scene) {
   return guarded([&] { scenes().remove(scene); });
 }

@@ -4,6 +4,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <utility>
 
 #include "error.hpp"
 
@@ -94,9 +95,9 @@ uint32_t checksum(const char* bytes, size_t size) {
   return code ^ 0xFFFFFFFFu;
 }
 
-Archive::Archive(const std::string& path) : bytes_(read_file(path)) {
+Archive::Archive(std::vector<char> bytes, const std::string& name) : bytes_(std::move(bytes)) {
   if (bytes_.size() < kHead || std::memcmp(bytes_.data(), kMark, 8) != 0) {
-    fail(TS_ERROR_FILE, "%s is no world file: give a folder that `taichi-soft export` wrote", path.c_str());
+    fail(TS_ERROR_FILE, "%s is no world file: give a folder that `taichi-soft export` wrote", name.c_str());
   }
   Reader head(bytes_.data() + 8, kHead - 8);
   const uint32_t version = head.number<uint32_t>(), count = head.number<uint32_t>();

@@ -13,7 +13,7 @@ uint32_t checksum(const char* bytes, size_t size);  // CRC-32, of IEEE 802.3
 
 class Archive {
  public:
-  explicit Archive(const std::string& path);
+  Archive(std::vector<char> bytes, const std::string& name);  // the name is for errors
 
   // The numbers of an array, for as long as the archive lives. Fails where there is none of that type.
   template <typename Number>

@@ -63,18 +63,29 @@ Kernels::Kernels(const std::string& folder, const std::vector<std::string>& file
     fail(TS_ERROR_FILE, "the world file is damaged: kernels/%s is not what was exported. Export it again",
          files[file].c_str());
   }
+  constexpr char kTable[] = "taichi_soft_kernels";
 #if defined(_WIN32)
   library_ = LoadLibraryW(path.c_str());
   if (library_ == nullptr) {
     fail(TS_ERROR_FILE, "Windows does not open %s: error %lu", path.u8string().c_str(), GetLastError());
   }
+  void* table = reinterpret_cast<void*>(GetProcAddress(static_cast<HMODULE>(library_), kTable));
 #else
   library_ = dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
   if (library_ == nullptr) fail(TS_ERROR_FILE, "cannot open %s: %s", path.c_str(), dlerror());
+  void* table = dlsym(library_, kTable);
 #endif
+  rows_ = static_cast<const ts_linked_kernel*>(table);
+  if (rows_ == nullptr) {
+    close();
+    fail(TS_ERROR_FILE, "kernels/%s has no kernels: export the world again", files[file].c_str());
+  }
 }
 
-Kernels::~Kernels() {
+Kernels::~Kernels() { close(); }
+
+void Kernels::close() {
+  if (library_ == nullptr) return;
 #if defined(_WIN32)
   FreeLibrary(static_cast<HMODULE>(library_));
 #else
@@ -83,14 +94,10 @@ Kernels::~Kernels() {
 }
 
 Kernels::Kernel Kernels::find(const std::string& name) const {
-  const std::string symbol = "taichi_soft_kernel_" + name;
-#if defined(_WIN32)
-  void* found = reinterpret_cast<void*>(GetProcAddress(static_cast<HMODULE>(library_), symbol.c_str()));
-#else
-  void* found = dlsym(library_, symbol.c_str());
-#endif
-  if (found == nullptr) fail(TS_ERROR_FILE, "the world file has no kernel %s: export it again", name.c_str());
-  return reinterpret_cast<Kernel>(found);
+  for (const ts_linked_kernel* row = rows_ + 1; row->name != nullptr; ++row) {
+    if (name == row->name) return reinterpret_cast<Kernel>(row->run);
+  }
+  fail(TS_ERROR_FILE, "the world file has no kernel %s: export it again", name.c_str());
 }
 
 }  // namespace taichi_soft

@@ -1,10 +1,13 @@
-// The machine code of a world: what `taichi-soft export` compiled its kernels to, and how they are called.
+// The machine code of a world, which `taichi-soft export` compiled its kernels to: in a file that is opened here, or
+// linked into the game. And how it is called.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>
+
+#include "taichi_soft.h"
 
 namespace taichi_soft {
 
@@ -44,14 +47,21 @@ class Kernels {
   // The file of this platform among those in a folder. Fails where there is none, or where it is not the one that was
   // exported, whose length and checksum are given for each.
   Kernels(const std::string& folder, const std::vector<std::string>& files, const std::vector<int64_t>& sums);
+  // Those that a game is linked with.
+  explicit Kernels(const ts_linked_kernel* rows) : rows_(rows) {}
   ~Kernels();
   Kernels(const Kernels&) = delete;
   Kernels& operator=(const Kernels&) = delete;
 
+  // By which the export is known that made them.
+  const char* stamp() const { return rows_->name; }
   Kernel find(const std::string& name) const;
 
  private:
-  void* library_;
+  void close();
+
+  void* library_ = nullptr;
+  const ts_linked_kernel* rows_ = nullptr;  // the first has the stamp for a name, the last has none
 };
 
 }  // namespace taichi_soft

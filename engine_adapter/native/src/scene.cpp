@@ -2,6 +2,7 @@
 
 #include <cstdio>
 #include <filesystem>
+#include <utility>
 
 #include "error.hpp"
 
@@ -83,15 +84,38 @@ bool is_skin_whole(const Mesh& mesh, size_t n) {
   return true;
 }
 
+std::string path_of(const std::string& folder, const char* name) {
+  return (std::filesystem::u8path(folder) / name).u8string();
+}
+
 const char* const kKinds[] = {"names/body", "names/asset", "names/collider", "names/frame", "names/mesh"};
 
 }  // namespace
 
-Scene::Scene(const std::string& folder)
-    : archive((std::filesystem::u8path(folder) / "world.tsw").u8string()),
+Scene::Scene(const std::string& folder) : Scene(read_file(path_of(folder, "world.tsw")), path_of(folder, "world.tsw")) {
+  const auto sums = archive.rows<int64_t>("kernels/sums", 2);
+  const auto files = archive.texts("kernels/files");
+  if (sums.count != 2 * files.size()) out_of_order("kernels");
+  take(std::make_unique<Kernels>(path_of(folder, "kernels"), files, std::vector<int64_t>(sums.begin(), sums.end())));
+}
+
+Scene::Scene(std::vector<char> world, const ts_linked_kernel* kernels) : Scene(std::move(world), "world") {
+  take(std::make_unique<Kernels>(kernels));
+}
+
+void Scene::take(std::unique_ptr<Kernels> kernels) {
+  code_ = std::move(kernels);
+  const auto stamp = archive.texts("kernels/stamp");
+  if (stamp.size() != 1 || code_->stamp() == nullptr || stamp[0] != code_->stamp()) {
+    fail(TS_ERROR_FILE, "the kernels are not those of this world file: export it again, with both");
+  }
+  for (const std::string& name : archive.texts("kernels/names")) kernels_[name] = code_->find(name);
+}
+
+Scene::Scene(std::vector<char> world, const std::string& name)
+    : archive(std::move(world), name),
       axes(archive.rows<double>("host_axes", 3).count == 9 ? archive.get<double>("host_axes").data
-                                                           : (out_of_order("axes"), nullptr)),
-      folder_(folder) {
+                                                           : (out_of_order("axes"), nullptr)) {
   for (int kind = 0; kind < 5; ++kind) names_[kind] = archive.texts(kKinds[kind]);
   const auto flags = archive.get<int32_t>("world/flags"), counts = archive.get<int32_t>("world/counts");
   const auto stable = archive.get<double>("world/stable"), limits = archive.get<double>("world/limits");
@@ -125,12 +149,6 @@ Scene::Scene(const std::string& folder)
   read_fields();
   read_assets();
   read_meshes();
-  const auto sums = archive.rows<int64_t>("kernels/sums", 2);
-  const auto files = archive.texts("kernels/files");
-  if (sums.count != 2 * files.size()) out_of_order("kernels");
-  code_ = std::make_unique<Kernels>((std::filesystem::u8path(folder) / "kernels").u8string(), files,
-                                    std::vector<int64_t>(sums.begin(), sums.end()));
-  for (const std::string& name : archive.texts("kernels/names")) kernels_[name] = code_->find(name);
   // A level that is exported anew as it was takes the snapshots of before.
   for (const char* name : {"fields/carried", "fields/places"}) {
     const auto rows = archive.get<int64_t>(name);

@@ -50,6 +50,7 @@ struct Mesh {
 class Scene {
  public:
   explicit Scene(const std::string& folder);
+  Scene(std::vector<char> world, const ts_linked_kernel* kernels);
 
   const std::vector<std::string>& names(int32_t kind) const;  // of TS_BODY and so on
   // Fails where the field is missing, or has fewer elements or numbers in each.
@@ -75,11 +76,12 @@ class Scene {
   uint32_t code = 0;  // of what a snapshot fits into
 
  private:
+  Scene(std::vector<char> world, const std::string& name);
+  void take(std::unique_ptr<Kernels> kernels);
   void read_assets();
   void read_meshes();
   void read_fields();
 
-  std::string folder_;
   std::vector<std::string> names_[5];
   std::vector<std::string> field_names_;
   std::vector<Place> places_;
