@@ -11,7 +11,8 @@ import types
 import warnings
 import weakref
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from typing import Any
 
@@ -26,6 +27,7 @@ from taichi_soft.core.float_environment import with_usual_floats
 from taichi_soft.core.threads import in_turn
 
 __all__ = [
+    "calling",
     "check_real_functions",
     "choose_by_comparison",
     "code_options",
@@ -34,6 +36,7 @@ __all__ = [
     "let_any_number_of_threads_run",
     "let_threads_in",
     "let_whole_numbers_overflow",
+    "not_kept",
     "remember_sources",
     "ti",
     "tree_of",
@@ -163,6 +166,31 @@ def code_options() -> str:
     names = [name for name in dir(config) if not name.startswith(("_", "offline_cache", "print_", "verbose"))]
     numbers = {name: getattr(config, name) for name in names if name != "num_compile_threads"}
     return str({name: value for name, value in numbers.items() if isinstance(value, (bool, int, float))})
+
+
+def calling(function: int) -> Callable[[Any], None]:
+    """For kernels: what calls the C function at an address, with one argument."""
+
+    def call(argument: Any) -> None:
+        runtime = ti.lang.impl.get_runtime()
+        place = ti._lib.core.DebugInfo(runtime.get_current_src_info())
+        given, nothing = ti.lang.expr.make_expr_group([argument]), ti.lang.expr.make_expr_group([])
+        builder = runtime.compiling_callable.ast_builder()
+        builder.insert_external_func_call(function, "", "", "", given, nothing, place)
+
+    setattr(call, "_is_wrapped_kernel", True)  # noqa: B010  # or Taichi warns of it
+    return call
+
+
+@contextmanager
+def not_kept() -> Iterator[None]:
+    """Kernels that are compiled within do not get into Taichi's cache."""
+    config = ti.lang.impl.current_cfg()
+    usual, config.offline_cache = config.offline_cache, False
+    try:
+        yield
+    finally:
+        config.offline_cache = usual
 
 
 def choose_by_comparison() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from importlib.metadata import version
 from typing import Any
 
 import numpy as np
@@ -39,7 +38,6 @@ def description_of(
 ) -> Arrays:
     """Arrays by name: see `engine_adapter/native/src/scene.cpp`, which reads them."""
     arrays: Arrays = {
-        "package": words([version("taichi-soft"), version("taichi")]),
         "host_axes": np.asarray(axes, dtype=np.float64),
         **{f"names/{kind}": words(each) for kind, each in names.items()},
         **_of_world(context),

@@ -123,7 +123,8 @@ def hidden_share(
                 way = pixel_ray(rays, u_there, v_there) / q_there - here
                 far2 = way.dot(way)
                 near = ti.max(1.0 - far2 / (reach * reach), 0.0)
-                total += ti.max(above / ti.sqrt(far2 + 1e-12 * reach * reach) - BIAS, 0.0) * near
+                # A thousandth of the reach more, or round-off would hide a pixel from itself.
+                total += ti.max(above / ti.sqrt(far2 + 1e-6 * reach * reach) - BIAS, 0.0) * near
     return 1.0 - ti.exp(-STRENGTH * total / TAPS)
 
 

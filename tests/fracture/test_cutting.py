@@ -472,7 +472,7 @@ def test_the_stable_step_of_a_part_is_its_own(swinging):
     (fallen,) = body.cut(plane=ALONG)
     limits = [part.stable_step.limit for part in (body, fallen)]
     assert limits[0] != limits[1]
-    assert whole not in limits
+    assert whole < max(limits)
     for part, limit in zip((body, fallen), limits, strict=True):
         mesh = TetMesh(BAR.vertices[part.vertex_origins], part.tets)
         alone = SoftBodyAsset(mesh, part.material)

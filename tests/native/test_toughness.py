@@ -43,7 +43,8 @@ import random, shutil
 from pathlib import Path
 source, copy = Path(arguments[0]), Path(arguments[1])
 shutil.copytree(source, copy)
-files = sorted(each for each in copy.rglob("*") if each.is_file())
+opened = "linux-x64-v3.so" if " avx2 " in Path("/proc/cpuinfo").read_text() else "linux-x64.so"
+files = [copy / "kernels" / opened, copy / "world.tsw"]
 rng, found = random.Random(3), []
 for trial in range(200):
     path = copy / "world.tsw" if trial % 2 else rng.choice(files)

@@ -141,9 +141,9 @@ def add_pin_reactions(state: ti.template(), body, h):
 
 @ti.func
 def keep_residual(state: ti.template(), body, residual, is_first):
-    """Note how exact a solve was, with those of the step before it."""
+    """Keep the largest residual of a step's solves. That of a body that goes non-finite does not count."""
     so_far = ti.select(is_first == 1, 0.0, state.body_residual[body])
-    state.body_residual[body] = ti.max(so_far, residual)
+    state.body_residual[body] = ti.select(residual > so_far, residual, so_far)
 
 
 @ti.func
