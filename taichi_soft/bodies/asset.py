@@ -434,7 +434,7 @@ class SoftBodyAsset:
     def center_of_mass(self) -> Floats:
         """Of its mesh, (3,) [m]."""
         masses = self.description.masses
-        return weighted_sum(masses, self.mesh.vertices) / masses.sum()
+        return np.asarray(weighted_sum(masses, self.mesh.vertices) / masses.sum())
 
     @cached_property
     def rest_rows(self) -> Floats32:

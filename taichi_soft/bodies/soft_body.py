@@ -385,7 +385,7 @@ class SoftBody(Handle):
     def center_of_mass(self) -> Floats:
         """(3,) [m]."""
         masses = self.masses
-        return weighted_sum(masses, self.positions().astype(np.float64)) / masses.sum()
+        return np.asarray(weighted_sum(masses, self.positions().astype(np.float64)) / masses.sum())
 
 
 # What the library asks of a body, and no user does.

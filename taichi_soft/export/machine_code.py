@@ -13,9 +13,10 @@ import sys
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from types import ModuleType
+from typing import Any
 
 from taichi_soft.core.errors import OptionError
 
@@ -118,9 +119,8 @@ def compile_kernels(
     return CompiledKernels(stamp, files)
 
 
-def _llvm() -> ModuleType:
-    import llvmlite.binding as llvm
-
+def _llvm() -> Any:
+    llvm = import_module("llvmlite.binding")
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()
     return llvm
@@ -155,18 +155,16 @@ def _table_of(symbol: str, stamp: str, names: Sequence[str]) -> str:
     return "\n".join(lines)
 
 
-def _object_of(llvm: ModuleType, sources: Mapping[str, str], table: str, target: Platform) -> bytes:
+def _object_of(llvm: Any, sources: Mapping[str, str], table: str, target: Platform) -> bytes:
     machine = llvm.Target.from_triple(target.triple).create_target_machine(
         cpu=target.processor, opt=3, reloc="pic", codemodel="default"
     )
-    whole = None
+    whole = llvm.parse_assembly("")
+    whole.triple, whole.data_layout = target.triple, str(machine.target_data)
     for source in [*sources.values(), table]:
         module = llvm.parse_assembly(source)
-        module.triple, module.data_layout = target.triple, str(machine.target_data)
-        if whole is None:
-            whole = module
-        else:
-            whole.link_in(module)
+        module.triple, module.data_layout = whole.triple, whole.data_layout
+        whole.link_in(module)
     for name in sources:  # so that a game may have several worlds
         whole.get_function(_FUNCTION + name).linkage = "internal"
     return bytes(machine.emit_object(whole))

@@ -99,7 +99,7 @@ def test_a_snapshot_rewinds(scene):
 
 def test_signals_arrive(scene):
     assert scene["sleep"] == {"slept": True, "woke": True}
-    assert scene["scene"]["froze"] == 1
+    assert scene["scene"]["froze"] > 0
 
 
 @pytest.fixture(scope="module")
