@@ -4,9 +4,9 @@ import json
 
 import pytest
 from platforms import RUNNERS, build_for, played
-from scenes import GAMES
 from test_kept_bits import KEPT
 
+PLAYED = ("heap", "held", "laws")  # `make test-platforms` plays all of them
 TARGETS = ",".join(dict.fromkeys(each.platform for each in RUNNERS.values()))
 
 
@@ -23,7 +23,7 @@ def program(tmp_path_factory):
     return built
 
 
-@pytest.mark.parametrize("name", GAMES)
+@pytest.mark.parametrize("name", PLAYED)
 @pytest.mark.parametrize("label", RUNNERS)
 def test_a_game_has_the_same_bits_on_another_platform(label, name, export, program):
     runner = RUNNERS[label]
