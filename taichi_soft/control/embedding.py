@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from taichi_soft.bodies.soft_body import SoftBody
 from taichi_soft.core.errors import OptionError
-from taichi_soft.core.math.barycentric import barycentric
+from taichi_soft.core.math.barycentric import edge_inverses, shares_by
 
 Floats = NDArray[np.float64]
 
@@ -40,11 +40,11 @@ def places_at(body: SoftBody, points: Floats, names: list[str]) -> Places:
     corners = positions[body.tets]
     a, b, c = np.moveaxis(corners[:, 1:] - corners[:, :1], 1, 0)
     is_solid = np.abs((a * np.cross(b, c)).sum(axis=1)) > 1e-30
-    tets, corners = body.tets[is_solid], corners[is_solid]
+    tets, starts, inverses = body.tets[is_solid], corners[is_solid, 0], edge_inverses(corners[is_solid])
     weights = np.empty((len(points), 4))
     chosen = np.zeros(len(points), dtype=np.int64)
     for i, point in enumerate(points):
-        found = barycentric(point, corners)
+        found = shares_by(inverses, point - starts)
         least = found.min(axis=1) if len(found) else np.array([-np.inf])
         chosen[i] = np.argmax(least)
         if not least[chosen[i]] >= FARTHEST:

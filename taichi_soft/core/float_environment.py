@@ -32,7 +32,7 @@ except (AttributeError, OSError):
 
 
 def _usual_environment() -> Any:
-    """What C calls `FE_DFL_ENV`. Where it is not known, that of this thread as the package is imported."""
+    """C's `FE_DFL_ENV`; where we do not know it, the environment of the thread that imports the package."""
     here, usual = Environment(), Environment()
     _read(here)
     if sys.platform == "linux":

@@ -1,4 +1,7 @@
-"""What NumPy finds, the same on every processor: sums in one order, and without what is but round-off."""
+"""Numbers that NumPy computes alike on every processor.
+
+Sums are made in one order. Where round-off remains, it is cut off.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 SHARE = 1e-12
-"""Of the largest number, below which one is taken for round-off."""
+"""Share of the largest number: we take what is smaller for round-off."""
 
 
 def rounded(value: float) -> float:
@@ -32,5 +35,5 @@ def weighted_sum(weights: Floats, rows: Floats) -> Floats:
 
 
 def kept(rows: Floats) -> Floats:
-    """With the digits of a 32-bit float, and without residue: for what a world remembers in more digits."""
+    """Numbers rounded to 32-bit floats, without residue. A world remembers such ones."""
     return without_residue(rows).astype(np.float32).astype(np.float64)

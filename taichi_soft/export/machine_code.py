@@ -21,12 +21,12 @@ from typing import Any
 from taichi_soft.core.errors import OptionError
 
 TABLE = "taichi_soft_kernels"
-"""What a file has: rows of a name and a function, `ts_linked_kernel` of the C library."""
+"""Symbol of the table in a file: rows of a name and a function, `ts_linked_kernel` of the C library."""
 
 
 @dataclass(frozen=True)
 class Platform:
-    """What code is compiled for."""
+    """A processor and a system, for which LLVM compiles and zig links."""
 
     triple: str  # of LLVM
     target: str  # of zig
@@ -35,7 +35,7 @@ class Platform:
 
     @property
     def end(self) -> str:
-        """Of the name of a library."""
+        """The end of a library's name."""
         return {"windows": ".dll", "macos": ".dylib"}.get(self.file.split("-")[0], ".so")
 
 
@@ -64,7 +64,7 @@ _WINDOWS = """
 int _fltused = 0;
 int DllMainCRTStartup(void *library, unsigned reason, void *reserved) { return 1; }
 """
-"""What Windows wants of a library."""
+"""Windows looks for these two in every library."""
 
 
 def platforms_of(names: Sequence[str] | None) -> list[str]:
@@ -83,9 +83,9 @@ def platforms_of(names: Sequence[str] | None) -> list[str]:
 
 @dataclass(frozen=True)
 class CompiledKernels:
-    """What was compiled."""
+    """Files of machine code, and what says that they belong to a world file."""
 
-    stamp: str  # by which the library knows that world file and kernels belong together
+    stamp: str  # the library compares it with the one in the world file
     files: list[Path]  # one or more for each platform
 
 

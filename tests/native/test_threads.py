@@ -1,4 +1,4 @@
-"""Who makes the parts of a step, and how many threads at a time, changes no bit of it."""
+"""Who makes the parts of a step, how many threads at a time, and how these round, changes no bit of it."""
 
 from library import ARGUMENT, OK, in_process
 
@@ -44,3 +44,27 @@ def test_any_number_of_threads_and_the_host_s_own_give_the_same_bits(native, exp
     assert all(each == found[0] for each in found)
     assert max(counts) > 2  # the host had something to share out
     assert codes == [ARGUMENT, ARGUMENT, ARGUMENT, OK]
+
+
+ROUNDED = """
+import ctypes
+c = ctypes.CDLL(None)
+toward_zero = 0xC00 if __import__("platform").machine() == "x86_64" else 0xC00000  # of fenv.h
+world = soft.create(soft.load(arguments[0]))
+if arguments[1] == "toward zero":
+    assert c.fesetround(toward_zero) == 0
+found = []
+for _ in range(60):
+    soft.call("ts_world_step", world, c_double(0.015625), c_int32(0))
+    found.append(soft.hash(world))
+is_left = c.fegetround() == toward_zero
+c.fesetround(0)
+print(json.dumps([found, is_left]))
+"""
+
+
+def test_a_thread_that_rounds_otherwise_gets_the_same_bits_and_rounds_so_afterwards(native, export):
+    found, is_left = in_process(native, ROUNDED, export("heap"), "toward zero")
+    usual, _ = in_process(native, ROUNDED, export("heap"), "to nearest")
+    assert found == usual
+    assert is_left

@@ -52,7 +52,7 @@ enum {
   TS_ERROR_SIZE = -6,     /* a buffer that does not fit */
   TS_ERROR_STATE = -7,    /* what the world cannot do now: a full pool, an attached body */
   TS_ERROR_SNAPSHOT = -8, /* bytes that are no snapshot of this world */
-  TS_ERROR_RUNTIME = -9   /* Taichi, or the system, has failed */
+  TS_ERROR_RUNTIME = -9   /* the system has failed: memory, threads */
 };
 
 typedef uint64_t ts_scene; /* a world file in memory; 0 is none */

@@ -6,6 +6,7 @@
 #include <thread>
 #include <utility>
 
+#include "floats.hpp"
 #include "handles.hpp"
 #include "scene.hpp"
 #include "world.hpp"
@@ -33,6 +34,7 @@ void note(const char* text) {
 
 template <typename Function>
 ts_result guarded(Function function) noexcept {
+  const WithUsualFloats floats;
   try {
     function();
     return TS_OK;

@@ -1,29 +1,41 @@
-// Kernels compute as IEEE 754 says, subnormal numbers included, in whichever thread they run and whatever the game
-// has its own threads do.
+// Calls compute as IEEE 754 says, subnormal numbers included, whatever the game has its threads do.
 #pragma once
 
+#include <cstdint>
 #if defined(__x86_64__) || defined(_M_X64)
 #include <xmmintrin.h>
 #endif
 
 namespace taichi_soft {
 
+// The processor's register of how it rounds, and whether it takes subnormal numbers for zero.
 #if defined(__x86_64__) || defined(_M_X64)
+constexpr uint64_t kUsualFloats = 0x1F80;
+inline uint64_t float_control() { return _mm_getcsr(); }
+inline void set_float_control(uint64_t control) { _mm_setcsr(unsigned(control)); }
+#elif defined(__aarch64__)
+constexpr uint64_t kUsualFloats = 0;
+inline uint64_t float_control() {
+  uint64_t control;
+  asm volatile("mrs %0, fpcr" : "=r"(control));
+  return control;
+}
+inline void set_float_control(uint64_t control) { asm volatile("msr fpcr, %0" : : "r"(control)); }
+#else
+constexpr uint64_t kUsualFloats = 0;  // others have no such register, or we do not know it
+inline uint64_t float_control() { return 0; }
+inline void set_float_control(uint64_t) {}
+#endif
+
 class WithUsualFloats {
  public:
-  WithUsualFloats() : before_(_mm_getcsr()) { _mm_setcsr(0x1F80u); }
-  ~WithUsualFloats() { _mm_setcsr(before_); }
+  WithUsualFloats() : before_(float_control()) { set_float_control(kUsualFloats); }
+  ~WithUsualFloats() { set_float_control(before_); }
   WithUsualFloats(const WithUsualFloats&) = delete;
   WithUsualFloats& operator=(const WithUsualFloats&) = delete;
 
  private:
-  unsigned before_;
+  uint64_t before_;
 };
-#else
-class WithUsualFloats {
- public:
-  WithUsualFloats() {}
-};
-#endif
 
 }  // namespace taichi_soft

@@ -2,7 +2,6 @@
 
 #include <cstring>
 
-#include "floats.hpp"
 #include "scene.hpp"
 
 namespace taichi_soft {
@@ -54,7 +53,6 @@ void Machine::launch(const char* kernel, const std::vector<Argument>& arguments)
   packed_.resize(packed_.size() + sizeof(void*));
   int64_t result[8];
   Context context = {packed_.data(), runtime_.get(), 0, result};
-  const WithUsualFloats floats;
   scene_.kernel(kernel)(&context);
 }
 

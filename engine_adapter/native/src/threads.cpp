@@ -1,6 +1,7 @@
 #include "threads.hpp"
 
 #include <algorithm>
+#include <exception>
 
 #include "floats.hpp"
 
@@ -45,10 +46,7 @@ void Threads::run(int32_t count, void* closure, Task task) {
 void Threads::run_on_workers(int32_t count, void* closure, Task task) {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    const int32_t helpers = std::min(count, most_) - 1;
-    while (int32_t(workers_.size()) < helpers) {
-      workers_.emplace_back(&Threads::serve, this, int32_t(workers_.size()) + 1, round_);
-    }
+    const int32_t helpers = helpers_for(count);
     closure_ = closure, task_ = task, count_ = count;
     next_ = 0;
     helpers_ = busy_ = helpers;
@@ -58,6 +56,18 @@ void Threads::run_on_workers(int32_t count, void* closure, Task task) {
   take_tasks(0);
   std::unique_lock<std::mutex> lock(mutex_);
   ends_.wait(lock, [this] { return busy_ == 0; });
+}
+
+// Where the system gives no more threads, those that there are have to do: no exception can pass through a kernel.
+int32_t Threads::helpers_for(int32_t count) noexcept {
+  const int32_t wanted = std::min(count, most_) - 1;
+  try {
+    while (int32_t(workers_.size()) < wanted) {
+      workers_.emplace_back(&Threads::serve, this, int32_t(workers_.size()) + 1, round_);
+    }
+  } catch (const std::exception&) {
+  }
+  return std::min(wanted, int32_t(workers_.size()));
 }
 
 void Threads::take_tasks(int32_t thread) {

@@ -30,6 +30,7 @@ class Threads {
 
  private:
   void run_on_workers(int32_t count, void* closure, Task task);
+  int32_t helpers_for(int32_t count) noexcept;
   void serve(int32_t thread, uint64_t done);  // after the round that was done when it started
   void take_tasks(int32_t thread);
 

@@ -30,8 +30,10 @@ int main(int count, char** arguments) {
   const int rounds = count > 2 ? std::atoi(arguments[2]) : 30, steps = count > 3 ? std::atoi(arguments[3]) : 100;
   const Clock::time_point start = Clock::now();
   const auto scene = std::make_shared<Scene>(arguments[1]);
-  std::printf("loaded in %.2f s\n", microseconds_since(start) * 1e-6);
+  std::printf("loaded in %.1f ms\n", microseconds_since(start) * 1e-3);
+  const Clock::time_point loaded = Clock::now();
   World world(scene);
+  std::printf("a world in %.1f ms\n", microseconds_since(loaded) * 1e-3);
   // The same kernel with memory of its own, launched with nothing round it.
   const auto machine = std::make_unique<Machine>(*scene);
   const int32_t substeps = world.stable_substeps(kDt), bodies = scene->slot_count;

@@ -25,5 +25,6 @@ def barycentric(points: Floats, corners: Floats) -> Floats:
 
 def shares_by(inverses: Floats, arms: Floats) -> Floats:
     """The same by what `edge_inverses` has found, of arms (..., 3) [m] from the first corners."""
-    rest = (inverses * arms[..., None, :]).sum(axis=-1)
+    x, y, z = arms[..., 0, None], arms[..., 1, None], arms[..., 2, None]
+    rest = inverses[..., 0] * x + inverses[..., 1] * y + inverses[..., 2] * z
     return np.concatenate([1.0 - rest.sum(axis=-1, keepdims=True), rest], axis=-1)

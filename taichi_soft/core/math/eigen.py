@@ -10,7 +10,7 @@ SWEEPS = 6
 """Convergence is quadratic once sorted out: four sweeps reach float32, six reach float64."""
 
 NOTHING = 1e-17
-"""What is smaller beside the diagonal, over the diagonal, changes nothing there, in float64 either."""
+"""An entry whose share of the diagonal is smaller changes nothing there, not even in float64."""
 
 
 @ti.func

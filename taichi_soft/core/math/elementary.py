@@ -58,7 +58,7 @@ _ATAN = [(-1.0) ** k / (2 * k + 1) for k in range(1, 22)]
 
 
 def _is_double(x: Any) -> bool:
-    """As Taichi compiles a kernel: whether a number in it has 64 bits."""
+    """Whether a number of the kernel that Taichi compiles now has 64 bits."""
     return bool(x.ptr.get_rvalue_type() == ti.f64)
 
 
