@@ -74,13 +74,13 @@ def export_world(
         raise OptionError("the native library does not run this world: it has a force field, in Python")
     if path.exists() and not (path / WORLD).is_file():
         raise OptionError(f"{path} is there and no world file: give another --out")
-    require_extra("export", "an export needs")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         part = PartFolder(path.parent)
     except OSError as error:
         raise OptionError(f"cannot write {path}: {error.strerror}") from error
     try:
+        require_extra("export", "an export needs")
         return _written(context, path, part, matrix, dict(names or {}), platforms, static)
     finally:
         part.remove()
