@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cstring>
 #include <new>
-#include <thread>
 #include <utility>
 
 #include "floats.hpp"
@@ -35,6 +34,10 @@ void note(const char* text) {
 template <typename Function>
 ts_result guarded(Function function) noexcept {
   const WithUsualFloats floats;
+#if defined(__wasm__)
+  function();  // see `fail`
+  return TS_OK;
+#else
   try {
     function();
     return TS_OK;
@@ -49,14 +52,15 @@ ts_result guarded(Function function) noexcept {
     note("unknown error");
   }
   return TS_ERROR_RUNTIME;
+#endif
 }
 
 // A world for the time of one call, which no other thread can use meanwhile.
 class Turn {
  public:
-  explicit Turn(ts_world handle) : world_(worlds().find(handle)), lock_(world_->turn, std::try_to_lock) {
-    const bool is_free = lock_.owns_lock() &&
-                         (world_->advancing == std::thread::id() || world_->advancing == std::this_thread::get_id());
+  explicit Turn(ts_world handle) : world_(worlds().find(handle)), lock_(world_->turn) {
+    const bool is_free =
+        lock_.has_succeeded() && (world_->advancing == ThreadId() || world_->advancing == this_thread());
     if (!is_free) fail(TS_ERROR_BUSY, "another thread is in a call of this world");
   }
   World* operator->() const { return world_.get(); }
@@ -65,7 +69,7 @@ class Turn {
 
  private:
   std::shared_ptr<World> world_;  // before the lock, which is given back first
-  std::unique_lock<std::mutex> lock_;
+  Attempt lock_;
 };
 
 // The steps of one frame. Between them the world is free for its own thread, whose function moves colliders, and
@@ -74,9 +78,9 @@ class Frame {
  public:
   Frame(ts_world handle, double seconds) : handle_(handle), world_(worlds().find(handle)) {
     const Turn turn(handle);
-    if (world_->advancing != std::thread::id()) fail(TS_ERROR_STATE, "ts_world_advance was called within itself");
+    if (world_->advancing != ThreadId()) fail(TS_ERROR_STATE, "ts_world_advance was called within itself");
     due = left = world_->steps_due(seconds);
-    world_->advancing = std::this_thread::get_id();
+    world_->advancing = this_thread();
   }
   ~Frame() { end(); }
   Frame(const Frame&) = delete;
@@ -95,9 +99,9 @@ class Frame {
 
   void end() noexcept {
     if (is_over_) return;
-    const std::lock_guard<std::mutex> lock(world_->turn);
+    const Guard lock(world_->turn);
     world_->end_frame(left);
-    world_->advancing = std::thread::id();
+    world_->advancing = ThreadId();
     is_over_ = true;
   }
 
@@ -435,6 +439,16 @@ ts_result ts_world_advance(ts_world world, double seconds, ts_clock* clock) {
     if (clock != nullptr) Turn(world)->write_clock(clock, frame.due);
   });
 }
+
+#if defined(__wasm__)
+// What `Frame` does at its end, for one that was left by an exception of JavaScript's.
+TS_API ts_result ts_web_end_frame(ts_world world) {
+  const auto found = worlds().find(world);
+  found->end_frame(0);
+  found->advancing = ThreadId();
+  return TS_OK;
+}
+#endif
 
 ts_result ts_world_get_clock(ts_world world, ts_clock* clock) {
   return guarded([&] {

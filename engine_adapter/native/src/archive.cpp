@@ -2,8 +2,6 @@
 
 #include <array>
 #include <cstring>
-#include <filesystem>
-#include <fstream>
 #include <utility>
 
 #include "error.hpp"
@@ -65,20 +63,6 @@ class Reader {
 };
 
 }  // namespace
-
-std::vector<char> read_file(const std::string& path) {
-  std::ifstream file(std::filesystem::u8path(path), std::ios::binary | std::ios::ate);
-  const std::streamoff size = file ? static_cast<std::streamoff>(file.tellg()) : -1;
-  if (size < 0 || size > (std::streamoff(1) << 40)) {
-    fail(TS_ERROR_FILE, "cannot read %s: give a folder that `taichi-soft export` wrote", path.c_str());
-  }
-  std::vector<char> found(static_cast<size_t>(size));
-  file.seekg(0);
-  if (!found.empty() && !file.read(found.data(), size)) {
-    fail(TS_ERROR_FILE, "cannot read %s", path.c_str());
-  }
-  return found;
-}
 
 uint32_t checksum(const char* bytes, size_t size) {
   static const std::array<uint32_t, 256> table = [] {

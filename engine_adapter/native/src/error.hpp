@@ -16,6 +16,12 @@ struct Error : std::runtime_error {
   Error(ts_result code, const std::string& text) : std::runtime_error(text), code(code) {}
 };
 
+#if defined(__wasm__)
+// There are no exceptions there: the host throws one of its own, and puts the stack back.
+extern "C" __attribute__((import_module("taichi_soft"), import_name("fail"))) [[noreturn]] void taichi_soft_fail(
+    ts_result code, const char* text);
+#endif
+
 #if defined(__GNUC__)
 [[noreturn]] __attribute__((format(printf, 2, 3)))
 #else
@@ -27,7 +33,11 @@ inline void fail(ts_result code, const char* format, ...) {
   va_start(values, format);
   std::vsnprintf(text, sizeof text, format, values);
   va_end(values);
+#if defined(__wasm__)
+  taichi_soft_fail(code, text);
+#else
   throw Error(code, text);
+#endif
 }
 
 }  // namespace taichi_soft

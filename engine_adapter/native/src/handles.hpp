@@ -3,10 +3,10 @@
 
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <vector>
 
 #include "error.hpp"
+#include "locks.hpp"
 
 namespace taichi_soft {
 
@@ -17,7 +17,7 @@ class Handles {
   Handles(const char* name, uint64_t kind) : name_(name), kind_(kind << 56) {}
 
   uint64_t add(std::shared_ptr<Thing> thing) {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const Guard lock(mutex_);
     size_t row = 0;
     while (row < rows_.size() && rows_[row].thing) ++row;
     if (row == rows_.size()) rows_.push_back({});
@@ -28,13 +28,13 @@ class Handles {
 
   // It lives for as long as the caller keeps what is returned.
   std::shared_ptr<Thing> find(uint64_t handle) {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const Guard lock(mutex_);
     return row_of(handle).thing;
   }
 
   // Forget a handle; whoever is in a call keeps the thing until that ends.
   std::shared_ptr<Thing> remove(uint64_t handle) {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const Guard lock(mutex_);
     return std::move(row_of(handle).thing);
   }
 
@@ -57,7 +57,7 @@ class Handles {
 
   const char* name_;
   uint64_t kind_;
-  std::mutex mutex_;
+  Mutex mutex_;
   std::vector<Row> rows_;
 };
 

@@ -1,7 +1,6 @@
 #include "scene.hpp"
 
 #include <cstdio>
-#include <filesystem>
 #include <utility>
 
 #include "error.hpp"
@@ -84,20 +83,9 @@ bool is_skin_whole(const Mesh& mesh, size_t n) {
   return true;
 }
 
-std::string path_of(const std::string& folder, const char* name) {
-  return (std::filesystem::u8path(folder) / name).u8string();
-}
-
 const char* const kKinds[] = {"names/body", "names/asset", "names/collider", "names/frame", "names/mesh"};
 
 }  // namespace
-
-Scene::Scene(const std::string& folder) : Scene(read_file(path_of(folder, "world.tsw")), path_of(folder, "world.tsw")) {
-  const auto sums = archive.rows<int64_t>("kernels/sums", 2);
-  const auto files = archive.texts("kernels/files");
-  if (sums.count != 2 * files.size()) out_of_order("kernels");
-  take(std::make_unique<Kernels>(path_of(folder, "kernels"), files, std::vector<int64_t>(sums.begin(), sums.end())));
-}
 
 Scene::Scene(std::vector<char> world, const ts_linked_kernel* kernels) : Scene(std::move(world), "world") {
   take(std::make_unique<Kernels>(kernels));

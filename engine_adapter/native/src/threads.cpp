@@ -21,6 +21,22 @@ void run_job(void* loop, int32_t number) {
 
 }  // namespace
 
+void Threads::run(int32_t count, void* closure, Task task) {
+  if (count > 1 && host_ != nullptr) {
+    Loop loop = {closure, task};
+    host_(user_, count, run_job, &loop);
+    return;
+  }
+#if !defined(__wasm__)
+  if (count > 1 && most_ > 1) return run_on_workers(count, closure, task);
+#endif
+  for (int32_t number = 0; number < count; ++number) task(closure, 0, number);
+}
+
+#if defined(__wasm__)
+Threads::Threads() : most_(1) {}
+Threads::~Threads() = default;
+#else
 Threads::Threads() : most_(std::max(int32_t(std::thread::hardware_concurrency()), 1)) {}
 
 Threads::~Threads() {
@@ -30,17 +46,6 @@ Threads::~Threads() {
   }
   begins_.notify_all();
   for (std::thread& worker : workers_) worker.join();
-}
-
-void Threads::run(int32_t count, void* closure, Task task) {
-  if (count > 1 && host_ != nullptr) {
-    Loop loop = {closure, task};
-    host_(user_, count, run_job, &loop);
-  } else if (count > 1 && most_ > 1) {
-    run_on_workers(count, closure, task);
-  } else {
-    for (int32_t number = 0; number < count; ++number) task(closure, 0, number);
-  }
 }
 
 void Threads::run_on_workers(int32_t count, void* closure, Task task) {
@@ -88,5 +93,6 @@ void Threads::serve(int32_t thread, uint64_t done) {
     if (--busy_ == 0) ends_.notify_one();
   }
 }
+#endif
 
 }  // namespace taichi_soft

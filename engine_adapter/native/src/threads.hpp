@@ -1,15 +1,18 @@
 // Who runs the tasks of a loop: the thread that calls, with threads of a world's own beside it, or the host's.
 #pragma once
 
-#include <atomic>
-#include <condition_variable>
 #include <cstdint>
-#include <mutex>
-#include <thread>
-#include <vector>
 
 #include "kernels.hpp"
 #include "taichi_soft.h"
+
+#if !defined(__wasm__)
+#include <atomic>
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+#include <vector>
+#endif
 
 namespace taichi_soft {
 
@@ -29,14 +32,15 @@ class Threads {
   void run(int32_t count, void* closure, Task task);
 
  private:
+  int32_t most_;
+  ts_run_jobs host_ = nullptr;
+  void* user_ = nullptr;
+#if !defined(__wasm__)
   void run_on_workers(int32_t count, void* closure, Task task);
   int32_t helpers_for(int32_t count) noexcept;
   void serve(int32_t thread, uint64_t done);  // after the round that was done when it started
   void take_tasks(int32_t thread);
 
-  int32_t most_;
-  ts_run_jobs host_ = nullptr;
-  void* user_ = nullptr;
   std::vector<std::thread> workers_;
   std::mutex mutex_;
   std::condition_variable begins_, ends_;
@@ -48,6 +52,7 @@ class Threads {
   Task task_ = nullptr;
   int32_t count_ = 0;
   std::atomic<int32_t> next_{0};
+#endif
 };
 
 }  // namespace taichi_soft

@@ -2,12 +2,11 @@
 #pragma once
 
 #include <memory>
-#include <mutex>
-#include <thread>
 #include <vector>
 
 #include "colliders.hpp"
 #include "events.hpp"
+#include "locks.hpp"
 #include "machine.hpp"
 #include "scene.hpp"
 #include "taichi_soft.h"
@@ -64,8 +63,8 @@ class World {
   World& operator=(const World&) = delete;
 
   const Scene& scene() const { return *scene_; }
-  std::mutex turn;            // of the thread that is in a call
-  std::thread::id advancing;  // which makes the steps of a frame, and lets go of its turn between them
+  Mutex turn;          // of the thread that is in a call
+  ThreadId advancing{};  // which makes the steps of a frame, and lets go of its turn between them
 
   // Steps.
   void set_fixed_step(double dt, int32_t substeps, int32_t max_steps);
@@ -157,7 +156,7 @@ class World {
   void require_step(double dt) const;
   int32_t require_substeps(double dt, int32_t substeps) const;
   void require_image() const;
-  void require_rows(const char* at, const SnapshotHead& head) const;
+  bool are_rows_in_order(const char* at, const SnapshotHead& head) const;
   bool is_in_order(const Contact& contact, size_t colliders) const;
   Present present() const;
   std::map<Pair, std::array<float, 3>> look();

@@ -142,9 +142,8 @@ bool World::is_in_order(const Contact& contact, size_t colliders) const {
          is_below(contact.other, contact.kind == kOfBody ? slots : colliders);
 }
 
-// Fails where a step would read beyond its fields, or begin with what is not finite.
-void World::require_rows(const char* at, const SnapshotHead& head) const {
-  const auto refuse = [] { fail(TS_ERROR_SNAPSHOT, "this snapshot is not in order: it names what there is not"); };
+// Whether a step would read within its fields, and begin with what is finite.
+bool World::are_rows_in_order(const char* at, const SnapshotHead& head) const {
   const Scene& s = *scene_;
   const std::pair<size_t, int64_t> limits[] = {// of whole numbers, by where their field lies
                                                {s.place("body_status").offset, kAbsent + 1},
@@ -161,45 +160,46 @@ void World::require_rows(const char* at, const SnapshotHead& head) const {
       if (each.place.is_whole) {
         int32_t number;
         take(&at, &number, 1);
-        if (is_limited && (number < 0 || number >= limit)) refuse();
+        if (is_limited && (number < 0 || number >= limit)) return false;
         if (each.is_fixed) {
           const size_t row = i / each.place.width, column = i % each.place.width;
           const char* now = machine_->root() + each.place.offset + row * each.place.stride + 4 * column;
-          if (std::memcmp(now, &number, 4) != 0) refuse();
+          if (std::memcmp(now, &number, 4) != 0) return false;
         }
       } else {
         float number;
         take(&at, &number, 1);
-        if (each.is_finite && !std::isfinite(number)) refuse();
+        if (each.is_finite && !std::isfinite(number)) return false;
       }
     }
   }
   for (size_t i = 0; i < 24 * head.frames; ++i) {
     float number;
     take(&at, &number, 1);
-    if (!(std::fabs(number) <= s.position_limit)) refuse();
+    if (!(std::fabs(number) <= s.position_limit)) return false;
   }
   at += head.frames + feels_.size() + sizeof(uint32_t) * (generations_.size() + grab_generations_.size());
   for (size_t i = 0; i < head.colliders; ++i) {
     unsigned char flags[2];
     std::memcpy(flags, at + offsetof(Collider, is_alive), 1);
     std::memcpy(flags + 1, at + offsetof(Collider, has_target), 1);
-    if (flags[0] > 1 || flags[1] > 1) refuse();
+    if (flags[0] > 1 || flags[1] > 1) return false;
     Collider row;
     take(&at, &row, 1);
     // Those with a grid were there when the world was exported.
     const bool is_known = row.kind >= 0 && (row.kind <= 3 || (i < s.names(TS_COLLIDER).size() && row.kind <= 5));
     if (!is_known || !is_place(row.pose) || (row.has_target && !is_place(row.target)) ||
         !std::isfinite(length_of(row.velocity)) || !std::isfinite(length_of(row.spin))) {
-      refuse();
+      return false;
     }
   }
   at += sizeof(int32_t) * events_.status.size() + sizeof(ts_body) * generations_.size();
   for (size_t i = 0; i < head.contacts; ++i) {
     Contact contact;
     take(&at, &contact, 1);
-    if (!is_in_order(contact, size_t(head.colliders))) refuse();
+    if (!is_in_order(contact, size_t(head.colliders))) return false;
   }
+  return true;
 }
 
 // The same of the world file, whose image was taken as it is.
@@ -208,9 +208,7 @@ void World::require_image() const {
   snapshot(bytes.data());
   SnapshotHead head;
   std::memcpy(&head, bytes.data(), sizeof head);
-  try {
-    require_rows(bytes.data() + sizeof head, head);
-  } catch (const Error&) {
+  if (!are_rows_in_order(bytes.data() + sizeof head, head)) {
     fail(TS_ERROR_FILE, "the world file is not in order: its state names what there is not. Export it again");
   }
 }
@@ -235,7 +233,9 @@ void World::restore(const char* bytes, size_t size) {
   if (sum != checksum(whole.data(), size)) {
     fail(TS_ERROR_SNAPSHOT, "this snapshot is damaged: its checksum is wrong");
   }
-  require_rows(bytes + sizeof head, head);
+  if (!are_rows_in_order(bytes + sizeof head, head)) {
+    fail(TS_ERROR_SNAPSHOT, "this snapshot is not in order: it names what there is not");
+  }
   // What may find no memory comes before what changes the world.
   const size_t frames = size_t(head.frames);
   Events::Memory memory = {int32_t(head.kinds), std::vector<int32_t>(slots + 2), std::vector<ts_body>(slots),
