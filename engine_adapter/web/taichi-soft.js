@@ -1,0 +1,786 @@
+// Soft bodies in a browser or in node: worlds that `taichi-soft export --for web` wrote.
+//
+//     const world = await loadWorld("game.softworld");
+//     const jelly = world.body("jelly").mesh();
+//     function frame() {
+//       world.advance(1 / 60);
+//       jelly.update(); // jelly.positions and jelly.normals are views of the module's memory
+//     }
+//
+// All is in the axes for which the world was exported, in SI units; turns are unit quaternions [x, y, z, w].
+
+const CODES = ["OK", "ARGUMENT", "HANDLE", "BUSY", "FILE", "VERSION", "SIZE", "STATE", "SNAPSHOT", "RUNTIME"];
+const STATUS = ["active", "frozen", "asleep"];
+const KINDS = { body: 0, asset: 1, collider: 2, frame: 3, mesh: 4 };
+const SHAPES = ["plane", "sphere", "box", "capsule"];
+const UPRIGHT = [0, 0, 0, 1];
+
+/** Kinds of events, as bits. */
+export const EVENTS = { contactBegan: 1, contactEnded: 2, fellAsleep: 4, woke: 8, froze: 16 };
+const EVENT_NAMES = Object.fromEntries(Object.entries(EVENTS).map(([name, bit]) => [bit, name]));
+
+/** What the library refuses. `code` is ARGUMENT, STATE and so on; nothing was changed. */
+export class SoftError extends Error {
+  constructor(code, text) {
+    super(text);
+    this.name = "SoftError";
+    this.code = CODES[-code] ?? "RUNTIME";
+  }
+}
+
+// The module's memory and functions.
+class Native {
+  constructor(module) {
+    const refuse = (code, text) => {
+      throw new SoftError(code, this.text(text));
+    };
+    const listeners = new Map();
+    const nothing = () => 8; // of WASI: a bad file; the library writes to none
+    const imports = {
+      taichi_soft: { fail: refuse, before_step: (world) => listeners.get(world)?.() },
+      wasi_snapshot_preview1: new Proxy({}, { get: () => nothing }),
+    };
+    this.exports = new WebAssembly.Instance(module, imports).exports;
+    this.exports._initialize();
+    this.listeners = listeners;
+    this.small = this.exports.malloc(1024); // for what is given to one call, and for what it finds
+  }
+
+  get view() {
+    if (this.kept?.buffer !== this.exports.memory.buffer) this.kept = new DataView(this.exports.memory.buffer);
+    return this.kept;
+  }
+
+  // Calls a function. One that refuses leaves by an exception, which the module's stack has to follow.
+  call(name, ...args) {
+    const stack = this.exports.__stack_pointer.value;
+    try {
+      this.exports[name](...args);
+    } catch (error) {
+      this.exports.__stack_pointer.value = stack;
+      throw error;
+    }
+  }
+
+  text(at) {
+    const bytes = new Uint8Array(this.exports.memory.buffer);
+    let end = at;
+    while (bytes[end] !== 0) end += 1;
+    return new TextDecoder().decode(bytes.slice(at, end));
+  }
+
+  doubles(at, numbers) {
+    numbers.forEach((number, i) => this.view.setFloat64(at + 8 * i, number, true));
+    return at;
+  }
+
+  read(at, count) {
+    return Array.from({ length: count }, (_, i) => this.view.getFloat64(at + 8 * i, true));
+  }
+
+  int(at) {
+    return this.view.getInt32(at, true);
+  }
+
+  handle(at) {
+    return this.view.getBigUint64(at, true);
+  }
+
+  // Calls a function with memory of its own for some bytes.
+  lending(bytes, use) {
+    const at = this.exports.malloc(Math.max(bytes.byteLength, 8));
+    try {
+      new Uint8Array(this.exports.memory.buffer).set(
+        new Uint8Array(bytes.buffer, bytes.byteOffset, bytes.byteLength),
+        at,
+      );
+      return use(at);
+    } finally {
+      this.exports.free(at);
+    }
+  }
+
+  lendingText(text, use) {
+    return this.lending(new TextEncoder().encode(`${text}\0`), use);
+  }
+
+  lendingInts(numbers, use) {
+    return this.lending(Int32Array.from(numbers ?? []), (at) => use(at, numbers?.length ?? 0));
+  }
+}
+
+// Numbers in the module's memory, which is another one after it has grown.
+class Block {
+  constructor(native, Kind, count) {
+    this.native = native;
+    this.Kind = Kind;
+    this.count = count;
+    this.at = native.exports.malloc(Math.max(count * Kind.BYTES_PER_ELEMENT, 8));
+  }
+
+  get view() {
+    const { buffer } = this.native.exports.memory;
+    if (this.kept?.buffer !== buffer) this.kept = new this.Kind(buffer, this.at, this.count);
+    return this.kept;
+  }
+
+  free() {
+    this.native.exports.free(this.at);
+  }
+}
+
+/** A world file: `loadScene` reads it. Worlds of one scene share its code. */
+export class Scene {
+  constructor(module, bytes) {
+    this.native = new Native(module);
+    const { small } = this.native;
+    this.native.lending(bytes, (at) => this.native.call("ts_web_load", at, bytes.byteLength, small));
+    this.handle = this.native.handle(small);
+    this.native.view.setUint32(small, 24, true);
+    this.native.call("ts_scene_get_info", this.handle, small);
+    const [slots, assets, colliders, frames, meshes] = [4, 8, 12, 16, 20].map((at) => this.native.int(small + at));
+    this.counts = { body: slots, asset: assets, collider: colliders, frame: frames, mesh: meshes };
+    this.meshes = Array.from({ length: meshes }, (_, i) => this.#mesh(i));
+  }
+
+  #mesh(number) {
+    const { native } = this;
+    native.view.setUint32(native.small, 20, true);
+    native.call("ts_mesh_get_info", this.handle, number, native.small);
+    const [asset, vertexCount, triangleCount, hasUv] = [4, 8, 12, 16].map((at) => native.int(native.small + at));
+    const triangles = new Block(native, Uint32Array, 3 * triangleCount);
+    native.call("ts_mesh_get_triangles", this.handle, number, triangles.at, triangles.count);
+    const uv = hasUv ? new Block(native, Float32Array, 2 * vertexCount) : null;
+    if (uv) native.call("ts_mesh_get_uv", this.handle, number, uv.at, uv.count);
+    return { number, asset, vertexCount, name: this.nameOf("mesh", number), triangles, uv };
+  }
+
+  /** Name of a "body", "asset", "collider", "frame" or "mesh". */
+  nameOf(kind, number) {
+    const { native } = this;
+    native.call("ts_scene_get_name", this.handle, KINDS[kind], number, native.small, 1024);
+    return native.text(native.small);
+  }
+
+  /** Number of what is called so. */
+  find(kind, name) {
+    const { native } = this;
+    if (typeof name === "number") return name;
+    native.lendingText(name, (at) => native.call("ts_scene_find", this.handle, KINDS[kind], at, native.small));
+    return native.int(native.small);
+  }
+
+  /** `vertexCount`, `slotCount` and `mass` [kg] of an asset. */
+  asset(name) {
+    const { native } = this;
+    const number = this.find("asset", name);
+    native.view.setUint32(native.small, 16, true);
+    native.call("ts_asset_get_info", this.handle, number, native.small);
+    const { small } = native;
+    return {
+      number,
+      vertexCount: native.int(small + 4),
+      slotCount: native.int(small + 8),
+      mass: native.view.getFloat32(small + 12, true),
+    };
+  }
+
+  /** A world as it was exported. */
+  createWorld() {
+    return new World(this);
+  }
+
+  /** Gives its memory back with the last of its worlds. */
+  unload() {
+    this.native.call("ts_scene_unload", this.handle);
+  }
+}
+
+/** A scene that moves. */
+export class World {
+  #listener = null;
+  #meshes = new Set();
+
+  constructor(scene) {
+    this.scene = scene;
+    this.native = scene.native;
+    this.native.call("ts_world_create", scene.handle, this.native.small);
+    this.handle = this.native.handle(this.native.small);
+    this.native.call("ts_web_listen", this.handle);
+  }
+
+  #call(name, ...args) {
+    this.native.call(name, this.handle, ...args);
+  }
+
+  destroy() {
+    this.#call("ts_world_destroy");
+    this.native.listeners.delete(this.handle);
+    for (const mesh of this.#meshes) mesh.free();
+    this.#meshes.clear();
+  }
+
+  /** One step of `dt` [s]; 0 substeps for as many as are stable. */
+  step(dt = 1 / 60, substeps = 0) {
+    this.#call("ts_world_step", dt, substeps);
+  }
+
+  /** How `advance` steps: time beyond `maxSteps` in a frame is dropped. */
+  setFixedStep({ dt = 1 / 60, substeps = 0, maxSteps = 8 } = {}) {
+    const { view, small } = this.native;
+    view.setUint32(small, 24, true);
+    view.setInt32(small + 4, substeps, true);
+    view.setInt32(small + 8, maxSteps, true);
+    view.setFloat64(small + 16, dt, true);
+    this.#call("ts_world_set_fixed_step", small);
+  }
+
+  /** Puts in the time of a frame [s] and makes the steps that are due. Returns the `clock`. */
+  advance(seconds) {
+    const { small } = this.native;
+    this.native.view.setUint32(small, 40, true);
+    try {
+      this.#call("ts_world_advance", seconds, small);
+    } catch (error) {
+      this.#call("ts_web_end_frame");
+      throw error;
+    }
+    return this.#clock();
+  }
+
+  /** `stepsMade` by the last `advance`, `steps`, `time` [s], `alpha`, `dropped` [s]. */
+  get clock() {
+    this.native.view.setUint32(this.native.small, 40, true);
+    this.#call("ts_world_get_clock", this.native.small);
+    return this.#clock();
+  }
+
+  #clock() {
+    const { view, small } = this.native;
+    const [time, alpha, dropped] = this.native.read(small + 16, 3);
+    return { stepsMade: view.getInt32(small + 4, true), steps: Number(view.getBigInt64(small + 8, true)), time, alpha, dropped };
+  }
+
+  /** A function that is called before each step of `advance`: it moves colliders and frames, and pushes. */
+  set onStep(listener) {
+    this.#listener = listener;
+    if (listener) this.native.listeners.set(this.handle, listener);
+    else this.native.listeners.delete(this.handle);
+  }
+
+  get onStep() {
+    return this.#listener;
+  }
+
+  stableSubsteps(dt) {
+    this.#call("ts_world_stable_substeps", dt, this.native.small);
+    return this.native.int(this.native.small);
+  }
+
+  wake() {
+    this.#call("ts_world_wake");
+  }
+
+  /** Air that moves [m/s], of a density [kg/m^3]. */
+  setWind(velocity, { density = 1.2, drag = 1 } = {}) {
+    this.#call("ts_world_set_wind", this.native.doubles(this.native.small, velocity), density, drag);
+  }
+
+  radialImpulse(center, impulse, radius) {
+    this.#call("ts_world_radial_impulse", this.native.doubles(this.native.small, center), impulse, radius);
+  }
+
+  /** The state as 16 hexadecimal digits: the same on every platform. */
+  hash() {
+    this.#call("ts_world_hash", this.native.small);
+    return this.native.handle(this.native.small).toString(16).padStart(16, "0");
+  }
+
+  /** The state between two steps, as bytes of your own. */
+  snapshot() {
+    const { native } = this;
+    this.#call("ts_world_snapshot", 0, 0, native.small);
+    const size = native.view.getUint32(native.small, true);
+    const at = native.exports.malloc(size);
+    try {
+      this.#call("ts_world_snapshot", at, size, native.small);
+      return new Uint8Array(native.exports.memory.buffer).slice(at, at + size);
+    } finally {
+      native.exports.free(at);
+    }
+  }
+
+  restore(bytes) {
+    this.native.lending(bytes, (at) => this.#call("ts_world_restore", at, bytes.byteLength));
+  }
+
+  /** Kinds are bits of `EVENTS`; all if you say nothing, 0 for none. */
+  recordEvents(kinds = 31) {
+    this.#call("ts_world_record_events", kinds);
+  }
+
+  /** What happened since the last call. */
+  events() {
+    const { native } = this;
+    const [size, most, found] = [72, 64, []];
+    const at = native.exports.malloc(size * most);
+    try {
+      for (let count = most; count === most; ) {
+        this.#call("ts_world_drain_events", at, size, most, native.small);
+        count = native.view.getUint32(native.small, true);
+        for (let i = 0; i < count; i += 1) found.push(this.#event(at + size * i));
+      }
+      return found;
+    } finally {
+      native.exports.free(at);
+    }
+  }
+
+  #event(at) {
+    const { native } = this;
+    const [impulse, other] = [native.read(at + 40, 3), native.handle(at + 32)];
+    return {
+      kind: EVENT_NAMES[native.int(at)],
+      collider: native.int(at + 4),
+      step: Number(native.view.getBigInt64(at + 8, true)),
+      time: native.view.getFloat64(at + 16, true),
+      body: new Body(this, native.handle(at + 24)),
+      other: other === 0n ? null : new Body(this, other),
+      impulse,
+      duration: native.view.getFloat64(at + 64, true),
+    };
+  }
+
+  get droppedEvents() {
+    this.#call("ts_world_dropped_events", this.native.small);
+    return Number(this.native.view.getBigInt64(this.native.small, true));
+  }
+
+  /** Who lives in a slot, by its number or name; null for nobody. */
+  body(name) {
+    const slot = this.scene.find("body", name);
+    this.#call("ts_world_get_body", slot, this.native.small);
+    const handle = this.native.handle(this.native.small);
+    return handle === 0n ? null : new Body(this, handle);
+  }
+
+  /** All that live, by slot. */
+  get bodies() {
+    return Array.from({ length: this.scene.counts.body }, (_, slot) => this.body(slot)).filter(Boolean);
+  }
+
+  spawn(asset, { position = [0, 0, 0], rotation = UPRIGHT, velocity = [0, 0, 0], spin = [0, 0, 0] } = {}) {
+    const number = this.scene.find("asset", asset);
+    const { native } = this;
+    native.view.setUint32(native.small, 112, true);
+    native.view.setInt32(native.small + 4, 0, true);
+    native.doubles(native.small + 8, [...position, ...rotation, ...velocity, ...spin]);
+    this.#call("ts_world_spawn", number, native.small, native.small + 128);
+    return new Body(this, native.handle(native.small + 128));
+  }
+
+  /** The first surface on a ray, or null. */
+  raycast(origin, direction, reach = Infinity) {
+    const { native } = this;
+    native.view.setUint32(native.small, 112, true);
+    const at = native.doubles(native.small + 128, [...origin, ...direction]);
+    this.#call("ts_world_raycast", at, at + 24, reach, native.small);
+    return this.#hit();
+  }
+
+  /** The nearest point of all surfaces, or null. */
+  closest(point, reach = Infinity) {
+    const { native } = this;
+    native.view.setUint32(native.small, 112, true);
+    this.#call("ts_world_closest", native.doubles(native.small + 128, point), reach, native.small);
+    return this.#hit();
+  }
+
+  #hit() {
+    const { native } = this;
+    const { small } = native;
+    const handle = native.handle(small + 8);
+    if (handle === 0n) return null;
+    const numbers = native.read(small + 16, 10);
+    return {
+      body: new Body(this, handle),
+      triangle: native.int(small + 4),
+      distance: numbers[0],
+      weights: numbers.slice(1, 4),
+      point: numbers.slice(4, 7),
+      normal: numbers.slice(7),
+      vertices: [0, 4, 8].map((at) => native.int(small + 96 + at)),
+      isInside: native.int(small + 108) === 1,
+    };
+  }
+
+  overlapSphere(center, radius) {
+    return this.#overlaps((bodies, capacity, count) => {
+      const at = this.native.doubles(this.native.small, center);
+      this.#call("ts_world_overlap_sphere", at, radius, bodies, capacity, count);
+    });
+  }
+
+  overlapBox({ position = [0, 0, 0], rotation = UPRIGHT }, size) {
+    return this.#overlaps((bodies, capacity, count) => {
+      const at = this.native.doubles(this.native.small, [...position, ...rotation, ...size]);
+      this.#call("ts_world_overlap_box", at, at + 56, bodies, capacity, count);
+    });
+  }
+
+  #overlaps(ask) {
+    const { native } = this;
+    const capacity = this.scene.counts.body;
+    const at = native.exports.malloc(8 * capacity);
+    try {
+      ask(at, capacity, native.small + 256);
+      const count = native.view.getUint32(native.small + 256, true);
+      return Array.from({ length: count }, (_, i) => new Body(this, native.handle(at + 8 * i)));
+    } finally {
+      native.exports.free(at);
+    }
+  }
+
+  collider(name) {
+    return new Collider(this, this.scene.find("collider", name));
+  }
+
+  /** A plane, sphere, box or capsule, where the world was made with `collider_room`. */
+  addCollider(
+    { kind, size = [0, 0, 0], friction = 0.5, restitution = -1, thickness = 0, group = 1, mask = -1 },
+    { position = [0, 0, 0], rotation = UPRIGHT } = {},
+  ) {
+    const { native } = this;
+    const { view, small } = native;
+    view.setUint32(small, 64, true);
+    view.setInt32(small + 4, SHAPES.indexOf(kind), true);
+    native.doubles(small + 8, [...size, 0, 0, 0].slice(0, 3).concat([friction, restitution, thickness]));
+    view.setInt32(small + 56, group, true);
+    view.setInt32(small + 60, mask, true);
+    const pose = native.doubles(small + 64, [...position, ...rotation]);
+    this.#call("ts_collider_add", small, pose, small + 128);
+    return new Collider(this, native.int(small + 128));
+  }
+
+  frame(name) {
+    return new Frame(this, this.scene.find("frame", name));
+  }
+
+  addFrame({ position = [0, 0, 0], rotation = UPRIGHT } = {}) {
+    const { native } = this;
+    this.#call("ts_frame_add", native.doubles(native.small, [...position, ...rotation]), native.small + 64);
+    return new Frame(this, native.int(native.small + 64));
+  }
+
+  /** The grab with a number from 0 to 15, or null. */
+  grab(number) {
+    this.#call("ts_world_get_grab", number, this.native.small);
+    const handle = this.native.handle(this.native.small);
+    return handle === 0n ? null : new Grab(this, handle);
+  }
+
+  keep(mesh) {
+    this.#meshes.add(mesh);
+    return mesh;
+  }
+
+  forget(mesh) {
+    this.#meshes.delete(mesh);
+  }
+}
+
+/** A body in a world. */
+export class Body {
+  constructor(world, handle) {
+    this.world = world;
+    this.handle = handle;
+  }
+
+  #call(name, ...args) {
+    this.world.native.call(name, this.world.handle, this.handle, ...args);
+  }
+
+  get #small() {
+    return this.world.native.small;
+  }
+
+  despawn() {
+    this.#call("ts_world_despawn");
+  }
+
+  get asset() {
+    this.#call("ts_body_get_asset", this.#small);
+    return this.world.native.int(this.#small);
+  }
+
+  /** "active", "frozen" or "asleep". */
+  get status() {
+    this.#call("ts_body_get_status", this.#small);
+    return STATUS[this.world.native.int(this.#small)];
+  }
+
+  /** Places of its vertices after the last step, or on the way to it, as numbers of your own. */
+  positions(alpha = 1) {
+    const { native, scene } = this.world;
+    const block = new Block(native, Float32Array, 3 * scene.asset(this.asset).vertexCount);
+    try {
+      this.#call("ts_body_positions", alpha, block.at, block.count);
+      return block.view.slice();
+    } finally {
+      block.free();
+    }
+  }
+
+  /** What is drawn of it: the first of its asset's meshes, or one by its number or name. */
+  mesh(name = null) {
+    const { asset } = this;
+    const { scene } = this.world;
+    const found =
+      name === null ? scene.meshes.find((each) => each.asset === asset) : scene.meshes[scene.find("mesh", name)];
+    if (!found) throw new SoftError(-1, `nothing is drawn of asset ${asset}`);
+    return this.world.keep(new Mesh(this, found));
+  }
+
+  get center() {
+    this.#call("ts_body_center", this.#small);
+    return this.world.native.read(this.#small, 3);
+  }
+
+  setVelocity(linear, spin = [0, 0, 0]) {
+    const at = this.world.native.doubles(this.#small, [...linear, ...spin]);
+    this.#call("ts_body_set_velocity", at, at + 24);
+  }
+
+  teleport(center, { turn = UPRIGHT, keepsVelocity = false } = {}) {
+    const at = this.world.native.doubles(this.#small, [...center, ...turn]);
+    this.#call("ts_body_teleport", at, at + 24, Number(keepsVelocity));
+  }
+
+  /** Of a list of vertices, or of all [N s]. */
+  applyImpulse(impulse, vertices = null) {
+    const at = this.world.native.doubles(this.#small, impulse);
+    this.world.native.lendingInts(vertices, (list, count) => this.#call("ts_body_apply_impulse", at, list, count));
+  }
+
+  /** For the coming step [N]. */
+  applyForce(force, vertices = null) {
+    const at = this.world.native.doubles(this.#small, force);
+    this.world.native.lendingInts(vertices, (list, count) => this.#call("ts_body_apply_force", at, list, count));
+  }
+
+  impulseAt(impulse, point, radius) {
+    const at = this.world.native.doubles(this.#small, [...impulse, ...point]);
+    this.#call("ts_body_impulse_at", at, at + 24, radius);
+  }
+
+  setGravityScale(scale) {
+    this.#call("ts_body_set_gravity_scale", scale);
+  }
+
+  setDamping(rate) {
+    this.#call("ts_body_set_damping", rate);
+  }
+
+  setSheltered(isSheltered) {
+    this.#call("ts_body_set_sheltered", Number(isSheltered));
+  }
+
+  pin(vertices) {
+    this.world.native.lendingInts(vertices, (list, count) => this.#call("ts_body_pin", list, count));
+  }
+
+  unpin(vertices = null) {
+    this.world.native.lendingInts(vertices, (list, count) => this.#call("ts_body_unpin", list, count));
+  }
+
+  /** Where pinned vertices are after the coming step, 3 numbers each. */
+  setTargets(vertices, targets) {
+    const { native } = this.world;
+    native.lending(Float32Array.from(targets), (places) =>
+      native.lendingInts(vertices, (list, count) => this.#call("ts_body_set_targets", list, count, places)),
+    );
+  }
+
+  attach(vertices, frame, { feels = false } = {}) {
+    this.world.native.lendingInts(vertices, (list, count) =>
+      this.#call("ts_body_attach", list, count, frame.number, Number(feels)),
+    );
+  }
+
+  detach(vertices = null) {
+    this.world.native.lendingInts(vertices, (list, count) => this.#call("ts_body_detach", list, count));
+  }
+
+  /** `force` [N] and `torque` [N m] with which it pulls a frame. */
+  load(frame) {
+    this.#call("ts_body_get_load", frame.number, this.#small, this.#small + 24);
+    return { force: this.world.native.read(this.#small, 3), torque: this.world.native.read(this.#small + 24, 3) };
+  }
+
+  /** Take hold of what a ray has hit. */
+  grab({ triangle, weights, point }, { frequency = 5, maxForce = -1, target = point } = {}) {
+    const { native } = this.world;
+    native.view.setUint32(this.#small, 72, true);
+    native.view.setInt32(this.#small + 4, triangle, true);
+    native.doubles(this.#small + 8, [...weights, ...target, frequency, maxForce]);
+    this.#call("ts_body_grab", this.#small, this.#small + 128);
+    return new Grab(this.world, native.handle(this.#small + 128));
+  }
+}
+
+/** What is drawn of a body. `positions` and `normals` are views that `update` writes: take them anew each time. */
+export class Mesh {
+  #blocks;
+
+  constructor(body, { number, vertexCount, triangles, uv }) {
+    const { native } = body.world;
+    this.body = body;
+    this.number = number;
+    this.vertexCount = vertexCount;
+    this.#blocks = { triangles, uv };
+    for (const name of ["positions", "normals"]) this.#blocks[name] = new Block(native, Float32Array, 3 * vertexCount);
+    this.update();
+  }
+
+  get positions() {
+    return this.#blocks.positions.view;
+  }
+
+  get normals() {
+    return this.#blocks.normals.view;
+  }
+
+  /** Three numbers of vertices each. */
+  get triangles() {
+    return this.#blocks.triangles.view;
+  }
+
+  /** Two numbers a vertex, v upwards; null where there are none. */
+  get uv() {
+    return this.#blocks.uv?.view ?? null;
+  }
+
+  update() {
+    const { world, handle } = this.body;
+    const { positions, normals } = this.#blocks;
+    world.native.call("ts_body_mesh", world.handle, handle, this.number, positions.at, normals.at, positions.count);
+  }
+
+  free() {
+    this.#blocks.positions.free();
+    this.#blocks.normals.free();
+    this.body.world.forget(this);
+  }
+}
+
+/** A hand on a body. */
+export class Grab {
+  constructor(world, handle) {
+    this.world = world;
+    this.handle = handle;
+  }
+
+  moveTo(point) {
+    const { native } = this.world;
+    native.call("ts_grab_move", this.world.handle, this.handle, native.doubles(native.small, point));
+  }
+
+  release() {
+    this.world.native.call("ts_grab_release", this.world.handle, this.handle);
+  }
+
+  /** With what it pulls [N]. */
+  get force() {
+    const { native } = this.world;
+    native.call("ts_grab_get_force", this.world.handle, this.handle, native.small);
+    return native.read(native.small, 3);
+  }
+}
+
+// What has a number and a pose.
+class Placed {
+  constructor(world, number, prefix) {
+    this.world = world;
+    this.number = number;
+    this.prefix = prefix;
+  }
+
+  call(name, ...args) {
+    this.world.native.call(`${this.prefix}_${name}`, this.world.handle, this.number, ...args);
+  }
+
+  /** Be there at the end of the coming step. */
+  moveTo({ position, rotation = UPRIGHT }) {
+    this.call("move_to", this.world.native.doubles(this.world.native.small, [...position, ...rotation]));
+  }
+
+  get pose() {
+    const { native } = this.world;
+    this.call("get_pose", native.small);
+    return { position: native.read(native.small, 3), rotation: native.read(native.small + 24, 4) };
+  }
+
+  remove() {
+    this.call("remove");
+  }
+}
+
+/** What bodies meet and do not move. */
+export class Collider extends Placed {
+  constructor(world, number) {
+    super(world, number, "ts_collider");
+  }
+
+  setVelocity(linear, spin = [0, 0, 0]) {
+    const at = this.world.native.doubles(this.world.native.small, [...linear, ...spin]);
+    this.call("set_velocity", at, at + 24);
+  }
+
+  teleport({ position, rotation = UPRIGHT }) {
+    this.call("teleport", this.world.native.doubles(this.world.native.small, [...position, ...rotation]));
+  }
+
+  /** `impulse` [N s] that bodies gave it in the last step, and `moment` about its place. */
+  get impulse() {
+    const { native } = this.world;
+    this.call("get_impulse", native.small, native.small + 24);
+    return { impulse: native.read(native.small, 3), moment: native.read(native.small + 24, 3) };
+  }
+}
+
+/** A place that moves as the game says, with what hangs from it. */
+export class Frame extends Placed {
+  constructor(world, number) {
+    super(world, number, "ts_frame");
+  }
+}
+
+async function bytesOf(address) {
+  const answer = await fetch(address);
+  if (!answer.ok) throw new SoftError(-4, `cannot read ${address}: ${answer.status} ${answer.statusText}`);
+  return new Uint8Array(await answer.arrayBuffer());
+}
+
+/** Compiles a world's module and reads its file: the bytes of `kernels/web.wasm` and of `world.tsw`. */
+export async function sceneOf(code, world) {
+  if (typeof WebAssembly === "undefined") throw new SoftError(-9, "this browser has no WebAssembly");
+  let module;
+  try {
+    module = await WebAssembly.compile(code);
+  } catch (error) {
+    throw new SoftError(-9, `this browser cannot compile the world, for which it needs SIMD: ${error.message}`);
+  }
+  return new Scene(module, world);
+}
+
+/** Loads a folder that `taichi-soft export --for web` wrote. */
+export async function loadScene(folder) {
+  const base = String(folder).replace(/\/$/, "");
+  const [code, world] = await Promise.all([bytesOf(`${base}/kernels/web.wasm`), bytesOf(`${base}/world.tsw`)]);
+  return sceneOf(code, world);
+}
+
+/** A world of such a folder. */
+export async function loadWorld(folder) {
+  return (await loadScene(folder)).createWorld();
+}
