@@ -1,6 +1,7 @@
 """Worlds in WebAssembly, by the package for JavaScript. `test_platforms.py` plays games in them."""
 
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -153,6 +154,30 @@ def test_the_sample_of_three_js_shows_a_jelly_that_can_be_lifted_and_balls_that_
         blue = (after - after.mean(axis=2, keepdims=True))[..., 2] > 40
         assert blue.mean() > 0.01
         assert complaints == []
+
+
+def test_the_code_of_the_documentation_runs_in_a_browser(sample):
+    first, second = re.findall(r"```js\n(.*?)```", (ROOT / "docs" / "web.md").read_text(), re.DOTALL)
+    imports = "".join(re.findall(r"^import .*\n", second, re.MULTILINE))
+    stage = """const scene = new THREE.Scene();
+const renderer = { setAnimationLoop: (draw) => draw(16) };
+"""
+    rest = second.replace(imports, "")
+    check = "frame(0.5); window.found = [scene.children.length, jelly.positions[1]];"
+    places = {"three": f"https://cdn.jsdelivr.net/npm/three@{VERSION}/build/three.module.js"}
+    (sample / "page.html").write_text(
+        f"""<link rel="icon" href="data:,"><script type="importmap">{json.dumps({"imports": places})}</script>
+<script type="module">{imports}{first}{stage}{{ {rest} }}{check}</script>"""
+    )
+    fetch_three_js()
+    with serving(sample) as address, chromium() as browser:
+        page = browser.new_page()
+        complaints = complaints_of(page)
+        page.route("https://cdn.jsdelivr.net/**", of_this_machine)
+        page.goto(f"{address}/page.html")
+        page.wait_for_function("window.found")
+        count, height = page.evaluate("window.found")
+        assert (count, abs(height) < 1.0, complaints) == (1, True, [])
 
 
 def of_this_machine(route):
