@@ -756,8 +756,17 @@ export class Frame extends Placed {
 }
 
 async function bytesOf(address) {
-  const answer = await fetch(address);
-  if (!answer.ok) throw new SoftError(-4, `cannot read ${address}: ${answer.status} ${answer.statusText}`);
+  let answer;
+  try {
+    answer = await fetch(address);
+  } catch (error) {
+    const way = "serve the folder, for example by python -m http.server";
+    throw new SoftError(-4, `cannot read ${address}: ${error.message}. A page from a file may read no other: ${way}`);
+  }
+  if (!answer.ok) {
+    const way = "is it a folder that taichi-soft export --for web wrote?";
+    throw new SoftError(-4, `cannot read ${address}: ${answer.status} ${answer.statusText}; ${way}`);
+  }
   return new Uint8Array(await answer.arrayBuffer());
 }
 

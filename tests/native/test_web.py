@@ -26,7 +26,7 @@ def node():
 
 REFUSED = """
 import { readFileSync } from "node:fs";
-import { sceneOf } from "PACKAGE/taichi-soft.js";
+import { loadScene, sceneOf } from "PACKAGE/taichi-soft.js";
 const [folder, other] = process.argv.slice(2);
 const read = (from, name) => readFileSync(`${from}/${name}`);
 const found = [];
@@ -42,7 +42,20 @@ const code = read(folder, "kernels/web.wasm");
 const whole = read(folder, "world.tsw");
 await refused("cut off", () => sceneOf(code, whole.subarray(0, 1000)));
 await refused("another world", () => sceneOf(code, read(other, "world.tsw")));
+await refused("elsewhere", () => loadScene("http://127.0.0.1:9/nothing"));
 await refused("no module", () => sceneOf(whole, whole));
+const named = new Set();
+for (let i = 0; i < 200; i += 1) {
+  const damaged = Uint8Array.from(whole);
+  damaged[Math.floor((i * whole.length) / 200) + (i % 7)] ^= 1 << i % 8;
+  try {
+    await sceneOf(code, i % 2 ? damaged : whole.subarray(0, Math.floor((i * whole.length) / 200)));
+    named.add("taken");
+  } catch (error) {
+    named.add(error.code ?? error.name);
+  }
+}
+found.push(["damaged", [...named].sort().join(), ""]);
 const world = (await sceneOf(code, whole)).createWorld();
 const before = world.hash();
 await refused("time", () => world.step(-1));
@@ -70,6 +83,8 @@ console.log(JSON.stringify(found));
 WANTED = {
     "cut off": ("FILE", "the world file is damaged"),
     "another world": ("FILE", "the kernels are not those of this world file"),
+    "damaged": ("FILE", ""),
+    "elsewhere": ("FILE", "cannot read http://127.0.0.1:9/nothing/kernels/web.wasm"),
     "no module": ("RUNTIME", "this browser cannot compile the world"),
     "time": ("ARGUMENT", "dt is -1 s"),
     "name": ("ARGUMENT", "nothing of that kind is called nobody"),
