@@ -502,6 +502,7 @@ CALLS: dict[str, dict[str, Call]] = {
         "snapshot": NOTHING,
         "restore": Call({"data": DATA}),
         "state_hash": NOTHING,
+        "bodies_hash": NOTHING,
         "save_recording": Call({"path": PATH}),
     },
     "Body": {
