@@ -8,9 +8,8 @@ from typing import NamedTuple
 
 from engine_adapter.fixed_step import FixedStep
 from engine_adapter.rollback import Rollback
-from taichi_soft import OptionError, World
+from taichi_soft import OptionError, TaichiSoftError, World
 from taichi_soft.core.checks import as_count
-from taichi_soft.core.errors import TaichiSoftError
 
 Inputs = tuple[bytes, ...]
 """The inputs of all players in one tick, by player."""
@@ -38,7 +37,7 @@ class _Message(NamedTuple):
     hash_tick: int  # of the newest hash that no late input can change, or NO_TICK
     hash: int
     first: int  # tick of the first input
-    count: int
+    input_count: int
     heard: tuple[int, ...]
     inputs: list[bytes]
 
@@ -46,25 +45,24 @@ class _Message(NamedTuple):
 class RollbackSession:
     """Make ticks with predicted inputs, and make them again where a prediction was wrong.
 
-    Each machine runs the same world and has a session of its own. `advance` makes a tick with the own input; the
-    inputs of others that are not known yet are predicted to be the last known ones. `message` is a datagram for
-    all others, `receive` takes theirs: late, twice, in any order. A lost one does no harm, because each repeats
-    all inputs that another machine has not acknowledged. The arguments are the same on all machines, but `act`,
-    `player`, `delay` and `patience`.
+    Each machine runs the same world and has its own session. `advance` makes a tick with the input of the
+    own player. It predicts that the others repeat their last known inputs. `message` returns a datagram for
+    all other machines, and `receive` takes theirs: late, twice, in any order. A datagram may be lost, because
+    each one repeats all inputs that another machine has not acknowledged. Give all machines the same
+    arguments. Only `act`, `player`, `delay` and `patience` may differ.
 
     Args:
         world: built of the same script on all machines, at the same step.
-        act: function that applies the inputs of all players, by player, before each step. It uses nothing else
-            than them and the world: a tick may be made several times.
+        act: function that applies the inputs of all players, by player, before each step. It must depend on
+            these and the world only: a tick may be made several times.
         player: number of the own player, from 0.
         players: how many there are, 2 to 16.
         input_size: bytes of each input, 1 to 64. Before the first one of a player, zeros are used.
         step: length and substeps of each tick.
-        ticks: the most ticks made beyond the last one of which all inputs are known, 1 to 1000. Each takes the
-            size of a snapshot.
-        delay: ticks after which an own input is used, 0 to `ticks`. Each makes rewinds shorter, and the own
-            player's answer later.
-        hash_every: every so many ticks the machines compare hashes of their states, 1 to 10000.
+        ticks: largest number of ticks made on predictions, 1 to 1000. Each takes the memory of a snapshot.
+        delay: ticks after which an own input is used, 0 to `ticks`. A larger delay makes rewinds shorter, and
+            the own player's answer later.
+        hash_every: ticks between two comparisons of hashes, 1 to 10000.
         patience: calls of `advance` in a row that may wait for another player before it raises an error.
     Raises: OptionError for an argument out of range; StateError if the world is not built.
     Example:
@@ -154,10 +152,10 @@ class RollbackSession:
 
         Args:
             own_input: what the own player does, `input_size` bytes. It is used `delay` ticks later.
-        Returns: False if no tick was made, because `ticks` are made on predictions already. Call it again in the
-            next frame, and go on sending messages.
-        Raises: OptionError for an input of another size; SessionError after `patience` calls in a row that made
-            no tick; what `act` and `World.step` raise: the tick was not made then.
+        Returns: False if no tick was made, because `ticks` are made on predictions already. Call it again in
+            the next frame, and go on sending messages.
+        Raises: OptionError for an input of another size; SessionError after `patience` calls in a row that
+            made no tick; what `act` and `World.step` raise: the tick was not made then.
         """
         if not isinstance(own_input, bytes) or len(own_input) != self._input_size:
             raise OptionError(f"own_input must be {self._input_size} bytes, got {own_input!r}")
@@ -207,13 +205,13 @@ class RollbackSession:
         return HEAD.pack(*head) + struct.pack(f"<{self._players}I", *self._heard) + b"".join(own)
 
     def receive(self, data: bytes) -> None:
-        """Take a message of another machine: a late one, a copy, or one that an earlier message has overtaken.
+        """Take a message of another machine. It may be late, a copy, or out of order.
 
         The ticks that it proves wrong are made again by the next call of `advance` or `settle`.
         Args:
             data: what `message` returned there.
-        Raises: SessionError for a message of another session, world or version, for one that is damaged, and for
-            one that contradicts what its player sent before. It says which, and nothing is changed.
+        Raises: SessionError for a message that is damaged, belongs to another session, world or version, or
+            contradicts an earlier message of its player. The text says which, and nothing is changed.
         """
         message = self._read(data)
         other = message.player
@@ -229,8 +227,8 @@ class RollbackSession:
             self._their_hashes[message.hash_tick, other] = message.hash
         if message.tick > self._newest[other]:
             self._newest[other] = message.tick
-            # Both machines see the other one late, by the same time if the network is as slow both ways: half of
-            # the difference is what their clocks differ by.
+            # Each machine sees the other one late. If the network is as slow in both directions, half of the
+            # difference is the lead of this machine.
             lead = ((self._tick - message.tick) - (message.tick - (heard - self._delay))) / 2
             self._leads[other] += LEAD_SMOOTHING * (lead - self._leads[other])
 
@@ -243,7 +241,7 @@ class RollbackSession:
         heard = struct.unpack_from(f"<{self._players}I", data, HEAD.size)
         size = self._input_size
         inputs = [data[at : at + size] for at in range(body, len(data), size)]
-        message = _Message(*head, heard, inputs)
+        message = _Message(*head, heard=heard, inputs=inputs)
         theirs = message.players, message.input_size, message.ticks, message.hash_every
         ours = self._players, self._input_size, self._ticks, self._hash_every
         if theirs != ours:
@@ -256,8 +254,10 @@ class RollbackSession:
             )
         if message.player not in self._others:
             raise SessionError(f"player {message.player} is no other player: here is player {self._player}")
-        if len(data) != body + size * message.count:
-            raise SessionError(f"a message of {message.count} inputs has {len(data)} bytes: it is damaged")
+        if len(data) != body + size * message.input_count:
+            raise SessionError(
+                f"a message of {message.input_count} inputs has {len(data)} bytes: it is damaged"
+            )
         self._require_order(message)
         return message
 
@@ -266,10 +266,12 @@ class RollbackSession:
         who, known = f"player {message.player}", self._inputs[message.player]
         due = self._heard[message.player]
         if message.first > due:
-            raise SessionError(f"{who} sends no input before tick {message.first}, and that of {due} is missing")
+            raise SessionError(
+                f"{who} sends no input before tick {message.first}, and that of {due} is missing"
+            )
         most = self._heard[self._player] + 2 * self._ticks  # a machine that waits as it has to is not beyond
         hash_tick = -1 if message.hash_tick == NO_TICK else message.hash_tick
-        if max(message.first + message.count, message.tick, hash_tick) > most:
+        if max(message.first + message.input_count, message.tick, hash_tick) > most:
             raise SessionError(f"{who} is beyond tick {most}, which no machine of this session can be yet")
         if message.heard[self._player] > self._heard[self._player]:
             raise SessionError(f"{who} acknowledges an input that was not sent yet: the message is damaged")
@@ -306,8 +308,8 @@ class RollbackSession:
             tick = self.confirmed
             silent = [str(each) for each in self._others if self._heard[each] == tick]
             raise SessionError(
-                f"no input of player {' and '.join(silent)} for tick {tick} came in {self._waits} frames, and "
-                f"{self._ticks} ticks are predicted already: end the session, or go on waiting"
+                f"no input of player {' and '.join(silent)} for tick {tick} came in {self._waits} frames, "
+                f"and {self._ticks} ticks are predicted already: end the session, or go on waiting"
             )
 
     def _compare(self) -> None:
@@ -322,7 +324,11 @@ class RollbackSession:
         """Drop what no rewind and no message can ask for."""
         confirmed = self.confirmed
         for player, known in enumerate(self._inputs):
-            needed = min(self._acknowledged[each] for each in self._others) if player == self._player else confirmed
+            needed = (
+                min(self._acknowledged[each] for each in self._others)
+                if player == self._player
+                else confirmed
+            )
             _drop_before(known, min(needed, confirmed) - 1)  # the last known input is the prediction
         _drop_before(self._used, confirmed)
         oldest = self._tick - 4 * self._ticks - self._delay - self._hash_every

@@ -65,9 +65,9 @@ class WorldStates(WorldParts):
     def bodies_hash(self) -> str:
         """Hash of the state of all bodies, 16 hexadecimal digits: the same as in the exported world.
 
-        There it is `ts_world_hash` in C and `world.hash()` in JavaScript. It covers positions, velocities, pins,
-        and who is asleep or frozen. Step count, gravity, colliders, frames, grabs and joints are in `state_hash`
-        alone, which exported worlds do not have.
+        There it is `ts_world_hash` in C and `world.hash()` in JavaScript. It covers positions, velocities,
+        pins, and who is asleep or frozen. `state_hash`, which exported worlds do not have, covers step count,
+        gravity, colliders, frames, grabs and joints too.
         Raises: StateError before `build`.
         """
         return bodies_hash(self._context)

@@ -3,8 +3,8 @@
     python engine_adapter/web/sample/play.py           # in real time
     python engine_adapter/web/sample/play.py --fast    # the same game on a simulated clock
 
-Each player is a process and sends UDP datagrams to this one. It is the network between them: it delays, loses,
-copies and reorders what they send.
+Each player is a process and sends UDP datagrams to this process, which is the network between them: it
+delays, loses, copies and reorders datagrams.
 """
 
 import argparse
@@ -18,7 +18,9 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 HERE = Path(__file__).parent
 DT = 1 / 60
@@ -31,11 +33,12 @@ PATIENCE = 60.0  # for a process that says nothing [s]
 class Network:
     """Messages on their way, drawn from a seed: the same ones in every run with `--fast`."""
 
-    def __init__(self, seed):
-        self._rng, self._way, self._newest = random.Random(seed), [], [0, 0]
-        self.counts = Counter()
+    def __init__(self, seed: int) -> None:
+        self._rng, self._newest = random.Random(seed), [0, 0]
+        self._way: list[tuple[float, int, int, bytes]] = []  # by time
+        self.counts: Counter[str] = Counter()
 
-    def send(self, now, to, data):
+    def send(self, now: float, to: int, data: bytes) -> None:
         """Take a message for a player at a time [s]."""
         rng = self._rng
         self.counts["sent"] += 1
@@ -48,7 +51,7 @@ class Network:
             due = now + DELAY + rng.uniform(0, JITTER) + (STALL if rng.random() < STALLED else 0.0)
             heapq.heappush(self._way, (due, self.counts["sent"], to, data))
 
-    def due(self, now):
+    def due(self, now: float) -> Iterator[tuple[int, bytes]]:
         """Yield the messages that arrive until a time [s], with their players."""
         while self._way and self._way[0][0] <= now:
             _, number, to, data = heapq.heappop(self._way)
@@ -56,7 +59,7 @@ class Network:
             self._newest[to] = max(number, self._newest[to])
             yield to, data
 
-    def next(self, now):
+    def next(self, now: float) -> float:
         """Time until the next message arrives [s]."""
         return max(self._way[0][0] - now, 0.0) if self._way else DT
 
@@ -64,26 +67,28 @@ class Network:
 class Line:
     """The socket to a player's process."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.bind(("127.0.0.1", 0))
         self.socket.settimeout(PATIENCE)
         self.port = self.socket.getsockname()[1]
 
-    def meet(self):
+    def meet(self) -> None:
         """Wait until the player is there."""
         data, address = self.socket.recvfrom(16)
         assert data == b"ready"
         self.socket.connect(address)
 
-    def send(self, data):
+    def send(self, data: bytes) -> None:
+        """Send to the player."""
         self.socket.send(data)
 
-    def receive(self):
+    def receive(self) -> bytes:
+        """Return what the player has sent."""
         return self.socket.recv(65536)
 
 
-def run_fast(lines, network):
+def run_fast(lines: list[Line], network: Network) -> None:
     """Let both make their frames on one simulated clock, until both are done."""
     state, frame = [b"frame", b"frame"], 0
     while state != [b"done", b"done"]:
@@ -100,7 +105,7 @@ def run_fast(lines, network):
         frame += 1
 
 
-def run(lines, network):
+def run(lines: list[Line], network: Network) -> None:
     """Carry what both send in real time, until both are done."""
     state = [b"frame", b"frame"]
     with selectors.DefaultSelector() as selector:
@@ -118,10 +123,12 @@ def run(lines, network):
                     state[key.data] = data
 
 
-def session(folder, *, ticks, seed, is_fast, cheat):
+def session(
+    folder: Path, *, ticks: int, seed: int, is_fast: bool, cheat: int
+) -> tuple[list[dict[str, Any]], Counter[str]]:
     """Run both processes. Returns: what each reports, and what the network did."""
     lines, network = [Line(), Line()], Network(seed)
-    commands = [
+    commands: list[list[str | Path]] = [
         [sys.executable, HERE / "player.py", "--cheat", str(cheat)],
         ["node", HERE / "player.mjs", folder],
     ]
@@ -138,7 +145,9 @@ def session(folder, *, ticks, seed, is_fast, cheat):
         (run_fast if is_fast else run)(lines, network)
         for line in lines:
             line.send(b"end")
-        reports = [json.loads(process.communicate(timeout=PATIENCE)[0].splitlines()[-1]) for process in processes]
+        reports = [
+            json.loads(process.communicate(timeout=PATIENCE)[0].splitlines()[-1]) for process in processes
+        ]
     finally:
         for process in processes:
             process.kill()
@@ -148,19 +157,21 @@ def session(folder, *, ticks, seed, is_fast, cheat):
     return reports, network.counts
 
 
-def export(folder):
+def export(folder: Path) -> None:
     """Write the same world for node."""
     command = ["export", str(HERE / "arena.py"), "--out", str(folder), "--for", "web"]
     subprocess.run([sys.executable, "-m", "taichi_soft", *command], check=True, stdout=subprocess.DEVNULL)
 
 
-def main():
+def main() -> None:
     """Play, print what happened, and end with an error if the worlds differ."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--fast", action="store_true", help="on a simulated clock, as fast as both can")
     parser.add_argument("--ticks", type=int, default=3600, help="of 1/60 s (default 3600)")
     parser.add_argument("--seed", type=int, default=1, help="of the network (default 1)")
-    parser.add_argument("--cheat", type=int, default=-1, metavar="TICK", help="change a bit in Python's world")
+    parser.add_argument(
+        "--cheat", type=int, default=-1, metavar="TICK", help="change a bit in Python's world"
+    )
     parser.add_argument("--world", type=Path, help="folder of the exported world, if there is one already")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
@@ -172,8 +183,8 @@ def main():
     print(", ".join(f"{counts[name]:,} {name}" for name in ("sent", "lost", "copied", "overtaken")))
     for name, found in zip(("Python", "node"), reports, strict=True):
         print(
-            f"{name}: {found['ticks']:,} ticks, {found['rollbacks']:,} rollbacks, {found['longest']} ticks at most, "
-            f"{found['remade']:,} ticks made again in {found['ms']:.2f} ms each, hash {found['hash']}"
+            f"{name}: {found['ticks']:,} ticks, {found['rollbacks']:,} rollbacks, the longest "
+            f"{found['longest']} ticks; {found['remade']:,} ticks made again, {found['ms']:.2f} ms each; hash {found['hash']}"
         )
         if found["desync"] is not None:
             print(f"{name}: the worlds differ at tick {found['desync']}")

@@ -1,52 +1,51 @@
-"""The player of the network sample whose world is Python's. `play.py` starts it, and `player.mjs` as the other one."""
+"""The player of the network sample in Python. `play.py` starts it, and `player.mjs` in node."""
 
 import argparse
 import json
 import socket
-import sys
 import time
-from pathlib import Path
+from typing import Any
 
 from engine_adapter import FixedStep, RollbackSession
-
-sys.path.insert(0, str(Path(__file__).parent))
-
-from arena import players, stage, world  # noqa: E402
+from engine_adapter.session import Inputs
+from engine_adapter.web.sample.arena import players, stage, world
 
 STEP = FixedStep(dt=1 / 60, substeps=8)
 FORCE, LIFT = 8.0, 0.02  # for each unit of an input [N]; by which each player raises the stage [m]
 
 
-def act(inputs):
+def act(inputs: Inputs) -> None:
     """Apply the inputs of a tick. Each is 100 + x, 100 + y, and whether to raise the stage."""
     for body, (x, y, _) in zip(players, inputs, strict=True):
         body.apply_force((FORCE * (x - 100), FORCE * (y - 100), 0.0))
     stage.move_to((0.0, 0.0, LIFT * (inputs[0][2] + inputs[1][2])))
 
 
-def press(tick, player):
+def press(tick: int, player: int) -> bytes:
     """Return what a player does in a tick: another direction every third of a second or so."""
     turn = tick // (17 + 6 * player)
-    return bytes([(37 * turn + 91 * player) % 201, (59 * turn + 13 * player) % 201, int(tick % 50 < 5 + player)])
+    return bytes(
+        [(37 * turn + 91 * player) % 201, (59 * turn + 13 * player) % 201, int(tick % 50 < 5 + player)]
+    )
 
 
 class Player:
     """A session, the socket to the other machine, and the time that it took."""
 
-    def __init__(self, line, player, ticks, cheat):
+    def __init__(self, line: socket.socket, player: int, ticks: int, cheat: int) -> None:
         self.line, self.player, self.ticks, self.cheat = line, player, ticks, cheat
         self.session = RollbackSession(world, self.act, player=player, input_size=3, step=STEP)
         self.frames = self.remade = 0
         self.seconds = 0.0  # for what was made again
 
-    def act(self, inputs):
+    def act(self, inputs: Inputs) -> None:
         """Apply inputs; a cheat sees one bit of them changed in one tick."""
         if world.step_count == self.cheat:
             inputs = (bytes([inputs[0][0] ^ 1, *inputs[0][1:]]), inputs[1])
         act(inputs)
 
-    def frame(self):
-        """Make a tick, unless this machine is ahead of the other one, and send what the other may not know."""
+    def frame(self) -> None:
+        """Make a tick, unless this machine is ahead of the other one, and send a message."""
         session = self.session
         start = time.perf_counter()
         made = session.settle()
@@ -59,7 +58,7 @@ class Player:
         self.line.send(session.message())
         self.line.send(b"done" if session.confirmed >= self.ticks == session.tick else b"frame")
 
-    def report(self):
+    def report(self) -> dict[str, Any]:
         """Return what there is to tell at the end."""
         session = self.session
         session.settle()
@@ -75,7 +74,7 @@ class Player:
         }
 
 
-def play(player, is_fast):
+def play(player: Player, is_fast: bool) -> None:
     """Play until `play.py` says that both know all inputs. It is the clock too if `is_fast`."""
     due = time.monotonic()
     while True:
@@ -95,7 +94,7 @@ def play(player, is_fast):
             player.session.receive(data)
 
 
-def main():
+def main() -> None:
     """Play over the port of this machine that the command line names."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--port", type=int, required=True)
