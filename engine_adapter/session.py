@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from engine_adapter.fixed_step import FixedStep
 from engine_adapter.rollback import Rollback
@@ -237,11 +237,11 @@ class RollbackSession:
         body = HEAD.size + 4 * self._players
         if not isinstance(data, bytes) or len(data) < body or data[:4] != MARK:
             raise SessionError("these bytes are no message of a session of this version")
-        head = HEAD.unpack_from(data)
-        heard = struct.unpack_from(f"<{self._players}I", data, HEAD.size)
         size = self._input_size
-        inputs = [data[at : at + size] for at in range(body, len(data), size)]
-        message = _Message(*head, heard=heard, inputs=inputs)
+        parts: list[Any] = [*HEAD.unpack_from(data)]
+        parts.append(struct.unpack_from(f"<{self._players}I", data, HEAD.size))
+        parts.append([data[at : at + size] for at in range(body, len(data), size)])
+        message = _Message(*parts)
         theirs = message.players, message.input_size, message.ticks, message.hash_every
         ours = self._players, self._input_size, self._ticks, self._hash_every
         if theirs != ours:
