@@ -26,8 +26,8 @@ def export(
         str | None,
         typer.Option(
             "--for",
-            help="Platforms: linux-x64, windows-x64, linux-arm64, macos-arm64, with commas between them, or "
-            "all. This machine's by default.",
+            help="Platforms: linux-x64, windows-x64, linux-arm64, macos-arm64, web, with commas between "
+            "them, or all. This machine's by default.",
         ),
     ] = None,
     static: Annotated[

@@ -23,6 +23,7 @@ from taichi_soft.export.machine_code import compile_kernels, platforms_of
 from taichi_soft.export.meshes import meshes_of
 from taichi_soft.export.module import kernels_of
 from taichi_soft.export.refusals import require_native
+from taichi_soft.export.web import write_package
 from taichi_soft.solver.context import WorldContext
 from taichi_soft.world.world import World, context_of_world, force_field_of
 
@@ -133,8 +134,10 @@ def _written(
     arrays["kernels/stamp"] = words([compiled.stamp])
     arrays["kernels/files"] = words([each.name for each in compiled.files])
     arrays["kernels/sums"] = np.array([(len(each), zlib.crc32(each)) for each in contents], dtype=np.int64)
-    whole = written(arrays)
-    (new / WORLD).write_bytes(whole)
+    if any(each.suffix == ".wasm" for each in compiled.files):
+        write_package(new)
+    (new / WORLD).write_bytes(written(arrays))
+    size = sum(each.stat().st_size for each in new.rglob("*") if each.is_file())
     if path.exists():
         path.rename(part.path / "before")
     try:
@@ -142,4 +145,4 @@ def _written(
     except OSError:
         (part.path / "before").rename(path)
         raise
-    return ExportReport(path, len(whole) + sum(map(len, contents)), len(kernels), names)
+    return ExportReport(path, size, len(kernels), names)

@@ -18,8 +18,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-import engine_adapter
 from taichi_soft.core.errors import OptionError
+from taichi_soft.export.web import for_web, web_sources
 
 TABLE = "taichi_soft_kernels"
 """Symbol of the table in a file: rows of a name and a function, `ts_linked_kernel` of the C library."""
@@ -57,66 +57,15 @@ PLATFORMS = {
     ),
     "linux-arm64": (Platform("aarch64-unknown-linux-gnu", "aarch64-linux-gnu", "generic", "linux-arm64"),),
     "macos-arm64": (Platform("arm64-apple-macosx11.0", "aarch64-macos", "apple-m1", "macos-arm64"),),
-    "web": (Platform("wasm32-unknown-unknown", "wasm32-wasi", "generic", "web", "+simd128,+nontrapping-fptoint"),),
+    "web": (
+        Platform("wasm32-unknown-unknown", "wasm32-wasi", "generic", "web", "+simd128,+nontrapping-fptoint"),
+    ),
 }
 """By the name that `taichi-soft export --for` takes."""
 
 _TARGET_LINES = re.compile(r"^target (?:datalayout|triple).*\n", re.MULTILINE)
 _PROCESSOR = re.compile(r'"(?:target-cpu|target-features|tune-cpu)"="[^"]*"')
-_LOOP = re.compile(r"^define internal void @cpu_parallel_range_for_task\(.*?^}\n", re.MULTILINE | re.DOTALL)
-_CLOSURE = re.compile(r"^  %\S+ = alloca (%\S+), align 8\n(?=(?:(?!^}).)*@cpu_parallel_range_for_task)", re.MULTILINE | re.DOTALL)
 _PART = re.compile(r"^define void @(\w+_kernel_(\d+)_\w+)\((%struct\.RuntimeContext[.\d]*\*)", re.MULTILINE)
-
-_SERIAL_LOOP = """
-define internal void @cpu_parallel_range_for_task(i8* %given, i32 %thread, i32 %number) {{
-entry:
-  %closure = bitcast i8* %given to {closure}*
-  %at0 = getelementptr inbounds {closure}, {closure}* %closure, i32 0, i32 0
-  %at1 = getelementptr inbounds {closure}, {closure}* %closure, i32 0, i32 1
-  %at2 = getelementptr inbounds {closure}, {closure}* %closure, i32 0, i32 2
-  %at3 = getelementptr inbounds {closure}, {closure}* %closure, i32 0, i32 3
-  %at4 = getelementptr inbounds {closure}, {closure}* %closure, i32 0, i32 4
-  %at5 = getelementptr inbounds {closure}, {closure}* %closure, i32 0, i32 5
-  %at6 = getelementptr inbounds {closure}, {closure}* %closure, i32 0, i32 6
-  %at7 = getelementptr inbounds {closure}, {closure}* %closure, i32 0, i32 7
-  %context = load {context}, {context}* %at0
-  %prologue = load void ({context}, i8*)*, void ({context}, i8*)** %at1
-  %body = load void ({context}, i8*, i32)*, void ({context}, i8*, i32)** %at2
-  %epilogue = load void ({context}, i8*)*, void ({context}, i8*)** %at3
-  %size = load i64, i64* %at4
-  %first = load i32, i32* %at5
-  %last = load i32, i32* %at6
-  %count = load i32, i32* %at7
-  %memory = alloca i8, i64 %size, align 8
-  %before = mul i32 %count, %number
-  %begin = add i32 %first, %before
-  %behind = add i32 %begin, %count
-  %is_short = icmp slt i32 %behind, %last
-  %end = select i1 %is_short, i32 %behind, i32 %last
-  %has_prologue = icmp ne void ({context}, i8*)* %prologue, null
-  br i1 %has_prologue, label %start, label %check
-start:
-  call void %prologue({context} %context, i8* %memory)
-  br label %check
-check:
-  %i = phi i32 [ %begin, %entry ], [ %begin, %start ], [ %next, %work ]
-  %goes_on = icmp slt i32 %i, %end
-  br i1 %goes_on, label %work, label %done
-work:
-  call void %body({context} %context, i8* %memory, i32 %i)
-  %next = add i32 %i, 1
-  br label %check
-done:
-  %has_epilogue = icmp ne void ({context}, i8*)* %epilogue, null
-  br i1 %has_epilogue, label %finish, label %leave
-finish:
-  call void %epilogue({context} %context, i8* %memory)
-  br label %leave
-leave:
-  ret void
-}}
-"""
-"""One part of a loop forwards, as Taichi's runtime has it, but with the places that LLVM chooses."""
 
 _FUNCTION = "taichi_soft_kernel_"
 """How functions begin that run all parts of a kernel."""
@@ -201,15 +150,6 @@ def _source_of(name: str, text: str) -> str:
     return f"{text}\ndefine void @{_FUNCTION}{name}({context} %context) {{\n{calls}  ret void\n}}\n"
 
 
-def _for_web(source: str) -> str:
-    """A kernel's text for pointers of 32 bits: Taichi has places of 64 in what runs the parts of a loop."""
-    if not _LOOP.search(source):
-        return source
-    (closure,) = set(_CLOSURE.findall(source))
-    (context,) = set(re.findall(rf"^define void @{_FUNCTION}\w+\((\S+) %context\)", source, re.MULTILINE))
-    return _LOOP.sub(lambda _: _SERIAL_LOOP.format(closure=closure, context=context), source)
-
-
 def _table_of(symbol: str, stamp: str, names: Sequence[str]) -> str:
     """Rows of a name and a function, with the stamp in front and nothing at the end, as text for LLVM."""
     lines, rows = [], []
@@ -236,7 +176,7 @@ def _object_of(llvm: Any, sources: Mapping[str, str], table: str, target: Platfo
     whole = llvm.parse_assembly("")
     whole.triple, whole.data_layout = target.triple, str(machine.target_data)
     for source in [*sources.values(), table]:
-        module = llvm.parse_assembly(_for_web(source) if target.is_web else source)
+        module = llvm.parse_assembly(for_web(source) if target.is_web else source)
         module.triple, module.data_layout = whole.triple, whole.data_layout
         whole.link_in(module)
     for name in sources:  # so that a game may have several worlds
@@ -248,34 +188,20 @@ def _linked(target: Platform, code: Path) -> Path:
     """A library made of an object file, beside it."""
     linked = code.with_name(target.file + target.end)
     if target.is_web:
-        return _linked_for_web(code, linked)
+        return _zig(linked, "c++", "-target", target.target, *web_sources(), code)
     # What compilers call, to set memory and the like, comes with zig: nothing of a system is linked.
-    command = [
-        *(sys.executable, "-m", "ziglang", "cc", "-target", target.target, "-shared", "-nostdlib"),
-        *("-lcompiler_rt", "-s", "-o", str(linked), str(code)),
-    ]
+    given: list[str | Path] = ["cc", "-target", target.target, "-shared", "-nostdlib", "-lcompiler_rt", code]
     if target.end == ".dll":
         start, definitions = code.with_name("start.c"), code.with_name("kernels.def")
         start.write_text(_WINDOWS)
         definitions.write_text(f"EXPORTS\n  {TABLE} DATA\n")
-        command += ["-fno-sanitize=all", str(start), str(definitions)]
-    done = subprocess.run(command, capture_output=True, text=True)
-    if done.returncode != 0:
-        raise OptionError(f"cannot link {linked.name}: {done.stderr.strip() or 'zig has failed'}")
-    return linked
+        given += ["-fno-sanitize=all", start, definitions]
+    return _zig(linked, *given)
 
 
-def _linked_for_web(code: Path, linked: Path) -> Path:
-    """The whole library with the kernels, as one module."""
-    native = Path(engine_adapter.__file__).parent / "native"
-    sources = [each for each in sorted((native / "src").glob("*.cpp")) if each.name != "files.cpp"]
-    command = [
-        *(sys.executable, "-m", "ziglang", "c++", "-target", "wasm32-wasi", "-mexec-model=reactor"),
-        *("-std=c++17", "-O2", "-fno-exceptions", "-fno-rtti", "-msimd128", "-ffp-contract=off", "-fvisibility=hidden"),
-        *("-DTAICHI_SOFT_BUILDS", f"-I{native / 'include'}", *map(str, sources), str(code)),
-        *("-Wl,--export-dynamic", "-Wl,--export=malloc", "-Wl,--export=free", "-Wl,--export=__stack_pointer"),
-        *("-s", "-o", str(linked)),
-    ]
+def _zig(linked: Path, *given: str | Path) -> Path:
+    """What zig's compilers make of what they are given."""
+    command = [sys.executable, "-m", "ziglang", *map(str, given), "-s", "-o", str(linked)]
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode != 0:
         raise OptionError(f"cannot link {linked.name}: {done.stderr.strip() or 'zig has failed'}")

@@ -9,14 +9,17 @@ import pytest
 ROOT = Path(__file__).parents[2]
 
 
-def build(folder, *options):
-    """Build the library and the programs of its tests. Returns: the folder."""
+NATIVE = ROOT / "engine_adapter" / "native"
+
+
+def build(folder, *options, targets=()):
+    """Build the library and the programs of its tests, or only some of them. Returns: the folder."""
     missing = [tool for tool in ("cmake", "g++") if shutil.which(tool) is None]
     if missing:
         pytest.skip(f"needs {' and '.join(missing)}, to build the native library")
-    source = ROOT / "engine_adapter" / "native"
-    settings = ["-DTAICHI_SOFT_TESTS=ON", *options]
-    for command in (["-S", str(source), "-B", str(folder), *settings], ["--build", str(folder), "-j2"]):
-        done = subprocess.run(["cmake", *command], capture_output=True, text=True)
+    settings = ["-S", NATIVE, "-B", folder, "-DTAICHI_SOFT_TESTS=ON", *options]
+    wanted = ["--target", *targets] if targets else []
+    for arguments in (settings, ["--build", folder, "-j2", *wanted]):
+        done = subprocess.run(["cmake", *map(str, arguments)], capture_output=True, text=True)
         assert done.returncode == 0, done.stdout + done.stderr
     return folder

@@ -1,4 +1,4 @@
-"""Recorded games on the platforms that can be played here: under qemu and Wine. By hand:
+"""Recorded games on platforms that can be played here: under qemu and Wine, in node and Chromium. By hand:
 
     python tests/native/platforms.py
 
@@ -20,11 +20,9 @@ if __name__ == "__main__":
 
 # ruff: noqa: E402
 from games import digests, lines_of
-from native_build import ROOT
+from native_build import NATIVE, build
 from scenes import GAMES
 from test_kept_bits import bits_of
-
-NATIVE = ROOT / "engine_adapter" / "native"
 
 
 @dataclass(frozen=True)
@@ -33,59 +31,72 @@ class Runner:
 
     platform: str
     command: tuple[str, ...] = ()
-    needs: str = ""  # a file or a program
-    package: str = ""  # of Debian's, that has it
+    needs: tuple[str, ...] = ()  # files, programs or Python's packages
+    source: str = ""  # of these
 
     @property
     def is_here(self):
-        return not self.needs or Path(self.needs).exists() or shutil.which(self.needs) is not None
+        return all(Path(each).exists() or shutil.which(each) or _is_package(each) for each in self.needs)
 
 
+def _is_package(name):
+    return name.isidentifier() and find_spec(name) is not None
+
+
+_ARM64 = "/usr/aarch64-linux-gnu"
 RUNNERS = {
     "x86-64-v3": Runner("linux-x64"),
-    "x86-64-v2": Runner("linux-x64", ("qemu-x86_64", "-cpu", "Nehalem"), "qemu-x86_64", "qemu-user"),
+    "x86-64-v2": Runner(
+        "linux-x64", ("qemu-x86_64", "-cpu", "Nehalem"), ("qemu-x86_64",), "apt-get install qemu-user"
+    ),
     "arm64": Runner(
         "linux-arm64",
-        ("qemu-aarch64", "-L", "/usr/aarch64-linux-gnu"),
-        "/usr/aarch64-linux-gnu/lib/ld-linux-aarch64.so.1",
-        "qemu-user libc6-arm64-cross",
+        ("qemu-aarch64", "-L", _ARM64),
+        ("qemu-aarch64", f"{_ARM64}/lib/ld-linux-aarch64.so.1"),
+        "apt-get install qemu-user libc6-arm64-cross",
     ),
-    "Windows": Runner("windows-x64", ("wine",), "wine", "wine64 wine"),
+    "Windows": Runner("windows-x64", ("wine",), ("wine",), "apt-get install wine64 wine"),
+    "node": Runner("web", ("node", str(HERE / "play.mjs")), ("node",), "apt-get install nodejs"),
+    "Chromium": Runner(
+        "web",
+        (sys.executable, str(HERE / "play_in_browser.py")),
+        ("chromium", "playwright"),
+        "apt-get install chromium, and make setup",
+    ),
 }
-"""By what a table calls them."""
+"""By what a table calls them. In a browser there is a world and no program of its own."""
 
 
-def build_for(platform, folder, *targets):
-    """Build the library and programs for a platform, with zig."""
+def player_for(platform, folder):
+    """The program that plays games on a platform, built with zig in a folder; none for the web."""
+    if platform == "web":
+        return None
     zig = Path(find_spec("ziglang").origin).parent / "zig"
     settings = [f"-DPLATFORM={platform}", f"-DZIG={zig}", f"-DCMAKE_TOOLCHAIN_FILE={NATIVE / 'zig.cmake'}"]
-    build = ["--build", folder, "--target", *targets, "-j2"]
-    for command in (["-S", NATIVE, "-B", folder, "-DTAICHI_SOFT_TESTS=ON", *settings], build):
-        done = subprocess.run(["cmake", *map(str, command)], capture_output=True, text=True)
-        assert done.returncode == 0, done.stdout + done.stderr
-    return folder
+    program = build(folder, *settings, targets=["play"]) / "play"
+    return program.with_suffix(".exe") if platform.startswith("windows") else program
 
 
-def played(name, runner, program, folder):
+def played(name, runner, program, world):
     """Hashes of what a game tells there: see `digests`.
 
-    Args: program: of `tests/play.c`, without the end of its name; folder: the world file.
+    Args: program: see `player_for`; world: folder of the world file.
     """
-    file = program.with_suffix(".exe") if runner.platform.startswith("windows") else program
-    quiet = {**os.environ, "WINEDEBUG": "-all", "WINEPREFIX": str(program.parent / "wine")}
-    return digests(lines_of([*runner.command, file, folder], list(GAMES[name][1]()), env=quiet))
+    quiet = {**os.environ, "WINEDEBUG": "-all", "WINEPREFIX": str(world.parent / "wine")}
+    programs = [] if program is None else [program]
+    return digests(lines_of([*runner.command, *programs, world], list(GAMES[name][1]()), env=quiet))
 
 
 def main():
     """Print the table. Returns: the exit status, 1 where two platforms differ."""
     runners = {name: each for name, each in RUNNERS.items() if each.is_here}
     for name in RUNNERS.keys() - runners.keys():
-        print(f"{name} is left out: it needs {RUNNERS[name].package}")
+        print(f"{name} is left out: {RUNNERS[name].source}")
     with tempfile.TemporaryDirectory() as place:
         programs = {}
         for platform in dict.fromkeys(each.platform for each in runners.values()):
             print(f"building for {platform}", flush=True)
-            programs[platform] = build_for(platform, Path(place) / platform, "play") / "play"
+            programs[platform] = player_for(platform, Path(place) / platform)
         print("game", "Python", *runners, sep=" | ")
         differing = 0
         for name in GAMES:

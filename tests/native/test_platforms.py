@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from platforms import RUNNERS, build_for, played
+from platforms import RUNNERS, played, player_for
 from test_kept_bits import KEPT
 
 PLAYED = ("heap", "held", "laws")  # `make test-platforms` plays all of them
@@ -17,7 +17,7 @@ def program(tmp_path_factory):
 
     def built(platform):
         if platform not in made:
-            made[platform] = build_for(platform, tmp_path_factory.mktemp(platform), "play") / "play"
+            made[platform] = player_for(platform, tmp_path_factory.mktemp(platform))
         return made[platform]
 
     return built
@@ -28,6 +28,6 @@ def program(tmp_path_factory):
 def test_a_game_has_the_same_bits_on_another_platform(label, name, export, program):
     runner = RUNNERS[label]
     if not runner.is_here:
-        pytest.skip(f"needs {runner.needs}: apt-get install {runner.package}")
+        pytest.skip(f"needs {' and '.join(runner.needs)}: {runner.source}")
     found = played(name, runner, program(runner.platform), export(name, "--for", TARGETS))
     assert found == json.loads(KEPT.read_text())[name]

@@ -1,74 +1,27 @@
-"""Worlds in WebAssembly: the same games as in C, by the package for JavaScript, in node and in a browser."""
+"""Worlds in WebAssembly, by the package for JavaScript. `test_platforms.py` plays games in them."""
 
 import json
+import re
 import shutil
 import subprocess
-from functools import partial
-from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
-from threading import Thread
+import sys
+from pathlib import Path
 
+import numpy as np
 import pytest
-from browser import chromium, opened
-from games import digests, lines_of
+from browser import chromium, complaints_of, pixels_of, serving
 from native_build import ROOT
-from scenes import GAMES
-from test_kept_bits import KEPT
 
-PLAYER, PACKAGE = ROOT / "tests" / "native" / "play.mjs", ROOT / "engine_adapter" / "web"
+from taichi_soft.live.three_js import FOLDER, VERSION, fetch_three_js
+
+PACKAGE = ROOT / "engine_adapter" / "web"
 
 
 @pytest.fixture
 def node():
     if shutil.which("node") is None:
-        pytest.skip("needs node")
+        pytest.skip("needs node: apt-get install nodejs")
     return "node"
-
-
-@pytest.mark.parametrize("name", GAMES)
-def test_a_game_in_node_has_the_same_bits(name, node, export):
-    lines = lines_of([node, PLAYER, export(name, "--for", "web")], list(GAMES[name][1]()))
-    assert digests(lines) == json.loads(KEPT.read_text())[name]
-
-
-PAGE = """<!DOCTYPE html><title>games</title><link rel="icon" href="data:,"><script type="module">
-import { loadScene } from "./engine_adapter/web/taichi-soft.js";
-import { play } from "./tests/native/play.mjs";
-window.played = async (folder, game) => play(await loadScene(folder), game);
-window.isReady = true;
-</script>"""
-
-
-class Quiet(SimpleHTTPRequestHandler):
-    def log_message(self, *_):
-        pass
-
-
-@pytest.fixture
-def site(tmp_path):
-    """A folder with the package and the player of games, and the address at which it is served."""
-    for file in (*(each for each in PACKAGE.iterdir() if each.is_file()), PLAYER):
-        place = tmp_path / file.relative_to(ROOT)
-        place.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy(file, place)
-    (tmp_path / "index.html").write_text(PAGE)
-    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Quiet, directory=tmp_path))
-    Thread(target=server.serve_forever, daemon=True).start()
-    yield tmp_path, f"http://127.0.0.1:{server.server_address[1]}"
-    server.shutdown()
-
-
-def test_games_in_chromium_have_the_same_bits_and_nobody_complains(site, export):
-    folder, address = site
-    with chromium() as browser:
-        page, complaints, _ = opened(browser, address + "/index.html")
-        page.wait_for_function("window.isReady")
-        for name in ("heap", "held"):
-            shutil.copytree(export(name, "--for", "web"), folder / name)
-            game = "\n".join(GAMES[name][1]())
-            lines = page.evaluate("([folder, game]) => played(folder, game)", [name, game])
-            assert digests(lines) == json.loads(KEPT.read_text())[name]
-        page.close()
-    assert [each for each in complaints if "favicon" not in each] == []
 
 
 REFUSED = """
@@ -162,3 +115,74 @@ console.log(JSON.stringify(names));
         assert f" {name}" in types, name
         for member in set(members) - inner.get(name, set()):
             assert f"{member}(" in types or f"{member}:" in types, f"{name}.{member}"
+
+
+@pytest.fixture(scope="module")
+def sample(tmp_path_factory):
+    """A folder with the sample's page and world, as its page in the documentation says."""
+    folder = tmp_path_factory.mktemp("sample")
+    shutil.copy(PACKAGE / "sample" / "index.html", folder)
+    out = ["--out", str(folder / "game.softworld"), "--axes", "y-up", "--for", "web"]
+    command = [sys.executable, "-m", "taichi_soft", "export", str(PACKAGE / "sample" / "game.py"), *out]
+    subprocess.run(command, check=True, capture_output=True)
+    return folder
+
+
+def test_the_sample_of_three_js_shows_a_jelly_that_can_be_lifted_and_balls_that_fall(sample):
+    fetch_three_js()
+    with serving(sample) as address, chromium() as browser:
+        page = browser.new_page(viewport={"width": 600, "height": 400})
+        complaints = complaints_of(page)
+        page.route("https://cdn.jsdelivr.net/**", of_this_machine)
+        page.goto(f"{address}/index.html")
+        page.wait_for_function("() => document.querySelector('canvas')?.width === 600")
+        page.wait_for_timeout(1000)
+        at_rest = pixels_of(page, "canvas")
+        red = np.argwhere((at_rest - at_rest.mean(axis=2, keepdims=True))[..., 0] > 40)
+        y, x = red.mean(axis=0)
+        page.mouse.move(x, y)
+        page.mouse.down()
+        page.mouse.move(x, y - 120, steps=10)
+        page.wait_for_timeout(2000)
+        lifted = pixels_of(page, "canvas")
+        page.mouse.up()
+        above = np.argwhere((lifted - lifted.mean(axis=2, keepdims=True))[..., 0] > 40)
+        assert above[:, 0].mean() < y - 25
+        for _ in range(6):  # the first two go again: there is room for four
+            page.click("button")
+        page.wait_for_timeout(1500)
+        after = pixels_of(page, "canvas")
+        blue = (after - after.mean(axis=2, keepdims=True))[..., 2] > 40
+        assert blue.mean() > 0.01
+        assert complaints == []
+
+
+def test_the_code_of_the_documentation_runs_in_a_browser(sample):
+    first, second = re.findall(r"```js\n(.*?)```", (ROOT / "docs" / "web.md").read_text(), re.DOTALL)
+    imports = "".join(re.findall(r"^import .*\n", second, re.MULTILINE))
+    stage = """const scene = new THREE.Scene();
+const renderer = { setAnimationLoop: (draw) => draw(16) };
+"""
+    rest = second.replace(imports, "")
+    check = "frame(0.5); window.found = [scene.children.length, jelly.positions[1]];"
+    places = {"three": f"https://cdn.jsdelivr.net/npm/three@{VERSION}/build/three.module.js"}
+    (sample / "page.html").write_text(
+        f"""<link rel="icon" href="data:,"><script type="importmap">{json.dumps({"imports": places})}</script>
+<script type="module">{imports}{first}{stage}{{ {rest} }}{check}</script>"""
+    )
+    fetch_three_js()
+    with serving(sample) as address, chromium() as browser:
+        page = browser.new_page()
+        complaints = complaints_of(page)
+        page.route("https://cdn.jsdelivr.net/**", of_this_machine)
+        page.goto(f"{address}/page.html")
+        page.wait_for_function("window.found")
+        count, height = page.evaluate("window.found")
+        assert (count, abs(height) < 1.0, complaints) == (1, True, [])
+
+
+def of_this_machine(route):
+    """The same version of three.js as the page asks for, which the live page has too."""
+    assert f"three@{VERSION}/" in route.request.url
+    headers = {"access-control-allow-origin": "*"}
+    route.fulfill(path=FOLDER / Path(route.request.url).name, content_type="text/javascript", headers=headers)

@@ -2,6 +2,9 @@
 
 import contextlib
 import shutil
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from threading import Thread
 
 import cv2
 import numpy as np
@@ -39,12 +42,32 @@ def opened(browser, address, **options):
     """A page, and lists of what it complained of and what it asked for."""
     page = browser.new_page(**options)
     page.set_default_timeout(PATIENCE)
-    complaints, requests = [], []
-    page.on("console", lambda said: said.type in ("error", "warning") and complaints.append(said.text))
-    page.on("pageerror", lambda error: complaints.append(str(error)))
+    complaints, requests = complaints_of(page), []
     page.on("request", lambda request: requests.append(request.url))
     page.goto(address)
     return page, complaints, requests
+
+
+def complaints_of(page):
+    """A list of what a page complains of from now on."""
+    complaints = []
+    page.on("console", lambda said: said.type in ("error", "warning") and complaints.append(said.text))
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    return complaints
+
+
+class Quiet(SimpleHTTPRequestHandler):
+    def log_message(self, *_):
+        pass
+
+
+@contextlib.contextmanager
+def serving(folder):
+    """The address at which the files of a folder are served."""
+    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Quiet, directory=folder))
+    Thread(target=server.serve_forever, daemon=True).start()
+    yield f"http://127.0.0.1:{server.server_address[1]}"
+    server.shutdown()
 
 
 def pixels_of(page, selector):
