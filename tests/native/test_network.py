@@ -8,6 +8,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from browser import chromium, opened, serving
 from native_build import ROOT
 
 from engine_adapter import FixedStep, RollbackSession, SessionError
@@ -25,7 +26,7 @@ def _node():
 @pytest.fixture
 def sample():
     """The modules of the sample: who plays in Python, and the network between the two."""
-    from engine_adapter.web.sample import play, player
+    from engine_adapter.web.network import play, player
 
     return play, player
 
@@ -33,7 +34,7 @@ def sample():
 @pytest.fixture(scope="module")
 def arena(tmp_path_factory):
     """The folder of the sample's world."""
-    from engine_adapter.web.sample.play import export
+    from engine_adapter.web.network.play import export
 
     folder = tmp_path_factory.mktemp("network") / "arena.softworld"
     export(folder)
@@ -320,3 +321,67 @@ def test_three_players_agree_and_a_ring_goes_back_as_in_python(arena, tmp_path):
     assert back == [True, [301, 302]]
     assert refusals[0] == "step 300 is not kept (kept: 301 to 303): save more ticks, or rewind less far"
     assert "the world was restored since" in refusals[1]
+
+
+PEERS = """<!DOCTYPE html><title>two players</title><link rel="icon" href="data:,"><script type="module">
+const [a, b] = [new RTCPeerConnection(), new RTCPeerConnection()];
+a.onicecandidate = ({ candidate }) => candidate && b.addIceCandidate(candidate);
+b.onicecandidate = ({ candidate }) => candidate && a.addIceCandidate(candidate);
+const options = { ordered: false, maxRetransmits: 0, negotiated: true, id: 0 };
+window.channels = [a, b].map((each) => each.createDataChannel("game", options));
+const opens = (channel) => new Promise((done) => channel.addEventListener("open", done));
+const open = Promise.all(window.channels.map(opens));
+await a.setLocalDescription();
+await b.setRemoteDescription(a.localDescription);
+await b.setLocalDescription();
+await a.setRemoteDescription(b.localDescription);
+await open;
+const players = await Promise.all([import("./player0.js"), import("./player1.js")]);
+const frames = (count) => new Promise((done) => {
+  let made = 0;
+  const timer = setInterval(() => {
+    players.forEach(({ frame, session }, i) => {
+      if (session.tick < count) frame((session.tick * (i + 3)) % 251, session.tick % 16 < 8 ? 200 : 0);
+      else {
+        session.settle();
+        channels[i].send(session.message());
+      }
+    });
+    made += 1;
+    if (made < 10 * count && players.some(({ session }) => session.confirmed < count)) return;
+    clearInterval(timer);
+    done();
+  }, 4);
+});
+await frames(200);
+window.found = players.map(({ world, session }) => {
+  session.settle();
+  return [session.tick, session.confirmed, session.desync, world.hash()];
+});
+</script>"""
+
+
+def test_the_code_of_the_documentation_plays_over_webrtc_in_a_browser(arena, sample, tmp_path):
+    """Unordered, and without repeats. Both end as a world of Python does that knows all inputs."""
+    (code,) = re.findall(r"```js\n(.*?)```", (ROOT / "docs" / "network.md").read_text(), re.DOTALL)
+    shutil.copytree(arena, tmp_path / "game.softworld")
+    (tmp_path / "index.html").write_text(PEERS)
+    for player in (0, 1):
+        own = code.replace("player: 1", f"player: {player}")
+        text = f"const channel = window.channels[{player}];\n{own}\nexport {{ frame, session, world }};\n"
+        (tmp_path / f"player{player}.js").write_text(text)
+    with serving(tmp_path) as address, chromium() as browser:
+        page, complaints, _ = opened(browser, f"{address}/index.html")
+        page.wait_for_function("window.found")
+        first, second = page.evaluate("window.found")
+    world, bodies = sample[1].world, sample[1].players
+    start = world.snapshot()
+    for tick in range(200):
+        for who, body in enumerate(bodies):
+            left, right = tick * (who + 3) % 251, 200 if tick % 16 < 8 else 0
+            body.apply_force((2.0 * (right - left), 0.0, 0.0))
+        world.step(1 / 60)
+    wanted = [200, 200, None, world.bodies_hash()]
+    world.restore(start)
+    assert [first, second] == [wanted, wanted]
+    assert complaints == []

@@ -8,7 +8,7 @@ from typing import Any
 
 from engine_adapter import FixedStep, RollbackSession
 from engine_adapter.session import Inputs
-from engine_adapter.web.sample.arena import players, stage, world
+from engine_adapter.web.network.arena import players, stage, world
 
 STEP = FixedStep(dt=1 / 60, substeps=8)
 FORCE, LIFT = 8.0, 0.02  # for each unit of an input [N]; by which each player raises the stage [m]

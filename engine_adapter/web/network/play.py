@@ -1,7 +1,7 @@
 """Play a game between Python and node over a slow network that loses messages, and compare the two worlds.
 
-    python engine_adapter/web/sample/play.py           # in real time
-    python engine_adapter/web/sample/play.py --fast    # the same game on a simulated clock
+    python engine_adapter/web/network/play.py           # in real time
+    python engine_adapter/web/network/play.py --fast    # the same game on a simulated clock
 
 Each player is a process and sends UDP datagrams to this process, which is the network between them: it
 delays, loses, copies and reorders datagrams.
