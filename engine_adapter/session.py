@@ -85,6 +85,11 @@ class RollbackSession:
         hash_every: int = 60,
         patience: int = 600,
     ) -> None:
+        step = FixedStep() if step is None else step
+        if not callable(act):
+            raise OptionError(f"act must be a function of the inputs, got {act!r}")
+        if not isinstance(step, FixedStep):
+            raise OptionError(f"step must be a FixedStep, got {type(step).__name__}")
         self._players = as_count(players, "players", 2, 16)
         self._player = as_count(player, "player", 0, self._players - 1)
         self._input_size = as_count(input_size, "input_size", 1, 64)
@@ -92,9 +97,8 @@ class RollbackSession:
         self._delay = as_count(delay, "delay", 0, self._ticks)
         self._hash_every = as_count(hash_every, "hash_every", 1, 10_000)
         self._patience = as_count(patience, "patience")
-        self._step = FixedStep() if step is None else step
         self._rollback = Rollback(world, self._ticks)
-        self._world, self._act = world, act
+        self._world, self._act, self._step = world, act, step
         self._others = [each for each in range(self._players) if each != self._player]
         self._start = int(world.bodies_hash(), 16)
         self._tick = first = world.step_count

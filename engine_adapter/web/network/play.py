@@ -12,6 +12,7 @@ import heapq
 import json
 import random
 import selectors
+import shutil
 import socket
 import subprocess
 import sys
@@ -75,9 +76,7 @@ class Line:
 
     def meet(self) -> None:
         """Wait until the player is there."""
-        data, address = self.socket.recvfrom(16)
-        assert data == b"ready"
-        self.socket.connect(address)
+        self.socket.connect(self.socket.recvfrom(16)[1])
 
     def send(self, data: bytes) -> None:
         """Send to the player."""
@@ -107,7 +106,7 @@ def run_fast(lines: list[Line], network: Network) -> None:
 
 def run(lines: list[Line], network: Network) -> None:
     """Carry what both send in real time, until both are done."""
-    state = [b"frame", b"frame"]
+    state, heard = [b"frame", b"frame"], time.monotonic()
     with selectors.DefaultSelector() as selector:
         for player, line in enumerate(lines):
             selector.register(line.socket, selectors.EVENT_READ, player)
@@ -115,7 +114,10 @@ def run(lines: list[Line], network: Network) -> None:
             now = time.monotonic()
             for to, data in network.due(now):
                 lines[to].send(data)
+            if now - heard > PATIENCE:
+                raise TimeoutError(f"neither process has sent anything for {PATIENCE:g} s")
             for key, _ in selector.select(network.next(now)):
+                heard = now
                 data = lines[key.data].receive()
                 if len(data) > 8:
                     network.send(now, 1 - key.data, data)
@@ -174,6 +176,8 @@ def main() -> None:
     )
     parser.add_argument("--world", type=Path, help="folder of the exported world, if there is one already")
     options = parser.parse_args()
+    if shutil.which("node") is None:
+        sys.exit("needs node: apt-get install nodejs")
     with tempfile.TemporaryDirectory() as scratch:
         folder = options.world or Path(scratch) / "arena.softworld"
         if options.world is None:

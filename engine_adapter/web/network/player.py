@@ -107,7 +107,7 @@ def main() -> None:
         line.connect(("127.0.0.1", options.port))
         player = Player(line, 0, options.ticks, options.cheat)
         line.send(b"ready")
-        assert line.recv(16) == b"start"
+        line.recv(16)  # "start"
         play(player, options.fast)
     print(json.dumps(player.report()))
 
