@@ -191,6 +191,7 @@ def _linked(target: Platform, code: Path) -> Path:
         return _zig(linked, "c++", "-target", target.target, *web_sources(), code)
     # What compilers call, to set memory and the like, comes with zig: nothing of a system is linked.
     given: list[str | Path] = ["cc", "-target", target.target, "-shared", "-nostdlib", "-lcompiler_rt", code]
+    given.append("-Wl,-dead_strip" if target.end == ".dylib" else "-Wl,--gc-sections")
     if target.end == ".dll":
         start, definitions = code.with_name("start.c"), code.with_name("kernels.def")
         start.write_text(_WINDOWS)

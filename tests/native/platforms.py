@@ -5,11 +5,14 @@
 prints a table of what all of them give. It takes a quarter of an hour.
 """
 
+import functools
+import json
 import os
 import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -19,6 +22,7 @@ if __name__ == "__main__":
     sys.path[:0] = [str(HERE), str(HERE.parent / "shared"), str(HERE.parents[1])]
 
 # ruff: noqa: E402
+import pytest
 from games import digests, lines_of
 from native_build import NATIVE, build
 from scenes import GAMES
@@ -27,10 +31,11 @@ from test_kept_bits import bits_of
 
 @dataclass(frozen=True)
 class Runner:
-    """What plays the programs of a platform here."""
+    """What plays games on a platform here."""
 
-    platform: str
-    command: tuple[str, ...] = ()
+    platform: str  # for which worlds are exported
+    make: Callable[[Path], list[Path | str]]  # makes the program in a folder; returns how it is called
+    command: tuple[str, ...] = ()  # in front of that
     needs: tuple[str, ...] = ()  # files, programs or Python's packages
     source: str = ""  # of these
 
@@ -43,48 +48,96 @@ def _is_package(name):
     return name.isidentifier() and find_spec(name) is not None
 
 
+def built_for(platform, folder, *targets):
+    """The library and programs, built with zig. Returns: the folder."""
+    zig = Path(find_spec("ziglang").origin).parent / "zig"
+    settings = [f"-DPLATFORM={platform}", f"-DZIG={zig}", f"-DCMAKE_TOOLCHAIN_FILE={NATIVE / 'zig.cmake'}"]
+    return build(folder, *settings, targets=targets)
+
+
+def _native(platform, end=""):
+    return lambda folder: [built_for(platform, folder, "play") / f"play{end}"]
+
+
+def _in_browser(folder):
+    return [sys.executable, HERE / "play_in_browser.py"]
+
+
+def dotnet(folder):
+    """Microsoft's .NET for Windows, in a folder: how it is called."""
+    command = ["-m", "pip", "download", DOTNET, "--no-deps", "--only-binary=:all:", "--platform=win_amd64"]
+    done = subprocess.run([sys.executable, *command, "-d", str(folder)], capture_output=True, text=True)
+    if done.returncode != 0:
+        pytest.skip(f"needs {DOTNET} of the Python package index: {done.stderr.strip()}")
+    (wheel,) = folder.glob("*.whl")
+    shutil.unpack_archive(wheel, folder, "zip")
+    return [folder / "dotnetcore2" / "bin" / "dotnet.exe", "exec"]
+
+
+def _csharp_on_windows(folder):
+    command = dotnet(folder)
+    built_for("windows-x64", folder, "taichi_soft")
+    program, sources = (
+        folder / "Play.exe",
+        [NATIVE / "csharp" / f"{name}.cs" for name in ("TaichiSoft", "Play")],
+    )
+    subprocess.run(["mcs", "-langversion:7", f"-out:{program}", *sources], check=True)
+    framework = {"name": "Microsoft.NETCore.App", "version": "3.1.0"}
+    options = json.dumps({"runtimeOptions": {"framework": framework}})
+    (folder / "Play.runtimeconfig.json").write_text(options)
+    return [*command, program]
+
+
+DOTNET = "dotnetcore2==3.1.23"
+"""A package for Python that holds .NET for Windows, and nothing for Python."""
+
+_play_on_linux = _native("linux-x64")
 _ARM64 = "/usr/aarch64-linux-gnu"
 RUNNERS = {
-    "x86-64-v3": Runner("linux-x64"),
+    "x86-64-v3": Runner("linux-x64", _play_on_linux),
     "x86-64-v2": Runner(
-        "linux-x64", ("qemu-x86_64", "-cpu", "Nehalem"), ("qemu-x86_64",), "apt-get install qemu-user"
+        "linux-x64",
+        _play_on_linux,
+        ("qemu-x86_64", "-cpu", "Nehalem"),
+        ("qemu-x86_64",),
+        "apt-get install qemu-user",
     ),
     "arm64": Runner(
         "linux-arm64",
+        _native("linux-arm64"),
         ("qemu-aarch64", "-L", _ARM64),
         ("qemu-aarch64", f"{_ARM64}/lib/ld-linux-aarch64.so.1"),
         "apt-get install qemu-user libc6-arm64-cross",
     ),
-    "Windows": Runner("windows-x64", ("wine",), ("wine",), "apt-get install wine64 wine"),
-    "node": Runner("web", ("node", str(HERE / "play.mjs")), ("node",), "apt-get install nodejs"),
+    "Windows": Runner(
+        "windows-x64",
+        _native("windows-x64", ".exe"),
+        ("wine",),
+        ("wine",),
+        "apt-get install wine64 wine",
+    ),
+    "Windows, C#": Runner(
+        "windows-x64",
+        _csharp_on_windows,
+        ("wine",),
+        ("wine", "mcs"),
+        "apt-get install wine64 wine mono-mcs",
+    ),
+    "node": Runner("web", lambda _: [HERE / "play.mjs"], ("node",), ("node",), "apt-get install nodejs"),
     "Chromium": Runner(
-        "web",
-        (sys.executable, str(HERE / "play_in_browser.py")),
-        ("chromium", "playwright"),
-        "apt-get install chromium, and make setup",
+        "web", _in_browser, (), ("chromium", "playwright"), "apt-get install chromium, and make setup"
     ),
 }
-"""By what a table calls them. In a browser there is a world and no program of its own."""
-
-
-def player_for(platform, folder):
-    """The program that plays games on a platform, built with zig in a folder; none for the web."""
-    if platform == "web":
-        return None
-    zig = Path(find_spec("ziglang").origin).parent / "zig"
-    settings = [f"-DPLATFORM={platform}", f"-DZIG={zig}", f"-DCMAKE_TOOLCHAIN_FILE={NATIVE / 'zig.cmake'}"]
-    program = build(folder, *settings, targets=["play"]) / "play"
-    return program.with_suffix(".exe") if platform.startswith("windows") else program
+"""By what a table calls them. Chromium and node run the world itself, which has the library in it."""
 
 
 def played(name, runner, program, world):
     """Hashes of what a game tells there: see `digests`.
 
-    Args: program: see `player_for`; world: folder of the world file.
+    Args: program: how it is called, see `Runner.make`; world: folder of the world file.
     """
     quiet = {**os.environ, "WINEDEBUG": "-all", "WINEPREFIX": str(world.parent / "wine")}
-    programs = [] if program is None else [program]
-    return digests(lines_of([*runner.command, *programs, world], list(GAMES[name][1]()), env=quiet))
+    return digests(lines_of([*runner.command, *program, world], list(GAMES[name][1]()), env=quiet))
 
 
 def main():
@@ -93,20 +146,20 @@ def main():
     for name in RUNNERS.keys() - runners.keys():
         print(f"{name} is left out: {RUNNERS[name].source}")
     with tempfile.TemporaryDirectory() as place:
-        programs = {}
-        for platform in dict.fromkeys(each.platform for each in runners.values()):
-            print(f"building for {platform}", flush=True)
-            programs[platform] = player_for(platform, Path(place) / platform)
+        print("building", flush=True)
+        made = functools.cache(lambda make: make(Path(tempfile.mkdtemp(dir=place))))
+        programs = {label: made(each.make) for label, each in runners.items()}
+        platforms = ",".join(dict.fromkeys(each.platform for each in runners.values()))
         print("game", "Python", *runners, sep=" | ")
         differing = 0
         for name in GAMES:
             world = Path(place) / f"{name}.softworld"
-            scene, targets = f"{HERE / 'scenes.py'}:{name}", ",".join(programs)
-            export = ["-m", "taichi_soft", "export", scene, "--out", str(world), "--for", targets]
+            scene = f"{HERE / 'scenes.py'}:{name}"
+            export = ["-m", "taichi_soft", "export", scene, "--out", str(world), "--for", platforms]
             subprocess.run([sys.executable, *export], check=True, stdout=subprocess.DEVNULL)
             found = {"Python": bits_of(name)}
             for label, each in runners.items():
-                found[label] = played(name, each, programs[each.platform], world)
+                found[label] = played(name, each, programs[label], world)
             differing += len({tuple(each) for each in found.values()}) > 1
             print(name, *(each[-1] for each in found.values()), sep=" | ", flush=True)
     print("all are equal, every 60 lines" if not differing else f"{differing} games differ")

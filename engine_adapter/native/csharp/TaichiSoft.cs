@@ -704,7 +704,7 @@ namespace TaichiSoft
                 int room = Math.Min(drained.Length, events.Length - made);
                 Native.Check(
                     Native.ts_world_drain_events(
-                        handle, drained, new UIntPtr(Size<PlainEvent>.Bytes), new UIntPtr((uint)room), out size),
+                        handle, ref drained[0], new UIntPtr(Size<PlainEvent>.Bytes), new UIntPtr((uint)room), out size),
                     this);
                 int count = (int)size.ToUInt64();
                 for (int i = 0; i < count; ++i) events[made + i] = new SoftEvent(this, ref drained[i]);
@@ -1297,7 +1297,7 @@ namespace TaichiSoft
         internal static extern int ts_world_record_events(ulong world, int kinds);
 
         [DllImport(Library, CallingConvention = C)]
-        internal static extern int ts_world_drain_events(ulong world, PlainEvent[] events, UIntPtr event_size,
+        internal static extern int ts_world_drain_events(ulong world, ref PlainEvent first, UIntPtr event_size,
             UIntPtr capacity, out UIntPtr count);
 
         [DllImport(Library, CallingConvention = C)]
