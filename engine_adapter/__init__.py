@@ -4,5 +4,6 @@ from engine_adapter.adapter import EngineAdapter
 from engine_adapter.budget import GivenUp
 from engine_adapter.fixed_step import FixedStep
 from engine_adapter.rollback import Rollback
+from engine_adapter.session import RollbackSession, SessionError
 
-__all__ = ["EngineAdapter", "FixedStep", "GivenUp", "Rollback"]
+__all__ = ["EngineAdapter", "FixedStep", "GivenUp", "Rollback", "RollbackSession", "SessionError"]

@@ -103,12 +103,13 @@ from taichi_soft.world.body import Body
 from taichi_soft.world.world import World
 
 if TYPE_CHECKING:
-    from engine_adapter import EngineAdapter, FixedStep, GivenUp, Rollback
+    from engine_adapter import EngineAdapter, FixedStep, GivenUp, Rollback, RollbackSession, SessionError
 else:
+    _OF_ADAPTER = ("EngineAdapter", "FixedStep", "GivenUp", "Rollback", "RollbackSession", "SessionError")
 
     def __getattr__(name):
         """Import the names of `engine_adapter` when one is asked for: that package imports this one."""
-        if name not in ("EngineAdapter", "FixedStep", "GivenUp", "Rollback"):
+        if name not in _OF_ADAPTER:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         import engine_adapter
 
@@ -165,6 +166,8 @@ __all__ = [
     "Released",
     "RenderMesh",
     "Rollback",
+    "RollbackSession",
+    "SessionError",
     "Settings",
     "Shape",
     "SkinMesh",

@@ -81,6 +81,7 @@ export class World {
   hash(): string;
   snapshot(): Uint8Array;
   restore(bytes: Uint8Array): void;
+  readonly restoreCount: number;
   recordEvents(kinds?: number): void;
   events(): SoftEvent[];
   body(name: string | number): Body | null;

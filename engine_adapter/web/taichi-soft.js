@@ -199,6 +199,7 @@ export class Scene {
 /** A scene that moves. */
 export class World {
   #listener = null;
+  #restoreCount = 0;
   #meshes = new Set();
 
   constructor(scene) {
@@ -312,6 +313,12 @@ export class World {
 
   restore(bytes) {
     this.native.lending(bytes, (at) => this.#call("ts_world_restore", at, bytes.byteLength));
+    this.#restoreCount += 1;
+  }
+
+  /** How often `restore` was called: whoever keeps earlier states sees that they are of another past. */
+  get restoreCount() {
+    return this.#restoreCount;
   }
 
   /** Kinds are bits of `EVENTS`; all if you say nothing, 0 for none. */

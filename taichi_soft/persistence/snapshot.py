@@ -74,6 +74,12 @@ def state_hash(context: WorldContext) -> str:
     return blake2b(to_json([code, write_manifest(context)]), digest_size=8).hexdigest()
 
 
+def bodies_hash(context: WorldContext) -> str:
+    """As `World.bodies_hash`."""
+    code = int(hash_bodies(context.built.state, len(context.slots.slots)))
+    return f"{code % 2**64:016x}"
+
+
 def _table(context: WorldContext, entries: dict[str, list[list[Any]]]) -> Words:
     """Where the words of each group of fields are, by what slices have entered in a manifest."""
     state, scene, slots = context.built.state, context.layout, len(context.slots.slots)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from taichi_soft.core.errors import StateError
-from taichi_soft.persistence.snapshot import restore_snapshot, state_hash, take_snapshot
+from taichi_soft.persistence.snapshot import bodies_hash, restore_snapshot, state_hash, take_snapshot
 from taichi_soft.world.world_parts import WorldParts
 
 
@@ -61,6 +61,16 @@ class WorldStates(WorldParts):
         Raises: StateError before `build`.
         """
         return state_hash(self._context)
+
+    def bodies_hash(self) -> str:
+        """Hash of the state of all bodies, 16 hexadecimal digits: the same as in the exported world.
+
+        There it is `ts_world_hash` in C and `world.hash()` in JavaScript. It covers positions, velocities,
+        pins, and who is asleep or frozen. `state_hash`, which exported worlds do not have, covers step count,
+        gravity, colliders, frames, grabs and joints too.
+        Raises: StateError before `build`.
+        """
+        return bodies_hash(self._context)
 
     def save_recording(self, path: str | Path) -> Path:
         """Write what was done in the last `record` steps or more, and the snapshot before them, to a file.

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from taichi_soft import Material, SoftBodyAsset, StateError, World, box, cylinder
+from taichi_soft import FrozenBodyWarning, Material, SoftBodyAsset, StateError, World, box, cylinder
 
 DT = 1 / 60
 WHEEL = cylinder(0.5, 0.4, rings=3, layers=3)
@@ -160,6 +160,18 @@ def test_no_torque_and_no_speed_breaks_a_body(integrator, limit):
     run(world, 300)
     assert not body.is_frozen
     assert body.flipped_count() == 0
+
+
+def test_a_world_whose_driven_body_has_frozen_can_be_restored():
+    """Its particles were beyond any number when the motor looked at them last."""
+    world, body = made(WHEEL, JELLY, retries=0)
+    motor = world.add_motor(body, HUB, (0, 0, 1), speed=5.0, max_torque=3.0)
+    body.set_velocity((0.0, 0.0, 0.0), (0.0, 0.0, 1e3))
+    with pytest.warns(FrozenBodyWarning):
+        run(world, 4, 12)
+    assert body.is_frozen
+    world.restore(world.snapshot())
+    assert motor.effort == 0.0
 
 
 def test_effort_counts_the_attempt_that_was_kept_only():

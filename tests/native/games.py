@@ -20,7 +20,6 @@ from taichi_soft.contact.collider import row_of
 from taichi_soft.control.frames import Frames
 from taichi_soft.control.grabs import Grabs
 from taichi_soft.core.math.rotations import quaternion_of
-from taichi_soft.persistence.kernels.packing import hash_bodies
 from taichi_soft.world.world import context_of_world
 
 MASK = (1 << 64) - 1
@@ -101,8 +100,7 @@ class Player:
     def step(self):
         dt, substeps = self.take(2)
         self.world.step(dt, int(substeps) or None)
-        built = context_of_world(self.world).built
-        self.say(f"{hash_bodies(built.state, self.world.slot_count) & MASK:016x}")
+        self.say(self.world.bodies_hash())
 
     def impulse(self):
         self.body().apply_impulse(self.take(3), self.list())

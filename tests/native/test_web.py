@@ -109,10 +109,11 @@ def test_bad_input_is_refused_by_name_and_the_world_goes_on(node, export, tmp_pa
         assert any(each in found[what][1] for each in text.replace("-?", "").split("|")), (what, found[what])
 
 
-def test_the_types_name_what_the_package_has(node):
+@pytest.mark.parametrize("module", ["taichi-soft", "rollback"])
+def test_the_types_name_what_the_package_has(module, node):
     """Every class, method and property of the one is in the other."""
     program = f"""
-import * as soft from "{PACKAGE.as_posix()}/taichi-soft.js";
+import * as soft from "{PACKAGE.as_posix()}/{module}.js";
 const names = {{}};
 for (const [name, thing] of Object.entries(soft)) {{
   const own = Object.getOwnPropertyNames(thing.prototype ?? {{}});
@@ -123,7 +124,7 @@ console.log(JSON.stringify(names));
     done = subprocess.run(
         [node, "--input-type=module", "-e", program], capture_output=True, text=True, check=True
     )
-    types = (PACKAGE / "taichi-soft.d.ts").read_text(encoding="utf-8")
+    types = (PACKAGE / f"{module}.d.ts").read_text(encoding="utf-8")
     inner = {"World": {"keep", "forget"}}
     for name, members in json.loads(done.stdout).items():
         assert f" {name}" in types, name

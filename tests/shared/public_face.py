@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from engine_adapter import EngineAdapter, FixedStep, Rollback
+from engine_adapter import EngineAdapter, FixedStep, Rollback, RollbackSession
 from taichi_soft import (
     AnisotropicMaterial,
     BoxShape,
@@ -502,6 +502,7 @@ CALLS: dict[str, dict[str, Call]] = {
         "snapshot": NOTHING,
         "restore": Call({"data": DATA}),
         "state_hash": NOTHING,
+        "bodies_hash": NOTHING,
         "save_recording": Call({"path": PATH}),
     },
     "Body": {
@@ -702,6 +703,14 @@ MAKERS: dict[Any, dict[str, Kind]] = {
     Rollback: {
         "world": Kind(lambda g, rng: g.world, {"none": None, "number": 1, "not built": Of(lambda g: g.other)}),
         "ticks": choice(2, **NOT_COUNTS, zero=0),
+    },
+    RollbackSession: {
+        "world": Kind(lambda g, rng: g.world, {"none": None, "number": 1, "not built": Of(lambda g: g.other)}),
+        "act": choice(print_nothing, none=None, number=1), "player": choice(0, 1, **NOT_COUNTS, another=2),
+        "players": choice(2, **NOT_COUNTS, one=1, seventeen=17), "input_size": choice(1, 64, **NOT_COUNTS, zero=0),
+        "step": choice(None, FixedStep(), number=DT), "ticks": choice(3, 1000, **NOT_COUNTS, zero=0),
+        "delay": choice(0, 3, **NOT_COUNTS, beyond=1001), "hash_every": choice(1, 60, **NOT_COUNTS, zero=0),
+        "patience": choice(1, 600, **NOT_COUNTS, zero=0),
     },
 }  # fmt: skip
 """What is made before or beside a world."""

@@ -127,12 +127,14 @@ def _run_motor(state: ti.template(), program: ti.template(), motor, h, kick):
             momentum += state.particle_mass[p] * d.dot(velocity)
             longest = ti.max(longest, d.dot(d))
         row = row_behind(row)
-    impulse = point.x * 0.0
+    impulse = h * 0.0  # the point may be infinite
     if inertia > 0.0:
         speed = momentum / inertia
         most = ti.min(motor.limit * h / inertia, MOST_CHANGE * sound_speed / ti.sqrt(longest))
         change = ti.max(-most, ti.min(motor.speed - speed, most))
-        if ti.abs(speed) < 1e18 and ti.abs(change) < 1e18:  # or the body is on its way to infinity
+        pushed = inertia * change
+        # Or the body is on its way to infinity.
+        if ti.abs(speed) < 1e18 and ti.abs(change) < 1e18 and ti.abs(pushed) < 1e18:
             row = motor.first
             while row < motor.end:
                 p = state.motors.particle[row]
@@ -140,7 +142,7 @@ def _run_motor(state: ti.template(), program: ti.template(), motor, h, kick):
                     d = _pattern(state, motor, p, point, axis)
                     state.particle_velocity[p] = state.particle_velocity[p] + change * d
                 row = row_behind(row)
-            impulse = inertia * change
+            impulse = pushed
     return impulse
 
 

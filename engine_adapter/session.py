@@ -1,0 +1,347 @@
+"""One machine's side of a game of several players, whose inputs come late over a network."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from engine_adapter.fixed_step import FixedStep
+from engine_adapter.rollback import Rollback
+from taichi_soft import OptionError, TaichiSoftError, World
+from taichi_soft.core.checks import as_count
+
+Inputs = tuple[bytes, ...]
+"""The inputs of all players in one tick, by player."""
+
+MARK, NO_TICK = b"TSR1", 0xFFFFFFFF
+HEAD = struct.Struct("<4sQBBHHHIIQIH")
+LEAD_SMOOTHING = 0.1  # weight of the newest message in the estimate of how far ahead this machine is
+
+
+class SessionError(TaichiSoftError, ValueError):
+    """A message does not belong to this session, or a player has been silent for too long."""
+
+
+class _Message(NamedTuple):
+    """The fields of `HEAD`, then for each player how many of his ticks the sender knows, then inputs."""
+
+    mark: bytes
+    start: int  # hash of the state in which the session began
+    player: int
+    players: int
+    input_size: int
+    ticks: int
+    hash_every: int
+    tick: int  # that the sender makes next
+    hash_tick: int  # of the newest hash that no late input can change, or NO_TICK
+    hash: int
+    first: int  # tick of the first input
+    input_count: int
+    heard: tuple[int, ...]
+    inputs: list[bytes]
+
+
+class RollbackSession:
+    """Make ticks with predicted inputs, and make them again where a prediction was wrong.
+
+    Each machine runs the same world and has its own session. `advance` makes a tick with the input of the
+    own player. It predicts that the others repeat their last known inputs. `message` returns a datagram for
+    all other machines, and `receive` takes theirs: late, twice, in any order. A datagram may be lost, because
+    each one repeats all inputs that another machine has not acknowledged. Give all machines the same
+    arguments. Only `act`, `player`, `delay` and `patience` may differ.
+
+    Args:
+        world: built of the same script on all machines, at the same step.
+        act: function that applies the inputs of all players, by player, before each step. It must depend on
+            these and the world only: a tick may be made several times.
+        player: number of the own player, from 0.
+        players: how many there are, 2 to 16.
+        input_size: bytes of each input, 1 to 64. Before the first one of a player, zeros are used.
+        step: length and substeps of each tick.
+        ticks: largest number of ticks made on predictions, 1 to 1000. Each takes the memory of a snapshot.
+        delay: ticks after which an own input is used, 0 to `ticks`. A larger delay makes rewinds shorter, and
+            the own player's answer later.
+        hash_every: ticks between two comparisons of hashes, 1 to 10000.
+        patience: calls of `advance` in a row that may wait for another player before it raises an error.
+    Raises: OptionError for an argument out of range; StateError if the world is not built.
+    Example:
+        session = RollbackSession(world, lambda inputs: None, player=0, input_size=1)
+        session.advance(b"\\x01")  # True: the tick was made
+        datagram = session.message()  # for the others' `receive`
+    """
+
+    def __init__(
+        self,
+        world: World,
+        act: Callable[[Inputs], None],
+        *,
+        player: int,
+        players: int = 2,
+        input_size: int,
+        step: FixedStep | None = None,
+        ticks: int = 30,
+        delay: int = 0,
+        hash_every: int = 60,
+        patience: int = 600,
+    ) -> None:
+        step = FixedStep() if step is None else step
+        if not callable(act):
+            raise OptionError(f"act must be a function of the inputs, got {act!r}")
+        if not isinstance(step, FixedStep):
+            raise OptionError(f"step must be a FixedStep, got {type(step).__name__}")
+        self._players = as_count(players, "players", 2, 16)
+        self._player = as_count(player, "player", 0, self._players - 1)
+        self._input_size = as_count(input_size, "input_size", 1, 64)
+        self._ticks = as_count(ticks, "ticks", 1, 1000)
+        self._delay = as_count(delay, "delay", 0, self._ticks)
+        self._hash_every = as_count(hash_every, "hash_every", 1, 10_000)
+        self._patience = as_count(patience, "patience")
+        self._rollback = Rollback(world, self._ticks)
+        self._world, self._act, self._step = world, act, step
+        self._others = [each for each in range(self._players) if each != self._player]
+        self._start = int(world.bodies_hash(), 16)
+        self._tick = first = world.step_count
+        blank = bytes(self._input_size)
+        self._inputs = [{first - 1: blank} for _ in range(self._players)]  # known ones, by player and tick
+        self._used: dict[int, Inputs] = {}  # by tick
+        self._heard = [first] * self._players  # of each player all inputs before this tick are known
+        self._acknowledged = [first] * self._players  # tick up to which each other knows the own inputs
+        for _ in range(self._delay):
+            self._learn(self._player, blank)
+        self._wrong: int | None = None  # first tick that was made with a wrong prediction
+        self._hashes: dict[int, int] = {}  # own ones, by tick
+        self._their_hashes: dict[tuple[int, int], int] = {}  # not compared yet, by tick and player
+        self._newest = [first] * self._players  # tick of the newest message
+        self._leads = [0.0] * self._players
+        self._waits = 0
+        self._rollbacks = self._longest_rewind = 0
+        self._desync: int | None = None
+
+    @property
+    def tick(self) -> int:
+        """Number of the tick that `advance` makes next: the step count of the world on the first machine."""
+        return self._tick
+
+    @property
+    def confirmed(self) -> int:
+        """Tick before which all inputs are known: no message can change what happened before it."""
+        return min(self._heard)
+
+    @property
+    def ahead(self) -> float:
+        """Ticks by which this machine is ahead of the slowest other one, estimated; negative if it is behind.
+
+        A game that skips a tick now and then while this is above 1 spares itself and the others long rewinds.
+        """
+        return max(self._leads[each] for each in self._others)
+
+    @property
+    def desync(self) -> int | None:
+        """First compared tick that began in another state on another machine; None if all states agreed."""
+        return self._desync
+
+    @property
+    def rollbacks(self) -> int:
+        """Number of rewinds so far."""
+        return self._rollbacks
+
+    @property
+    def longest_rewind(self) -> int:
+        """The most ticks that one rewind went back."""
+        return self._longest_rewind
+
+    def advance(self, own_input: bytes) -> bool:
+        """Correct wrong predictions, then make a tick.
+
+        Args:
+            own_input: what the own player does, `input_size` bytes. It is used `delay` ticks later.
+        Returns: False if no tick was made, because `ticks` are made on predictions already. Call it again in
+            the next frame, and go on sending messages.
+        Raises: OptionError for an input of another size; SessionError after `patience` calls in a row that
+            made no tick; what `act` and `World.step` raise: the tick was not made then.
+        """
+        if not isinstance(own_input, bytes) or len(own_input) != self._input_size:
+            raise OptionError(f"own_input must be {self._input_size} bytes, got {own_input!r}")
+        self.settle()
+        if self._tick - self.confirmed >= self._ticks:
+            self._wait()
+            return False
+        self._waits = 0
+        tick = self._heard[self._player]
+        self._learn(self._player, own_input)
+        try:
+            self._make_tick()
+        except BaseException:
+            del self._inputs[self._player][tick]
+            self._heard[self._player] = tick
+            raise
+        self._tick += 1
+        self._forget()
+        return True
+
+    def settle(self) -> int:
+        """Make again the ticks that were made with wrong predictions, as `advance` does first.
+
+        Returns: how many ticks were made again.
+        Raises: what `act` and `World.step` raise. The next call goes on with the tick that was not made.
+        """
+        if self._wrong is not None:
+            self._rollback.rewind_to(self._wrong)
+            self._rollbacks += 1
+            self._longest_rewind = max(self._longest_rewind, self._tick - self._wrong)
+            self._wrong = None
+        missing = self._tick - self._world.step_count
+        while self._world.step_count < self._tick:
+            self._make_tick()
+        self._compare()
+        return missing
+
+    def message(self) -> bytes:
+        """A datagram for all other machines. Send one after each call of `advance`, whatever it returned."""
+        first, end = min(self._acknowledged[each] for each in self._others), self._heard[self._player]
+        own = [self._inputs[self._player][tick] for tick in range(first, end)]
+        # A state that a rewind is going to change, or some later input can change, has no hash to send.
+        final = min(self.confirmed, self._tick if self._wrong is None else self._wrong)
+        tick = max((each for each in self._hashes if each <= final), default=NO_TICK)
+        settings = self._player, self._players, self._input_size, self._ticks, self._hash_every
+        head = (MARK, self._start, *settings, self._tick, tick, self._hashes.get(tick, 0), first, len(own))
+        return HEAD.pack(*head) + struct.pack(f"<{self._players}I", *self._heard) + b"".join(own)
+
+    def receive(self, data: bytes) -> None:
+        """Take a message of another machine. It may be late, a copy, or out of order.
+
+        The ticks that it proves wrong are made again by the next call of `advance` or `settle`.
+        Args:
+            data: what `message` returned there.
+        Raises: SessionError for a message that is damaged, belongs to another session, world or version, or
+            contradicts an earlier message of its player. The text says which, and nothing is changed.
+        """
+        message = self._read(data)
+        other = message.player
+        for tick, each in enumerate(message.inputs, message.first):
+            if tick >= self._heard[other]:
+                self._learn(other, each)
+                used = self._used.get(tick)
+                if used is not None and used[other] != each:
+                    self._wrong = tick if self._wrong is None else min(self._wrong, tick)
+        heard = message.heard[self._player]
+        self._acknowledged[other] = max(self._acknowledged[other], heard)
+        if message.hash_tick != NO_TICK:
+            self._their_hashes[message.hash_tick, other] = message.hash
+        if message.tick > self._newest[other]:
+            self._newest[other] = message.tick
+            # Each machine sees the other one late. If the network is as slow in both directions, half of the
+            # difference is the lead of this machine.
+            lead = ((self._tick - message.tick) - (message.tick - (heard - self._delay))) / 2
+            self._leads[other] += LEAD_SMOOTHING * (lead - self._leads[other])
+
+    def _read(self, data: bytes) -> _Message:
+        """Parse and check a message. Raises: SessionError."""
+        body = HEAD.size + 4 * self._players
+        if not isinstance(data, bytes) or len(data) < body or data[:4] != MARK:
+            raise SessionError("these bytes are no message of a session of this version")
+        size = self._input_size
+        parts: list[Any] = [*HEAD.unpack_from(data)]
+        parts.append(struct.unpack_from(f"<{self._players}I", data, HEAD.size))
+        parts.append([data[at : at + size] for at in range(body, len(data), size)])
+        message = _Message(*parts)
+        theirs = message.players, message.input_size, message.ticks, message.hash_every
+        ours = self._players, self._input_size, self._ticks, self._hash_every
+        if theirs != ours:
+            names = "players, input_size, ticks, hash_every"
+            raise SessionError(f"{names} are {theirs} there and {ours} here: give all sessions the same")
+        if message.start != self._start:
+            raise SessionError(
+                f"the other world began in the state {message.start:016x}, this one in {self._start:016x}: "
+                "run the same script, of the same version, on all machines"
+            )
+        if message.player not in self._others:
+            raise SessionError(f"player {message.player} is no other player: here is player {self._player}")
+        if len(data) != body + size * message.input_count:
+            raise SessionError(
+                f"a message of {message.input_count} inputs has {len(data)} bytes: it is damaged"
+            )
+        self._require_order(message)
+        return message
+
+    def _require_order(self, message: _Message) -> None:
+        """Compare a message with what is known. Raises: SessionError."""
+        who, known = f"player {message.player}", self._inputs[message.player]
+        due = self._heard[message.player]
+        if message.first > due:
+            raise SessionError(
+                f"{who} sends no input before tick {message.first}, and that of {due} is missing"
+            )
+        most = self._heard[self._player] + 2 * self._ticks  # a machine that waits as it has to is not beyond
+        hash_tick = -1 if message.hash_tick == NO_TICK else message.hash_tick
+        if max(message.first + message.input_count, message.tick, hash_tick) > most:
+            raise SessionError(f"{who} is beyond tick {most}, which no machine of this session can be yet")
+        if message.heard[self._player] > self._heard[self._player]:
+            raise SessionError(f"{who} acknowledges an input that was not sent yet: the message is damaged")
+        for tick, each in enumerate(message.inputs, message.first):
+            if known.get(tick, each) != each:
+                raise SessionError(f"{who} sends another input for tick {tick} than before")
+
+    def _learn(self, player: int, value: bytes) -> None:
+        """Keep the next input of a player."""
+        self._inputs[player][self._heard[player]] = value
+        self._heard[player] += 1
+
+    def _make_tick(self) -> None:
+        """Keep the state, apply what is known or predicted, and make a step; or change nothing."""
+        tick = self._world.step_count
+        self._rollback.save()
+        if tick % self._hash_every == 0:
+            self._hashes[tick] = int(self._world.bodies_hash(), 16)
+        used = tuple(
+            known[min(tick, heard - 1)] for known, heard in zip(self._inputs, self._heard, strict=True)
+        )
+        try:
+            self._act(used)
+            self._world.step(self._step.dt, self._step.substeps)
+        except BaseException:
+            self._rollback.rewind_to(tick)
+            raise
+        self._used[tick] = used
+
+    def _wait(self) -> None:
+        """Count a call that made no tick. Raises: SessionError if there were too many."""
+        self._waits += 1
+        if self._waits >= self._patience:
+            tick = self.confirmed
+            silent = [str(each) for each in self._others if self._heard[each] == tick]
+            raise SessionError(
+                f"no input of player {' and '.join(silent)} for tick {tick} came in {self._waits} frames, "
+                f"and {self._ticks} ticks are predicted already: end the session, or go on waiting"
+            )
+
+    def _compare(self) -> None:
+        """Compare the hashes of states that no late input can change."""
+        for (tick, player), theirs in list(self._their_hashes.items()):
+            if tick <= self.confirmed and tick in self._hashes:
+                del self._their_hashes[tick, player]
+                if theirs != self._hashes[tick]:
+                    self._desync = tick if self._desync is None else min(self._desync, tick)
+
+    def _forget(self) -> None:
+        """Drop what no rewind and no message can ask for."""
+        confirmed = self.confirmed
+        for player, known in enumerate(self._inputs):
+            needed = (
+                min(self._acknowledged[each] for each in self._others)
+                if player == self._player
+                else confirmed
+            )
+            _drop_before(known, min(needed, confirmed) - 1)  # the last known input is the prediction
+        _drop_before(self._used, confirmed)
+        oldest = self._tick - 4 * self._ticks - self._delay - self._hash_every
+        _drop_before(self._hashes, oldest)
+        for key in [each for each in self._their_hashes if each[0] < oldest]:
+            del self._their_hashes[key]
+
+
+def _drop_before(rows: dict[int, bytes] | dict[int, Inputs] | dict[int, int], tick: int) -> None:
+    """Delete what belongs to earlier ticks."""
+    for each in [each for each in rows if each < tick]:
+        del rows[each]
