@@ -76,6 +76,7 @@ export class World {
   advance(seconds: number): Clock;
   stableSubsteps(dt: number): number;
   wake(): void;
+  setGravity(gravity: Vector): void;
   setWind(velocity: Vector, air?: { density?: number; drag?: number }): void;
   radialImpulse(center: Vector, impulse: number, radius: number): void;
   hash(): string;

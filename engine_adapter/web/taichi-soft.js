@@ -281,6 +281,11 @@ export class World {
     this.#call("ts_world_wake");
   }
 
+  /** Gravity [m/s^2], from the next step on. Who sleeps wakes. */
+  setGravity(gravity) {
+    this.#call("ts_world_set_gravity", this.native.doubles(this.native.small, gravity));
+  }
+
   /** Air that moves [m/s], of a density [kg/m^3]. */
   setWind(velocity, { density = 1.2, drag = 1 } = {}) {
     this.#call("ts_world_set_wind", this.native.doubles(this.native.small, velocity), density, drag);

@@ -70,6 +70,7 @@ def _of_world(context: WorldContext) -> Arrays:
             ]
         ),
         "world/floor": _floats([] if settings.floor is None else [settings.floor]),
+        "world/surroundings": _floats(settings.gravity),
         "world/steps": np.array([context.clock.steps], dtype=np.int64),
         "world/clock": _floats([context.clock.time, context.clock.last_dt]),
         "events/limits": _floats([CONTACT_PAUSE, MOST_EVENTS, touch_rows(room, len(context.slots.slots))]),

@@ -147,6 +147,9 @@ class Player:
         velocity, (density, drag) = self.take(3), self.take(2)
         self.world.set_wind(velocity, density=density, drag=drag)
 
+    def gravity(self):
+        self.world.set_gravity(self.take(3))
+
     def wake(self):
         self.world.wake()
 

@@ -62,6 +62,7 @@ export function play(scene, game) {
       who.setTargets(vertices, take(3 * vertices.length));
     },
     wind: () => world.setWind(take(3), { density: one(), drag: one() }),
+    gravity: () => world.setGravity(take(3)),
     wake: () => world.wake(),
     spawn: () => world.spawn(one(), { position: take(3), rotation: take(4), velocity: take(3), spin: take(3) }),
     despawn: () => body().despawn(),

@@ -298,6 +298,27 @@ def toys_game():
             yield line("mesh", 0, 0)
 
 
+def tilted():
+    """Bodies on a floor that is no collider, while the game tilts gravity."""
+    world = World(floor=0.0, gravity=(0.0, 0.0, -5.0))
+    for i in range(3):
+        world.add_body(box((0.4, 0.3, 0.2), (3, 2, 2)), RUBBER, position=(0.0, i, 0.15), velocity=(1.0, 0, 0))
+    world.build()
+    world.set_gravity((0.0, 0.5, -9.0))
+    return world
+
+
+def tilted_game():
+    for i in range(STEPS):
+        if i % 100 == 50:
+            yield line("gravity", (4.0 * np.sin(0.01 * i), 1.0, -9.81))
+        if i == 120:
+            yield line("snapshot")
+        if i == 480:
+            yield line("restore")
+        yield line("step", DT, 0)
+
+
 def thesis_sphere():
     """What docs/native.md measures a step of."""
     world = World(floor=0.0)
@@ -314,4 +335,5 @@ GAMES = {
     "drape": (drape, drape_game),
     "held": (held, held_game),
     "laws": (laws, laws_game),
+    "tilted": (tilted, tilted_game),
 }

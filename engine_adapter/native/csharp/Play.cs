@@ -207,6 +207,7 @@ namespace TaichiSoft
             { "unpin", () => { Body who = Who(); who.Unpin(List()); } },
             { "targets", Targets },
             { "wind", () => { Vector3d wind = Vector(); double density = Number(); world.SetWind(wind, density, Number()); } },
+            { "gravity", () => world.SetGravity(Vector()) },
             { "wake", () => world.Wake() },
             { "spawn", Spawn },
             { "despawn", () => Who().Despawn() },

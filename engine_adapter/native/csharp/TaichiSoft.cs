@@ -628,6 +628,12 @@ namespace TaichiSoft
             Native.Check(Native.ts_world_wake(handle), this);
         }
 
+        /// <summary>Gravity [unit of length/s^2], from the next step on. Who sleeps wakes.</summary>
+        public void SetGravity(Vector3d gravity)
+        {
+            Native.Check(Native.ts_world_set_gravity(handle, ref gravity), this);
+        }
+
         /// <summary>Wind: its velocity, density of the air [kg/m^3], coefficient of drag.</summary>
         public void SetWind(Vector3d velocity, double density, double drag)
         {
@@ -1276,6 +1282,9 @@ namespace TaichiSoft
 
         [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_world_wake(ulong world);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_world_set_gravity(ulong world, ref Vector3d gravity);
 
         [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_world_set_wind(ulong world, ref Vector3d velocity, double density, double drag);

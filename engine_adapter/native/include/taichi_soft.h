@@ -160,6 +160,8 @@ TS_API ts_result ts_world_advance(ts_world world, double seconds, ts_clock* cloc
 TS_API ts_result ts_world_get_clock(ts_world world, ts_clock* clock);
 TS_API ts_result ts_world_stable_substeps(ts_world world, double dt, int32_t* substeps);
 TS_API ts_result ts_world_wake(ts_world world);
+/* [m/s^2, in Unreal cm/s^2], from the next step on. Who sleeps wakes. */
+TS_API ts_result ts_world_set_gravity(ts_world world, const double gravity[3]);
 TS_API ts_result ts_world_set_wind(ts_world world, const double velocity[3], double density, double drag);
 TS_API ts_result ts_world_radial_impulse(ts_world world, const double center[3], double impulse, double radius);
 /* A number that tells states apart: that of Python's world in the same state. */

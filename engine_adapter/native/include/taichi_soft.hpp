@@ -153,6 +153,8 @@ class World {
     check(ts_world_on_step(handle_, *next ? call : nullptr, next.get()));
     before_ = std::move(next);  // now that the library knows the other one no more
   }
+  // [m/s^2]
+  void set_gravity(const Vector& gravity) { check(ts_world_set_gravity(handle_, gravity.data())); }
   uint64_t hash() const {
     uint64_t found = 0;
     check(ts_world_hash(handle_, &found));

@@ -475,6 +475,13 @@ ts_result ts_world_set_wind(ts_world world, const double velocity[3], double den
   });
 }
 
+ts_result ts_world_set_gravity(ts_world world, const double gravity[3]) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn->set_gravity(turn.axes().place_in(finite(gravity, 3, "gravity")));
+  });
+}
+
 ts_result ts_world_radial_impulse(ts_world world, const double center[3], double impulse, double radius) {
   return guarded([&] {
     const Turn turn(world);

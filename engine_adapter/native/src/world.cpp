@@ -22,15 +22,17 @@ World::World(std::shared_ptr<Scene> scene) : scene_(std::move(scene)), machine_(
   const Archive& archive = scene_->archive;
   const auto clock = archive.get<double>("world/clock");
   const auto steps = archive.get<int64_t>("world/steps");
+  const auto surroundings = archive.get<double>("world/surroundings");
   const auto poses = archive.get<float>("frames/poses");
   const size_t frames = poses.count / 24, named = scene_->names(TS_FRAME).size();
   const auto alive = archive.get<int32_t>("frames/alive");
   const auto feels = archive.get<unsigned char>("frames/feels");
-  if (clock.count != 2 || steps.count != 1 || poses.count != 24 * frames || frames == 0 || named > frames ||
+  if (clock.count != 2 || steps.count != 1 || surroundings.count != 3 || poses.count != 24 * frames || frames == 0 || named > frames ||
       alive.count != named || feels.count != size_t(scene_->particle_count)) {
-    fail(TS_ERROR_FILE, "the world file is not in order: clock or frames. Export it again");
+    fail(TS_ERROR_FILE, "the world file is not in order: clock, gravity or frames. Export it again");
   }
   steps_ = steps[0], time_ = clock[0], last_dt_ = clock[1];
+  surroundings_ = {{surroundings[0], surroundings[1], surroundings[2]}};
   present_.assign(poses.data, poses.data + 12 * frames);
   coming_.assign(poses.data + 12 * frames, poses.data + 24 * frames);
   frame_alive_.assign(frames, 0);  // a row that no frame ever had is there where there is none
@@ -62,6 +64,7 @@ void World::bind() {
   gravity_scale_ = {root, s.place("body_gravity_scale", bodies, 1)};
   damping_ = {root, s.place("body_damping", bodies, 1)};
   wind_ = {root, s.place("wind", 1, 4)};
+  gravity_ = {root, s.place("gravity", 1, 3)};
   target_ = {root, s.place("particle_target", particles, 3)};
   reaction_ = {root, s.place("particle_reaction", particles, 3)};
   if (s.is_implicit) particle_contact_ = {root, s.place("particle_contact", particles, 1)};

@@ -54,6 +54,11 @@ struct Hit {
   bool is_inside = false;
 };
 
+// What holds for all bodies.
+struct Surroundings {
+  Vector gravity;  // [m/s^2]
+};
+
 struct SnapshotHead;
 
 class World {
@@ -113,6 +118,7 @@ class World {
 
   // All of them.
   void wake();
+  void set_gravity(const Vector& gravity);
   void set_wind(const Vector& velocity, double density, double drag);
   void radial_impulse(const Vector& center, double impulse, double radius);
 
@@ -158,6 +164,8 @@ class World {
   void require_image() const;
   bool are_rows_in_order(const char* at, const SnapshotHead& head) const;
   bool is_in_order(const Contact& contact, size_t colliders) const;
+  bool is_in_order(const Surroundings& given) const;
+  void write_surroundings();
   Present present() const;
   std::map<Pair, std::array<float, 3>> look();
   void take_down(double dt, const std::vector<int32_t>& frozen);
@@ -189,6 +197,7 @@ class World {
   Colliders colliders_;
   std::vector<ColliderMotion> motion_;
   Events events_;
+  Surroundings surroundings_;
   std::vector<float> present_, coming_;  // of frames, after the last step and the coming one: rotation row by row
                                          // and place, (f, 12)
   std::vector<unsigned char> frame_alive_;
@@ -208,6 +217,7 @@ class World {
 
   Field<int32_t> body_status_, body_drives_, particle_aim_, is_awake_, failed_, is_driven_, island_count_;
   Field<float> position_, velocity_, mass_, inv_mass_, lag_, gravity_scale_, damping_, wind_, target_, reaction_;
+  Field<float> gravity_;
   Field<int32_t> particle_contact_, records_touches_;
   Field<int32_t> grab_body_, grab_corners_, grab_count_, grab_particle_;
   Field<float> grab_weights_, grab_target_, grab_spring_, grab_limits_, grab_force_, grab_share_;

@@ -38,7 +38,7 @@ uint64_t World::hash() const {
   return code;
 }
 
-constexpr uint64_t kSnapshotMark = 0x3250414E53534354u;
+constexpr uint64_t kSnapshotMark = 0x3350414E53534354u;
 
 // What a snapshot begins with. Behind it lie, in this order: the fields that are carried; frames, and who is felt
 // there; numbers that tell handles apart; colliders; what events depend on.
@@ -49,6 +49,7 @@ struct SnapshotHead {
   uint64_t frames, colliders, contacts;
   int64_t kinds;  // of events that are recorded
   double time, last_dt;
+  Surroundings surroundings;
 };
 
 namespace {
@@ -106,6 +107,7 @@ void World::snapshot(char* bytes) const {
   head.frames = frame_alive_.size(), head.colliders = colliders_.rows.size();
   head.contacts = memory.contacts.size(), head.kinds = memory.kinds;
   head.steps = steps_, head.time = time_, head.last_dt = last_dt_;
+  head.surroundings = surroundings_;
   char* at = bytes + sizeof head;
   for (const Carried& each : scene_->carried) {
     const char* row = machine_->root() + each.place.offset;
@@ -208,7 +210,7 @@ void World::require_image() const {
   snapshot(bytes.data());
   SnapshotHead head;
   std::memcpy(&head, bytes.data(), sizeof head);
-  if (!are_rows_in_order(bytes.data() + sizeof head, head)) {
+  if (!is_in_order(head.surroundings) || !are_rows_in_order(bytes.data() + sizeof head, head)) {
     fail(TS_ERROR_FILE, "the world file is not in order: its state names what there is not. Export it again");
   }
 }
@@ -233,7 +235,7 @@ void World::restore(const char* bytes, size_t size) {
   if (sum != checksum(whole.data(), size)) {
     fail(TS_ERROR_SNAPSHOT, "this snapshot is damaged: its checksum is wrong");
   }
-  if (!are_rows_in_order(bytes + sizeof head, head)) {
+  if (!is_in_order(head.surroundings) || !are_rows_in_order(bytes + sizeof head, head)) {
     fail(TS_ERROR_SNAPSHOT, "this snapshot is not in order: it names what there is not");
   }
   // What may find no memory comes before what changes the world.
@@ -260,6 +262,8 @@ void World::restore(const char* bytes, size_t size) {
   take_all(&at, &memory.sleepers);
   take_all(&at, &memory.contacts);
   if (scene_->has_contact) write_colliders();
+  surroundings_ = head.surroundings;
+  write_surroundings();
   steps_ = head.steps, time_ = head.time, last_dt_ = head.last_dt;
   colliders_.is_dirty = has_work_ = true;
   is_still_ = false;

@@ -182,6 +182,10 @@ static void play(const char* call) {
     numbers(a, 5);
     check(ts_world_set_wind(world, a, a[3], a[4]));
   }
+  CALL("gravity") {
+    numbers(a, 3);
+    check(ts_world_set_gravity(world, a));
+  }
   CALL("wake") check(ts_world_wake(world));
   CALL("spawn") {
     ts_placement place;
