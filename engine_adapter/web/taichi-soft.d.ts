@@ -77,6 +77,7 @@ export class World {
   stableSubsteps(dt: number): number;
   wake(): void;
   setGravity(gravity: Vector): void;
+  setFriction(friction: number): void;
   setWind(velocity: Vector, air?: { density?: number; drag?: number }): void;
   radialImpulse(center: Vector, impulse: number, radius: number): void;
   hash(): string;
@@ -115,6 +116,7 @@ export class Body {
   applyForce(force: Vector, vertices?: ArrayLike<number> | null): void;
   impulseAt(impulse: Vector, point: Vector, radius: number): void;
   setGravityScale(scale: number): void;
+  setFriction(friction: number): void;
   setDamping(rate: number): void;
   setSheltered(isSheltered: boolean): void;
   pin(vertices: ArrayLike<number>): void;
@@ -153,6 +155,7 @@ export class Collider {
   readonly impulse: { impulse: number[]; moment: number[] };
   moveTo(pose: Pose): void;
   setVelocity(linear: Vector, spin?: Vector): void;
+  setFriction(friction: number): void;
   teleport(pose: Pose): void;
   remove(): void;
 }

@@ -286,6 +286,11 @@ export class World {
     this.#call("ts_world_set_gravity", this.native.doubles(this.native.small, gravity));
   }
 
+  /** Coulomb's coefficient of the floor, from the next step on. */
+  setFriction(friction) {
+    this.#call("ts_world_set_friction", friction);
+  }
+
   /** Air that moves [m/s], of a density [kg/m^3]. */
   setWind(velocity, { density = 1.2, drag = 1 } = {}) {
     this.#call("ts_world_set_wind", this.native.doubles(this.native.small, velocity), density, drag);
@@ -582,6 +587,11 @@ export class Body {
     this.#call("ts_body_set_gravity_scale", scale);
   }
 
+  /** Coulomb's coefficient against other bodies, in worlds with soft contact. */
+  setFriction(friction) {
+    this.#call("ts_body_set_friction", friction);
+  }
+
   setDamping(rate) {
     this.#call("ts_body_set_damping", rate);
   }
@@ -739,6 +749,11 @@ export class Collider extends Placed {
   setVelocity(linear, spin = [0, 0, 0]) {
     const at = this.world.native.doubles(this.world.native.small, [...linear, ...spin]);
     this.call("set_velocity", at, at + 24);
+  }
+
+  /** Coulomb's coefficient, from the next step on. */
+  setFriction(friction) {
+    this.call("set_friction", friction);
   }
 
   teleport({ position, rotation = UPRIGHT }) {

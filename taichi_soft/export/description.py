@@ -54,9 +54,10 @@ def description_of(
 
 
 def _of_world(context: WorldContext) -> Arrays:
-    settings, built = context.settings, context.built
+    settings, built, floor = context.settings, context.built, context.floor_collider
     share, longest = context.substeps.rule
     kinds, room = list(context.slots.kinds), built.state.capacity.contact
+    slots = list(zip(context.slots.assets, context.slots.slots, strict=True))
     return {
         "world/flags": _ints(
             [built.program.has_contact, built.sleeps, room.soft, built.state.capacity.implicit]
@@ -70,7 +71,8 @@ def _of_world(context: WorldContext) -> Arrays:
             ]
         ),
         "world/floor": _floats([] if settings.floor is None else [settings.floor]),
-        "world/surroundings": _floats(settings.gravity),
+        "world/surroundings": _floats([*settings.gravity, settings.friction]),
+        "world/floor_collider": _ints([-1 if floor is None or not floor.is_alive else floor.index]),
         "world/steps": np.array([context.clock.steps], dtype=np.int64),
         "world/clock": _floats([context.clock.time, context.clock.last_dt]),
         "events/limits": _floats([CONTACT_PAUSE, MOST_EVENTS, touch_rows(room, len(context.slots.slots))]),
@@ -78,6 +80,9 @@ def _of_world(context: WorldContext) -> Arrays:
             [PATCH_SIZE, FARTHEST_PULL, WEIGHTS * GRAVITY_EARTH, HIGHEST_SPEED, PATCH_ROWS]
         ),
         "slots/asset": _ints([kinds.index(asset) for asset in context.slots.assets]),
+        "slots/friction": _floats(
+            [asset.contact.friction if body is None else body.friction for asset, body in slots]
+        ),
         "slots/begin": _ints([each.particles[0] for each in context.layout.ranges]),
     }
 
@@ -128,6 +133,7 @@ def _of_asset(asset: SoftBodyAsset) -> Arrays:
         "elements": _ints(elements),
         "element_stiffness": _floats(stiffness),
         "thickness": _floats([asset.surface_row[1]]),
+        "friction": _floats([asset.contact.friction]),
     }
 
 

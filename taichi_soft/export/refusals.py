@@ -46,11 +46,6 @@ def _of_bodies(context: WorldContext) -> list[str]:
         for body in context.slots.living
         if record_of(body).description is not present_asset(body).description
     ]
-    found += [
-        f"body {body.index} was given another friction: make its asset with that Contact"
-        for body in context.slots.living
-        if record_of(body).friction is not None
-    ]
     status = context.built.state.body_status.to_numpy()
     return found + [
         f"body {body.index} skips the coming step: make a step before"

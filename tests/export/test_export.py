@@ -59,14 +59,6 @@ def changed():
     return world
 
 
-def greased():
-    world = World(soft_contact=True)
-    world.add_body(BALL, position=(0, 0, 1))
-    world.build()
-    world.bodies[0].set_friction(0.1)
-    return world
-
-
 def skipping():
     world = plain()
     world.build()
@@ -89,7 +81,6 @@ def flat():
         (recording, "it records events"),
         (forced, "it has a force field"),
         (changed, "body 0 was given another material"),
-        (greased, "body 0 was given another friction"),
         (skipping, "body 0 skips the coming step"),
         (flat, "schedule 'flat'"),
     ],

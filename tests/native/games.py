@@ -150,6 +150,15 @@ class Player:
     def gravity(self):
         self.world.set_gravity(self.take(3))
 
+    def floor_friction(self):
+        self.world.set_friction(*self.take(1))
+
+    def body_friction(self):
+        self.body().set_friction(*self.take(1))
+
+    def collider_friction(self):
+        self.collider().set_friction(*self.take(1))
+
     def wake(self):
         self.world.wake()
 

@@ -299,7 +299,7 @@ def toys_game():
 
 
 def tilted():
-    """Bodies on a floor that is no collider, while the game tilts gravity."""
+    """Bodies on a floor that is no collider, while the game tilts gravity and greases it."""
     world = World(floor=0.0, gravity=(0.0, 0.0, -5.0))
     for i in range(3):
         world.add_body(box((0.4, 0.3, 0.2), (3, 2, 2)), RUBBER, position=(0.0, i, 0.15), velocity=(1.0, 0, 0))
@@ -312,10 +312,47 @@ def tilted_game():
     for i in range(STEPS):
         if i % 100 == 50:
             yield line("gravity", (4.0 * np.sin(0.01 * i), 1.0, -9.81))
+        if i in (90, 300):
+            yield line("floor_friction", 0.05 + 0.001 * i)
         if i == 120:
             yield line("snapshot")
         if i == 480:
             yield line("restore")
+        yield line("step", DT, 0)
+
+
+def joined():
+    """A table of boxes that slide on each other, while friction and gravity change."""
+    world = World(soft_contact=True, sleep_speed=0.3, collider_room=3)
+    crate = SoftBodyAsset(box((0.4, 0.4, 0.3), (2, 2, 2)), RUBBER, contact=Contact(friction=0.2))
+    world.reserve(crate, 5)
+    for i in range(4):
+        world.spawn(crate, position=(0.05 * i, 0.6 * (i % 2), 0.2 + 0.35 * (i // 2)))
+    world.add_collider(BoxShape((4.0, 0.2, 1.0)), position=(0.0, -0.6, 0.2), friction=0.9)
+    world.build()
+    world.bodies[2].set_friction(0.7)
+    return world
+
+
+def joined_game():
+    """Slots 0 and 1 lie on the floor, 2 and 3 on these. Colliders: 0 a wall, 1 the floor."""
+    for i in range(STEPS):
+        if i in (40, 260):
+            yield line("gravity", (2.0 + 0.01 * i, -0.5, -9.81))
+        if i in (100, 300):
+            yield line("body_friction", 2, 0.05)
+            yield line("body_friction", 0, 0.9)
+            yield line("collider_friction", 0, 0.1)
+        if i in (140, 310):
+            yield line("floor_friction", 0.02 if i < 200 else 0.8)
+            yield line("collider_friction", 1, 0.03 if i < 200 else 0.9)
+        if i == 120:
+            yield line("snapshot")
+        if i == 200:
+            yield line("restore")
+        if i == 330:
+            yield line("despawn", 2)
+            yield line("spawn", 0, (0.3, 0.1, 0.9), UPRIGHT, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
         yield line("step", DT, 0)
 
 
@@ -336,4 +373,5 @@ GAMES = {
     "held": (held, held_game),
     "laws": (laws, laws_game),
     "tilted": (tilted, tilted_game),
+    "joined": (joined, joined_game),
 }

@@ -634,6 +634,12 @@ namespace TaichiSoft
             Native.Check(Native.ts_world_set_gravity(handle, ref gravity), this);
         }
 
+        /// <summary>Coulomb's coefficient of the floor, from the next step on.</summary>
+        public void SetFriction(double friction)
+        {
+            Native.Check(Native.ts_world_set_friction(handle, friction), this);
+        }
+
         /// <summary>Wind: its velocity, density of the air [kg/m^3], coefficient of drag.</summary>
         public void SetWind(Vector3d velocity, double density, double drag)
         {
@@ -837,6 +843,12 @@ namespace TaichiSoft
             Native.Check(Native.ts_collider_teleport(handle, collider, ref pose), this);
         }
 
+        /// <summary>Coulomb's coefficient of a collider, from the next step on.</summary>
+        public void SetColliderFriction(int collider, double friction)
+        {
+            Native.Check(Native.ts_collider_set_friction(handle, collider, friction), this);
+        }
+
         /// <summary>Where a collider is.</summary>
         public Pose GetColliderPose(int collider)
         {
@@ -1025,6 +1037,12 @@ namespace TaichiSoft
         public void SetGravityScale(double scale)
         {
             Check(Native.ts_body_set_gravity_scale(World.Handle, Id, scale));
+        }
+
+        /// <summary>Coulomb's coefficient against other bodies, in worlds with soft contact.</summary>
+        public void SetFriction(double friction)
+        {
+            Check(Native.ts_body_set_friction(World.Handle, Id, friction));
         }
 
         /// <summary>How fast it loses its velocity [1/s].</summary>
@@ -1287,6 +1305,9 @@ namespace TaichiSoft
         internal static extern int ts_world_set_gravity(ulong world, ref Vector3d gravity);
 
         [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_world_set_friction(ulong world, double friction);
+
+        [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_world_set_wind(ulong world, ref Vector3d velocity, double density, double drag);
 
         [DllImport(Library, CallingConvention = C)]
@@ -1366,6 +1387,9 @@ namespace TaichiSoft
         internal static extern int ts_body_set_gravity_scale(ulong world, ulong body, double scale);
 
         [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_body_set_friction(ulong world, ulong body, double friction);
+
+        [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_body_set_damping(ulong world, ulong body, double rate);
 
         [DllImport(Library, CallingConvention = C)]
@@ -1437,6 +1461,9 @@ namespace TaichiSoft
 
         [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_collider_teleport(ulong world, int collider, ref Pose pose);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_collider_set_friction(ulong world, int collider, double friction);
 
         [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_collider_get_pose(ulong world, int collider, out Pose pose);

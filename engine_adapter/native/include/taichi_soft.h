@@ -162,6 +162,8 @@ TS_API ts_result ts_world_stable_substeps(ts_world world, double dt, int32_t* su
 TS_API ts_result ts_world_wake(ts_world world);
 /* [m/s^2, in Unreal cm/s^2], from the next step on. Who sleeps wakes. */
 TS_API ts_result ts_world_set_gravity(ts_world world, const double gravity[3]);
+/* Coulomb's coefficient of the floor. */
+TS_API ts_result ts_world_set_friction(ts_world world, double friction);
 TS_API ts_result ts_world_set_wind(ts_world world, const double velocity[3], double density, double drag);
 TS_API ts_result ts_world_radial_impulse(ts_world world, const double center[3], double impulse, double radius);
 /* A number that tells states apart: that of Python's world in the same state. */
@@ -241,6 +243,8 @@ TS_API ts_result ts_body_apply_force(ts_world world, ts_body body, const double 
 TS_API ts_result ts_body_impulse_at(ts_world world, ts_body body, const double impulse[3], const double point[3],
                                     double radius);
 TS_API ts_result ts_body_set_gravity_scale(ts_world world, ts_body body, double scale);
+/* Coulomb's coefficient against other bodies, in worlds with soft contact: of two the geometric mean counts. */
+TS_API ts_result ts_body_set_friction(ts_world world, ts_body body, double friction);
 TS_API ts_result ts_body_set_damping(ts_world world, ts_body body, double rate);
 TS_API ts_result ts_body_set_sheltered(ts_world world, ts_body body, int32_t is_sheltered);
 TS_API ts_result ts_body_pin(ts_world world, ts_body body, const int32_t* vertices, size_t count);
@@ -330,6 +334,8 @@ TS_API ts_result ts_collider_move_to(ts_world world, int32_t collider, const ts_
 TS_API ts_result ts_collider_set_velocity(ts_world world, int32_t collider, const double linear[3],
                                           const double spin[3]);
 TS_API ts_result ts_collider_teleport(ts_world world, int32_t collider, const ts_pose* pose);
+/* Coulomb's coefficient, from the next step on. Who sleeps near it wakes. */
+TS_API ts_result ts_collider_set_friction(ts_world world, int32_t collider, double friction);
 TS_API ts_result ts_collider_get_pose(ts_world world, int32_t collider, ts_pose* pose);
 /* What bodies gave it in the last step, and the moment of that about its place. Either may be null. */
 TS_API ts_result ts_collider_get_impulse(ts_world world, int32_t collider, double impulse[3], double moment[3]);

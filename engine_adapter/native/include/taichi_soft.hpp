@@ -153,6 +153,12 @@ class World {
     check(ts_world_on_step(handle_, *next ? call : nullptr, next.get()));
     before_ = std::move(next);  // now that the library knows the other one no more
   }
+  // Of the floor, of a body against others, of a collider.
+  void set_friction(double friction) { check(ts_world_set_friction(handle_, friction)); }
+  void set_friction(Body body, double friction) { check(ts_body_set_friction(handle_, body.handle, friction)); }
+  void set_collider_friction(int32_t collider, double friction) {
+    check(ts_collider_set_friction(handle_, collider, friction));
+  }
   // [m/s^2]
   void set_gravity(const Vector& gravity) { check(ts_world_set_gravity(handle_, gravity.data())); }
   uint64_t hash() const {

@@ -475,6 +475,10 @@ ts_result ts_world_set_wind(ts_world world, const double velocity[3], double den
   });
 }
 
+ts_result ts_world_set_friction(ts_world world, double friction) {
+  return guarded([&] { Turn(world)->set_friction(friction); });
+}
+
 ts_result ts_world_set_gravity(ts_world world, const double gravity[3]) {
   return guarded([&] {
     const Turn turn(world);
@@ -661,6 +665,13 @@ ts_result ts_body_set_gravity_scale(ts_world world, ts_body body, double scale) 
   });
 }
 
+ts_result ts_body_set_friction(ts_world world, ts_body body, double friction) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn->set_body_friction(turn->slot_of(body), friction);
+  });
+}
+
 ts_result ts_body_set_damping(ts_world world, ts_body body, double rate) {
   return guarded([&] {
     const Turn turn(world);
@@ -838,6 +849,10 @@ ts_result ts_collider_teleport(ts_world world, int32_t collider, const ts_pose* 
     const Turn turn(world);
     turn->teleport_collider(collider, pose(turn, where));
   });
+}
+
+ts_result ts_collider_set_friction(ts_world world, int32_t collider, double friction) {
+  return guarded([&] { Turn(world)->set_collider_friction(collider, friction); });
 }
 
 ts_result ts_collider_get_pose(ts_world world, int32_t collider, ts_pose* where) {

@@ -125,6 +125,9 @@ Scene::Scene(std::vector<char> world, const std::string& name)
   stable_share = stable[0], stable_step = stable[1];
   has_floor = floors.count == 1;
   floor = has_floor ? floors[0] : 0.0;
+  const auto floor_colliders = archive.get<int32_t>("world/floor_collider");
+  if (floor_colliders.count != 1) out_of_order("the floor");
+  floor_collider = floor_colliders[0];
   position_limit = limits[0], velocity_limit = limits[1], spin_limit = limits[2];
   impulse_limit = limits[3], push_limit = limits[4];
   shortest_step = limits[5], longest_step = limits[6];
@@ -179,11 +182,13 @@ void Scene::read_assets() {
                    archive.get<double>(prefix + "element_stiffness"),
                    0,
                    0.0,
+                   0.0,
                    0};
     const auto center = archive.get<double>(prefix + "center"), skin = archive.get<double>(prefix + "thickness");
+    const auto friction = archive.get<double>(prefix + "friction");
     const size_t n = asset.vertex_count();
     if (asset.rest_rows.count != 8 * n || asset.vertices.count != 3 * n || asset.rank.count != n || center.count != 3 ||
-        skin.count != 1 || !are_places(asset.vertices) || asset.elements.sizes.size() != 2 ||
+        skin.count != 1 || friction.count != 1 || !are_places(asset.vertices) || asset.elements.sizes.size() != 2 ||
         !are_below(asset.elements, n) || !are_below(asset.pinned, n) || !are_below(asset.outer, n) ||
         !are_below(asset.rank, n) || !are_below(asset.surface, n)) {
       out_of_order("an asset");
@@ -194,7 +199,7 @@ void Scene::read_assets() {
       out_of_order("an asset");
     }
     asset.center = {center[0], center[1], center[2]};
-    asset.thickness = skin[0];
+    asset.thickness = skin[0], asset.friction = friction[0];
     assets.push_back(asset);
   }
   for (int32_t slot = 0; slot < slot_count; ++slot) {

@@ -34,7 +34,7 @@ struct Asset {
   Archive::View<int32_t> elements;  // vertices of each: 2 of springs, 4 of tetrahedra
   Archive::View<double> element_stiffness;
   size_t element_width;
-  double thickness;
+  double thickness, friction;
   int32_t slot_count;
   size_t vertex_count() const { return masses.count; }
 };
@@ -65,6 +65,7 @@ class Scene {
   double stable_share, stable_step;  // see `Substeps.rule`
   bool has_floor;
   double floor;
+  int32_t floor_collider;  // the floor, where there are colliders; -1 where it is none
   double position_limit, velocity_limit, spin_limit, impulse_limit, push_limit, shortest_step, longest_step;
   double patch_size, farthest_pull, pull_in_weights, highest_pull_speed;  // of grabs; the third in N/kg
   size_t patch_rows;

@@ -27,12 +27,17 @@ World::World(std::shared_ptr<Scene> scene) : scene_(std::move(scene)), machine_(
   const size_t frames = poses.count / 24, named = scene_->names(TS_FRAME).size();
   const auto alive = archive.get<int32_t>("frames/alive");
   const auto feels = archive.get<unsigned char>("frames/feels");
-  if (clock.count != 2 || steps.count != 1 || surroundings.count != 3 || poses.count != 24 * frames || frames == 0 || named > frames ||
+  if (clock.count != 2 || steps.count != 1 || surroundings.count != 4 || poses.count != 24 * frames || frames == 0 || named > frames ||
       alive.count != named || feels.count != size_t(scene_->particle_count)) {
-    fail(TS_ERROR_FILE, "the world file is not in order: clock, gravity or frames. Export it again");
+    fail(TS_ERROR_FILE, "the world file is not in order: clock, surroundings or frames. Export it again");
   }
   steps_ = steps[0], time_ = clock[0], last_dt_ = clock[1];
-  surroundings_ = {{surroundings[0], surroundings[1], surroundings[2]}};
+  surroundings_ = {{surroundings[0], surroundings[1], surroundings[2]}, surroundings[3]};
+  const auto frictions = archive.get<double>("slots/friction");
+  friction_.assign(frictions.begin(), frictions.end());
+  if (friction_.size() != size_t(scene_->slot_count)) {
+    fail(TS_ERROR_FILE, "the world file is not in order: frictions. Export it again");
+  }
   present_.assign(poses.data, poses.data + 12 * frames);
   coming_.assign(poses.data + 12 * frames, poses.data + 24 * frames);
   frame_alive_.assign(frames, 0);  // a row that no frame ever had is there where there is none
@@ -65,6 +70,7 @@ void World::bind() {
   damping_ = {root, s.place("body_damping", bodies, 1)};
   wind_ = {root, s.place("wind", 1, 4)};
   gravity_ = {root, s.place("gravity", 1, 3)};
+  floor_ = {root, s.place("floor", 1, 3)};
   target_ = {root, s.place("particle_target", particles, 3)};
   reaction_ = {root, s.place("particle_reaction", particles, 3)};
   if (s.is_implicit) particle_contact_ = {root, s.place("particle_contact", particles, 1)};
@@ -79,7 +85,10 @@ void World::bind() {
   grab_particle_ = {root, s.place("grabs.particle", kMostGrabs * kPatchRows, 1)};
   grab_share_ = {root, s.place("grabs.share", kMostGrabs * kPatchRows, 1)};
   if (s.patch_rows != kPatchRows) fail(TS_ERROR_FILE, "the world file is not in order: grabs. Export it again");
-  if (s.has_soft_contact) records_touches_ = {root, s.place("soft.records_touches", 1, 1)};
+  if (s.has_soft_contact) {
+    records_touches_ = {root, s.place("soft.records_touches", 1, 1)};
+    body_surface_ = {root, s.place("soft.body_surface", bodies, 3)};
+  }
   if (!s.has_contact) return;
   island_count_ = {root, s.place("contact.island_count", 1, 1)};
   const size_t rows = colliders_.rows.size();

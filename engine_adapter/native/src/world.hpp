@@ -56,7 +56,8 @@ struct Hit {
 
 // What holds for all bodies.
 struct Surroundings {
-  Vector gravity;  // [m/s^2]
+  Vector gravity;   // [m/s^2]
+  double friction;  // of the floor
 };
 
 struct SnapshotHead;
@@ -119,6 +120,9 @@ class World {
   // All of them.
   void wake();
   void set_gravity(const Vector& gravity);
+  void set_friction(double friction);  // of the floor
+  void set_collider_friction(int32_t number, double friction);
+  void set_body_friction(int32_t slot, double friction);
   void set_wind(const Vector& velocity, double density, double drag);
   void radial_impulse(const Vector& center, double impulse, double radius);
 
@@ -165,7 +169,10 @@ class World {
   bool are_rows_in_order(const char* at, const SnapshotHead& head) const;
   bool is_in_order(const Contact& contact, size_t colliders) const;
   bool is_in_order(const Surroundings& given) const;
+  static bool are_frictions(const double* numbers, size_t count);
   void write_surroundings();
+  bool is_floor(int32_t number) const;
+  void give_friction(int32_t slot, double friction);
   Present present() const;
   std::map<Pair, std::array<float, 3>> look();
   void take_down(double dt, const std::vector<int32_t>& frozen);
@@ -198,6 +205,7 @@ class World {
   std::vector<ColliderMotion> motion_;
   Events events_;
   Surroundings surroundings_;
+  std::vector<double> friction_;  // of each body against others
   std::vector<float> present_, coming_;  // of frames, after the last step and the coming one: rotation row by row
                                          // and place, (f, 12)
   std::vector<unsigned char> frame_alive_;
@@ -217,7 +225,7 @@ class World {
 
   Field<int32_t> body_status_, body_drives_, particle_aim_, is_awake_, failed_, is_driven_, island_count_;
   Field<float> position_, velocity_, mass_, inv_mass_, lag_, gravity_scale_, damping_, wind_, target_, reaction_;
-  Field<float> gravity_;
+  Field<float> gravity_, floor_, body_surface_;
   Field<int32_t> particle_contact_, records_touches_;
   Field<int32_t> grab_body_, grab_corners_, grab_count_, grab_particle_;
   Field<float> grab_weights_, grab_target_, grab_spring_, grab_limits_, grab_force_, grab_share_;

@@ -102,6 +102,7 @@ void World::despawn(int32_t slot) {
   for (size_t g = 0; g < kMostGrabs; ++g) {
     if (grab_body_(g) == slot + 1) end_grab(g);
   }
+  give_friction(slot, asset_of(slot).friction);
   wake_near(box_of(slot));
   is_still_ = false;
   std::fill_n(feels_.begin() + std::ptrdiff_t(begin_of(slot)), asset_of(slot).vertex_count(), 0);

@@ -87,7 +87,7 @@ constexpr size_t kFrameSize = 24 * sizeof(float) + 1;
 // Of all behind the fields.
 size_t size_of_rest(const SnapshotHead& head, size_t slots, size_t particles) {
   return kFrameSize * head.frames + particles + sizeof(uint32_t) * (slots + kMostGrabs) +
-         sizeof(Collider) * head.colliders + sizeof(int32_t) * (slots + 2) + sizeof(ts_body) * slots +
+         sizeof(double) * slots + sizeof(Collider) * head.colliders + sizeof(int32_t) * (slots + 2) + sizeof(ts_body) * slots +
          sizeof(Contact) * head.contacts;
 }
 
@@ -119,6 +119,7 @@ void World::snapshot(char* bytes) const {
   put_all(&at, feels_);
   put_all(&at, generations_);
   put_all(&at, grab_generations_);
+  put_all(&at, friction_);
   for (const Collider& each : colliders_.rows) {
     Collider row;
     std::memset(static_cast<void*>(&row), 0, sizeof row);  // what lies between its parts is the same every time
@@ -181,6 +182,9 @@ bool World::are_rows_in_order(const char* at, const SnapshotHead& head) const {
     if (!(std::fabs(number) <= s.position_limit)) return false;
   }
   at += head.frames + feels_.size() + sizeof(uint32_t) * (generations_.size() + grab_generations_.size());
+  std::vector<double> frictions(friction_.size());
+  take_all(&at, &frictions);
+  if (!are_frictions(frictions.data(), frictions.size())) return false;
   for (size_t i = 0; i < head.colliders; ++i) {
     unsigned char flags[2];
     std::memcpy(flags, at + offsetof(Collider, is_alive), 1);
@@ -256,6 +260,7 @@ void World::restore(const char* bytes, size_t size) {
   take_all(&at, &feels_);
   take_all(&at, &generations_);
   take_all(&at, &grab_generations_);
+  take_all(&at, &friction_);
   colliders_.rows.resize(size_t(head.colliders));
   take_all(&at, &colliders_.rows);
   take_all(&at, &memory.status);
@@ -264,6 +269,7 @@ void World::restore(const char* bytes, size_t size) {
   if (scene_->has_contact) write_colliders();
   surroundings_ = head.surroundings;
   write_surroundings();
+  for (int32_t slot = 0; slot < scene_->slot_count; ++slot) give_friction(slot, friction_[size_t(slot)]);
   steps_ = head.steps, time_ = head.time, last_dt_ = head.last_dt;
   colliders_.is_dirty = has_work_ = true;
   is_still_ = false;

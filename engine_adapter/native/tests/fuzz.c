@@ -209,7 +209,7 @@ static ts_result one_call(ts_world world) {
   const ts_body body = any_body(world);
   size_t count = 0;
   const int32_t* which = list(&count);
-  switch (below(58)) {
+  switch (below(60)) {
     case 0: case 1: case 2: return ts_world_step(world, bad(8) ? number() : 0.01, bad(8) ? whole(50) : 4);
     case 3: {
       ts_clock clock = {size_of(sizeof clock), 0, 0, 0, 0, 0};
@@ -330,6 +330,9 @@ static ts_result one_call(ts_world world) {
     case 54: return add_frame(world);
     case 55: return one_in(2) ? ts_frame_remove(world, whole(8)) : ts_frame_get_pose(world, whole(3), pose());
     case 56: return ts_world_set_gravity(world, numbers(3));
+    case 57: return ts_body_set_friction(world, body, number());
+    case 58:
+      return one_in(2) ? ts_world_set_friction(world, number()) : ts_collider_set_friction(world, whole(4), number());
     default: {
       double center[3];
       return ts_body_center(world, body, bad(10) ? NULL : center);

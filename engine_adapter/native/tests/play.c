@@ -186,6 +186,15 @@ static void play(const char* call) {
     numbers(a, 3);
     check(ts_world_set_gravity(world, a));
   }
+  CALL("floor_friction") check(ts_world_set_friction(world, number()));
+  CALL("body_friction") {
+    const ts_body who = body();
+    check(ts_body_set_friction(world, who, number()));
+  }
+  CALL("collider_friction") {
+    const int32_t which = whole();
+    check(ts_collider_set_friction(world, which, number()));
+  }
   CALL("wake") check(ts_world_wake(world));
   CALL("spawn") {
     ts_placement place;
