@@ -13,7 +13,7 @@ export class SoftError extends Error {
   code: "ARGUMENT" | "HANDLE" | "BUSY" | "FILE" | "VERSION" | "SIZE" | "STATE" | "SNAPSHOT" | "RUNTIME";
 }
 
-export type Kind = "body" | "asset" | "collider" | "frame" | "mesh";
+export type Kind = "body" | "asset" | "collider" | "frame" | "mesh" | "joint" | "motor";
 
 export class Scene {
   readonly counts: Record<Kind, number>;
@@ -99,6 +99,8 @@ export class World {
   frame(name: string | number): Frame;
   addFrame(pose?: Pose): Frame;
   grab(number: number): Grab | null;
+  joint(name: string | number): Joint | null;
+  motor(name: string | number): Motor | null;
 }
 
 export class Body {
@@ -125,6 +127,18 @@ export class Body {
   attach(vertices: ArrayLike<number> | null, frame: Frame, how?: { feels?: boolean }): void;
   detach(vertices?: ArrayLike<number> | null): void;
   load(frame: Frame): { force: number[]; torque: number[] };
+  join(vertices: ArrayLike<number>, other: Body, how?: { onto?: ArrayLike<number> | null }): Joint;
+  addMotor(
+    vertices: ArrayLike<number>,
+    drive: {
+      axis: Vector;
+      speed?: number;
+      maxTorque?: number | null;
+      maxForce?: number | null;
+      isFixed?: boolean;
+      point?: Vector | null;
+    },
+  ): Motor;
   grab(
     hit: Pick<Hit, "triangle" | "weights" | "point">,
     spring?: { frequency?: number; maxForce?: number; target?: Vector },
@@ -147,6 +161,23 @@ export class Grab {
   readonly force: number[];
   moveTo(point: Vector): void;
   release(): void;
+}
+
+export class Joint {
+  readonly number: number;
+  readonly handle: bigint;
+  readonly force: number[];
+  release(): void;
+}
+
+export class Motor {
+  readonly number: number;
+  readonly handle: bigint;
+  readonly measuredSpeed: number;
+  readonly effort: number;
+  setSpeed(speed: number): void;
+  setLimit(limit: number): void;
+  remove(): void;
 }
 
 export class Collider {

@@ -220,6 +220,16 @@ void fill_shape(const Turn& world, const ts_shape& shape, Collider* row) {
   row->mask = shape.mask;
 }
 
+// Of a motor that turns: rad/s and a moment. Of one that pushes: length/s and a force.
+double motor_speed_in(const Turn& world, bool turns, double host) {
+  return turns ? host : world.axes().length_in(host);
+}
+
+double motor_limit_in(const Turn& world, bool turns, double host) {
+  const double once = world.axes().length_in(host);
+  return turns ? world.axes().length_in(once) : once;
+}
+
 Vertices list(const int32_t* vertices, size_t count) {
   if (count > 0) given(vertices, "vertices");
   if (count > 100000000) fail(TS_ERROR_ARGUMENT, "count is %zu: no body has so many vertices", count);
@@ -238,6 +248,17 @@ Struct* sized(Struct* given_struct, const char* name) {
 
 void require_size(size_t count, size_t needed, const char* name) {
   if (count != needed) fail(TS_ERROR_SIZE, "%s has room for %zu numbers: give room for %zu", name, count, needed);
+}
+
+Drive drive_of(const Turn& world, const ts_drive& host) {
+  Drive found{};
+  found.turns = host.turns != 0, found.is_fixed = host.is_fixed != 0, found.has_point = host.has_point != 0;
+  const double* axis = finite(host.axis, 3, "axis");
+  found.axis = found.turns ? world.axes().turn_in(axis) : world.axes().normal_in(axis);
+  if (found.has_point) found.point = place(world, host.point, "point");
+  found.speed = motor_speed_in(world, found.turns, host.speed);
+  found.limit = motor_limit_in(world, found.turns, host.limit);
+  return found;
 }
 
 double as_reach(const Turn& world, double host) {
@@ -767,6 +788,86 @@ ts_result ts_grab_get_force(ts_world world, ts_grab grab, double force[3]) {
   return guarded([&] {
     const Turn turn(world);
     turn.axes().place_out(turn->grab_force(grab), given(force, "force"));
+  });
+}
+
+ts_result ts_body_join(ts_world world, ts_body body, const int32_t* vertices, size_t count, ts_body other,
+                       const int32_t* onto, ts_joint* joint) {
+  return guarded([&] {
+    const Turn turn(world);
+    given(joint, "joint");
+    const int32_t slot = turn->slot_of(body);
+    *joint = turn->join(slot, list(vertices, count), turn->slot_of(other), onto);
+  });
+}
+
+ts_result ts_world_get_joint(ts_world world, int32_t number, ts_joint* joint) {
+  return guarded([&] {
+    const Turn turn(world);
+    *given(joint, "joint") = turn->joint_at(number);
+  });
+}
+
+ts_result ts_joint_release(ts_world world, ts_joint joint) {
+  return guarded([&] { Turn(world)->release_joint(joint); });
+}
+
+ts_result ts_joint_get_force(ts_world world, ts_joint joint, double force[3]) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn.axes().place_out(turn->joint_force(joint), given(force, "force"));
+  });
+}
+
+ts_result ts_body_add_motor(ts_world world, ts_body body, const int32_t* vertices, size_t count, const ts_drive* drive,
+                            ts_motor* motor) {
+  return guarded([&] {
+    const Turn turn(world);
+    sized(drive, "drive");
+    given(motor, "motor");
+    *motor = turn->add_motor(turn->slot_of(body), list(vertices, count), drive_of(turn, *drive));
+  });
+}
+
+ts_result ts_world_get_motor(ts_world world, int32_t number, ts_motor* motor) {
+  return guarded([&] {
+    const Turn turn(world);
+    *given(motor, "motor") = turn->motor_at(number);
+  });
+}
+
+ts_result ts_motor_set_speed(ts_world world, ts_motor motor, double speed) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn->set_motor_speed(motor, motor_speed_in(turn, turn->turns(motor), speed));
+  });
+}
+
+ts_result ts_motor_set_limit(ts_world world, ts_motor motor, double limit) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn->set_motor_limit(motor, motor_limit_in(turn, turn->turns(motor), limit));
+  });
+}
+
+ts_result ts_motor_remove(ts_world world, ts_motor motor) {
+  return guarded([&] { Turn(world)->remove_motor(motor); });
+}
+
+ts_result ts_motor_get_speed(ts_world world, ts_motor motor, double* speed) {
+  return guarded([&] {
+    const Turn turn(world);
+    given(speed, "speed");
+    *speed = turn->motor_speed(motor) * (turn->turns(motor) ? 1.0 : turn.axes().scale());
+  });
+}
+
+ts_result ts_motor_get_effort(ts_world world, ts_motor motor, double* effort) {
+  return guarded([&] {
+    const Turn turn(world);
+    given(effort, "effort");
+    const double scale = turn.axes().scale();
+    *effort = turn->motor_effort(motor) * (turn->turns(motor) ? scale * scale : scale);
   });
 }
 

@@ -14,6 +14,7 @@ constexpr double kRoundOff = 1e-9;  // of a step, as in engine_adapter/fixed_ste
 constexpr int32_t kMostThreads = 256;
 constexpr int32_t kAll = std::numeric_limits<int32_t>::max();
 
+const char* const kMotorFields[] = {"body", "first", "end", "turns", "is_fixed", "has_point"};
 const char* const kColliderFields[] = {"position", "rotation", "velocity", "spin", "lower", "upper", "speed"};
 
 }  // namespace
@@ -47,6 +48,8 @@ World::World(std::shared_ptr<Scene> scene) : scene_(std::move(scene)), machine_(
   events_ = Events(archive, size_t(scene_->slot_count));
   generations_.assign(size_t(scene_->slot_count), 1);
   grab_generations_.assign(kMostGrabs, 1);
+  joint_generations_.assign(kMostJoints, 1);
+  motor_generations_.assign(kMostMotors, 1);
   bind();
   require_image();
 }
@@ -84,12 +87,22 @@ void World::bind() {
   grab_count_ = {root, s.place("grabs.count", kMostGrabs, 1)};
   grab_particle_ = {root, s.place("grabs.particle", kMostGrabs * kPatchRows, 1)};
   grab_share_ = {root, s.place("grabs.share", kMostGrabs * kPatchRows, 1)};
+  for (size_t i = 0; i < 6; ++i) motor_wholes_[i] = {root, s.place(std::string("motors.motor.") + kMotorFields[i], kMostMotors)};
+  motor_axis_ = {root, s.place("motors.motor.axis", kMostMotors, 3)};
+  motor_point_ = {root, s.place("motors.motor.point", kMostMotors, 3)};
+  motor_speed_ = {root, s.place("motors.motor.speed", kMostMotors)};
+  motor_limit_ = {root, s.place("motors.motor.limit", kMostMotors)};
+  motor_impulse_ = {root, s.place("motors.impulse", kMostMotors)};
+  motor_particle_ = {root, s.place("motors.particle", kMotorRows)};
   if (s.patch_rows != kPatchRows) fail(TS_ERROR_FILE, "the world file is not in order: grabs. Export it again");
   if (s.has_soft_contact) {
     records_touches_ = {root, s.place("soft.records_touches", 1, 1)};
     body_surface_ = {root, s.place("soft.body_surface", bodies, 3)};
   }
   if (!s.has_contact) return;
+  joint_bodies_ = {root, s.place("joints.bodies", kMostJoints, 2)};
+  joint_span_ = {root, s.place("joints.rows", kMostJoints, 2)};
+  joint_impulse_ = {root, s.place("joints.impulse", kMostJoints, 3)};
   island_count_ = {root, s.place("contact.island_count", 1, 1)};
   const size_t rows = colliders_.rows.size();
   const Place kind = s.place("contact.collider_kind", rows, 1);

@@ -96,8 +96,11 @@ ts_body World::spawn(int32_t asset, const Vector& place, const Quaternion& turn,
 }
 
 void World::despawn(int32_t slot) {
-  if ((body_drives_(slot) & kJoined) != 0 || is_driven_(slot) != 0) {
-    fail(TS_ERROR_STATE, "the body in slot %d is joined to another or driven: it cannot be taken out", slot);
+  for (size_t j = 0; scene_->has_contact && j < kMostJoints; ++j) {
+    if (joint_bodies_(j, 0) == slot + 1 || joint_bodies_(j, 1) == slot + 1) end_joint(j);
+  }
+  for (size_t m = 0; m < kMostMotors; ++m) {
+    if (motor_wholes_[0](m) == slot + 1) end_motor(m);
   }
   for (size_t g = 0; g < kMostGrabs; ++g) {
     if (grab_body_(g) == slot + 1) end_grab(g);
