@@ -136,6 +136,7 @@ def _plain(place: Any) -> tuple[int, ...]:
 
 def _of_asset(asset: SoftBodyAsset) -> Arrays:
     elements, stiffness = elements_of(asset.description)
+    hull = asset.bound_hull
     return {
         "rest_rows": asset.rest_rows,
         "vertices": _floats(asset.mesh.vertices),
@@ -143,6 +144,8 @@ def _of_asset(asset: SoftBodyAsset) -> Arrays:
         "center": _floats(asset.center_of_mass),
         "pinned": _ints(asset.description.pinned),
         "outer": _ints(outer_vertices(asset.mesh)),
+        "hull": _ints([] if hull is None else hull.vertices).ravel(),
+        "hull_weights": _floats([] if hull is None else hull.weights).ravel(),
         "rank": _ints(asset.arrays.rank),
         "surface": _ints(asset.mesh.surface).reshape(-1, 3),
         "elements": _ints(elements),

@@ -35,8 +35,6 @@ def _of_assets(context: WorldContext) -> list[str]:
             found.append(f"asset {number} is cut or tears: leave spare_vertices out")
         if asset.coarser:
             found.append(f"asset {number} has levels of detail: take one number of cells")
-        if asset.hull is not None:
-            found.append(f"asset {number} touches by a hull: leave hull out")
     return found
 
 

@@ -24,14 +24,6 @@ def with_levels():
     return world
 
 
-def with_hull():
-    world = World()
-    hull = sphere(radius=0.3, resolution=3)
-    body = SoftBodyAsset(hull, JELLY, hull=(hull.vertices, hull.surface), contact=Contact(thickness=0.01))
-    world.add_body(body, position=(0, 0, 1))
-    return world
-
-
 def plain():
     world = World()
     world.add_body(BALL, position=(0, 0, 1))
@@ -77,7 +69,6 @@ def flat():
     [
         (cut, "asset 0 is cut or tears"),
         (with_levels, "asset 0 has levels of detail"),
-        (with_hull, "asset 0 touches by a hull"),
         (recording, "it records events"),
         (forced, "it has a force field"),
         (changed, "body 0 was given another material"),

@@ -403,6 +403,59 @@ def joined_game():
         yield line("step", DT, 0)
 
 
+def hulled():
+    """Bodies that touch colliders, and no body, by a hull; what joints hold is stepped together."""
+    world = World(sleep_speed=0.2, collider_room=3)
+    surface = sphere(radius=0.3, resolution=5)
+    coarse = sphere(radius=0.32, resolution=2)
+    ball = SoftBodyAsset(coarse, RUBBER, hull=(surface.vertices, surface.surface))
+    crate = SoftBodyAsset(box((0.4, 0.4, 0.4), (2, 2, 2)), RUBBER)
+    world.reserve(ball, 4)
+    world.reserve(crate, 2)
+    for i in range(3):
+        world.spawn(ball, position=(0.8 * i, 0.0, 0.9 + 0.2 * i), angular_velocity=(0.0, 2.0 * i, 0.0))
+    world.spawn(crate, position=(0.0, 1.0, 0.4))
+    world.add_collider(BoxShape((1.0, 1.0, 0.3)), position=(0.3, 0.0, 0.2), rotation=turn((0, 1, 0), 0.2))
+    world.build()
+    return world
+
+
+def hulled_game():
+    """Slots 0 to 3 are balls, 4 and 5 crates. Colliders: 0 a ramp, 1 the floor."""
+    still = (0.0, 0.0, 0.0)
+    for i in range(STEPS):
+        if i in (0, 200):
+            yield line("record_events", 31)
+        if i == 30:
+            yield line("spawn", 0, (0.4, 0.1, 1.5), turn((1, 0, 1), 0.7), still, (1.0, 2.0, 3.0))
+            yield line("snapshot")
+        if i == 50:
+            yield line("teleport", 4, (1.5, 0.0, 1.2), UPRIGHT, 0)
+            yield line("velocity", 4, still, still)
+        if i == 60:
+            yield line("join", 4, [0, 1, 2], 2, [5, 6, 7])
+            yield line("add_motor", 1, [0, 1, 2, 5], 1, 0, 0, (0.0, 1.0, 0.0), still, 9.0, 40.0)
+        if 100 <= i < 200:
+            yield line("move_collider", 0, (0.3, 0.0, 0.2 + 0.003 * (i - 100)), turn((0, 1, 0), 0.2))
+        if i == 220:
+            yield line("restore")
+        if i == 300:
+            yield line("join", 1, [0, 1], 4, [5, 6])
+            yield line("impulse", 0, (3.0, 0.0, 30.0), [])
+        if i == 380:
+            yield line("despawn", 1)
+        if i == 400:
+            yield line("spawn", 0, (0.0, 0.0, 1.3), UPRIGHT, still, still)
+            yield line("collider_friction", 1, 0.1)
+        yield line("step", DT, 0)
+        if i % 50 == 0:
+            yield line("collider_impulse", 0)
+            yield line("collider_impulse", 1)
+            yield line("status", 0)
+            yield line("positions", 2, 0.5)
+            yield line("drain")
+
+
 def thesis_sphere():
     """What docs/native.md measures a step of."""
     world = World(floor=0.0)
@@ -421,4 +474,5 @@ GAMES = {
     "laws": (laws, laws_game),
     "tilted": (tilted, tilted_game),
     "joined": (joined, joined_game),
+    "hulled": (hulled, hulled_game),
 }

@@ -36,6 +36,8 @@ struct Asset {
   Archive::View<double> element_stiffness;
   size_t element_width;
   Archive::View<int32_t> tets;
+  Archive::View<int32_t> hull;  // four vertices of each point of its hull; none where it touches by its surface
+  Archive::View<double> hull_weights;
   double thickness, friction, wave_speed;
   int32_t slot_count;
   size_t vertex_count() const { return masses.count; }

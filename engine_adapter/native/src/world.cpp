@@ -287,16 +287,22 @@ void World::wake_near(const Box& box) {
   is_still_ = false;
 }
 
+// Round a body and what it touches others by.
 Box World::box_of(int32_t slot) const {
   const Asset& asset = asset_of(slot);
+  std::vector<Vector> points(asset.vertex_count());
+  for (size_t v = 0; v < points.size(); ++v) points[v] = vertex_place(slot, int32_t(v));
+  if (asset.hull.count > 0) {
+    const std::vector<Vector> hull = touching_points(asset, points);
+    points.insert(points.end(), hull.begin(), hull.end());
+  }
   Box box;
   for (int k = 0; k < 3; ++k) {
     box.lower[k] = std::numeric_limits<double>::infinity();
     box.upper[k] = -box.lower[k];
-    for (size_t v = 0; v < asset.vertex_count(); ++v) {
-      const double x = position_(particle(slot, v), k);
-      box.lower[k] = std::min(box.lower[k], x);
-      box.upper[k] = std::max(box.upper[k], x);
+    for (const Vector& each : points) {
+      box.lower[k] = std::min(box.lower[k], each[k]);
+      box.upper[k] = std::max(box.upper[k], each[k]);
     }
     box.lower[k] = box.lower[k] - asset.thickness;
     box.upper[k] = box.upper[k] + asset.thickness;

@@ -220,6 +220,7 @@ class World {
   void let_go(int32_t slot, const std::vector<int32_t>& vertices);
   size_t grab_of(ts_grab grab) const;  // its number
   void end_grab(size_t number);
+  std::vector<Vector> touching_points(const Asset& asset, const std::vector<Vector>& x) const;
   Vector vertex_place(int32_t slot, int32_t vertex) const;
   std::vector<Holder> holders_at(int32_t slot, const std::vector<int32_t>& vertices, int32_t other) const;
   std::vector<Holder> holders_on(int32_t other, const std::vector<int32_t>& partners) const;

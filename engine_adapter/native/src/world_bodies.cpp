@@ -27,6 +27,22 @@ int32_t World::slot_of(ts_body body) const {
   return static_cast<int32_t>(slot);
 }
 
+// By what a body touches colliders, its vertices being at `x`.
+std::vector<Vector> World::touching_points(const Asset& asset, const std::vector<Vector>& x) const {
+  std::vector<Vector> found;
+  if (asset.hull.count == 0) {
+    for (int32_t v : asset.outer) found.push_back(x[size_t(v)]);
+  }
+  for (size_t h = 0; h < asset.hull.count; h += 4) {
+    Vector point = {0.0, 0.0, 0.0};
+    for (size_t i = h; i < h + 4; ++i) {
+      for (size_t k = 0; k < 3; ++k) point[k] += asset.hull_weights[i] * x[size_t(asset.hull[i])][k];
+    }
+    found.push_back(point);
+  }
+  return found;
+}
+
 std::vector<float> World::place_rows(const Asset& asset, const Vector& place, const Quaternion& turn,
                                      const Vector& drift, const Vector& spin) const {
   const Matrix rows = matrix_of(turn);
@@ -48,7 +64,7 @@ std::vector<float> World::place_rows(const Asset& asset, const Vector& place, co
     fail(TS_ERROR_ARGUMENT, "position puts the body beyond %g m: stay nearer the origin", scene_->position_limit);
   }
   double lowest = std::numeric_limits<double>::infinity();
-  for (int32_t v : asset.outer) lowest = std::min(lowest, x[v][2]);
+  for (const Vector& each : touching_points(asset, x)) lowest = std::min(lowest, each[2]);
   if (scene_->has_floor && lowest < scene_->floor - 1e-3 * (highest - lowest)) {
     fail(TS_ERROR_ARGUMENT, "the body would begin %.4g m below the floor: raise it", scene_->floor - lowest);
   }
