@@ -71,9 +71,7 @@ def export_world(
     if not world.is_built:
         raise StateError("the world is not built: call world.build() before it is exported")
     context = context_of_world(world)
-    require_native(context)
-    if force_field_of(world) is not None:
-        raise OptionError("the native library does not run this world: it has a force field, in Python")
+    require_native(context, has_force_field=force_field_of(world) is not None)
     if path.exists() and not (path / WORLD).is_file():
         raise OptionError(f"{path} is there and no world file: give another --out")
     try:

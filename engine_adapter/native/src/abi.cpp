@@ -206,6 +206,12 @@ void fill_shape(const Turn& world, const ts_shape& shape, Collider* row) {
       half = {radius, radius, along + radius};
       break;
     }
+    case kHeightField:
+    case kMeshShape:
+      fail(TS_ERROR_ARGUMENT,
+           "kind is %d: height fields and meshes have a grid of distances, which Python makes before the export. Export "
+           "the world with them, and move them here",
+           shape.kind);
     default:
       fail(TS_ERROR_ARGUMENT, "kind is %d: give TS_PLANE to TS_CAPSULE", shape.kind);
   }

@@ -299,7 +299,8 @@ bool World::are_rows_in_order(const char* at, const SnapshotHead& head) const {
     Collider row;
     take(&at, &row, 1);
     // Those with a grid were there when the world was exported.
-    const bool is_known = row.kind >= 0 && (row.kind <= 3 || (i < s.names(TS_COLLIDER).size() && row.kind <= 5));
+    const bool is_known = row.kind >= 0 && (row.kind <= TS_CAPSULE ||
+                                            (i < s.names(TS_COLLIDER).size() && row.kind <= kMeshShape));
     if (!is_known || !is_place(row.pose) || (row.has_target && !is_place(row.target)) ||
         !std::isfinite(length_of(row.velocity)) || !std::isfinite(length_of(row.spin))) {
       return false;
