@@ -88,7 +88,7 @@ REFUSED = {
     "empty list": "Argument: no vertex is named: give null for all",
     "targets": "Size: targets has 3 numbers: give 6",
     "not pinned": "State: vertex 0 is not pinned: call ts_body_pin first",
-    "snapshot": "Snapshot: these bytes are no snapshot",
+    "snapshot": "Snapshot: 100 bytes are no snapshot",
     "room for a snapshot": r"Size: buffer has 3 bytes: give \d+",
     "body of no world": "Handle: this body is of no world",
     "kinds": "Argument: ",

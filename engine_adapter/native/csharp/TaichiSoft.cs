@@ -1275,6 +1275,12 @@ namespace TaichiSoft
             Id = id;
         }
 
+        /// <summary>Whether there was one of its number.</summary>
+        public bool IsThere
+        {
+            get { return Id != 0; }
+        }
+
         /// <summary>Where it is.</summary>
         public World World
         {
@@ -1312,6 +1318,12 @@ namespace TaichiSoft
         {
             this.world = world;
             Id = id;
+        }
+
+        /// <summary>Whether there was one of its number.</summary>
+        public bool IsThere
+        {
+            get { return Id != 0; }
         }
 
         /// <summary>Where it is.</summary>
