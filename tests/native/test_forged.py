@@ -155,7 +155,7 @@ def test_the_library_knows_the_numbers_of_status_drives_aims_and_grabs():
     assert names.index("kAbsent") == status.ABSENT
     drives = dict(re.findall(r"(k\w+) = (\d+)", re.search(r"enum Drives {(.*?)}", source).group(1)))
     wanted = {"kMovesPins": "MOVES_PINS", "kDamped": "DAMPED", "kSheltered": "SHELTERED"}
-    wanted |= {"kGrabbed": "GRABBED", "kJoined": "JOINED", "kFeelsReaction": "FEELS_REACTION"}
+    wanted |= {"kGrabbed": "GRABBED", "kFeelsReaction": "FEELS_REACTION"}
     assert {name: int(bit) for name, bit in drives.items()} == {
         a: getattr(status, b) for a, b in wanted.items()
     }

@@ -171,7 +171,7 @@ TS_API ts_result ts_world_radial_impulse(ts_world world, const double center[3],
 /* A number that tells states apart: that of Python's world in the same state. */
 TS_API ts_result ts_world_hash(ts_world world, uint64_t* hash);
 /* The state between two steps. With a null buffer only the size [bytes] is given, which changes with the events that are
- * recorded, with frames and with colliders. What the picture is ahead of the last step, and what was dropped, is not in
+ * recorded, with frames, colliders, joints and motors. What the picture is ahead of the last step, and what was dropped, is not in
  * it. */
 TS_API ts_result ts_world_snapshot(ts_world world, void* buffer, size_t capacity, size_t* size);
 TS_API ts_result ts_world_restore(ts_world world, const void* bytes, size_t size);

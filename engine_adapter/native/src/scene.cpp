@@ -197,7 +197,8 @@ void Scene::read_assets() {
     if (asset.rest_rows.count != 8 * n || asset.vertices.count != 3 * n || asset.rank.count != n || center.count != 3 ||
         skin.count != 1 || friction.count != 1 || wave_speed.count != 1 ||
         asset.tets.count % 4 != 0 || !are_below(asset.tets, n) || asset.hull.count % 4 != 0 ||
-        !are_below(asset.hull, n) || asset.hull_weights.count != asset.hull.count || !are_places(asset.vertices) || asset.elements.sizes.size() != 2 ||
+        !are_below(asset.hull, n) || asset.hull_weights.count != asset.hull.count ||
+        !are_places(asset.vertices) || asset.elements.sizes.size() != 2 ||
         !are_below(asset.elements, n) || !are_below(asset.pinned, n) || !are_below(asset.outer, n) ||
         !are_below(asset.rank, n) || !are_below(asset.surface, n)) {
       out_of_order("an asset");

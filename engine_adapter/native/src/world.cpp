@@ -28,8 +28,8 @@ World::World(std::shared_ptr<Scene> scene) : scene_(std::move(scene)), machine_(
   const size_t frames = poses.count / 24, named = scene_->names(TS_FRAME).size();
   const auto alive = archive.get<int32_t>("frames/alive");
   const auto feels = archive.get<unsigned char>("frames/feels");
-  if (clock.count != 2 || steps.count != 1 || surroundings.count != 4 || poses.count != 24 * frames || frames == 0 || named > frames ||
-      alive.count != named || feels.count != size_t(scene_->particle_count)) {
+  if (clock.count != 2 || steps.count != 1 || surroundings.count != 4 || poses.count != 24 * frames || frames == 0 ||
+      named > frames || alive.count != named || feels.count != size_t(scene_->particle_count)) {
     fail(TS_ERROR_FILE, "the world file is not in order: clock, surroundings or frames. Export it again");
   }
   steps_ = steps[0], time_ = clock[0], last_dt_ = clock[1];
@@ -87,7 +87,9 @@ void World::bind() {
   grab_count_ = {root, s.place("grabs.count", kMostGrabs, 1)};
   grab_particle_ = {root, s.place("grabs.particle", kMostGrabs * kPatchRows, 1)};
   grab_share_ = {root, s.place("grabs.share", kMostGrabs * kPatchRows, 1)};
-  for (size_t i = 0; i < 6; ++i) motor_wholes_[i] = {root, s.place(std::string("motors.motor.") + kMotorFields[i], kMostMotors)};
+  for (size_t i = 0; i < 6; ++i) {
+    motor_wholes_[i] = {root, s.place(std::string("motors.motor.") + kMotorFields[i], kMostMotors)};
+  }
   motor_axis_ = {root, s.place("motors.motor.axis", kMostMotors, 3)};
   motor_point_ = {root, s.place("motors.motor.point", kMostMotors, 3)};
   motor_speed_ = {root, s.place("motors.motor.speed", kMostMotors)};

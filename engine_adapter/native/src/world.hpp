@@ -15,7 +15,7 @@ namespace taichi_soft {
 
 // As taichi_soft/bodies/status.py has them.
 enum Status { kActive, kFrozen, kAsleep, kSkipping, kAbsent };
-enum Drives { kMovesPins = 1, kFeelsReaction = 2, kDamped = 8, kSheltered = 16, kGrabbed = 32, kJoined = 64 };
+enum Drives { kMovesPins = 1, kFeelsReaction = 2, kDamped = 8, kSheltered = 16, kGrabbed = 32 };
 enum Aims { kStill = 0, kWithFrame = 3 };  // as taichi_soft/control/kernels/pins.py has them
 
 // As taichi_soft/control/kernels/grabs.py has them; fields of other sizes are refused.

@@ -100,7 +100,8 @@ size_t size_of_fields(const SnapshotHead& head, const std::vector<Carried>& carr
 // Of all behind the fields.
 size_t size_of_rest(const SnapshotHead& head, size_t slots, size_t particles) {
   return kFrameSize * head.frames + particles + sizeof(uint32_t) * (slots + kMostGrabs + kMostJoints + kMostMotors) +
-         sizeof(double) * slots + sizeof(Collider) * head.colliders + sizeof(int32_t) * (slots + 2) + sizeof(ts_body) * slots +
+         sizeof(double) * slots + sizeof(Collider) * head.colliders + sizeof(int32_t) * (slots + 2) +
+         sizeof(ts_body) * slots +
          sizeof(Contact) * head.contacts;
 }
 
