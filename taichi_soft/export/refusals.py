@@ -33,8 +33,8 @@ LEVELS = (
     "ts_world_spawn"
 )
 MATERIAL = (
-    "was given another material, and the library takes the constants of a body from its asset: make its asset "
-    "of that material"
+    "was given another material, and the library takes the constants of a body from its asset: make its "
+    "asset of that material"
 )
 SKIPS = (
     "skips the coming step, and Python alone chooses who skips steps: make a step with World.step before the "

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from taichi_soft import Contact, Event, Material, OptionError, SoftBodyAsset, StateError, World, box, sphere
+from taichi_soft import Event, Material, OptionError, SoftBodyAsset, StateError, World, box, sphere
 from taichi_soft.export import AXES, export_world
 from taichi_soft.export.archive import written
 
