@@ -13,7 +13,7 @@ export class SoftError extends Error {
   code: "ARGUMENT" | "HANDLE" | "BUSY" | "FILE" | "VERSION" | "SIZE" | "STATE" | "SNAPSHOT" | "RUNTIME";
 }
 
-export type Kind = "body" | "asset" | "collider" | "frame" | "mesh";
+export type Kind = "body" | "asset" | "collider" | "frame" | "mesh" | "joint" | "motor";
 
 export class Scene {
   readonly counts: Record<Kind, number>;
@@ -76,6 +76,8 @@ export class World {
   advance(seconds: number): Clock;
   stableSubsteps(dt: number): number;
   wake(): void;
+  setGravity(gravity: Vector): void;
+  setFriction(friction: number): void;
   setWind(velocity: Vector, air?: { density?: number; drag?: number }): void;
   radialImpulse(center: Vector, impulse: number, radius: number): void;
   hash(): string;
@@ -98,6 +100,8 @@ export class World {
   frame(name: string | number): Frame;
   addFrame(pose?: Pose): Frame;
   grab(number: number): Grab | null;
+  joint(name: string | number): Joint | null;
+  motor(name: string | number): Motor | null;
 }
 
 export class Body {
@@ -115,6 +119,7 @@ export class Body {
   applyForce(force: Vector, vertices?: ArrayLike<number> | null): void;
   impulseAt(impulse: Vector, point: Vector, radius: number): void;
   setGravityScale(scale: number): void;
+  setFriction(friction: number): void;
   setDamping(rate: number): void;
   setSheltered(isSheltered: boolean): void;
   pin(vertices: ArrayLike<number>): void;
@@ -123,6 +128,18 @@ export class Body {
   attach(vertices: ArrayLike<number> | null, frame: Frame, how?: { feels?: boolean }): void;
   detach(vertices?: ArrayLike<number> | null): void;
   load(frame: Frame): { force: number[]; torque: number[] };
+  join(vertices: ArrayLike<number>, other: Body, how?: { onto?: ArrayLike<number> | null }): Joint;
+  addMotor(
+    vertices: ArrayLike<number>,
+    drive: {
+      axis: Vector;
+      speed?: number;
+      maxTorque?: number | null;
+      maxForce?: number | null;
+      isFixed?: boolean;
+      point?: Vector | null;
+    },
+  ): Motor;
   grab(
     hit: Pick<Hit, "triangle" | "weights" | "point">,
     spring?: { frequency?: number; maxForce?: number; target?: Vector },
@@ -147,12 +164,30 @@ export class Grab {
   release(): void;
 }
 
+export class Joint {
+  readonly number: number;
+  readonly handle: bigint;
+  readonly force: number[];
+  release(): void;
+}
+
+export class Motor {
+  readonly number: number;
+  readonly handle: bigint;
+  readonly measuredSpeed: number;
+  readonly effort: number;
+  setSpeed(speed: number): void;
+  setLimit(limit: number): void;
+  remove(): void;
+}
+
 export class Collider {
   readonly number: number;
   readonly pose: { position: number[]; rotation: number[] };
   readonly impulse: { impulse: number[]; moment: number[] };
   moveTo(pose: Pose): void;
   setVelocity(linear: Vector, spin?: Vector): void;
+  setFriction(friction: number): void;
   teleport(pose: Pose): void;
   remove(): void;
 }

@@ -11,7 +11,7 @@
 
 const CODES = ["OK", "ARGUMENT", "HANDLE", "BUSY", "FILE", "VERSION", "SIZE", "STATE", "SNAPSHOT", "RUNTIME"];
 const STATUS = ["active", "frozen", "asleep"];
-const KINDS = { body: 0, asset: 1, collider: 2, frame: 3, mesh: 4 };
+const KINDS = { body: 0, asset: 1, collider: 2, frame: 3, mesh: 4, joint: 5, motor: 6 };
 const SHAPES = ["plane", "sphere", "box", "capsule"];
 const UPRIGHT = [0, 0, 0, 1];
 
@@ -282,6 +282,16 @@ export class World {
     this.#call("ts_world_wake");
   }
 
+  /** Gravity [m/s^2], from the next step on. Who sleeps wakes. */
+  setGravity(gravity) {
+    this.#call("ts_world_set_gravity", this.native.doubles(this.native.small, gravity));
+  }
+
+  /** Coulomb's coefficient of the floor, from the next step on. */
+  setFriction(friction) {
+    this.#call("ts_world_set_friction", friction);
+  }
+
   /** Air that moves [m/s], of a density [kg/m^3]. */
   setWind(velocity, { density = 1.2, drag = 1 } = {}) {
     this.#call("ts_world_set_wind", this.native.doubles(this.native.small, velocity), density, drag);
@@ -486,6 +496,20 @@ export class World {
     return handle === 0n ? null : new Grab(this, handle);
   }
 
+  /** The joint of a name or number, 0 to 63; null for none. */
+  joint(name) {
+    this.#call("ts_world_get_joint", this.scene.find("joint", name), this.native.small);
+    const handle = this.native.handle(this.native.small);
+    return handle === 0n ? null : new Joint(this, handle);
+  }
+
+  /** The motor of a name or number, 0 to 63; null for none. */
+  motor(name) {
+    this.#call("ts_world_get_motor", this.scene.find("motor", name), this.native.small);
+    const handle = this.native.handle(this.native.small);
+    return handle === 0n ? null : new Motor(this, handle);
+  }
+
   keep(mesh) {
     this.#meshes.add(mesh);
     return mesh;
@@ -584,6 +608,11 @@ export class Body {
     this.#call("ts_body_set_gravity_scale", scale);
   }
 
+  /** Coulomb's coefficient against other bodies, in worlds with soft contact. */
+  setFriction(friction) {
+    this.#call("ts_body_set_friction", friction);
+  }
+
   setDamping(rate) {
     this.#call("ts_body_set_damping", rate);
   }
@@ -622,6 +651,35 @@ export class Body {
   load(frame) {
     this.#call("ts_body_get_load", frame.number, this.#small, this.#small + 24);
     return { force: this.world.native.read(this.#small, 3), torque: this.world.native.read(this.#small + 24, 3) };
+  }
+
+  /** Let vertices be held by another body: where they are in it, or each at a vertex of it, `onto`. */
+  join(vertices, other, { onto = null } = {}) {
+    const { native } = this.world;
+    if (onto && onto.length !== vertices.length) throw new SoftError(-6, "onto names a vertex for each of vertices");
+    native.lendingInts(vertices, (list, count) =>
+      native.lendingInts(onto, (partners) =>
+        this.#call("ts_body_join", list, count, other.handle, onto ? partners : 0, this.#small),
+      ),
+    );
+    return new Joint(this.world, native.handle(this.#small));
+  }
+
+  /**
+   * Turn vertices about an axis with up to `maxTorque` [N m], or push them along it with up to `maxForce` [N], towards a
+   * speed [rad/s] or [m/s]. The axis turns with them, or is fixed in space, where it may go through a point.
+   */
+  addMotor(vertices, { axis, speed = 0, maxTorque = null, maxForce = null, isFixed = false, point = null }) {
+    const { native } = this.world;
+    if ((maxTorque === null) === (maxForce === null)) throw new SoftError(-1, "give one of maxTorque and maxForce");
+    native.lendingInts(vertices, (list, count) => {
+      const { view } = native;
+      view.setUint32(this.#small, 80, true);
+      [maxTorque !== null, isFixed, point !== null].forEach((is, i) => view.setInt32(this.#small + 4 + 4 * i, Number(is), true));
+      native.doubles(this.#small + 16, [...axis, ...(point ?? [0, 0, 0]), speed, maxTorque ?? maxForce]);
+      this.#call("ts_body_add_motor", list, count, this.#small, this.#small + 128);
+    });
+    return new Motor(this.world, native.handle(this.#small + 128));
   }
 
   /** Take hold of what a ray has hit. */
@@ -704,6 +762,62 @@ export class Grab {
   }
 }
 
+// What has a handle, with its number.
+class Numbered {
+  constructor(world, handle) {
+    this.world = world;
+    this.handle = handle;
+    this.number = Number(handle & 0xffffffffn) - 1;
+  }
+
+  call(name, ...args) {
+    this.world.native.call(name, this.world.handle, this.handle, ...args);
+  }
+
+  readNumbers(name, count) {
+    this.call(name, this.world.native.small);
+    return this.world.native.read(this.world.native.small, count);
+  }
+}
+
+/** What holds a part of a body to another one. */
+export class Joint extends Numbered {
+  /** With what the other body pulls, mean over the last step [N]. */
+  get force() {
+    return this.readNumbers("ts_joint_get_force", 3);
+  }
+
+  release() {
+    this.call("ts_joint_release");
+  }
+}
+
+/** What turns a part of a body, or pushes it. */
+export class Motor extends Numbered {
+  /** That its vertices have [rad/s] or [m/s]. */
+  get measuredSpeed() {
+    return this.readNumbers("ts_motor_get_speed", 1)[0];
+  }
+
+  /** Torque [N m] or force [N] that it gave, mean over the last step. */
+  get effort() {
+    return this.readNumbers("ts_motor_get_effort", 1)[0];
+  }
+
+  setSpeed(speed) {
+    this.call("ts_motor_set_speed", speed);
+  }
+
+  /** Of torque or force; with 0 its vertices coast. */
+  setLimit(limit) {
+    this.call("ts_motor_set_limit", limit);
+  }
+
+  remove() {
+    this.call("ts_motor_remove");
+  }
+}
+
 // What has a number and a pose.
 class Placed {
   constructor(world, number, prefix) {
@@ -741,6 +855,11 @@ export class Collider extends Placed {
   setVelocity(linear, spin = [0, 0, 0]) {
     const at = this.world.native.doubles(this.world.native.small, [...linear, ...spin]);
     this.call("set_velocity", at, at + 24);
+  }
+
+  /** Coulomb's coefficient, from the next step on. */
+  setFriction(friction) {
+    this.call("set_friction", friction);
   }
 
   teleport({ position, rotation = UPRIGHT }) {

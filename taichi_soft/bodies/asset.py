@@ -373,7 +373,7 @@ class SoftBodyAsset:
         hull = self.bound_hull
         if hull is None:
             return x[outer_vertices(self.mesh)]
-        return np.asarray(np.einsum("hc,hcx->hx", hull.weights, x[hull.vertices]))
+        return np.asarray((hull.weights[:, :, None] * x[hull.vertices]).sum(axis=1))  # corner by corner
 
     @cached_property
     def stable_step(self) -> StableStep:

@@ -37,7 +37,7 @@ def export(
     """Write a world with its kernels, which a C library steps in an engine without Python.
 
     A script need not know of it: its world is taken as it leaves it, and built if it is not. Bodies, assets,
-    colliders and frames are called as the script's variables are.
+    colliders, frames, joints and motors are called as the script's variables are.
     """
     init("cpu")
     world, names = _found_in(scene)
@@ -82,7 +82,7 @@ def _found_in(scene: str) -> tuple[Any, dict[Any, str]]:
 
 def _names_in(made: Mapping[str, Any]) -> dict[Any, str]:
     """Names of what a world has, by the variables that hold it; of what is in a list, with its place."""
-    from taichi_soft import Body, Collider, Frame, SoftBodyAsset
+    from taichi_soft import Body, Collider, Frame, Joint, Motor, SoftBodyAsset
 
     found: dict[Any, str] = {}
     for name, value in made.items():
@@ -91,6 +91,6 @@ def _names_in(made: Mapping[str, Any]) -> dict[Any, str]:
         several = list(enumerate(value)) if isinstance(value, (list, tuple)) else []
         several = list(value.items()) if isinstance(value, dict) else several
         for text, each in [(name, value), *((f"{name}[{key}]", each) for key, each in several)]:
-            if isinstance(each, (Body, Collider, Frame, SoftBodyAsset)):
+            if isinstance(each, (Body, Collider, Frame, Joint, Motor, SoftBodyAsset)):
                 found.setdefault(each, text)
     return found

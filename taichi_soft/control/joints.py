@@ -17,7 +17,7 @@ from taichi_soft.bodies.soft_body import (
     record_of,
     require_alive,
 )
-from taichi_soft.control.change import change, named_particles, rows_of
+from taichi_soft.control.change import change, mass_of, named_particles, rows_of, some_particles
 from taichi_soft.control.embedding import Places, places_at, places_on
 from taichi_soft.control.grab_patch import wave_speed
 from taichi_soft.control.kernels.joints import (
@@ -250,8 +250,11 @@ def _find_places(
 def _draw_speed(body: SoftBody, other: SoftBody, vertices: NDArray[np.int32], places: Places) -> float:
     """[m/s] at which a gap between the two may close."""
     holders = np.unique(places.vertices[places.weights != 0.0])
-    slowest = min(
-        wave_speed(record_of(each).description) * np.sqrt(each.masses[held].sum() / each.masses.sum())
-        for each, held in ((body, vertices), (other, holders))
-    )
-    return DRAW * float(slowest)
+    slowest = min(_follow_speed(body, vertices), _follow_speed(other, holders))
+    return DRAW * slowest
+
+
+def _follow_speed(body: SoftBody, held: NDArray[np.int32]) -> float:
+    """[m/s] at which what is held of a body may follow."""
+    share = mass_of(body, held) / mass_of(body, some_particles(body, None))
+    return wave_speed(record_of(body).description) * float(np.sqrt(share))

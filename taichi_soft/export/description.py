@@ -14,10 +14,14 @@ from taichi_soft.contact.collider import FASTEST_SPIN, ColliderRow, row_of
 from taichi_soft.contact.shapes.shape import SEAM
 from taichi_soft.control.drives import LARGEST_PUSH
 from taichi_soft.control.frames import Frames
-from taichi_soft.control.grab_patch import FARTHEST_PULL, PATCH_SIZE, elements_of
+from taichi_soft.control.grab_patch import FARTHEST_PULL, PATCH_SIZE, elements_of, wave_speed
 from taichi_soft.control.grabs import HIGHEST_SPEED, WEIGHTS, Grabs
 from taichi_soft.control.impulses import LARGEST_IMPULSE
+from taichi_soft.control.joints import Joints
 from taichi_soft.control.kernels.grabs import PATCH_ROWS
+from taichi_soft.control.kernels.joints import ENDS
+from taichi_soft.control.kernels.motors import MOST_MOTORS
+from taichi_soft.control.motors import Motors
 from taichi_soft.core.checks import LONGEST_STEP, SHORTEST_STEP
 from taichi_soft.core.constants import GRAVITY_EARTH, POSITION_LIMIT, VELOCITY_LIMIT
 from taichi_soft.events.contacts import CONTACT_PAUSE
@@ -31,6 +35,9 @@ from taichi_soft.persistence.snapshot import carried_rows, steering
 from taichi_soft.solver.context import WorldContext
 
 Arrays = dict[str, NDArray[Any]]
+
+_ALWAYS, _OF_JOINTS, _OF_MOTORS = range(3)
+"""Whose rows a carried field has: all of them, or those that joints or motors hold. As `scene.hpp` has it."""
 
 
 def description_of(
@@ -54,9 +61,10 @@ def description_of(
 
 
 def _of_world(context: WorldContext) -> Arrays:
-    settings, built = context.settings, context.built
+    settings, built, floor = context.settings, context.built, context.floor_collider
     share, longest = context.substeps.rule
     kinds, room = list(context.slots.kinds), built.state.capacity.contact
+    slots = list(zip(context.slots.assets, context.slots.slots, strict=True))
     return {
         "world/flags": _ints(
             [built.program.has_contact, built.sleeps, room.soft, built.state.capacity.implicit]
@@ -70,6 +78,8 @@ def _of_world(context: WorldContext) -> Arrays:
             ]
         ),
         "world/floor": _floats([] if settings.floor is None else [settings.floor]),
+        "world/surroundings": _floats([*settings.gravity, settings.friction]),
+        "world/floor_collider": _ints([-1 if floor is None or not floor.is_alive else floor.index]),
         "world/steps": np.array([context.clock.steps], dtype=np.int64),
         "world/clock": _floats([context.clock.time, context.clock.last_dt]),
         "events/limits": _floats([CONTACT_PAUSE, MOST_EVENTS, touch_rows(room, len(context.slots.slots))]),
@@ -77,6 +87,9 @@ def _of_world(context: WorldContext) -> Arrays:
             [PATCH_SIZE, FARTHEST_PULL, WEIGHTS * GRAVITY_EARTH, HIGHEST_SPEED, PATCH_ROWS]
         ),
         "slots/asset": _ints([kinds.index(asset) for asset in context.slots.assets]),
+        "slots/friction": _floats(
+            [asset.contact.friction if body is None else body.friction for asset, body in slots]
+        ),
         "slots/begin": _ints([each.particles[0] for each in context.layout.ranges]),
     }
 
@@ -85,21 +98,29 @@ def _of_fields(context: WorldContext) -> Arrays:
     state = context.built.state
     places = places_of(state)
     rows = carried_rows(context)
-    # By what no call of the library changes kernels find their way; what moves bodies must be finite.
     slices = [name for name, groups in state.carried.items() for _ in groups]
-    fixed = [False] * len(OWNERS) + [name not in ("colliders", Grabs.name) for name in slices]
-    grabs = state.grabs
+    grabs, motors = state.grabs, state.motors
+    # What moves bodies must be finite.
     moving = [state.particle_position, state.particle_velocity, *(field for _, field in steering(state))]
     moving += [grabs.weights, grabs.target, grabs.spring, grabs.limits, grabs.share]
-    # Of grabs all rows: the game takes hold of more.
-    begin = len(OWNERS) + slices.index(Grabs.name)
-    for owner in range(begin, begin + slices.count(Grabs.name)):
-        rows[owner] = int(np.prod(carried(state, owner)[0][0].shape))
+    # Of grabs and motors all rows: the game makes more. Of joints and motors so many particles as they hold.
+    whose = [_ALWAYS] * len(rows)
+    for owner, name in enumerate(slices, start=len(OWNERS)):
+        if name in (Grabs.name, Motors.name):
+            rows[owner] = int(np.prod(carried(state, owner)[0][0].shape))
+    if Joints.name in slices:
+        begin = len(OWNERS) + slices.index(Joints.name)
+        rows[begin + 1 : begin + 3] = [1, ENDS]
+        whose[begin + 1 : begin + 3] = [_OF_JOINTS, _OF_JOINTS]
+        moving += [state.joints.draw_speed, state.joints.weight]
     kept = [
-        (place_of(field), rows[owner], fixed[owner], any(field is each for each in moving))
+        (place_of(field), rows[owner], whose[owner], any(field is each for each in moving))
         for owner in owners(state)
         for field, _, _ in carried(state, owner)
     ]
+    of_motors = [motors.motor.get_member_field(key) for key in motors.motor.keys]
+    kept += [(place_of(field), MOST_MOTORS, _ALWAYS, True) for field in of_motors]
+    kept += [(place_of(motors.particle), 1, _OF_MOTORS, False)]
     return {
         "fields/names": words(list(places)),
         "fields/places": np.array([_plain(each) for each in places.values()], dtype=np.int64),
@@ -115,6 +136,7 @@ def _plain(place: Any) -> tuple[int, ...]:
 
 def _of_asset(asset: SoftBodyAsset) -> Arrays:
     elements, stiffness = elements_of(asset.description)
+    hull = asset.bound_hull
     return {
         "rest_rows": asset.rest_rows,
         "vertices": _floats(asset.mesh.vertices),
@@ -122,11 +144,16 @@ def _of_asset(asset: SoftBodyAsset) -> Arrays:
         "center": _floats(asset.center_of_mass),
         "pinned": _ints(asset.description.pinned),
         "outer": _ints(outer_vertices(asset.mesh)),
+        "hull": _ints([] if hull is None else hull.vertices).ravel(),
+        "hull_weights": _floats([] if hull is None else hull.weights).ravel(),
         "rank": _ints(asset.arrays.rank),
         "surface": _ints(asset.mesh.surface).reshape(-1, 3),
         "elements": _ints(elements),
         "element_stiffness": _floats(stiffness),
+        "tets": _ints(asset.mesh.tets if elements.shape[1] == 2 else []).ravel(),
+        "wave_speed": _floats([wave_speed(asset.description)]),
         "thickness": _floats([asset.surface_row[1]]),
+        "friction": _floats([asset.contact.friction]),
     }
 
 

@@ -12,6 +12,8 @@ import numpy as np
 
 from taichi_soft.bodies.fields import made_fields
 from taichi_soft.control.frames import Frames
+from taichi_soft.control.joints import Joints
+from taichi_soft.control.motors import Motors
 from taichi_soft.core.errors import OptionError, StateError
 from taichi_soft.core.extras import require_extra
 from taichi_soft.core.part_folder import PartFolder
@@ -38,7 +40,7 @@ class ExportReport:
     path: Path  # of the folder
     size: int  # of all files [bytes]
     kernels: int  # number of them
-    names: dict[str, list[str]]  # of bodies, assets, colliders, frames and meshes
+    names: dict[str, list[str]]  # of bodies, assets, colliders, frames, joints, motors, meshes
 
 
 def export_world(
@@ -56,8 +58,8 @@ def export_world(
     Args:
         path: of the folder, which must not be there yet, or be an earlier one.
         axes: of the engine, see `AXES`.
-        names: of bodies, assets, colliders and frames, by which the game finds them; others get one with
-            their number, such as body3.
+        names: of bodies, assets, colliders, frames, joints and motors, by which the game finds them; others
+            get one with their number, such as body3.
         platforms: some of `PLATFORMS`, that the world is to run on; by default the one of this machine.
         static: write objects that the game is linked with, where it may open no code: see
             `ts_scene_load_linked`.
@@ -70,9 +72,7 @@ def export_world(
     if not world.is_built:
         raise StateError("the world is not built: call world.build() before it is exported")
     context = context_of_world(world)
-    require_native(context)
-    if force_field_of(world) is not None:
-        raise OptionError("the native library does not run this world: it has a force field, in Python")
+    require_native(context, has_force_field=force_field_of(world) is not None)
     if path.exists() and not (path / WORLD).is_file():
         raise OptionError(f"{path} is there and no world file: give another --out")
     try:
@@ -117,6 +117,9 @@ def _written(
             for i, each in enumerate(context.of(Frames).rows)
         ],
     }
+    for kind, handles in (("joint", context.of(Joints).by_number), ("motor", context.of(Motors).by_number)):
+        numbers = range(max(handles, default=-1) + 1)
+        names[kind] = [given.get(handles.get(i), f"{kind}{i}") for i in numbers]
     meshes = [mesh for i, asset in enumerate(assets) for mesh in meshes_of(i, asset, names["asset"][i])]
     names["mesh"] = [mesh.name for mesh in meshes]
     names = {kind: _told_apart(each) for kind, each in names.items()}

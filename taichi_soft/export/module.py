@@ -11,6 +11,8 @@ from taichi_soft.contact.kernels.collider_rows import forget_collider, sum_colli
 from taichi_soft.contact.kernels.touches import read_touches
 from taichi_soft.control.kernels.drives import add_push
 from taichi_soft.control.kernels.impulses import add_impulse_near, add_radial_impulse, add_velocity
+from taichi_soft.control.kernels.joints import end_joint, forget_held, write_joint
+from taichi_soft.control.kernels.motors import read_speed
 from taichi_soft.control.kernels.pins import aim_pinned, free_particles, pin_particles, write_targets
 from taichi_soft.control.kernels.rigid_motion import jump, write_rigid_velocity
 from taichi_soft.core.runtime import ti
@@ -18,6 +20,7 @@ from taichi_soft.export.kernels.root import read_root
 from taichi_soft.export.meshes import ExportedMesh
 from taichi_soft.queries.kernels import find_closest, find_hits, find_overlaps
 from taichi_soft.solver.context import WorldContext
+from taichi_soft.solver.kernels.islands import list_joined_islands
 from taichi_soft.solver.kernels.sleep import wake_body, wake_near
 from taichi_soft.solver.kernels.spawn import despawn_body, spawn_body
 from taichi_soft.solver.kernels.step import step_in_turn, step_islands, step_per_body
@@ -45,6 +48,14 @@ _SERIAL = {
 }
 """Those that every world has, by name."""
 
+_OF_CONTACT = {
+    "write_joint": write_joint,
+    "end_joint": end_joint,
+    "forget_held": forget_held,
+    "read_speed": read_speed,
+}
+"""Those of joints and motors, which take a world that is made for contact."""
+
 
 def kernels_of(context: WorldContext, meshes: Sequence[ExportedMesh]) -> Kernels:
     """All that the native library calls in this world, by name."""
@@ -54,6 +65,9 @@ def kernels_of(context: WorldContext, meshes: Sequence[ExportedMesh]) -> Kernels
         found["step"] = _example(step_islands, state=state, program=program)
         found["forget_collider"] = _example(forget_collider, contact=state.contact)
         found["sum_collider_impulses"] = _example(sum_collider_impulses, contact=state.contact)
+        found |= {name: _example(kernel, state=state) for name, kernel in _OF_CONTACT.items()}
+        if not program.has_soft_contact:
+            found["list_joined_islands"] = _example(list_joined_islands, state=state)
     elif len(context.slots.slots) == 1:
         found["step"] = _example(step_in_turn, state=state, program=program)
     else:

@@ -1,4 +1,4 @@
-"""What a world may have that the native library does not run."""
+"""What a world may have that the native library does not run: why, and what to do instead."""
 
 from __future__ import annotations
 
@@ -9,51 +9,73 @@ from taichi_soft.core.runtime import device
 from taichi_soft.core.types import Schedule
 from taichi_soft.solver.context import WorldContext
 
+FLAT = (
+    "it has schedule 'flat', whose loops over the particles of the whole world have no place for contact, "
+    "forces, grabs, joints and motors, which the library's calls take: make it with schedule='per_body'"
+)
+RECORDS = (
+    "it records events, and Python would go on to collect them; stress is watched by Python too, which reads "
+    "it of each tetrahedron after each step: leave record_events, on and watches out, and let the game call "
+    "ts_world_record_events"
+)
+FORCE_FIELD = (
+    "it has a force field, a function in Python that the library cannot call: take it out with "
+    "set_force_field(None), and let the game push in the function of ts_world_on_step, by "
+    "ts_body_apply_force, ts_world_set_wind or ts_world_radial_impulse"
+)
+CUT = (
+    "is cut or tears, and Python makes the new mesh of a body that is cut: leave spare_vertices out, and let "
+    "the game put bodies of the parts in its place, by ts_world_despawn and ts_world_spawn"
+)
+LEVELS = (
+    "has levels of detail, between which Python computes how a body passes: take one number of cells, or an "
+    "asset for each level, of which the game puts one in place of another by ts_world_despawn and "
+    "ts_world_spawn"
+)
+MATERIAL = (
+    "was given another material, and the library takes the constants of a body from its asset: make its "
+    "asset of that material"
+)
+SKIPS = (
+    "skips the coming step, and Python alone chooses who skips steps: make a step with World.step before the "
+    "export, and let the game despawn what is far away"
+)
 
-def require_native(context: WorldContext) -> None:
-    """Raises: OptionError with all that the native library has no place for, by name."""
-    found = _of_world(context) + _of_assets(context) + _of_bodies(context)
+
+def require_native(context: WorldContext, *, has_force_field: bool) -> None:
+    """Raises: OptionError with all that the native library has no place for: why, and the way out."""
+    found = _of_world(context, has_force_field) + _of_assets(context) + _of_bodies(context)
     if found:
         raise OptionError(f"the native library does not run this world: {'; '.join(found)}")
 
 
-def _of_world(context: WorldContext) -> list[str]:
+def _of_world(context: WorldContext, has_force_field: bool) -> list[str]:
     found = []
     if device().is_gpu:
-        found.append(f"it runs on {device().arch}: call init('cpu')")
+        found.append(
+            f"it runs on {device().arch}, and its kernels become code for processors: call init('cpu')"
+        )
     if context.settings.schedule is Schedule.FLAT:
-        found.append("schedule 'flat': make it with schedule='per_body'")
+        found.append(FLAT)
     if context.built.events.is_recording:
-        found.append("it records events: leave record_events, on and watches out; the game records its own")
-    return found
+        found.append(RECORDS)
+    return found + [FORCE_FIELD] * has_force_field
 
 
 def _of_assets(context: WorldContext) -> list[str]:
     found = []
     for number, asset in enumerate(context.slots.kinds):
-        if asset.spare_vertices:
-            found.append(f"asset {number} is cut or tears: leave spare_vertices out")
-        if asset.coarser:
-            found.append(f"asset {number} has levels of detail: take one number of cells")
-        if asset.hull is not None:
-            found.append(f"asset {number} touches by a hull: leave hull out")
+        found += [f"asset {number} {CUT}"] * bool(asset.spare_vertices)
+        found += [f"asset {number} {LEVELS}"] * bool(asset.coarser)
     return found
 
 
 def _of_bodies(context: WorldContext) -> list[str]:
-    found = [
-        f"body {body.index} was given another material: make its asset of that"
-        for body in context.slots.living
-        if record_of(body).description is not present_asset(body).description
-    ]
-    found += [
-        f"body {body.index} was given another friction: make its asset with that Contact"
-        for body in context.slots.living
-        if record_of(body).friction is not None
-    ]
     status = context.built.state.body_status.to_numpy()
-    return found + [
-        f"body {body.index} skips the coming step: make a step before"
-        for body in context.slots.living
-        if status[body.index] == SKIPPING
-    ]
+    found = []
+    for body in context.slots.living:
+        if record_of(body).description is not present_asset(body).description:
+            found.append(f"body {body.index} {MATERIAL}")
+        if status[body.index] == SKIPPING:
+            found.append(f"body {body.index} {SKIPS}")
+    return found

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from taichi_soft import Contact, Event, Material, OptionError, SoftBodyAsset, StateError, World, box, sphere
+from taichi_soft import Event, Material, OptionError, SoftBodyAsset, StateError, World, box, sphere
 from taichi_soft.export import AXES, export_world
 from taichi_soft.export.archive import written
 
@@ -24,14 +24,6 @@ def with_levels():
     return world
 
 
-def with_hull():
-    world = World()
-    hull = sphere(radius=0.3, resolution=3)
-    body = SoftBodyAsset(hull, JELLY, hull=(hull.vertices, hull.surface), contact=Contact(thickness=0.01))
-    world.add_body(body, position=(0, 0, 1))
-    return world
-
-
 def plain():
     world = World()
     world.add_body(BALL, position=(0, 0, 1))
@@ -42,6 +34,13 @@ def recording():
     world = plain()
     world.build()
     world.record_events([Event])
+    return world
+
+
+def watching():
+    world = plain()
+    world.build()
+    world.bodies[0].watch_stress(1e4)
     return world
 
 
@@ -59,14 +58,6 @@ def changed():
     return world
 
 
-def greased():
-    world = World(soft_contact=True)
-    world.add_body(BALL, position=(0, 0, 1))
-    world.build()
-    world.bodies[0].set_friction(0.1)
-    return world
-
-
 def skipping():
     world = plain()
     world.build()
@@ -81,25 +72,36 @@ def flat():
 
 
 @pytest.mark.parametrize(
-    ("make", "reason"),
+    ("make", "what", "why", "way_out"),
     [
-        (cut, "asset 0 is cut or tears"),
-        (with_levels, "asset 0 has levels of detail"),
-        (with_hull, "asset 0 touches by a hull"),
-        (recording, "it records events"),
-        (forced, "it has a force field"),
-        (changed, "body 0 was given another material"),
-        (greased, "body 0 was given another friction"),
-        (skipping, "body 0 skips the coming step"),
-        (flat, "schedule 'flat'"),
+        (cut, "asset 0 is cut or tears", "Python makes the new mesh", "leave spare_vertices out"),
+        (with_levels, "asset 0 has levels of detail", "Python computes how", "an asset for each level"),
+        (recording, "it records events", "Python would go on", "ts_world_record_events"),
+        (
+            watching,
+            "stress is watched by Python",
+            "of each tetrahedron",
+            "leave record_events, on and watches",
+        ),
+        (forced, "it has a force field", "the library cannot call", "set_force_field(None)"),
+        (
+            changed,
+            "body 0 was given another material",
+            "constants of a body from its asset",
+            "make its asset",
+        ),
+        (skipping, "body 0 skips the coming step", "Python alone chooses", "make a step with World.step"),
+        (flat, "schedule 'flat'", "no place for contact", "schedule='per_body'"),
     ],
 )
-def test_what_the_library_does_not_run_is_refused_by_name(make, reason, tmp_path):
+def test_a_refused_export_says_what_why_and_what_to_do_instead(make, what, why, way_out, tmp_path):
     world = make()
     if not world.is_built:
         world.build()
-    with pytest.raises(OptionError, match=reason):
+    with pytest.raises(OptionError) as refused:
         export_world(world, tmp_path / "game.softworld")
+    for words in (what, why, way_out):
+        assert words in str(refused.value)
     assert list(tmp_path.iterdir()) == []
 
 

@@ -19,6 +19,8 @@ from taichi_soft import (
 from taichi_soft.contact.collider import row_of
 from taichi_soft.control.frames import Frames
 from taichi_soft.control.grabs import Grabs
+from taichi_soft.control.joints import Joints
+from taichi_soft.control.motors import Motors
 from taichi_soft.core.math.rotations import quaternion_of
 from taichi_soft.world.world import context_of_world
 
@@ -145,6 +147,18 @@ class Player:
         velocity, (density, drag) = self.take(3), self.take(2)
         self.world.set_wind(velocity, density=density, drag=drag)
 
+    def gravity(self):
+        self.world.set_gravity(self.take(3))
+
+    def floor_friction(self):
+        self.world.set_friction(*self.take(1))
+
+    def body_friction(self):
+        self.body().set_friction(*self.take(1))
+
+    def collider_friction(self):
+        self.collider().set_friction(*self.take(1))
+
     def wake(self):
         self.world.wake()
 
@@ -241,6 +255,50 @@ class Player:
 
     def grab_force(self):
         self.say(hash_of(self.grab_of().force))
+
+    def join(self):
+        body, vertices, other, onto = self.body(), self.list(), self.body(), self.list()
+        self.say(str(body.attach_to(other, vertices, onto=onto)._number))
+
+    def joint(self):
+        return context_of_world(self.world).of(Joints).by_number[self.whole()]
+
+    def joint_force(self):
+        self.say(hash_of(self.joint().force))
+
+    def release_joint(self):
+        self.joint().release()
+
+    def add_motor(self):
+        body, vertices = self.body(), self.list()
+        turns, is_fixed, has_point = (bool(each) for each in self.take(3))
+        axis, point, (speed, limit) = self.take(3), self.take(3), self.take(2)
+        made = self.world.add_motor(
+            body,
+            vertices,
+            axis,
+            speed=speed,
+            **{"max_torque" if turns else "max_force": limit},
+            is_fixed=is_fixed,
+            point=point if has_point else None,
+        )
+        self.say(str(made._number))
+
+    def motor(self):
+        return context_of_world(self.world).of(Motors).by_number[self.whole()]
+
+    def motor_speed(self):
+        self.motor().set_speed(*self.take(1))
+
+    def motor_limit(self):
+        self.motor().set_limit(*self.take(1))
+
+    def motor_state(self):
+        motor = self.motor()
+        self.say(hash_of([motor.measured_speed, motor.effort]))
+
+    def remove_motor(self):
+        self.motor().remove()
 
     def add_frame(self):
         frame = self.world.add_frame(self.take(3), self.take(4))

@@ -62,6 +62,10 @@ export function play(scene, game) {
       who.setTargets(vertices, take(3 * vertices.length));
     },
     wind: () => world.setWind(take(3), { density: one(), drag: one() }),
+    gravity: () => world.setGravity(take(3)),
+    floor_friction: () => world.setFriction(one()),
+    body_friction: () => body().setFriction(one()),
+    collider_friction: () => world.collider(one()).setFriction(one()),
     wake: () => world.wake(),
     spawn: () => world.spawn(one(), { position: take(3), rotation: take(4), velocity: take(3), spin: take(3) }),
     despawn: () => body().despawn(),
@@ -96,6 +100,25 @@ export function play(scene, game) {
     move_grab: () => world.grab(one()).moveTo(take(3)),
     release_grab: () => world.grab(one()).release(),
     grab_force: () => tell(hashOf(world.grab(one()).force)),
+    join() {
+      const [who, vertices, other, onto] = [body(), list(), body(), list()];
+      tell(who.join(vertices, other, { onto: onto.length ? onto : null }).number);
+    },
+    joint_force: () => tell(hashOf(world.joint(one()).force)),
+    release_joint: () => world.joint(one()).release(),
+    add_motor() {
+      const [who, vertices, turns, isFixed, hasPoint] = [body(), list(), one() === 1, one() === 1, one() === 1];
+      const [axis, point, speed, limit] = [take(3), take(3), one(), one()];
+      const most = turns ? { maxTorque: limit } : { maxForce: limit };
+      tell(who.addMotor(vertices, { axis, speed, isFixed, point: hasPoint ? point : null, ...most }).number);
+    },
+    motor_speed: () => world.motor(one()).setSpeed(one()),
+    motor_limit: () => world.motor(one()).setLimit(one()),
+    motor_state() {
+      const motor = world.motor(one());
+      tell(hashOf([motor.measuredSpeed, motor.effort]));
+    },
+    remove_motor: () => world.motor(one()).remove(),
     add_frame: () => tell(world.addFrame(pose()).number),
     remove_frame: () => world.frame(one()).remove(),
     frame_pose: () => tell(hashOf(flat(world.frame(one()).pose))),

@@ -298,6 +298,164 @@ def toys_game():
             yield line("mesh", 0, 0)
 
 
+def tilted():
+    """Bodies on a floor that is no collider, while the game tilts gravity and greases it."""
+    world = World(floor=0.0, gravity=(0.0, 0.0, -5.0))
+    for i in range(3):
+        world.add_body(box((0.4, 0.3, 0.2), (3, 2, 2)), RUBBER, position=(0.0, i, 0.15), velocity=(1.0, 0, 0))
+    world.build()
+    world.set_gravity((0.0, 0.5, -9.0))
+    return world
+
+
+def tilted_game():
+    for i in range(STEPS):
+        if i % 100 == 50:
+            yield line("gravity", (4.0 * np.sin(0.01 * i), 1.0, -9.81))
+        if i in (90, 300):
+            yield line("floor_friction", 0.05 + 0.001 * i)
+        if i == 120:
+            yield line("snapshot")
+        if i == 480:
+            yield line("restore")
+        yield line("step", DT, 0)
+
+
+def joined():
+    """Boxes that slide on each other, are joined and driven, while friction and gravity change."""
+    world = World(soft_contact=True, sleep_speed=0.3, collider_room=3)
+    crate = SoftBodyAsset(box((0.4, 0.4, 0.3), (2, 2, 2)), RUBBER, contact=Contact(friction=0.2))
+    bar = SoftBodyAsset(box((1.0, 0.2, 0.2), (5, 1, 1)), RUBBER)
+    world.reserve(crate, 5)
+    world.reserve(bar, 3)
+    for i in range(4):
+        world.spawn(crate, position=(0.05 * i, 0.6 * (i % 2), 0.2 + 0.35 * (i // 2)))
+    for i in range(3):
+        world.spawn(bar, position=(2.0 + 1.02 * i, 0.0, 0.4))
+    world.add_collider(BoxShape((4.0, 0.2, 1.0)), position=(0.0, -0.6, 0.2), friction=0.9)
+    world.build()
+    world.bodies[2].set_friction(0.7)
+    left, middle = world.bodies[4], world.bodies[5]
+    middle.attach_to(left, ends_of(bar, -1), onto=ends_of(bar, 1))
+    world.add_motor(left, ends_of(bar, -1), (1.0, 0.0, 0.0), speed=3.0, max_torque=20.0)
+    return world
+
+
+def ends_of(bar, side):
+    """Vertices of the end of a bar on one side."""
+    x = side * bar.mesh.vertices[:, 0]
+    return np.flatnonzero(x > x.max() - 1e-6).tolist()
+
+
+def joined_game():
+    """Slots 0 and 1 lie on the floor, 2 and 3 on these, 5 to 7 are bars. Colliders: 0 a wall, 1 the floor.
+
+    Joint 0 holds 6 to 5, motor 0 turns 5.
+    """
+    bar = SoftBodyAsset(box((1.0, 0.2, 0.2), (5, 1, 1)), RUBBER)
+    near, far = ends_of(bar, -1), ends_of(bar, 1)
+    up, along, still = (0.0, 0.0, 1.0), (1.0, 0.3, 0.0), (0.0, 0.0, 0.0)
+    for i in range(STEPS):
+        if i in (40, 260):
+            yield line("gravity", (2.0 + 0.01 * i, -0.5, -9.81))
+        if i in (100, 300):
+            yield line("body_friction", 2, 0.05)
+            yield line("body_friction", 0, 0.9)
+            yield line("collider_friction", 0, 0.1)
+        if i in (140, 310):
+            yield line("floor_friction", 0.02 if i < 200 else 0.8)
+            yield line("collider_friction", 1, 0.03 if i < 200 else 0.9)
+        if i == 2:
+            yield line("teleport", 7, (4.0, 0.0, 0.39), UPRIGHT, 0)
+            yield line("join", 7, near, 6, [])  # where it is in the other
+            yield line("join", 3, [2, 0], 2, [5, 3])
+        if i == 30:
+            yield line("add_motor", 7, [*far, 0, 3, 7], 1, 0, 0, along, still, 6.0, 30.0)
+            yield line("add_motor", 3, [4, 1, 9], 0, 1, 0, along, still, 0.5, 50.0)
+            yield line("add_motor", 1, [8, 6, 2, 0], 1, 1, 1, up, (0.1, 0.6, 0.2), -4.0, 15.0)
+        if i == 60:
+            yield line("motor_speed", 0, -8.0)
+            yield line("motor_limit", 1, 90.0)
+            yield line("remove_motor", 2)
+        if i == 80:
+            yield line("release_joint", 0)
+            yield line("add_motor", 0, [0, 5, 7], 0, 0, 0, up, still, 2.0, 20.0)
+        if i == 120:
+            yield line("snapshot")
+        if i == 160:
+            yield line("release_joint", 1)
+            yield line("remove_motor", 0)
+        if i == 200:
+            yield line("restore")
+        if i % 25 == 13 and 30 < i < 330:
+            yield line("joint_force", 2)
+            yield line("motor_state", 1)
+            yield line("motor_state", 3)
+        if i == 330:
+            yield line("despawn", 2)  # with what holds it to 3
+            yield line("despawn", 7)  # with its joint and its motor
+            yield line("spawn", 0, (0.3, 0.1, 0.9), UPRIGHT, still, (0.0, 0.0, 1.0))
+        if i == 350:
+            yield line("join", 2, [0, 1, 2], 3, [0, 1, 2])
+            yield line("joint_force", 0)
+        if i == 450:
+            yield line("joint_force", 0)
+        yield line("step", DT, 0)
+
+
+def hulled():
+    """Bodies that touch colliders, and no body, by a hull; what joints hold is stepped together."""
+    world = World(sleep_speed=0.2, collider_room=3)
+    surface = sphere(radius=0.3, resolution=5)
+    coarse = sphere(radius=0.32, resolution=2)
+    ball = SoftBodyAsset(coarse, RUBBER, hull=(surface.vertices, surface.surface))
+    crate = SoftBodyAsset(box((0.4, 0.4, 0.4), (2, 2, 2)), RUBBER)
+    world.reserve(ball, 4)
+    world.reserve(crate, 2)
+    for i in range(3):
+        world.spawn(ball, position=(0.8 * i, 0.0, 0.9 + 0.2 * i), angular_velocity=(0.0, 2.0 * i, 0.0))
+    world.spawn(crate, position=(0.0, 1.0, 0.4))
+    world.add_collider(BoxShape((1.0, 1.0, 0.3)), position=(0.3, 0.0, 0.2), rotation=turn((0, 1, 0), 0.2))
+    world.build()
+    return world
+
+
+def hulled_game():
+    """Slots 0 to 3 are balls, 4 and 5 crates. Colliders: 0 a ramp, 1 the floor."""
+    still = (0.0, 0.0, 0.0)
+    for i in range(STEPS):
+        if i in (0, 200):
+            yield line("record_events", 31)
+        if i == 30:
+            yield line("spawn", 0, (0.4, 0.1, 1.5), turn((1, 0, 1), 0.7), still, (1.0, 2.0, 3.0))
+            yield line("snapshot")
+        if i == 50:
+            yield line("teleport", 4, (1.5, 0.0, 1.2), UPRIGHT, 0)
+            yield line("velocity", 4, still, still)
+        if i == 60:
+            yield line("join", 4, [0, 1, 2], 2, [5, 6, 7])
+            yield line("add_motor", 1, [0, 1, 2, 5], 1, 0, 0, (0.0, 1.0, 0.0), still, 9.0, 40.0)
+        if 100 <= i < 200:
+            yield line("move_collider", 0, (0.3, 0.0, 0.2 + 0.003 * (i - 100)), turn((0, 1, 0), 0.2))
+        if i == 220:
+            yield line("restore")
+        if i == 300:
+            yield line("join", 1, [0, 1], 4, [5, 6])
+            yield line("impulse", 0, (3.0, 0.0, 30.0), [])
+        if i == 380:
+            yield line("despawn", 1)
+        if i == 400:
+            yield line("spawn", 0, (0.0, 0.0, 1.3), UPRIGHT, still, still)
+            yield line("collider_friction", 1, 0.1)
+        yield line("step", DT, 0)
+        if i % 50 == 0:
+            yield line("collider_impulse", 0)
+            yield line("collider_impulse", 1)
+            yield line("status", 0)
+            yield line("positions", 2, 0.5)
+            yield line("drain")
+
+
 def thesis_sphere():
     """What docs/native.md measures a step of."""
     world = World(floor=0.0)
@@ -314,4 +472,7 @@ GAMES = {
     "drape": (drape, drape_game),
     "held": (held, held_game),
     "laws": (laws, laws_game),
+    "tilted": (tilted, tilted_game),
+    "joined": (joined, joined_game),
+    "hulled": (hulled, hulled_game),
 }

@@ -14,8 +14,13 @@ from native_build import ROOT
 from taichi_soft.bodies import status
 from taichi_soft.contact.fields import PAIR_ROWS
 from taichi_soft.contact.kernels.touches import OF_BODY, OF_COLLIDER
+from taichi_soft.control.embedding import FARTHEST
+from taichi_soft.control.joints import DRAW
 from taichi_soft.control.kernels.grabs import CORNERS, MOST_GRABS, PATCH_ROWS
+from taichi_soft.control.kernels.joints import ENDS, JOINT_ROWS, MOST_JOINTS
+from taichi_soft.control.kernels.motors import MOST_MOTORS, MOTOR_ROWS
 from taichi_soft.control.kernels.pins import STILL, WITH_FRAME
+from taichi_soft.control.motors import LARGEST_LIMIT, THINNEST
 from taichi_soft.export.archive import TYPES, written
 
 HEADERS = Path(ROOT) / "engine_adapter" / "native" / "src"
@@ -46,7 +51,7 @@ print(json.dumps(codes))
 """
 
 
-@pytest.mark.parametrize("name", ["heap", "free", "held"])
+@pytest.mark.parametrize("name", ["heap", "free", "held", "joined"])
 def test_a_forged_snapshot_is_refused_or_ends_no_process(name, native, export):
     codes = in_process(native, FORGED, export(name))
     assert set(codes) == {0, -8}
@@ -150,7 +155,7 @@ def test_the_library_knows_the_numbers_of_status_drives_aims_and_grabs():
     assert names.index("kAbsent") == status.ABSENT
     drives = dict(re.findall(r"(k\w+) = (\d+)", re.search(r"enum Drives {(.*?)}", source).group(1)))
     wanted = {"kMovesPins": "MOVES_PINS", "kDamped": "DAMPED", "kSheltered": "SHELTERED"}
-    wanted |= {"kGrabbed": "GRABBED", "kJoined": "JOINED", "kFeelsReaction": "FEELS_REACTION"}
+    wanted |= {"kGrabbed": "GRABBED", "kFeelsReaction": "FEELS_REACTION"}
     assert {name: int(bit) for name, bit in drives.items()} == {
         a: getattr(status, b) for a, b in wanted.items()
     }
@@ -159,6 +164,14 @@ def test_the_library_knows_the_numbers_of_status_drives_aims_and_grabs():
     )
     grabs = re.search(r"kMostGrabs = (\d+), kPatchRows = (\d+), kGrabCorners = (\d+);", source).groups()
     assert tuple(map(int, grabs)) == (MOST_GRABS, PATCH_ROWS, CORNERS)
+    joints = re.search(r"kMostJoints = (\d+), kJointRows = (\d+), kJointEnds = (\d+);", source).groups()
+    assert tuple(map(int, joints)) == (MOST_JOINTS, JOINT_ROWS, ENDS)
+    motors = re.search(r"kMostMotors = (\d+), kMotorRows = (\d+);", source).groups()
+    assert tuple(map(int, motors)) == (MOST_MOTORS, MOTOR_ROWS)
+    constants = (HEADERS / "world_joints.cpp").read_text() + (HEADERS / "world_motors.cpp").read_text()
+    known = {name: float(number) for name, number in re.findall(r"(k[A-Z]\w+) = (-?[\d.e-]+)", constants)}
+    wanted = {"kFarthest": FARTHEST, "kDraw": DRAW, "kLargestLimit": LARGEST_LIMIT, "kThinnest": THINNEST}
+    assert {name: known[name] for name in wanted} == wanted
     kinds = re.search(r"kOfCollider = (\d+), kOfBody = (\d+)", (HEADERS / "events.hpp").read_text()).groups()
     assert tuple(map(int, kinds)) == (OF_COLLIDER, OF_BODY)
     rows = re.search(r"kPairRows = (\d+);", (HEADERS / "events.hpp").read_text()).group(1)

@@ -216,6 +216,21 @@ HELD = {  # by step
     50: [line("move_grab", 0, (1.25, 1.25, 0.5)), line("attach", 0, [3, 1, 12], 0, 1)],
     70: [line("grab_force", 0), line("load", 0, 0), line("release_grab", 0)],
     80: [line("move_frame", 0, (0.5, 1.125, 0.25), UPRIGHT)],
+    90: [
+        line("gravity", (0.5, -9.5, 0.25)),
+        line("body_friction", 3, 0.25),
+        line("collider_friction", 0, 0.125),
+        line("join", 0, [3, 1], 3, [5, 7]),
+        line("add_motor", 3, [0, 1, 2, 9], 1, 0, 0, (0.0, 1.0, 0.0), (0.0, 0.0, 0.0), 2.0, 8.0),
+    ],
+    140: [
+        line("motor_speed", 0, -4.0),
+        line("joint_force", 0),
+        line("motor_state", 0),
+        line("release_joint", 0),
+    ],
+    155: [line("motor_limit", 0, 2.0)],
+    180: [line("remove_motor", 0)],
     150: [line("detach", 0, [1]), line("grab", 0, 7, (0.0, 1.0, 0.0), (-1.5, 2.0, 0.0), 8.0, 64.0)],
     210: [line("add_frame", (0.0, 1.0, 0.0), UPRIGHT), line("remove_frame", 1), line("detach", 0, [])],
 }

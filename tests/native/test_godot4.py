@@ -125,6 +125,22 @@ HELD = {  # by step
     50: [line("move_grab", 0, (1.25, 1.25, 0.5)), line("attach", 0, [3, 1, 12], 0, 1)],
     70: [line("grab_force", 0), line("load", 0, 0), line("release_grab", 0)],
     80: [line("move_frame", 0, (0.5, 1.125, 0.25), UPRIGHT)],
+    90: [
+        line("gravity", (0.5, 0.25, -9.5)),
+        line("floor_friction", 0.75),
+        line("body_friction", 5, 0.25),
+        line("collider_friction", 0, 0.125),
+        line("join", 6, [3, 1], 5, [5, 7]),
+        line("add_motor", 5, [0, 1, 2, 9], 1, 0, 0, (0.0, 1.0, 0.0), (0.0, 0.0, 0.0), 2.0, 8.0),
+    ],
+    140: [
+        line("motor_speed", 0, -4.0),
+        line("joint_force", 0),
+        line("motor_state", 0),
+        line("release_joint", 0),
+    ],
+    155: [line("motor_limit", 0, 2.0)],
+    180: [line("remove_motor", 0)],
     150: [line("detach", 0, [1]), line("grab", 0, 7, (0.0, 1.0, 0.0), (-1.5, 2.0, 0.0), 8.0, 64.0)],
     210: [line("add_frame", (0.0, 1.0, 0.0), UPRIGHT), line("remove_frame", 1), line("detach", 0, [])],
 }
@@ -263,6 +279,51 @@ class Player:
 
     def grab_force(self):
         self.say(hash_of(self.instance.grab_force(self.grab_of())))
+
+    def gravity(self):
+        assert self.instance.set_gravity(self.take(3)) is True
+
+    def floor_friction(self):
+        assert self.instance.set_friction(*self.take(1)) is True
+
+    def body_friction(self):
+        assert self.instance.set_body_friction(self.body(), *self.take(1)) is True
+
+    def collider_friction(self):
+        assert self.instance.set_collider_friction(self.whole(), *self.take(1)) is True
+
+    def join(self):
+        self.say(slot(self.instance.join(self.body(), self.list(), self.body(), self.list())))
+
+    def joint_of(self):
+        return self.instance.joint_of(self.whole())
+
+    def joint_force(self):
+        self.say(hash_of(self.instance.joint_force(self.joint_of())))
+
+    def release_joint(self):
+        assert self.instance.release_joint(self.joint_of()) is True
+
+    def add_motor(self):
+        body, vertices, kinds = self.body(), self.list(), [self.whole() for _ in range(3)]
+        self.say(
+            slot(self.instance.add_motor(body, vertices, *kinds, self.take(3), self.take(3), *self.take(2)))
+        )
+
+    def motor_of(self):
+        return self.instance.motor_of(self.whole())
+
+    def motor_speed(self):
+        assert self.instance.set_motor_speed(self.motor_of(), *self.take(1)) is True
+
+    def motor_limit(self):
+        assert self.instance.set_motor_limit(self.motor_of(), *self.take(1)) is True
+
+    def motor_state(self):
+        self.say(hash_of(self.instance.motor_state(self.motor_of())))
+
+    def remove_motor(self):
+        assert self.instance.remove_motor(self.motor_of()) is True
 
     def add_frame(self):
         self.say(self.instance.add_frame(self.place()))

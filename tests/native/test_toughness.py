@@ -207,6 +207,7 @@ def out(v, unit):
     return [unit * sum(row[k] * v[k] for k in range(3)) for row in rows]
 pose = Pose((c_double * 3)(*out((0.1, -0.2, 0.45), scale)), (c_double * 4)(*turn))
 soft.call("ts_collider_move_to", world, c_int32(0), byref(pose))
+soft.call("ts_world_set_gravity", world, vector(*out((0.2, -0.1, -9.0), scale)))
 body = soft.body(world, 1)
 soft.call("ts_body_apply_impulse", world, body, vector(*out((3.0, 2.0, 5.0), scale)), None, c_size_t(0))
 for _ in range(60):

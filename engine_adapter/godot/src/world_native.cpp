@@ -345,6 +345,101 @@ Variant grab_force(Self self, In in) {
   return of_vector(found);
 }
 
+// ---- gravity and friction ----
+
+Variant set_gravity(Self self, In in) {
+  double gravity[3];
+  in.vector(0, gravity);
+  check(ts_world_set_gravity(self.world, gravity));
+  return of(true);
+}
+
+Variant set_friction(Self self, In in) {
+  check(ts_world_set_friction(self.world, in.real(0)));
+  return of(true);
+}
+
+Variant set_body_friction(Self self, In in) {
+  check(ts_body_set_friction(self.world, body_of(in), in.real(1)));
+  return of(true);
+}
+
+Variant set_collider_friction(Self self, In in) {
+  check(ts_collider_set_friction(self.world, in.small(0), in.real(1)));
+  return of(true);
+}
+
+// ---- joints and motors ----
+
+Variant join(Self self, In in) {
+  const std::vector<int32_t> vertices = in.whole_numbers(1), onto = in.whole_numbers(3);
+  if (!onto.empty() && onto.size() != vertices.size()) throw Refused("argument 4 names a vertex for each of argument 2");
+  ts_joint made = 0;
+  check(ts_body_join(self.world, body_of(in), vertices.data(), vertices.size(), ts_body(in.whole(2)),
+                     onto.empty() ? nullptr : onto.data(), &made));
+  return of(int64_t(made));
+}
+
+// That with a number from 0 to 63.
+Variant joint_of(Self self, In in) {
+  ts_joint found = 0;
+  check(ts_world_get_joint(self.world, in.small(0), &found));
+  return of(int64_t(found));
+}
+
+Variant release_joint(Self self, In in) {
+  check(ts_joint_release(self.world, ts_joint(in.whole(0))));
+  return of(true);
+}
+
+Variant joint_force(Self self, In in) {
+  double found[3];
+  check(ts_joint_get_force(self.world, ts_joint(in.whole(0)), found));
+  return of_vector(found);
+}
+
+Variant add_motor(Self self, In in) {
+  const std::vector<int32_t> vertices = in.whole_numbers(1);
+  ts_drive drive{};
+  drive.struct_size = sizeof drive;
+  drive.turns = in.small(2), drive.is_fixed = in.small(3), drive.has_point = in.small(4);
+  in.vector(5, drive.axis);
+  in.vector(6, drive.point);
+  drive.speed = in.real(7), drive.limit = in.real(8);
+  ts_motor made = 0;
+  check(ts_body_add_motor(self.world, body_of(in), vertices.data(), vertices.size(), &drive, &made));
+  return of(int64_t(made));
+}
+
+Variant motor_of(Self self, In in) {
+  ts_motor found = 0;
+  check(ts_world_get_motor(self.world, in.small(0), &found));
+  return of(int64_t(found));
+}
+
+Variant set_motor_speed(Self self, In in) {
+  check(ts_motor_set_speed(self.world, ts_motor(in.whole(0)), in.real(1)));
+  return of(true);
+}
+
+Variant set_motor_limit(Self self, In in) {
+  check(ts_motor_set_limit(self.world, ts_motor(in.whole(0)), in.real(1)));
+  return of(true);
+}
+
+// Its speed, and torque or force.
+Variant motor_state(Self self, In in) {
+  double speed = 0.0, effort = 0.0;
+  check(ts_motor_get_speed(self.world, ts_motor(in.whole(0)), &speed));
+  check(ts_motor_get_effort(self.world, ts_motor(in.whole(0)), &effort));
+  return of_list({of(speed), of(effort)});
+}
+
+Variant remove_motor(Self self, In in) {
+  check(ts_motor_remove(self.world, ts_motor(in.whole(0))));
+  return of(true);
+}
+
 // ---- colliders and frames ----
 
 Variant add_collider(Self self, In in) {
@@ -483,6 +578,20 @@ const std::vector<Method> methods = {
     {"move_grab", 2, move_grab},
     {"release_grab", 1, release_grab},
     {"grab_force", 1, grab_force},
+    {"set_gravity", 1, set_gravity},
+    {"set_friction", 1, set_friction},
+    {"set_body_friction", 2, set_body_friction},
+    {"set_collider_friction", 2, set_collider_friction},
+    {"join", 4, join},
+    {"joint_of", 1, joint_of},
+    {"release_joint", 1, release_joint},
+    {"joint_force", 1, joint_force},
+    {"add_motor", 9, add_motor},
+    {"motor_of", 1, motor_of},
+    {"set_motor_speed", 2, set_motor_speed},
+    {"set_motor_limit", 2, set_motor_limit},
+    {"motor_state", 1, motor_state},
+    {"remove_motor", 1, remove_motor},
     {"add_collider", 8, add_collider},
     {"remove_collider", 1, remove_collider},
     {"move_collider", 2, move_collider},

@@ -287,7 +287,7 @@ namespace TaichiSoft
                 int[] counts = { info.SlotCount, info.AssetCount, info.ColliderCount, info.FrameCount, info.MeshCount };
                 foreach (NameKind kind in Enum.GetValues(typeof(NameKind)))
                 {
-                    for (int i = 0; i < counts[(int)kind]; ++i)
+                    for (int i = 0; (int)kind < counts.Length && i < counts[(int)kind]; ++i)
                     {
                         string name = scene.GetName(kind, i);
                         Require(scene.Find(kind, name) == i, name);

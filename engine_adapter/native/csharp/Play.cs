@@ -139,6 +139,41 @@ namespace TaichiSoft
             return world.GetGrab(Whole());
         }
 
+        private static void Join()
+        {
+            Body who = Who();
+            int[] list = List();
+            Body other = Who();
+            Say(NumberOf(who.Join(list, other, List()).Id));
+        }
+
+        private static void AddMotor()
+        {
+            Body who = Who();
+            int[] list = List();
+            bool turns = Whole() != 0, isFixed = Whole() != 0, hasPoint = Whole() != 0;
+            Vector3d axis = Vector(), point = Vector();
+            double speed = Number(), limit = Number();
+            Drive drive = turns ? Drive.Turn(axis, speed, limit) : Drive.Push(axis, speed, limit);
+            Say(NumberOf(who.AddMotor(list, hasPoint ? drive.Through(point) : isFixed ? drive.Fixed() : drive).Id));
+        }
+
+        private static Motor Driven()
+        {
+            return world.GetMotor(Whole());
+        }
+
+        private static void MotorState()
+        {
+            Motor motor = Driven();
+            Say(HashOf((float)motor.GetSpeed(), (float)motor.GetEffort()));
+        }
+
+        private static string NumberOf(ulong id)
+        {
+            return ((long)(id & 0xFFFFFFFF) - 1).ToString(CultureInfo.InvariantCulture);
+        }
+
         private static void SayForce(Vector3d force)
         {
             Say(HashOf((float)force.X, (float)force.Y, (float)force.Z));
@@ -207,6 +242,10 @@ namespace TaichiSoft
             { "unpin", () => { Body who = Who(); who.Unpin(List()); } },
             { "targets", Targets },
             { "wind", () => { Vector3d wind = Vector(); double density = Number(); world.SetWind(wind, density, Number()); } },
+            { "gravity", () => world.SetGravity(Vector()) },
+            { "floor_friction", () => world.SetFriction(Number()) },
+            { "body_friction", () => { Body who = Who(); who.SetFriction(Number()); } },
+            { "collider_friction", () => { int which = Whole(); world.SetColliderFriction(which, Number()); } },
             { "wake", () => world.Wake() },
             { "spawn", Spawn },
             { "despawn", () => Who().Despawn() },
@@ -244,6 +283,14 @@ namespace TaichiSoft
             { "move_grab", () => { Grab held = Held(); held.Move(Vector()); } },
             { "release_grab", () => Held().Release() },
             { "grab_force", () => SayForce(Held().GetForce()) },
+            { "join", Join },
+            { "joint_force", () => SayForce(world.GetJoint(Whole()).GetForce()) },
+            { "release_joint", () => world.GetJoint(Whole()).Release() },
+            { "add_motor", AddMotor },
+            { "motor_speed", () => { Motor motor = Driven(); motor.SetSpeed(Number()); } },
+            { "motor_limit", () => { Motor motor = Driven(); motor.SetLimit(Number()); } },
+            { "motor_state", MotorState },
+            { "remove_motor", () => Driven().Remove() },
             { "add_frame", () => Say(world.AddFrame(Place()).ToString(CultureInfo.InvariantCulture)) },
             { "remove_frame", () => world.RemoveFrame(Whole()) },
             { "frame_pose", () => SayPose(world.GetFramePose(Whole())) },

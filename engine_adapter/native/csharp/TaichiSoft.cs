@@ -60,7 +60,11 @@ namespace TaichiSoft
         /// <summary>What attached vertices follow.</summary>
         Frame = 3,
         /// <summary>What is drawn of an asset.</summary>
-        Mesh = 4
+        Mesh = 4,
+        /// <summary>What holds two bodies together.</summary>
+        Joint = 5,
+        /// <summary>What drives a part of a body.</summary>
+        Motor = 6
     }
 
     /// <summary>How a body fares.</summary>
@@ -264,6 +268,59 @@ namespace TaichiSoft
         /// <summary>As a hand does, where a ray has hit.</summary>
         public Pull(Hit hit) : this(hit.Triangle, hit.Weights, hit.Point)
         {
+        }
+    }
+
+    /// <summary>What a motor does.</summary>
+    [StructLayout(LayoutKind.Sequential)]
+    public struct Drive
+    {
+        internal uint structSize;
+        private readonly int turns;
+        private int isFixed;
+        private int hasPoint;
+        private readonly Vector3d axis;
+        private Vector3d point;
+        /// <summary>Wanted [rad/s], or [unit of length/s] where it pushes.</summary>
+        public double Speed;
+        /// <summary>Of torque, or of force where it pushes.</summary>
+        public double Limit;
+
+        private Drive(bool turns, Vector3d axis, double speed, double limit) : this()
+        {
+            this.turns = turns ? 1 : 0;
+            this.axis = axis;
+            Speed = speed;
+            Limit = limit;
+        }
+
+        /// <summary>Turn vertices about an axis through their centre, that turns with them.</summary>
+        public static Drive Turn(Vector3d axis, double speed, double maxTorque)
+        {
+            return new Drive(true, axis, speed, maxTorque);
+        }
+
+        /// <summary>Push vertices along an axis that turns with them.</summary>
+        public static Drive Push(Vector3d axis, double speed, double maxForce)
+        {
+            return new Drive(false, axis, speed, maxForce);
+        }
+
+        /// <summary>The same about or along an axis that stays as it is in space.</summary>
+        public Drive Fixed()
+        {
+            Drive found = this;
+            found.isFixed = 1;
+            return found;
+        }
+
+        /// <summary>The same about an axis that stays in space and goes through a point.</summary>
+        public Drive Through(Vector3d place)
+        {
+            Drive found = Fixed();
+            found.hasPoint = 1;
+            found.point = place;
+            return found;
         }
     }
 
@@ -628,6 +685,18 @@ namespace TaichiSoft
             Native.Check(Native.ts_world_wake(handle), this);
         }
 
+        /// <summary>Gravity [unit of length/s^2], from the next step on. Who sleeps wakes.</summary>
+        public void SetGravity(Vector3d gravity)
+        {
+            Native.Check(Native.ts_world_set_gravity(handle, ref gravity), this);
+        }
+
+        /// <summary>Coulomb's coefficient of the floor, from the next step on.</summary>
+        public void SetFriction(double friction)
+        {
+            Native.Check(Native.ts_world_set_friction(handle, friction), this);
+        }
+
         /// <summary>Wind: its velocity, density of the air [kg/m^3], coefficient of drag.</summary>
         public void SetWind(Vector3d velocity, double density, double drag)
         {
@@ -798,6 +867,22 @@ namespace TaichiSoft
             return new Grab(this, grab);
         }
 
+        /// <summary>The joint with a number from 0 to 63; one that is not there, for none.</summary>
+        public Joint GetJoint(int number)
+        {
+            ulong joint;
+            Native.Check(Native.ts_world_get_joint(handle, number, out joint), this);
+            return new Joint(this, joint);
+        }
+
+        /// <summary>The motor with a number from 0 to 63; one that is not there, for none.</summary>
+        public Motor GetMotor(int number)
+        {
+            ulong motor;
+            Native.Check(Native.ts_world_get_motor(handle, number, out motor), this);
+            return new Motor(this, motor);
+        }
+
         /// <summary>A new one, where the world was made with room for it. Returns its number.</summary>
         public int AddCollider(Shape shape, Pose pose)
         {
@@ -829,6 +914,12 @@ namespace TaichiSoft
         public void TeleportCollider(int collider, Pose pose)
         {
             Native.Check(Native.ts_collider_teleport(handle, collider, ref pose), this);
+        }
+
+        /// <summary>Coulomb's coefficient of a collider, from the next step on.</summary>
+        public void SetColliderFriction(int collider, double friction)
+        {
+            Native.Check(Native.ts_collider_set_friction(handle, collider, friction), this);
         }
 
         /// <summary>Where a collider is.</summary>
@@ -1021,6 +1112,12 @@ namespace TaichiSoft
             Check(Native.ts_body_set_gravity_scale(World.Handle, Id, scale));
         }
 
+        /// <summary>Coulomb's coefficient against other bodies, in worlds with soft contact.</summary>
+        public void SetFriction(double friction)
+        {
+            Check(Native.ts_body_set_friction(World.Handle, Id, friction));
+        }
+
         /// <summary>How fast it loses its velocity [1/s].</summary>
         public void SetDamping(double rate)
         {
@@ -1068,6 +1165,28 @@ namespace TaichiSoft
         public void Detach(int[] vertices = null)
         {
             Check(Native.ts_body_detach(World.Handle, Id, vertices, Native.Count(vertices)));
+        }
+
+        /// <summary>Let vertices be held by another body: where they are in it, or each at a vertex of it.</summary>
+        public Joint Join(int[] vertices, Body other, int[] onto = null)
+        {
+            if (onto != null && (vertices == null || onto.Length != vertices.Length))
+            {
+                throw new SoftException(ErrorCode.Size, "onto names a vertex for each of vertices");
+            }
+            ulong joint;
+            Check(Native.ts_body_join(World.Handle, Id, vertices, Native.Count(vertices), other.Id, onto, out joint));
+            return new Joint(World, joint);
+        }
+
+        /// <summary>Turn vertices, or push them.</summary>
+        public Motor AddMotor(int[] vertices, Drive drive)
+        {
+            ulong motor;
+            drive.structSize = Size<Drive>.Bytes;
+            Check(
+                Native.ts_body_add_motor(World.Handle, Id, vertices, Native.Count(vertices), ref drive, out motor));
+            return new Motor(World, motor);
         }
 
         /// <summary>What it pulled a frame with, mean over the last step, and the torque about its origin.</summary>
@@ -1139,6 +1258,116 @@ namespace TaichiSoft
             Vector3d force;
             Check(Native.ts_grab_get_force(World.Handle, Id, out force));
             return force;
+        }
+    }
+
+    /// <summary>What holds a part of a body to another one.</summary>
+    public struct Joint
+    {
+        private readonly World world;
+
+        /// <summary>The library's number; 0 is none.</summary>
+        public readonly ulong Id;
+
+        internal Joint(World world, ulong id)
+        {
+            this.world = world;
+            Id = id;
+        }
+
+        /// <summary>Whether there was one of its number.</summary>
+        public bool IsThere
+        {
+            get { return Id != 0; }
+        }
+
+        /// <summary>Where it is.</summary>
+        public World World
+        {
+            get
+            {
+                if (world == null) throw new SoftException(ErrorCode.Handle, "this joint is of no world");
+                return world;
+            }
+        }
+
+        /// <summary>Let go.</summary>
+        public void Release()
+        {
+            Native.Check(Native.ts_joint_release(World.Handle, Id), world);
+        }
+
+        /// <summary>With what the other body pulls, mean over the last step.</summary>
+        public Vector3d GetForce()
+        {
+            Vector3d force;
+            Native.Check(Native.ts_joint_get_force(World.Handle, Id, out force), world);
+            return force;
+        }
+    }
+
+    /// <summary>What turns a part of a body, or pushes it.</summary>
+    public struct Motor
+    {
+        private readonly World world;
+
+        /// <summary>The library's number; 0 is none.</summary>
+        public readonly ulong Id;
+
+        internal Motor(World world, ulong id)
+        {
+            this.world = world;
+            Id = id;
+        }
+
+        /// <summary>Whether there was one of its number.</summary>
+        public bool IsThere
+        {
+            get { return Id != 0; }
+        }
+
+        /// <summary>Where it is.</summary>
+        public World World
+        {
+            get
+            {
+                if (world == null) throw new SoftException(ErrorCode.Handle, "this motor is of no world");
+                return world;
+            }
+        }
+
+        /// <summary>Drive towards another speed.</summary>
+        public void SetSpeed(double speed)
+        {
+            Native.Check(Native.ts_motor_set_speed(World.Handle, Id, speed), world);
+        }
+
+        /// <summary>Allow another torque or force; with 0 the vertices coast.</summary>
+        public void SetLimit(double limit)
+        {
+            Native.Check(Native.ts_motor_set_limit(World.Handle, Id, limit), world);
+        }
+
+        /// <summary>That its vertices have.</summary>
+        public double GetSpeed()
+        {
+            double speed;
+            Native.Check(Native.ts_motor_get_speed(World.Handle, Id, out speed), world);
+            return speed;
+        }
+
+        /// <summary>Torque or force that it gave, mean over the last step.</summary>
+        public double GetEffort()
+        {
+            double effort;
+            Native.Check(Native.ts_motor_get_effort(World.Handle, Id, out effort), world);
+            return effort;
+        }
+
+        /// <summary>Drive no longer.</summary>
+        public void Remove()
+        {
+            Native.Check(Native.ts_motor_remove(World.Handle, Id), world);
         }
     }
 
@@ -1278,6 +1507,12 @@ namespace TaichiSoft
         internal static extern int ts_world_wake(ulong world);
 
         [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_world_set_gravity(ulong world, ref Vector3d gravity);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_world_set_friction(ulong world, double friction);
+
+        [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_world_set_wind(ulong world, ref Vector3d velocity, double density, double drag);
 
         [DllImport(Library, CallingConvention = C)]
@@ -1357,6 +1592,9 @@ namespace TaichiSoft
         internal static extern int ts_body_set_gravity_scale(ulong world, ulong body, double scale);
 
         [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_body_set_friction(ulong world, ulong body, double friction);
+
+        [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_body_set_damping(ulong world, ulong body, double rate);
 
         [DllImport(Library, CallingConvention = C)]
@@ -1399,6 +1637,41 @@ namespace TaichiSoft
         internal static extern int ts_grab_get_force(ulong world, ulong grab, out Vector3d force);
 
         [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_body_join(ulong world, ulong body, int[] vertices, UIntPtr count, ulong other,
+            int[] onto, out ulong joint);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_world_get_joint(ulong world, int number, out ulong joint);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_joint_release(ulong world, ulong joint);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_joint_get_force(ulong world, ulong joint, out Vector3d force);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_body_add_motor(ulong world, ulong body, int[] vertices, UIntPtr count,
+            ref Drive drive, out ulong motor);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_world_get_motor(ulong world, int number, out ulong motor);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_motor_set_speed(ulong world, ulong motor, double speed);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_motor_set_limit(ulong world, ulong motor, double limit);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_motor_remove(ulong world, ulong motor);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_motor_get_speed(ulong world, ulong motor, out double speed);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_motor_get_effort(ulong world, ulong motor, out double effort);
+
+        [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_world_raycast(ulong world, ref Vector3d origin, ref Vector3d direction,
             double reach, ref Hit hit);
 
@@ -1428,6 +1701,9 @@ namespace TaichiSoft
 
         [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_collider_teleport(ulong world, int collider, ref Pose pose);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_collider_set_friction(ulong world, int collider, double friction);
 
         [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_collider_get_pose(ulong world, int collider, out Pose pose);

@@ -60,9 +60,11 @@ typedef uint64_t ts_world; /* an instance of it that moves */
 typedef uint64_t ts_body;  /* who lives in a slot: another one that comes later has another number. After
                             * ts_world_restore numbers are as they were, and the same calls give the same again */
 typedef uint64_t ts_grab;  /* a hand on a body, likewise */
+typedef uint64_t ts_joint; /* between two bodies, likewise */
+typedef uint64_t ts_motor; /* that drives a part of a body, likewise */
 
 /* Kinds of names. The number of a TS_BODY is its slot. */
-enum { TS_BODY = 0, TS_ASSET = 1, TS_COLLIDER = 2, TS_FRAME = 3, TS_MESH = 4 };
+enum { TS_BODY = 0, TS_ASSET = 1, TS_COLLIDER = 2, TS_FRAME = 3, TS_MESH = 4, TS_JOINT = 5, TS_MOTOR = 6 };
 
 enum { TS_ACTIVE = 0, TS_FROZEN = 1, TS_ASLEEP = 2 }; /* status of a body */
 
@@ -160,12 +162,16 @@ TS_API ts_result ts_world_advance(ts_world world, double seconds, ts_clock* cloc
 TS_API ts_result ts_world_get_clock(ts_world world, ts_clock* clock);
 TS_API ts_result ts_world_stable_substeps(ts_world world, double dt, int32_t* substeps);
 TS_API ts_result ts_world_wake(ts_world world);
+/* [m/s^2, in Unreal cm/s^2], from the next step on. Who sleeps wakes. */
+TS_API ts_result ts_world_set_gravity(ts_world world, const double gravity[3]);
+/* Coulomb's coefficient of the floor. */
+TS_API ts_result ts_world_set_friction(ts_world world, double friction);
 TS_API ts_result ts_world_set_wind(ts_world world, const double velocity[3], double density, double drag);
 TS_API ts_result ts_world_radial_impulse(ts_world world, const double center[3], double impulse, double radius);
 /* A number that tells states apart: that of Python's world in the same state. */
 TS_API ts_result ts_world_hash(ts_world world, uint64_t* hash);
 /* The state between two steps. With a null buffer only the size [bytes] is given, which changes with the events that are
- * recorded, with frames and with colliders. What the picture is ahead of the last step, and what was dropped, is not in
+ * recorded, with frames, colliders, joints and motors. What the picture is ahead of the last step, and what was dropped, is not in
  * it. */
 TS_API ts_result ts_world_snapshot(ts_world world, void* buffer, size_t capacity, size_t* size);
 TS_API ts_result ts_world_restore(ts_world world, const void* bytes, size_t size);
@@ -239,6 +245,8 @@ TS_API ts_result ts_body_apply_force(ts_world world, ts_body body, const double 
 TS_API ts_result ts_body_impulse_at(ts_world world, ts_body body, const double impulse[3], const double point[3],
                                     double radius);
 TS_API ts_result ts_body_set_gravity_scale(ts_world world, ts_body body, double scale);
+/* Coulomb's coefficient against other bodies, in worlds with soft contact: of two the geometric mean counts. */
+TS_API ts_result ts_body_set_friction(ts_world world, ts_body body, double friction);
 TS_API ts_result ts_body_set_damping(ts_world world, ts_body body, double rate);
 TS_API ts_result ts_body_set_sheltered(ts_world world, ts_body body, int32_t is_sheltered);
 TS_API ts_result ts_body_pin(ts_world world, ts_body body, const int32_t* vertices, size_t count);
@@ -272,6 +280,43 @@ TS_API ts_result ts_grab_move(ts_world world, ts_grab grab, const double point[3
 TS_API ts_result ts_grab_release(ts_world world, ts_grab grab);
 /* With what it pulls, in the last substep [N, in Unreal kg cm/s^2]. */
 TS_API ts_result ts_grab_get_force(ts_world world, ts_grab grab, double force[3]);
+
+/* ---- joints and motors, in worlds that are made for contact. Those of a body that is taken out end with it ---- */
+
+/* Let vertices of a body be held by another one: where they are in it now, or with `onto`, which may be null, each at a
+ * vertex of `other`. There can be 64 joints at a time, which hold 2,048 vertices together. */
+TS_API ts_result ts_body_join(ts_world world, ts_body body, const int32_t* vertices, size_t count, ts_body other,
+                              const int32_t* onto, ts_joint* joint);
+/* That with a number from 0 to 63; 0 for none. Joints of the exported world are there, too. */
+TS_API ts_result ts_world_get_joint(ts_world world, int32_t number, ts_joint* joint);
+TS_API ts_result ts_joint_release(ts_world world, ts_joint joint);
+/* With what `other` pulls `body`, mean over the last step [N, in Unreal kg cm/s^2]. */
+TS_API ts_result ts_joint_get_force(ts_world world, ts_joint joint, double force[3]);
+
+typedef struct ts_drive {
+  uint32_t struct_size;
+  int32_t turns;     /* 1: it turns vertices about the axis; 0: it pushes them along it */
+  int32_t is_fixed;  /* 1: the axis stays as it is in space; 0: it turns with the vertices */
+  int32_t has_point; /* 1: it goes through `point`; 0: through the centre of the vertices */
+  double axis[3];    /* of any length but 0 */
+  double point[3];   /* only where it turns and is fixed */
+  double speed;      /* wanted [rad/s, or the unit of length/s] */
+  double limit;      /* of torque [N m, in Unreal kg cm^2/s^2], or of force [N, in Unreal kg cm/s^2] */
+} ts_drive;
+
+/* There can be 64 motors at a time, which drive 16,384 vertices together. */
+TS_API ts_result ts_body_add_motor(ts_world world, ts_body body, const int32_t* vertices, size_t count,
+                                   const ts_drive* drive, ts_motor* motor);
+/* That with a number from 0 to 63; 0 for none. Motors of the exported world are there, too. */
+TS_API ts_result ts_world_get_motor(ts_world world, int32_t number, ts_motor* motor);
+TS_API ts_result ts_motor_set_speed(ts_world world, ts_motor motor, double speed);
+/* With 0 the vertices coast. */
+TS_API ts_result ts_motor_set_limit(ts_world world, ts_motor motor, double limit);
+TS_API ts_result ts_motor_remove(ts_world world, ts_motor motor);
+/* That its vertices have, after the last step. */
+TS_API ts_result ts_motor_get_speed(ts_world world, ts_motor motor, double* speed);
+/* Torque or force that it gave, mean over the last step. */
+TS_API ts_result ts_motor_get_effort(ts_world world, ts_motor motor, double* effort);
 
 /* ---- questions ---- */
 
@@ -328,6 +373,8 @@ TS_API ts_result ts_collider_move_to(ts_world world, int32_t collider, const ts_
 TS_API ts_result ts_collider_set_velocity(ts_world world, int32_t collider, const double linear[3],
                                           const double spin[3]);
 TS_API ts_result ts_collider_teleport(ts_world world, int32_t collider, const ts_pose* pose);
+/* Coulomb's coefficient, from the next step on. Who sleeps near it wakes. */
+TS_API ts_result ts_collider_set_friction(ts_world world, int32_t collider, double friction);
 TS_API ts_result ts_collider_get_pose(ts_world world, int32_t collider, ts_pose* pose);
 /* What bodies gave it in the last step, and the moment of that about its place. Either may be null. */
 TS_API ts_result ts_collider_get_impulse(ts_world world, int32_t collider, double impulse[3], double moment[3]);

@@ -59,6 +59,16 @@ struct Body {
   explicit operator bool() const { return handle != 0; }
 };
 
+// What holds a part of a body to another one, and what drives a part of one; numbers, to copy as you like.
+struct Joint {
+  ts_joint handle = 0;
+  explicit operator bool() const { return handle != 0; }
+};
+struct Motor {
+  ts_motor handle = 0;
+  explicit operator bool() const { return handle != 0; }
+};
+
 // A hand on a body, from `World::grab`; it lets go when it ends, or another is moved into it. Moves, but has no copies.
 // After `World::restore` to before it took hold it is none; as numbers are given again, let it end, or `forget` it, before
 // others take hold.
@@ -153,6 +163,14 @@ class World {
     check(ts_world_on_step(handle_, *next ? call : nullptr, next.get()));
     before_ = std::move(next);  // now that the library knows the other one no more
   }
+  // Of the floor, of a body against others, of a collider.
+  void set_friction(double friction) { check(ts_world_set_friction(handle_, friction)); }
+  void set_friction(Body body, double friction) { check(ts_body_set_friction(handle_, body.handle, friction)); }
+  void set_collider_friction(int32_t collider, double friction) {
+    check(ts_collider_set_friction(handle_, collider, friction));
+  }
+  // [m/s^2]
+  void set_gravity(const Vector& gravity) { check(ts_world_set_gravity(handle_, gravity.data())); }
   uint64_t hash() const {
     uint64_t found = 0;
     check(ts_world_hash(handle_, &found));
@@ -262,6 +280,31 @@ class World {
     check(ts_body_grab(handle_, hit.body, &pull, &found));
     return Grab(handle_, found);
   }
+
+  // Let vertices be held by another body: where they are in it, or with `onto` each at one of its vertices.
+  Joint join(Body body, const std::vector<int32_t>& vertices, Body other, const std::vector<int32_t>& onto = {}) {
+    if (!onto.empty() && onto.size() != vertices.size()) throw std::invalid_argument("onto differs in size");
+    Joint found;
+    check(ts_body_join(handle_, body.handle, vertices.data(), vertices.size(), other.handle,
+                       onto.empty() ? nullptr : onto.data(), &found.handle));
+    return found;
+  }
+  void release(Joint joint) { check(ts_joint_release(handle_, joint.handle)); }
+  // With what the other body pulls, mean over the last step [N].
+  Vector force(Joint joint) const {
+    Vector found;
+    check(ts_joint_get_force(handle_, joint.handle, found.data()));
+    return found;
+  }
+  Motor add_motor(Body body, const std::vector<int32_t>& vertices, ts_drive drive) {
+    Motor found;
+    drive.struct_size = sizeof drive;
+    check(ts_body_add_motor(handle_, body.handle, vertices.data(), vertices.size(), &drive, &found.handle));
+    return found;
+  }
+  void set_speed(Motor motor, double speed) { check(ts_motor_set_speed(handle_, motor.handle, speed)); }
+  void set_limit(Motor motor, double limit) { check(ts_motor_set_limit(handle_, motor.handle, limit)); }
+  void remove(Motor motor) { check(ts_motor_remove(handle_, motor.handle)); }
 
   // Its body is 0 where nothing is met.
   ts_hit raycast(const Vector& origin, const Vector& direction, double max_distance = HUGE_VAL) const {

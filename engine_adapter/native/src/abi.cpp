@@ -206,6 +206,12 @@ void fill_shape(const Turn& world, const ts_shape& shape, Collider* row) {
       half = {radius, radius, along + radius};
       break;
     }
+    case kHeightField:
+    case kMeshShape:
+      fail(TS_ERROR_ARGUMENT,
+           "kind is %d: height fields and meshes have a grid of distances, which Python makes before the export. Export "
+           "the world with them, and move them here",
+           shape.kind);
     default:
       fail(TS_ERROR_ARGUMENT, "kind is %d: give TS_PLANE to TS_CAPSULE", shape.kind);
   }
@@ -218,6 +224,16 @@ void fill_shape(const Turn& world, const ts_shape& shape, Collider* row) {
   row->restitution = shape.restitution < 0.0 ? -1.0 : shape.restitution;
   row->group = shape.group;
   row->mask = shape.mask;
+}
+
+// Of a motor that turns: rad/s and a moment. Of one that pushes: length/s and a force.
+double motor_speed_in(const Turn& world, bool turns, double host) {
+  return turns ? host : world.axes().length_in(host);
+}
+
+double motor_limit_in(const Turn& world, bool turns, double host) {
+  const double once = world.axes().length_in(host);
+  return turns ? world.axes().length_in(once) : once;
 }
 
 Vertices list(const int32_t* vertices, size_t count) {
@@ -238,6 +254,17 @@ Struct* sized(Struct* given_struct, const char* name) {
 
 void require_size(size_t count, size_t needed, const char* name) {
   if (count != needed) fail(TS_ERROR_SIZE, "%s has room for %zu numbers: give room for %zu", name, count, needed);
+}
+
+Drive drive_of(const Turn& world, const ts_drive& host) {
+  Drive found{};
+  found.turns = host.turns != 0, found.is_fixed = host.is_fixed != 0, found.has_point = host.has_point != 0;
+  const double* axis = finite(host.axis, 3, "axis");
+  found.axis = found.turns ? world.axes().turn_in(axis) : world.axes().normal_in(axis);
+  if (found.has_point) found.point = place(world, host.point, "point");
+  found.speed = motor_speed_in(world, found.turns, host.speed);
+  found.limit = motor_limit_in(world, found.turns, host.limit);
+  return found;
 }
 
 double as_reach(const Turn& world, double host) {
@@ -475,6 +502,17 @@ ts_result ts_world_set_wind(ts_world world, const double velocity[3], double den
   });
 }
 
+ts_result ts_world_set_friction(ts_world world, double friction) {
+  return guarded([&] { Turn(world)->set_friction(friction); });
+}
+
+ts_result ts_world_set_gravity(ts_world world, const double gravity[3]) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn->set_gravity(turn.axes().place_in(finite(gravity, 3, "gravity")));
+  });
+}
+
 ts_result ts_world_radial_impulse(ts_world world, const double center[3], double impulse, double radius) {
   return guarded([&] {
     const Turn turn(world);
@@ -654,6 +692,13 @@ ts_result ts_body_set_gravity_scale(ts_world world, ts_body body, double scale) 
   });
 }
 
+ts_result ts_body_set_friction(ts_world world, ts_body body, double friction) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn->set_body_friction(turn->slot_of(body), friction);
+  });
+}
+
 ts_result ts_body_set_damping(ts_world world, ts_body body, double rate) {
   return guarded([&] {
     const Turn turn(world);
@@ -752,6 +797,86 @@ ts_result ts_grab_get_force(ts_world world, ts_grab grab, double force[3]) {
   });
 }
 
+ts_result ts_body_join(ts_world world, ts_body body, const int32_t* vertices, size_t count, ts_body other,
+                       const int32_t* onto, ts_joint* joint) {
+  return guarded([&] {
+    const Turn turn(world);
+    given(joint, "joint");
+    const int32_t slot = turn->slot_of(body);
+    *joint = turn->join(slot, list(vertices, count), turn->slot_of(other), onto);
+  });
+}
+
+ts_result ts_world_get_joint(ts_world world, int32_t number, ts_joint* joint) {
+  return guarded([&] {
+    const Turn turn(world);
+    *given(joint, "joint") = turn->joint_at(number);
+  });
+}
+
+ts_result ts_joint_release(ts_world world, ts_joint joint) {
+  return guarded([&] { Turn(world)->release_joint(joint); });
+}
+
+ts_result ts_joint_get_force(ts_world world, ts_joint joint, double force[3]) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn.axes().place_out(turn->joint_force(joint), given(force, "force"));
+  });
+}
+
+ts_result ts_body_add_motor(ts_world world, ts_body body, const int32_t* vertices, size_t count, const ts_drive* drive,
+                            ts_motor* motor) {
+  return guarded([&] {
+    const Turn turn(world);
+    sized(drive, "drive");
+    given(motor, "motor");
+    *motor = turn->add_motor(turn->slot_of(body), list(vertices, count), drive_of(turn, *drive));
+  });
+}
+
+ts_result ts_world_get_motor(ts_world world, int32_t number, ts_motor* motor) {
+  return guarded([&] {
+    const Turn turn(world);
+    *given(motor, "motor") = turn->motor_at(number);
+  });
+}
+
+ts_result ts_motor_set_speed(ts_world world, ts_motor motor, double speed) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn->set_motor_speed(motor, motor_speed_in(turn, turn->turns(motor), speed));
+  });
+}
+
+ts_result ts_motor_set_limit(ts_world world, ts_motor motor, double limit) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn->set_motor_limit(motor, motor_limit_in(turn, turn->turns(motor), limit));
+  });
+}
+
+ts_result ts_motor_remove(ts_world world, ts_motor motor) {
+  return guarded([&] { Turn(world)->remove_motor(motor); });
+}
+
+ts_result ts_motor_get_speed(ts_world world, ts_motor motor, double* speed) {
+  return guarded([&] {
+    const Turn turn(world);
+    given(speed, "speed");
+    *speed = turn->motor_speed(motor) * (turn->turns(motor) ? 1.0 : turn.axes().scale());
+  });
+}
+
+ts_result ts_motor_get_effort(ts_world world, ts_motor motor, double* effort) {
+  return guarded([&] {
+    const Turn turn(world);
+    given(effort, "effort");
+    const double scale = turn.axes().scale();
+    *effort = turn->motor_effort(motor) * (turn->turns(motor) ? scale * scale : scale);
+  });
+}
+
 ts_result ts_world_raycast(ts_world world, const double origin[3], const double direction[3], double reach,
                            ts_hit* hit) {
   return guarded([&] {
@@ -831,6 +956,10 @@ ts_result ts_collider_teleport(ts_world world, int32_t collider, const ts_pose* 
     const Turn turn(world);
     turn->teleport_collider(collider, pose(turn, where));
   });
+}
+
+ts_result ts_collider_set_friction(ts_world world, int32_t collider, double friction) {
+  return guarded([&] { Turn(world)->set_collider_friction(collider, friction); });
 }
 
 ts_result ts_collider_get_pose(ts_world world, int32_t collider, ts_pose* where) {

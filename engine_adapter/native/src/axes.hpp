@@ -13,6 +13,7 @@ class Axes {
   Vector place_in(const double* host) const { return in(host, 1.0 / scale_); }
   void place_out(const Vector& ours, double* host) const { out(ours, scale_, host); }
   void normal_out(const Vector& ours, double* host) const { out(ours, 1.0, host); }
+  Vector normal_in(const double* host) const { return in(host, 1.0); }
   // Of what turns something: angular velocities, and moments (of the engine's unit, squared, for those).
   Vector turn_in(const double* host) const { return in(host, handedness_); }
   void moment_out(const Vector& ours, double* host) const { out(ours, handedness_ * scale_ * scale_, host); }

@@ -10,6 +10,9 @@
 
 namespace taichi_soft {
 
+// Kinds of shapes with a grid, as taichi_soft/contact/distances/kinds.py has them, behind TS_PLANE to TS_CAPSULE.
+enum { kHeightField = 4, kMeshShape = 5 };
+
 struct Pose {
   Vector position;
   Quaternion rotation;

@@ -37,7 +37,7 @@ Machine::Machine(const Scene& scene) : scene_(scene), runtime_(std::make_unique<
   runtime_->parallel_for = run_on_threads;
 }
 
-void Machine::launch(const char* kernel, const std::vector<Argument>& arguments) {
+float Machine::launch(const char* kernel, const std::vector<Argument>& arguments) {
   packed_.clear();
   for (const Argument& each : arguments) {
     if (each.kind == Argument::kWhole) pack(&packed_, each.whole);
@@ -51,9 +51,12 @@ void Machine::launch(const char* kernel, const std::vector<Argument>& arguments)
     }
   }
   packed_.resize(packed_.size() + sizeof(void*));
-  int64_t result[8];
+  int64_t result[8] = {};
   Context context = {packed_.data(), runtime_.get(), 0, result};
   scene_.kernel(kernel)(&context);
+  float number;
+  std::memcpy(&number, result, sizeof number);
+  return number;
 }
 
 }  // namespace taichi_soft

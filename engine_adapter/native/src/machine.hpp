@@ -52,7 +52,8 @@ class Machine {
   static Argument array(const Buffer& buffer, uint32_t rows, uint32_t width = 0) {
     return array(buffer.data(), rows, width);
   }
-  void launch(const char* kernel, const std::vector<Argument>& arguments);
+  // Returns: what kernels return that return a number.
+  float launch(const char* kernel, const std::vector<Argument>& arguments);
 
   Threads threads;
   Buffer numbers, rows, found, vertices, frames, positions, normals;

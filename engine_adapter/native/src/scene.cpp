@@ -83,7 +83,8 @@ bool is_skin_whole(const Mesh& mesh, size_t n) {
   return true;
 }
 
-const char* const kKinds[] = {"names/body", "names/asset", "names/collider", "names/frame", "names/mesh"};
+const char* const kKinds[] = {"names/body", "names/asset", "names/collider", "names/frame", "names/mesh",
+                              "names/joint", "names/motor"};
 
 }  // namespace
 
@@ -104,7 +105,7 @@ Scene::Scene(std::vector<char> world, const std::string& name)
     : archive(std::move(world), name),
       axes(archive.rows<double>("host_axes", 3).count == 9 ? archive.get<double>("host_axes").data
                                                            : (out_of_order("axes"), nullptr)) {
-  for (int kind = 0; kind < 5; ++kind) names_[kind] = archive.texts(kKinds[kind]);
+  for (int kind = 0; kind < 7; ++kind) names_[kind] = archive.texts(kKinds[kind]);
   const auto flags = archive.get<int32_t>("world/flags"), counts = archive.get<int32_t>("world/counts");
   const auto stable = archive.get<double>("world/stable"), limits = archive.get<double>("world/limits");
   const auto floors = archive.get<double>("world/floor");
@@ -125,6 +126,9 @@ Scene::Scene(std::vector<char> world, const std::string& name)
   stable_share = stable[0], stable_step = stable[1];
   has_floor = floors.count == 1;
   floor = has_floor ? floors[0] : 0.0;
+  const auto floor_colliders = archive.get<int32_t>("world/floor_collider");
+  if (floor_colliders.count != 1) out_of_order("the floor");
+  floor_collider = floor_colliders[0];
   position_limit = limits[0], velocity_limit = limits[1], spin_limit = limits[2];
   impulse_limit = limits[3], push_limit = limits[4];
   shortest_step = limits[5], longest_step = limits[6];
@@ -155,11 +159,12 @@ void Scene::read_fields() {
   if (rows.count != 5 * field_names_.size()) out_of_order("fields");
   for (size_t i = 0; i < field_names_.size(); ++i) places_.push_back(place_from(rows.data + 5 * i, image));
   const auto kept = archive.rows<int64_t>("fields/carried", 8);
-  carried_words = 0;
   for (size_t i = 0; i + 8 <= kept.count; i += 8) {
-    Carried each = {place_from(kept.data + i, image), size_t(kept[i + 5]), kept[i + 6] != 0, kept[i + 7] != 0};
-    if (kept[i + 5] < 0 || each.count > each.place.count) out_of_order("what snapshots have");
-    carried_words += each.count * each.place.width;
+    const Carried each = {place_from(kept.data + i, image), size_t(kept[i + 5]), int(kept[i + 6]), kept[i + 7] != 0};
+    if (kept[i + 5] < 0 || each.whose < Carried::kAlways || each.whose > Carried::kOfMotors ||
+        each.count > each.place.count) {
+      out_of_order("what snapshots have");
+    }
     carried.push_back(each);
   }
 }
@@ -178,12 +183,22 @@ void Scene::read_assets() {
                    archive.get<int32_t>(prefix + "elements"),
                    archive.get<double>(prefix + "element_stiffness"),
                    0,
+                   archive.get<int32_t>(prefix + "tets"),
+                   archive.get<int32_t>(prefix + "hull"),
+                   archive.get<double>(prefix + "hull_weights"),
+                   0.0,
+                   0.0,
                    0.0,
                    0};
     const auto center = archive.get<double>(prefix + "center"), skin = archive.get<double>(prefix + "thickness");
+    const auto wave_speed = archive.get<double>(prefix + "wave_speed");
+    const auto friction = archive.get<double>(prefix + "friction");
     const size_t n = asset.vertex_count();
     if (asset.rest_rows.count != 8 * n || asset.vertices.count != 3 * n || asset.rank.count != n || center.count != 3 ||
-        skin.count != 1 || !are_places(asset.vertices) || asset.elements.sizes.size() != 2 ||
+        skin.count != 1 || friction.count != 1 || wave_speed.count != 1 ||
+        asset.tets.count % 4 != 0 || !are_below(asset.tets, n) || asset.hull.count % 4 != 0 ||
+        !are_below(asset.hull, n) || asset.hull_weights.count != asset.hull.count ||
+        !are_places(asset.vertices) || asset.elements.sizes.size() != 2 ||
         !are_below(asset.elements, n) || !are_below(asset.pinned, n) || !are_below(asset.outer, n) ||
         !are_below(asset.rank, n) || !are_below(asset.surface, n)) {
       out_of_order("an asset");
@@ -194,7 +209,8 @@ void Scene::read_assets() {
       out_of_order("an asset");
     }
     asset.center = {center[0], center[1], center[2]};
-    asset.thickness = skin[0];
+    asset.thickness = skin[0], asset.friction = friction[0], asset.wave_speed = wave_speed[0];
+    if (asset.element_width == 4) asset.tets = asset.elements;
     assets.push_back(asset);
   }
   for (int32_t slot = 0; slot < slot_count; ++slot) {
@@ -231,7 +247,7 @@ void Scene::read_meshes() {
 }
 
 const std::vector<std::string>& Scene::names(int32_t kind) const {
-  if (kind < 0 || kind > 4) fail(TS_ERROR_ARGUMENT, "kind is %d: give TS_BODY to TS_MESH", kind);
+  if (kind < 0 || kind > 6) fail(TS_ERROR_ARGUMENT, "kind is %d: give TS_BODY to TS_MOTOR", kind);
   return names_[kind];
 }
 

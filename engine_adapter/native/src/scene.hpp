@@ -19,9 +19,10 @@ struct Place {
 };
 
 struct Carried {  // a field that snapshots have, and how many of its elements
+  enum { kAlways, kOfJoints, kOfMotors };
   Place place;
-  size_t count;
-  bool is_fixed;   // no call changes its whole numbers
+  size_t count;    // for each row that joints or motors hold, if it is one of theirs
+  int whose;
   bool is_finite;  // it moves bodies
 };
 
@@ -34,7 +35,10 @@ struct Asset {
   Archive::View<int32_t> elements;  // vertices of each: 2 of springs, 4 of tetrahedra
   Archive::View<double> element_stiffness;
   size_t element_width;
-  double thickness;
+  Archive::View<int32_t> tets;
+  Archive::View<int32_t> hull;  // four vertices of each point of its hull; none where it touches by its surface
+  Archive::View<double> hull_weights;
+  double thickness, friction, wave_speed;
   int32_t slot_count;
   size_t vertex_count() const { return masses.count; }
 };
@@ -65,6 +69,7 @@ class Scene {
   double stable_share, stable_step;  // see `Substeps.rule`
   bool has_floor;
   double floor;
+  int32_t floor_collider;  // the floor, where there are colliders; -1 where it is none
   double position_limit, velocity_limit, spin_limit, impulse_limit, push_limit, shortest_step, longest_step;
   double patch_size, farthest_pull, pull_in_weights, highest_pull_speed;  // of grabs; the third in N/kg
   size_t patch_rows;
@@ -72,7 +77,6 @@ class Scene {
   std::vector<int32_t> asset_of_slot, begin_of_slot;
   std::vector<Mesh> meshes;
   std::vector<Carried> carried;
-  size_t carried_words;
   uint32_t code = 0;  // of what a snapshot fits into
 
  private:
@@ -82,7 +86,7 @@ class Scene {
   void read_meshes();
   void read_fields();
 
-  std::vector<std::string> names_[5];
+  std::vector<std::string> names_[7];
   std::vector<std::string> field_names_;
   std::vector<Place> places_;
   std::unique_ptr<Kernels> code_;

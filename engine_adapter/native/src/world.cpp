@@ -14,6 +14,7 @@ constexpr double kRoundOff = 1e-9;  // of a step, as in engine_adapter/fixed_ste
 constexpr int32_t kMostThreads = 256;
 constexpr int32_t kAll = std::numeric_limits<int32_t>::max();
 
+const char* const kMotorFields[] = {"body", "first", "end", "turns", "is_fixed", "has_point"};
 const char* const kColliderFields[] = {"position", "rotation", "velocity", "spin", "lower", "upper", "speed"};
 
 }  // namespace
@@ -22,15 +23,22 @@ World::World(std::shared_ptr<Scene> scene) : scene_(std::move(scene)), machine_(
   const Archive& archive = scene_->archive;
   const auto clock = archive.get<double>("world/clock");
   const auto steps = archive.get<int64_t>("world/steps");
+  const auto surroundings = archive.get<double>("world/surroundings");
   const auto poses = archive.get<float>("frames/poses");
   const size_t frames = poses.count / 24, named = scene_->names(TS_FRAME).size();
   const auto alive = archive.get<int32_t>("frames/alive");
   const auto feels = archive.get<unsigned char>("frames/feels");
-  if (clock.count != 2 || steps.count != 1 || poses.count != 24 * frames || frames == 0 || named > frames ||
-      alive.count != named || feels.count != size_t(scene_->particle_count)) {
-    fail(TS_ERROR_FILE, "the world file is not in order: clock or frames. Export it again");
+  if (clock.count != 2 || steps.count != 1 || surroundings.count != 4 || poses.count != 24 * frames || frames == 0 ||
+      named > frames || alive.count != named || feels.count != size_t(scene_->particle_count)) {
+    fail(TS_ERROR_FILE, "the world file is not in order: clock, surroundings or frames. Export it again");
   }
   steps_ = steps[0], time_ = clock[0], last_dt_ = clock[1];
+  surroundings_ = {{surroundings[0], surroundings[1], surroundings[2]}, surroundings[3]};
+  const auto frictions = archive.get<double>("slots/friction");
+  friction_.assign(frictions.begin(), frictions.end());
+  if (friction_.size() != size_t(scene_->slot_count)) {
+    fail(TS_ERROR_FILE, "the world file is not in order: frictions. Export it again");
+  }
   present_.assign(poses.data, poses.data + 12 * frames);
   coming_.assign(poses.data + 12 * frames, poses.data + 24 * frames);
   frame_alive_.assign(frames, 0);  // a row that no frame ever had is there where there is none
@@ -40,6 +48,8 @@ World::World(std::shared_ptr<Scene> scene) : scene_(std::move(scene)), machine_(
   events_ = Events(archive, size_t(scene_->slot_count));
   generations_.assign(size_t(scene_->slot_count), 1);
   grab_generations_.assign(kMostGrabs, 1);
+  joint_generations_.assign(kMostJoints, 1);
+  motor_generations_.assign(kMostMotors, 1);
   bind();
   require_image();
 }
@@ -62,6 +72,8 @@ void World::bind() {
   gravity_scale_ = {root, s.place("body_gravity_scale", bodies, 1)};
   damping_ = {root, s.place("body_damping", bodies, 1)};
   wind_ = {root, s.place("wind", 1, 4)};
+  gravity_ = {root, s.place("gravity", 1, 3)};
+  floor_ = {root, s.place("floor", 1, 3)};
   target_ = {root, s.place("particle_target", particles, 3)};
   reaction_ = {root, s.place("particle_reaction", particles, 3)};
   if (s.is_implicit) particle_contact_ = {root, s.place("particle_contact", particles, 1)};
@@ -75,9 +87,24 @@ void World::bind() {
   grab_count_ = {root, s.place("grabs.count", kMostGrabs, 1)};
   grab_particle_ = {root, s.place("grabs.particle", kMostGrabs * kPatchRows, 1)};
   grab_share_ = {root, s.place("grabs.share", kMostGrabs * kPatchRows, 1)};
+  for (size_t i = 0; i < 6; ++i) {
+    motor_wholes_[i] = {root, s.place(std::string("motors.motor.") + kMotorFields[i], kMostMotors)};
+  }
+  motor_axis_ = {root, s.place("motors.motor.axis", kMostMotors, 3)};
+  motor_point_ = {root, s.place("motors.motor.point", kMostMotors, 3)};
+  motor_speed_ = {root, s.place("motors.motor.speed", kMostMotors)};
+  motor_limit_ = {root, s.place("motors.motor.limit", kMostMotors)};
+  motor_impulse_ = {root, s.place("motors.impulse", kMostMotors)};
+  motor_particle_ = {root, s.place("motors.particle", kMotorRows)};
   if (s.patch_rows != kPatchRows) fail(TS_ERROR_FILE, "the world file is not in order: grabs. Export it again");
-  if (s.has_soft_contact) records_touches_ = {root, s.place("soft.records_touches", 1, 1)};
+  if (s.has_soft_contact) {
+    records_touches_ = {root, s.place("soft.records_touches", 1, 1)};
+    body_surface_ = {root, s.place("soft.body_surface", bodies, 3)};
+  }
   if (!s.has_contact) return;
+  joint_bodies_ = {root, s.place("joints.bodies", kMostJoints, 2)};
+  joint_span_ = {root, s.place("joints.rows", kMostJoints, 2)};
+  joint_impulse_ = {root, s.place("joints.impulse", kMostJoints, 3)};
   island_count_ = {root, s.place("contact.island_count", 1, 1)};
   const size_t rows = colliders_.rows.size();
   const Place kind = s.place("contact.collider_kind", rows, 1);
@@ -262,16 +289,22 @@ void World::wake_near(const Box& box) {
   is_still_ = false;
 }
 
+// Round a body and what it touches others by.
 Box World::box_of(int32_t slot) const {
   const Asset& asset = asset_of(slot);
+  std::vector<Vector> points(asset.vertex_count());
+  for (size_t v = 0; v < points.size(); ++v) points[v] = vertex_place(slot, int32_t(v));
+  if (asset.hull.count > 0) {
+    const std::vector<Vector> hull = touching_points(asset, points);
+    points.insert(points.end(), hull.begin(), hull.end());
+  }
   Box box;
   for (int k = 0; k < 3; ++k) {
     box.lower[k] = std::numeric_limits<double>::infinity();
     box.upper[k] = -box.lower[k];
-    for (size_t v = 0; v < asset.vertex_count(); ++v) {
-      const double x = position_(particle(slot, v), k);
-      box.lower[k] = std::min(box.lower[k], x);
-      box.upper[k] = std::max(box.upper[k], x);
+    for (const Vector& each : points) {
+      box.lower[k] = std::min(box.lower[k], each[k]);
+      box.upper[k] = std::max(box.upper[k], each[k]);
     }
     box.lower[k] = box.lower[k] - asset.thickness;
     box.upper[k] = box.upper[k] + asset.thickness;

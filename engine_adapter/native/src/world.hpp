@@ -15,11 +15,15 @@ namespace taichi_soft {
 
 // As taichi_soft/bodies/status.py has them.
 enum Status { kActive, kFrozen, kAsleep, kSkipping, kAbsent };
-enum Drives { kMovesPins = 1, kFeelsReaction = 2, kDamped = 8, kSheltered = 16, kGrabbed = 32, kJoined = 64 };
+enum Drives { kMovesPins = 1, kFeelsReaction = 2, kDamped = 8, kSheltered = 16, kGrabbed = 32 };
 enum Aims { kStill = 0, kWithFrame = 3 };  // as taichi_soft/control/kernels/pins.py has them
 
 // As taichi_soft/control/kernels/grabs.py has them; fields of other sizes are refused.
 constexpr size_t kMostGrabs = 16, kPatchRows = 128, kGrabCorners = 4;
+
+// As taichi_soft/control/kernels/joints.py and motors.py have them.
+constexpr size_t kMostJoints = 64, kJointRows = 2048, kJointEnds = 5;
+constexpr size_t kMostMotors = 64, kMotorRows = 16384;
 
 constexpr size_t kMostFrames = 100000;
 
@@ -52,6 +56,18 @@ struct Hit {
   double weights[3];
   Vector point, normal;
   bool is_inside = false;
+};
+
+// What holds for all bodies.
+struct Surroundings {
+  Vector gravity;   // [m/s^2]
+  double friction;  // of the floor
+};
+
+struct Drive {  // what a motor does
+  bool turns, is_fixed, has_point;
+  Vector axis, point;  // the latter 0 where there is none
+  double speed, limit;
 };
 
 struct SnapshotHead;
@@ -111,8 +127,28 @@ class World {
   void release(ts_grab grab);
   Vector grab_force(ts_grab grab) const;
 
+  // Joints: their handles.
+  ts_joint joint_at(int32_t number) const;
+  ts_joint join(int32_t slot, Vertices which, int32_t other, const int32_t* onto);
+  void release_joint(ts_joint joint);
+  Vector joint_force(ts_joint joint) const;
+
+  // Motors.
+  ts_motor motor_at(int32_t number) const;
+  bool turns(ts_motor motor) const;
+  ts_motor add_motor(int32_t slot, Vertices which, const Drive& drive);
+  void set_motor_speed(ts_motor motor, double speed);
+  void set_motor_limit(ts_motor motor, double limit);
+  void remove_motor(ts_motor motor);
+  double motor_speed(ts_motor motor);
+  double motor_effort(ts_motor motor) const;
+
   // All of them.
   void wake();
+  void set_gravity(const Vector& gravity);
+  void set_friction(double friction);  // of the floor
+  void set_collider_friction(int32_t number, double friction);
+  void set_body_friction(int32_t slot, double friction);
   void set_wind(const Vector& velocity, double density, double drag);
   void radial_impulse(const Vector& center, double impulse, double radius);
 
@@ -150,6 +186,18 @@ class World {
   void restore(const char* bytes, size_t size);
 
  private:
+  struct Holder {  // a place in a body: weights of four vertices
+    int32_t vertices[4];
+    double weights[4];
+  };
+  struct MotorRow {
+    size_t number;
+    int32_t slot, kind[3];  // turns, is_fixed, has_point
+    float axis[3], point[3], speed, limit;
+    std::vector<int32_t> particles;
+  };
+  class Packed;
+
   void bind();
   uint32_t give_living();
   Hit hit_from(const float* row) const;
@@ -158,6 +206,11 @@ class World {
   void require_image() const;
   bool are_rows_in_order(const char* at, const SnapshotHead& head) const;
   bool is_in_order(const Contact& contact, size_t colliders) const;
+  bool is_in_order(const Surroundings& given) const;
+  static bool are_frictions(const double* numbers, size_t count);
+  void write_surroundings();
+  bool is_floor(int32_t number) const;
+  void give_friction(int32_t slot, double friction);
   Present present() const;
   std::map<Pair, std::array<float, 3>> look();
   void take_down(double dt, const std::vector<int32_t>& frozen);
@@ -167,6 +220,25 @@ class World {
   void let_go(int32_t slot, const std::vector<int32_t>& vertices);
   size_t grab_of(ts_grab grab) const;  // its number
   void end_grab(size_t number);
+  std::vector<Vector> touching_points(const Asset& asset, const std::vector<Vector>& x) const;
+  Vector vertex_place(int32_t slot, int32_t vertex) const;
+  std::vector<Holder> holders_at(int32_t slot, const std::vector<int32_t>& vertices, int32_t other) const;
+  std::vector<Holder> holders_on(int32_t other, const std::vector<int32_t>& partners) const;
+  double follow_speed(int32_t slot, std::vector<int32_t> held) const;
+  size_t joint_of(ts_joint joint) const;  // its number
+  size_t joint_rows() const;              // particles that all joints hold together
+  void end_joint(size_t number);
+  void joints_have_changed();
+  Vector axis_at_rest(int32_t slot, const std::vector<int32_t>& vertices, const Vector& axis) const;
+  std::vector<MotorRow> motors() const;
+  void write_motors(const std::vector<MotorRow>& rows);
+  void mark_driven();
+  size_t motor_of(ts_motor motor) const;
+  size_t motor_rows() const;
+  void end_motor(size_t number);
+  bool are_joints_in_order(const Packed& packed, const SnapshotHead& head) const;
+  bool are_motors_in_order(const Packed& packed, const SnapshotHead& head) const;
+  bool lies_in(int32_t particle, int32_t slot) const;
   void write_colliders();
   bool aim_pins(double dt);
   bool prepare_colliders(double dt);
@@ -189,11 +261,13 @@ class World {
   Colliders colliders_;
   std::vector<ColliderMotion> motion_;
   Events events_;
+  Surroundings surroundings_;
+  std::vector<double> friction_;  // of each body against others
   std::vector<float> present_, coming_;  // of frames, after the last step and the coming one: rotation row by row
                                          // and place, (f, 12)
   std::vector<unsigned char> frame_alive_;
   std::vector<unsigned char> feels_;  // of each particle: it hangs from a frame, which is asked for its load
-  std::vector<uint32_t> generations_, grab_generations_;
+  std::vector<uint32_t> generations_, grab_generations_, joint_generations_, motor_generations_;
 
   int64_t steps_ = 0;
   double time_ = 0.0, last_dt_ = 0.0;
@@ -208,9 +282,14 @@ class World {
 
   Field<int32_t> body_status_, body_drives_, particle_aim_, is_awake_, failed_, is_driven_, island_count_;
   Field<float> position_, velocity_, mass_, inv_mass_, lag_, gravity_scale_, damping_, wind_, target_, reaction_;
+  Field<float> gravity_, floor_, body_surface_;
   Field<int32_t> particle_contact_, records_touches_;
   Field<int32_t> grab_body_, grab_corners_, grab_count_, grab_particle_;
   Field<float> grab_weights_, grab_target_, grab_spring_, grab_limits_, grab_force_, grab_share_;
+  Field<int32_t> joint_bodies_, joint_span_;
+  Field<float> joint_impulse_;
+  Field<int32_t> motor_wholes_[6], motor_particle_;  // body, first and end, turns, is_fixed, has_point
+  Field<float> motor_axis_, motor_point_, motor_speed_, motor_limit_, motor_impulse_;
   Field<float> collider_[7], collider_parameters_, collider_surface_;
   Field<int32_t> collider_kind_, collider_filter_, collider_count_;
   size_t collider_room_ = 0;

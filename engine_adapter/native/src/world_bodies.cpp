@@ -27,6 +27,22 @@ int32_t World::slot_of(ts_body body) const {
   return static_cast<int32_t>(slot);
 }
 
+// By what a body touches colliders, its vertices being at `x`.
+std::vector<Vector> World::touching_points(const Asset& asset, const std::vector<Vector>& x) const {
+  std::vector<Vector> found;
+  if (asset.hull.count == 0) {
+    for (int32_t v : asset.outer) found.push_back(x[size_t(v)]);
+  }
+  for (size_t h = 0; h < asset.hull.count; h += 4) {
+    Vector point = {0.0, 0.0, 0.0};
+    for (size_t i = h; i < h + 4; ++i) {
+      for (size_t k = 0; k < 3; ++k) point[k] += asset.hull_weights[i] * x[size_t(asset.hull[i])][k];
+    }
+    found.push_back(point);
+  }
+  return found;
+}
+
 std::vector<float> World::place_rows(const Asset& asset, const Vector& place, const Quaternion& turn,
                                      const Vector& drift, const Vector& spin) const {
   const Matrix rows = matrix_of(turn);
@@ -48,7 +64,7 @@ std::vector<float> World::place_rows(const Asset& asset, const Vector& place, co
     fail(TS_ERROR_ARGUMENT, "position puts the body beyond %g m: stay nearer the origin", scene_->position_limit);
   }
   double lowest = std::numeric_limits<double>::infinity();
-  for (int32_t v : asset.outer) lowest = std::min(lowest, x[v][2]);
+  for (const Vector& each : touching_points(asset, x)) lowest = std::min(lowest, each[2]);
   if (scene_->has_floor && lowest < scene_->floor - 1e-3 * (highest - lowest)) {
     fail(TS_ERROR_ARGUMENT, "the body would begin %.4g m below the floor: raise it", scene_->floor - lowest);
   }
@@ -96,12 +112,16 @@ ts_body World::spawn(int32_t asset, const Vector& place, const Quaternion& turn,
 }
 
 void World::despawn(int32_t slot) {
-  if ((body_drives_(slot) & kJoined) != 0 || is_driven_(slot) != 0) {
-    fail(TS_ERROR_STATE, "the body in slot %d is joined to another or driven: it cannot be taken out", slot);
+  for (size_t j = 0; scene_->has_contact && j < kMostJoints; ++j) {
+    if (joint_bodies_(j, 0) == slot + 1 || joint_bodies_(j, 1) == slot + 1) end_joint(j);
+  }
+  for (size_t m = 0; m < kMostMotors; ++m) {
+    if (motor_wholes_[0](m) == slot + 1) end_motor(m);
   }
   for (size_t g = 0; g < kMostGrabs; ++g) {
     if (grab_body_(g) == slot + 1) end_grab(g);
   }
+  give_friction(slot, asset_of(slot).friction);
   wake_near(box_of(slot));
   is_still_ = false;
   std::fill_n(feels_.begin() + std::ptrdiff_t(begin_of(slot)), asset_of(slot).vertex_count(), 0);

@@ -25,6 +25,7 @@ int32_t World::add_collider(const Collider& row) {
   colliders_.rows[size_t(number)].serial = serial;
   machine_->launch("forget_collider", {Machine::whole(scene_->slot_count), Machine::whole(number)});
   write_colliders();
+  colliders_.is_dirty = true;
   double speed;
   wake_near(row.way(0.0, &speed));
   return number;
@@ -34,6 +35,7 @@ void World::remove_collider(int32_t number) {
   Collider& row = collider(number);
   row.is_alive = false;
   write_colliders();
+  colliders_.is_dirty = true;
   double speed;
   wake_near(row.way(0.0, &speed));
 }
@@ -50,7 +52,6 @@ void World::write_colliders() {
     collider_filter_(c, 0) = row.group;
     collider_filter_(c, 1) = row.mask;
   }
-  colliders_.is_dirty = true;
 }
 
 void World::move_collider(int32_t number, const Pose& pose) {

@@ -1,5 +1,7 @@
+#include <algorithm>
 #include <cstddef>
 #include <cstring>
+#include <map>
 
 #include "error.hpp"
 #include "world.hpp"
@@ -38,7 +40,7 @@ uint64_t World::hash() const {
   return code;
 }
 
-constexpr uint64_t kSnapshotMark = 0x3250414E53534354u;
+constexpr uint64_t kSnapshotMark = 0x3350414E53534354u;
 
 // What a snapshot begins with. Behind it lie, in this order: the fields that are carried; frames, and who is felt
 // there; numbers that tell handles apart; colliders; what events depend on.
@@ -46,9 +48,10 @@ struct SnapshotHead {
   uint64_t mark, size;
   uint32_t scene, sum;
   int64_t steps;
-  uint64_t frames, colliders, contacts;
+  uint64_t frames, colliders, contacts, joint_rows, motor_rows;
   int64_t kinds;  // of events that are recorded
   double time, last_dt;
+  Surroundings surroundings;
 };
 
 namespace {
@@ -83,10 +86,22 @@ bool is_place(const Pose& pose) {
 
 constexpr size_t kFrameSize = 24 * sizeof(float) + 1;
 
+size_t count_of(const Carried& each, const SnapshotHead& head) {
+  const uint64_t rows[] = {1, head.joint_rows, head.motor_rows};
+  return each.count * size_t(rows[each.whose]);
+}
+
+size_t size_of_fields(const SnapshotHead& head, const std::vector<Carried>& carried) {
+  size_t words = 0;
+  for (const Carried& each : carried) words += count_of(each, head) * each.place.width;
+  return 4 * words;
+}
+
 // Of all behind the fields.
 size_t size_of_rest(const SnapshotHead& head, size_t slots, size_t particles) {
-  return kFrameSize * head.frames + particles + sizeof(uint32_t) * (slots + kMostGrabs) +
-         sizeof(Collider) * head.colliders + sizeof(int32_t) * (slots + 2) + sizeof(ts_body) * slots +
+  return kFrameSize * head.frames + particles + sizeof(uint32_t) * (slots + kMostGrabs + kMostJoints + kMostMotors) +
+         sizeof(double) * slots + sizeof(Collider) * head.colliders + sizeof(int32_t) * (slots + 2) +
+         sizeof(ts_body) * slots +
          sizeof(Contact) * head.contacts;
 }
 
@@ -96,7 +111,8 @@ size_t World::snapshot_size() const {
   SnapshotHead head{};
   head.frames = frame_alive_.size(), head.colliders = colliders_.rows.size();
   head.contacts = events_.contact_count();
-  return sizeof head + 4 * scene_->carried_words + size_of_rest(head, size_t(scene_->slot_count), feels_.size());
+  head.joint_rows = joint_rows(), head.motor_rows = motor_rows();
+  return sizeof head + size_of_fields(head, scene_->carried) + size_of_rest(head, size_t(scene_->slot_count), feels_.size());
 }
 
 void World::snapshot(char* bytes) const {
@@ -105,11 +121,14 @@ void World::snapshot(char* bytes) const {
   head.mark = kSnapshotMark, head.size = snapshot_size(), head.scene = scene_->code;
   head.frames = frame_alive_.size(), head.colliders = colliders_.rows.size();
   head.contacts = memory.contacts.size(), head.kinds = memory.kinds;
+  head.joint_rows = joint_rows(), head.motor_rows = motor_rows();
   head.steps = steps_, head.time = time_, head.last_dt = last_dt_;
+  head.surroundings = surroundings_;
   char* at = bytes + sizeof head;
   for (const Carried& each : scene_->carried) {
     const char* row = machine_->root() + each.place.offset;
-    for (size_t i = 0; i < each.count; ++i, row += each.place.stride) put(&at, row, 4 * each.place.width);
+    const size_t count = count_of(each, head);
+    for (size_t i = 0; i < count; ++i, row += each.place.stride) put(&at, row, 4 * each.place.width);
   }
   put_all(&at, present_);
   put_all(&at, coming_);
@@ -117,6 +136,9 @@ void World::snapshot(char* bytes) const {
   put_all(&at, feels_);
   put_all(&at, generations_);
   put_all(&at, grab_generations_);
+  put_all(&at, joint_generations_);
+  put_all(&at, motor_generations_);
+  put_all(&at, friction_);
   for (const Collider& each : colliders_.rows) {
     Collider row;
     std::memset(static_cast<void*>(&row), 0, sizeof row);  // what lies between its parts is the same every time
@@ -142,30 +164,117 @@ bool World::is_in_order(const Contact& contact, size_t colliders) const {
          is_below(contact.other, contact.kind == kOfBody ? slots : colliders);
 }
 
+// Fields as a snapshot has them, by where they lie in a world.
+class World::Packed {
+ public:
+  Packed(const World& world, const char* at, const SnapshotHead& head) {
+    for (const Carried& each : world.scene().carried) {
+      rows_[each.place.offset] = {at, each.place.width};
+      at += 4 * count_of(each, head) * each.place.width;
+    }
+    status_ = rows_.at(world.scene().place("body_status").offset).first;
+  }
+  template <typename Number = int32_t>
+  Number number(const Place& place, size_t row, size_t column = 0) const {
+    const auto& [at, width] = rows_.at(place.offset);
+    Number found;
+    std::memcpy(&found, at + 4 * (row * width + column), sizeof found);
+    return found;
+  }
+  // Whether somebody lives in the slot of this number and 1.
+  bool lives(int32_t body) const {
+    int32_t status;
+    std::memcpy(&status, status_ + 4 * (body - 1), sizeof status);
+    return status != kAbsent;
+  }
+
+ private:
+  std::map<size_t, std::pair<const char*, size_t>> rows_;
+  const char* status_;
+};
+
+bool World::lies_in(int32_t particle, int32_t slot) const {
+  const size_t begin = begin_of(slot), p = size_t(particle);
+  return p >= begin && p < begin + asset_of(slot).vertex_count();
+}
+
+// Numbers of bodies and particles are within their fields already.
+bool World::are_joints_in_order(const Packed& packed, const SnapshotHead& head) const {
+  const Scene& s = *scene_;
+  if (!s.has_contact) return head.joint_rows == 0;
+  const Place bodies = s.place("joints.bodies"), rows = s.place("joints.rows");
+  const Place particle = s.place("joints.particle"), weight = s.place("joints.weight");
+  std::vector<std::pair<size_t, size_t>> spans;
+  for (size_t j = 0; j < kMostJoints; ++j) {
+    const int32_t a = packed.number(bodies, j, 0), b = packed.number(bodies, j, 1);
+    if (a == 0) continue;
+    const size_t first = size_t(packed.number(rows, j, 0)), end = size_t(packed.number(rows, j, 1));
+    if (b == 0 || a == b || !packed.lives(a) || !packed.lives(b) || first >= end || end > head.joint_rows) return false;
+    spans.push_back({first, end});
+    for (size_t i = kJointEnds * first; i < kJointEnds * end; ++i) {
+      if (!lies_in(packed.number(particle, i), (i % kJointEnds == 0 ? a : b) - 1)) return false;
+      if (!(std::fabs(packed.number<float>(weight, i)) < 1e3f)) return false;
+    }
+  }
+  std::sort(spans.begin(), spans.end());
+  size_t next = 0;
+  for (const auto& span : spans) {
+    if (span.first != next) return false;
+    next = span.second;
+  }
+  return next == head.joint_rows;
+}
+
+bool World::are_motors_in_order(const Packed& packed, const SnapshotHead& head) const {
+  const Scene& s = *scene_;
+  const Place body = s.place("motors.motor.body"), first = s.place("motors.motor.first"),
+              end = s.place("motors.motor.end"), axis = s.place("motors.motor.axis"),
+              particle = s.place("motors.particle");
+  size_t next = 0;
+  for (size_t m = 0; m < kMostMotors; ++m) {
+    const int32_t who = packed.number(body, m);
+    if (who == 0) continue;
+    const int64_t from = packed.number(first, m), to = packed.number(end, m);
+    if (!s.has_contact || !packed.lives(who) || from != int64_t(next) || to <= from || to > int64_t(head.motor_rows)) {
+      return false;
+    }
+    Vector direction;
+    for (size_t k = 0; k < 3; ++k) direction[k] = packed.number<float>(axis, m, k);
+    if (!(length_of(direction) <= 1.001)) return false;
+    for (next = size_t(from); next < size_t(to); ++next) {
+      if (!lies_in(packed.number(particle, next), who - 1)) return false;
+    }
+  }
+  return next == head.motor_rows;
+}
+
 // Whether a step would read within its fields, and begin with what is finite.
 bool World::are_rows_in_order(const char* at, const SnapshotHead& head) const {
   const Scene& s = *scene_;
-  const std::pair<size_t, int64_t> limits[] = {// of whole numbers, by where their field lies
-                                               {s.place("body_status").offset, kAbsent + 1},
-                                               {s.place("particle_aim").offset, kWithFrame + int64_t(head.frames)},
-                                               {s.place("grabs.body").offset, s.slot_count + 1},
-                                               {s.place("grabs.corners").offset, s.particle_count},
-                                               {s.place("grabs.count").offset, int64_t(kPatchRows) + 1},
-                                               {s.place("grabs.particle").offset, s.particle_count}};
+  std::vector<std::pair<size_t, int64_t>> limits = {// of whole numbers, by where their field lies
+                                                    {s.place("body_status").offset, kAbsent + 1},
+                                                    {s.place("particle_aim").offset, kWithFrame + int64_t(head.frames)},
+                                                    {s.place("grabs.body").offset, s.slot_count + 1},
+                                                    {s.place("grabs.corners").offset, s.particle_count},
+                                                    {s.place("grabs.count").offset, int64_t(kPatchRows) + 1},
+                                                    {s.place("grabs.particle").offset, s.particle_count},
+                                                    {s.place("motors.motor.body").offset, s.slot_count + 1},
+                                                    {s.place("motors.particle").offset, s.particle_count}};
+  if (s.has_contact) {
+    limits.push_back({s.place("joints.bodies").offset, s.slot_count + 1});
+    limits.push_back({s.place("joints.rows").offset, int64_t(kJointRows) + 1});
+    limits.push_back({s.place("joints.particle").offset, s.particle_count});
+  }
+  const Packed packed(*this, at, head);
   for (const Carried& each : s.carried) {
     int64_t limit = int64_t(1) << 32;
     for (const auto& [offset, most] : limits) limit = each.place.offset == offset ? most : limit;
     const bool is_limited = limit < int64_t(1) << 32;
-    for (size_t i = 0; i < each.count * each.place.width; ++i) {
+    for (size_t i = 0; i < count_of(each, head) * each.place.width; ++i) {
       if (each.place.is_whole) {
         int32_t number;
         take(&at, &number, 1);
         if (is_limited && (number < 0 || number >= limit)) return false;
-        if (each.is_fixed) {
-          const size_t row = i / each.place.width, column = i % each.place.width;
-          const char* now = machine_->root() + each.place.offset + row * each.place.stride + 4 * column;
-          if (std::memcmp(now, &number, 4) != 0) return false;
-        }
       } else {
         float number;
         take(&at, &number, 1);
@@ -173,12 +282,16 @@ bool World::are_rows_in_order(const char* at, const SnapshotHead& head) const {
       }
     }
   }
+  if (!are_joints_in_order(packed, head) || !are_motors_in_order(packed, head)) return false;
   for (size_t i = 0; i < 24 * head.frames; ++i) {
     float number;
     take(&at, &number, 1);
     if (!(std::fabs(number) <= s.position_limit)) return false;
   }
-  at += head.frames + feels_.size() + sizeof(uint32_t) * (generations_.size() + grab_generations_.size());
+  at += head.frames + feels_.size() + sizeof(uint32_t) * (generations_.size() + kMostGrabs + kMostJoints + kMostMotors);
+  std::vector<double> frictions(friction_.size());
+  take_all(&at, &frictions);
+  if (!are_frictions(frictions.data(), frictions.size())) return false;
   for (size_t i = 0; i < head.colliders; ++i) {
     unsigned char flags[2];
     std::memcpy(flags, at + offsetof(Collider, is_alive), 1);
@@ -187,7 +300,8 @@ bool World::are_rows_in_order(const char* at, const SnapshotHead& head) const {
     Collider row;
     take(&at, &row, 1);
     // Those with a grid were there when the world was exported.
-    const bool is_known = row.kind >= 0 && (row.kind <= 3 || (i < s.names(TS_COLLIDER).size() && row.kind <= 5));
+    const bool is_known = row.kind >= 0 && (row.kind <= TS_CAPSULE ||
+                                            (i < s.names(TS_COLLIDER).size() && row.kind <= kMeshShape));
     if (!is_known || !is_place(row.pose) || (row.has_target && !is_place(row.target)) ||
         !std::isfinite(length_of(row.velocity)) || !std::isfinite(length_of(row.spin))) {
       return false;
@@ -208,7 +322,7 @@ void World::require_image() const {
   snapshot(bytes.data());
   SnapshotHead head;
   std::memcpy(&head, bytes.data(), sizeof head);
-  if (!are_rows_in_order(bytes.data() + sizeof head, head)) {
+  if (!is_in_order(head.surroundings) || !are_rows_in_order(bytes.data() + sizeof head, head)) {
     fail(TS_ERROR_FILE, "the world file is not in order: its state names what there is not. Export it again");
   }
 }
@@ -219,7 +333,9 @@ void World::restore(const char* bytes, size_t size) {
   std::memcpy(&head, bytes, sizeof head);
   if (head.mark != kSnapshotMark) fail(TS_ERROR_SNAPSHOT, "these bytes are no snapshot");
   if (head.scene != scene_->code) fail(TS_ERROR_SNAPSHOT, "this snapshot is of another world file");
-  const size_t slots = size_t(scene_->slot_count), fields = sizeof head + 4 * scene_->carried_words;
+  const size_t slots = size_t(scene_->slot_count);
+  if (head.joint_rows > kJointRows || head.motor_rows > kMotorRows) fail(TS_ERROR_SNAPSHOT, "this snapshot is cut off");
+  const size_t fields = sizeof head + size_of_fields(head, scene_->carried);
   if (head.size != size || head.frames == 0 || head.frames > kMostFrames || head.colliders > collider_room_ ||
       head.contacts > slots * events_.touch_rows || size != fields + size_of_rest(head, slots, feels_.size()) ||
       (head.kinds & ~int64_t(TS_ALL_EVENTS)) != 0 || head.steps < 0 || !std::isfinite(head.time) ||
@@ -233,7 +349,7 @@ void World::restore(const char* bytes, size_t size) {
   if (sum != checksum(whole.data(), size)) {
     fail(TS_ERROR_SNAPSHOT, "this snapshot is damaged: its checksum is wrong");
   }
-  if (!are_rows_in_order(bytes + sizeof head, head)) {
+  if (!is_in_order(head.surroundings) || !are_rows_in_order(bytes + sizeof head, head)) {
     fail(TS_ERROR_SNAPSHOT, "this snapshot is not in order: it names what there is not");
   }
   // What may find no memory comes before what changes the world.
@@ -242,10 +358,12 @@ void World::restore(const char* bytes, size_t size) {
                            std::vector<Contact>(size_t(head.contacts))};
   present_.reserve(12 * frames), coming_.reserve(12 * frames), frame_alive_.reserve(frames);
   colliders_.rows.reserve(size_t(head.colliders));
+  if (scene_->has_contact) machine_->launch("forget_held", {});
   const char* at = bytes + sizeof head;
   for (const Carried& each : scene_->carried) {
     char* row = machine_->root() + each.place.offset;
-    for (size_t i = 0; i < each.count; ++i, row += each.place.stride) take(&at, row, 4 * each.place.width);
+    const size_t count = count_of(each, head);
+    for (size_t i = 0; i < count; ++i, row += each.place.stride) take(&at, row, 4 * each.place.width);
   }
   present_.resize(12 * frames), coming_.resize(12 * frames), frame_alive_.resize(frames);
   take_all(&at, &present_);
@@ -254,12 +372,20 @@ void World::restore(const char* bytes, size_t size) {
   take_all(&at, &feels_);
   take_all(&at, &generations_);
   take_all(&at, &grab_generations_);
+  take_all(&at, &joint_generations_);
+  take_all(&at, &motor_generations_);
+  take_all(&at, &friction_);
   colliders_.rows.resize(size_t(head.colliders));
   take_all(&at, &colliders_.rows);
   take_all(&at, &memory.status);
   take_all(&at, &memory.sleepers);
   take_all(&at, &memory.contacts);
   if (scene_->has_contact) write_colliders();
+  mark_driven();
+  joints_have_changed();
+  surroundings_ = head.surroundings;
+  write_surroundings();
+  for (int32_t slot = 0; slot < scene_->slot_count; ++slot) give_friction(slot, friction_[size_t(slot)]);
   steps_ = head.steps, time_ = head.time, last_dt_ = head.last_dt;
   colliders_.is_dirty = has_work_ = true;
   is_still_ = false;

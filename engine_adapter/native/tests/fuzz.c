@@ -205,11 +205,58 @@ static ts_result add_frame(ts_world world) {
   return result;
 }
 
+static ts_joint any_joint(ts_world world) {
+  ts_joint found = 0;
+  if (bad(15)) return next();
+  ts_world_get_joint(world, (int32_t)below(bad(4) ? 66 : 3), &found);
+  return found;
+}
+
+static ts_motor any_motor(ts_world world) {
+  ts_motor found = 0;
+  if (bad(15)) return next();
+  ts_world_get_motor(world, (int32_t)below(bad(4) ? 66 : 3), &found);
+  return found;
+}
+
+static ts_result join(ts_world world, ts_body body) {
+  static int32_t partners[32];
+  size_t count = 0;
+  const int32_t* which = list(&count);
+  ts_joint made = 0, there = 0;
+  ts_joint* joint = bad(20) ? NULL : &made;
+  for (int i = 0; i < 32; ++i) partners[i] = whole(27);
+  const int has_onto = count <= 20 && one_in(2);
+  const ts_result result = ts_body_join(world, body, which, count, any_body(world), has_onto ? partners : NULL, joint);
+  if (result != TS_OK) return result;
+  const int32_t number = (int32_t)(made & 0xFFFFFFFFu) - 1;
+  if (ts_world_get_joint(world, number, &there) != TS_OK || there != made) broken("a joint that is not there");
+  return result;
+}
+
+static ts_result add_motor(ts_world world, ts_body body) {
+  size_t count = 0;
+  const int32_t* which = list(&count);
+  ts_drive drive;
+  ts_motor made = 0, there = 0;
+  ts_motor* motor = bad(20) ? NULL : &made;
+  memset(&drive, 0, sizeof drive);
+  drive.struct_size = size_of(sizeof drive);
+  drive.turns = whole(2), drive.is_fixed = whole(2), drive.has_point = one_in(4);
+  for (int i = 0; i < 3; ++i) drive.axis[i] = number(), drive.point[i] = number();
+  drive.speed = number(), drive.limit = bad(4) ? number() : fabs(number());
+  const ts_result result = ts_body_add_motor(world, body, which, count, bad(20) ? NULL : &drive, motor);
+  if (result != TS_OK) return result;
+  const int32_t number_of_it = (int32_t)(made & 0xFFFFFFFFu) - 1;
+  if (ts_world_get_motor(world, number_of_it, &there) != TS_OK || there != made) broken("a motor that is not there");
+  return result;
+}
+
 static ts_result one_call(ts_world world) {
   const ts_body body = any_body(world);
   size_t count = 0;
   const int32_t* which = list(&count);
-  switch (below(57)) {
+  switch (below(68)) {
     case 0: case 1: case 2: return ts_world_step(world, bad(8) ? number() : 0.01, bad(8) ? whole(50) : 4);
     case 3: {
       ts_clock clock = {size_of(sizeof clock), 0, 0, 0, 0, 0};
@@ -329,6 +376,23 @@ static ts_result one_call(ts_world world) {
     case 53: return ts_grab_get_force(world, any_grab(world), numbers(3));
     case 54: return add_frame(world);
     case 55: return one_in(2) ? ts_frame_remove(world, whole(8)) : ts_frame_get_pose(world, whole(3), pose());
+    case 56: return ts_world_set_gravity(world, numbers(3));
+    case 57: return ts_body_set_friction(world, body, number());
+    case 58:
+      return one_in(2) ? ts_world_set_friction(world, number()) : ts_collider_set_friction(world, whole(4), number());
+    case 59: case 60: return join(world, body);
+    case 61: return ts_joint_release(world, any_joint(world));
+    case 62: return ts_joint_get_force(world, any_joint(world), numbers(3));
+    case 63: return add_motor(world, body);
+    case 64: return ts_motor_set_speed(world, any_motor(world), number());
+    case 65: return ts_motor_set_limit(world, any_motor(world), number());
+    case 66: {
+      double found = 0.0;
+      const ts_motor motor = any_motor(world);
+      const ts_result speed = ts_motor_get_speed(world, motor, bad(10) ? NULL : &found);
+      const ts_result effort = ts_motor_get_effort(world, motor, bad(10) ? NULL : &found);
+      return speed != TS_OK ? speed : one_in(2) ? effort : ts_motor_remove(world, motor);
+    }
     default: {
       double center[3];
       return ts_body_center(world, body, bad(10) ? NULL : center);
@@ -336,19 +400,21 @@ static ts_result one_call(ts_world world) {
   }
 }
 
-/* Numbers of all bodies and grabs. */
-static void look(ts_world world, uint64_t found[32]) {
-  for (int32_t i = 0; i < 32; ++i) {
+/* Numbers of all bodies, grabs, joints and motors. */
+static void look(ts_world world, uint64_t found[64]) {
+  for (int32_t i = 0; i < 64; ++i) {
     found[i] = 0;
     if (i < 16) ts_world_get_grab(world, i, found + i);
-    if (i >= 16) ts_world_get_body(world, i - 16, found + i);
+    if (i >= 16 && i < 32) ts_world_get_body(world, i - 16, found + i);
+    if (i >= 32 && i < 48) ts_world_get_joint(world, i - 32, found + i);
+    if (i >= 48) ts_world_get_motor(world, i - 48, found + i);
   }
 }
 
 /* A snapshot that was taken goes back; one that is damaged is refused. */
 static void try_snapshots(ts_world world) {
   size_t size = 0;
-  uint64_t before = 0, after = 0, there[32], again[32];
+  uint64_t before = 0, after = 0, there[64], again[64];
   if (ts_world_snapshot(world, NULL, 0, &size) != TS_OK) return;
   char* bytes = malloc(size);
   if (ts_world_snapshot(world, bytes, size - 1, &size) != TS_ERROR_SIZE) broken("a small buffer was taken");

@@ -89,13 +89,25 @@ static void print_hit(const ts_hit* hit) {
 }
 
 static float rows[3 * MOST], normals[3 * MOST];
-static int32_t vertices[MOST];
+static int32_t vertices[MOST], partners[MOST];
 static char* kept;
 static size_t kept_size;
 
 static ts_grab grab(void) {
   ts_grab found = 0;
   check(ts_world_get_grab(world, whole(), &found));
+  return found;
+}
+
+static ts_joint joint(void) {
+  ts_joint found = 0;
+  check(ts_world_get_joint(world, whole(), &found));
+  return found;
+}
+
+static ts_motor motor(void) {
+  ts_motor found = 0;
+  check(ts_world_get_motor(world, whole(), &found));
   return found;
 }
 
@@ -181,6 +193,19 @@ static void play(const char* call) {
   CALL("wind") {
     numbers(a, 5);
     check(ts_world_set_wind(world, a, a[3], a[4]));
+  }
+  CALL("gravity") {
+    numbers(a, 3);
+    check(ts_world_set_gravity(world, a));
+  }
+  CALL("floor_friction") check(ts_world_set_friction(world, number()));
+  CALL("body_friction") {
+    const ts_body who = body();
+    check(ts_body_set_friction(world, who, number()));
+  }
+  CALL("collider_friction") {
+    const int32_t which = whole();
+    check(ts_collider_set_friction(world, which, number()));
   }
   CALL("wake") check(ts_world_wake(world));
   CALL("spawn") {
@@ -279,6 +304,54 @@ static void play(const char* call) {
     for (int i = 0; i < 3; ++i) rows[i] = (float)a[i];
     printf("%016" PRIx64 "\n", hash_of(rows, 3));
   }
+  CALL("join") {
+    ts_joint made = 0;
+    const ts_body who = body();
+    const size_t count = list(vertices);
+    const ts_body other = body();
+    const size_t named = list(partners);
+    check(ts_body_join(world, who, vertices, count, other, named == 0 ? NULL : partners, &made));
+    printf("%d\n", (int)(made & 0xFFFFFFFFu) - 1);
+  }
+  CALL("joint_force") {
+    check(ts_joint_get_force(world, joint(), a));
+    for (int i = 0; i < 3; ++i) rows[i] = (float)a[i];
+    printf("%016" PRIx64 "\n", hash_of(rows, 3));
+  }
+  CALL("release_joint") check(ts_joint_release(world, joint()));
+  CALL("add_motor") {
+    ts_drive drive;
+    ts_motor made = 0;
+    const ts_body who = body();
+    const size_t count = list(vertices);
+    memset(&drive, 0, sizeof drive);
+    drive.struct_size = sizeof drive;
+    drive.turns = whole();
+    drive.is_fixed = whole();
+    drive.has_point = whole();
+    numbers(drive.axis, 3);
+    numbers(drive.point, 3);
+    drive.speed = number();
+    drive.limit = number();
+    check(ts_body_add_motor(world, who, vertices, count, &drive, &made));
+    printf("%d\n", (int)(made & 0xFFFFFFFFu) - 1);
+  }
+  CALL("motor_speed") {
+    const ts_motor which = motor();
+    check(ts_motor_set_speed(world, which, number()));
+  }
+  CALL("motor_limit") {
+    const ts_motor which = motor();
+    check(ts_motor_set_limit(world, which, number()));
+  }
+  CALL("motor_state") {
+    const ts_motor which = motor();
+    check(ts_motor_get_speed(world, which, a));
+    check(ts_motor_get_effort(world, which, a + 1));
+    for (int i = 0; i < 2; ++i) rows[i] = (float)a[i];
+    printf("%016" PRIx64 "\n", hash_of(rows, 2));
+  }
+  CALL("remove_motor") check(ts_motor_remove(world, motor()));
   CALL("add_frame") {
     int32_t made = 0;
     const ts_pose where = pose();

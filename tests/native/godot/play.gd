@@ -80,6 +80,41 @@ func _play(call: String) -> void:
             _native.release_grab(_grab())
         "grab_force":
             _say(_hash_of(_parts([_native.grab_force(_grab())])))
+        "gravity":
+            _native.set_gravity(_vector())
+        "body_friction":
+            var body := _body()
+            _native.set_body_friction(body, _number())
+        "collider_friction":
+            var collider := int(_number())
+            _native.set_collider_friction(collider, _number())
+        "join":
+            var body := _body()
+            var vertices := _list()
+            var other := _body()
+            _say(_slot(_native.join(body, vertices, other, _list())))
+        "joint_force":
+            _say(_hash_of(_parts([_native.joint_force(_native.joint_of(int(_number())))])))
+        "release_joint":
+            _native.release_joint(_native.joint_of(int(_number())))
+        "add_motor":
+            var body := _body()
+            var vertices := _list()
+            var kind := [int(_number()), int(_number()), int(_number())]
+            var axis := _vector()
+            var point := _vector()
+            var speed := _number()
+            _say(_slot(_native.add_motor(body, vertices, kind[0], kind[1], kind[2], axis, point, speed, _number())))
+        "motor_speed":
+            var motor: int = _native.motor_of(int(_number()))
+            _native.set_motor_speed(motor, _number())
+        "motor_limit":
+            var motor: int = _native.motor_of(int(_number()))
+            _native.set_motor_limit(motor, _number())
+        "motor_state":
+            _say(_hash_of(_native.motor_state(_native.motor_of(int(_number())))))
+        "remove_motor":
+            _native.remove_motor(_native.motor_of(int(_number())))
         "add_frame":
             _say(_native.add_frame(_place()))
         "remove_frame":

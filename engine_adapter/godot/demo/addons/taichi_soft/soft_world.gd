@@ -16,7 +16,7 @@ signal body_slept(body)
 signal body_woke(body)
 signal body_froze(body)
 
-enum Kind { BODY, ASSET, COLLIDER, FRAME, MESH }
+enum Kind { BODY, ASSET, COLLIDER, FRAME, MESH, JOINT, MOTOR }
 enum Status { ACTIVE, FROZEN, ASLEEP }
 enum Shape { PLANE, SPHERE, BOX, CAPSULE }
 enum Event { CONTACT_BEGAN = 1, CONTACT_ENDED = 2, SLEPT = 4, WOKE = 8, FROZE = 16 }
@@ -236,6 +236,72 @@ func release_grab(which: int) -> bool:
 func grab_force(which: int) -> Vector3:
     var found = native.grab_force(which) if _is_started("grab_force") else null
     return Vector3() if found == null else found
+
+
+# Gravity [m/s^2], from the next step on.
+func set_gravity(gravity: Vector3) -> bool:
+    return _is_started("set_gravity") and native.set_gravity(gravity) != null
+
+
+# Coulomb's coefficient of a body against others. That of a collider by its name or number: set_collider_friction.
+func set_body_friction(which: int, friction: float) -> bool:
+    return _is_started("set_body_friction") and native.set_body_friction(which, friction) != null
+
+
+func set_collider_friction(collider, friction: float) -> bool:
+    var number := _number(Kind.COLLIDER, collider, "set_collider_friction")
+    return number >= 0 and native.set_collider_friction(number, friction) != null
+
+
+# Let vertices be held by another body: where they are in it, or each at a vertex of it. Returns a number, or 0.
+func join(which: int, vertices: PoolIntArray, other: int, onto := PoolIntArray()) -> int:
+    var made = native.join(which, vertices, other, onto) if _is_started("join") else null
+    return 0 if made == null else made
+
+
+# The joint of the world's script of this name; 0 for none.
+func joint(called) -> int:
+    var number := _number(Kind.JOINT, called, "joint")
+    var found = null if number < 0 else native.joint_of(number)
+    return 0 if found == null else found
+
+
+func release_joint(which: int) -> bool:
+    return _is_started("release_joint") and native.release_joint(which) != null
+
+
+# With what the other body pulls [N].
+func joint_force(which: int) -> Vector3:
+    var found = native.joint_force(which) if _is_started("joint_force") else null
+    return Vector3() if found == null else found
+
+
+# Turn vertices about an axis that turns with them, with so much torque at most. Returns a number, or 0.
+func add_motor(which: int, vertices: PoolIntArray, axis: Vector3, speed: float, max_torque: float) -> int:
+    if not _is_started("add_motor"):
+        return 0
+    var made = native.add_motor(which, vertices, 1, 0, 0, axis, Vector3(), speed, max_torque)
+    return 0 if made == null else made
+
+
+# The motor of the world's script of this name; 0 for none.
+func motor(called) -> int:
+    var number := _number(Kind.MOTOR, called, "motor")
+    var found = null if number < 0 else native.motor_of(number)
+    return 0 if found == null else found
+
+
+func set_motor_speed(which: int, speed: float) -> bool:
+    return _is_started("set_motor_speed") and native.set_motor_speed(which, speed) != null
+
+
+# With 0 its vertices coast.
+func set_motor_limit(which: int, limit: float) -> bool:
+    return _is_started("set_motor_limit") and native.set_motor_limit(which, limit) != null
+
+
+func remove_motor(which: int) -> bool:
+    return _is_started("remove_motor") and native.remove_motor(which) != null
 
 
 # Where the vertices of a body are, by their numbers.

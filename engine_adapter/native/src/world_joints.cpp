@@ -1,0 +1,232 @@
+// Joints: as taichi_soft/control/joints.py and embedding.py have them.
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "error.hpp"
+#include "world.hpp"
+
+namespace taichi_soft {
+
+namespace {
+
+constexpr ts_joint kJoint = uint64_t(5) << 56;  // what a joint's handle begins with, and no other handle
+constexpr double kFarthest = -0.5, kDraw = 0.25, kLeastWeight = 1e-4;
+
+Vector difference(const Vector& a, const Vector& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+
+Vector cross(const Vector& a, const Vector& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+
+double dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+// Where points lie in a tetrahedron, as taichi_soft/core/math/barycentric.py finds it.
+class Coordinates {
+ public:
+  explicit Coordinates(const Vector corners[4]) : start_(corners[0]) {
+    const Vector a = difference(corners[1], start_), b = difference(corners[2], start_),
+                 c = difference(corners[3], start_);
+    const Vector normals[3] = {cross(b, c), cross(c, a), cross(a, b)};
+    volume6_ = dot(a, normals[0]);
+    for (int i = 0; i < 3; ++i) {
+      for (int k = 0; k < 3; ++k) inverse_[i][k] = normals[i][k] / volume6_;
+    }
+  }
+  bool is_solid() const { return std::fabs(volume6_) > 1e-30; }
+  std::array<double, 4> of(const Vector& point) const {
+    const Vector arm = difference(point, start_);
+    const Vector rest = {dot(inverse_[0], arm), dot(inverse_[1], arm), dot(inverse_[2], arm)};
+    return {1.0 - (rest[0] + rest[1] + rest[2]), rest[0], rest[1], rest[2]};
+  }
+
+ private:
+  Vector start_, inverse_[3];
+  double volume6_;
+};
+
+}  // namespace
+
+Vector World::vertex_place(int32_t slot, int32_t vertex) const {
+  const size_t p = particle(slot, size_t(vertex));
+  return {position_(p, 0), position_(p, 1), position_(p, 2)};
+}
+
+// Where vertices of `slot` lie in the tetrahedra of `other`, both as they are now.
+std::vector<World::Holder> World::holders_at(int32_t slot, const std::vector<int32_t>& vertices, int32_t other) const {
+  const Archive::View<int32_t>& tets = asset_of(other).tets;
+  if (tets.count == 0) {
+    fail(TS_ERROR_ARGUMENT,
+         "the body in slot %d has no tetrahedra to hold by: join it to the other one instead, or name vertices by onto",
+         other);
+  }
+  std::vector<Coordinates> solids;
+  std::vector<const int32_t*> corners;
+  for (size_t t = 0; t + 4 <= tets.count; t += 4) {
+    Vector places[4];
+    for (int i = 0; i < 4; ++i) places[i] = vertex_place(other, tets[t + size_t(i)]);
+    const Coordinates found(places);
+    if (!found.is_solid()) continue;
+    solids.push_back(found);
+    corners.push_back(tets.data + t);
+  }
+  std::vector<Holder> holders;
+  for (int32_t vertex : vertices) {
+    const Vector point = vertex_place(slot, vertex);
+    Holder best{};
+    double highest = -std::numeric_limits<double>::infinity();
+    for (size_t t = 0; t < solids.size(); ++t) {
+      const std::array<double, 4> weights = solids[t].of(point);
+      const double least = *std::min_element(weights.begin(), weights.end());
+      if (!(least > highest)) continue;
+      highest = least;
+      std::copy(corners[t], corners[t] + 4, best.vertices);
+      std::copy(weights.begin(), weights.end(), best.weights);
+    }
+    if (!(highest >= kFarthest)) {
+      fail(TS_ERROR_ARGUMENT,
+           "vertex %d of the body in slot %d is too far from the one in slot %d: bring the two together first, or name "
+           "vertices by onto",
+           vertex, slot, other);
+    }
+    double sum = 0.0;
+    for (double& each : best.weights) {
+      if (std::fabs(each) < kLeastWeight) each = 0.0;  // or neighbours would be held by what is none of theirs
+      sum += each;
+    }
+    for (double& each : best.weights) each = each / sum;
+    holders.push_back(best);
+  }
+  return holders;
+}
+
+// Vertices of `other` themselves, each by the first tetrahedron that has it, if there is one.
+std::vector<World::Holder> World::holders_on(int32_t other, const std::vector<int32_t>& partners) const {
+  const Archive::View<int32_t>& tets = asset_of(other).tets;
+  std::vector<Holder> holders;
+  for (int32_t vertex : partners) {
+    Holder found{{vertex, vertex, vertex, vertex}, {0.0, 0.0, 0.0, 0.0}};
+    if (tets.count > 0) {
+      const auto at = std::find(tets.begin(), tets.end(), vertex);
+      const size_t first = at == tets.end() ? 0 : size_t(at - tets.begin()) / 4 * 4;
+      std::copy(tets.data + first, tets.data + first + 4, found.vertices);
+    }
+    const auto corner = std::find(found.vertices, found.vertices + 4, vertex);
+    found.weights[corner == found.vertices + 4 ? 0 : corner - found.vertices] = 1.0;
+    holders.push_back(found);
+  }
+  return holders;
+}
+
+// [m/s] at which what is held of a body may follow.
+double World::follow_speed(int32_t slot, std::vector<int32_t> held) const {
+  const Asset& asset = asset_of(slot);
+  std::sort(held.begin(), held.end());
+  held.erase(std::unique(held.begin(), held.end()), held.end());
+  double total = 0.0;
+  for (double each : asset.masses) total += each;
+  return asset.wave_speed * std::sqrt(mass_of(slot, held) / total);
+}
+
+size_t World::joint_rows() const {
+  int32_t used = 0;
+  for (size_t j = 0; scene_->has_contact && j < kMostJoints; ++j) {
+    if (joint_bodies_(j, 0) != 0) used = std::max(used, joint_span_(j, 1));
+  }
+  return size_t(used);
+}
+
+ts_joint World::joint_at(int32_t number) const {
+  if (number < 0 || size_t(number) >= kMostJoints) {
+    fail(TS_ERROR_ARGUMENT, "number is %d: give 0 to %zu", number, kMostJoints - 1);
+  }
+  if (!scene_->has_contact || joint_bodies_(size_t(number), 0) == 0) return 0;
+  return kJoint | ts_joint(joint_generations_[size_t(number)]) << 32 | uint32_t(number + 1);
+}
+
+size_t World::joint_of(ts_joint joint) const {
+  const int64_t number = int64_t(joint & 0xFFFFFFFFu) - 1;
+  if (number < 0 || number >= int64_t(kMostJoints) || joint_at(int32_t(number)) != joint) {
+    fail(TS_ERROR_HANDLE, "joint %llu is not in this world, or was released", static_cast<unsigned long long>(joint));
+  }
+  return size_t(number);
+}
+
+ts_joint World::join(int32_t slot, Vertices which, int32_t other, const int32_t* onto) {
+  if (other == slot) fail(TS_ERROR_ARGUMENT, "other is the body itself: name another one");
+  const std::vector<int32_t> vertices = checked(slot, which, false);
+  std::vector<Holder> holders;
+  if (onto == nullptr) {
+    holders = holders_at(slot, vertices, other);
+  } else {
+    checked(other, {onto, which.count}, false);
+    if (vertices.size() != which.count) fail(TS_ERROR_ARGUMENT, "a vertex is named twice: name each once");
+    std::vector<std::pair<int32_t, int32_t>> pairs;
+    for (size_t i = 0; i < which.count; ++i) pairs.push_back({which.numbers[i], onto[i]});
+    std::sort(pairs.begin(), pairs.end());
+    std::vector<int32_t> partners;
+    for (const auto& pair : pairs) partners.push_back(pair.second);
+    holders = holders_on(other, partners);
+  }
+  if (scene_->is_implicit) fail(TS_ERROR_STATE, "implicit_euler has no joints: export a world with leapfrog");
+  if (!scene_->has_contact) {
+    fail(TS_ERROR_STATE,
+         "joints need bodies that are stepped together: export a world with soft_contact, or with collider_room=1");
+  }
+  size_t j = 0;
+  while (j < kMostJoints && joint_bodies_(j, 0) != 0) ++j;
+  if (j == kMostJoints) fail(TS_ERROR_STATE, "all %zu joints of this world are in use: release one first", kMostJoints);
+  const size_t used = joint_rows(), n = vertices.size();
+  if (used + n > kJointRows) {
+    fail(TS_ERROR_STATE, "the joints of a world hold at most %zu particles, and %zu are held: release a joint first",
+         kJointRows, used);
+  }
+  std::vector<int32_t> holding;
+  int32_t* particles = machine_->rows.room<int32_t>(kJointEnds * n);
+  float* weights = machine_->vertices.room<float>(kJointEnds * n);
+  for (size_t i = 0; i < n; ++i) {
+    particles[kJointEnds * i] = int32_t(particle(slot, size_t(vertices[i])));
+    weights[kJointEnds * i] = 1.0f;
+    for (size_t k = 0; k < 4; ++k) {
+      particles[kJointEnds * i + 1 + k] = int32_t(particle(other, size_t(holders[i].vertices[k])));
+      weights[kJointEnds * i + 1 + k] = as_float(-holders[i].weights[k]);
+      if (holders[i].weights[k] != 0.0) holding.push_back(holders[i].vertices[k]);
+    }
+  }
+  const double speed = kDraw * std::min(follow_speed(slot, vertices), follow_speed(other, holding));
+  wake_slot(other);
+  const uint32_t count = uint32_t(n);
+  machine_->launch("write_joint", {Machine::whole(int32_t(j)), Machine::whole(slot), Machine::whole(other),
+                                   Machine::whole(int32_t(used)), Machine::real(speed),
+                                   Machine::array(machine_->rows, count, kJointEnds),
+                                   Machine::array(machine_->vertices, count, kJointEnds)});
+  rouse(slot);
+  joint_generations_[j] = (joint_generations_[j] + 1) & 0xFFFFFF;
+  joints_have_changed();
+  return joint_at(int32_t(j));
+}
+
+void World::release_joint(ts_joint joint) { end_joint(joint_of(joint)); }
+
+void World::end_joint(size_t j) {
+  const int32_t body = joint_bodies_(j, 0) - 1;
+  wake_slot(joint_bodies_(j, 1) - 1);
+  machine_->launch("end_joint", {Machine::whole(int32_t(j))});
+  rouse(body);
+  joints_have_changed();
+}
+
+// Bodies that are joined are stepped together, also where no step looks for who touches whom.
+void World::joints_have_changed() {
+  if (!scene_->has_contact || scene_->has_soft_contact) return;
+  machine_->launch("list_joined_islands", {Machine::whole(scene_->slot_count)});
+}
+
+Vector World::joint_force(ts_joint joint) const {
+  const size_t j = joint_of(joint);
+  const double dt = std::max(last_dt_, 1e-30);
+  return {joint_impulse_(j, 0) / dt, joint_impulse_(j, 1) / dt, joint_impulse_(j, 2) / dt};
+}
+
+}  // namespace taichi_soft

@@ -1,0 +1,238 @@
+// Motors: as taichi_soft/control/motors.py has them.
+
+#include <algorithm>
+#include <cmath>
+
+#include "error.hpp"
+#include "fitting.hpp"
+#include "world.hpp"
+
+namespace taichi_soft {
+
+namespace {
+
+constexpr ts_motor kMotor = uint64_t(6) << 56;  // what a motor's handle begins with, and no other handle
+constexpr double kLargestLimit = 1e12, kThinnest = 1e-3, kLeaning = 1e-10, kResidue = 1e-12;
+
+double sum_of(const std::vector<double>& numbers) {
+  double total = 0.0;
+  for (double each : numbers) total += each;
+  return total;
+}
+
+Vector center(const std::vector<Vector>& points, const std::vector<double>& shares) {
+  Vector found = {0.0, 0.0, 0.0};
+  for (size_t i = 0; i < points.size(); ++i) {
+    for (int k = 0; k < 3; ++k) found[k] += shares[i] * points[i][k];
+  }
+  return found;
+}
+
+Matrix moment(const std::vector<Vector>& a, const std::vector<Vector>& b, const std::vector<double>& shares) {
+  const Vector of_a = center(a, shares), of_b = center(b, shares);
+  Matrix found{};
+  for (size_t n = 0; n < a.size(); ++n) {
+    for (int i = 0; i < 3; ++i) {
+      for (int k = 0; k < 3; ++k) found[i][k] += shares[n] * (a[n][i] - of_a[i]) * (b[n][k] - of_b[k]);
+    }
+  }
+  return found;
+}
+
+// Whether all lie on a line, so that their turn about it cannot be seen.
+bool is_thin(const std::vector<Vector>& rest, const std::vector<double>& shares) {
+  std::array<double, 3> spreads = Eigen<3>(moment(rest, rest, shares)).values;
+  std::sort(spreads.begin(), spreads.end());
+  return !(spreads[1] > kThinnest * kThinnest * spreads[2]);
+}
+
+}  // namespace
+
+void require_motor_speed(double speed, double fastest) {
+  if (!(std::fabs(speed) <= fastest)) fail(TS_ERROR_ARGUMENT, "speed is %g: give a number up to %g", speed, fastest);
+}
+
+void require_motor_limit(double limit) {
+  if (!(limit >= 0.0 && limit <= kLargestLimit)) {
+    fail(TS_ERROR_ARGUMENT, "limit is %g: give a number from 0 to %g", limit, kLargestLimit);
+  }
+}
+
+// The axis at rest, of particles that have turned since.
+Vector World::axis_at_rest(int32_t slot, const std::vector<int32_t>& vertices, const Vector& axis) const {
+  const Asset& asset = asset_of(slot);
+  std::vector<Vector> rest, now;
+  std::vector<double> shares;
+  for (int32_t v : vertices) {
+    const double* at = asset.vertices.data + 3 * size_t(v);
+    rest.push_back({at[0], at[1], at[2]});
+    now.push_back(vertex_place(slot, v));
+    shares.push_back(asset.masses[size_t(v)]);
+  }
+  const double mass = sum_of(shares);
+  for (double& each : shares) each = each / mass;
+  if (is_thin(rest, shares)) {
+    fail(TS_ERROR_ARGUMENT, "the vertices lie on a line, so an axis cannot turn with them: name more, or set is_fixed");
+  }
+  Matrix turned_by = moment(now, rest, shares);
+  const Matrix spread = moment(rest, rest, shares);
+  for (int i = 0; i < 3; ++i) turned_by[i][i] += kLeaning * (spread[0][0] + spread[1][1] + spread[2][2]);
+  const Matrix turn = nearest_rotation(turned_by);
+  Vector found;
+  double size = 0.0;
+  for (int k = 0; k < 3; ++k) {
+    found[k] = turn[0][k] * axis[0] + turn[1][k] * axis[1] + turn[2][k] * axis[2];
+    size = std::max(size, std::fabs(found[k]));
+  }
+  for (double& each : found) {  // as `kept` in taichi_soft/core/residue.py
+    each = std::fabs(each) > kResidue * size ? double(as_float(each)) : 0.0;
+  }
+  return found;
+}
+
+std::vector<World::MotorRow> World::motors() const {
+  std::vector<MotorRow> found;
+  for (size_t m = 0; m < kMostMotors; ++m) {
+    if (motor_wholes_[0](m) == 0) continue;
+    MotorRow row;
+    row.number = m;
+    row.slot = motor_wholes_[0](m) - 1;
+    for (size_t k = 0; k < 3; ++k) row.kind[k] = motor_wholes_[3 + k](m);
+    for (size_t k = 0; k < 3; ++k) row.axis[k] = motor_axis_(m, k), row.point[k] = motor_point_(m, k);
+    row.speed = motor_speed_(m), row.limit = motor_limit_(m);
+    for (int32_t r = motor_wholes_[1](m); r < motor_wholes_[2](m); ++r) {
+      row.particles.push_back(motor_particle_(size_t(r)));
+    }
+    found.push_back(std::move(row));
+  }
+  return found;
+}
+
+// Let there be these, in the order of their numbers, and no other.
+void World::write_motors(const std::vector<MotorRow>& rows) {
+  for (size_t m = 0; m < kMostMotors; ++m) motor_wholes_[0](m) = 0;
+  size_t at = 0;
+  for (const MotorRow& row : rows) {
+    const size_t m = row.number;
+    motor_wholes_[0](m) = row.slot + 1;
+    motor_wholes_[1](m) = int32_t(at);
+    for (int32_t each : row.particles) motor_particle_(at++) = each;
+    motor_wholes_[2](m) = int32_t(at);
+    for (size_t k = 0; k < 3; ++k) motor_wholes_[3 + k](m) = row.kind[k];
+    for (size_t k = 0; k < 3; ++k) motor_axis_(m, k) = row.axis[k], motor_point_(m, k) = row.point[k];
+    motor_speed_(m) = row.speed, motor_limit_(m) = row.limit;
+  }
+  mark_driven();
+}
+
+void World::mark_driven() {
+  for (int32_t slot = 0; slot < scene_->slot_count; ++slot) is_driven_(size_t(slot)) = 0;
+  for (size_t m = 0; m < kMostMotors; ++m) {
+    if (motor_wholes_[0](m) != 0) is_driven_(size_t(motor_wholes_[0](m) - 1)) = 1;
+  }
+}
+
+size_t World::motor_rows() const {
+  int32_t used = 0;
+  for (size_t m = 0; m < kMostMotors; ++m) {
+    if (motor_wholes_[0](m) != 0) used = std::max(used, motor_wholes_[2](m));
+  }
+  return size_t(used);
+}
+
+ts_motor World::motor_at(int32_t number) const {
+  if (number < 0 || size_t(number) >= kMostMotors) {
+    fail(TS_ERROR_ARGUMENT, "number is %d: give 0 to %zu", number, kMostMotors - 1);
+  }
+  if (motor_wholes_[0](size_t(number)) == 0) return 0;
+  return kMotor | ts_motor(motor_generations_[size_t(number)]) << 32 | uint32_t(number + 1);
+}
+
+size_t World::motor_of(ts_motor motor) const {
+  const int64_t number = int64_t(motor & 0xFFFFFFFFu) - 1;
+  if (number < 0 || number >= int64_t(kMostMotors) || motor_at(int32_t(number)) != motor) {
+    fail(TS_ERROR_HANDLE, "motor %llu is not in this world, or was removed", static_cast<unsigned long long>(motor));
+  }
+  return size_t(number);
+}
+
+bool World::turns(ts_motor motor) const { return motor_wholes_[3](motor_of(motor)) != 0; }
+
+ts_motor World::add_motor(int32_t slot, Vertices which, const Drive& drive) {
+  const std::vector<int32_t> vertices = checked(slot, which, false);
+  require_motor_limit(drive.limit);
+  require_motor_speed(drive.speed, scene_->velocity_limit);
+  const double length = length_of(drive.axis);
+  if (!(length > 0.0)) fail(TS_ERROR_ARGUMENT, "axis must have a direction");
+  if (drive.has_point && !(drive.turns && drive.is_fixed)) {
+    fail(TS_ERROR_ARGUMENT,
+         "point is of an axis that particles turn about, and that stays in space: set turns and is_fixed with it");
+  }
+  if (!scene_->has_contact) {
+    fail(TS_ERROR_STATE, "motors need a world that is made for contact: export it with a collider, or collider_room=1");
+  }
+  Vector axis = {drive.axis[0] / length, drive.axis[1] / length, drive.axis[2] / length};
+  if (!drive.is_fixed) axis = axis_at_rest(slot, vertices, axis);
+  int32_t number = 0;
+  while (size_t(number) < kMostMotors && motor_at(number) != 0) ++number;
+  if (size_t(number) == kMostMotors) {
+    fail(TS_ERROR_STATE, "all %zu motors of this world are in use: remove one first", kMostMotors);
+  }
+  const size_t m = size_t(number), used = motor_rows();
+  if (used + vertices.size() > kMotorRows) {
+    fail(TS_ERROR_STATE, "the motors of a world drive at most %zu particles, and %zu are driven: remove a motor first",
+         kMotorRows, used);
+  }
+  MotorRow row;
+  row.number = m, row.slot = slot;
+  row.kind[0] = drive.turns, row.kind[1] = drive.is_fixed, row.kind[2] = drive.has_point;
+  for (size_t k = 0; k < 3; ++k) row.axis[k] = as_float(axis[k]), row.point[k] = as_float(drive.point[k]);
+  row.speed = as_float(drive.speed), row.limit = as_float(drive.limit);
+  for (int32_t vertex : vertices) row.particles.push_back(int32_t(particle(slot, size_t(vertex))));
+  std::vector<MotorRow> rows = motors();
+  const auto at = std::find_if(rows.begin(), rows.end(), [&](const MotorRow& each) { return each.number > m; });
+  rows.insert(at, std::move(row));
+  write_motors(rows);
+  motor_impulse_(m) = 0.0f;
+  motor_generations_[m] = (motor_generations_[m] + 1) & 0xFFFFFF;
+  rouse(slot);
+  return motor_at(number);
+}
+
+void World::set_motor_speed(ts_motor motor, double speed) {
+  const size_t m = motor_of(motor);
+  require_motor_speed(speed, scene_->velocity_limit);
+  motor_speed_(m) = as_float(speed);
+  rouse(motor_wholes_[0](m) - 1);
+}
+
+void World::set_motor_limit(ts_motor motor, double limit) {
+  const size_t m = motor_of(motor);
+  require_motor_limit(limit);
+  motor_limit_(m) = as_float(limit);
+  rouse(motor_wholes_[0](m) - 1);
+}
+
+void World::remove_motor(ts_motor motor) { end_motor(motor_of(motor)); }
+
+void World::end_motor(size_t m) {
+  const int32_t slot = motor_wholes_[0](m) - 1;
+  std::vector<MotorRow> rows = motors();
+  rows.erase(std::find_if(rows.begin(), rows.end(), [&](const MotorRow& each) { return each.number == m; }));
+  write_motors(rows);
+  rouse(slot);
+}
+
+double World::motor_speed(ts_motor motor) {
+  const size_t m = motor_of(motor);
+  if (body_status_(size_t(motor_wholes_[0](m) - 1)) == kFrozen) return 0.0;
+  return machine_->launch("read_speed", {Machine::whole(int32_t(m))});
+}
+
+double World::motor_effort(ts_motor motor) const {
+  const size_t m = motor_of(motor);
+  if (body_status_(size_t(motor_wholes_[0](m) - 1)) == kFrozen) return 0.0;
+  return motor_impulse_(m) / std::max(last_dt_, 1e-30);
+}
+
+}  // namespace taichi_soft

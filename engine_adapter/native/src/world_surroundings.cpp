@@ -1,0 +1,98 @@
+// Gravity and friction: as taichi_soft/control/drives.py and frictions.py have them.
+
+#include <algorithm>
+
+#include "error.hpp"
+#include "world.hpp"
+
+namespace taichi_soft {
+
+namespace {
+
+constexpr uint32_t kFirstSerial = 1;  // of a collider that was exported
+
+bool is_friction(double number) { return number >= 0.0 && number <= 1e6; }
+
+void require_friction(double friction) {
+  if (!is_friction(friction)) fail(TS_ERROR_ARGUMENT, "friction is %g: give a number from 0 to 1,000,000", friction);
+}
+
+}  // namespace
+
+void World::set_gravity(const Vector& gravity) {
+  for (double each : gravity) {
+    if (!(std::fabs(each) < scene_->position_limit)) {
+      fail(TS_ERROR_ARGUMENT, "gravity is %g m/s^2: stay below %g", each, scene_->position_limit);
+    }
+  }
+  if (gravity == surroundings_.gravity) return;
+  surroundings_.gravity = gravity;
+  write_surroundings();
+  rouse(-1);
+}
+
+void World::set_friction(double friction) {
+  require_friction(friction);
+  const int32_t number = scene_->floor_collider;
+  if (!scene_->has_floor || (scene_->has_contact && !is_floor(number))) {
+    fail(TS_ERROR_STATE,
+         "the world has no floor: ts_collider_set_friction changes a collider's friction, ts_body_set_friction that "
+         "between bodies");
+  }
+  if (scene_->has_contact) return set_collider_friction(number, friction);
+  if (friction == surroundings_.friction) return;
+  surroundings_.friction = friction;
+  write_surroundings();
+  rouse(-1);
+}
+
+bool World::is_floor(int32_t number) const {
+  if (number < 0 || number != scene_->floor_collider || size_t(number) >= colliders_.rows.size()) return false;
+  const Collider& row = colliders_.rows[size_t(number)];
+  return row.is_alive && row.serial == kFirstSerial;  // another one may have come into its row
+}
+
+void World::set_collider_friction(int32_t number, double friction) {
+  Collider& row = collider(number);
+  require_friction(friction);
+  if (friction == row.friction) return;
+  row.friction = friction;
+  if (is_floor(number)) surroundings_.friction = friction;
+  write_surroundings();
+  write_colliders();
+  double speed;
+  wake_near(row.way(0.0, &speed));
+}
+
+void World::set_body_friction(int32_t slot, double friction) {
+  require_friction(friction);
+  if (!scene_->has_soft_contact) {
+    fail(TS_ERROR_STATE,
+         "a body's friction counts between bodies, and these do not touch each other: export the world with "
+         "soft_contact, or change that of the floor or a collider");
+  }
+  if (friction == friction_[size_t(slot)]) return;
+  give_friction(slot, friction);
+  rouse(slot);
+}
+
+void World::give_friction(int32_t slot, double friction) {
+  friction_[size_t(slot)] = friction;
+  if (scene_->has_soft_contact) body_surface_(size_t(slot)) = as_float(friction);
+}
+
+void World::write_surroundings() {
+  for (size_t k = 0; k < 3; ++k) gravity_(0, k) = as_float(surroundings_.gravity[k]);
+  floor_(0, 2) = as_float(surroundings_.friction);
+}
+
+bool World::is_in_order(const Surroundings& given) const {
+  for (double each : given.gravity) {
+    if (!(std::fabs(each) < scene_->position_limit)) return false;
+  }
+  return is_friction(given.friction);
+}
+
+bool World::are_frictions(const double* numbers, size_t count) { return std::all_of(numbers, numbers + count, is_friction); }
+
+}  // namespace taichi_soft
