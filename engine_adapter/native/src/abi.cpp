@@ -63,12 +63,12 @@ class Turn {
         lock_.has_succeeded() && (world_->advancing == ThreadId() || world_->advancing == this_thread());
     if (!is_free) fail(TS_ERROR_BUSY, "another thread is in a call of this world");
   }
-  World* operator->() const { return world_.get(); }
+  World* operator->() const { return &*world_; }
   World& operator*() const { return *world_; }
   const Axes& axes() const { return world_->scene().axes; }
 
  private:
-  std::shared_ptr<World> world_;  // before the lock, which is given back first
+  Kept<World> world_;  // before the lock, which is given back first
   Attempt lock_;
 };
 
@@ -79,7 +79,7 @@ class Frame {
   Frame(ts_world handle, double seconds) : handle_(handle), world_(worlds().find(handle)) {
     const Turn turn(handle);
     if (world_->advancing != ThreadId()) fail(TS_ERROR_STATE, "ts_world_advance was called within itself");
-    due = left = world_->steps_due(seconds);
+    due = world_->steps_due(seconds);
     world_->advancing = this_thread();
   }
   ~Frame() { end(); }
@@ -100,16 +100,15 @@ class Frame {
   void end() noexcept {
     if (is_over_) return;
     const Guard lock(world_->turn);
-    world_->end_frame(left);
-    world_->advancing = ThreadId();
+    world_->end_frame();
     is_over_ = true;
   }
 
-  int32_t due = 0, left = 0;
+  int32_t due = 0;
 
  private:
   ts_world handle_;
-  std::shared_ptr<World> world_;
+  Kept<World> world_;
   bool is_over_ = false;
 };
 
@@ -418,7 +417,7 @@ ts_result ts_mesh_get_uv(ts_scene scene, int32_t mesh, float* uv, size_t count) 
 ts_result ts_world_create(ts_scene scene, ts_world* world) {
   return guarded([&] {
     given(world, "world");
-    *world = worlds().add(std::make_shared<World>(scenes().find(scene)));
+    *world = worlds().add(std::make_shared<World>(scenes().share(scene)));
   });
 }
 
@@ -457,10 +456,9 @@ ts_result ts_world_advance(ts_world world, double seconds, ts_clock* clock) {
   return guarded([&] {
     if (clock != nullptr) sized(clock, "clock");
     Frame frame(world, seconds);
-    while (frame.left > 0) {
+    for (int32_t i = 0; i < frame.due; ++i) {
       frame.before_step();
       Turn(world)->step_in_time();
-      --frame.left;
     }
     frame.end();
     if (clock != nullptr) Turn(world)->write_clock(clock, frame.due);
@@ -470,9 +468,7 @@ ts_result ts_world_advance(ts_world world, double seconds, ts_clock* clock) {
 #if defined(__wasm__)
 // What `Frame` does at its end, for one that was left by an exception of JavaScript's.
 TS_API ts_result ts_web_end_frame(ts_world world) {
-  const auto found = worlds().find(world);
-  found->end_frame(0);
-  found->advancing = ThreadId();
+  worlds().find(world)->end_frame();
   return TS_OK;
 }
 #endif

@@ -64,7 +64,7 @@ class Reader {
 
 }  // namespace
 
-uint32_t checksum(const char* bytes, size_t size) {
+uint32_t checksum(const char* bytes, size_t size, uint32_t before) {
   static const std::array<uint32_t, 256> table = [] {
     std::array<uint32_t, 256> made{};
     for (uint32_t i = 0; i < 256; ++i) {
@@ -74,9 +74,9 @@ uint32_t checksum(const char* bytes, size_t size) {
     }
     return made;
   }();
-  uint32_t code = 0xFFFFFFFFu;
+  uint32_t code = ~before;
   for (size_t i = 0; i < size; ++i) code = table[(code ^ static_cast<unsigned char>(bytes[i])) & 255] ^ (code >> 8);
-  return code ^ 0xFFFFFFFFu;
+  return ~code;
 }
 
 Archive::Archive(std::vector<char> bytes, const std::string& name) : bytes_(std::move(bytes)) {

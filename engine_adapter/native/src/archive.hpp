@@ -9,7 +9,7 @@
 namespace taichi_soft {
 
 std::vector<char> read_file(const std::string& path);
-uint32_t checksum(const char* bytes, size_t size);  // CRC-32, of IEEE 802.3
+uint32_t checksum(const char* bytes, size_t size, uint32_t before = 0);  // CRC-32, of IEEE 802.3, behind other bytes
 
 class Archive {
  public:

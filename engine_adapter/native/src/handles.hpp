@@ -10,6 +10,16 @@
 
 namespace taichi_soft {
 
+// What a call has of a thing while it lasts. In WebAssembly, where a refused call ends without destructors, it keeps
+// nothing alive that would never be given back; there nobody else can take the thing away meanwhile.
+#if defined(__wasm__)
+template <typename Thing>
+using Kept = Thing*;
+#else
+template <typename Thing>
+using Kept = std::shared_ptr<Thing>;
+#endif
+
 template <typename Thing>
 class Handles {
  public:
@@ -26,8 +36,16 @@ class Handles {
     return kind_ | uint64_t(rows_[row].generation) << 32 | (row + 1);
   }
 
-  // It lives for as long as the caller keeps what is returned.
-  std::shared_ptr<Thing> find(uint64_t handle) {
+  Kept<Thing> find(uint64_t handle) {
+    const Guard lock(mutex_);
+#if defined(__wasm__)
+    return row_of(handle).thing.get();
+#else
+    return row_of(handle).thing;
+#endif
+  }
+
+  std::shared_ptr<Thing> share(uint64_t handle) {
     const Guard lock(mutex_);
     return row_of(handle).thing;
   }

@@ -246,18 +246,25 @@ int32_t World::steps_due(double seconds) {
   if (due >= double(max_steps_) + 1.0) {
     remainder_ = 0.0;
     dropped_ += waiting - max_steps_ * dt_;
-    return max_steps_;
+    return steps_left_ = max_steps_;
   }
   const int32_t steps = static_cast<int32_t>(due);
   remainder_ = waiting - steps * dt_;
-  return steps;
+  return steps_left_ = steps;
 }
 
 double World::alpha() const { return std::max(remainder_ / dt_, 0.0); }
 
-void World::end_frame(int32_t steps_left) {
-  dropped_ += steps_left * dt_;
+void World::step_in_time() {
+  step(dt_, substeps_);
+  --steps_left_;
+}
+
+void World::end_frame() {
+  dropped_ += steps_left_ * dt_;
+  steps_left_ = 0;
   picture_ = alpha();
+  advancing = ThreadId();
 }
 
 void World::write_clock(ts_clock* clock, int32_t steps_made) const {

@@ -90,8 +90,8 @@ class World {
   int32_t stable_substeps(double dt) const;
   void step(double dt, int32_t substeps);
   int32_t steps_due(double seconds);   // puts in the time of a frame
-  void end_frame(int32_t steps_left);  // that were due and not made: their time is dropped
-  void step_in_time() { step(dt_, substeps_); }
+  void step_in_time();
+  void end_frame();  // the time of steps that were due and not made is dropped
   ts_before_step before_step() const { return before_step_; }
   void* user() const { return user_; }
   void write_clock(ts_clock* clock, int32_t steps_made) const;
@@ -272,6 +272,7 @@ class World {
   int64_t steps_ = 0;
   double time_ = 0.0, last_dt_ = 0.0;
   double dt_ = 1.0 / 60.0, remainder_ = 0.0, dropped_ = 0.0;
+  int32_t steps_left_ = 0;  // of the present frame
   double picture_ = 1.0;  // how far what is drawn is from the previous step to the last one
   int32_t substeps_ = 0, max_steps_ = 8;
   ts_before_step before_step_ = nullptr;

@@ -342,11 +342,10 @@ void World::restore(const char* bytes, size_t size) {
       !std::isfinite(head.last_dt)) {
     fail(TS_ERROR_SNAPSHOT, "this snapshot is cut off");
   }
-  std::vector<char> whole(bytes, bytes + size);
   const uint32_t sum = head.sum;
   head.sum = 0;
-  std::memcpy(whole.data(), &head, sizeof head);
-  if (sum != checksum(whole.data(), size)) {
+  const uint32_t of_head = checksum(reinterpret_cast<const char*>(&head), sizeof head);
+  if (sum != checksum(bytes + sizeof head, size - sizeof head, of_head)) {
     fail(TS_ERROR_SNAPSHOT, "this snapshot is damaged: its checksum is wrong");
   }
   if (!is_in_order(head.surroundings) || !are_rows_in_order(bytes + sizeof head, head)) {
