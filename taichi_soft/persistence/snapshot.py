@@ -74,6 +74,12 @@ def state_hash(context: WorldContext) -> str:
     return blake2b(to_json([code, write_manifest(context)]), digest_size=8).hexdigest()
 
 
+def native_hash(context: WorldContext) -> str:
+    """Hash of the fields alone, 16 hexadecimal digits, as JavaScript and `ts_world_hash` give it."""
+    code = int(hash_bodies(context.built.state, len(context.slots.slots)))
+    return f"{code & (1 << 64) - 1:016x}"
+
+
 def _table(context: WorldContext, entries: dict[str, list[list[Any]]]) -> Words:
     """Where the words of each group of fields are, by what slices have entered in a manifest."""
     state, scene, slots = context.built.state, context.layout, len(context.slots.slots)
