@@ -152,8 +152,10 @@ async function open() {
   const { name, title, what } = scenes.find((each) => `#${each.name}` === location.hash) ?? scenes[0];
   leave();
   for (const link of find("scenes").children) {
-    if (link.hash === `#${name}`) link.setAttribute("aria-current", "page");
+    const isCurrent = link.hash === `#${name}`;
+    if (isCurrent) link.setAttribute("aria-current", "page");
     else link.removeAttribute("aria-current");
+    if (isCurrent) link.scrollIntoView({ block: "nearest", inline: "nearest" });
   }
   document.title = `${title} - taichi-soft`;
   find("title").textContent = title;

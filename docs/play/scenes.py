@@ -1,4 +1,4 @@
-"""Scenes that visitors of the documentation play: each function makes one, `SCENES` lists them.
+"""Scenes that visitors of the documentation play: each public function makes one.
 
 Its `controls` are plain data that `game.js` reads: sliders that set gravity, damping or wind, or move a thing
 `along` or `about` a direction, and buttons that spawn bodies or push them.
@@ -6,7 +6,7 @@ Its `controls` are plain data that `game.js` reads: sliders that set gravity, da
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -41,10 +41,8 @@ STEPS = 300
 
 @dataclass
 class Scene:
-    """A world with all that a page needs to show it."""
+    """A world with all that a page needs to show it. Docstrings have its title, and what to do in it."""
 
-    title: str
-    what: str  # to do
     world: World  # built, made with `record=STEPS`
     camera: Camera
     controls: list[dict[str, Any]]
@@ -54,7 +52,7 @@ class Scene:
     props: Mapping[Frame, Any] = field(default_factory=dict)  # (vertices, triangles) drawn with a frame
 
 
-def gravity(most: float = 2.0) -> dict[str, Any]:
+def _gravity(most: float = 2.0) -> dict[str, Any]:
     """A slider for gravity, in multiples of the Earth's."""
     return {
         "kind": "gravity",
@@ -67,7 +65,7 @@ def gravity(most: float = 2.0) -> dict[str, Any]:
     }
 
 
-def damping(value: float = 0.0) -> dict[str, Any]:
+def _damping(value: float = 0.0) -> dict[str, Any]:
     """A slider for the drag on all bodies."""
     return {
         "kind": "damping",
@@ -81,7 +79,10 @@ def damping(value: float = 0.0) -> dict[str, Any]:
 
 
 def jelly() -> Scene:
-    """A pudding, and berries to drop on it."""
+    """Pull a jelly.
+
+    Take hold of the pudding and pull, or drop berries on it. Its Young's modulus is 20 kPa.
+    """
     world = World(soft_contact=True, friction=0.8, record=STEPS)
     contact = Contact(friction=0.8, thickness=0.01)
     pudding = SoftBodyAsset(
@@ -95,11 +96,9 @@ def jelly() -> Scene:
     world.build()
     drop = {"kind": "spawn", "label": "Drop a berry", "asset": "berry", "at": [0, 0, 1.6], "spread": 0.25}
     return Scene(
-        "Pull a jelly",
-        "Take hold of the pudding and pull. It wobbles as its Young's modulus of 20 kPa says.",
         world,
-        Camera.framing((-0.75, -0.75, 0), (0.75, 0.75, 1.0), aspect=1.6, elevation=16),
-        [drop, gravity(), damping()],
+        Camera.framing((-0.65, -0.65, 0), (0.65, 0.65, 0.95), aspect=1.6, elevation=16),
+        [drop, _gravity(), _damping()],
         [ROSE if each is pudding else CORAL for each in _assets(world)],
         {pudding: "pudding", berry: "berry", body: "jelly"},
     )
@@ -124,7 +123,10 @@ def _pudding() -> TetMesh:
 
 
 def bowl() -> Scene:
-    """Bodies in a bowl that tips."""
+    """Tip the bowl.
+
+    Tip the bowl with its sliders until it is empty, or take a body out by hand.
+    """
     world = World(soft_contact=True, friction=0.5, record=STEPS)
     material = Material(young=1e5, poisson=0.3, density=500.0, damping_ratio=0.1)
     shapes = [sphere(0.3, 3), box((0.5, 0.5, 0.5), (3, 3, 3)), torus(0.3, 0.14, rings=1, segments=16)]
@@ -148,14 +150,12 @@ def bowl() -> Scene:
         "rate": 60,
     }
     return Scene(
-        "Tip the bowl",
-        "Tip the bowl with the sliders until it is empty, or take a body out by hand.",
         world,
         Camera.framing((-1.5, -1.5, 0), (1.5, 1.5, 2.1), aspect=1.6, elevation=32, margin=1.0),
         [
             {**tip, "label": "Left, right", "about": [0, 1, 0]},
             {**tip, "label": "Back, forth", "about": [1, 0, 0]},
-            gravity(),
+            _gravity(),
         ],
         [PALETTE[i] for i in range(8)],
         {bowl: "bowl"},
@@ -173,7 +173,10 @@ def _bowl(radius: float, wall: float) -> trimesh.Trimesh:
 
 
 def elephant() -> Scene:
-    """Steps, and elephants to drop on them."""
+    """Drop an elephant.
+
+    Drop elephants onto the steps. There is room for four: a fifth one takes the place of the first.
+    """
     world = World(soft_contact=True, friction=0.8, record=STEPS)
     depth, rise, width = 0.6, 0.24, 2.4
     for i in range(3):
@@ -203,11 +206,9 @@ def elephant() -> Scene:
     }
     blast = {"kind": "blast", "label": "Throw them up", "at": [0, -1.2, -0.3], "impulse": 60, "radius": 3}
     return Scene(
-        "Drop an elephant",
-        "Drop elephants onto the steps. There is room for four; a fifth one takes the place of the first.",
         world,
         Camera.framing((-1.3, -2.4, 0.0), (1.3, 0.0, 1.8), aspect=1.6, azimuth=-68, elevation=16),
-        [drop, blast, gravity(), damping(0.8)],
+        [drop, blast, _gravity(), _damping(0.8)],
         [(1.0, 1.0, 1.0)] * 4,
         {asset: "elephant"},
         {asset: mesh.visual.material.baseColorTexture.convert("RGB")},
@@ -215,7 +216,10 @@ def elephant() -> Scene:
 
 
 def flag() -> Scene:
-    """A cloth in the wind."""
+    """Let the wind blow.
+
+    Set the wind along and across the flag, and pull at its corners.
+    """
     cells = (22, 16)
     mesh = cloth((1.65, 1.2), cells, 0.3)
     stiffness = cloth_constants(mesh, cells, tensile=400.0, shear=150.0, bend=3.0)
@@ -230,14 +234,12 @@ def flag() -> Scene:
     wind = {"kind": "wind", "min": -12, "max": 12, "step": 0.5, "unit": "m/s"}
     mast = trimesh.creation.cylinder(radius=0.03, height=2.35, sections=24)
     return Scene(
-        "Let the wind blow",
-        "Set the wind along and across the flag, and pull at its corners.",
         world,
         Camera.framing((-0.8, -0.7, 0.0), (1.8, 0.7, 2.4), aspect=1.6, azimuth=-65, elevation=8),
         [
             {**wind, "label": "Wind along", "along": [1, 0, 0], "value": 5},
             {**wind, "label": "Wind across", "along": [0, 1, 0], "value": 1.5},
-            gravity(),
+            _gravity(),
         ],
         [HONEY],
         {pole: "pole", body: "flag"},
@@ -246,7 +248,10 @@ def flag() -> Scene:
 
 
 def tower() -> Scene:
-    """A tower of blocks, and a ball to knock it down with."""
+    """Bring a tower down.
+
+    Push the ball through the tower with its slider, blast it, or pull out a block.
+    """
     world = World(soft_contact=True, friction=0.6, record=STEPS)
     contact = Contact(friction=0.6, thickness=0.015)
     material = Material(young=6e4, poisson=0.35, density=300.0, damping_ratio=0.2)
@@ -268,18 +273,19 @@ def tower() -> Scene:
     }
     blast = {"kind": "blast", "label": "Blast", "at": [0.2, -0.3, 0.1], "impulse": 350, "radius": 2.5}
     return Scene(
-        "Bring a tower down",
-        "Push the ball through the tower with its slider, blast it, or pull out a block.",
         world,
         Camera.framing((-2.4, -1.0, 0.0), (2.2, 1.0, 2.8), aspect=1.6, azimuth=-72, elevation=10),
-        [{**swing, "label": "Ball", "along": [1, 0, 0], "home": -2}, blast, gravity()],
+        [{**swing, "label": "Ball", "along": [1, 0, 0]}, blast, _gravity()],
         [PALETTE[i] for i in (3, 1, 4, 2, 0, 5)],
         {ball: "ball"},
     )
 
 
 def stiffness() -> Scene:
-    """Balls of one shape and four stiffnesses."""
+    """Compare stiffness.
+
+    The Young's moduli of the four balls are 20, 50, 100 and 400 kPa, from left to right.
+    """
     world = World(soft_contact=True, friction=0.6, record=STEPS)
     for i, young in enumerate((2e4, 5e4, 1e5, 4e5)):
         material = Material(young=young, poisson=0.4, density=500.0, damping_ratio=0.03)
@@ -288,17 +294,18 @@ def stiffness() -> Scene:
     world.build()
     throw = {"kind": "throw", "label": "Throw them up", "velocity": [0, 0, 5]}
     return Scene(
-        "Compare what is stiff",
-        "Four balls with Young's moduli of 20, 50, 100 and 400 kPa, from left to right.",
         world,
         Camera.framing((-2.1, -0.5, 0.0), (2.1, 0.5, 2.3), aspect=1.6, azimuth=-80, elevation=9),
-        [throw, gravity(), damping()],
+        [throw, _gravity(), _damping()],
         [CORAL, HONEY, LEAF, SKY],
     )
 
 
 def hand() -> Scene:
-    """A long soft bar that hangs from a plate."""
+    """Swing and twist.
+
+    Move the plate from which the bar hangs, turn it, or pull at the bar.
+    """
     size = (0.26, 0.26, 1.6)
     mesh = box(size, (3, 3, 16))
     mesh = mesh.translated(-np.mean(mesh.bounds, axis=0))
@@ -312,8 +319,6 @@ def hand() -> Scene:
     slab = box((0.5, 0.5, 0.08), (1, 1, 1))
     move = {"kind": "move", "frame": "plate", "value": 0}
     return Scene(
-        "Swing and twist",
-        "Move the plate from which the bar hangs, turn it, or pull at the bar.",
         world,
         Camera.framing((-1.3, -0.6, 0.0), (1.3, 0.6, 2.5), aspect=1.6, azimuth=-75, elevation=8),
         [
@@ -337,15 +342,10 @@ def hand() -> Scene:
                 "unit": "°",
                 "rate": 360,
             },
-            gravity(),
-            damping(),
+            _gravity(),
+            _damping(),
         ],
         [TEAL],
         {plate: "plate", body: "bar"},
         props={plate: (slab.vertices - np.mean(slab.bounds, axis=0) + (0, 0, 0.04), slab.surface)},
     )
-
-
-SCENES: dict[str, Callable[[], Scene]] = {
-    each.__name__: each for each in (jelly, bowl, elephant, flag, tower, stiffness, hand)
-}

@@ -67,9 +67,9 @@ export class Stage {
   #light([x, y], target) {
     const reach = 0.55 * this.distance;
     const sun = new THREE.DirectionalLight(0xfff1e0, 2.7);
-    const angle = Math.atan2(y - target[1], x - target[0]) - 0.9;
+    const angle = Math.atan2(y - target[1], x - target[0]) - 1.35;
     sun.target.position.set(...target);
-    sun.position.set(Math.cos(angle), Math.sin(angle), 1.7).multiplyScalar(reach).add(sun.target.position);
+    sun.position.set(Math.cos(angle), Math.sin(angle), 1.35).multiplyScalar(reach).add(sun.target.position);
     sun.castShadow = true;
     sun.shadow.mapSize.set(1024, 1024);
     sun.shadow.radius = 3;

@@ -1,6 +1,6 @@
 """Make what the playable gallery needs: the player, and each scene's world and recording.
 
-`python docs/play/make_worlds.py` makes all scenes, in some minutes; with names, those. An export ends what a
+`python docs/make_worlds.py` makes all scenes, in some minutes; with names, those. An export ends what a
 process can do with Taichi, so that each scene is made by one of its own.
 """
 
@@ -11,10 +11,12 @@ import json
 import shutil
 import subprocess
 import sys
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from gallery_hooks import WORLDS, scenes
 
 from taichi_soft import init
 from taichi_soft.cli.console import say
@@ -30,51 +32,43 @@ from taichi_soft.render.props import SLATE, drawn_surface, is_level
 from taichi_soft.world.world import context_of_world
 
 HERE = Path(__file__).parent
-FOLDER = HERE.parent / "gallery" / "play"
-PACKAGE = HERE.parents[1] / "engine_adapter" / "web"
+PACKAGE = HERE.parent / "engine_adapter" / "web"
 PAGE = ("index.html", "player.css", "player.js", "game.js", "stage.js")
 DT = 1 / 60
 CREASE = 40.0
 
 
-def write_player(folder: Path, names: list[str]) -> None:
+def write_player(folder: Path) -> None:
     """Write the page and the list of its scenes. Raises: OSError if three.js cannot be fetched."""
     fetch_three_js()
     folder.mkdir(parents=True, exist_ok=True)
-    own = [HERE / name for name in PAGE]
+    own = [HERE / "play" / name for name in PAGE]
     libraries = [PACKAGE / "taichi-soft.js", PACKAGE / "three.js"]
     drawing = [THREE / name for name in ("three.core.js", "three.module.js", "OrbitControls.js", "LICENSE")]
     for file in (*own, *libraries, *drawing):
         shutil.copyfile(file, folder / {"LICENSE": "three-licence.txt"}.get(file.name, file.name))
-    listed = [{"name": name, **_facts(folder / name)} for name in names if (folder / name).is_dir()]
+    listed = [asdict(each) for each in scenes() if (folder / each.name / "scene.json").is_file()]
     (folder / "scenes.json").write_text(json.dumps(listed), encoding="utf-8")
-
-
-def _facts(folder: Path) -> dict[str, Any]:
-    whole = json.loads((folder / "scene.json").read_text(encoding="utf-8"))
-    return {"title": whole["title"], "what": whole["what"]}
 
 
 def write_scene(name: str, folder: Path) -> None:
     """Write a scene: world, recording, and what the page has to know. It ends this process's Taichi."""
-    from scenes import SCENES, STEPS
+    from play import scenes as made
 
     from taichi_soft.export import export_world
 
     init("cpu")
-    scene = SCENES[name]()
+    scene = vars(made)[name]()
     world, context = scene.world, context_of_world(scene.world)
     first, handles = world.snapshot(), _handles(world)
-    for _ in range(STEPS):
+    for _ in range(made.STEPS):
         world.step(DT)
-    proof = {"steps": STEPS, "hash": native_hash(context)}
+    proof = {"steps": made.STEPS, "hash": native_hash(context)}
     folder.mkdir(parents=True, exist_ok=True)
     world.save_recording(folder / f"{name}.recording")
     world.restore(first)
     frames = list(scene.props)
     facts = {
-        "title": scene.title,
-        "what": scene.what,
         "dt": DT,
         "camera": {"eye": scene.camera.eye, "target": scene.camera.target, "fov": scene.camera.fov_degrees},
         "colors": scene.colors,
@@ -96,7 +90,7 @@ def write_scene(name: str, folder: Path) -> None:
     }
     report = export_world(world, folder / "world", names=scene.names, platforms=["web"])
     (folder / "scene.json").write_text(json.dumps(facts), encoding="utf-8")
-    say(f"{name}: {report.size / 1e6:.1f} MB, step {STEPS} has the hash {proof['hash']}")
+    say(f"{name}: {report.size / 1e6:.1f} MB, step {made.STEPS} has the hash {proof['hash']}")
 
 
 def _handles(world: Any) -> dict[str, Any]:
@@ -132,11 +126,9 @@ def _picture(folder: Path, picture: Any) -> str:
 
 def main() -> None:
     """Make the scenes that are named, and the page for all that are there."""
-    from scenes import SCENES
-
     options = argparse.ArgumentParser(description="Make the worlds of the playable gallery.")
     options.add_argument("names", nargs="*", metavar="NAME", help="a scene; all of them by default")
-    options.add_argument("--out", type=Path, default=FOLDER, help="folder of the page")
+    options.add_argument("--out", type=Path, default=WORLDS, help="folder of the page")
     options.add_argument("--alone", action="store_true", help="make this one scene in this process")
     given = options.parse_args()
     if given.alone:
@@ -144,10 +136,10 @@ def main() -> None:
         return
     try:
         require_extra("export", "a playable gallery needs")
-        for name in given.names or list(SCENES):
-            command = [sys.executable, str(HERE / "make_worlds.py"), name, "--alone", "--out", str(given.out)]
+        for name in given.names or [each.name for each in scenes()]:
+            command = [sys.executable, __file__, name, "--alone", "--out", str(given.out)]
             subprocess.run(command, check=True)
-        write_player(given.out, list(SCENES))
+        write_player(given.out)
     except (MissingExtraError, OSError) as error:  # three.js has to be fetched once
         say(f"playable worlds: skipped. {error}")
 

@@ -1,0 +1,44 @@
+"""Measure how fast the gallery plays in Chromium without a window: frames a second and the cost of a step.
+
+`python tests/docs/measure_playing.py [NAME ...]`, after `python docs/make_worlds.py`. A window has 1280 x 800 pixels.
+"""
+
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "tests" / "shared"))
+
+from browser import chromium, opened  # noqa: E402
+
+WAIT = 12_000
+"""After which the page has chosen how finely it draws [ms]."""
+
+
+def main(names):
+    """Print a line for each scene."""
+    command = [sys.executable, "-u", "-m", "http.server", "0", "--bind", "127.0.0.1"]
+    server = subprocess.Popen(
+        [*command, "--directory", str(ROOT / "docs")],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+    )
+    port = server.stdout.readline().split(" port ")[1].split()[0]
+    try:
+        with chromium() as browser:
+            for name in names:
+                address = f"http://127.0.0.1:{port}/gallery/play/index.html#{name}"
+                page, complaints, _ = opened(browser, address, viewport={"width": 1280, "height": 800})
+                page.locator("#words").wait_for(state="hidden")
+                page.wait_for_timeout(WAIT)
+                rate, cost = (page.locator(each).inner_text() for each in ("#rate", "#cost"))
+                print(f"{name}: {rate}, {cost} a step", *complaints, flush=True)
+                page.close()
+    finally:
+        server.terminate()
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:] or ["jelly"])
