@@ -10,6 +10,7 @@ import tempfile
 from pathlib import Path
 
 import cv2
+import gallery_hooks
 import numpy as np
 from play import scenes
 
@@ -75,7 +76,8 @@ def write_played_still(name: str) -> None:
     made = vars(scenes)[name]()
     actors = [Actor(body, made.colors[body.index]) for body in made.world.bodies]
     props = [Prop(surface, frame) for frame, surface in made.props.items()]
-    stage = Stage(name, made.world, actors, made.camera, FixedStep(1 / 60), 5.0, props=props)
+    (title,) = [each.title for each in gallery_hooks.scenes() if each.name == name]
+    stage = Stage(title, made.world, actors, made.camera, FixedStep(1 / 60), 5.0, props=props)
     file = FOLDER / "play" / f"{name}.jpg"
     file.parent.mkdir(exist_ok=True)
     cv2.imwrite(str(file), still_of(stage, PLAYED[name], STILL_SIZE), [cv2.IMWRITE_JPEG_QUALITY, QUALITY])

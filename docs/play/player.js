@@ -106,11 +106,11 @@ function act(doing) {
   stage.isStale = true;
 }
 
+/** Push what is in the middle of the picture, or else what is nearest to where the camera looks. */
 function poke() {
   const caster = stage.ray();
-  const hit = stage.hit(caster);
+  const hit = stage.hit(caster) ?? game.world.closest(stage.controls.target.toArray());
   if (hit) game.poke(hit, caster.ray.direction.toArray());
-  else verdict.textContent = "Nothing is in the middle of the picture: turn the view.";
 }
 
 function press(event) {

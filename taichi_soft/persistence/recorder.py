@@ -12,6 +12,7 @@ import json
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -177,12 +178,13 @@ def read_recording(path: Any) -> tuple[dict[str, Any], bytes]:
 
 
 def _read_played(data: bytes) -> tuple[dict[str, Any], bytes]:
-    """Read what a page saved: the recording with which it began, and the visitor's calls and steps."""
+    """Read what a page saved: a recording, and what the visitor did in place of its steps."""
     try:
         played = json.loads(data)
         made_of, snapshot = _read_sealed(base64.b64decode(played["start"], validate=True))
-        return {**made_of, "entries": list(played["entries"])}, snapshot
-    except (ValueError, KeyError, TypeError, RecursionError) as error:
+        before = takewhile(lambda entry: entry[0] == "call", made_of["entries"])
+        return {**made_of, "entries": [*before, *played["entries"]]}, snapshot
+    except (ValueError, LookupError, TypeError, RecursionError) as error:
         if isinstance(error, TaichiSoftError):
             raise
         raise SnapshotError(f"this file of a page is not in order: {error!r}") from None

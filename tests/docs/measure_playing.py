@@ -1,6 +1,7 @@
 """Measure how fast the gallery plays in Chromium without a window: frames a second and the cost of a step.
 
-`python tests/docs/measure_playing.py [NAME ...]`, after `python docs/make_worlds.py`. A window has 1280 x 800 pixels.
+Run `python docs/make_worlds.py`, then `python tests/docs/measure_playing.py [NAME ...]`. The window has
+1280 x 800 pixels.
 """
 
 import subprocess

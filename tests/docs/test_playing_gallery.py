@@ -221,10 +221,9 @@ def test_a_hidden_tab_stands_still_and_goes_on_from_there(browser, site, tmp_pat
         page.evaluate(lose)
         page.mouse.move(x + 60, y - 60, steps=2)
         page.wait_for_timeout(200)
-        _, calls = saved(page, tmp_path)
-        assert calls[-1] == "release"
         page.mouse.up()
-    assert calls.count("grab") == calls.count("release") == 3
+    _, calls = saved(page, tmp_path)
+    assert calls == 3 * ["grab", "move", "release"]  # which does not follow the pointer any more
     assert complaints == []
     page.close()
 

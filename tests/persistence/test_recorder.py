@@ -180,6 +180,8 @@ def test_what_a_page_saved_replaces_the_steps_of_its_recording(game, tmp_path):
     """And a hash that differs is found at its step."""
     _, path = game
     entries = json.loads(to_json(read_recording(path)[0]["entries"]))
+    while entries[0][0] == "call":  # before its first step: they stay
+        del entries[0]
     saved = tmp_path / "played.json"
 
     def replayed(entries, **options):
