@@ -69,7 +69,7 @@ def _damping(value: float = 0.0) -> dict[str, Any]:
     """A slider for the drag on all bodies."""
     return {
         "kind": "damping",
-        "label": "Drag",
+        "label": "Damping",
         "min": 0,
         "max": 5,
         "step": 0.1,

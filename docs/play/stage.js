@@ -104,12 +104,16 @@ export class Stage {
     geometry.setAttribute("position", new THREE.Float32BufferAttribute(vertices, 3));
     geometry.setIndex(triangles);
     geometry.computeVertexNormals();
-    const material = new THREE.MeshStandardMaterial({ roughness: 0.75, side: THREE.DoubleSide });
-    material.color.setRGB(...color, THREE.SRGBColorSpace);
-    const mesh = new THREE.Mesh(geometry, material);
+    const mesh = new THREE.Mesh(geometry, this.#material({ roughness: 0.75, color }));
     mesh.castShadow = mesh.receiveShadow = true;
     this.scene.add(mesh);
     return { mesh, thing };
+  }
+
+  /** One without highlights where drawing is slow. */
+  #material({ color, map = null, roughness }) {
+    const looks = { map, color: new THREE.Color().setRGB(...color, THREE.SRGBColorSpace), side: THREE.DoubleSide };
+    return this.isPlain ? new THREE.MeshLambertMaterial(looks) : new THREE.MeshStandardMaterial({ roughness, ...looks });
   }
 
   /** What is drawn of each body that is there: a body that came in the slot of another one is another mesh. */
@@ -126,9 +130,8 @@ export class Stage {
       if (this.bodies.has(handle)) continue;
       const slot = Number(handle & 0xffffffffn) - 1;
       const map = this.pictures.get(body.asset) ?? null;
-      const material = new THREE.MeshStandardMaterial({ map, roughness: 0.42, side: THREE.DoubleSide });
-      if (!map) material.color.setRGB(...this.game.facts.colors[slot], THREE.SRGBColorSpace);
-      const drawn = new SoftMesh(THREE, body, material);
+      const color = map ? [1, 1, 1] : this.game.facts.colors[slot];
+      const drawn = new SoftMesh(THREE, body, this.#material({ roughness: 0.42, color, map }));
       drawn.mesh.castShadow = drawn.mesh.receiveShadow = true;
       this.scene.add(drawn.mesh);
       this.bodies.set(handle, drawn);
@@ -173,12 +176,18 @@ export class Stage {
     this.isStale = true;
   }
 
-  /** Draw hard shadows and fewer pixels where there are too few pictures a second: the world is to keep its time. */
+  /** Draw hard shadows, no highlights and fewer pixels where there are too few pictures a second. */
   ease(rate) {
     if (rate > 0.9 * WANTED || this.sharpness === LOWEST) return;
-    if (this.renderer.shadowMap.type !== THREE.BasicShadowMap) {
+    if (!this.isPlain) {
+      this.isPlain = true;
       this.renderer.shadowMap.type = THREE.BasicShadowMap;
-      this.scene.traverse((each) => each.material && (each.material.needsUpdate = true));
+      this.floor.material.needsUpdate = true;
+      for (const { mesh } of [...this.solids, ...this.bodies.values()]) {
+        const { map, color, side } = mesh.material;
+        mesh.material.dispose();
+        mesh.material = new THREE.MeshLambertMaterial({ map, color, side });
+      }
     }
     this.sharpness = Math.max(LOWEST, this.sharpness * Math.sqrt(rate / WANTED));
     this.#fit();
