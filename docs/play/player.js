@@ -216,7 +216,7 @@ function tell(now) {
 function steps(seconds) {
   const { dt } = game.facts;
   // A screen of about as many pictures a second as the world makes steps has one step in each.
-  due += Math.abs(seconds - dt) < 0.2 * dt ? dt : seconds;
+  due += Math.abs(seconds - dt) < 0.06 * dt ? dt : seconds;
   const costs = [];
   while (due > 0.999 * dt && costs.length < MOST_STEPS && game.steps < end) {
     const begin = performance.now();
