@@ -6,8 +6,8 @@ import { Stage } from "./stage.js";
 const find = (id) => document.getElementById(id);
 const [canvas, words, play, verdict] = ["view", "words", "play", "verdict"].map(find);
 const wantsStill = matchMedia("(prefers-reduced-motion: reduce)").matches;
-const LONGEST = 0.1; // that a picture lets pass [s]: after a hidden tab the world goes on from where it was
-const MOST_STEPS = 4; // in a picture
+const LONGEST = 0.1; // that a frame lets pass [s]: after a hidden tab the world goes on from where it was
+const MOST_STEPS = 4; // in a frame
 // A module of one function that has an instruction of SIMD.
 const WITH_SIMD = Uint8Array.of(
   ...[0, 97, 115, 109, 1, 0, 0, 0, 1, 5, 1, 96, 0, 1, 123, 3, 2, 1, 0, 10, 10, 1, 8, 0, 65, 0, 253, 15, 253, 98, 11],
@@ -19,9 +19,9 @@ let game = null;
 let isPlaying = false;
 let end = Infinity; // number of steps after which it pauses
 let opened = 0; // how many scenes: one that is loaded too late is dropped
-let [last, due] = [0, 0]; // time of the last picture [ms], and what the world is behind [s]
-let pictures = []; // of the last second: { at, costs }, each step's cost [ms]
-let [since, pictured] = [0, 0]; // from when on pictures are counted for `Stage.ease` [ms]
+let [last, due] = [0, 0]; // time of the last frame [ms], and what the world is behind [s]
+let frames = []; // of the last second: { at, costs }, each step's cost [ms]
+let [since, framed] = [0, 0]; // from when on frames are counted for `Stage.ease` [ms]
 let told = 0; // when the meter was written [ms]
 const held = new Map(); // what pointers pull
 
@@ -47,7 +47,7 @@ function setPlaying(value) {
   isPlaying = value && game !== null;
   if (!isPlaying) end = Infinity;
   play.textContent = isPlaying ? "Pause" : "Play";
-  [pictures, pictured, since, due] = [[], 0, performance.now(), 0];
+  [frames, framed, since, due] = [[], 0, performance.now(), 0];
   tell(performance.now());
 }
 
@@ -204,10 +204,10 @@ function median(numbers) {
 /** Write the meter. */
 function tell(now) {
   told = now;
-  const costs = pictures.flatMap((each) => each.costs);
-  const span = pictures.length > 1 ? pictures.at(-1).at - pictures[0].at : 0;
+  const costs = frames.flatMap((each) => each.costs);
+  const span = frames.length > 1 ? frames.at(-1).at - frames[0].at : 0;
   find("cost").textContent = costs.length ? `${median(costs).toFixed(1)} ms` : "–";
-  find("rate").textContent = span ? `${((1000 * (pictures.length - 1)) / span).toFixed(0)} a second` : "–";
+  find("rate").textContent = span ? `${((1000 * (frames.length - 1)) / span).toFixed(0)} a second` : "–";
   find("steps").textContent = game ? game.steps : "";
   find("hash").textContent = game ? game.hash : "";
 }
@@ -215,7 +215,7 @@ function tell(now) {
 /** Make the steps that are due. Returns the cost of each [ms]. */
 function steps(seconds) {
   const { dt } = game.facts;
-  // A screen of about as many pictures a second as the world makes steps has one step in each.
+  // A screen of about as many frames a second as the world makes steps has one step in each.
   due += Math.abs(seconds - dt) < 0.06 * dt ? dt : seconds;
   const costs = [];
   while (due > 0.999 * dt && costs.length < MOST_STEPS && game.steps < end) {
@@ -234,18 +234,18 @@ function frame(now) {
   last = now;
   if (!game || !stage?.scene || document.hidden) return;
   if (isPlaying) {
-    pictures.push({ at: now, costs: steps(passed) });
-    pictured += 1;
+    frames.push({ at: now, costs: steps(passed) });
+    framed += 1;
     stage.isStale = true;
-    while (now - pictures[0].at > 1000) pictures.shift();
+    while (now - frames[0].at > 1000) frames.shift();
     if (game.steps >= end) finish();
   }
   if (stage.isStale) stage.draw();
   if (isPlaying && now - told > 250) {
     tell(now);
     if (now - since < 1000) return;
-    stage.ease((1000 * pictured) / (now - since));
-    [since, pictured] = [now, 0];
+    stage.ease((1000 * framed) / (now - since));
+    [since, framed] = [now, 0];
   }
 }
 

@@ -81,13 +81,15 @@ def _damping(value: float = 0.0) -> dict[str, Any]:
 def jelly() -> Scene:
     """Pull a jelly.
 
-    Take hold of the pudding and pull, or drop berries on it. Its Young's modulus is 20 kPa.
+    Take hold of the pudding and pull, or drop berries on it. Its foot is fixed, and its Young's modulus is
+    20 kPa.
     """
     world = World(soft_contact=True, friction=0.8, record=STEPS)
     contact = Contact(friction=0.8, thickness=0.01)
-    pudding = SoftBodyAsset(
-        _pudding(), Material(young=2e4, poisson=0.42, density=500.0, damping_ratio=0.05), contact=contact
-    )
+    mesh = _pudding()
+    material = Material(young=2e4, poisson=0.42, density=500.0, damping_ratio=0.05)
+    foot = np.flatnonzero(mesh.vertices[:, 2] < mesh.vertices[:, 2].min() + 1e-6)
+    pudding = SoftBodyAsset(mesh, material, contact=contact, pinned=foot)
     berry = SoftBodyAsset(
         sphere(0.11, 2), Material(young=5e4, poisson=0.3, density=400.0, damping_ratio=0.1), contact=contact
     )

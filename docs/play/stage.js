@@ -5,7 +5,7 @@ import { SoftMesh } from "./three.js";
 
 const FRAMED = 1.6; // width over height that the cameras of the scenes frame
 const [LOWEST, FINEST] = [0.5, 2]; // pixels drawn along one of CSS: fewer where drawing is slow, more for smooth edges
-const WANTED = 60; // pictures a second
+const WANTED = 60; // frames a second
 
 export class Stage {
   constructor(canvas) {
@@ -42,8 +42,9 @@ export class Stage {
       ...facts.colliders.map((each) => this.#solid(each, game.world.collider(each.number))),
       ...facts.props.map((each) => this.#solid(each, game.world.frame(each.frame))),
     ];
-    this.strings = new THREE.LineSegments(new THREE.BufferGeometry(), new THREE.LineBasicMaterial());
+    this.strings = new THREE.LineSegments(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({ depthTest: false }));
     this.strings.frustumCulled = false;
+    this.strings.renderOrder = 1; // over the body that is pulled
     this.scene.add(this.strings);
     Object.assign(this.camera, { near: this.distance / 50, far: 30 * this.distance });
     Object.assign(this.controls, { minDistance: this.distance / 4, maxDistance: 2.5 * this.distance, maxPolarAngle: 1.54 });
@@ -176,7 +177,7 @@ export class Stage {
     this.isStale = true;
   }
 
-  /** Draw hard shadows, no highlights and fewer pixels where there are too few pictures a second. */
+  /** Draw hard shadows, no highlights and fewer pixels where there are too few frames a second. */
   ease(rate) {
     if (rate > 0.9 * WANTED || this.sharpness === LOWEST) return;
     if (!this.isPlain) {
