@@ -18,7 +18,7 @@ help:
 	@echo "make test-platforms  set up, build it for other platforms, play games on all that run here"
 	@echo "make dist-native  build it for all platforms, pack it with headers, wrappers and sample into dist; and a project for Godot 3"
 	@echo "make profile  set up, measure what a frame costs here"
-	@echo "make gallery  set up, film every demo for the documentation: takes minutes"
+	@echo "make gallery  set up, film every demo and export worlds to play for the documentation: takes minutes"
 	@echo "make docs     set up, build the documentation into out/docs"
 	@echo "make lint     set up with every extra, check style and types"
 	@echo "make setup    set up with every extra"
@@ -87,6 +87,7 @@ profile: $(VENV)/.demo
 
 gallery: $(VENV)/.demo
 	@$(BIN)/python docs/make_gallery.py $(GALLERY)
+	@$(BIN)/python docs/make_worlds.py $(WORLDS)
 
 docs: $(VENV)/.docs
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict

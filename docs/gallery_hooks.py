@@ -1,10 +1,10 @@
 """The gallery of the documentation site: an entry for every demo, and a page with its script.
 
 An entry is made of the docstring of the demo: its first paragraph says what is seen, its second one what to
-notice. Its still comes from `docs/pictures/demos`, which is in the repository. Films and the page with bodies
-to turn come from `docs/gallery`, where `make_gallery.py` puts them. Without its film an entry shows its
-still, and the page says how to make the films. MkDocs calls these functions by their names (mkdocs.yml,
-`hooks`).
+notice. Above the demos are scenes to play, with the docstrings of `play/scenes.py`. Stills come from
+`docs/pictures`, which is in the repository; films and worlds from `docs/gallery`, where `make_gallery.py` and
+`make_worlds.py` put them. Without them an entry shows its still, and the page says how to make them. MkDocs
+calls these functions by their names (mkdocs.yml, `hooks`).
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from typing import Any
 
 ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / "docs" / "gallery"
+WORLDS = FOLDER / "play"
 
 ENTRY = """<section class="demo" markdown>
 
@@ -28,7 +29,7 @@ ENTRY = """<section class="demo" markdown>
 
 **What to notice:** {notice}
 
-[Script](demos/{name}.md){turn} &middot; `taichi-soft demo {name}`
+[Script](demos/{name}.md) &middot; `taichi-soft demo {name}`
 
 </section>"""
 
@@ -43,15 +44,25 @@ loading="lazy">"""
 
 PAUSE = '<p><button id="films" class="md-button" type="button" hidden>Pause all films</button></p>'
 
-VIEWER = """## Turn it, and stop the time
+PLAYED = """<section class="demo" markdown>
 
-{count} demos as data: the places of all vertices in each picture, in some hundred kilobytes.
+### {title}
 
-<iframe class="viewer" src="gallery/viewer.html" title="Bodies to turn, and time to scrub" \
-loading="lazy"></iframe>
+{still}
 
-[Open it by itself](gallery/viewer.html){{ target="_blank" }}. It is one file of {size:.1f} MB: save it, \
-and it opens from a folder too, without a server. The picture turns by dragging and by arrow keys."""
+{what}
+
+</section>"""
+
+PLAYED_STILL = """<img class="film" src="pictures/play/{name}.jpg" alt="{title}" width="480" height="270" \
+loading="lazy">"""
+
+LINK = """<a href="gallery/play/index.html#{name}" aria-label="Play: {title}">{still}</a>"""
+
+WORLDLESS = """!!! note "Stills instead of worlds"
+
+    This copy of the documentation was built without its worlds. `make gallery` makes them, in some minutes; \
+then `make docs` takes them into the site."""
 
 MISSING = """!!! note "Stills instead of films"
 
@@ -71,6 +82,26 @@ search:
 {script}
 ```
 """
+
+
+@dataclass(frozen=True)
+class Played:
+    """What the page says of a scene to play."""
+
+    name: str
+    title: str
+    what: str  # to do
+
+
+def scenes() -> list[Played]:
+    """All scenes to play: the public functions of their script."""
+    script = ast.parse((ROOT / "docs" / "play" / "scenes.py").read_text(encoding="utf-8"))
+    found = []
+    for each in script.body:
+        if isinstance(each, ast.FunctionDef) and not each.name.startswith("_"):
+            title, _, what = (ast.get_docstring(each) or "").partition("\n\n")
+            found.append(Played(each.name, title.rstrip("."), " ".join(what.split())))
+    return found
 
 
 @dataclass(frozen=True)
@@ -112,15 +143,22 @@ def on_page_markdown(text: str, page: Any, **_: Any) -> str:
     """Fill the gallery."""
     if page.file.src_uri != "gallery.md":
         return text
-    return text.replace("<!-- viewer -->", viewer()).replace("<!-- demos -->", entries())
+    return text.replace("<!-- play -->", played()).replace("<!-- demos -->", entries())
 
 
-def viewer() -> str:
-    """The page with bodies to turn, within this one; nothing where it was not made."""
-    file = FOLDER / "viewer.html"
-    if not file.is_file():
-        return ""
-    return VIEWER.format(count=len(list(FOLDER.glob("*.motion"))), size=file.stat().st_size / 1e6)
+def played() -> str:
+    """An entry for each scene to play, which leads to its page where that was made."""
+    found, missing = [], False
+    for scene in scenes():
+        named = {"name": scene.name, "title": escape(scene.title, quote=True)}
+        still = PLAYED_STILL.format(**named)
+        if (WORLDS / scene.name / "scene.json").is_file():
+            still = LINK.format(still=still, **named)
+        else:
+            missing = True
+        found.append(PLAYED.format(title=scene.title, what=scene.what, still=still))
+    head = [WORLDLESS] if missing else []
+    return "\n\n".join([*head, '<div class="gallery" markdown>', *found, "</div>"])
 
 
 def entries() -> str:
@@ -140,6 +178,4 @@ def _entry(demo: Demo) -> str:
     film = STILL.format(**named)
     if (FOLDER / f"{demo.name}.webm").is_file():
         film = FILM.format(still=film, **named)
-    is_turned = all((FOLDER / name).is_file() for name in (f"{demo.name}.motion", "viewer.html"))
-    turn = f' &middot; [Turn it](gallery/viewer.html#{demo.name}){{ target="_blank" }}' if is_turned else ""
-    return ENTRY.format(name=demo.name, film=film, what=demo.what, notice=demo.notice, turn=turn)
+    return ENTRY.format(name=demo.name, film=film, what=demo.what, notice=demo.notice)

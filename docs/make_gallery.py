@@ -1,7 +1,7 @@
-"""Make the gallery of the documentation: films of all demos, and the page with bodies to turn.
+"""Make the films of all demos for the gallery of the documentation.
 
-`python docs/make_gallery.py` makes everything, in some minutes; with names of demos, only their films. A demo
-that needs a missing package is skipped by name. `make_pictures.py` makes the stills.
+`python docs/make_gallery.py` makes all, in some minutes; with names of demos, those. A demo that needs a
+missing package is skipped by name. `make_pictures.py` makes the stills, `make_worlds.py` what is played.
 """
 
 import argparse
@@ -14,8 +14,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 from rich.markup import escape
-from viewer.motion import motion_of
-from viewer.page import write_page
 
 from taichi_soft.cli.console import filming, say
 from taichi_soft.cli.filming import size_of
@@ -27,8 +25,6 @@ from taichi_soft.render.film import Stage, film
 
 FOLDER = Path(__file__).parent / "gallery"
 SIZE, FPS = (480, 270), 25
-TURNABLE = ("jelly", "playground", "cloth")
-"""Demos on the page with bodies to turn."""
 
 FADE = 10
 """Pictures in which the last one becomes the first again."""
@@ -43,8 +39,8 @@ CODEC = (
 )
 """Small files, for which encoding may take its time."""
 
-SIZES = {".webm": 6e6, ".motion": 3e6}
-"""What all files of a kind may have together [bytes]: a page is read on the way, too."""
+MOST = 6e6
+"""What all films may have together [bytes]: a page is read on the way, too."""
 
 Progress = Callable[[int, int], None]
 
@@ -95,24 +91,12 @@ def main() -> None:
         try:
             with filming(f"{name}, {number} of {len(names)}") as show:
                 write_film(stage_of(name), name, show, size)
-                if name in TURNABLE:
-                    (FOLDER / f"{name}.motion").write_bytes(motion_of(stage_of(name)))
         except MissingExtraError as error:
             say(f"{name}: skipped. {escape(str(error))}")
             continue
         say(f"{name}: {(FOLDER / f'{name}.webm').stat().st_size / 1e3:.0f} kB")
-    motions = [FOLDER / f"{name}.motion" for name in TURNABLE]
-    if all(file.is_file() for file in motions):
-        try:
-            write_page(FOLDER / "viewer.html", {file.stem: file.read_bytes() for file in motions})
-        except OSError as error:  # three.js has to be fetched once
-            say(f"viewer.html: skipped. {escape(str(error))}")
-    for suffix, most in SIZES.items():
-        total = sum(file.stat().st_size for file in FOLDER.glob(f"*{suffix}"))
-        say(
-            f"{suffix}: {total / 1e6:.1f} MB together"
-            + (f", above {most / 1e6:.0f} MB" if total > most else "")
-        )
+    total = sum(file.stat().st_size for file in FOLDER.glob("*.webm"))
+    say(f"films: {total / 1e6:.1f} MB together" + (f", above {MOST / 1e6:.0f} MB" if total > MOST else ""))
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """Make the pictures of the README and the pages, and the stills of the gallery.
 
-`python docs/make_pictures.py` makes all, in some minutes; with names of demos, only their stills.
+`python docs/make_pictures.py` makes all, in some minutes; with names of demos, or of scenes to play such as
+`play/jelly`, only their stills.
 """
 
 import subprocess
@@ -9,13 +10,17 @@ import tempfile
 from pathlib import Path
 
 import cv2
+import gallery_hooks
 import numpy as np
+from play import scenes
 
+from engine_adapter import FixedStep
 from taichi_soft.core.package_data import ASSETS
 from taichi_soft.lab.peers import Drop, compare, missing_peers
 from taichi_soft.lab.peers.wall import draw_wall
 from taichi_soft.render.demos import demo_names, load_demo
-from taichi_soft.render.film import film
+from taichi_soft.render.film import Actor, Stage, film
+from taichi_soft.render.props import Prop
 
 FOLDER = Path(__file__).parent / "pictures"
 MOMENTS = {"dents": 0.44, "bars": 1.06, "tower": 1.7, "drape": 2.6, "bridge": 1.6, "bowl": 3.0}
@@ -23,6 +28,17 @@ MOMENTS = {"dents": 0.44, "bars": 1.06, "tower": 1.7, "drape": 2.6, "bridge": 1.
 
 STILLS = {"bounce": 1.3, "elephants": 0.6, "grab": 2.3, "jelly": 0.74, "lod": 3.1, "wheels": 3.0}
 """Moments of demos that their stills in the gallery show [s]."""
+
+PLAYED = {
+    "jelly": 0.3,
+    "bowl": 1.2,
+    "elephant": 0.9,
+    "flag": 1.6,
+    "tower": 0.5,
+    "stiffness": 0.75,
+    "hand": 0.2,
+}
+"""Moments of the scenes to play [s]."""
 
 STILL = 0.3
 """Moment of all others [share of the film's length]."""
@@ -37,7 +53,12 @@ STILL_SIZE, QUALITY = (480, 270), 82
 def still(name: str, moment: float | None, size: tuple[int, int] = (520, 292)) -> np.ndarray:
     """Picture of a demo at a moment, uint8 (height, width, 3)."""
     stage = load_demo(name).stage()
-    film(stage, None, seconds=STILL * stage.seconds if moment is None else moment)  # draws nothing
+    return still_of(stage, STILL * stage.seconds if moment is None else moment, size)
+
+
+def still_of(stage: Stage, moment: float, size: tuple[int, int]) -> np.ndarray:
+    """Picture of a stage at a moment, uint8 (height, width, 3)."""
+    film(stage, None, seconds=moment)  # draws nothing
     with tempfile.TemporaryDirectory() as folder:
         film(stage, Path(folder) / "f.png", fps=50, seconds=0.02, size=size)
         return cv2.imread(f"{folder}/f_0000.png")
@@ -48,6 +69,18 @@ def write_still(name: str) -> None:
     file = FOLDER / "demos" / f"{name}.jpg"
     file.parent.mkdir(exist_ok=True)
     cv2.imwrite(str(file), still(name, STILLS.get(name), STILL_SIZE), [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
+
+
+def write_played_still(name: str) -> None:
+    """Write the still of a scene to play."""
+    made = vars(scenes)[name]()
+    actors = [Actor(body, made.colors[body.index]) for body in made.world.bodies]
+    props = [Prop(surface, frame) for frame, surface in made.props.items()]
+    (title,) = [each.title for each in gallery_hooks.scenes() if each.name == name]
+    stage = Stage(title, made.world, actors, made.camera, FixedStep(1 / 60), 5.0, props=props)
+    file = FOLDER / "play" / f"{name}.jpg"
+    file.parent.mkdir(exist_ok=True)
+    cv2.imwrite(str(file), still_of(stage, PLAYED[name], STILL_SIZE), [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
 
 
 def write_strip() -> None:
@@ -62,8 +95,9 @@ def write_strip() -> None:
 
 def main(names: list[str]) -> None:
     """Write the stills of these demos, or all pictures."""
-    for name in names or demo_names():
-        write_still(name)
+    for name in names or [*demo_names(), *(f"play/{each}" for each in PLAYED)]:
+        scene = name.removeprefix("play/")
+        write_still(name) if scene == name else write_played_still(scene)
     if names:
         return
     stills = [still(name, moment) for name, moment in MOMENTS.items()]

@@ -7,9 +7,12 @@ plain data, with the assets and shapes that it needs, so that `replay` can build
 
 from __future__ import annotations
 
+import base64
+import json
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +23,7 @@ from taichi_soft.bodies.asset import SoftBodyAsset
 from taichi_soft.contact.shapes import Shape
 from taichi_soft.core.checks import as_path
 from taichi_soft.core.container import name_of_sealed, seal, unseal
-from taichi_soft.core.errors import SnapshotError
+from taichi_soft.core.errors import SnapshotError, TaichiSoftError
 from taichi_soft.core.handles import Handle, serial_of
 from taichi_soft.core.serialisation import as_plain, digest_of, from_json, plain_of, to_json
 from taichi_soft.persistence.snapshot import state_hash, take_snapshot
@@ -169,6 +172,26 @@ def read_recording(path: Any) -> tuple[dict[str, Any], bytes]:
         data = file.read_bytes()
     except OSError as error:
         raise SnapshotError(f"cannot read {str(file)!r}: {error.strerror or error}") from None
+    if data[:1] == b"{":
+        return _read_played(data)
+    return _read_sealed(data)
+
+
+def _read_played(data: bytes) -> tuple[dict[str, Any], bytes]:
+    """Read what a page saved: a recording, and what the visitor did in place of its steps."""
+    try:
+        played = json.loads(data)
+        made_of, snapshot = _read_sealed(base64.b64decode(played["start"], validate=True))
+        before = takewhile(lambda entry: entry[0] == "call", made_of["entries"])
+        return {**made_of, "entries": [*before, *played["entries"]]}, snapshot
+    except (ValueError, LookupError, TypeError, RecursionError) as error:
+        if isinstance(error, TaichiSoftError):
+            raise
+        raise SnapshotError(f"this file of a page is not in order: {error!r}") from None
+
+
+def _read_sealed(data: bytes) -> tuple[dict[str, Any], bytes]:
+    """Read what `Recorder.save` wrote."""
     parts = unseal(data, MARK, VERSION, "recording")
     try:
         content, snapshot = parts

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,11 +13,12 @@ import numpy as np
 from taichi_soft.bodies.asset import SoftBodyAsset
 from taichi_soft.bodies.failure import Failure
 from taichi_soft.control.drives import push_bodies
-from taichi_soft.core.checks import as_path
+from taichi_soft.core.checks import as_count, as_path
 from taichi_soft.core.errors import FrozenBodyWarning, SnapshotError, TaichiSoftError, VideoError
 from taichi_soft.core.handles import Handle, handles_of, is_recorded
 from taichi_soft.core.serialisation import from_plain
 from taichi_soft.persistence.recorder import read_recording
+from taichi_soft.persistence.snapshot import bodies_hash
 from taichi_soft.render import FLIPPED, PALETTE, Camera, Renderer, Surface, draw_text, highlight
 from taichi_soft.render.opencv import cv2
 from taichi_soft.render.props import Scenery
@@ -33,18 +35,21 @@ class ReplayReport:
     first_difference: int | None  # step count of the world after which a state was another; None for none
     failures: tuple[Failure, ...]  # of the bodies that are frozen at the end
     picture: Path | None
+    hash: str  # of the last state, as pages and the C library print it
 
 
-def replay(path: Any, picture: Any = None) -> ReplayReport:
+def replay(path: Any, picture: Any = None, steps: int | None = None) -> ReplayReport:
     """Make a recording again.
 
     Args:
-        path: of a file that `World.save_recording` or a body that froze has written.
+        path: of a file that `World.save_recording`, a body that froze or a page of the gallery has written.
         picture: of the end, .png; None draws nothing.
+        steps: to make, at most; None makes all.
     Raises: SnapshotError for what is damaged, no recording, or from another version of this package;
         VideoError where the picture cannot be written.
     """
     target = None if picture is None else as_path(picture)
+    most = math.inf if steps is None else as_count(steps, "steps", 0)
     made_of, snapshot = read_recording(path)
     try:
         world, parts = _rebuilt(made_of)
@@ -54,22 +59,29 @@ def replay(path: Any, picture: Any = None) -> ReplayReport:
             raise
         raise SnapshotError(f"this recording is not in order: {error!r}") from None
     world.restore(snapshot)
-    steps, difference = 0, None
+    made, difference = 0, None
     for entry in entries:
+        if made == most:
+            break
         try:
             if entry[0] == "call":
                 _call(world, parts, *entry[1:])
                 continue
             expected = _step(world, *entry[1:])
         except (KeyError, TypeError, ValueError, AttributeError) as error:
-            raise SnapshotError(f"this recording stops after {steps} steps: {error}") from None
-        steps += 1
-        if difference is None and world.state_hash() != expected:
+            raise SnapshotError(f"this recording stops after {made} steps: {error}") from None
+        made += 1
+        if difference is None and not _is_state(world, expected):
             difference = world.step_count
     failures = tuple(body.failure for body in world.bodies if body.failure is not None)
     if target is not None:
         _draw(world, failures, target)
-    return ReplayReport(world, steps, difference, failures, target)
+    return ReplayReport(world, made, difference, failures, target, bodies_hash(context_of_world(world)))
+
+
+def _is_state(world: World, expected: str) -> bool:
+    """True if the state has that hash: World's own, or the one that pages print."""
+    return expected in (world.state_hash(), bodies_hash(context_of_world(world)))
 
 
 def _rebuilt(made_of: dict[str, Any]) -> tuple[World, dict[str, Any]]:
@@ -115,7 +127,7 @@ def _value(world: World, parts: dict[str, Any], data: Any) -> Any:
     return from_plain(data)
 
 
-def _step(world: World, seconds: float, substeps: int, expected: str, pushes: list[Any]) -> str:
+def _step(world: World, seconds: float, substeps: int | None, expected: str, pushes: list[Any]) -> str:
     """Make a step again. Returns the name that the state had."""
     rows = []
     for serial, data in pushes:

@@ -1,7 +1,5 @@
-"""The gallery: an entry for each demo, motions that hold what the world did, pages that work in a browser."""
+"""The gallery: an entry for each demo and scene, and films that play in a browser."""
 
-import gzip
-import json
 import shutil
 import sys
 from html.parser import HTMLParser
@@ -11,18 +9,15 @@ from types import SimpleNamespace
 import cv2
 import numpy as np
 import pytest
-from browser import chromium, opened, pixels_of
+from browser import chromium, opened
 
 from engine_adapter import FixedStep
 from taichi_soft import (
     BoxShape,
     Material,
     MissingExtraError,
-    SpringMaterial,
     World,
     box,
-    cloth,
-    cloth_constants,
 )
 from taichi_soft.core.package_data import DEMOS
 from taichi_soft.render import Camera, VideoWriter
@@ -34,8 +29,6 @@ sys.path.insert(0, str(ROOT / "docs"))
 
 import gallery_hooks  # noqa: E402
 import make_gallery  # noqa: E402
-from viewer.motion import motion_of  # noqa: E402
-from viewer.page import write_page  # noqa: E402
 
 DT = 1 / 50
 RED, BLUE = (0.9, 0.1, 0.1), (0.1, 0.2, 0.9)
@@ -59,90 +52,6 @@ def falling_stage():
     return Stage("a box", world, actors, camera, FixedStep(DT), 0.6, act, collider_colors={mover: BLUE})
 
 
-def hanging_stage():
-    """A cloth that hangs from two corners: both of its sides are drawn."""
-    mesh = cloth((1.0, 1.0), (6, 6), 0.2)
-    world = World(integrator="implicit_euler", floor=None)
-    material = SpringMaterial(
-        cloth_constants(mesh, (6, 6), tensile=400.0, shear=150.0, bend=3.0), damping=0.05
-    )
-    world.add_body(mesh, material, law="springs", pinned=[0, 6], position=(0.5, 0.0, 2.0))
-    world.build()
-    camera = Camera.framing((-0.5, -0.6, 0.8), (1.1, 0.6, 2.2), aspect=16 / 9)
-    return Stage("a cloth", world, [Actor(world.bodies[0], BLUE)], camera, FixedStep(1 / 60, 1), 0.5)
-
-
-def decoded(motion):
-    """The header, and of each part its triangles (m, 3) of points and its places (frames, points, 3)."""
-    raw = gzip.decompress(motion)
-    begin = 4 + int.from_bytes(raw[:4], "little")
-    header = json.loads(raw[4:begin])
-    low, high = np.frombuffer(raw[begin:], np.uint8).reshape(2, -1).astype(np.int64)
-    numbers = iter(np.split(low + 256 * high, np.cumsum(list(counts_of(header)))))
-    corners = []
-    for _ in header["parts"]:
-        points = next(numbers)
-        corners.append(points[next(numbers)].reshape(-1, 3))
-    still = [next(numbers).reshape(1, 3, -1) for part in header["parts"] if not part["moves"]]
-    track = next(numbers).reshape(header["frames"], 3, -1)
-    steps = np.cumsum(track[1:], axis=0)
-    track = np.cumsum(np.concatenate([track[:1], steps]), axis=0) % 65536
-    ends = np.cumsum([part["points"] for part in header["parts"] if part["moves"]])
-    moving = iter(np.split(track, ends, axis=2))
-    still = iter(still)
-    places = []
-    for part in header["parts"]:
-        whole = next(moving) if part["moves"] else np.repeat(next(still), header["frames"], axis=0)
-        places.append(np.array(header["lower"]) + header["quantum"] * whole.transpose(0, 2, 1))
-    return header, corners, places
-
-
-def counts_of(header):
-    """How many numbers there are of each kind, but the last."""
-    for part in header["parts"]:
-        yield from (part["vertices"], 3 * part["triangles"])
-    yield from (3 * part["points"] for part in header["parts"] if not part["moves"])
-
-
-def test_a_motion_holds_the_places_of_all_vertices_within_half_a_quantum():
-    """Those that the world has, stepped by itself here; of colliders by their sizes and where they are."""
-    header, corners, places = decoded(motion_of(falling_stage()))
-    assert header["fps"] == 25.0
-    assert header["frames"] == 16
-    assert header["floor"] == -0.5
-    assert [part["moves"] for part in header["parts"]] == [True, True, False]
-    np.testing.assert_allclose([part["color"] for part in header["parts"][:2]], [RED, BLUE], atol=2e-3)
-    stage = falling_stage()
-    body, mover = stage.actors[0].body, stage.world.colliders[0]
-    slack = header["quantum"] / 2 + 1e-6
-    ends = np.array(np.meshgrid(*3 * [[-0.5, 0.5]], indexing="ij")).reshape(3, -1).T
-    for frame in range(header["frames"]):
-        rows = body.positions() + np.array([0.1, 0.0, 0.0])
-        np.testing.assert_allclose(places[0][frame][corners[0]], rows[body.mesh.surface], atol=slack)
-        turned = ends * (0.3, 0.4, 0.5) @ np.array(mover.rotation).T + mover.position
-        for found, wanted in ((places[1], turned), (places[2], ends * (4.0, 2.0, 0.2) + (0.3, 0, -0.4))):
-            gaps = np.abs(found[frame][:, None] - wanted).max(axis=2)
-            assert gaps.shape == (8, 8)
-            assert gaps.min(axis=0).max() < slack
-        for _ in range(2):
-            stage.act(stage.world)
-            stage.world.step(DT)
-
-
-def test_a_motion_of_a_cloth_has_both_of_its_sides_and_each_place_once():
-    header, corners, places = decoded(motion_of(hanging_stage()))
-    assert header["fps"] == pytest.approx(30.0)
-    assert header["floor"] is None
-    stage = hanging_stage()
-    body = stage.actors[0].body
-    assert header["parts"][0]["points"] == len(body.positions()) == 49
-    for frame in range(header["frames"]):
-        rows = body.positions()[body.mesh.surface]
-        np.testing.assert_allclose(places[0][frame][corners[0]], rows, atol=header["quantum"] / 2 + 1e-6)
-        for _ in range(2):
-            stage.world.step(1 / 60, 1)
-
-
 class Films(HTMLParser):
     """The attributes of every element, by its name."""
 
@@ -163,6 +72,7 @@ def folder(tmp_path, monkeypatch):
     for name in demo_names():
         (made / f"{name}.webm").touch()
     monkeypatch.setattr(gallery_hooks, "FOLDER", made)
+    monkeypatch.setattr(gallery_hooks, "WORLDS", made / "play")
     return made
 
 
@@ -189,11 +99,6 @@ def test_every_demo_has_an_entry_with_film_still_words_script_and_command(folder
 
 
 def test_without_films_the_gallery_shows_stills_and_says_how_to_make_films(folder):
-    assert gallery_hooks.viewer() == ""
-    (folder / "viewer.html").write_text("x" * 2_300_000)
-    (folder / "jelly.motion").touch()
-    assert "2.3 MB" in gallery_hooks.viewer()
-    assert "gallery/viewer.html#jelly" in gallery_hooks.entries()
     (folder / "cut.webm").unlink()
     text = gallery_hooks.entries()
     assert "without some of its films. `make gallery`" in text
@@ -207,10 +112,32 @@ def test_without_films_the_gallery_shows_stills_and_says_how_to_make_films(folde
     assert "demos/cut.md" in text
 
 
-@pytest.mark.parametrize("name", demo_names())
-def test_every_demo_has_a_still_in_the_repository(name):
-    """`python docs/make_pictures.py NAME` makes it."""
-    file = ROOT / "docs" / "pictures" / "demos" / f"{name}.jpg"
+def test_a_scene_to_play_leads_to_its_page_where_that_was_made(folder):
+    scenes = gallery_hooks.scenes()
+    assert len(scenes) >= 6
+    assert all(each.title and each.what for each in scenes)
+    text = gallery_hooks.played()
+    assert "a" not in Films(text).found
+    assert "without its worlds. `make gallery`" in text
+    for each in scenes:
+        (folder / "play" / each.name).mkdir(parents=True)
+        (folder / "play" / each.name / "scene.json").touch()
+    text = gallery_hooks.played()
+    found = Films(text).found
+    assert [each["href"] for each in found["a"]] == [
+        f"gallery/play/index.html#{each.name}" for each in scenes
+    ]
+    assert [each["src"] for each in found["img"]] == [f"pictures/play/{each.name}.jpg" for each in scenes]
+    assert "make gallery" not in text
+
+
+STILLS = [f"demos/{name}" for name in demo_names()] + [f"play/{each.name}" for each in gallery_hooks.scenes()]
+
+
+@pytest.mark.parametrize("name", STILLS)
+def test_every_demo_and_scene_has_a_still_in_the_repository(name):
+    """`python docs/make_pictures.py` makes them."""
+    file = ROOT / "docs" / "pictures" / f"{name}.jpg"
     assert cv2.imread(str(file)).shape == (270, 480, 3)
     assert file.stat().st_size < 40_000
 
@@ -270,151 +197,6 @@ def test_a_demo_that_needs_a_missing_package_is_skipped_by_name(tmp_path, monkey
     film = cv2.VideoCapture(str(tmp_path / "box.webm"))
     assert int(film.get(cv2.CAP_PROP_FRAME_COUNT)) == 2 + make_gallery.FADE
     assert film.get(cv2.CAP_PROP_FRAME_WIDTH) == 96
-
-
-@pytest.mark.parametrize("name", make_gallery.TURNABLE)
-def test_the_motion_of_a_demo_is_less_than_a_megabyte(name):
-    assert len(motion_of(load_demo(name).stage())) < 1e6
-
-
-@pytest.fixture(scope="module")
-def turned_page(tmp_path_factory):
-    """The page with two small motions."""
-    path = tmp_path_factory.mktemp("page") / "viewer.html"
-    motions = {"box": motion_of(falling_stage()), "cloth": motion_of(hanging_stage())}
-    try:
-        write_page(path, motions)
-    except OSError as error:
-        pytest.skip(f"needs registry.npmjs.org: {error}")
-    return path.as_uri()
-
-
-def ready(browser, address, **options):
-    """The page, once it has drawn."""
-    options = {"viewport": {"width": 960, "height": 700}, **options}
-    page, complaints, requests = opened(browser, address, **options)
-    page.wait_for_function("document.querySelector('#told').textContent !== ''")
-    return page, complaints, requests
-
-
-def reach(page, text):
-    """Wait until the page tells a time."""
-    page.wait_for_function(f"document.querySelector('#told').textContent.startsWith('{text}')")
-
-
-def change(page, act):
-    """By how much the picture changes through what is done, mean of levels from 0 to 255."""
-    before = pixels_of(page, "#view")
-    act()
-    page.wait_for_timeout(500)
-    return np.abs(pixels_of(page, "#view") - before).mean()
-
-
-def test_the_page_plays_scrubs_and_turns_by_keys_from_a_file(turned_page):
-    """Without asking for anything, and without a complaint."""
-    with chromium() as browser:
-        page, complaints, requests = ready(browser, turned_page, reduced_motion="reduce")
-        assert page.locator("#told").text_content() == "0.00 of 0.60 s"
-        assert change(page, lambda: None) == 0.0  # who wants no motion has none
-        still = pixels_of(page, "#view")
-
-        slider = page.get_by_role("slider", name="Time")
-        slider.focus()
-        slider.press("ArrowRight")
-        reach(page, "0.04")
-        assert change(page, lambda: (slider.press("End"), reach(page, "0.60"))) > 0.5
-        assert slider.get_attribute("aria-valuetext") == "0.60 seconds"
-
-        view = page.get_by_role("application")
-        view.focus()
-        assert change(page, lambda: view.press("ArrowLeft")) > 0.5
-        assert change(page, lambda: view.press("-")) > 0.5
-        view.press(",")
-        reach(page, "0.56")
-        view.press(".")
-        reach(page, "0.60")
-        slider.press("Home")
-        reach(page, "0.00")
-        page.get_by_role("button", name="First view").click()
-        page.wait_for_timeout(500)
-        np.testing.assert_allclose(pixels_of(page, "#view"), still, atol=2)
-
-        page.get_by_role("combobox", name="Speed").select_option("1/10")
-        view.press(" ")
-        page.wait_for_function("!document.querySelector('#told').textContent.startsWith('0.00')")
-        page.get_by_role("button", name="Pause").click()
-        assert page.get_by_role("button", name="Play").is_visible()
-        assert np.abs(pixels_of(page, "#view") - still).mean() > 0.01
-
-        page.get_by_role("radio", name="cloth").check()
-        page.wait_for_function("document.querySelector('#told').textContent.endsWith('of 0.50 s')")
-        assert "a cloth" in view.get_attribute("aria-label")
-        assert complaints == []
-        assert {url.partition(":")[0] for url in requests} <= {"file", "blob", "data"}
-
-
-def test_the_page_plays_by_itself_where_motion_is_wanted(turned_page):
-    with chromium() as browser:
-        page, complaints, _ = ready(browser, f"{turned_page}#cloth", reduced_motion="no-preference")
-        assert page.get_by_role("radio", name="cloth").is_checked()
-        times = set()
-        page.wait_for_function("document.querySelector('#time').value > 0")
-        for _ in range(4):
-            times.add(page.locator("#told").text_content())
-            page.wait_for_timeout(300)
-        assert len(times) > 1
-        assert complaints == []
-
-
-def test_a_browser_that_cannot_draw_says_so(turned_page):
-    with chromium("--disable-3d-apis") as browser:
-        page, _, _ = opened(browser, turned_page)
-        page.get_by_text("This browser cannot show the bodies").wait_for()
-
-
-def test_a_body_is_drawn_where_the_camera_of_its_stage_sees_it(turned_page):
-    """Its red pixels lie about the place to which its middle is projected here."""
-    header, _, places = decoded(motion_of(falling_stage()))
-    with chromium() as browser:
-        page, _, _ = ready(browser, turned_page, reduced_motion="reduce")
-        for frame in (0, 12):
-            page.get_by_role("slider").fill(str(frame))
-            reach(page, f"{frame / 25:.2f}")
-            page.wait_for_timeout(500)
-            pixels = pixels_of(page, "#view")
-            red, green, blue = np.moveaxis(pixels, 2, 0)
-            found = np.argwhere((red > 2 * green) & (red > 2 * blue) & (red > 60))
-            camera = falling_stage().camera
-            wanted = camera.project(places[0][frame].mean(axis=0)[None], pixels.shape[1], pixels.shape[0])
-            assert len(found) > 300
-            np.testing.assert_allclose(found.mean(axis=0)[::-1], wanted[0, :2], atol=8)
-        assert header["frames"] > 12
-
-
-@pytest.mark.parametrize(("width", "height"), [(1280, 800), (360, 640)])
-def test_every_control_of_the_page_has_a_name_and_is_in_view(turned_page, width, height):
-    with chromium() as browser:
-        page, _, _ = ready(browser, turned_page, viewport={"width": width, "height": height})
-        tree = page.context.new_cdp_session(page).send("Accessibility.getFullAXTree")["nodes"]
-        roles = ("application", "button", "slider", "combobox", "radio")
-        named = {}
-        for node in tree:
-            role = node.get("role", {}).get("value")
-            if role in roles and not node["ignored"]:
-                named.setdefault(role, []).append(node.get("name", {}).get("value", ""))
-        assert {role: len(names) for role, names in named.items()} == {
-            **{"application": 1, "button": 2, "slider": 1, "combobox": 1},
-            "radio": 2,
-        }
-        assert all(name for names in named.values() for name in names)
-        assert page.evaluate("document.documentElement.scrollWidth") <= width
-        for selector in ("#play", "#time", "#speed", "#reset", "#view", "#demos"):
-            place = page.locator(selector).bounding_box()
-            assert place["x"] >= 0
-            assert place["y"] >= 0
-            assert place["x"] + place["width"] <= width
-            assert place["y"] + place["height"] <= height
-        assert page.locator("#view").bounding_box()["height"] > 0.35 * height
 
 
 @pytest.mark.parametrize("motion", ["reduce", "no-preference"])

@@ -1,5 +1,7 @@
 """Flight recordings: written when a body freezes or on request, and made again from the file alone."""
 
+import base64
+import json
 import tracemalloc
 import zlib
 
@@ -172,6 +174,35 @@ def test_damaged_and_foreign_recordings_are_refused(game, tmp_path):
             replay(bad)
     with pytest.raises(SnapshotError, match="cannot read"):
         replay(tmp_path / "nowhere.recording")
+
+
+def test_what_a_page_saved_replaces_the_steps_of_its_recording(game, tmp_path):
+    """And a hash that differs is found at its step."""
+    _, path = game
+    entries = json.loads(to_json(read_recording(path)[0]["entries"]))
+    while entries[0][0] == "call":  # before its first step: they stay
+        del entries[0]
+    saved = tmp_path / "played.json"
+
+    def replayed(entries, **options):
+        start = base64.b64encode(path.read_bytes()).decode()
+        saved.write_text(json.dumps({"start": start, "entries": entries}))
+        return replay(saved, **options)
+
+    ends = [i + 1 for i, entry in enumerate(entries) if entry[0] == "step"]
+    whole = replayed(entries, steps=3)
+    assert (whole.steps, whole.first_difference) == (3, None)
+    entries[ends[2] - 1][3] = whole.hash  # as a page prints it
+    entries[ends[1] - 1][3] = whole.hash  # which is the hash of the step after
+    short = replayed(entries[: ends[2]])
+    assert (short.steps, short.hash) == (3, whole.hash)
+    assert short.first_difference == whole.world.step_count - 1
+    for content in ('{"start": "", "entries": []}', '{"entries": []}', "{", '{"start": "?"}', '{"start": 3}'):
+        saved.write_text(content)
+        with pytest.raises(SnapshotError):
+            replay(saved)
+    with pytest.raises(OptionError, match="steps"):
+        replay(path, steps=-1)
 
 
 def test_a_recording_inflates_to_so_much_and_no_more(game, tmp_path, monkeypatch):
