@@ -184,7 +184,8 @@ class RollbackSession:
         """Make again the ticks that were made with wrong predictions, as `advance` does first.
 
         Returns: how many ticks were made again.
-        Raises: what `act` and `World.step` raise. The next call goes on with the tick that was not made.
+        Raises: SessionError if the world was stepped by others; what `act` and `World.step` raise: the next
+            call goes on with the tick that was not made.
         """
         if self._wrong is not None:
             self._rollback.rewind_to(self._wrong)
@@ -192,6 +193,10 @@ class RollbackSession:
             self._longest_rewind = max(self._longest_rewind, self._tick - self._wrong)
             self._wrong = None
         missing = self._tick - self._world.step_count
+        if missing < 0:
+            raise SessionError(
+                f"the world made {-missing} steps outside its session: call RollbackSession.advance only"
+            )
         while self._world.step_count < self._tick:
             self._make_tick()
         self._compare()
@@ -239,8 +244,9 @@ class RollbackSession:
     def _read(self, data: bytes) -> _Message:
         """Parse and check a message. Raises: SessionError."""
         body = HEAD.size + 4 * self._players
-        if not isinstance(data, bytes) or len(data) < body or data[:4] != MARK:
+        if not isinstance(data, (bytes, bytearray)) or len(data) < body or data[:4] != MARK:
             raise SessionError("these bytes are no message of a session of this version")
+        data = bytes(data)  # a copy: the buffer may be used again
         size = self._input_size
         parts: list[Any] = [*HEAD.unpack_from(data)]
         parts.append(struct.unpack_from(f"<{self._players}I", data, HEAD.size))

@@ -190,7 +190,7 @@ export class RollbackSession {
     }
     this.#waits = 0;
     const tick = this.#heard[player];
-    this.#learn(player, ownInput.slice());
+    this.#learn(player, Uint8Array.from(ownInput)); // a copy, of a Buffer too
     try {
       this.#makeTick();
     } catch (error) {
@@ -212,6 +212,9 @@ export class RollbackSession {
       this.#wrong = null;
     }
     const missing = this.#tick - this.#world.clock.steps;
+    if (missing < 0) {
+      throw new SessionError(`the world made ${-missing} steps outside its session: call session.advance only`);
+    }
     for (let i = 0; i < missing; i += 1) this.#makeTick();
     this.#compare();
     return missing;
@@ -271,6 +274,7 @@ export class RollbackSession {
   #read(data) {
     const { player, players, inputSize, ticks, hashEvery } = this.#settings;
     const body = HEAD_SIZE + 4 * players;
+    if (data instanceof ArrayBuffer) data = new Uint8Array(data);
     const view = data instanceof Uint8Array ? new DataView(data.buffer, data.byteOffset, data.byteLength) : null;
     if (!view || data.length < body || view.getUint32(0, true) !== MARK) {
       throw new SessionError("these bytes are no message of a session of this version");
@@ -303,7 +307,7 @@ export class RollbackSession {
     if (data.length !== body + inputSize * count) {
       throw new SessionError(`a message of ${count} inputs has ${data.length} bytes: it is damaged`);
     }
-    const inputAt = (i) => data.slice(body + inputSize * i, body + inputSize * (i + 1));
+    const inputAt = (i) => Uint8Array.from(data.subarray(body + inputSize * i, body + inputSize * (i + 1)));
     message.inputs = Array.from({ length: count }, (_, i) => inputAt(i));
     this.#requireOrder(message);
     return message;

@@ -13,6 +13,7 @@ const CODES = ["OK", "ARGUMENT", "HANDLE", "BUSY", "FILE", "VERSION", "SIZE", "S
 const STATUS = ["active", "frozen", "asleep"];
 const KINDS = { body: 0, asset: 1, collider: 2, frame: 3, mesh: 4, joint: 5, motor: 6 };
 const SHAPES = ["plane", "sphere", "box", "capsule"];
+const ORIGIN = [0, 0, 0];
 const UPRIGHT = [0, 0, 0, 1];
 
 /** Kinds of events, as bits. */
@@ -27,6 +28,15 @@ export class SoftError extends Error {
     this.code = CODES[-code] ?? "RUNTIME";
   }
 }
+
+// The numbers of a vector of any kind: an array, a typed array, a Vector3 or Quaternion of three.js.
+function vector(value, name, count = 3) {
+  const found = typeof value?.[Symbol.iterator] === "function" ? Array.from(value, Number) : [];
+  if (found.length === count) return found;
+  throw new SoftError(-1, `${name} takes ${count} numbers, got ${Array.isArray(value) ? `[${value}]` : value}`);
+}
+
+const poseOf = ({ position, rotation = UPRIGHT }) => [...vector(position, "position"), ...vector(rotation, "rotation", 4)];
 
 // The module's memory and functions.
 class Native {
@@ -43,7 +53,7 @@ class Native {
     this.exports = new WebAssembly.Instance(module, imports).exports;
     this.exports._initialize();
     this.listeners = listeners;
-    this.small = this.exports.malloc(1024); // for what is given to one call, and for what it finds
+    this.small = this.allocate(1024); // for what is given to one call, and for what it finds
   }
 
   get view() {
@@ -51,14 +61,24 @@ class Native {
     return this.kept;
   }
 
+  allocate(size) {
+    const at = this.exports.malloc(Math.max(size, 8));
+    if (at === 0) throw new SoftError(-9, `there is not enough memory for ${size} bytes`);
+    return at;
+  }
+
   // Calls a function. One that refuses leaves by an exception, which the module's stack has to follow.
   call(name, ...args) {
+    if (!(name in this.exports)) {
+      throw new SoftError(-5, `the world has no ${name}, and is of another version than this package: export it again`);
+    }
     const stack = this.exports.__stack_pointer.value;
     try {
       this.exports[name](...args);
     } catch (error) {
       this.exports.__stack_pointer.value = stack;
-      throw error;
+      if (!(error instanceof WebAssembly.RuntimeError)) throw error;
+      throw new SoftError(-9, `${name} has failed, for want of memory or by a fault: ${error.message}`);
     }
   }
 
@@ -88,13 +108,13 @@ class Native {
 
   // Calls a function with memory of its own for some bytes.
   lending(bytes, use) {
-    const at = this.exports.malloc(Math.max(bytes.byteLength, 8));
+    const view = bytes instanceof ArrayBuffer ? new Uint8Array(bytes) : bytes;
+    if (!ArrayBuffer.isView(view)) throw new SoftError(-1, `bytes are a typed array or an ArrayBuffer, got ${bytes}`);
+    const { buffer, byteOffset, byteLength } = view;
+    const at = this.allocate(byteLength);
     try {
-      new Uint8Array(this.exports.memory.buffer).set(
-        new Uint8Array(bytes.buffer, bytes.byteOffset, bytes.byteLength),
-        at,
-      );
-      return use(at);
+      new Uint8Array(this.exports.memory.buffer).set(new Uint8Array(buffer, byteOffset, byteLength), at);
+      return use(at, byteLength);
     } finally {
       this.exports.free(at);
     }
@@ -104,8 +124,14 @@ class Native {
     return this.lending(new TextEncoder().encode(`${text}\0`), use);
   }
 
-  lendingInts(numbers, use) {
-    return this.lending(Int32Array.from(numbers ?? []), (at) => use(at, numbers?.length ?? 0));
+  // Calls a function with a list of vertices; null is all of them.
+  lendingVertices(vertices, use) {
+    if (vertices === null) return use(0, 0);
+    const numbers = Array.from(vertices);
+    if (numbers.length === 0) throw new SoftError(-1, "no vertex is named: give null for all");
+    const wrong = numbers.find((each) => !Number.isInteger(each));
+    if (wrong !== undefined) throw new SoftError(-1, `vertices are whole numbers, got ${wrong}`);
+    return this.lending(Int32Array.from(numbers), (at) => use(at, numbers.length));
   }
 }
 
@@ -115,7 +141,7 @@ class Block {
     this.native = native;
     this.Kind = Kind;
     this.count = count;
-    this.at = native.exports.malloc(Math.max(count * Kind.BYTES_PER_ELEMENT, 8));
+    this.at = native.allocate(count * Kind.BYTES_PER_ELEMENT);
   }
 
   get view() {
@@ -134,13 +160,38 @@ export class Scene {
   constructor(module, bytes) {
     this.native = new Native(module);
     const { small } = this.native;
-    this.native.lending(bytes, (at) => this.native.call("ts_web_load", at, bytes.byteLength, small));
+    this.native.lending(bytes, (at, size) => this.native.call("ts_web_load", at, size, small));
     this.handle = this.native.handle(small);
     this.native.view.setUint32(small, 24, true);
     this.native.call("ts_scene_get_info", this.handle, small);
     const [slots, assets, colliders, frames, meshes] = [4, 8, 12, 16, 20].map((at) => this.native.int(small + at));
     this.counts = { body: slots, asset: assets, collider: colliders, frame: frames, mesh: meshes };
-    this.meshes = Array.from({ length: meshes }, (_, i) => this.#mesh(i));
+    // Read once: worlds go on when the scene was unloaded.
+    this.names = Object.fromEntries(Object.keys(KINDS).map((kind) => [kind, this.#names(kind)]));
+    this.assets = this.names.asset.map((_, i) => this.#asset(i));
+    this.meshes = this.names.mesh.map((_, i) => this.#mesh(i));
+  }
+
+  #names(kind) {
+    const { native } = this;
+    const found = [];
+    for (;;) {
+      try {
+        native.call("ts_scene_get_name", this.handle, KINDS[kind], found.length, native.small, 1024);
+      } catch {
+        return found; // there are no more
+      }
+      found.push(native.text(native.small));
+    }
+  }
+
+  #asset(number) {
+    const { native } = this;
+    const { small } = native;
+    native.view.setUint32(small, 16, true);
+    native.call("ts_asset_get_info", this.handle, number, small);
+    const [vertexCount, slotCount] = [4, 8].map((at) => native.int(small + at));
+    return { number, vertexCount, slotCount, mass: native.view.getFloat32(small + 12, true) };
   }
 
   #mesh(number) {
@@ -152,37 +203,35 @@ export class Scene {
     native.call("ts_mesh_get_triangles", this.handle, number, triangles.at, triangles.count);
     const uv = hasUv ? new Block(native, Float32Array, 2 * vertexCount) : null;
     if (uv) native.call("ts_mesh_get_uv", this.handle, number, uv.at, uv.count);
-    return { number, asset, vertexCount, name: this.nameOf("mesh", number), triangles, uv };
+    return { number, asset, vertexCount, triangles, uv };
   }
 
-  /** Name of a "body", "asset", "collider", "frame" or "mesh". */
+  /** Name of a "body", "asset", "collider", "frame", "mesh", "joint" or "motor". */
   nameOf(kind, number) {
-    const { native } = this;
-    native.call("ts_scene_get_name", this.handle, KINDS[kind], number, native.small, 1024);
-    return native.text(native.small);
+    const found = this.#namesOf(kind)[number];
+    if (found === undefined) throw new SoftError(-1, `there is no ${kind} ${number}: there are ${this.names[kind].length}`);
+    return found;
   }
 
-  /** Number of what is called so. */
+  /** Number of a thing, by its name. */
   find(kind, name) {
-    const { native } = this;
-    if (typeof name === "number") return name;
-    native.lendingText(name, (at) => native.call("ts_scene_find", this.handle, KINDS[kind], at, native.small));
-    return native.int(native.small);
+    const names = this.#namesOf(kind);
+    if (Number.isInteger(name)) return name;
+    const number = names.indexOf(name);
+    if (number >= 0) return number;
+    throw new SoftError(-1, `no ${kind} is called ${name}: give a number, or one of these names: ${names.join(", ") || "none"}`);
+  }
+
+  #namesOf(kind) {
+    if (Object.hasOwn(KINDS, kind)) return this.names[kind];
+    throw new SoftError(-1, `kind is ${kind}: give one of ${Object.keys(KINDS).join(", ")}`);
   }
 
   /** `vertexCount`, `slotCount` and `mass` [kg] of an asset. */
   asset(name) {
-    const { native } = this;
-    const number = this.find("asset", name);
-    native.view.setUint32(native.small, 16, true);
-    native.call("ts_asset_get_info", this.handle, number, native.small);
-    const { small } = native;
-    return {
-      number,
-      vertexCount: native.int(small + 4),
-      slotCount: native.int(small + 8),
-      mass: native.view.getFloat32(small + 12, true),
-    };
+    const found = this.assets[this.find("asset", name)];
+    if (!found) throw new SoftError(-1, `there is no asset ${name}: there are ${this.assets.length}`);
+    return found;
   }
 
   /** A world as it was exported. */
@@ -200,6 +249,7 @@ export class Scene {
 export class World {
   #listener = null;
   #restoreCount = 0;
+  #isAdvancing = false;
   #meshes = new Set();
 
   constructor(scene) {
@@ -217,8 +267,7 @@ export class World {
   destroy() {
     this.#call("ts_world_destroy");
     this.native.listeners.delete(this.handle);
-    for (const mesh of this.#meshes) mesh.free();
-    this.#meshes.clear();
+    for (const mesh of [...this.#meshes]) mesh.free();
   }
 
   /** One step of `dt` [s]; 0 substeps for as many as are stable. */
@@ -236,17 +285,29 @@ export class World {
     this.#call("ts_world_set_fixed_step", small);
   }
 
-  /** Puts in the time of a frame [s] and makes the steps that are due. Returns the `clock`. */
+  /** Adds the time of a frame [s] and makes the steps that are due. Returns the `clock`. */
   advance(seconds) {
+    if (this.#isAdvancing) throw new SoftError(-7, "world.advance was called within its own onStep");
     const { small } = this.native;
     this.native.view.setUint32(small, 40, true);
+    this.#isAdvancing = true;
     try {
       this.#call("ts_world_advance", seconds, small);
     } catch (error) {
-      this.#call("ts_web_end_frame");
+      this.#endFrame();
       throw error;
+    } finally {
+      this.#isAdvancing = false;
     }
     return this.#clock();
+  }
+
+  #endFrame() {
+    try {
+      this.#call("ts_web_end_frame");
+    } catch {
+      // onStep destroyed the world: what it threw counts
+    }
   }
 
   /** `stepsMade` by the last `advance`, `steps`, `time` [s], `alpha`, `dropped` [s]. */
@@ -284,7 +345,7 @@ export class World {
 
   /** Gravity [m/s^2], from the next step on. Who sleeps wakes. */
   setGravity(gravity) {
-    this.#call("ts_world_set_gravity", this.native.doubles(this.native.small, gravity));
+    this.#call("ts_world_set_gravity", this.native.doubles(this.native.small, vector(gravity, "gravity")));
   }
 
   /** Coulomb's coefficient of the floor, from the next step on. */
@@ -294,11 +355,11 @@ export class World {
 
   /** Air that moves [m/s], of a density [kg/m^3]. */
   setWind(velocity, { density = 1.2, drag = 1 } = {}) {
-    this.#call("ts_world_set_wind", this.native.doubles(this.native.small, velocity), density, drag);
+    this.#call("ts_world_set_wind", this.native.doubles(this.native.small, vector(velocity, "velocity")), density, drag);
   }
 
   radialImpulse(center, impulse, radius) {
-    this.#call("ts_world_radial_impulse", this.native.doubles(this.native.small, center), impulse, radius);
+    this.#call("ts_world_radial_impulse", this.native.doubles(this.native.small, vector(center, "center")), impulse, radius);
   }
 
   /** The state as 16 hexadecimal digits: the same on every platform. */
@@ -312,7 +373,7 @@ export class World {
     const { native } = this;
     this.#call("ts_world_snapshot", 0, 0, native.small);
     const size = native.view.getUint32(native.small, true);
-    const at = native.exports.malloc(size);
+    const at = native.allocate(size);
     try {
       this.#call("ts_world_snapshot", at, size, native.small);
       return new Uint8Array(native.exports.memory.buffer).slice(at, at + size);
@@ -322,7 +383,7 @@ export class World {
   }
 
   restore(bytes) {
-    this.native.lending(bytes, (at) => this.#call("ts_world_restore", at, bytes.byteLength));
+    this.native.lending(bytes, (at, size) => this.#call("ts_world_restore", at, size));
     this.#restoreCount += 1;
   }
 
@@ -333,6 +394,7 @@ export class World {
 
   /** Kinds are bits of `EVENTS`; all if you say nothing, 0 for none. */
   recordEvents(kinds = 31) {
+    if (!Number.isInteger(kinds)) throw new SoftError(-1, `kinds is ${kinds}: give a sum of EVENTS`);
     this.#call("ts_world_record_events", kinds);
   }
 
@@ -340,7 +402,7 @@ export class World {
   events() {
     const { native } = this;
     const [size, most, found] = [72, 64, []];
-    const at = native.exports.malloc(size * most);
+    const at = native.allocate(size * most);
     try {
       for (let count = most; count === most; ) {
         this.#call("ts_world_drain_events", at, size, most, native.small);
@@ -386,12 +448,13 @@ export class World {
     return Array.from({ length: this.scene.counts.body }, (_, slot) => this.body(slot)).filter(Boolean);
   }
 
-  spawn(asset, { position = [0, 0, 0], rotation = UPRIGHT, velocity = [0, 0, 0], spin = [0, 0, 0] } = {}) {
+  spawn(asset, { velocity = [0, 0, 0], spin = [0, 0, 0], ...pose } = {}) {
     const number = this.scene.find("asset", asset);
     const { native } = this;
     native.view.setUint32(native.small, 112, true);
     native.view.setInt32(native.small + 4, 0, true);
-    native.doubles(native.small + 8, [...position, ...rotation, ...velocity, ...spin]);
+    const motion = [...vector(velocity, "velocity"), ...vector(spin, "spin")];
+    native.doubles(native.small + 8, [...poseOf({ position: ORIGIN, ...pose }), ...motion]);
     this.#call("ts_world_spawn", number, native.small, native.small + 128);
     return new Body(this, native.handle(native.small + 128));
   }
@@ -400,7 +463,7 @@ export class World {
   raycast(origin, direction, reach = Infinity) {
     const { native } = this;
     native.view.setUint32(native.small, 112, true);
-    const at = native.doubles(native.small + 128, [...origin, ...direction]);
+    const at = native.doubles(native.small + 128, [...vector(origin, "origin"), ...vector(direction, "direction")]);
     this.#call("ts_world_raycast", at, at + 24, reach, native.small);
     return this.#hit();
   }
@@ -409,7 +472,7 @@ export class World {
   closest(point, reach = Infinity) {
     const { native } = this;
     native.view.setUint32(native.small, 112, true);
-    this.#call("ts_world_closest", native.doubles(native.small + 128, point), reach, native.small);
+    this.#call("ts_world_closest", native.doubles(native.small + 128, vector(point, "point")), reach, native.small);
     return this.#hit();
   }
 
@@ -433,14 +496,14 @@ export class World {
 
   overlapSphere(center, radius) {
     return this.#overlaps((bodies, capacity, count) => {
-      const at = this.native.doubles(this.native.small, center);
+      const at = this.native.doubles(this.native.small, vector(center, "center"));
       this.#call("ts_world_overlap_sphere", at, radius, bodies, capacity, count);
     });
   }
 
-  overlapBox({ position = [0, 0, 0], rotation = UPRIGHT }, size) {
+  overlapBox(pose, size) {
     return this.#overlaps((bodies, capacity, count) => {
-      const at = this.native.doubles(this.native.small, [...position, ...rotation, ...size]);
+      const at = this.native.doubles(this.native.small, [...poseOf(pose), ...vector(size, "size")]);
       this.#call("ts_world_overlap_box", at, at + 56, bodies, capacity, count);
     });
   }
@@ -448,7 +511,7 @@ export class World {
   #overlaps(ask) {
     const { native } = this;
     const capacity = this.scene.counts.body;
-    const at = native.exports.malloc(8 * capacity);
+    const at = native.allocate(8 * capacity);
     try {
       ask(at, capacity, native.small + 256);
       const count = native.view.getUint32(native.small + 256, true);
@@ -464,18 +527,19 @@ export class World {
 
   /** A plane, sphere, box or capsule, where the world was made with `collider_room`. */
   addCollider(
-    { kind, size = [0, 0, 0], friction = 0.5, restitution = -1, thickness = 0, group = 1, mask = -1 },
-    { position = [0, 0, 0], rotation = UPRIGHT } = {},
+    { kind, size = ORIGIN, friction = 0.5, restitution = -1, thickness = 0, group = 1, mask = -1 },
+    pose = {},
   ) {
+    if (!SHAPES.includes(kind)) throw new SoftError(-1, `kind is ${kind}: give one of ${SHAPES.join(", ")}`);
     const { native } = this;
     const { view, small } = native;
     view.setUint32(small, 64, true);
     view.setInt32(small + 4, SHAPES.indexOf(kind), true);
-    native.doubles(small + 8, [...size, 0, 0, 0].slice(0, 3).concat([friction, restitution, thickness]));
+    native.doubles(small + 8, [...vector(size, "size"), friction, restitution, thickness]);
     view.setInt32(small + 56, group, true);
     view.setInt32(small + 60, mask, true);
-    const pose = native.doubles(small + 64, [...position, ...rotation]);
-    this.#call("ts_collider_add", small, pose, small + 128);
+    native.doubles(small + 64, poseOf({ position: ORIGIN, ...pose }));
+    this.#call("ts_collider_add", small, small + 64, small + 128);
     return new Collider(this, native.int(small + 128));
   }
 
@@ -483,9 +547,9 @@ export class World {
     return new Frame(this, this.scene.find("frame", name));
   }
 
-  addFrame({ position = [0, 0, 0], rotation = UPRIGHT } = {}) {
+  addFrame(pose = {}) {
     const { native } = this;
-    this.#call("ts_frame_add", native.doubles(native.small, [...position, ...rotation]), native.small + 64);
+    this.#call("ts_frame_add", native.doubles(native.small, poseOf({ position: ORIGIN, ...pose })), native.small + 64);
     return new Frame(this, native.int(native.small + 64));
   }
 
@@ -553,7 +617,7 @@ export class Body {
   /** Places of its vertices after the last step, or on the way to it, as numbers of your own. */
   positions(alpha = 1) {
     const { native, scene } = this.world;
-    const block = new Block(native, Float32Array, 3 * scene.asset(this.asset).vertexCount);
+    const block = new Block(native, Float32Array, 3 * scene.assets[this.asset].vertexCount);
     try {
       this.#call("ts_body_positions", alpha, block.at, block.count);
       return block.view.slice();
@@ -578,29 +642,29 @@ export class Body {
   }
 
   setVelocity(linear, spin = [0, 0, 0]) {
-    const at = this.world.native.doubles(this.#small, [...linear, ...spin]);
+    const at = this.world.native.doubles(this.#small, [...vector(linear, "linear"), ...vector(spin, "spin")]);
     this.#call("ts_body_set_velocity", at, at + 24);
   }
 
   teleport(center, { turn = UPRIGHT, keepsVelocity = false } = {}) {
-    const at = this.world.native.doubles(this.#small, [...center, ...turn]);
+    const at = this.world.native.doubles(this.#small, [...vector(center, "center"), ...vector(turn, "turn", 4)]);
     this.#call("ts_body_teleport", at, at + 24, Number(keepsVelocity));
   }
 
   /** Of a list of vertices, or of all [N s]. */
   applyImpulse(impulse, vertices = null) {
-    const at = this.world.native.doubles(this.#small, impulse);
-    this.world.native.lendingInts(vertices, (list, count) => this.#call("ts_body_apply_impulse", at, list, count));
+    const at = this.world.native.doubles(this.#small, vector(impulse, "impulse"));
+    this.world.native.lendingVertices(vertices, (list, count) => this.#call("ts_body_apply_impulse", at, list, count));
   }
 
   /** For the coming step [N]. */
   applyForce(force, vertices = null) {
-    const at = this.world.native.doubles(this.#small, force);
-    this.world.native.lendingInts(vertices, (list, count) => this.#call("ts_body_apply_force", at, list, count));
+    const at = this.world.native.doubles(this.#small, vector(force, "force"));
+    this.world.native.lendingVertices(vertices, (list, count) => this.#call("ts_body_apply_force", at, list, count));
   }
 
   impulseAt(impulse, point, radius) {
-    const at = this.world.native.doubles(this.#small, [...impulse, ...point]);
+    const at = this.world.native.doubles(this.#small, [...vector(impulse, "impulse"), ...vector(point, "point")]);
     this.#call("ts_body_impulse_at", at, at + 24, radius);
   }
 
@@ -622,29 +686,30 @@ export class Body {
   }
 
   pin(vertices) {
-    this.world.native.lendingInts(vertices, (list, count) => this.#call("ts_body_pin", list, count));
+    this.world.native.lendingVertices(vertices, (list, count) => this.#call("ts_body_pin", list, count));
   }
 
   unpin(vertices = null) {
-    this.world.native.lendingInts(vertices, (list, count) => this.#call("ts_body_unpin", list, count));
+    this.world.native.lendingVertices(vertices, (list, count) => this.#call("ts_body_unpin", list, count));
   }
 
   /** Where pinned vertices are after the coming step, 3 numbers each. */
   setTargets(vertices, targets) {
     const { native } = this.world;
+    if (targets.length !== 3 * vertices.length) throw new SoftError(-6, `targets has ${targets.length} numbers: give ${3 * vertices.length}`);
     native.lending(Float32Array.from(targets), (places) =>
-      native.lendingInts(vertices, (list, count) => this.#call("ts_body_set_targets", list, count, places)),
+      native.lendingVertices(vertices, (list, count) => this.#call("ts_body_set_targets", list, count, places)),
     );
   }
 
   attach(vertices, frame, { feels = false } = {}) {
-    this.world.native.lendingInts(vertices, (list, count) =>
+    this.world.native.lendingVertices(vertices, (list, count) =>
       this.#call("ts_body_attach", list, count, frame.number, Number(feels)),
     );
   }
 
   detach(vertices = null) {
-    this.world.native.lendingInts(vertices, (list, count) => this.#call("ts_body_detach", list, count));
+    this.world.native.lendingVertices(vertices, (list, count) => this.#call("ts_body_detach", list, count));
   }
 
   /** `force` [N] and `torque` [N m] with which it pulls a frame. */
@@ -657,8 +722,8 @@ export class Body {
   join(vertices, other, { onto = null } = {}) {
     const { native } = this.world;
     if (onto && onto.length !== vertices.length) throw new SoftError(-6, "onto names a vertex for each of vertices");
-    native.lendingInts(vertices, (list, count) =>
-      native.lendingInts(onto, (partners) =>
+    native.lendingVertices(vertices, (list, count) =>
+      native.lendingVertices(onto, (partners) =>
         this.#call("ts_body_join", list, count, other.handle, onto ? partners : 0, this.#small),
       ),
     );
@@ -672,11 +737,11 @@ export class Body {
   addMotor(vertices, { axis, speed = 0, maxTorque = null, maxForce = null, isFixed = false, point = null }) {
     const { native } = this.world;
     if ((maxTorque === null) === (maxForce === null)) throw new SoftError(-1, "give one of maxTorque and maxForce");
-    native.lendingInts(vertices, (list, count) => {
+    native.lendingVertices(vertices, (list, count) => {
       const { view } = native;
       view.setUint32(this.#small, 80, true);
       [maxTorque !== null, isFixed, point !== null].forEach((is, i) => view.setInt32(this.#small + 4 + 4 * i, Number(is), true));
-      native.doubles(this.#small + 16, [...axis, ...(point ?? [0, 0, 0]), speed, maxTorque ?? maxForce]);
+      native.doubles(this.#small + 16, [...vector(axis, "axis"), ...vector(point ?? ORIGIN, "point"), speed, maxTorque ?? maxForce]);
       this.#call("ts_body_add_motor", list, count, this.#small, this.#small + 128);
     });
     return new Motor(this.world, native.handle(this.#small + 128));
@@ -687,7 +752,7 @@ export class Body {
     const { native } = this.world;
     native.view.setUint32(this.#small, 72, true);
     native.view.setInt32(this.#small + 4, triangle, true);
-    native.doubles(this.#small + 8, [...weights, ...target, frequency, maxForce]);
+    native.doubles(this.#small + 8, [...vector(weights, "weights"), ...vector(target, "target"), frequency, maxForce]);
     this.#call("ts_body_grab", this.#small, this.#small + 128);
     return new Grab(this.world, native.handle(this.#small + 128));
   }
@@ -708,32 +773,39 @@ export class Mesh {
   }
 
   get positions() {
-    return this.#blocks.positions.view;
+    return this.#there.positions.view;
   }
 
   get normals() {
-    return this.#blocks.normals.view;
+    return this.#there.normals.view;
   }
 
   /** Three numbers of vertices each. */
   get triangles() {
-    return this.#blocks.triangles.view;
+    return this.#there.triangles.view;
   }
 
   /** Two numbers a vertex, v upwards; null where there are none. */
   get uv() {
-    return this.#blocks.uv?.view ?? null;
+    return this.#there.uv?.view ?? null;
   }
 
   update() {
     const { world, handle } = this.body;
-    const { positions, normals } = this.#blocks;
+    const { positions, normals } = this.#there;
     world.native.call("ts_body_mesh", world.handle, handle, this.number, positions.at, normals.at, positions.count);
   }
 
+  get #there() {
+    if (this.#blocks) return this.#blocks;
+    throw new SoftError(-2, "this mesh was freed, or its world destroyed");
+  }
+
+  /** Gives back its memory, as `World.destroy` does for all. */
   free() {
-    this.#blocks.positions.free();
-    this.#blocks.normals.free();
+    this.#blocks?.positions.free();
+    this.#blocks?.normals.free();
+    this.#blocks = null;
     this.body.world.forget(this);
   }
 }
@@ -747,7 +819,7 @@ export class Grab {
 
   moveTo(point) {
     const { native } = this.world;
-    native.call("ts_grab_move", this.world.handle, this.handle, native.doubles(native.small, point));
+    native.call("ts_grab_move", this.world.handle, this.handle, native.doubles(native.small, vector(point, "point")));
   }
 
   release() {
@@ -831,8 +903,8 @@ class Placed {
   }
 
   /** Be there at the end of the coming step. */
-  moveTo({ position, rotation = UPRIGHT }) {
-    this.call("move_to", this.world.native.doubles(this.world.native.small, [...position, ...rotation]));
+  moveTo(pose) {
+    this.call("move_to", this.world.native.doubles(this.world.native.small, poseOf(pose)));
   }
 
   get pose() {
@@ -853,7 +925,7 @@ export class Collider extends Placed {
   }
 
   setVelocity(linear, spin = [0, 0, 0]) {
-    const at = this.world.native.doubles(this.world.native.small, [...linear, ...spin]);
+    const at = this.world.native.doubles(this.world.native.small, [...vector(linear, "linear"), ...vector(spin, "spin")]);
     this.call("set_velocity", at, at + 24);
   }
 
@@ -862,8 +934,8 @@ export class Collider extends Placed {
     this.call("set_friction", friction);
   }
 
-  teleport({ position, rotation = UPRIGHT }) {
-    this.call("teleport", this.world.native.doubles(this.world.native.small, [...position, ...rotation]));
+  teleport(pose) {
+    this.call("teleport", this.world.native.doubles(this.world.native.small, poseOf(pose)));
   }
 
   /** `impulse` [N s] that bodies gave it in the last step, and `moment` about its place. */
@@ -886,8 +958,10 @@ async function bytesOf(address) {
   try {
     answer = await fetch(address);
   } catch (error) {
-    const way = "serve the folder, for example by python -m http.server";
-    throw new SoftError(-4, `cannot read ${address}: ${error.message}. A page from a file may read no other: ${way}`);
+    const way = globalThis.document
+      ? "A page from a file may read no other: serve the folder, for example by python -m http.server"
+      : "It reads addresses: give the bytes of files to sceneOf";
+    throw new SoftError(-4, `cannot read ${address}: ${error.message}. ${way}`);
   }
   if (!answer.ok) {
     const way = "is it a folder that taichi-soft export --for web wrote?";
@@ -899,6 +973,10 @@ async function bytesOf(address) {
 /** Compiles a world's module and reads its file: the bytes of `kernels/web.wasm` and of `world.tsw`. */
 export async function sceneOf(code, world) {
   if (typeof WebAssembly === "undefined") throw new SoftError(-9, "this browser has no WebAssembly");
+  const start = new Uint8Array(code.buffer ?? code, code.byteOffset ?? 0, Math.min(4, code.byteLength));
+  if (start.join() !== "0,97,115,109") {
+    throw new SoftError(-4, "the code is no module: is the folder one that taichi-soft export --for web wrote?");
+  }
   let module;
   try {
     module = await WebAssembly.compile(code);

@@ -43,7 +43,9 @@ def export(
     world, names = _found_in(scene)
     from taichi_soft.export import PLATFORMS, export_world
 
-    platforms = None if for_ is None else list(PLATFORMS) if for_ == "all" else for_.split(",")
+    platforms = None if for_ is None else for_.split(",")
+    if for_ == "all":
+        platforms = [each for each in PLATFORMS if not (static and each == "web")]
     with progress_bar() as progress:
         task = progress.add_task("compiling", total=None)
         if not world.is_built:

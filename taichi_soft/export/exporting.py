@@ -65,10 +65,12 @@ def export_world(
             `ts_scene_load_linked`.
         world: built, at the state in which the game starts.
     Raises: StateError for a world that is not built; OptionError for a path that is taken or cannot be
-        written, for an unknown platform, and for what the native library does not run, by name;
-        MissingExtraError without llvmlite or zig.
+        written, for an unknown platform, for the web where it is static, and for what the native library does
+        not run, by name; MissingExtraError without llvmlite or zig.
     """
     path, matrix, platforms = Path(path), axes_of(axes), platforms_of(platforms)
+    if static and "web" in platforms:
+        raise OptionError("a world for the web has the library in it already: leave static out for it")
     if not world.is_built:
         raise StateError("the world is not built: call world.build() before it is exported")
     context = context_of_world(world)

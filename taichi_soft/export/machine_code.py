@@ -80,10 +80,8 @@ int DllMainCRTStartup(void *library, unsigned reason, void *reserved) { return 1
 def platforms_of(names: Sequence[str] | None) -> list[str]:
     """Platforms by name, each once; that of this machine for None. Raises: OptionError for others."""
     if names is None:
-        machine = {"amd64": "x64", "x86_64": "x64", "aarch64": "arm64"}.get(
-            platform.machine().lower(), "arm64"
-        )
-        system = {"win32": "windows", "darwin": "macos"}.get(sys.platform, "linux")
+        known = {"amd64": "x64", "x86_64": "x64", "aarch64": "arm64", "win32": "windows", "darwin": "macos"}
+        system, machine = (known.get(each, each) for each in (sys.platform, platform.machine().lower()))
         names = [f"{system}-{machine}"]
     for name in names:
         if name not in PLATFORMS:

@@ -18,7 +18,6 @@ from taichi_soft.core.errors import FrozenBodyWarning, SnapshotError, TaichiSoft
 from taichi_soft.core.handles import Handle, handles_of, is_recorded
 from taichi_soft.core.serialisation import from_plain
 from taichi_soft.persistence.recorder import read_recording
-from taichi_soft.persistence.snapshot import bodies_hash
 from taichi_soft.render import FLIPPED, PALETTE, Camera, Renderer, Surface, draw_text, highlight
 from taichi_soft.render.opencv import cv2
 from taichi_soft.render.props import Scenery
@@ -76,12 +75,12 @@ def replay(path: Any, picture: Any = None, steps: int | None = None) -> ReplayRe
     failures = tuple(body.failure for body in world.bodies if body.failure is not None)
     if target is not None:
         _draw(world, failures, target)
-    return ReplayReport(world, made, difference, failures, target, bodies_hash(context_of_world(world)))
+    return ReplayReport(world, made, difference, failures, target, world.bodies_hash())
 
 
 def _is_state(world: World, expected: str) -> bool:
     """True if the state has that hash: World's own, or the one that pages print."""
-    return expected in (world.state_hash(), bodies_hash(context_of_world(world)))
+    return expected in (world.state_hash(), world.bodies_hash())
 
 
 def _rebuilt(made_of: dict[str, Any]) -> tuple[World, dict[str, Any]]:

@@ -80,14 +80,126 @@ found.push(["goes on", String(world.hash() !== before), ""]);
 console.log(JSON.stringify(found));
 """
 
+MISTAKES = """
+import { readFileSync } from "node:fs";
+import { sceneOf } from "PACKAGE/taichi-soft.js";
+import { RollbackSession } from "PACKAGE/rollback.js";
+const read = (name) => readFileSync(`${process.argv[2]}/${name}`);
+const scene = await sceneOf(read("kernels/web.wasm"), read("world.tsw"));
+const found = {};
+function refused(what, action) {
+  try {
+    action();
+    found[what] = "taken";
+  } catch (error) {
+    found[what] = error.code ?? error.name;
+  }
+}
+const [world, other] = [scene.createWorld(), scene.createWorld()];
+const body = world.body(0);
+const before = world.hash();
+refused("two numbers", () => body.applyImpulse([0, 0]));
+refused("no numbers", () => body.setVelocity(undefined));
+refused("a position of two", () => world.spawn(0, { position: [0, 3] }));
+refused("no vertex", () => body.applyImpulse([0, 0, 1], []));
+refused("half a vertex", () => body.pin([0.5]));
+refused("half a body", () => world.body(0.5));
+refused("half a kind", () => world.recordEvents("contactBegan"));
+refused("a kind", () => scene.nameOf("bodies", 0));
+refused("no bytes", () => world.restore("abc"));
+found.untouched = world.hash() === before;
+
+const mesh = body.mesh();
+mesh.free();
+mesh.free();
+refused("a freed mesh", () => mesh.update());
+const kept = world.snapshot();
+world.step();
+world.restore(kept.buffer.slice(kept.byteOffset, kept.byteOffset + kept.byteLength));
+found.rewound = world.hash() === before;
+
+world.onStep = () => world.advance(1 / 60);
+refused("advance within", () => world.advance(1 / 60));
+let count = 0;
+world.onStep = () => {
+  count += 1;
+  if (count === 2) throw new TypeError("of the game");
+};
+refused("a game's error", () => world.advance(0.1));
+world.onStep = null;
+found.dropped = Math.round(60 * world.clock.dropped); // the first call and the second had 1 and 5 left
+world.step();
+world.destroy();
+refused("a destroyed world", () => world.step());
+found.memory = 0;
+const sizeOf = () => scene.native.exports.memory.buffer.byteLength;
+for (let i = 0, size = 0; i < 60; i += 1) {
+  const each = scene.createWorld();
+  refused("time", () => each.step(-1));
+  each.onStep = () => {
+    throw new TypeError("of the game");
+  };
+  refused("of the game", () => each.advance(0.1));
+  const bytes = each.snapshot();
+  bytes[bytes.length - 1] ^= 1;
+  refused("damaged", () => each.restore(bytes));
+  each.destroy();
+  if (i === 10) size = sizeOf();
+  found.memory = sizeOf() - size;
+}
+
+// A session copies what it is given: node hands out buffers that it uses again.
+const worlds = [other, scene.createWorld()];
+const sessions = worlds.map((each, player) => new RollbackSession(each, () => {}, { player, inputSize: 1 }));
+const [own, wire] = [Buffer.alloc(1), Buffer.alloc(1000)];
+for (let tick = 0; tick < 20; tick += 1) {
+  sessions.forEach((session, i) => {
+    own[0] = tick + i;
+    session.advance(own);
+    const data = session.message();
+    wire.set(data);
+    sessions[1 - i].receive(wire.subarray(0, data.length));
+  });
+}
+sessions.forEach((session) => session.settle());
+found.confirmed = sessions.map((each) => each.confirmed);
+other.step();
+refused("a step outside", () => sessions[0].advance(own));
+
+scene.unload();
+found.named = other.body(scene.nameOf("body", 0)).positions().length === 3 * scene.asset(0).vertexCount;
+other.step();
+refused("an unloaded scene", () => scene.createWorld());
+console.log(JSON.stringify(found));
+"""
+
+
+def test_mistakes_of_a_game_are_refused_and_nothing_leaks(node, export, tmp_path):
+    program = tmp_path / "mistakes.mjs"
+    program.write_text(MISTAKES.replace("PACKAGE", PACKAGE.as_posix()))
+    done = subprocess.run([node, program, export("free", "--for", "web")], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert found.pop("memory") == 0
+    assert found.pop("dropped") == 6
+    assert found.pop("confirmed") == [20, 20]
+    assert [found.pop(name) for name in ("untouched", "rewound", "named")] == [True] * 3
+    wanted = {
+        **dict.fromkeys(["a freed mesh", "a destroyed world", "an unloaded scene"], "HANDLE"),
+        **dict.fromkeys(["a game's error", "of the game"], "TypeError"),
+        **{"advance within": "STATE", "damaged": "SNAPSHOT", "a step outside": "SessionError"},
+    }
+    assert found == {name: wanted.get(name, "ARGUMENT") for name in found}
+
+
 WANTED = {
     "cut off": ("FILE", "the world file is damaged"),
     "another world": ("FILE", "the kernels are not those of this world file"),
     "damaged": ("FILE", ""),
     "elsewhere": ("FILE", "cannot read http://127.0.0.1:9/nothing/kernels/web.wasm"),
-    "no module": ("RUNTIME", "this browser cannot compile the world"),
+    "no module": ("FILE", "the code is no module"),
     "time": ("ARGUMENT", "dt is -1 s"),
-    "name": ("ARGUMENT", "nothing of that kind is called nobody"),
+    "name": ("ARGUMENT", "no body is called nobody"),
     "snapshot": ("SNAPSHOT", "cut off|no snapshot|40 bytes"),
     "vector": ("ARGUMENT", "has -?nan in it"),
     "listener": ("Error", "of the game"),

@@ -1532,7 +1532,7 @@ namespace TaichiSoft
         internal static extern int ts_world_record_events(ulong world, int kinds);
 
         [DllImport(Library, CallingConvention = C)]
-        internal static extern int ts_world_drain_events(ulong world, ref PlainEvent first, UIntPtr event_size,
+        internal static extern int ts_world_drain_events(ulong world, ref PlainEvent events, UIntPtr event_size,
             UIntPtr capacity, out UIntPtr count);
 
         [DllImport(Library, CallingConvention = C)]
