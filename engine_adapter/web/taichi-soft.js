@@ -20,7 +20,7 @@ const UPRIGHT = [0, 0, 0, 1];
 export const EVENTS = { contactBegan: 1, contactEnded: 2, fellAsleep: 4, woke: 8, froze: 16 };
 const EVENT_NAMES = Object.fromEntries(Object.entries(EVENTS).map(([name, bit]) => [bit, name]));
 
-/** What the library refuses. `code` is ARGUMENT, STATE and so on; nothing was changed. */
+/** An error of the library, with a `code` such as ARGUMENT or STATE. A refused call changes nothing. */
 export class SoftError extends Error {
   constructor(code, text) {
     super(text);
@@ -53,7 +53,7 @@ class Native {
     this.exports = new WebAssembly.Instance(module, imports).exports;
     this.exports._initialize();
     this.listeners = listeners;
-    this.small = this.allocate(1024); // for what is given to one call, and for what it finds
+    this.small = this.allocate(1024); // for the arguments and results of one call
   }
 
   get view() {
@@ -239,13 +239,13 @@ export class Scene {
     return new World(this);
   }
 
-  /** Gives its memory back with the last of its worlds. */
+  /** Free the scene, as soon as the last of its worlds is destroyed. */
   unload() {
     this.native.call("ts_scene_unload", this.handle);
   }
 }
 
-/** A scene that moves. */
+/** A simulation of a scene. */
 export class World {
   #listener = null;
   #restoreCount = 0;
@@ -343,7 +343,7 @@ export class World {
     this.#call("ts_world_wake");
   }
 
-  /** Gravity [m/s^2], from the next step on. Who sleeps wakes. */
+  /** Gravity [m/s^2], from the next step on. It wakes all bodies. */
   setGravity(gravity) {
     this.#call("ts_world_set_gravity", this.native.doubles(this.native.small, vector(gravity, "gravity")));
   }
@@ -353,7 +353,7 @@ export class World {
     this.#call("ts_world_set_friction", friction);
   }
 
-  /** Air that moves [m/s], of a density [kg/m^3]. */
+  /** Wind [m/s], of air with a density [kg/m^3]. */
   setWind(velocity, { density = 1.2, drag = 1 } = {}) {
     this.#call("ts_world_set_wind", this.native.doubles(this.native.small, vector(velocity, "velocity")), density, drag);
   }
@@ -368,7 +368,7 @@ export class World {
     return this.native.handle(this.native.small).toString(16).padStart(16, "0");
   }
 
-  /** The state between two steps, as bytes of your own. */
+  /** A copy of the state between two steps. */
   snapshot() {
     const { native } = this;
     this.#call("ts_world_snapshot", 0, 0, native.small);
@@ -387,18 +387,18 @@ export class World {
     this.#restoreCount += 1;
   }
 
-  /** How often `restore` was called: whoever keeps earlier states sees that they are of another past. */
+  /** How often `restore` was called. A history of states is void when somebody else has restored one. */
   get restoreCount() {
     return this.#restoreCount;
   }
 
-  /** Kinds are bits of `EVENTS`; all if you say nothing, 0 for none. */
+  /** Record events of these kinds, a sum of `EVENTS`; all by default, 0 for none. */
   recordEvents(kinds = 31) {
     if (!Number.isInteger(kinds)) throw new SoftError(-1, `kinds is ${kinds}: give a sum of EVENTS`);
     this.#call("ts_world_record_events", kinds);
   }
 
-  /** What happened since the last call. */
+  /** The events since the last call. */
   events() {
     const { native } = this;
     const [size, most, found] = [72, 64, []];
@@ -435,7 +435,7 @@ export class World {
     return Number(this.native.view.getBigInt64(this.native.small, true));
   }
 
-  /** Who lives in a slot, by its number or name; null for nobody. */
+  /** The body in a slot, by its number or name; null if the slot is empty. */
   body(name) {
     const slot = this.scene.find("body", name);
     this.#call("ts_world_get_body", slot, this.native.small);
@@ -443,7 +443,7 @@ export class World {
     return handle === 0n ? null : new Body(this, handle);
   }
 
-  /** All that live, by slot. */
+  /** All bodies, by slot. */
   get bodies() {
     return Array.from({ length: this.scene.counts.body }, (_, slot) => this.body(slot)).filter(Boolean);
   }
@@ -525,7 +525,7 @@ export class World {
     return new Collider(this, this.scene.find("collider", name));
   }
 
-  /** A plane, sphere, box or capsule, where the world was made with `collider_room`. */
+  /** Add a plane, sphere, box or capsule. The world needs `collider_room` for it. */
   addCollider(
     { kind, size = ORIGIN, friction = 0.5, restitution = -1, thickness = 0, group = 1, mask = -1 },
     pose = {},
@@ -614,7 +614,7 @@ export class Body {
     return STATUS[this.world.native.int(this.#small)];
   }
 
-  /** Places of its vertices after the last step, or on the way to it, as numbers of your own. */
+  /** A copy of the positions of its vertices [m]: after the last step, or `alpha` of the way to it. */
   positions(alpha = 1) {
     const { native, scene } = this.world;
     const block = new Block(native, Float32Array, 3 * scene.assets[this.asset].vertexCount);
@@ -626,7 +626,7 @@ export class Body {
     }
   }
 
-  /** What is drawn of it: the first of its asset's meshes, or one by its number or name. */
+  /** A mesh to draw: the first one of its asset, or one by its number or name. Call it once, not in each frame. */
   mesh(name = null) {
     const { asset } = this;
     const { scene } = this.world;
@@ -651,13 +651,13 @@ export class Body {
     this.#call("ts_body_teleport", at, at + 24, Number(keepsVelocity));
   }
 
-  /** Of a list of vertices, or of all [N s]. */
+  /** Apply an impulse [N s] to vertices, or to the whole body. */
   applyImpulse(impulse, vertices = null) {
     const at = this.world.native.doubles(this.#small, vector(impulse, "impulse"));
     this.world.native.lendingVertices(vertices, (list, count) => this.#call("ts_body_apply_impulse", at, list, count));
   }
 
-  /** For the coming step [N]. */
+  /** Apply a force [N] during the next step, to vertices or to the whole body. */
   applyForce(force, vertices = null) {
     const at = this.world.native.doubles(this.#small, vector(force, "force"));
     this.world.native.lendingVertices(vertices, (list, count) => this.#call("ts_body_apply_force", at, list, count));
@@ -693,7 +693,7 @@ export class Body {
     this.world.native.lendingVertices(vertices, (list, count) => this.#call("ts_body_unpin", list, count));
   }
 
-  /** Where pinned vertices are after the coming step, 3 numbers each. */
+  /** Positions of pinned vertices after the next step [m], 3 numbers each. */
   setTargets(vertices, targets) {
     const { native } = this.world;
     if (targets.length !== 3 * vertices.length) throw new SoftError(-6, `targets has ${targets.length} numbers: give ${3 * vertices.length}`);
@@ -712,7 +712,7 @@ export class Body {
     this.world.native.lendingVertices(vertices, (list, count) => this.#call("ts_body_detach", list, count));
   }
 
-  /** `force` [N] and `torque` [N m] with which it pulls a frame. */
+  /** `force` [N] and `torque` [N m] of the body on a frame. */
   load(frame) {
     this.#call("ts_body_get_load", frame.number, this.#small, this.#small + 24);
     return { force: this.world.native.read(this.#small, 3), torque: this.world.native.read(this.#small + 24, 3) };
@@ -747,7 +747,7 @@ export class Body {
     return new Motor(this.world, native.handle(this.#small + 128));
   }
 
-  /** Take hold of what a ray has hit. */
+  /** Hold the body where a ray has hit it, by a spring. */
   grab({ triangle, weights, point }, { frequency = 5, maxForce = -1, target = point } = {}) {
     const { native } = this.world;
     native.view.setUint32(this.#small, 72, true);
@@ -758,7 +758,7 @@ export class Body {
   }
 }
 
-/** What is drawn of a body. `positions` and `normals` are views that `update` writes: take them anew each time. */
+/** A mesh to draw. `positions` and `normals` are views that `update` fills: read them anew after each call. */
 export class Mesh {
   #blocks;
 
@@ -810,7 +810,7 @@ export class Mesh {
   }
 }
 
-/** A hand on a body. */
+/** A spring that holds a body. */
 export class Grab {
   constructor(world, handle) {
     this.world = world;
@@ -826,7 +826,7 @@ export class Grab {
     this.world.native.call("ts_grab_release", this.world.handle, this.handle);
   }
 
-  /** With what it pulls [N]. */
+  /** Force of the spring [N]. */
   get force() {
     const { native } = this.world;
     native.call("ts_grab_get_force", this.world.handle, this.handle, native.small);
@@ -852,9 +852,9 @@ class Numbered {
   }
 }
 
-/** What holds a part of a body to another one. */
+/** A connection between parts of two bodies. */
 export class Joint extends Numbered {
-  /** With what the other body pulls, mean over the last step [N]. */
+  /** Force of the other body, mean over the last step [N]. */
   get force() {
     return this.readNumbers("ts_joint_get_force", 3);
   }
@@ -864,14 +864,14 @@ export class Joint extends Numbered {
   }
 }
 
-/** What turns a part of a body, or pushes it. */
+/** A motor that turns or pushes a part of a body. */
 export class Motor extends Numbered {
-  /** That its vertices have [rad/s] or [m/s]. */
+  /** Speed of its vertices [rad/s] or [m/s]. */
   get measuredSpeed() {
     return this.readNumbers("ts_motor_get_speed", 1)[0];
   }
 
-  /** Torque [N m] or force [N] that it gave, mean over the last step. */
+  /** Its torque [N m] or force [N], mean over the last step. */
   get effort() {
     return this.readNumbers("ts_motor_get_effort", 1)[0];
   }
@@ -880,7 +880,7 @@ export class Motor extends Numbered {
     this.call("ts_motor_set_speed", speed);
   }
 
-  /** Of torque or force; with 0 its vertices coast. */
+  /** Limit of torque [N m] or force [N]; with 0 its vertices coast. */
   setLimit(limit) {
     this.call("ts_motor_set_limit", limit);
   }
@@ -902,7 +902,7 @@ class Placed {
     this.world.native.call(`${this.prefix}_${name}`, this.world.handle, this.number, ...args);
   }
 
-  /** Be there at the end of the coming step. */
+  /** Move to a pose until the end of the next step. */
   moveTo(pose) {
     this.call("move_to", this.world.native.doubles(this.world.native.small, poseOf(pose)));
   }
@@ -918,7 +918,7 @@ class Placed {
   }
 }
 
-/** What bodies meet and do not move. */
+/** A solid that bodies touch and do not move. */
 export class Collider extends Placed {
   constructor(world, number) {
     super(world, number, "ts_collider");
@@ -946,7 +946,7 @@ export class Collider extends Placed {
   }
 }
 
-/** A place that moves as the game says, with what hangs from it. */
+/** A pose that the game moves, with the bodies that are attached to it. */
 export class Frame extends Placed {
   constructor(world, number) {
     super(world, number, "ts_frame");
