@@ -60,7 +60,7 @@ test-native: $(VENV)/.test $(VENV)/.export
 test-platforms: $(VENV)/.test $(VENV)/.export
 	@$(BIN)/python tests/native/platforms.py
 
-# One for each platform, for C, C++ and C#; and a project for Godot 3. GODOT_HEADERS= names a folder of Godot's headers,
+# One for each platform, for C, C++ and C#; a package of npm for the web; and a project for Godot 3. GODOT_HEADERS= names a folder of Godot's headers,
 # where they cannot be fetched.
 dist-native: native
 	@mkdir -p dist out/godot3
@@ -71,6 +71,9 @@ dist-native: native
 	        && cmake --build out/$$platform && cd out/$$platform && cpack -B $(CURDIR)/dist && cd ../..; } > out/$$platform.log 2>&1 \
 	    || { cat out/$$platform.log; exit 1; }; \
 	done
+	@mkdir -p out/npm
+	@cp engine_adapter/web/*.js engine_adapter/web/*.ts engine_adapter/web/*.json engine_adapter/web/README.md LICENSE out/npm
+	@cd dist && { npm pack --silent ../out/npm || echo "npm is not here: dist has no package for the web"; }
 	@cmake -S engine_adapter/godot -B out/godot3 -DTAICHI_SOFT_DIR=$(CURDIR)/out/native -DGODOT_HEADERS="$(GODOT_HEADERS)" \
 	    -DTAICHI_SOFT_GODOT_WORLD=$(CURDIR)/out/godot3/demo.softworld > out/godot3/cmake.log 2>&1 \
 	    || { if grep -q "headers cannot be fetched" out/godot3/cmake.log; \
@@ -80,7 +83,7 @@ dist-native: native
 	@cp engine_adapter/godot/demo/world.py assets/elephant.glb out/godot3
 	@$(BIN)/taichi-soft export out/godot3/world.py --axes y-up --out out/godot3/demo.softworld
 	@cd out/godot3 && cpack -B $(CURDIR)/dist > cpack.log || { cat cpack.log; exit 1; }
-	@ls -l dist/taichi-soft-*.zip
+	@ls -l dist
 
 profile: $(VENV)/.demo
 	@$(BIN)/taichi-soft profile

@@ -12,6 +12,7 @@ import pytest
 from browser import chromium, complaints_of, pixels_of, serving
 from native_build import ROOT
 
+from taichi_soft.core.version import VERSION as VERSION_OF_PROJECT
 from taichi_soft.live.three_js import FOLDER, VERSION, fetch_three_js
 
 PACKAGE = ROOT / "engine_adapter" / "web"
@@ -222,6 +223,11 @@ def test_bad_input_is_refused_by_name_and_the_world_goes_on(node, export, tmp_pa
 
 
 @pytest.mark.parametrize("module", ["taichi-soft", "rollback"])
+def test_the_package_has_the_version_of_the_project():
+    package = json.loads((PACKAGE / "package.json").read_text())
+    assert VERSION_OF_PROJECT.split(".dev")[0] == package["version"]
+
+
 def test_the_types_name_what_the_package_has(module, node):
     """Every class, method and property of the one is in the other."""
     program = f"""
