@@ -19,7 +19,13 @@ export class Scene {
   readonly counts: Record<Kind, number>;
   nameOf(kind: Kind, number: number): string;
   find(kind: Kind, name: string | number): number;
-  asset(name: string | number): { number: number; vertexCount: number; slotCount: number; mass: number };
+  asset(name: string | number): {
+    number: number;
+    vertexCount: number;
+    slotCount: number;
+    mass: number;
+    levelCount: number;
+  };
   createWorld(): World;
   unload(): void;
 }
@@ -109,7 +115,12 @@ export class Body {
   readonly asset: number;
   readonly status: "active" | "frozen" | "asleep";
   readonly center: number[];
+  /** Of detail, 0 being the finest. */
+  readonly level: number;
+  /** At its level. */
+  readonly vertexCount: number;
   despawn(): void;
+  setLevel(level: number, how?: { release?: boolean }): void;
   positions(alpha?: number): Float32Array;
   mesh(name?: string | number | null): Mesh;
   setVelocity(linear: Vector, spin?: Vector): void;

@@ -152,7 +152,10 @@ export class Scene {
     native.call("ts_mesh_get_triangles", this.handle, number, triangles.at, triangles.count);
     const uv = hasUv ? new Block(native, Float32Array, 2 * vertexCount) : null;
     if (uv) native.call("ts_mesh_get_uv", this.handle, number, uv.at, uv.count);
-    return { number, asset, vertexCount, name: this.nameOf("mesh", number), triangles, uv };
+    native.call("ts_mesh_get_level", this.handle, number, native.small);
+    const level = native.int(native.small);
+    const name = this.nameOf("mesh", number);
+    return { number, asset, level: level < 0 ? null : level, vertexCount, name, triangles, uv };
   }
 
   /** Name of a "body", "asset", "collider", "frame" or "mesh". */
@@ -170,18 +173,20 @@ export class Scene {
     return native.int(native.small);
   }
 
-  /** `vertexCount`, `slotCount` and `mass` [kg] of an asset. */
+  /** `vertexCount`, `slotCount`, `mass` [kg] and `levelCount` of an asset. */
   asset(name) {
     const { native } = this;
     const number = this.find("asset", name);
     native.view.setUint32(native.small, 16, true);
     native.call("ts_asset_get_info", this.handle, number, native.small);
     const { small } = native;
+    native.call("ts_asset_get_level_count", this.handle, number, small + 16);
     return {
       number,
       vertexCount: native.int(small + 4),
       slotCount: native.int(small + 8),
       mass: native.view.getFloat32(small + 12, true),
+      levelCount: native.int(small + 16),
     };
   }
 
@@ -543,10 +548,29 @@ export class Body {
     return STATUS[this.world.native.int(this.#small)];
   }
 
+  /** Of detail, 0 being the finest. */
+  get level() {
+    this.#call("ts_body_get_level", this.#small);
+    return this.world.native.int(this.#small);
+  }
+
+  /**
+   * Go on with more or fewer tetrahedra. Joints, motors and attachments that have no place at that level bar the change,
+   * unless they are released.
+   */
+  setLevel(level, { release = false } = {}) {
+    this.#call("ts_body_set_level", level, Number(release));
+  }
+
+  /** At its level. */
+  get vertexCount() {
+    this.#call("ts_body_get_vertex_count", this.#small);
+    return this.world.native.int(this.#small);
+  }
+
   /** Places of its vertices after the last step, or on the way to it, as numbers of your own. */
   positions(alpha = 1) {
-    const { native, scene } = this.world;
-    const block = new Block(native, Float32Array, 3 * scene.asset(this.asset).vertexCount);
+    const block = new Block(this.world.native, Float32Array, 3 * this.vertexCount);
     try {
       this.#call("ts_body_positions", alpha, block.at, block.count);
       return block.view.slice();
@@ -555,12 +579,12 @@ export class Body {
     }
   }
 
-  /** What is drawn of it: the first of its asset's meshes, or one by its number or name. */
+  /** What is drawn of it: the first of its asset's meshes at its level, or one by its number or name. */
   mesh(name = null) {
-    const { asset } = this;
+    const { asset, level } = this;
     const { scene } = this.world;
-    const found =
-      name === null ? scene.meshes.find((each) => each.asset === asset) : scene.meshes[scene.find("mesh", name)];
+    const isIts = (each) => each.asset === asset && (each.level === null || each.level === level);
+    const found = name === null ? scene.meshes.find(isIts) : scene.meshes[scene.find("mesh", name)];
     if (!found) throw new SoftError(-1, `nothing is drawn of asset ${asset}`);
     return this.world.keep(new Mesh(this, found));
   }

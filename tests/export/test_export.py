@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from taichi_soft import Contact, Event, Material, OptionError, SoftBodyAsset, StateError, World, box, sphere
+from taichi_soft import Event, Material, OptionError, SoftBodyAsset, StateError, World, box, sphere
 from taichi_soft.export import AXES, export_world
 from taichi_soft.export.archive import written
 
@@ -14,13 +14,6 @@ BALL = SoftBodyAsset(sphere(radius=0.3, resolution=2), JELLY)
 def cut():
     world = World()
     world.add_body(box((1, 1, 1), (2, 2, 2)), JELLY, spare_vertices=20, position=(0, 0, 1))
-    return world
-
-
-def with_levels():
-    world = World()
-    fine = SoftBodyAsset(sphere(radius=0.3, resolution=4), JELLY)
-    world.add_body(fine.with_coarser(sphere(radius=0.3, resolution=2)), position=(0, 0, 1))
     return world
 
 
@@ -75,7 +68,6 @@ def flat():
     ("make", "what", "why", "way_out"),
     [
         (cut, "asset 0 is cut or tears", "Python makes the new mesh", "leave spare_vertices out"),
-        (with_levels, "asset 0 has levels of detail", "Python computes how", "an asset for each level"),
         (recording, "it records events", "Python would go on", "ts_world_record_events"),
         (
             watching,
