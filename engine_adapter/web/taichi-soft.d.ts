@@ -23,8 +23,14 @@ export class Scene {
   nameOf(kind: Kind, number: number): string;
   /** Number of a thing, by its name. */
   find(kind: Kind, name: string | number): number;
-  /** `vertexCount`, `slotCount` and `mass` [kg] of an asset. */
-  asset(name: string | number): { number: number; vertexCount: number; slotCount: number; mass: number };
+  /** `vertexCount`, `slotCount`, `mass` [kg] and `levelCount` of an asset. */
+  asset(name: string | number): {
+    number: number;
+    vertexCount: number;
+    slotCount: number;
+    mass: number;
+    levelCount: number;
+  };
   /** A world as it was exported. */
   createWorld(): World;
   /** Free the scene, as soon as the last of its worlds is destroyed. */
@@ -152,8 +158,14 @@ export class Body {
   readonly status: "active" | "frozen" | "asleep";
   /** Centre of mass [m]. */
   readonly center: number[];
+  /** Level of detail, 0 being the finest. */
+  readonly level: number;
+  /** Number of vertices at its level. */
+  readonly vertexCount: number;
   /** Take the body out of the world. */
   despawn(): void;
+  /** Go on with more or fewer tetrahedra. With `release`, joints and motors that have no place there are released. */
+  setLevel(level: number, how?: { release?: boolean }): void;
   /** A copy of the positions of its vertices [m]: after the last step, or `alpha` of the way to it. */
   positions(alpha?: number): Float32Array;
   /** A mesh to draw: the first one of its asset, or one by its number or name. Call it once, not in each frame. */

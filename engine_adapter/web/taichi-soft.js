@@ -191,7 +191,9 @@ export class Scene {
     native.view.setUint32(small, 16, true);
     native.call("ts_asset_get_info", this.handle, number, small);
     const [vertexCount, slotCount] = [4, 8].map((at) => native.int(small + at));
-    return { number, vertexCount, slotCount, mass: native.view.getFloat32(small + 12, true) };
+    const mass = native.view.getFloat32(small + 12, true);
+    native.call("ts_asset_get_level_count", this.handle, number, small);
+    return { number, vertexCount, slotCount, mass, levelCount: native.int(small) };
   }
 
   #mesh(number) {
@@ -203,7 +205,9 @@ export class Scene {
     native.call("ts_mesh_get_triangles", this.handle, number, triangles.at, triangles.count);
     const uv = hasUv ? new Block(native, Float32Array, 2 * vertexCount) : null;
     if (uv) native.call("ts_mesh_get_uv", this.handle, number, uv.at, uv.count);
-    return { number, asset, vertexCount, triangles, uv };
+    native.call("ts_mesh_get_level", this.handle, number, native.small);
+    const level = native.int(native.small);
+    return { number, asset, level: level < 0 ? null : level, vertexCount, triangles, uv };
   }
 
   /** Name of a "body", "asset", "collider", "frame", "mesh", "joint" or "motor". */
@@ -227,7 +231,7 @@ export class Scene {
     throw new SoftError(-1, `kind is ${kind}: give one of ${Object.keys(KINDS).join(", ")}`);
   }
 
-  /** `vertexCount`, `slotCount` and `mass` [kg] of an asset. */
+  /** `vertexCount`, `slotCount`, `mass` [kg] and `levelCount` of an asset. */
   asset(name) {
     const found = this.assets[this.find("asset", name)];
     if (!found) throw new SoftError(-1, `there is no asset ${name}: there are ${this.assets.length}`);
@@ -614,10 +618,29 @@ export class Body {
     return STATUS[this.world.native.int(this.#small)];
   }
 
+  /** Level of detail, 0 being the finest. */
+  get level() {
+    this.#call("ts_body_get_level", this.#small);
+    return this.world.native.int(this.#small);
+  }
+
+  /**
+   * Go on with more or fewer tetrahedra. Joints, motors and attachments that have no place at that level bar the change,
+   * unless they are released.
+   */
+  setLevel(level, { release = false } = {}) {
+    this.#call("ts_body_set_level", level, Number(release));
+  }
+
+  /** Number of vertices at its level. */
+  get vertexCount() {
+    this.#call("ts_body_get_vertex_count", this.#small);
+    return this.world.native.int(this.#small);
+  }
+
   /** A copy of the positions of its vertices [m]: after the last step, or `alpha` of the way to it. */
   positions(alpha = 1) {
-    const { native, scene } = this.world;
-    const block = new Block(native, Float32Array, 3 * scene.assets[this.asset].vertexCount);
+    const block = new Block(this.world.native, Float32Array, 3 * this.vertexCount);
     try {
       this.#call("ts_body_positions", alpha, block.at, block.count);
       return block.view.slice();
@@ -626,12 +649,12 @@ export class Body {
     }
   }
 
-  /** A mesh to draw: the first one of its asset, or one by its number or name. Call it once, not in each frame. */
+  /** A mesh to draw: the first one of its asset and level, or one by its number or name. Call it once, not in each frame. */
   mesh(name = null) {
-    const { asset } = this;
+    const { asset, level } = this;
     const { scene } = this.world;
-    const found =
-      name === null ? scene.meshes.find((each) => each.asset === asset) : scene.meshes[scene.find("mesh", name)];
+    const isIts = (each) => each.asset === asset && (each.level === null || each.level === level);
+    const found = name === null ? scene.meshes.find(isIts) : scene.meshes[scene.find("mesh", name)];
     if (!found) throw new SoftError(-1, `nothing is drawn of asset ${asset}`);
     return this.world.keep(new Mesh(this, found));
   }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from taichi_soft.bodies.fields import BodyFields
 from taichi_soft.bodies.kernels.constant_rows import write_numbers
@@ -14,6 +15,9 @@ def write_tet_constants(fields: BodyFields, first_block: int, body: BodyArrays) 
     """Write what `BodyFields.tet_constants` names."""
     if len(body.tet_vertices):
         for field, rows in fields.tet_constants(body):
-            width = rows.shape[1]
-            numbers = blocks_of(rows, width, 0).astype(np.float32)
-            write_numbers(field, first_block * LANES * width, numbers)
+            write_numbers(field, first_block * LANES * rows.shape[1], constant_blocks(rows))
+
+
+def constant_blocks(rows: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Constants of tetrahedra, (m, k), as their field has them: see `BodyFields`."""
+    return blocks_of(rows, rows.shape[1], 0).astype(np.float32)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from taichi_soft.bodies.asset import SoftBodyAsset
 from taichi_soft.bodies.description import outer_vertices
+from taichi_soft.bodies.soft_body import record_of
 from taichi_soft.contact.collider import FASTEST_SPIN, ColliderRow, row_of
 from taichi_soft.contact.shapes.shape import SEAM
 from taichi_soft.control.drives import LARGEST_PUSH
@@ -29,6 +30,7 @@ from taichi_soft.events.log import MOST_EVENTS
 from taichi_soft.events.observer import touch_rows
 from taichi_soft.export.archive import words
 from taichi_soft.export.layout import FLOAT, WHOLE, image_of, place_of, places_of
+from taichi_soft.export.levels import constant_names, passage_arrays, slot_arrays
 from taichi_soft.export.meshes import ExportedMesh
 from taichi_soft.persistence.kernels.packing import OWNERS, carried, owners
 from taichi_soft.persistence.snapshot import carried_rows, steering
@@ -52,12 +54,24 @@ def description_of(
         **_of_frames(context),
     }
     for number, asset in enumerate(context.slots.kinds):
-        arrays |= {f"asset{number}/{name}": each for name, each in _of_asset(asset).items()}
+        for level, each in enumerate(asset.levels):
+            arrays |= _within(_prefix(number, level), _of_asset(each))
+            if asset.coarser:
+                arrays |= _within(_prefix(number, level), slot_arrays(context, number, each))
+        arrays |= _within(f"asset{number}/", passage_arrays(asset))
     for number, mesh in enumerate(meshes):
-        arrays |= {f"mesh{number}/{name}": each for name, each in _of_mesh(mesh).items()}
+        arrays |= _within(f"mesh{number}/", _of_mesh(mesh))
     if context.built.colliders is not None:
         arrays |= _of_colliders([row_of(each) for each in context.colliders.all_handles])
     return arrays
+
+
+def _within(prefix: str, arrays: Arrays) -> Arrays:
+    return {prefix + name: each for name, each in arrays.items()}
+
+
+def _prefix(number: int, level: int) -> str:
+    return f"asset{number}/level{level}/" if level else f"asset{number}/"
 
 
 def _of_world(context: WorldContext) -> Arrays:
@@ -90,6 +104,10 @@ def _of_world(context: WorldContext) -> Arrays:
         "slots/friction": _floats(
             [asset.contact.friction if body is None else body.friction for asset, body in slots]
         ),
+        "levels/counts": _ints([len(asset.levels) for asset in kinds]),
+        "levels/level": _ints([0 if body is None else body.level for body in context.slots.slots]),
+        **_held(context),
+        "levels/constants": words(constant_names(context)),
         "slots/begin": _ints([each.particles[0] for each in context.layout.ranges]),
     }
 
@@ -157,14 +175,27 @@ def _of_asset(asset: SoftBodyAsset) -> Arrays:
     }
 
 
-def _of_mesh(mesh: ExportedMesh) -> Arrays:
+def _held(context: WorldContext) -> Arrays:
+    """What pins of bodies stand for in the finest level, slot after slot: see `BodyRecord.held`."""
+    bodies = context.slots.slots
+    held = [None if body is None or body.level == 0 else record_of(body).held for body in bodies]
+    rows = [np.zeros(0) if each is None else each for each in held]
     return {
-        "kind": _ints([mesh.asset, mesh.is_skin, mesh.is_serial, mesh.vertex_count]),
-        "triangles": _ints(mesh.triangles),
-        "ints": mesh.ints,
-        "floats": mesh.floats,
-        "uv": mesh.uv,
+        "levels/held_counts": _ints([len(each) for each in rows]),
+        "levels/held": _ints(np.concatenate(rows)),
     }
+
+
+def _of_mesh(mesh: ExportedMesh) -> Arrays:
+    found = {
+        "kind": _ints([mesh.asset, mesh.level, mesh.is_skin, mesh.vertex_count]),
+        "triangles": _ints(mesh.triangles),
+        "uv": mesh.uv,
+        "is_serial": _ints([table.is_serial for table in mesh.tables]),
+    }
+    for level, table in enumerate(mesh.tables):
+        found |= {f"ints{level}": table.ints, f"floats{level}": table.floats}
+    return found
 
 
 def _of_colliders(rows: Sequence[ColliderRow]) -> Arrays:
@@ -193,17 +224,20 @@ def _of_frames(context: WorldContext) -> Arrays:
     return {
         "frames/alive": _ints([each is not None for each in frames.rows]),
         "frames/poses": np.stack([frames.present, frames.coming]).astype(np.float32),
-        "frames/feels": _feeling(context),
+        **_attached(context),
     }
 
 
-def _feeling(context: WorldContext) -> NDArray[np.uint8]:
-    """1 for each particle whose frame feels its load."""
-    feels = np.zeros(context.layout.particle_count, dtype=np.uint8)
+def _attached(context: WorldContext) -> Arrays:
+    """Of each particle: 1 where its frame feels its load; which attachment of its body it belongs to, counted
+    from 1, or 0."""
+    count = context.layout.particle_count
+    feels, number = np.zeros(count, dtype=np.uint8), np.zeros(count, dtype=np.int32)
     for body, held in context.of(Frames).attachments.items():
-        for each in held:
-            feels[context.built.rows_of(body.index, each.particles)] |= each.two_way
-    return feels
+        for i, each in enumerate(held, start=1):
+            rows = context.built.rows_of(body.index, each.particles)
+            feels[rows], number[rows] = each.two_way, i
+    return {"frames/feels": feels, "frames/attachment": number}
 
 
 def _ints(numbers: Any) -> NDArray[np.int32]:

@@ -21,18 +21,13 @@ CREASE = 40.0
 
 
 @dataclass(frozen=True, eq=False)
-class ExportedMesh:
-    """One of the meshes of an asset, with what the kernel that draws it reads."""
+class Table:
+    """What the kernel reads that draws a mesh."""
 
-    name: str
-    asset: int
     is_skin: bool
     is_serial: bool
-    vertex_count: int
-    triangles: NDArray[np.int32]  # (m, 3)
     ints: NDArray[np.int32]
     floats: NDArray[np.float32]  # of a skin
-    uv: NDArray[np.float32]  # (k, 2), or none
 
     @property
     def kernel(self) -> tuple[str, Any]:
@@ -43,37 +38,64 @@ class ExportedMesh:
         return (name if self.is_serial else f"{name}_shared"), kernel
 
 
+@dataclass(frozen=True, eq=False)
+class ExportedMesh:
+    """One of the meshes of an asset."""
+
+    name: str
+    asset: int
+    level: int  # of detail that it draws; -1 for all
+    vertex_count: int
+    triangles: NDArray[np.int32]  # (m, 3)
+    tables: list[Table]  # one, or one for each level
+    uv: NDArray[np.float32]  # (k, 2), or none
+
+    @property
+    def is_skin(self) -> bool:
+        """Whether it is a skin, which is drawn at every level."""
+        return self.tables[0].is_skin
+
+
 def meshes_of(number: int, asset: SoftBodyAsset, name: str) -> list[ExportedMesh]:
-    """Of the asset that has this number: its skins, or else its surface, if it has triangles."""
+    """Of the asset that has this number: its skins, or else the surfaces of its levels, if they have
+    triangles."""
     found = []
     for i, skin in enumerate(asset.skins):
         surface = skin.surface
-        n = len(asset.mesh.vertices)
+        tables = [
+            Table(
+                True,
+                len(level.mesh.vertices) + skin.vertex_count < FEWEST_OF_SKIN,
+                level.skins[i].ints,
+                level.skins[i].floats,
+            )
+            for level in asset.levels
+        ]
         found.append(
             ExportedMesh(
                 surface.name or f"{name}.skin{i}",
                 number,
-                True,
-                n + skin.vertex_count < FEWEST_OF_SKIN,
+                -1,
                 skin.vertex_count,
                 np.asarray(surface.triangles, dtype=np.int32),
-                skin.ints,
-                skin.floats,
+                tables,
                 _uv_of(surface.visual, skin.vertex_count),
             )
         )
-    if not found and len(asset.mesh.surface):
-        vertices, triangles = split_at_creases(asset.mesh.vertices, asset.mesh.surface, CREASE)
+    if found or not len(asset.mesh.surface):
+        return found
+    for level, each in enumerate(asset.levels):
+        vertices, triangles = split_at_creases(each.mesh.vertices, each.mesh.surface, CREASE)
+        is_serial = len(vertices) < FEWEST_OF_SURFACE
+        table = Table(False, is_serial, render_table(vertices, triangles), np.zeros(1, dtype=np.float32))
         found.append(
             ExportedMesh(
-                f"{name}.surface",
+                f"{name}.surface{level or ''}",
                 number,
-                False,
-                len(vertices) < FEWEST_OF_SURFACE,
+                level,
                 len(vertices),
                 np.asarray(triangles, dtype=np.int32),
-                render_table(vertices, triangles),
-                np.zeros(1, dtype=np.float32),
+                [table],
                 np.zeros((0, 2), dtype=np.float32),
             )
         )

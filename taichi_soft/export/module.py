@@ -8,6 +8,7 @@ from typing import Any
 
 from taichi_soft.bodies.kernels.readout import read_positions
 from taichi_soft.contact.kernels.collider_rows import forget_collider, sum_collider_impulses
+from taichi_soft.contact.kernels.parting import mark_placed
 from taichi_soft.contact.kernels.touches import read_touches
 from taichi_soft.control.kernels.drives import add_push
 from taichi_soft.control.kernels.impulses import add_impulse_near, add_radial_impulse, add_velocity
@@ -18,6 +19,7 @@ from taichi_soft.control.kernels.rigid_motion import jump, write_rigid_velocity
 from taichi_soft.core.runtime import ti
 from taichi_soft.export.kernels.root import read_root
 from taichi_soft.export.meshes import ExportedMesh
+from taichi_soft.fracture.kernels.topology import read_motion, write_body, write_kind, write_touching
 from taichi_soft.queries.kernels import find_closest, find_hits, find_overlaps
 from taichi_soft.solver.context import WorldContext
 from taichi_soft.solver.kernels.islands import list_joined_islands
@@ -56,6 +58,9 @@ _OF_CONTACT = {
 }
 """Those of joints and motors, which take a world that is made for contact."""
 
+_OF_LEVELS = {"read_motion": read_motion, "write_body": write_body, "write_kind": write_kind}
+"""Those that change the level of detail of a body."""
+
 
 def kernels_of(context: WorldContext, meshes: Sequence[ExportedMesh]) -> Kernels:
     """All that the native library calls in this world, by name."""
@@ -76,9 +81,15 @@ def kernels_of(context: WorldContext, meshes: Sequence[ExportedMesh]) -> Kernels
     if context.built.sleeps:
         found["wake_body"] = _example(wake_body, state=state)
         found["wake_near"] = _example(wake_near, state=state)
-    for mesh in meshes:
-        name, kernel = mesh.kernel
-        found[name] = _example(kernel, state=state, is_serial=mesh.is_serial)
+    if any(asset.coarser for asset in context.slots.kinds):
+        found |= {name: _example(kernel, state=state) for name, kernel in _OF_LEVELS.items()}
+        if program.has_soft_contact:
+            found["mark_placed"] = _example(mark_placed, state=state)
+        if state.capacity.contact.hull:
+            found["write_touching"] = _example(write_touching, state=state)
+    for table in (table for mesh in meshes for table in mesh.tables):
+        name, kernel = table.kernel
+        found[name] = _example(kernel, state=state, is_serial=table.is_serial)
     return found
 
 

@@ -27,11 +27,6 @@ CUT = (
     "is cut or tears, and Python makes the new mesh of a body that is cut: leave spare_vertices out, and let "
     "the game put bodies of the parts in its place, by ts_world_despawn and ts_world_spawn"
 )
-LEVELS = (
-    "has levels of detail, between which Python computes how a body passes: take one number of cells, or an "
-    "asset for each level, of which the game puts one in place of another by ts_world_despawn and "
-    "ts_world_spawn"
-)
 MATERIAL = (
     "was given another material, and the library takes the constants of a body from its asset: make its "
     "asset of that material"
@@ -66,7 +61,6 @@ def _of_assets(context: WorldContext) -> list[str]:
     found = []
     for number, asset in enumerate(context.slots.kinds):
         found += [f"asset {number} {CUT}"] * bool(asset.spare_vertices)
-        found += [f"asset {number} {LEVELS}"] * bool(asset.coarser)
     return found
 
 

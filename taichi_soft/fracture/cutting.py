@@ -251,8 +251,13 @@ def write_surface(context: Context, state: BodyFields, slot: int, asset: SoftBod
 
 
 def _write_kind(state: BodyFields, slot: int, asset: SoftBodyAsset) -> None:
-    rows = [*asset.surface_row[:2], *asset.kind_row(is_implicit=state.capacity.implicit)]
-    write_kind(state, slot, np.array(rows, dtype=np.float32))
+    write_kind(state, slot, kind_numbers(state, asset))
+
+
+def kind_numbers(state: BodyFields, asset: SoftBodyAsset) -> NDArray[np.float32]:
+    """The row that `write_kind` takes for bodies of an asset."""
+    row = [*asset.surface_row[:2], *asset.kind_row(is_implicit=state.capacity.implicit)]
+    return np.array(row, dtype=np.float32)
 
 
 def write_slot(
@@ -272,14 +277,17 @@ def write_slot(
         status, model_of: as of `write_body`.
         inverses: of the rest shapes as they are, (m, 3, 3), where they may have flowed.
     """
+    write_body(state, slot, status, model_of, motion, *body_rows(arrays, inverses))
+    write_tet_constants(state, context.layout.ranges[slot].blocks[0], arrays)
+    if state.capacity.contact.hull:  # type: ignore[attr-defined]
+        write_touching(state, slot, *touching_rows(arrays, context.layout.ranges[slot]))
+
+
+def body_rows(arrays: BodyArrays, inverses: NDArray[np.float32] | None = None) -> tuple[NDArray[Any], ...]:
+    """The arrays that `write_body` takes behind the motion of a body. Args: as of `write_slot`."""
     first = _real_blocks(np.swapaxes(arrays.rest_inverse, 1, 2), 9)
     present = first if inverses is None else _real_blocks(np.swapaxes(inverses, 1, 2), 9)
-    write_body(
-        state,
-        slot,
-        status,
-        model_of,
-        motion,
+    return (
         arrays.rest_position.astype(np.float32),
         arrays.rank,
         blocks_of(arrays.tet_vertices, 4, 0),
@@ -291,9 +299,6 @@ def write_slot(
         arrays.triangles,
         arrays.outer,
     )
-    write_tet_constants(state, context.layout.ranges[slot].blocks[0], arrays)
-    if state.capacity.contact.hull:  # type: ignore[attr-defined]
-        write_touching(state, slot, *touching_rows(arrays, context.layout.ranges[slot]))
 
 
 def _real_blocks(rows: NDArray[Any], width: int) -> NDArray[np.float32]:

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taichi_soft.bodies.pose import best_fitting_pose
 from taichi_soft.bodies.soft_body import (
     SoftBody,
     context_of,
@@ -32,6 +31,7 @@ from taichi_soft.core.math.rotations import turned
 from taichi_soft.core.residue import kept, weighted_sum
 from taichi_soft.fracture.cutting import write_slot, write_surface
 from taichi_soft.fracture.kernels.topology import MOTION_WIDTH, read_motion
+from taichi_soft.levels.fitting import fitting_motion, moments
 from taichi_soft.levels.hanging import Hanging, hang_on, hanging_at, let_hold
 from taichi_soft.levels.passage import Passage, passage
 
@@ -126,16 +126,18 @@ def _make_room(
             released += each.holding(body)
             each.let_go(body)
     while True:  # without what was released fewer vertices are held, and others may have no place
-        held = _held_at(body, level)
+        finest = _finest_held(body)
+        held = _nearest_at(body, finest, level)
         hanging = hanging_at(body, over, held)
         homeless = [each for each, particles in hanging if not len(particles)]
-        if not homeless:
-            return released, held, hanging
-        if not may_release:
+        if homeless and not may_release:
             raise StateError(
                 f"{homeless[0]!r} would hold nothing at level {level}, where its vertices have no place of "
                 "their own: release it before the level changes, or let set_level do so with release=True"
             )
+        record_of(body).held = finest
+        if not homeless:
+            return released, held, hanging
         for each in homeless:
             each.release()
         released += homeless
@@ -169,8 +171,7 @@ def _hold(over: Passage, motion: Floats, rows: Floats, held: Ints) -> None:
     nearest = sources[over.nearest_sources(held, sources)]
     before, after = over.places
     for part in (POSITION, EARLIER_POSITION):
-        pose = best_fitting_pose(before[sources], motion[sources, part], np.ones(len(sources)))
-        turn, place = kept(pose.rotation), kept(pose.position)
+        turn, place = (kept(each) for each in fitting_motion(before[sources], motion[sources, part]))
         beside = motion[nearest, part] - (turned(before[nearest], turn) + place)
         rows[held, part] = turned(after[held], turn) + place + beside
     rows[held, INV_MASS] = 0.0
@@ -192,38 +193,35 @@ def _rigid(arms: Floats, masses: Floats, momentum: Floats, spin: Floats) -> Floa
     """Velocities of the rigid motion that has a momentum, and an angular momentum about the centre of mass;
     or accelerations, of a force and a torque. (n, 3), for places `arms` from about the centre."""
     arms = arms - weighted_sum(masses, arms) / masses.sum()
-    moments = _moments(masses, arms, arms)
+    own = moments(masses, arms, arms)
     # A little more, or there is none about the line on which all may lie.
-    inertia = np.trace(moments) * (1.0 + 1e-9) * np.eye(3) - moments
+    inertia = np.trace(own) * (1.0 + 1e-9) * np.eye(3) - own
     a, b, c = shares_by(edge_inverses(np.vstack([np.zeros(3), inertia])), spin)[1:]
     turning = np.array([[0, -c, b], [c, 0, -a], [-b, a, 0]])  # spin x r = turning @ r
     return np.asarray(momentum / masses.sum() + turned(arms, turning))
 
 
-def _held_at(body: SoftBody, level: int) -> Ints:
-    """Vertices of a level that are to be held: those nearest to what is held of the finest level."""
+def _finest_held(body: SoftBody) -> Ints | None:
+    """Vertices of the finest level that what is held now stands for; None for none."""
     record, present = record_of(body), body.pinned.astype(np.int64)
+    if not len(present):
+        return None
     if record.level == 0:
-        record.held = present if len(present) else None
-    elif record.held is None or not np.array_equal(_nearest_at(body, record.level), present):
-        # Pinned meanwhile: what is nearest to that, in the finest level.
-        record.held = passage(body.asset, record.level, 0).nearest(present) if len(present) else None
-    return _nearest_at(body, level)
+        return present
+    if record.held is not None and np.array_equal(_nearest_at(body, record.held, record.level), present):
+        return record.held
+    # Pinned meanwhile: what is nearest to that, in the finest level.
+    return passage(body.asset, record.level, 0).nearest(present)
 
 
-def _nearest_at(body: SoftBody, level: int) -> Ints:
-    held = record_of(body).held
-    if held is None:
+def _nearest_at(body: SoftBody, finest: Ints | None, level: int) -> Ints:
+    """Vertices of a level that are nearest to some of the finest, ascending."""
+    if finest is None:
         return np.zeros(0, dtype=np.int64)
-    return np.unique(held) if level == 0 else np.unique(passage(body.asset, 0, level).nearest(held))
+    return np.unique(finest if level == 0 else passage(body.asset, 0, level).nearest(finest))
 
 
 def _spin(arms: Floats, v: Floats, masses: Floats) -> Floats:
     """Sum of m r x v, (3,)."""
-    products = _moments(masses, arms, v)
+    products = moments(masses, arms, v)
     return np.array([products[i - 2, i - 1] - products[i - 1, i - 2] for i in range(3)])
-
-
-def _moments(masses: Floats, arms: Floats, v: Floats) -> Floats:
-    """Sum of m r v^T, (3, 3)."""
-    return np.asarray((masses[:, None, None] * arms[:, :, None] * v[:, None, :]).sum(axis=0))

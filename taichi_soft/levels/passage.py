@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import weakref
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +38,16 @@ class Passage:
         """Positions, velocities or other quantities (n, q) of the source's vertices, for those of the target,
         (k, q)."""
         return np.add.reduceat(rows[self._sources] * self._weights[:, None], self._begins, axis=0)
+
+    @property
+    def rows(self) -> dict[str, NDArray[Any]]:
+        """Which vertices of the source each one of the target is made of, and with what weights: its own
+        begin at `begins`."""
+        return {
+            "sources": self._sources.astype(np.int32),
+            "begins": self._begins.astype(np.int32),
+            "weights": self._weights,
+        }
 
     def nearest(self, vertices: Ints) -> Ints:
         """Vertices of the target that are nearest to some of the source, at rest."""

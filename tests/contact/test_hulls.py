@@ -7,6 +7,7 @@ import trimesh
 from taichi_soft import (
     BoxShape,
     Contact,
+    FrozenBodyWarning,
     Material,
     MeshError,
     OptionError,
@@ -309,6 +310,17 @@ def test_rewinding_and_recordings_are_exact(tmp_path):
     assert bits(world) == once
     report = replay(world.save_recording(tmp_path / "heap.recording"))
     assert report.first_difference is None
+
+
+def test_a_world_whose_body_has_frozen_on_its_hull_is_taken_back():
+    world = World()
+    world.add_body(asset_of(urchin(), 300), position=(9.9999e6, 0, 3), velocity=(1.9e4, 0, 0))
+    world.build()
+    with pytest.warns(FrozenBodyWarning):
+        world.step(1 / 60)
+    state = world.state_hash()
+    world.restore(world.snapshot())
+    assert world.state_hash() == state
 
 
 def test_a_body_without_hull_moves_beside_hulls_as_without_them():

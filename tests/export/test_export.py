@@ -17,13 +17,6 @@ def cut():
     return world
 
 
-def with_levels():
-    world = World()
-    fine = SoftBodyAsset(sphere(radius=0.3, resolution=4), JELLY)
-    world.add_body(fine.with_coarser(sphere(radius=0.3, resolution=2)), position=(0, 0, 1))
-    return world
-
-
 def plain():
     world = World()
     world.add_body(BALL, position=(0, 0, 1))
@@ -75,7 +68,6 @@ def flat():
     ("make", "what", "why", "way_out"),
     [
         (cut, "asset 0 is cut or tears", "Python makes the new mesh", "leave spare_vertices out"),
-        (with_levels, "asset 0 has levels of detail", "Python computes how", "an asset for each level"),
         (recording, "it records events", "Python would go on", "ts_world_record_events"),
         (
             watching,

@@ -16,6 +16,7 @@ from taichi_soft import (
     World,
     box,
 )
+from taichi_soft.bodies.soft_body import record_of
 from taichi_soft.render.replay import replay
 
 RUBBER = Material(young=8e4, poisson=0.4, density=900.0)
@@ -227,6 +228,7 @@ def test_an_attachment_without_a_vertex_is_released_where_it_may_be_and_others_h
     before = world.state_hash()
     with pytest.raises(StateError, match="would hold nothing at level 2"):
         body.set_level(2)
+    assert record_of(body).held is None
     assert (world.state_hash(), body.level) == (before, 0)
     body.set_level(2, release=True)
     assert (stays.is_attached, goes.is_attached) == (True, False)

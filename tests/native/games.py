@@ -143,6 +143,14 @@ class Player:
         body, vertices = self.body(), self.list()
         body.set_targets(vertices, np.reshape(self.numbers, (-1, 3)))
 
+    def set_level(self):
+        body, level = self.body(), self.whole()
+        body.set_level(level, release=bool(self.whole()))
+
+    def level(self):
+        body = self.body()
+        self.say(f"{body.level} {body.vertex_count}")
+
     def wind(self):
         velocity, (density, drag) = self.take(3), self.take(2)
         self.world.set_wind(velocity, density=density, drag=drag)

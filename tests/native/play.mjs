@@ -61,6 +61,11 @@ export function play(scene, game) {
       const [who, vertices] = [body(), list()];
       who.setTargets(vertices, take(3 * vertices.length));
     },
+    set_level: () => body().setLevel(one(), { release: one() === 1 }),
+    level() {
+      const who = body();
+      tell(who.level, who.vertexCount);
+    },
     wind: () => world.setWind(take(3), { density: one(), drag: one() }),
     gravity: () => world.setGravity(take(3)),
     floor_friction: () => world.setFriction(one()),

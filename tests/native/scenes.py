@@ -456,6 +456,182 @@ def hulled_game():
             yield line("drain")
 
 
+def levels():
+    """Bodies with levels of detail: balls with a skin and a hull, and bars."""
+    world = World(soft_contact=True, collider_room=2, sleep_speed=0.3)
+    round_one = sphere(radius=0.25, resolution=6)
+    ball = SoftBodyAsset.from_surface(
+        (round_one.vertices, round_one.surface),
+        RUBBER,
+        cells=(6, 4, 3),
+        hull=60,
+        contact=Contact(thickness=0.005),
+    )
+    cells = ((8, 3, 2), (5, 2, 2), (3, 1, 1))
+    finest, *coarser = (box((0.9, 0.3, 0.2), each) for each in cells)
+    bar = SoftBodyAsset(finest, RUBBER).with_coarser(*coarser)
+    ends = np.flatnonzero(finest.vertices[:, 0] == finest.vertices[:, 0].min())
+    pinned = SoftBodyAsset(finest, RUBBER, pinned=ends).with_coarser(*coarser)
+    for asset, count in ((ball, 3), (bar, 3), (pinned, 1)):
+        world.reserve(asset, count)
+    balls = [world.spawn(ball, position=(0.1 * i, 0.05 * i, 0.6 + 0.6 * i)) for i in range(2)]
+    for i in range(2):
+        world.spawn(bar, position=(1.6, 0.5 * i, 0.4 + 0.5 * i))
+    world.spawn(pinned, position=(-1.2, 0.0, 1.0))
+    world.add_collider(BoxShape((1.0, 1.0, 0.3)), position=(0.0, 0.0, 0.15))
+    world.build()
+    balls[1].set_level(1)
+    return world
+
+
+def levels_game():
+    """Slots 0 to 2 are balls, 3 to 5 bars, 6 a pinned bar. Mesh 0 is of balls."""
+    still = (0.0, 0.0, 0.0)
+    rng = np.random.default_rng(3)
+    now = {slot: 0 for slot in range(7)} | {1: 1}
+
+    def change(slot, level, release=0):
+        now[slot] = level
+        yield line("set_level", slot, level, release)
+        yield line("level", slot)
+
+    def held_game(i):
+        """What holds bodies passes on."""
+        if i == 30:
+            yield line("add_frame", (-0.5, 0.3, 1.0), turn((0, 0, 1), 0.3))
+            yield line("add_frame", (2.1, 0.5, 1.0), UPRIGHT)
+            yield line("attach", 6, [90, 91, 92, 94], 0, 1)  # near its free end
+            yield line("attach", 4, [0, 1, 2, 3], 1, 1)
+            yield line("attach", 4, [30, 40, 50], 1, 0)
+        if 30 <= i < 300:
+            yield line("move_frame", 0, (-0.5, 0.3 + 0.001 * (i - 30), 1.0), turn((0, 1, 2), 0.3 + 0.003 * i))
+            yield line("move_frame", 1, (2.1, 0.5, 1.0 + 0.001 * i), turn((0, 1, 0), 0.002 * i))
+        if i in (60, 110, 150, 210):
+            yield from change(6, {60: 1, 110: 2, 150: 1, 210: 0}[i], 1)
+            yield line("load", 6, 0) if i < 150 else line("status", 6)
+        if i in (70, 100, 160):
+            yield from change(4, {70: 2, 100: 1, 160: 0}[i], 1)
+        if i == 120:
+            yield line("pin", 6, [0, 8])
+            yield line("targets", 6, [0, 8], ((-1.6, -0.2, 1.1), (-1.5, 0.1, 1.2)))
+            yield from change(6, 0, 1)
+            yield from change(6, 2, 1)
+        if i == 310:
+            yield line("detach", 4, [])
+            yield line("unpin", 6, [])
+        if i == 320:
+            yield line("pin", 6, [5])  # one alone, which no turn follows from
+            yield from change(6, 1)
+            yield from change(6, 2)
+            yield from change(6, 0)
+
+    def grabbed_game(i):
+        if i == 40:
+            yield line("grab", 0, 3, (0.2, 0.5, 0.3), (0.2, 0.1, 0.9), 4.0, -1.0)
+            yield line("grab", 0, 9, (1.0, 0.0, 0.0), (0.0, -0.3, 0.8), 7.0, 60.0)
+            yield line("grab", 3, 5, (0.3, 0.3, 0.4), (1.6, 0.2, 0.9), 3.0, -1.0)
+        if i in (50, 75, 105):
+            yield from change(0, {50: 2, 75: 1, 105: 0}[i])
+            yield from change(3, {50: 1, 75: 2, 105: 0}[i])
+        if 40 < i < 130 and i % 10 == 0:
+            for grab in range(3):
+                yield line("grab_force", grab)
+        if i == 130:
+            for grab in range(3):
+                yield line("release_grab", grab)
+
+    for i in range(STEPS):
+        yield from held_game(i)
+        yield from grabbed_game(i)
+        if i == 0:
+            yield line("record_events", 31)
+        if i == 10:
+            yield line("force", 3, (100.0, 20.0, 60.0), [])
+            yield line("velocity", 0, (0.5, 0.0, 1.0), (2.0, 3.0, 1.0))
+            yield from change(0, 1)
+            yield from change(3, 2)
+        if i == 20:
+            yield from change(1, 2)
+            yield line("body_friction", 1, 0.8)
+            yield from change(0, 0)
+            yield from change(3, 0)
+        if i == 140:
+            yield from change(0, 2)
+            yield line("despawn", 0)
+            yield line("spawn", 0, (0.0, 0.0, 1.2), turn((1, 0, 1), 0.7), (0.5, 0.0, -1.0), (1.0, 2.0, 3.0))
+            now[0] = 0
+        if i == 170:
+            yield from change(1, 1)
+            yield line("snapshot")
+        if i == 181:
+            yield from change(1, 0)
+            yield from change(6, 2, 1)
+            yield line("despawn", 3)
+        if i == 190:
+            yield line("restore")
+            now |= {1: 1, 3: 0, 6: 1}
+        if i == 200:
+            yield line("restore")
+        if i == 220:
+            yield line("join", 3, [1, 2, 4], 1, [3, 5, 6])
+            yield line("add_motor", 3, [20, 21, 24, 25], 1, 0, 0, (1.0, 0.0, 0.0), still, 9.0, 20.0)
+        if i == 260:
+            yield from change(3, 1, 1)
+        if i in (330, 420):
+            yield line("wake")
+            for slot in (0, 1):
+                yield line("impulse", slot, (0.0, 3.0, 20.0), [0, 1, 2] if i == 330 else [])
+        if i > 340 and i % 25 == 0:
+            for slot in (0, 1, 3, 4):
+                yield from change(slot, int(rng.integers(3)))
+        if i == 500:
+            yield from change(1, 2)
+            yield line("despawn", 1)
+            yield line("snapshot")
+        if i == 510:
+            yield line("spawn", 0, (0.4, 0.4, 1.5), UPRIGHT, still, still)
+            now[1] = 0
+        yield line("step", DT, 0)
+        if i % 15 == 0:
+            yield line("raycast", (rng.uniform(-1.5, 2), -4.0, rng.uniform(0, 1)), (0.0, 1.0, 0.02), 9.0)
+            yield line("closest", rng.uniform(-1, 2, 3), 1.0)
+            yield line("overlap_sphere", rng.uniform(0, 1.2, 3), 0.5)
+            for slot in (0, 3, 4, 6):
+                yield line("positions", slot, 0.25)
+                yield line("positions", slot, 1.0)
+                yield line("mesh", slot, {0: 0, 3: 1 + now[3], 4: 1 + now[4], 6: 4 + now[6]}[slot])
+            yield line("drain")
+            yield line("collider_impulse", 0)
+    yield line("stable_substeps", DT)
+
+
+def solved_levels():
+    """Bodies with levels of detail under implicit Euler, in a world that is not made for contact."""
+    world = World(floor=0.0, integrator="implicit_euler")
+    finest, *coarser = (box((0.9, 0.3, 0.2), each) for each in ((8, 3, 2), (5, 2, 2), (3, 1, 1)))
+    block = SoftBodyAsset(finest, RUBBER).with_coarser(*coarser)
+    for i in range(2):
+        world.reserve(block, 1)
+        world.spawn(block, position=(0.0, 0.6 * i, 0.5 + 0.2 * i))
+    world.build()
+    return world
+
+
+def solved_levels_game():
+    for i in range(450):
+        if i == 5:
+            yield line("velocity", 0, (0.3, 0.0, 2.0), (3.0, 4.0, 0.0))
+        if i == 20:
+            yield line("grab", 1, 3, (0.2, 0.5, 0.3), (0.3, 0.8, 1.2), 3.0, -1.0)
+        if i == 100:
+            yield line("pin", 0, [0, 1])  # on a line, which leaves a turn open
+        if i % 30 == 10:
+            yield line("set_level", 0, (i // 30) % 3, 0)
+            yield line("set_level", 1, (i // 60) % 3, 0)
+            yield line("positions", 0, 1.0)
+        yield line("step", DT, 0)
+
+
 def thesis_sphere():
     """What docs/native.md measures a step of."""
     world = World(floor=0.0)
@@ -475,4 +651,6 @@ GAMES = {
     "tilted": (tilted, tilted_game),
     "joined": (joined, joined_game),
     "hulled": (hulled, hulled_game),
+    "levels": (levels, levels_game),
+    "solved_levels": (solved_levels, solved_levels_game),
 }

@@ -87,6 +87,7 @@ REFUSED = {
     "zero in a name": "Argument: a zero is in a name",
     "empty list": "Argument: no vertex is named: give null for all",
     "targets": "Size: targets has 3 numbers: give 6",
+    "no level": "Argument: level is 1, and asset 0 has 1",
     "not pinned": "State: vertex 0 is not pinned: call ts_body_pin first",
     "snapshot": "Snapshot: 100 bytes are no snapshot",
     "room for a snapshot": r"Size: buffer has 3 bytes: give \d+",

@@ -51,7 +51,7 @@ print(json.dumps(codes))
 """
 
 
-@pytest.mark.parametrize("name", ["heap", "free", "held", "joined"])
+@pytest.mark.parametrize("name", ["heap", "free", "held", "joined", "levels"])
 def test_a_forged_snapshot_is_refused_or_ends_no_process(name, native, export):
     codes = in_process(native, FORGED, export(name))
     assert set(codes) == {0, -8}

@@ -13,11 +13,11 @@ from taichi_soft.world.world import context_of_world
 
 
 def drawn(world):
-    """How Python draws what the world file's meshes are: of each asset its skins, or its surface."""
+    """How Python draws the world file's meshes: of each asset its skins, or the surfaces of its levels."""
     found = []
     for asset in dict.fromkeys(context_of_world(world).slots.assets):
         found += [lambda body, i=i: body.render_meshes[i] for i in range(len(asset.skins))]
-        found += [] if asset.skins else [lambda body: body.render_mesh(crease=CREASE)]
+        found += [] if asset.skins else [lambda body: body.render_mesh(crease=CREASE)] * len(asset.levels)
     return found
 
 

@@ -15,10 +15,19 @@ def heap(export):
     return export("heap")
 
 
-def test_calls_at_random_end_in_errors_and_change_nothing_that_they_do_not_return(heap, tmp_path):
-    """Built to look for faults of memory and undefined behaviour. By hand: ten minutes, with other seeds."""
-    folder = build(tmp_path / "checked", "-DTAICHI_SOFT_SANITIZE=ON", "-DCMAKE_BUILD_TYPE=RelWithDebInfo")
-    done = subprocess.run([folder / "fuzz", heap, "60", "1"], capture_output=True, text=True)
+@pytest.fixture(scope="module")
+def checked(tmp_path_factory):
+    """Folder of the library, built to look for faults of memory and undefined behaviour."""
+    options = "-DTAICHI_SOFT_SANITIZE=ON", "-DCMAKE_BUILD_TYPE=RelWithDebInfo"
+    return build(tmp_path_factory.mktemp("checked"), *options)
+
+
+@pytest.mark.parametrize(("name", "seconds"), [("heap", "60"), ("levels", "40")])
+def test_calls_at_random_end_in_errors_and_change_nothing_that_they_do_not_return(
+    name, seconds, checked, export
+):
+    """By hand: ten minutes, with other seeds."""
+    done = subprocess.run([checked / "fuzz", export(name), seconds, "1"], capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
     calls, refused = (int(text) for text in done.stdout.split() if text.isdigit())
     assert 0.2 < refused / calls < 0.95

@@ -51,6 +51,8 @@ namespace TaichiSoft
             Refused("zero in a name", () => scene.Find(NameKind.Body, "a\0b"));
             Refused("empty list", () => ball.ApplyImpulse(new Vector3d(0, 0, 1), new int[0]));
             Refused("targets", () => ball.SetTargets(new[] { 0, 1 }, new float[3]));
+            Refused("no level", () => ball.SetLevel(1));
+            Require(ball.Level == 0 && scene.GetLevelCount(0) == 1 && scene.GetMeshLevel(0) == 0, "levels are others");
             Refused("not pinned", () => ball.SetTargets(new[] { 0 }, new float[3]));
             Refused("snapshot", () => world.Restore(new byte[100]));
             Refused("room for a snapshot", () => world.Snapshot(new byte[3]));

@@ -241,6 +241,15 @@ namespace TaichiSoft
             { "pin", () => { Body who = Who(); who.Pin(List()); } },
             { "unpin", () => { Body who = Who(); who.Unpin(List()); } },
             { "targets", Targets },
+            { "set_level", () => { Body who = Who(); int level = Whole(); who.SetLevel(level, Whole() != 0); } },
+            {
+                "level",
+                () =>
+                {
+                    Body who = Who();
+                    Say(string.Format(CultureInfo.InvariantCulture, "{0} {1}", who.Level, who.VertexCount));
+                }
+            },
             { "wind", () => { Vector3d wind = Vector(); double density = Number(); world.SetWind(wind, density, Number()); } },
             { "gravity", () => world.SetGravity(Vector()) },
             { "floor_friction", () => world.SetFriction(Number()) },
@@ -330,7 +339,7 @@ namespace TaichiSoft
         private static void Positions()
         {
             Body who = Who();
-            var rows = new float[3 * scene.GetAssetInfo(who.GetAsset()).VertexCount];
+            var rows = new float[3 * who.VertexCount];
             who.ReadPositions(Number(), rows);
             Say(HashOf(rows));
         }

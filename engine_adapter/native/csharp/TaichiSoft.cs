@@ -539,6 +539,22 @@ namespace TaichiSoft
             return info;
         }
 
+        /// <summary>Levels of detail that an asset has; its info is of the finest.</summary>
+        public int GetLevelCount(int asset)
+        {
+            int count;
+            Native.Check(Native.ts_asset_get_level_count(handle, asset, out count), this);
+            return count;
+        }
+
+        /// <summary>The level of detail of bodies that a mesh draws; -1 for every one, as skins do.</summary>
+        public int GetMeshLevel(int mesh)
+        {
+            int level;
+            Native.Check(Native.ts_mesh_get_level(handle, mesh, out level), this);
+            return level;
+        }
+
         /// <summary>How much a mesh draws.</summary>
         public MeshInfo GetMeshInfo(int mesh)
         {
@@ -1039,6 +1055,35 @@ namespace TaichiSoft
             int status;
             Check(Native.ts_body_get_status(World.Handle, Id, out status));
             return (BodyStatus)status;
+        }
+
+        /// <summary>Its level of detail, 0 being the finest.</summary>
+        public int Level
+        {
+            get
+            {
+                int level;
+                Check(Native.ts_body_get_level(World.Handle, Id, out level));
+                return level;
+            }
+        }
+
+        /// <summary>Vertices that it has at its level.</summary>
+        public int VertexCount
+        {
+            get
+            {
+                int count;
+                Check(Native.ts_body_get_vertex_count(World.Handle, Id, out count));
+                return count;
+            }
+        }
+
+        /// <summary>Go on with more or fewer tetrahedra: its vertices and triangles are others then.</summary>
+        /// <remarks>Joints, motors and attachments that have no place there bar that, unless they are released.</remarks>
+        public void SetLevel(int level, bool release = false)
+        {
+            Check(Native.ts_body_set_level(World.Handle, Id, level, release ? 1 : 0));
         }
 
         /// <summary>Of its vertices, 3 numbers each; with alpha below 1 on the way from the step before.</summary>
@@ -1552,6 +1597,21 @@ namespace TaichiSoft
 
         [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_body_get_status(ulong world, ulong body, out int status);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_body_set_level(ulong world, ulong body, int level, int release);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_body_get_level(ulong world, ulong body, out int level);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_body_get_vertex_count(ulong world, ulong body, out int count);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_asset_get_level_count(ulong scene, int asset, out int count);
+
+        [DllImport(Library, CallingConvention = C)]
+        internal static extern int ts_mesh_get_level(ulong scene, int mesh, out int level);
 
         [DllImport(Library, CallingConvention = C)]
         internal static extern int ts_body_positions(ulong world, ulong body, double alpha, float[] positions,

@@ -111,7 +111,11 @@ TS_API ts_result ts_scene_find(ts_scene scene, int32_t kind, const char* name, i
 /* At most `capacity` bytes, the zero at the end included. */
 TS_API ts_result ts_scene_get_name(ts_scene scene, int32_t kind, int32_t number, char* name, size_t capacity);
 TS_API ts_result ts_asset_get_info(ts_scene scene, int32_t asset, ts_asset_info* info);
+/* Levels of detail that it has, 1 or more. Its info is of level 0, the finest. */
+TS_API ts_result ts_asset_get_level_count(ts_scene scene, int32_t asset, int32_t* count);
 TS_API ts_result ts_mesh_get_info(ts_scene scene, int32_t mesh, ts_mesh_info* info);
+/* The level of detail of bodies that it draws; -1 for every one, as skins do. */
+TS_API ts_result ts_mesh_get_level(ts_scene scene, int32_t mesh, int32_t* level);
 /* Triangles, 3 numbers each: counterclockwise seen from outside, clockwise in engines with left-handed axes. */
 TS_API ts_result ts_mesh_get_triangles(ts_scene scene, int32_t mesh, uint32_t* indices, size_t count);
 /* Texture coordinates, 2 numbers each, v upwards. */
@@ -226,6 +230,14 @@ TS_API ts_result ts_world_despawn(ts_world world, ts_body body);
 TS_API ts_result ts_world_get_body(ts_world world, int32_t slot, ts_body* body);
 TS_API ts_result ts_body_get_asset(ts_world world, ts_body body, int32_t* asset);
 TS_API ts_result ts_body_get_status(ts_world world, ts_body body, int32_t* status);
+/* Go on with more or fewer tetrahedra: a level of detail of its asset, 0 being the finest, at which it begins. Position,
+ * velocity and deformation pass over. Vertices and triangles are others then. Grabs go on, and so do pins and attachments,
+ * by the nearest vertices. Joints, motors and attachments for which there is none bar the change; with `release` of 1 they
+ * are released. */
+TS_API ts_result ts_body_set_level(ts_world world, ts_body body, int32_t level, int32_t release);
+TS_API ts_result ts_body_get_level(ts_world world, ts_body body, int32_t* level);
+/* At its level. */
+TS_API ts_result ts_body_get_vertex_count(ts_world world, ts_body body, int32_t* count);
 /* Of its vertices, 3 numbers each: after the last step, or with alpha below 1 on the way from the one before. */
 TS_API ts_result ts_body_positions(ts_world world, ts_body body, double alpha, float* positions, size_t count);
 /* What is drawn: places and normals of unit length, 3 numbers a vertex each. After ts_world_advance `alpha` of ts_clock

@@ -232,6 +232,21 @@ class World {
     check(ts_body_center(handle_, body.handle, found.data()));
     return found;
   }
+  // Of detail, 0 being the finest: see ts_body_set_level.
+  void set_level(Body body, int32_t level, bool release = false) {
+    check(ts_body_set_level(handle_, body.handle, level, release ? 1 : 0));
+  }
+  int32_t level(Body body) const {
+    int32_t found = 0;
+    check(ts_body_get_level(handle_, body.handle, &found));
+    return found;
+  }
+  // At its level.
+  int32_t vertex_count(Body body) const {
+    int32_t found = 0;
+    check(ts_body_get_vertex_count(handle_, body.handle, &found));
+    return found;
+  }
   // 3 numbers for each vertex.
   void positions(Body body, std::vector<float>& out, double alpha = 1.0) const {
     check(ts_body_positions(handle_, body.handle, alpha, out.data(), out.size()));

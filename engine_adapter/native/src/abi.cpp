@@ -292,6 +292,13 @@ void write_overlaps(const Turn& world, const std::vector<int32_t>& slots, ts_bod
   *count = slots.size();
 }
 
+const Asset& asset_in(const Scene& scene, int32_t asset) {
+  if (asset < 0 || size_t(asset) >= scene.assets.size()) {
+    fail(TS_ERROR_ARGUMENT, "there is no asset %d: there are %zu, from 0", asset, scene.assets.size());
+  }
+  return scene.assets[size_t(asset)];
+}
+
 const Mesh& mesh_of(const Scene& scene, int32_t mesh) {
   if (mesh < 0 || size_t(mesh) >= scene.meshes.size()) {
     fail(TS_ERROR_ARGUMENT, "there is no mesh %d: there are %zu, from 0", mesh, scene.meshes.size());
@@ -368,15 +375,26 @@ ts_result ts_asset_get_info(ts_scene scene, int32_t asset, ts_asset_info* info) 
   return guarded([&] {
     const auto found = scenes().find(scene);
     sized(info, "info");
-    if (asset < 0 || size_t(asset) >= found->assets.size()) {
-      fail(TS_ERROR_ARGUMENT, "there is no asset %d: there are %zu, from 0", asset, found->assets.size());
-    }
-    const Asset& row = found->assets[size_t(asset)];
+    const Asset& row = asset_in(*found, asset);
     double mass = 0.0;
     for (double each : row.masses) mass += each;
     info->vertex_count = int32_t(row.vertex_count());
     info->slot_count = row.slot_count;
     info->mass = float(mass);
+  });
+}
+
+ts_result ts_asset_get_level_count(ts_scene scene, int32_t asset, int32_t* count) {
+  return guarded([&] {
+    const auto found = scenes().find(scene);
+    *given(count, "count") = int32_t(asset_in(*found, asset).level_count());
+  });
+}
+
+ts_result ts_mesh_get_level(ts_scene scene, int32_t mesh, int32_t* level) {
+  return guarded([&] {
+    const auto found = scenes().find(scene);
+    *given(level, "level") = mesh_of(*found, mesh).level;
   });
 }
 
@@ -611,6 +629,27 @@ ts_result ts_body_get_status(ts_world world, ts_body body, int32_t* status) {
   });
 }
 
+ts_result ts_body_set_level(ts_world world, ts_body body, int32_t level, int32_t release) {
+  return guarded([&] {
+    const Turn turn(world);
+    turn->set_level(turn->slot_of(body), level, release != 0);
+  });
+}
+
+ts_result ts_body_get_level(ts_world world, ts_body body, int32_t* level) {
+  return guarded([&] {
+    const Turn turn(world);
+    *given(level, "level") = turn->level_of(turn->slot_of(body));
+  });
+}
+
+ts_result ts_body_get_vertex_count(ts_world world, ts_body body, int32_t* count) {
+  return guarded([&] {
+    const Turn turn(world);
+    *given(count, "count") = int32_t(turn->asset_of(turn->slot_of(body)).vertex_count());
+  });
+}
+
 ts_result ts_body_positions(ts_world world, ts_body body, double alpha, float* positions, size_t count) {
   return guarded([&] {
     const Turn turn(world);
@@ -627,6 +666,10 @@ ts_result ts_body_mesh(ts_world world, ts_body body, int32_t mesh, float* positi
     const Mesh& row = mesh_of(turn->scene(), mesh);
     if (row.asset != turn->scene().asset_of_slot[size_t(slot)]) {
       fail(TS_ERROR_ARGUMENT, "mesh %d is of asset %d, and the body is of another", mesh, row.asset);
+    }
+    if (row.level >= 0 && row.level != turn->level_of(slot)) {
+      fail(TS_ERROR_STATE, "mesh %d draws level %d, and the body is at level %d: draw the mesh of that level, or a skin",
+           mesh, row.level, turn->level_of(slot));
     }
     require_size(count, 3 * row.vertex_count, "positions");
     turn->read_mesh(slot, mesh, given(positions, "positions"), normals);

@@ -1,7 +1,10 @@
-// How a shape has turned, as taichi_soft/bodies/pose.py finds it. Only digits that a 32-bit float keeps are the same.
+// How a shape has turned: as taichi_soft/levels/fitting.py finds it, and taichi_soft/bodies/pose.py, of which only the
+// digits that a 32-bit float keeps are the same.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "rotations.hpp"
 
@@ -47,7 +50,7 @@ struct Eigen {
   }
 };
 
-// The rotation R with the largest trace of R^T m: Horn 1987.
+// The rotation R with the largest trace of R^T m: Horn 1987. No turn for zeros.
 inline Matrix nearest_rotation(const Matrix& m) {
   const std::array<std::array<double, 4>, 4> square = {
       {{m[0][0] - m[1][1] - m[2][2], m[0][1] + m[1][0], m[0][2] + m[2][0], m[2][1] - m[1][2]},
@@ -55,8 +58,8 @@ inline Matrix nearest_rotation(const Matrix& m) {
        {m[0][2] + m[2][0], m[1][2] + m[2][1], m[2][2] - m[0][0] - m[1][1], m[1][0] - m[0][1]},
        {m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1], m[0][0] + m[1][1] + m[2][2]}}};
   const Eigen<4> found(square);
-  size_t best = 0;
-  for (size_t i = 1; i < 4; ++i) {
+  size_t best = 3;
+  for (size_t i = 0; i < 3; ++i) {
     if (found.values[i] > found.values[best]) best = i;
   }
   Quaternion q;
@@ -64,6 +67,61 @@ inline Matrix nearest_rotation(const Matrix& m) {
   const double length = length_of(q);
   for (double& each : q) each = each / length;
   return matrix_of(q);
+}
+
+inline Vector weighted_sum(const std::vector<double>& weights, const std::vector<Vector>& rows) {
+  Vector found = {0.0, 0.0, 0.0};
+  for (size_t i = 0; i < rows.size(); ++i) {
+    for (size_t k = 0; k < 3; ++k) found[k] += weights[i] * rows[i][k];
+  }
+  return found;
+}
+
+// Sum of w a b^T.
+inline Matrix moments(const std::vector<double>& weights, const std::vector<Vector>& a, const std::vector<Vector>& b) {
+  Matrix found{};
+  for (size_t n = 0; n < a.size(); ++n) {
+    for (size_t i = 0; i < 3; ++i) {
+      for (size_t k = 0; k < 3; ++k) found[i][k] += weights[n] * a[n][i] * b[n][k];
+    }
+  }
+  return found;
+}
+
+inline std::vector<Vector> beside(std::vector<Vector> points, const Vector& center) {
+  for (Vector& each : points) each = {each[0] - center[0], each[1] - center[1], each[2] - center[2]};
+  return points;
+}
+
+// What a shape has turned by since it lay at rest. `shares` add up to 1.
+struct FittingMotion {
+  Matrix turn;
+  Vector place;  // of the origin
+};
+
+inline FittingMotion fitting_motion(const std::vector<Vector>& rest, const std::vector<Vector>& now,
+                                    const std::vector<double>& shares) {
+  constexpr double kLeaning = 1e-10;
+  const Vector rest_center = weighted_sum(shares, rest), center = weighted_sum(shares, now);
+  const std::vector<Vector> arms = beside(rest, rest_center);
+  Matrix moment = moments(shares, beside(now, center), arms);
+  const Matrix spread = moments(shares, arms, arms);
+  for (size_t i = 0; i < 3; ++i) moment[i][i] += kLeaning * (spread[0][0] + spread[1][1] + spread[2][2]);
+  const Matrix turn = nearest_rotation(moment);
+  const Vector carried = turned(rest_center, turn);
+  return {turn, {center[0] - carried[0], center[1] - carried[1], center[2] - carried[2]}};
+}
+
+// A vector rounded to 32-bit floats, without residue: as `kept` in taichi_soft/core/residue.py.
+inline Vector kept(const Vector& vector) {
+  constexpr double kResidue = 1e-12;
+  double size = 0.0;
+  for (double each : vector) size = std::max(size, std::fabs(each));
+  Vector found;
+  for (size_t k = 0; k < 3; ++k) {
+    found[k] = std::fabs(vector[k]) > kResidue * size ? double(static_cast<float>(vector[k])) : 0.0;
+  }
+  return found;
 }
 
 }  // namespace taichi_soft

@@ -4,15 +4,11 @@
 #include <cmath>
 #include <limits>
 
+#include "barycentric.hpp"
+
 namespace taichi_soft {
 
 namespace {
-
-double dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-
-Vector cross(const Vector& a, const Vector& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
 
 // Force per distance [N/m] by which vertices moved each by its falloff are held back.
 double stiffness(const Asset& asset, const std::vector<double>& falloff) {
@@ -46,11 +42,12 @@ double stiffness(const Asset& asset, const std::vector<double>& falloff) {
 
 }  // namespace
 
-Patch patch_round(const Scene& scene, const Asset& asset, const int32_t corners[3], const double weights[3]) {
+Patch patch_round(const Scene& scene, const Asset& asset, const int32_t* corners, const double* weights,
+                  size_t count) {
   const size_t n = asset.vertex_count(), most = scene.patch_rows;
   Vector point = {0.0, 0.0, 0.0}, size;
   for (int k = 0; k < 3; ++k) {
-    for (int i = 0; i < 3; ++i) point[k] += weights[i] * asset.vertices[size_t(3 * corners[i] + k)];
+    for (size_t i = 0; i < count; ++i) point[k] += weights[i] * asset.vertices[size_t(3 * corners[i] + k)];
     double least = std::numeric_limits<double>::infinity(), greatest = -least;
     for (size_t v = 0; v < n; ++v) {
       least = std::min(least, asset.vertices[3 * v + k]);
@@ -65,7 +62,7 @@ Patch patch_round(const Scene& scene, const Asset& asset, const int32_t corners[
     distance[v] = std::sqrt(dot(way, way));
   }
   double farthest = 0.0;
-  for (int i = 0; i < 3; ++i) farthest = std::max(farthest, distance[size_t(corners[i])]);
+  for (size_t i = 0; i < count; ++i) farthest = std::max(farthest, distance[size_t(corners[i])]);
   double radius = std::max(scene.patch_size * length_of(size), 1.2 * farthest);
   if (size_t(std::count_if(distance.begin(), distance.end(), [&](double d) { return d < radius; })) > most) {
     std::vector<double> sorted = distance;

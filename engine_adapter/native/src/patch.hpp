@@ -13,7 +13,7 @@ struct Patch {
   double strength;             // [N], up to which it is pulled on the patch
 };
 
-// Round a point at rest between three vertices.
-Patch patch_round(const Scene& scene, const Asset& asset, const int32_t corners[3], const double weights[3]);
+// Round a point at rest between `count` vertices, three or four.
+Patch patch_round(const Scene& scene, const Asset& asset, const int32_t* corners, const double* weights, size_t count);
 
 }  // namespace taichi_soft

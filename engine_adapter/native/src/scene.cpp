@@ -1,5 +1,6 @@
 #include "scene.hpp"
 
+#include <algorithm>
 #include <cstdio>
 #include <utility>
 
@@ -40,9 +41,9 @@ Place place_from(const int64_t* row, size_t image) {
 }
 
 // Whether the kernel reads within the table of a surface: see `render_table` in taichi_soft/bodies/render_mesh.py.
-bool is_surface_whole(const Mesh& mesh, size_t body_vertices) {
-  constexpr size_t kLanes = 8, kStride = 10 * kLanes;
-  const size_t k = mesh.vertex_count, blocks = (k + kLanes - 1) / kLanes, head = blocks * kStride + k;
+bool is_surface_whole(const Mesh::Table& mesh, size_t k, size_t body_vertices) {
+  constexpr size_t kStride = 10 * kLanes;
+  const size_t blocks = (k + kLanes - 1) / kLanes, head = blocks * kStride + k;
   if (k == 0 || mesh.ints.count < head + blocks + 2) return false;
   for (size_t i = 0; i < head; ++i) {
     const size_t limit = i < blocks * kStride ? k : body_vertices;
@@ -65,13 +66,13 @@ bool is_surface_whole(const Mesh& mesh, size_t body_vertices) {
 }
 
 // The same of a skin: see `write_skin` in taichi_soft/bodies/kernels/skin.py.
-bool is_skin_whole(const Mesh& mesh, size_t n) {
-  constexpr size_t kLanes = 16, kRow = 10;
-  const size_t blocks = (mesh.vertex_count + kLanes - 1) / kLanes;
-  if (mesh.vertex_count == 0 || mesh.ints.count < n + 1 || mesh.ints[n] < 0) return false;
+bool is_skin_whole(const Mesh::Table& mesh, size_t k, size_t n) {
+  constexpr size_t kSkinLanes = 16, kRow = 10;
+  const size_t blocks = (k + kSkinLanes - 1) / kSkinLanes;
+  if (k == 0 || mesh.ints.count < n + 1 || mesh.ints[n] < 0) return false;
   const size_t edges = size_t(mesh.ints[n]);
-  if (mesh.ints.count != n + 1 + edges + 4 * kLanes * blocks) return false;
-  if (mesh.floats.count != 3 * (edges + n) + kRow * kLanes * blocks) return false;
+  if (mesh.ints.count != n + 1 + edges + 4 * kSkinLanes * blocks) return false;
+  if (mesh.floats.count != 3 * (edges + n) + kRow * kSkinLanes * blocks) return false;
   int32_t before = 0;
   for (size_t v = 0; v <= n; ++v) {
     if (mesh.ints[v] < before || size_t(mesh.ints[v]) > edges) return false;
@@ -147,8 +148,10 @@ Scene::Scene(std::vector<char> world, const std::string& name)
     code = code * 31 + checksum(reinterpret_cast<const char*>(rows.data), rows.count * sizeof(int64_t));
   }
   for (const Asset& asset : assets) {
-    code = code * 31 +
-           checksum(reinterpret_cast<const char*>(asset.rest_rows.data), asset.rest_rows.count * sizeof(float));
+    for (size_t level = 0; level < asset.level_count(); ++level) {
+      const Archive::View<float>& rows = asset.level(level).rest_rows;
+      code = code * 31 + checksum(reinterpret_cast<const char*>(rows.data), rows.count * sizeof(float));
+    }
   }
 }
 
@@ -169,49 +172,148 @@ void Scene::read_fields() {
   }
 }
 
+Asset Scene::read_asset(const std::string& prefix) const {
+  Asset asset = {archive.rows<float>(prefix + "rest_rows", 8),
+                 archive.rows<double>(prefix + "vertices", 3),
+                 archive.get<double>(prefix + "masses"),
+                 {},
+                 archive.get<int32_t>(prefix + "pinned"),
+                 archive.get<int32_t>(prefix + "outer"),
+                 archive.get<int32_t>(prefix + "rank"),
+                 archive.rows<int32_t>(prefix + "surface", 3),
+                 archive.get<int32_t>(prefix + "elements"),
+                 archive.get<double>(prefix + "element_stiffness"),
+                 0,
+                 archive.get<int32_t>(prefix + "tets"),
+                 archive.get<int32_t>(prefix + "hull"),
+                 archive.get<double>(prefix + "hull_weights"),
+                 0.0,
+                 0.0,
+                 0.0,
+                 0,
+                 {},
+                 {},
+                 {}};
+  const auto center = archive.get<double>(prefix + "center"), skin = archive.get<double>(prefix + "thickness");
+  const auto wave_speed = archive.get<double>(prefix + "wave_speed");
+  const auto friction = archive.get<double>(prefix + "friction");
+  const size_t n = asset.vertex_count();
+  if (asset.rest_rows.count != 8 * n || asset.vertices.count != 3 * n || asset.rank.count != n || center.count != 3 ||
+      skin.count != 1 || friction.count != 1 || wave_speed.count != 1 || asset.tets.count % 4 != 0 ||
+      !are_below(asset.tets, n) || asset.hull.count % 4 != 0 || !are_below(asset.hull, n) ||
+      asset.hull_weights.count != asset.hull.count || !are_places(asset.vertices) ||
+      asset.elements.sizes.size() != 2 || !are_below(asset.elements, n) || !are_below(asset.pinned, n) ||
+      !are_below(asset.outer, n) || !are_below(asset.rank, n) || !are_below(asset.surface, n)) {
+    out_of_order("an asset");
+  }
+  asset.element_width = asset.elements.sizes[1];
+  if ((asset.element_width != 2 && asset.element_width != 4) ||
+      asset.elements.sizes[0] != asset.element_stiffness.count) {
+    out_of_order("an asset");
+  }
+  asset.center = {center[0], center[1], center[2]};
+  asset.thickness = skin[0], asset.friction = friction[0], asset.wave_speed = wave_speed[0];
+  if (asset.element_width == 4) asset.tets = asset.elements;
+  return asset;
+}
+
+// Of one level. Whether they fit into the slots is looked at with the first world.
+SlotRows Scene::read_slot_rows(const std::string& prefix, const Asset& asset, size_t most) const {
+  constexpr size_t kCornerRows = 4 * kLanes, kEdgeRows = 6 * kLanes;
+  const std::string slot = prefix + "slot/", touching = prefix + "touching/";
+  SlotRows rows{};
+  rows.rest = archive.rows<float>(slot + "rest", 3);
+  rows.rest_inverses = archive.get<float>(slot + "rest_inverses");
+  rows.edge_damping = archive.get<float>(slot + "edge_damping");
+  rows.kind = archive.get<float>(slot + "kind");
+  rows.tet_vertices = archive.get<int32_t>(slot + "tet_vertices");
+  rows.tet_edges = archive.get<int32_t>(slot + "tet_edges");
+  rows.edges = archive.rows<int32_t>(slot + "edges", 2);
+  rows.edge_blocks = archive.rows<int32_t>(slot + "edge_blocks", 2);
+  rows.triangles = archive.rows<int32_t>(slot + "triangles", 3);
+  rows.outer = archive.get<int32_t>(slot + "outer");
+  const size_t n = asset.vertex_count(), edges = rows.edges.count / 2, blocks = rows.tet_vertices.count / kCornerRows;
+  if (rows.rest.count != 3 * n || rows.tet_vertices.count != kCornerRows * blocks ||
+      rows.tet_edges.count != kEdgeRows * blocks || rows.rest_inverses.count != 2 * 9 * kLanes * blocks ||
+      rows.edge_damping.count != edges || edges < kLanes || rows.kind.count != 7 || !are_below(rows.tet_vertices, n) ||
+      !are_below(rows.tet_edges, edges) || !are_below(rows.edges, n) || !are_below(rows.triangles, n) ||
+      !are_below(rows.outer, n)) {
+    out_of_order("a level of detail");
+  }
+  for (size_t i = 0; i < rows.edge_blocks.count; i += 2) {
+    const int32_t first = rows.edge_blocks[i], count = rows.edge_blocks[i + 1];
+    if (first < 0 || count < 0 || count > int32_t(kLanes) || size_t(first) + kLanes > edges) {
+      out_of_order("a level of detail");
+    }
+  }
+  for (const std::string& name : constant_names) {
+    rows.constants.push_back(archive.get<float>(prefix + "constants/" + name));
+    if (blocks == 0 || rows.constants.back().count % (kLanes * blocks) != 0) out_of_order("a level of detail");
+  }
+  if (!has_hulls) return rows;
+  rows.touching_outer = archive.get<int32_t>(touching + "outer");
+  rows.touching_triangles = archive.rows<int32_t>(touching + "triangles", 3);
+  rows.carriers = archive.rows<int32_t>(touching + "carriers", 4);
+  rows.weights = archive.rows<float>(touching + "weights", 4);
+  // Points of a hull come behind all particles that the slot has room for.
+  const size_t room = most + asset.hull.count / 4;
+  if (rows.carriers.count != rows.weights.count || rows.carriers.count != asset.hull.count ||
+      !are_below(rows.carriers, n) || !are_below(rows.touching_outer, room) ||
+      !are_below(rows.touching_triangles, room)) {
+    out_of_order("a level of detail");
+  }
+  return rows;
+}
+
+void Scene::read_levels(const std::string& prefix, int32_t count, Asset* asset) const {
+  asset->rows = read_slot_rows(prefix, *asset, asset->vertex_count());
+  for (int32_t level = 1; level < count; ++level) {
+    const std::string name = prefix + "level" + std::to_string(level) + "/";
+    asset->coarser.push_back(read_asset(name));
+    Asset& coarse = asset->coarser.back();
+    coarse.rows = read_slot_rows(name, coarse, asset->vertex_count());
+    const SlotRows &rows = coarse.rows, &room = asset->rows;
+    if (coarse.vertex_count() > asset->vertex_count() || rows.tet_vertices.count > room.tet_vertices.count ||
+        rows.edges.count > room.edges.count || rows.edge_blocks.count > room.edge_blocks.count ||
+        rows.triangles.count > room.triangles.count || rows.outer.count > room.outer.count ||
+        rows.touching_outer.count > std::max(room.touching_outer.count, room.outer.count) ||
+        rows.touching_triangles.count > std::max(room.touching_triangles.count, room.triangles.count) ||
+        coarse.hull.count != asset->hull.count) {
+      out_of_order("a level of detail");
+    }
+  }
+  for (size_t i = 0; i < asset->level_count() * asset->level_count(); ++i) {
+    const size_t from = i / asset->level_count(), to = i % asset->level_count();
+    asset->passages.emplace_back();
+    if (from == to) continue;
+    const std::string name = prefix + "passage" + std::to_string(from) + "-" + std::to_string(to) + "/";
+    Passage& over = asset->passages.back();
+    over.sources = archive.get<int32_t>(name + "sources");
+    over.begins = archive.get<int32_t>(name + "begins");
+    over.weights = archive.get<double>(name + "weights");
+    bool is_whole = over.begins.count == asset->level(to).vertex_count() && over.begins.count > 0 &&
+                    over.begins[0] == 0 && over.weights.count == over.sources.count && are_places(over.weights) &&
+                    are_below(over.sources, asset->level(from).vertex_count());
+    for (size_t k = 0; is_whole && k < over.begins.count; ++k) {
+      const size_t end = k + 1 < over.begins.count ? size_t(over.begins[k + 1]) : over.sources.count;
+      is_whole = over.begins[k] >= 0 && size_t(over.begins[k]) < end && end <= over.sources.count;
+    }
+    if (!is_whole) out_of_order("how a level of detail passes to another");
+  }
+}
+
 void Scene::read_assets() {
-  for (size_t i = 0; i < names_[TS_ASSET].size(); ++i) {
+  const auto levels = archive.get<int32_t>("levels/counts");
+  constant_names = archive.texts("levels/constants");
+  has_hulls = std::find(field_names_.begin(), field_names_.end(), "hull.carriers") != field_names_.end();
+  if (levels.count != names_[TS_ASSET].size()) out_of_order("levels of detail");
+  for (size_t i = 0; i < levels.count; ++i) {
     const std::string prefix = "asset" + std::to_string(i) + "/";
-    Asset asset = {archive.rows<float>(prefix + "rest_rows", 8),
-                   archive.rows<double>(prefix + "vertices", 3),
-                   archive.get<double>(prefix + "masses"),
-                   {},
-                   archive.get<int32_t>(prefix + "pinned"),
-                   archive.get<int32_t>(prefix + "outer"),
-                   archive.get<int32_t>(prefix + "rank"),
-                   archive.rows<int32_t>(prefix + "surface", 3),
-                   archive.get<int32_t>(prefix + "elements"),
-                   archive.get<double>(prefix + "element_stiffness"),
-                   0,
-                   archive.get<int32_t>(prefix + "tets"),
-                   archive.get<int32_t>(prefix + "hull"),
-                   archive.get<double>(prefix + "hull_weights"),
-                   0.0,
-                   0.0,
-                   0.0,
-                   0};
-    const auto center = archive.get<double>(prefix + "center"), skin = archive.get<double>(prefix + "thickness");
-    const auto wave_speed = archive.get<double>(prefix + "wave_speed");
-    const auto friction = archive.get<double>(prefix + "friction");
-    const size_t n = asset.vertex_count();
-    if (asset.rest_rows.count != 8 * n || asset.vertices.count != 3 * n || asset.rank.count != n || center.count != 3 ||
-        skin.count != 1 || friction.count != 1 || wave_speed.count != 1 ||
-        asset.tets.count % 4 != 0 || !are_below(asset.tets, n) || asset.hull.count % 4 != 0 ||
-        !are_below(asset.hull, n) || asset.hull_weights.count != asset.hull.count ||
-        !are_places(asset.vertices) || asset.elements.sizes.size() != 2 ||
-        !are_below(asset.elements, n) || !are_below(asset.pinned, n) || !are_below(asset.outer, n) ||
-        !are_below(asset.rank, n) || !are_below(asset.surface, n)) {
-      out_of_order("an asset");
-    }
-    asset.element_width = asset.elements.sizes[1];
-    if ((asset.element_width != 2 && asset.element_width != 4) ||
-        asset.elements.sizes[0] != asset.element_stiffness.count) {
-      out_of_order("an asset");
-    }
-    asset.center = {center[0], center[1], center[2]};
-    asset.thickness = skin[0], asset.friction = friction[0], asset.wave_speed = wave_speed[0];
-    if (asset.element_width == 4) asset.tets = asset.elements;
-    assets.push_back(asset);
+    assets.push_back(read_asset(prefix));
+    if (levels[i] < 1 || levels[i] > 1000) out_of_order("levels of detail");
+    if (levels[i] == 1) continue;
+    read_levels(prefix, levels[i], &assets.back());
+    has_levels = true;
   }
   for (int32_t slot = 0; slot < slot_count; ++slot) {
     const int32_t asset = asset_of_slot[slot], begin = begin_of_slot[slot];
@@ -226,21 +328,31 @@ void Scene::read_assets() {
 void Scene::read_meshes() {
   for (size_t i = 0; i < names_[TS_MESH].size(); ++i) {
     const std::string prefix = "mesh" + std::to_string(i) + "/";
-    const auto kind = archive.get<int32_t>(prefix + "kind");
+    const auto kind = archive.get<int32_t>(prefix + "kind"), is_serial = archive.get<int32_t>(prefix + "is_serial");
     if (kind.count != 4 || kind[0] < 0 || size_t(kind[0]) >= assets.size() || kind[3] < 0) out_of_order("a mesh");
+    const Asset& asset = assets[size_t(kind[0])];
     Mesh mesh = {kind[0],
-                 kind[1] != 0,
+                 kind[1],
                  kind[2] != 0,
                  size_t(kind[3]),
                  archive.rows<int32_t>(prefix + "triangles", 3),
-                 archive.get<int32_t>(prefix + "ints"),
-                 archive.get<float>(prefix + "floats"),
-                 archive.get<float>(prefix + "uv")};
-    const bool has_uv = mesh.uv.count != 0;
-    if (!are_below(mesh.triangles, mesh.vertex_count) || (has_uv && mesh.uv.count != 2 * mesh.vertex_count) ||
-        !(mesh.is_skin ? is_skin_whole(mesh, assets[size_t(mesh.asset)].vertex_count())
-                       : is_surface_whole(mesh, assets[size_t(mesh.asset)].vertex_count()))) {
+                 archive.get<float>(prefix + "uv"),
+                 {}};
+    const bool is_of_all = mesh.level == -1, has_uv = mesh.uv.count != 0;
+    if (mesh.level < -1 || mesh.level >= int32_t(asset.level_count()) ||
+        is_serial.count != (is_of_all ? asset.level_count() : 1) || !are_below(mesh.triangles, mesh.vertex_count) ||
+        (has_uv && mesh.uv.count != 2 * mesh.vertex_count)) {
       out_of_order("a mesh");
+    }
+    for (size_t k = 0; k < is_serial.count; ++k) {
+      const Mesh::Table table = {is_serial[k] != 0, archive.get<int32_t>(prefix + "ints" + std::to_string(k)),
+                                 archive.get<float>(prefix + "floats" + std::to_string(k))};
+      const size_t n = asset.level(is_of_all ? k : size_t(mesh.level)).vertex_count();
+      if (!(mesh.is_skin ? is_skin_whole(table, mesh.vertex_count, n)
+                         : is_surface_whole(table, mesh.vertex_count, n))) {
+        out_of_order("a mesh");
+      }
+      mesh.tables.push_back(table);
     }
     meshes.push_back(mesh);
   }

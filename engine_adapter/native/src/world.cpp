@@ -51,6 +51,7 @@ World::World(std::shared_ptr<Scene> scene) : scene_(std::move(scene)), machine_(
   joint_generations_.assign(kMostJoints, 1);
   motor_generations_.assign(kMostMotors, 1);
   bind();
+  read_levels();
   require_image();
 }
 

@@ -1,6 +1,7 @@
 // An instance of a scene that moves: what a step is, and what a game does between two.
 #pragma once
 
+#include <map>
 #include <memory>
 #include <vector>
 
@@ -8,6 +9,7 @@
 #include "events.hpp"
 #include "locks.hpp"
 #include "machine.hpp"
+#include "passage.hpp"
 #include "scene.hpp"
 #include "taichi_soft.h"
 
@@ -70,6 +72,7 @@ struct Drive {  // what a motor does
   double speed, limit;
 };
 
+struct Patch;
 struct SnapshotHead;
 
 class World {
@@ -100,7 +103,9 @@ class World {
   // Bodies.
   ts_body body_in(int32_t slot) const;
   int32_t slot_of(ts_body body) const;  // fails for one that is not there
-  const Asset& asset_of(int32_t slot) const { return scene_->assets[scene_->asset_of_slot[slot]]; }
+  const Asset& whole_of(int32_t slot) const { return scene_->assets[size_t(scene_->asset_of_slot[size_t(slot)])]; }
+  // The level of detail that fills a slot.
+  const Asset& asset_of(int32_t slot) const { return whole_of(slot).level(size_t(levels_[size_t(slot)])); }
   int32_t status_of(int32_t slot) const { return body_status_(slot); }
   ts_body spawn(int32_t asset, const Vector& place, const Quaternion& turn, const Vector& drift, const Vector& spin);
   void despawn(int32_t slot);
@@ -118,6 +123,10 @@ class World {
   void pin(int32_t slot, Vertices which);
   void unpin(int32_t slot, Vertices which);
   void set_targets(int32_t slot, Vertices which, const float* targets);
+
+  // Levels of detail.
+  int32_t level_of(int32_t slot) const;
+  void set_level(int32_t slot, int32_t level, bool may_release);
 
   // Grabs.
   ts_grab grab_at(int32_t number) const;
@@ -196,8 +205,20 @@ class World {
     float axis[3], point[3], speed, limit;
     std::vector<int32_t> particles;
   };
+  struct Hanging {  // an attachment of a body whose level changes: vertices that it holds at both levels
+    int32_t frame;
+    bool feels;
+    std::vector<int32_t> before, after;
+  };
   class Packed;
 
+  struct Levels {  // of detail, by slot, and what pins stand for
+    std::vector<int32_t> levels;
+    std::vector<std::vector<int32_t>> held;
+    size_t held_count() const;
+  };
+  Levels present_levels() const;
+  bool take_levels(const char** at, const SnapshotHead& head, Levels* found) const;
   void bind();
   uint32_t give_living();
   Hit hit_from(const float* row) const;
@@ -220,6 +241,22 @@ class World {
   void let_go(int32_t slot, const std::vector<int32_t>& vertices);
   size_t grab_of(ts_grab grab) const;  // its number
   void end_grab(size_t number);
+  void write_patch(size_t number, int32_t slot, const Patch& patch);
+  void read_levels();
+  bool are_held(int32_t slot, const std::vector<int32_t>& vertices) const;
+  void write_slot(int32_t slot, int32_t level, const Motion& motion, int32_t status);
+  void write_kind(int32_t slot);
+  void refill(int32_t slot, int32_t level);
+  void require_change(int32_t slot, int32_t level, bool may_release) const;
+  std::vector<int32_t> pinned(int32_t slot) const;
+  std::vector<int32_t> nearest_at(int32_t slot, std::vector<int32_t> finest, int32_t level) const;
+  std::vector<int32_t> finest_held(int32_t slot) const;
+  std::map<int32_t, Hanging> hanging_at(int32_t slot, const std::vector<int32_t>& held, int32_t level) const;
+  void make_room(int32_t slot, int32_t level, bool may_release, std::vector<int32_t>* held,
+                 std::map<int32_t, Hanging>* attached);
+  void hang_on(const std::map<int32_t, Hanging>& attached, const Motion& before, Motion* after) const;
+  Vector place_of_grab(size_t number) const;
+  void hold_at(size_t number, const Vector& place);
   std::vector<Vector> touching_points(const Asset& asset, const std::vector<Vector>& x) const;
   Vector vertex_place(int32_t slot, int32_t vertex) const;
   std::vector<Holder> holders_at(int32_t slot, const std::vector<int32_t>& vertices, int32_t other) const;
@@ -238,7 +275,7 @@ class World {
   void end_motor(size_t number);
   bool are_joints_in_order(const Packed& packed, const SnapshotHead& head) const;
   bool are_motors_in_order(const Packed& packed, const SnapshotHead& head) const;
-  bool lies_in(int32_t particle, int32_t slot) const;
+  bool lies_in(int32_t particle, int32_t slot, int32_t level) const;
   void write_colliders();
   bool aim_pins(double dt);
   bool prepare_colliders(double dt);
@@ -266,6 +303,9 @@ class World {
   std::vector<float> present_, coming_;  // of frames, after the last step and the coming one: rotation row by row
                                          // and place, (f, 12)
   std::vector<unsigned char> frame_alive_;
+  std::vector<int32_t> levels_;             // of detail, that fill the slots, also of nobody
+  std::vector<std::vector<int32_t>> held_;  // vertices of the finest level that pins of a coarser one stand for
+  std::vector<int32_t> attachments_;        // of each particle: which attachment of its body holds it, or 0
   std::vector<unsigned char> feels_;  // of each particle: it hangs from a frame, which is asked for its load
   std::vector<uint32_t> generations_, grab_generations_, joint_generations_, motor_generations_;
 
@@ -294,6 +334,8 @@ class World {
   Field<float> collider_[7], collider_parameters_, collider_surface_;
   Field<int32_t> collider_kind_, collider_filter_, collider_count_;
   size_t collider_room_ = 0;
+  std::vector<Field<float>> constants_;  // of tetrahedra, where any asset has levels
+  Field<int32_t> body_blocks_;
 };
 
 }  // namespace taichi_soft

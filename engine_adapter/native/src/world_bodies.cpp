@@ -103,6 +103,11 @@ ts_body World::spawn(int32_t asset, const Vector& place, const Quaternion& turn,
          scene_->assets[asset].slot_count, asset);
   }
   const std::vector<float> rows = place_rows(scene_->assets[asset], place, turn, drift, spin);
+  if (levels_[size_t(slot)] != 0) {
+    refill(slot, 0);
+  } else if (scene_->assets[size_t(asset)].level_count() > 1) {
+    write_kind(slot);  // a snapshot may have brought along what an earlier body had here
+  }
   std::copy(rows.begin(), rows.end(), machine_->rows.room<float>(rows.size()));
   machine_->launch("spawn_body", {Machine::whole(slot), Machine::array(machine_->rows, uint32_t(rows.size() / 8), 8)});
   generations_[slot] = (generations_[slot] + 1) & 0xFFFFFF;
@@ -125,6 +130,7 @@ void World::despawn(int32_t slot) {
   wake_near(box_of(slot));
   is_still_ = false;
   std::fill_n(feels_.begin() + std::ptrdiff_t(begin_of(slot)), asset_of(slot).vertex_count(), 0);
+  std::fill_n(attachments_.begin() + std::ptrdiff_t(begin_of(slot)), asset_of(slot).vertex_count(), 0);
   body_drives_(slot) &= ~kMovesPins;  // or what hung from a frame would be aimed for ever
   machine_->launch("despawn_body", {Machine::whole(slot)});
 }
@@ -154,9 +160,10 @@ void World::read_mesh(int32_t slot, int32_t number, float* positions, float* nor
   const uint32_t count = uint32_t(mesh.vertex_count);
   const float* x = machine_->vertices.room<float>(3 * count);
   const float* n = machine_->normals.room<float>(3 * count);
+  const Mesh::Table& table = mesh.table(level_of(slot));
   std::string kernel = mesh.is_skin ? "write_skin" : "write_render_mesh";
-  if (!mesh.is_serial) kernel += "_shared";
-  const Argument ints = Machine::array(mesh.ints.data, uint32_t(mesh.ints.count));
+  if (!table.is_serial) kernel += "_shared";
+  const Argument ints = Machine::array(table.ints.data, uint32_t(table.ints.count));
   const Argument x_out = Machine::array(machine_->vertices, 3 * count);
   const Argument n_out = Machine::array(machine_->normals, 3 * count);
   if (mesh.is_skin) {
@@ -164,7 +171,7 @@ void World::read_mesh(int32_t slot, int32_t number, float* positions, float* nor
     machine_->rows.room<float>(12 * vertices);
     machine_->launch(kernel.c_str(),
                      {Machine::whole(slot), Machine::whole(int32_t(vertices)), Machine::real(picture_), ints,
-                      Machine::array(mesh.floats.data, uint32_t(mesh.floats.count)),
+                      Machine::array(table.floats.data, uint32_t(table.floats.count)),
                       Machine::array(machine_->rows, 12 * vertices), x_out, n_out});
   } else {
     machine_->launch(kernel.c_str(), {Machine::whole(slot), Machine::real(picture_), ints, x_out, n_out});

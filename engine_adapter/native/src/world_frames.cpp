@@ -70,6 +70,8 @@ void World::attach(int32_t slot, Vertices which, int32_t number, bool feels) {
   const std::vector<int32_t> vertices = checked(slot, which, false);
   const float* row = present_.data() + 12 * frame(number);
   require_unattached(slot, vertices);
+  const auto begin = attachments_.begin() + std::ptrdiff_t(begin_of(slot));
+  const int32_t attachment = 1 + *std::max_element(begin, begin + std::ptrdiff_t(asset_of(slot).vertex_count()));
   for (int32_t vertex : vertices) {
     const size_t p = particle(slot, size_t(vertex));
     double offset[3];
@@ -82,6 +84,7 @@ void World::attach(int32_t slot, Vertices which, int32_t number, bool feels) {
     inv_mass_(p) = 0.0f;
     particle_aim_(p) = kWithFrame + number;
     feels_[p] = feels ? 1 : 0;
+    attachments_[p] = attachment;
     if (scene_->is_implicit) particle_contact_(p) = 0;
   }
   body_drives_(slot) |= kMovesPins | (feels ? kFeelsReaction : 0);
@@ -108,6 +111,7 @@ void World::let_go(int32_t slot, const std::vector<int32_t>& vertices) {
     inv_mass_(p) = 1.0f / mass_(p);
     particle_aim_(p) = kStill;
     feels_[p] = 0;
+    attachments_[p] = 0;
   }
   if (!is_felt(slot, hanging(slot, -1))) body_drives_(slot) &= ~kFeelsReaction;
   rouse(slot);

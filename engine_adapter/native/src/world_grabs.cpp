@@ -61,7 +61,7 @@ ts_grab World::grab(int32_t slot, int32_t triangle, const double given[3], const
   for (double each : asset.masses) mass += each;
   const double strongest = max_force < 0.0 ? scene_->pull_in_weights * mass : max_force;
   const int32_t* corners = asset.surface.data + 3 * triangle;
-  const Patch patch = patch_round(*scene_, asset, corners, weights);
+  const Patch patch = patch_round(*scene_, asset, corners, weights, 3);
 
   grab_body_(g) = slot + 1;
   for (size_t i = 0; i < kGrabCorners; ++i) {
@@ -76,15 +76,19 @@ ts_grab World::grab(int32_t slot, int32_t triangle, const double given[3], const
     grab_limits_(g, k) = as_float(limits[k]);
     grab_force_(g, k) = 0.0f;
   }
+  write_patch(g, slot, patch);
+  body_drives_(slot) |= kGrabbed;
+  grab_generations_[g] = (grab_generations_[g] + 1) & 0xFFFFFF;
+  rouse(slot);
+  return grab_at(int32_t(g));
+}
+
+void World::write_patch(size_t g, int32_t slot, const Patch& patch) {
   grab_count_(g) = int32_t(patch.vertices.size());
   for (size_t i = 0; i < patch.vertices.size(); ++i) {
     grab_particle_(g * kPatchRows + i) = int32_t(particle(slot, size_t(patch.vertices[i])));
     grab_share_(g * kPatchRows + i) = as_float(patch.shares[i]);
   }
-  body_drives_(slot) |= kGrabbed;
-  grab_generations_[g] = (grab_generations_[g] + 1) & 0xFFFFFF;
-  rouse(slot);
-  return grab_at(int32_t(g));
 }
 
 void World::move_grab(ts_grab grab, const Vector& point) {

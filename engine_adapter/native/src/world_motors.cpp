@@ -12,7 +12,7 @@ namespace taichi_soft {
 namespace {
 
 constexpr ts_motor kMotor = uint64_t(6) << 56;  // what a motor's handle begins with, and no other handle
-constexpr double kLargestLimit = 1e12, kThinnest = 1e-3, kLeaning = 1e-10, kResidue = 1e-12;
+constexpr double kLargestLimit = 1e12, kThinnest = 1e-3;
 
 double sum_of(const std::vector<double>& numbers) {
   double total = 0.0;
@@ -20,28 +20,10 @@ double sum_of(const std::vector<double>& numbers) {
   return total;
 }
 
-Vector center(const std::vector<Vector>& points, const std::vector<double>& shares) {
-  Vector found = {0.0, 0.0, 0.0};
-  for (size_t i = 0; i < points.size(); ++i) {
-    for (int k = 0; k < 3; ++k) found[k] += shares[i] * points[i][k];
-  }
-  return found;
-}
-
-Matrix moment(const std::vector<Vector>& a, const std::vector<Vector>& b, const std::vector<double>& shares) {
-  const Vector of_a = center(a, shares), of_b = center(b, shares);
-  Matrix found{};
-  for (size_t n = 0; n < a.size(); ++n) {
-    for (int i = 0; i < 3; ++i) {
-      for (int k = 0; k < 3; ++k) found[i][k] += shares[n] * (a[n][i] - of_a[i]) * (b[n][k] - of_b[k]);
-    }
-  }
-  return found;
-}
-
 // Whether all lie on a line, so that their turn about it cannot be seen.
 bool is_thin(const std::vector<Vector>& rest, const std::vector<double>& shares) {
-  std::array<double, 3> spreads = Eigen<3>(moment(rest, rest, shares)).values;
+  const std::vector<Vector> arms = beside(rest, weighted_sum(shares, rest));
+  std::array<double, 3> spreads = Eigen<3>(moments(shares, arms, arms)).values;
   std::sort(spreads.begin(), spreads.end());
   return !(spreads[1] > kThinnest * kThinnest * spreads[2]);
 }
@@ -74,20 +56,10 @@ Vector World::axis_at_rest(int32_t slot, const std::vector<int32_t>& vertices, c
   if (is_thin(rest, shares)) {
     fail(TS_ERROR_ARGUMENT, "the vertices lie on a line, so an axis cannot turn with them: name more, or set is_fixed");
   }
-  Matrix turned_by = moment(now, rest, shares);
-  const Matrix spread = moment(rest, rest, shares);
-  for (int i = 0; i < 3; ++i) turned_by[i][i] += kLeaning * (spread[0][0] + spread[1][1] + spread[2][2]);
-  const Matrix turn = nearest_rotation(turned_by);
+  const Matrix turn = fitting_motion(rest, now, shares).turn;
   Vector found;
-  double size = 0.0;
-  for (int k = 0; k < 3; ++k) {
-    found[k] = turn[0][k] * axis[0] + turn[1][k] * axis[1] + turn[2][k] * axis[2];
-    size = std::max(size, std::fabs(found[k]));
-  }
-  for (double& each : found) {  // as `kept` in taichi_soft/core/residue.py
-    each = std::fabs(each) > kResidue * size ? double(as_float(each)) : 0.0;
-  }
-  return found;
+  for (size_t k = 0; k < 3; ++k) found[k] = turn[0][k] * axis[0] + turn[1][k] * axis[1] + turn[2][k] * axis[2];
+  return kept(found);
 }
 
 std::vector<World::MotorRow> World::motors() const {

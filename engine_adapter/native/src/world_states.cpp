@@ -40,15 +40,15 @@ uint64_t World::hash() const {
   return code;
 }
 
-constexpr uint64_t kSnapshotMark = 0x3350414E53534354u;
+constexpr uint64_t kSnapshotMark = 0x3450414E53534354u;
 
-// What a snapshot begins with. Behind it lie, in this order: the fields that are carried; frames, and who is felt
-// there; numbers that tell handles apart; colliders; what events depend on.
+// What a snapshot begins with. Behind it lie, in this order: levels of detail; the fields that are carried; frames, and
+// who is held and felt there; numbers that tell handles apart; colliders; what events depend on.
 struct SnapshotHead {
   uint64_t mark, size;
   uint32_t scene, sum;
   int64_t steps;
-  uint64_t frames, colliders, contacts, joint_rows, motor_rows;
+  uint64_t frames, colliders, contacts, joint_rows, motor_rows, held;
   int64_t kinds;  // of events that are recorded
   double time, last_dt;
   Surroundings surroundings;
@@ -97,22 +97,63 @@ size_t size_of_fields(const SnapshotHead& head, const std::vector<Carried>& carr
   return 4 * words;
 }
 
+// Of levels, how many vertices are held there, and which.
+size_t size_of_levels(const SnapshotHead& head, size_t slots) { return sizeof(int32_t) * (2 * slots + size_t(head.held)); }
+
 // Of all behind the fields.
 size_t size_of_rest(const SnapshotHead& head, size_t slots, size_t particles) {
-  return kFrameSize * head.frames + particles + sizeof(uint32_t) * (slots + kMostGrabs + kMostJoints + kMostMotors) +
-         sizeof(double) * slots + sizeof(Collider) * head.colliders + sizeof(int32_t) * (slots + 2) +
-         sizeof(ts_body) * slots +
+  return kFrameSize * head.frames + (1 + sizeof(int32_t)) * particles +
+         sizeof(uint32_t) * (slots + kMostGrabs + kMostJoints + kMostMotors) + sizeof(double) * slots +
+         sizeof(Collider) * head.colliders + sizeof(int32_t) * (slots + 2) + sizeof(ts_body) * slots +
          sizeof(Contact) * head.contacts;
 }
 
 }  // namespace
 
+// What a snapshot has of levels: those of who lives.
+World::Levels World::present_levels() const {
+  Levels found;
+  for (int32_t slot = 0; slot < scene_->slot_count; ++slot) {
+    const bool lives = body_status_(slot) != kAbsent;
+    found.levels.push_back(lives ? level_of(slot) : 0);
+    found.held.push_back(found.levels.back() != 0 ? held_[size_t(slot)] : std::vector<int32_t>());
+  }
+  return found;
+}
+
+size_t World::Levels::held_count() const {
+  size_t count = 0;
+  for (const auto& each : held) count += each.size();
+  return count;
+}
+
+// Reads them, and goes on to what lies behind. Returns: whether they can be.
+bool World::take_levels(const char** at, const SnapshotHead& head, Levels* found) const {
+  const size_t slots = size_t(scene_->slot_count);
+  std::vector<int32_t> counts(slots);
+  found->levels.resize(slots);
+  take_all(at, &found->levels);
+  take_all(at, &counts);
+  size_t left = size_t(head.held);
+  for (size_t slot = 0; slot < slots; ++slot) {
+    if (found->levels[slot] < 0 || size_t(found->levels[slot]) >= whole_of(int32_t(slot)).level_count()) return false;
+    if (counts[slot] < 0 || size_t(counts[slot]) > left) return false;
+    left -= size_t(counts[slot]);
+    found->held.emplace_back(size_t(counts[slot]));
+    take_all(at, &found->held.back());
+    if (!are_held(int32_t(slot), found->held.back())) return false;
+  }
+  return left == 0;
+}
+
 size_t World::snapshot_size() const {
   SnapshotHead head{};
+  head.held = present_levels().held_count();
   head.frames = frame_alive_.size(), head.colliders = colliders_.rows.size();
   head.contacts = events_.contact_count();
   head.joint_rows = joint_rows(), head.motor_rows = motor_rows();
-  return sizeof head + size_of_fields(head, scene_->carried) + size_of_rest(head, size_t(scene_->slot_count), feels_.size());
+  return sizeof head + size_of_levels(head, size_t(scene_->slot_count)) + size_of_fields(head, scene_->carried) +
+         size_of_rest(head, size_t(scene_->slot_count), feels_.size());
 }
 
 void World::snapshot(char* bytes) const {
@@ -125,6 +166,14 @@ void World::snapshot(char* bytes) const {
   head.steps = steps_, head.time = time_, head.last_dt = last_dt_;
   head.surroundings = surroundings_;
   char* at = bytes + sizeof head;
+  const Levels levels = present_levels();
+  head.held = levels.held_count();
+  put_all(&at, levels.levels);
+  for (const auto& each : levels.held) {
+    const int32_t count = int32_t(each.size());
+    put(&at, &count, 1);
+  }
+  for (const auto& each : levels.held) put_all(&at, each);
   for (const Carried& each : scene_->carried) {
     const char* row = machine_->root() + each.place.offset;
     const size_t count = count_of(each, head);
@@ -134,6 +183,7 @@ void World::snapshot(char* bytes) const {
   put_all(&at, coming_);
   put_all(&at, frame_alive_);
   put_all(&at, feels_);
+  put_all(&at, attachments_);
   put_all(&at, generations_);
   put_all(&at, grab_generations_);
   put_all(&at, joint_generations_);
@@ -167,7 +217,8 @@ bool World::is_in_order(const Contact& contact, size_t colliders) const {
 // Fields as a snapshot has them, by where they lie in a world.
 class World::Packed {
  public:
-  Packed(const World& world, const char* at, const SnapshotHead& head) {
+  Packed(const World& world, const char* at, const SnapshotHead& head, const std::vector<int32_t>& levels)
+      : levels_(levels) {
     for (const Carried& each : world.scene().carried) {
       rows_[each.place.offset] = {at, each.place.width};
       at += 4 * count_of(each, head) * each.place.width;
@@ -181,6 +232,7 @@ class World::Packed {
     std::memcpy(&found, at + 4 * (row * width + column), sizeof found);
     return found;
   }
+  int32_t level(int32_t slot) const { return levels_[size_t(slot)]; }
   // Whether somebody lives in the slot of this number and 1.
   bool lives(int32_t body) const {
     int32_t status;
@@ -191,11 +243,12 @@ class World::Packed {
  private:
   std::map<size_t, std::pair<const char*, size_t>> rows_;
   const char* status_;
+  const std::vector<int32_t>& levels_;
 };
 
-bool World::lies_in(int32_t particle, int32_t slot) const {
+bool World::lies_in(int32_t particle, int32_t slot, int32_t level) const {
   const size_t begin = begin_of(slot), p = size_t(particle);
-  return p >= begin && p < begin + asset_of(slot).vertex_count();
+  return p >= begin && p < begin + whole_of(slot).level(size_t(level)).vertex_count();
 }
 
 // Numbers of bodies and particles are within their fields already.
@@ -212,7 +265,8 @@ bool World::are_joints_in_order(const Packed& packed, const SnapshotHead& head) 
     if (b == 0 || a == b || !packed.lives(a) || !packed.lives(b) || first >= end || end > head.joint_rows) return false;
     spans.push_back({first, end});
     for (size_t i = kJointEnds * first; i < kJointEnds * end; ++i) {
-      if (!lies_in(packed.number(particle, i), (i % kJointEnds == 0 ? a : b) - 1)) return false;
+      const int32_t slot = (i % kJointEnds == 0 ? a : b) - 1;
+      if (!lies_in(packed.number(particle, i), slot, packed.level(slot))) return false;
       if (!(std::fabs(packed.number<float>(weight, i)) < 1e3f)) return false;
     }
   }
@@ -242,7 +296,7 @@ bool World::are_motors_in_order(const Packed& packed, const SnapshotHead& head) 
     for (size_t k = 0; k < 3; ++k) direction[k] = packed.number<float>(axis, m, k);
     if (!(length_of(direction) <= 1.001)) return false;
     for (next = size_t(from); next < size_t(to); ++next) {
-      if (!lies_in(packed.number(particle, next), who - 1)) return false;
+      if (!lies_in(packed.number(particle, next), who - 1, packed.level(who - 1))) return false;
     }
   }
   return next == head.motor_rows;
@@ -265,7 +319,9 @@ bool World::are_rows_in_order(const char* at, const SnapshotHead& head) const {
     limits.push_back({s.place("joints.rows").offset, int64_t(kJointRows) + 1});
     limits.push_back({s.place("joints.particle").offset, s.particle_count});
   }
-  const Packed packed(*this, at, head);
+  Levels levels;
+  if (!take_levels(&at, head, &levels)) return false;
+  const Packed packed(*this, at, head, levels.levels);
   for (const Carried& each : s.carried) {
     int64_t limit = int64_t(1) << 32;
     for (const auto& [offset, most] : limits) limit = each.place.offset == offset ? most : limit;
@@ -288,7 +344,7 @@ bool World::are_rows_in_order(const char* at, const SnapshotHead& head) const {
     take(&at, &number, 1);
     if (!(std::fabs(number) <= s.position_limit)) return false;
   }
-  at += head.frames + feels_.size() + sizeof(uint32_t) * (generations_.size() + kMostGrabs + kMostJoints + kMostMotors);
+  at += head.frames + feels_.size() + sizeof(int32_t) * attachments_.size() + sizeof(uint32_t) * (generations_.size() + kMostGrabs + kMostJoints + kMostMotors);
   std::vector<double> frictions(friction_.size());
   take_all(&at, &frictions);
   if (!are_frictions(frictions.data(), frictions.size())) return false;
@@ -335,7 +391,8 @@ void World::restore(const char* bytes, size_t size) {
   if (head.scene != scene_->code) fail(TS_ERROR_SNAPSHOT, "this snapshot is of another world file");
   const size_t slots = size_t(scene_->slot_count);
   if (head.joint_rows > kJointRows || head.motor_rows > kMotorRows) fail(TS_ERROR_SNAPSHOT, "this snapshot is cut off");
-  const size_t fields = sizeof head + size_of_fields(head, scene_->carried);
+  if (head.held > slots * size_t(scene_->particle_count)) fail(TS_ERROR_SNAPSHOT, "this snapshot is cut off");
+  const size_t fields = sizeof head + size_of_levels(head, slots) + size_of_fields(head, scene_->carried);
   if (head.size != size || head.frames == 0 || head.frames > kMostFrames || head.colliders > collider_room_ ||
       head.contacts > slots * events_.touch_rows || size != fields + size_of_rest(head, slots, feels_.size()) ||
       (head.kinds & ~int64_t(TS_ALL_EVENTS)) != 0 || head.steps < 0 || !std::isfinite(head.time) ||
@@ -357,8 +414,15 @@ void World::restore(const char* bytes, size_t size) {
                            std::vector<Contact>(size_t(head.contacts))};
   present_.reserve(12 * frames), coming_.reserve(12 * frames), frame_alive_.reserve(frames);
   colliders_.rows.reserve(size_t(head.colliders));
-  if (scene_->has_contact) machine_->launch("forget_held", {});
   const char* at = bytes + sizeof head;
+  Levels levels;
+  take_levels(&at, head, &levels);
+  const Packed packed(*this, at, head, levels.levels);
+  if (scene_->has_contact) machine_->launch("forget_held", {});
+  for (int32_t slot = 0; slot < scene_->slot_count; ++slot) {
+    if (packed.lives(slot + 1) && levels.levels[size_t(slot)] != level_of(slot)) refill(slot, levels.levels[size_t(slot)]);
+  }
+  held_ = std::move(levels.held);
   for (const Carried& each : scene_->carried) {
     char* row = machine_->root() + each.place.offset;
     const size_t count = count_of(each, head);
@@ -369,6 +433,7 @@ void World::restore(const char* bytes, size_t size) {
   take_all(&at, &coming_);
   take_all(&at, &frame_alive_);
   take_all(&at, &feels_);
+  take_all(&at, &attachments_);
   take_all(&at, &generations_);
   take_all(&at, &grab_generations_);
   take_all(&at, &joint_generations_);

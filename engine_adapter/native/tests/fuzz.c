@@ -256,7 +256,7 @@ static ts_result one_call(ts_world world) {
   const ts_body body = any_body(world);
   size_t count = 0;
   const int32_t* which = list(&count);
-  switch (below(68)) {
+  switch (below(71)) {
     case 0: case 1: case 2: return ts_world_step(world, bad(8) ? number() : 0.01, bad(8) ? whole(50) : 4);
     case 3: {
       ts_clock clock = {size_of(sizeof clock), 0, 0, 0, 0, 0};
@@ -297,12 +297,10 @@ static ts_result one_call(ts_world world) {
     case 25: return ts_collider_get_impulse(world, whole(4), numbers(3), numbers(3));
     case 26: return ts_frame_move_to(world, whole(2), pose());
     case 27: {
-      ts_asset_info info = {sizeof info, 0, 0, 0};
-      int32_t asset = 0;
-      ts_body_get_asset(world, body, &asset);
-      ts_asset_get_info(scene, asset, &info);
+      int32_t vertices = 0;
+      ts_body_get_vertex_count(world, body, &vertices);
       return ts_body_positions(world, body, is_tame ? 0.5 : number(), bad(10) ? NULL : rows,
-                               bad(3) ? below(ROOM) : 3 * (size_t)info.vertex_count);
+                               bad(3) ? below(ROOM) : 3 * (size_t)vertices);
     }
     case 28: {
       ts_mesh_info info = {sizeof info, 0, 0, 0, 0};
@@ -392,6 +390,19 @@ static ts_result one_call(ts_world world) {
       const ts_result speed = ts_motor_get_speed(world, motor, bad(10) ? NULL : &found);
       const ts_result effort = ts_motor_get_effort(world, motor, bad(10) ? NULL : &found);
       return speed != TS_OK ? speed : one_in(2) ? effort : ts_motor_remove(world, motor);
+    }
+    case 67: case 68: {
+      const int32_t level = whole(3);
+      int32_t now = -1;
+      const ts_result result = ts_body_set_level(world, body, level, whole(2));
+      if (result == TS_OK && (ts_body_get_level(world, body, &now) != TS_OK || now != level)) broken("another level");
+      return result;
+    }
+    case 69: {
+      int32_t found = 0;
+      const ts_result count = ts_asset_get_level_count(scene, whole(3), bad(10) ? NULL : &found);
+      const ts_result level = ts_mesh_get_level(scene, whole(3), bad(10) ? NULL : &found);
+      return count != TS_OK ? count : level;
     }
     default: {
       double center[3];

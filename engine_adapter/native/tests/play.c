@@ -190,6 +190,18 @@ static void play(const char* call) {
     for (size_t i = 0; i < 3 * count; ++i) rows[i] = (float)number();
     check(ts_body_set_targets(world, who, vertices, count, rows));
   }
+  CALL("set_level") {
+    const ts_body who = body();
+    const int32_t level = whole();
+    check(ts_body_set_level(world, who, level, whole()));
+  }
+  CALL("level") {
+    const ts_body who = body();
+    int32_t level = 0, count = 0;
+    check(ts_body_get_level(world, who, &level));
+    check(ts_body_get_vertex_count(world, who, &count));
+    printf("%d %d\n", (int)level, (int)count);
+  }
   CALL("wind") {
     numbers(a, 5);
     check(ts_world_set_wind(world, a, a[3], a[4]));
@@ -411,12 +423,10 @@ static void play(const char* call) {
   }
   CALL("restore") check(ts_world_restore(world, kept, kept_size));
   CALL("positions") {
-    ts_asset_info info = {sizeof info, 0, 0, 0};
     const ts_body who = body();
-    int32_t asset = 0;
-    check(ts_body_get_asset(world, who, &asset));
-    check(ts_asset_get_info(scene, asset, &info));
-    const size_t count = 3 * (size_t)info.vertex_count;
+    int32_t vertex_count = 0;
+    check(ts_body_get_vertex_count(world, who, &vertex_count));
+    const size_t count = 3 * (size_t)vertex_count;
     check(ts_body_positions(world, who, number(), rows, count));
     printf("%016" PRIx64 "\n", hash_of(rows, count));
   }

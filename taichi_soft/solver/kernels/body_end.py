@@ -5,6 +5,7 @@ from taichi_soft.bodies.kernels.plasticity import flow_body
 from taichi_soft.bodies.status import ACTIVE, FROZEN, PUSHED
 from taichi_soft.contact.kernels.candidates import forget_candidates
 from taichi_soft.contact.kernels.collide import forget_contacts
+from taichi_soft.contact.kernels.hull import place_points
 from taichi_soft.control.kernels.drives import push_particles
 from taichi_soft.control.kernels.reactions import forget_loads
 from taichi_soft.core.math.rows import row_behind
@@ -26,6 +27,7 @@ def _freeze_if_broken(state: ti.template(), body):
         while p < particles[1]:
             restore_particle(state, p)
             p = row_behind(p)
+        place_points(state, body)  # or they would not be finite, and no snapshot would be taken back
         clear_forces(state, body)
         forget_loads(state, body)
         state.body_status[body] = FROZEN

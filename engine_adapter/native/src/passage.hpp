@@ -1,0 +1,59 @@
+// How a body passes from one level of detail to another: as taichi_soft/levels has it, sum by sum.
+#pragma once
+
+#include <vector>
+
+#include "rotations.hpp"
+#include "scene.hpp"
+
+namespace taichi_soft {
+
+// Rows of `read_motion` in taichi_soft/fracture/kernels/topology.py.
+struct Motion {
+  enum Column : size_t {
+    kPosition = 0,
+    kVelocity = 3,
+    kEarlierPosition = 6,
+    kEarlierVelocity = 9,
+    kPassing = 12,  // columns that pass over as they are
+    kInvMass = 12,
+    kMass = 15,
+    kAim = 16,
+    kTarget = 17,
+    kPush = 20,
+    kReaction = 23,
+    kWidth = 26
+  };
+
+  explicit Motion(size_t rows) : count(rows), numbers(kWidth * rows, 0.0) {}
+  double& operator()(size_t row, size_t column) { return numbers[kWidth * row + column]; }
+  double operator()(size_t row, size_t column) const { return numbers[kWidth * row + column]; }
+  Vector at(size_t row, size_t column) const {
+    return {(*this)(row, column), (*this)(row, column + 1), (*this)(row, column + 2)};
+  }
+  void put(size_t row, size_t column, const Vector& vector) {
+    for (size_t k = 0; k < 3; ++k) (*this)(row, column + k) = vector[k];
+  }
+
+  size_t count;
+  std::vector<double> numbers;
+};
+
+// A body whose level of detail changes.
+struct Change {
+  const Asset &source, &target;  // levels of one asset
+  const Passage& over;
+  std::vector<int32_t> held;     // vertices of the target that are to be held
+};
+
+// Vertices of the target that are nearest to some of the source at rest, ascending, each once.
+std::vector<int32_t> nearest_vertices(const Asset& source, const std::vector<int32_t>& vertices, const Asset& target);
+// The same one for each, in their order.
+std::vector<int32_t> nearest_of_each(const Asset& source, const std::vector<int32_t>& vertices, const Asset& target);
+// Which of some vertices of the source is nearest to each of some of the target, at rest.
+std::vector<int32_t> nearest_sources(const Asset& source, const std::vector<int32_t>& among, const Asset& target,
+                                     const std::vector<int32_t>& vertices);
+
+Motion passed(const Change& change, const Motion& before);
+
+}  // namespace taichi_soft

@@ -1,0 +1,325 @@
+// Levels of detail: as taichi_soft/levels/level_change.py and hanging.py have them.
+
+#include <algorithm>
+#include <limits>
+
+#include "barycentric.hpp"
+#include "error.hpp"
+#include "patch.hpp"
+#include "world.hpp"
+
+namespace taichi_soft {
+
+namespace {
+
+template <typename Number>
+Argument array_of(const Archive::View<Number>& view, size_t width = 0) {
+  return Machine::array(view.data, uint32_t(width > 0 ? view.count / width : view.count), uint32_t(width));
+}
+
+}  // namespace
+
+// What a world file says of levels, and whether slots have room for them.
+void World::read_levels() {
+  const Archive& archive = scene_->archive;
+  const size_t slots = size_t(scene_->slot_count);
+  const auto levels = archive.get<int32_t>("levels/level"), counts = archive.get<int32_t>("levels/held_counts");
+  const auto held = archive.get<int32_t>("levels/held");
+  const auto attachments = archive.get<int32_t>("frames/attachment");
+  levels_.assign(levels.begin(), levels.end());
+  held_.assign(slots, {});
+  attachments_.assign(attachments.begin(), attachments.end());
+  bool is_whole = levels.count == slots && counts.count == slots && attachments_.size() == size_t(scene_->particle_count);
+  size_t at = 0;
+  for (size_t slot = 0; is_whole && slot < slots; ++slot) {
+    const Asset& asset = whole_of(int32_t(slot));
+    is_whole = levels_[slot] >= 0 && size_t(levels_[slot]) < asset.level_count() && counts[slot] >= 0 &&
+               at + size_t(counts[slot]) <= held.count;
+    for (int32_t i = 0; is_whole && i < counts[slot]; ++i) held_[slot].push_back(held[at++]);
+    is_whole = is_whole && are_held(int32_t(slot), held_[slot]);
+  }
+  if (!is_whole || at != held.count) fail(TS_ERROR_FILE, "the world file is not in order: levels. Export it again");
+  if (!scene_->has_levels) return;
+  const auto count_of = [&](const std::string& field) { return scene_->place(field).count; };
+  const auto fits = [&](const std::string& range, size_t slot, size_t most, size_t each, size_t rows) {
+    const int32_t first = Field<int32_t>(machine_->root(), scene_->place(range, slots, 2))(slot);
+    return first >= 0 && each * size_t(first) + rows <= most;
+  };
+  for (const std::string& name : scene_->constant_names) constants_.push_back({machine_->root(), scene_->place(name)});
+  body_blocks_ = {machine_->root(), scene_->place("body_blocks", slots, 2)};
+  for (size_t slot = 0; slot < slots; ++slot) {
+    const Asset& asset = whole_of(int32_t(slot));
+    if (asset.level_count() == 1) continue;
+    const SlotRows& rows = asset.rows;
+    bool is_there = fits("body_particles", slot, size_t(scene_->particle_count), 1, asset.vertex_count()) &&
+                    fits("body_blocks", slot, count_of("tet_vertices"), 4 * kLanes, rows.tet_vertices.count) &&
+                    fits("body_blocks", slot, count_of("tet_rest_inverse"), 9 * kLanes, rows.rest_inverses.count / 2) &&
+                    fits("body_edges", slot, count_of("edge_damping"), 1, rows.edges.count / 2) &&
+                    fits("body_edge_blocks", slot, count_of("edge_blocks"), 1, rows.edge_blocks.count / 2) &&
+                    fits("body_triangles", slot, count_of("triangle_vertices"), 1, rows.triangles.count / 3) &&
+                    fits("body_outer", slot, count_of("outer_particle"), 1, rows.outer.count);
+    const size_t blocks = rows.tet_vertices.count / (4 * kLanes);
+    for (size_t i = 0; is_there && i < constants_.size(); ++i) {
+      const size_t each = rows.constants[i].count / blocks;
+      is_there = fits("body_blocks", slot, count_of(scene_->constant_names[i]), each, rows.constants[i].count);
+      for (const Asset& coarse : asset.coarser) {
+        const size_t own = coarse.rows.tet_vertices.count / (4 * kLanes);
+        is_there = is_there && coarse.rows.constants[i].count == each * own;
+      }
+    }
+    if (is_there && scene_->has_hulls) {
+      is_there = fits("hull.body_outer", slot, count_of("hull.outer_particle"), 1, rows.outer.count) &&
+                 fits("hull.body_outer", slot, count_of("hull.outer_particle"), 1, rows.touching_outer.count) &&
+                 fits("hull.body_triangles", slot, count_of("hull.triangle_vertices"), 1, rows.triangles.count / 3) &&
+                 fits("hull.body_triangles", slot, count_of("hull.triangle_vertices"), 1,
+                      rows.touching_triangles.count / 3) &&
+                 fits("hull.body_points", slot, count_of("hull.carriers"), 1, rows.carriers.count / 4);
+    }
+    if (!is_there) fail(TS_ERROR_FILE, "the world file is not in order: a level of detail. Export it again");
+  }
+}
+
+// Whether these can be vertices of the finest level of the body in a slot.
+bool World::are_held(int32_t slot, const std::vector<int32_t>& vertices) const {
+  const size_t n = whole_of(slot).vertex_count();
+  return std::all_of(vertices.begin(), vertices.end(), [n](int32_t v) { return v >= 0 && size_t(v) < n; });
+}
+
+// Writes a level of a body's asset into its slot, in the middle of its motion.
+void World::write_slot(int32_t slot, int32_t level, const Motion& motion, int32_t status) {
+  const Asset& asset = whole_of(slot).level(size_t(level));
+  const SlotRows& rows = asset.rows;
+  float* numbers = machine_->rows.room<float>(motion.numbers.size());
+  std::transform(motion.numbers.begin(), motion.numbers.end(), numbers, as_float);
+  const size_t inverses = rows.rest_inverses.count / 2;
+  machine_->launch(
+      "write_body",
+      {Machine::whole(slot), Machine::whole(status), Machine::whole(slot),
+       Machine::array(machine_->rows, uint32_t(motion.count), Motion::kWidth), array_of(rows.rest, 3),
+       array_of(asset.rank), array_of(rows.tet_vertices), array_of(rows.tet_edges),
+       Machine::array(rows.rest_inverses.data, 2, uint32_t(inverses)), array_of(rows.edges, 2),
+       array_of(rows.edge_damping), array_of(rows.edge_blocks, 2), array_of(rows.triangles, 3), array_of(rows.outer)});
+  const size_t blocks = rows.tet_vertices.count / (4 * kLanes), first = size_t(body_blocks_(size_t(slot)));
+  for (size_t i = 0; i < constants_.size(); ++i) {
+    const Archive::View<float>& each = rows.constants[i];
+    const size_t begin = first * (each.count / blocks);
+    for (size_t k = 0; k < each.count; ++k) constants_[i](begin + k) = each[k];
+  }
+  if (scene_->has_hulls) {
+    machine_->launch("write_touching",
+                     {Machine::whole(slot), array_of(rows.touching_outer), array_of(rows.touching_triangles, 3),
+                      array_of(rows.carriers, 4), array_of(rows.weights, 4)});
+  }
+  levels_[size_t(slot)] = level;
+  write_kind(slot);
+}
+
+void World::write_kind(int32_t slot) {
+  machine_->launch("write_kind", {Machine::whole(slot), array_of(asset_of(slot).rows.kind)});
+}
+
+// Writes the whole body of a level, at rest, into a slot where another one was.
+void World::refill(int32_t slot, int32_t level) {
+  write_slot(slot, level, Motion(whole_of(slot).level(size_t(level)).vertex_count()), kAbsent);
+}
+
+int32_t World::level_of(int32_t slot) const { return levels_[size_t(slot)]; }
+
+void World::require_change(int32_t slot, int32_t level, bool may_release) const {
+  const Asset& asset = whole_of(slot);
+  if (level < 0 || size_t(level) >= asset.level_count()) {
+    fail(TS_ERROR_ARGUMENT, "level is %d, and asset %d has %zu: from_surface with cells=(12, 8, 5) makes several", level,
+         scene_->asset_of_slot[size_t(slot)], asset.level_count());
+  }
+  bool has_joints = false, has_motors = false;
+  for (size_t j = 0; scene_->has_contact && j < kMostJoints; ++j) {
+    has_joints = has_joints || joint_bodies_(j, 0) == slot + 1 || joint_bodies_(j, 1) == slot + 1;
+  }
+  for (size_t m = 0; m < kMostMotors; ++m) has_motors = has_motors || motor_wholes_[0](m) == slot + 1;
+  if ((has_joints || has_motors) && !may_release) {
+    fail(TS_ERROR_STATE,
+         "the body in slot %d has %s%s%s that name its vertices: release or remove them before its level changes, or "
+         "let ts_body_set_level do so with release of 1",
+         slot, has_joints ? "joints" : "", has_joints && has_motors ? " and " : "", has_motors ? "motors" : "");
+  }
+  if (body_status_(slot) == kFrozen) {
+    fail(TS_ERROR_STATE, "the body in slot %d is frozen: despawn it, and spawn another", slot);
+  }
+}
+
+std::vector<int32_t> World::pinned(int32_t slot) const {
+  std::vector<int32_t> found;
+  for (size_t v = 0; v < asset_of(slot).vertex_count(); ++v) {
+    if (inv_mass_(particle(slot, v)) == 0.0f) found.push_back(int32_t(v));
+  }
+  return found;
+}
+
+// Vertices of a level that are nearest to some of the finest.
+std::vector<int32_t> World::nearest_at(int32_t slot, std::vector<int32_t> finest, int32_t level) const {
+  const Asset& asset = whole_of(slot);
+  if (level != 0) return nearest_vertices(asset, finest, asset.level(size_t(level)));
+  std::sort(finest.begin(), finest.end());
+  finest.erase(std::unique(finest.begin(), finest.end()), finest.end());
+  return finest;
+}
+
+// Vertices of the finest level that what is held now stands for.
+std::vector<int32_t> World::finest_held(int32_t slot) const {
+  const std::vector<int32_t> present = pinned(slot), &held = held_[size_t(slot)];
+  const int32_t level = level_of(slot);
+  if (present.empty() || level == 0) return present;
+  if (!held.empty() && nearest_at(slot, held, level) == present) return held;
+  return nearest_of_each(asset_of(slot), present, whole_of(slot));
+}
+
+// What attachments will hold at another level, of which `held` are to be held: their vertices there, by number.
+std::map<int32_t, World::Hanging> World::hanging_at(int32_t slot, const std::vector<int32_t>& held,
+                                                    int32_t level) const {
+  std::map<int32_t, Hanging> found;
+  const std::vector<int32_t> sources = pinned(slot);
+  for (int32_t vertex : sources) {
+    const size_t p = particle(slot, size_t(vertex));
+    if (particle_aim_(p) < kWithFrame) continue;
+    Hanging& each = found[attachments_[p]];
+    each.frame = particle_aim_(p) - kWithFrame, each.feels = feels_[p] != 0;
+    each.before.push_back(vertex);
+  }
+  if (found.empty() || held.empty()) return found;
+  const std::vector<int32_t> nearest =
+      nearest_sources(asset_of(slot), sources, whole_of(slot).level(size_t(level)), held);
+  for (size_t i = 0; i < held.size(); ++i) {
+    const size_t p = particle(slot, size_t(nearest[i]));
+    if (particle_aim_(p) >= kWithFrame) found[attachments_[p]].after.push_back(held[i]);
+  }
+  return found;
+}
+
+// Releases what has no place at another level, and finds what is held there.
+void World::make_room(int32_t slot, int32_t level, bool may_release, std::vector<int32_t>* held,
+                      std::map<int32_t, Hanging>* attached) {
+  for (size_t j = 0; scene_->has_contact && j < kMostJoints; ++j) {
+    if (joint_bodies_(j, 0) == slot + 1 || joint_bodies_(j, 1) == slot + 1) end_joint(j);
+  }
+  for (size_t m = 0; m < kMostMotors; ++m) {
+    if (motor_wholes_[0](m) == slot + 1) end_motor(m);
+  }
+  for (bool is_done = false; !is_done;) {  // without what was released fewer are held, and others may have no place
+    std::vector<int32_t> finest = finest_held(slot);
+    *held = nearest_at(slot, finest, level);
+    *attached = hanging_at(slot, *held, level);
+    is_done = true;
+    std::vector<int32_t> homeless;
+    for (const auto& each : *attached) {
+      if (!each.second.after.empty()) continue;
+      if (!may_release) {
+        fail(TS_ERROR_STATE,
+             "what hangs from frame %d would hold nothing at level %d, where its vertices have no place of their own: "
+             "release it by ts_body_detach before the level changes, or let ts_body_set_level do so with release of 1",
+             each.second.frame, level);
+      }
+      homeless.insert(homeless.end(), each.second.before.begin(), each.second.before.end());
+      is_done = false;
+    }
+    held_[size_t(slot)] = std::move(finest);
+    let_go(slot, homeless);
+  }
+}
+
+// Writes where frames hold vertices, and shares the load of the last step among those of an attachment.
+void World::hang_on(const std::map<int32_t, Hanging>& attached, const Motion& before, Motion* after) const {
+  for (const auto& each : attached) {
+    const Hanging& held = each.second;
+    const float* row = present_.data() + 12 * size_t(held.frame);
+    Vector load = {0.0, 0.0, 0.0};
+    for (int32_t vertex : held.before) {
+      for (size_t k = 0; k < 3; ++k) load[k] += before(size_t(vertex), Motion::kReaction + k);
+    }
+    for (int32_t vertex : held.after) {
+      double arm[3];
+      for (size_t k = 0; k < 3; ++k) arm[k] = (*after)(size_t(vertex), Motion::kPosition + k) - double(row[9 + k]);
+      for (size_t k = 0; k < 3; ++k) {
+        (*after)(size_t(vertex), Motion::kTarget + k) =
+            double(row[k]) * arm[0] + double(row[3 + k]) * arm[1] + double(row[6 + k]) * arm[2];
+        (*after)(size_t(vertex), Motion::kReaction + k) = load[k] / double(held.after.size());
+      }
+    }
+  }
+}
+
+// The point of the rest shape that a grab pulls at.
+Vector World::place_of_grab(size_t g) const {
+  const int32_t slot = grab_body_(g) - 1;
+  const Asset& asset = asset_of(slot);
+  double weights[kGrabCorners], sum = 0.0;
+  for (size_t i = 0; i < kGrabCorners; ++i) weights[i] = double(grab_weights_(g, i)), sum = sum + weights[i];
+  Vector place = {0.0, 0.0, 0.0};
+  for (size_t i = 0; i < kGrabCorners; ++i) {
+    const int32_t rank = grab_corners_(g, i) - int32_t(begin_of(slot));
+    const auto at = std::find(asset.rank.begin(), asset.rank.end(), rank);
+    const size_t vertex = at == asset.rank.end() ? 0 : size_t(at - asset.rank.begin());
+    for (size_t k = 0; k < 3; ++k) place[k] += weights[i] / sum * asset.vertices[3 * vertex + k];
+  }
+  return place;
+}
+
+// Lets a grab hold the tetrahedra that its body has now, round a point of the rest shape.
+void World::hold_at(size_t g, const Vector& place) {
+  const int32_t slot = grab_body_(g) - 1;
+  const Asset& asset = asset_of(slot);
+  const int32_t* corners = asset.tets.data;
+  std::array<double, 4> weights{};
+  double highest = -std::numeric_limits<double>::infinity();
+  for (size_t t = 0; t + 4 <= asset.tets.count; t += 4) {
+    Vector places[4];
+    for (size_t i = 0; i < 4; ++i) {
+      for (size_t k = 0; k < 3; ++k) places[i][k] = asset.vertices[3 * size_t(asset.tets[t + i]) + k];
+    }
+    const std::array<double, 4> shares = Coordinates(places).of(place);
+    const double least = *std::min_element(shares.begin(), shares.end());
+    if (!(least > highest)) continue;
+    highest = least, weights = shares, corners = asset.tets.data + t;
+  }
+  const Patch patch = patch_round(*scene_, asset, corners, weights.data(), 4);
+  for (size_t i = 0; i < kGrabCorners; ++i) {
+    grab_corners_(g, i) = int32_t(particle(slot, size_t(corners[i])));
+    grab_weights_(g, i) = as_float(weights[i]);
+  }
+  grab_limits_(g, 0) = std::min(grab_limits_(g, 1), as_float(patch.strength));
+  write_patch(g, slot, patch);
+}
+
+void World::set_level(int32_t slot, int32_t level, bool may_release) {
+  require_change(slot, level, may_release);
+  const int32_t from = level_of(slot);
+  if (level == from) return;
+  const Asset &whole = whole_of(slot), &source = whole.level(size_t(from)), &target = whole.level(size_t(level));
+  Change change = {source, target, whole.passage(size_t(from), size_t(level)), {}};
+  std::map<int32_t, Hanging> attached;
+  make_room(slot, level, may_release, &change.held, &attached);
+  std::vector<std::pair<size_t, Vector>> grabbed;
+  for (size_t g = 0; g < kMostGrabs; ++g) {
+    if (grab_body_(g) == slot + 1) grabbed.push_back({g, place_of_grab(g)});
+  }
+  Motion before(source.vertex_count());
+  const float* found = machine_->rows.room<float>(before.numbers.size());
+  machine_->launch("read_motion", {Machine::whole(slot), Machine::array(machine_->rows, uint32_t(before.count), Motion::kWidth)});
+  std::copy(found, found + before.numbers.size(), before.numbers.begin());
+  Motion after = passed(change, before);
+  hang_on(attached, before, &after);
+  std::fill_n(feels_.begin() + std::ptrdiff_t(begin_of(slot)), whole.vertex_count(), 0);
+  std::fill_n(attachments_.begin() + std::ptrdiff_t(begin_of(slot)), whole.vertex_count(), 0);
+  write_slot(slot, level, after, body_status_(slot));
+  if (scene_->has_soft_contact) machine_->launch("mark_placed", {Machine::whole(slot)});
+  give_friction(slot, friction_[size_t(slot)]);
+  for (const auto& each : attached) {
+    for (int32_t vertex : each.second.after) {
+      const size_t p = particle(slot, size_t(vertex));
+      attachments_[p] = each.first, feels_[p] = each.second.feels ? 1 : 0;
+    }
+  }
+  for (const auto& each : grabbed) hold_at(each.first, each.second);
+  rouse(slot);
+}
+
+}  // namespace taichi_soft

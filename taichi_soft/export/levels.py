@@ -1,0 +1,55 @@
+"""What a world file says of an asset with levels of detail, so that bodies of it can pass between them."""
+
+from __future__ import annotations
+
+from inspect import signature
+from typing import Any
+
+from numpy.typing import NDArray
+
+from taichi_soft.bodies.asset import SoftBodyAsset
+from taichi_soft.bodies.tet_constants import constant_blocks
+from taichi_soft.contact.hull_fields import touching_rows
+from taichi_soft.fracture.cutting import body_rows, kind_numbers
+from taichi_soft.fracture.kernels.topology import write_body
+from taichi_soft.levels.passage import passage
+from taichi_soft.solver.context import WorldContext
+
+Arrays = dict[str, NDArray[Any]]
+
+_ROWS = list(signature(write_body).parameters)[5:]
+"""Names of what `body_rows` returns."""
+
+
+def slot_arrays(context: WorldContext, number: int, asset: SoftBodyAsset) -> Arrays:
+    """What kernels write into a slot of the asset with a number, where this level of it comes there."""
+    state, arrays = context.built.state, asset.arrays
+    found: Arrays = {f"slot/{name}": rows for name, rows in zip(_ROWS, body_rows(arrays), strict=True)}
+    found["slot/kind"] = kind_numbers(state, asset)
+    for field, rows in state.tet_constants(arrays):
+        name = next(name for name, each in vars(state).items() if each is field)
+        found[f"constants/{name}"] = constant_blocks(rows)
+    if state.capacity.contact.hull:
+        place = context.layout.ranges[context.slots.assets.index(context.slots.kinds[number])]
+        names = ("outer", "triangles", "carriers", "weights")
+        found |= {
+            f"touching/{name}": rows for name, rows in zip(names, touching_rows(arrays, place), strict=True)
+        }
+    return found
+
+
+def constant_names(context: WorldContext) -> list[str]:
+    """Names of the fields that have constants of tetrahedra."""
+    state = context.built.state
+    fields = [field for field, _ in state.tet_constants(context.layout.bodies[0])]
+    return [name for name, each in vars(state).items() if any(each is field for field in fields)]
+
+
+def passage_arrays(asset: SoftBodyAsset) -> Arrays:
+    """How bodies pass from each level of an asset to each other one."""
+    found: Arrays = {}
+    levels = range(len(asset.levels))
+    for source, target in ((i, j) for i in levels for j in levels if i != j):
+        over = passage(asset, source, target)
+        found |= {f"passage{source}-{target}/{name}": each for name, each in over.rows.items()}
+    return found
