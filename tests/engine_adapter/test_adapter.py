@@ -49,7 +49,8 @@ def snapshot(adapter):
 
 
 def test_public_names():
-    assert sorted(engine_adapter.__all__) == ["EngineAdapter", "FixedStep", "GivenUp", "Rollback"]
+    names = ["EngineAdapter", "FixedStep", "GivenUp", "Rollback", "RollbackSession", "SessionError"]
+    assert sorted(engine_adapter.__all__) == names
 
 
 def test_step_is_one_step_of_the_world(adapter, body, make_world):
