@@ -27,7 +27,10 @@ export function play(scene, game) {
   let kept = null;
   const take = (count) => numbers.splice(0, count);
   const one = () => numbers.shift();
-  const list = () => take(one());
+  const list = () => {
+    const count = one();
+    return count ? take(count) : null; // all
+  };
   const body = () => world.body(one());
   const pose = () => ({ position: take(3), rotation: take(4) });
   const tell = (...words) => told.push(words.join(" "));

@@ -110,8 +110,8 @@ def unnamed(arrays):
 
 
 FORGERIES = {
-    "a table that names what there is not": changed("mesh0/ints", first(2**28)),
-    "a table that is cut off": changed("mesh0/ints", lambda array: array[:8]),
+    "a table that names what there is not": changed("mesh0/ints0", first(2**28)),
+    "a table that is cut off": changed("mesh0/ints0", lambda array: array[:8]),
     "more particles than fields have": changed(
         "world/counts", lambda array: np.add(array, (0, 2**20)).astype(np.int32)
     ),
