@@ -1,6 +1,6 @@
 """Recorded games on platforms that can be played here: under qemu and Wine, in node and Chromium. By hand:
 
-    python tests/native/platforms.py
+    python tests/native/platforms.py [GAME ...]
 
 prints a table of what all of them give. It takes a quarter of an hour.
 """
@@ -140,8 +140,8 @@ def played(name, runner, program, world):
     return digests(lines_of([*runner.command, *program, world], list(GAMES[name][1]()), env=quiet))
 
 
-def main():
-    """Print the table. Returns: the exit status, 1 where two platforms differ."""
+def main(names):
+    """Print the table, of all games or of some. Returns: the exit status, 1 where two platforms differ."""
     runners = {name: each for name, each in RUNNERS.items() if each.is_here}
     for name in RUNNERS.keys() - runners.keys():
         print(f"{name} is left out: {RUNNERS[name].source}")
@@ -158,7 +158,7 @@ def main():
         platforms = ",".join(dict.fromkeys(each.platform for each in runners.values()))
         print("game", "Python", *runners, sep=" | ")
         differing = 0
-        for name in GAMES:
+        for name in names or GAMES:
             world = Path(place) / f"{name}.softworld"
             scene = f"{HERE / 'scenes.py'}:{name}"
             export = ["-m", "taichi_soft", "export", scene, "--out", str(world), "--for", platforms]
@@ -173,4 +173,4 @@ def main():
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(sys.argv[1:]))

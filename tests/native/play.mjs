@@ -110,7 +110,7 @@ export function play(scene, game) {
     grab_force: () => tell(hashOf(world.grab(one()).force)),
     join() {
       const [who, vertices, other, onto] = [body(), list(), body(), list()];
-      tell(who.join(vertices, other, { onto: onto.length ? onto : null }).number);
+      tell(who.join(vertices, other, { onto }).number);
     },
     joint_force: () => tell(hashOf(world.joint(one()).force)),
     release_joint: () => world.joint(one()).release(),
