@@ -86,7 +86,7 @@ search:
 
 @dataclass(frozen=True)
 class Played:
-    """What the page says of a scene to play."""
+    """Text of the gallery about a scene to play."""
 
     name: str
     title: str

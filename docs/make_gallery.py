@@ -40,7 +40,7 @@ CODEC = (
 """Small files, for which encoding may take its time."""
 
 MOST = 6e6
-"""What all films may have together [bytes]: a page is read on the way, too."""
+"""Largest size of all films together [bytes]: a page is read on the way, too."""
 
 Progress = Callable[[int, int], None]
 

@@ -183,7 +183,7 @@ class RollbackSession:
     def settle(self) -> int:
         """Make again the ticks that were made with wrong predictions, as `advance` does first.
 
-        Returns: how many ticks were made again.
+        Returns: how many ticks were repeated.
         Raises: SessionError if the world was stepped by others; what `act` and `World.step` raise: the next
             call goes on with the tick that was not made.
         """
@@ -216,7 +216,7 @@ class RollbackSession:
     def receive(self, data: bytes) -> None:
         """Take a message of another machine. It may be late, a copy, or out of order.
 
-        The ticks that it proves wrong are made again by the next call of `advance` or `settle`.
+        The next call of `advance` or `settle` repeats the ticks that it proves wrong.
         Args:
             data: what `message` returned there.
         Raises: SessionError for a message that is damaged, belongs to another session, world or version, or

@@ -36,7 +36,7 @@ from taichi_soft.render import PALETTE, Camera
 
 CORAL, TEAL, HONEY, PERIWINKLE, LEAF, ROSE, SKY, CLAY = PALETTE
 STEPS = 300
-"""Of the recording with which a browser is compared."""
+"""Length of the recording with which a browser is compared."""
 
 
 @dataclass

@@ -246,7 +246,7 @@ export class RollbackSession {
     return data;
   }
 
-  /** Take a message of another machine. What it proves wrong is made again by the next `advance` or `settle`. */
+  /** Take a message of another machine. The next `advance` or `settle` repeats the ticks that it proves wrong. */
   receive(data) {
     const message = this.#read(data);
     const other = message.player;

@@ -320,7 +320,7 @@ Variant grab(Self self, In in) {
   return of(int64_t(made));
 }
 
-// That with a number from 0 to 15.
+// By its number, from 0 to 15.
 Variant grab_of(Self self, In in) {
   ts_grab found = 0;
   check(ts_world_get_grab(self.world, in.small(0), &found));
@@ -380,7 +380,7 @@ Variant join(Self self, In in) {
   return of(int64_t(made));
 }
 
-// That with a number from 0 to 63.
+// By its number, from 0 to 63.
 Variant joint_of(Self self, In in) {
   ts_joint found = 0;
   check(ts_world_get_joint(self.world, in.small(0), &found));

@@ -286,7 +286,7 @@ typedef struct ts_pull {
 
 /* Take hold of a body's surface. There can be 16 grabs at a time. */
 TS_API ts_result ts_body_grab(ts_world world, ts_body body, const ts_pull* pull, ts_grab* grab);
-/* That with a number from 0 to 15; 0 for none. Grabs of the exported world are there, too. */
+/* The grab with a number from 0 to 15; 0 if there is none. Grabs of the exported world are among them. */
 TS_API ts_result ts_world_get_grab(ts_world world, int32_t number, ts_grab* grab);
 TS_API ts_result ts_grab_move(ts_world world, ts_grab grab, const double point[3]);
 TS_API ts_result ts_grab_release(ts_world world, ts_grab grab);
@@ -299,7 +299,7 @@ TS_API ts_result ts_grab_get_force(ts_world world, ts_grab grab, double force[3]
  * vertex of `other`. There can be 64 joints at a time, which hold 2,048 vertices together. */
 TS_API ts_result ts_body_join(ts_world world, ts_body body, const int32_t* vertices, size_t count, ts_body other,
                               const int32_t* onto, ts_joint* joint);
-/* That with a number from 0 to 63; 0 for none. Joints of the exported world are there, too. */
+/* The joint with a number from 0 to 63; 0 if there is none. Joints of the exported world are among them. */
 TS_API ts_result ts_world_get_joint(ts_world world, int32_t number, ts_joint* joint);
 TS_API ts_result ts_joint_release(ts_world world, ts_joint joint);
 /* With what `other` pulls `body`, mean over the last step [N, in Unreal kg cm/s^2]. */
@@ -319,7 +319,7 @@ typedef struct ts_drive {
 /* There can be 64 motors at a time, which drive 16,384 vertices together. */
 TS_API ts_result ts_body_add_motor(ts_world world, ts_body body, const int32_t* vertices, size_t count,
                                    const ts_drive* drive, ts_motor* motor);
-/* That with a number from 0 to 63; 0 for none. Motors of the exported world are there, too. */
+/* The motor with a number from 0 to 63; 0 if there is none. Motors of the exported world are among them. */
 TS_API ts_result ts_world_get_motor(ts_world world, int32_t number, ts_motor* motor);
 TS_API ts_result ts_motor_set_speed(ts_world world, ts_motor motor, double speed);
 /* With 0 the vertices coast. */

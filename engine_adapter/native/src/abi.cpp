@@ -225,7 +225,7 @@ void fill_shape(const Turn& world, const ts_shape& shape, Collider* row) {
   row->mask = shape.mask;
 }
 
-// Of a motor that turns: rad/s and a moment. Of one that pushes: length/s and a force.
+// A motor that turns has rad/s and a torque, one that pushes has length/s and a force.
 double motor_speed_in(const Turn& world, bool turns, double host) {
   return turns ? host : world.axes().length_in(host);
 }

@@ -188,7 +188,7 @@ def main() -> None:
     for name, found in zip(("Python", "node"), reports, strict=True):
         print(
             f"{name}: {found['ticks']:,} ticks, {found['rollbacks']:,} rollbacks, the longest "
-            f"{found['longest']} ticks; {found['remade']:,} ticks made again, {found['ms']:.2f} ms each; "
+            f"{found['longest']} ticks; {found['remade']:,} ticks repeated, {found['ms']:.2f} ms each; "
             f"hash {found['hash']}"
         )
         if found["desync"] is not None:

@@ -36,7 +36,7 @@ class Player:
         self.line, self.player, self.ticks, self.cheat = line, player, ticks, cheat
         self.session = RollbackSession(world, self.act, player=player, input_size=3, step=STEP)
         self.frames = self.remade = 0
-        self.seconds = 0.0  # for what was made again
+        self.seconds = 0.0  # for repeated ticks
 
     def act(self, inputs: Inputs) -> None:
         """Apply inputs; a cheat sees one bit of them changed in one tick."""
