@@ -80,7 +80,8 @@ def web_sources() -> list[str | Path]:
     """What the compiler is given for the native library, which is linked with a world's kernels."""
     native = _HERE / "native"
     return [
-        *("-mexec-model=reactor", "-std=c++17", "-O2", "-msimd128", "-ffp-contract=off"),
+        # Small code for our own, and fast code for what the kernels call of the standard library.
+        *("-mexec-model=reactor", "-std=c++17", "-O2", "-Xclang", "-Os", "-msimd128", "-ffp-contract=off"),
         *(
             "-fno-exceptions",
             "-fno-rtti",

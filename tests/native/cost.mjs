@@ -2,13 +2,14 @@
 //
 //     node cost.mjs FOLDER [STEPS]
 import { readFileSync } from "node:fs";
-import { gzipSync } from "node:zlib";
+import { brotliCompressSync, gzipSync } from "node:zlib";
 import { sceneOf } from "../../engine_adapter/web/taichi-soft.js";
 
 const [folder, steps = "300"] = process.argv.slice(2);
 const [code, file] = ["kernels/web.wasm", "world.tsw"].map((name) => readFileSync(`${folder}/${name}`));
-const kB = (bytes) => `${(gzipSync(bytes, { level: 9 }).length / 1000).toFixed(0)} kB`;
-console.log(`gzipped: module ${kB(code)}, world ${kB(file)}`);
+const kB = (bytes) => `${(bytes.length / 1000).toFixed(0)} kB`;
+console.log(`gzipped: module ${kB(gzipSync(code, { level: 9 }))}, world ${kB(gzipSync(file, { level: 9 }))}`);
+console.log(`by Brotli: module ${kB(brotliCompressSync(code))}, world ${kB(brotliCompressSync(file))}`);
 
 const start = performance.now();
 const scene = await sceneOf(code, file);
