@@ -369,6 +369,73 @@ def test_the_script_of_the_page_chooses_levels_by_distance(levels):
     assert levels["afar"] == [0, 1, 2, 2, 0]
 
 
+@pytest.fixture(scope="module")
+def drives(run, world_of):
+    """What bodies do under the functions of soft_world.gd for gravity, friction, joints and motors."""
+    world_of("joined")
+    return told(run("drives.gd"))
+
+
+def test_gravity_is_set(drives):
+    """Half a second of it."""
+    fall = drives["fall"]
+    assert fall["answer"]
+    assert fall["moved"] == pytest.approx([0.125, -0.25, 0.5], abs=0.005)
+
+
+def test_a_collider_brakes_by_its_friction(drives):
+    """From 1 m/s: without friction a second goes by, with it a length of v^2 / (2 mu g)."""
+    lengths = [found["moved"][1] for found in drives["floor"]]
+    assert all(found["answer"] for found in drives["floor"])
+    assert lengths == pytest.approx([1.0, 1 / (0.4 * 9.81), 1 / (0.8 * 9.81)], rel=0.05)
+
+
+def test_a_body_brakes_another_by_its_friction(drives):
+    assert [found["answers"] for found in drives["stack"]] == [[True, True]] * 2
+    slides, stays = (abs(found["apart"][0]) for found in drives["stack"])
+    assert slides > 0.12
+    assert stays < 0.06
+
+
+def test_a_joint_bears_a_body_until_it_is_released(drives):
+    hang = drives["hang"]
+    weight = 0.4 * 0.4 * 0.3 * 1000 * 9.81
+    assert hang["listed"]
+    assert hang["force"] == pytest.approx([0.0, 0.0, weight], abs=0.02 * weight)
+    assert hang["sank"] < 0.02
+    assert hang["released"] == [True, False]
+    assert hang["fell"] == pytest.approx(9.81 / 2 * (20 / 64) ** 2, rel=0.05)
+    assert hang["onto"] < 1e-4  # vertices that were joined one to one
+
+
+def test_a_motor_turns_a_body_as_it_is_set(drives):
+    turn = drives["turn"]
+    assert turn["listed"]
+    assert turn["answers"] == [True, True, True]
+    assert turn["speed"] == pytest.approx(3.0, rel=0.1)
+    assert turn["back"] == pytest.approx(-2.0, rel=0.1)
+    assert turn["coasts"] == pytest.approx(-2.0, abs=1.0)  # its limit is 0, though 9 rad/s are asked for
+    assert turn["removed"] == [True, False, 0]
+    assert turn["gone"] == [False, False]
+
+
+def test_joints_and_motors_are_found_by_name_and_number(drives):
+    assert drives["names"] == {
+        "there": True,
+        "numbers": [True, True],
+        "nobody": [0, 0, 0],
+        "set": [False, False],
+    }
+
+
+def test_these_tests_call_every_such_function_of_the_node():
+    node = (GODOT / "demo" / "addons" / "taichi_soft" / "soft_world.gd").read_text(encoding="utf-8")
+    named = re.findall(r"^func (\w*(?:gravity|friction|join|motor|level)\w*)\(", node, re.MULTILINE)
+    assert len(named) == 15
+    scripts = "".join((SCRIPTS / name).read_text(encoding="utf-8") for name in ("drives.gd", "levels.gd"))
+    assert [name for name in named if f"_world.{name}(" not in scripts] == []
+
+
 def test_the_script_of_the_page_runs(run, project):
     """Its elephant falls, and is drawn; the mouse takes it, and it is hung up."""
     text = (ROOT / "docs" / "godot.md").read_text(encoding="utf-8")
