@@ -324,6 +324,21 @@ def test_the_sample_of_three_js_shows_a_jelly_that_can_be_lifted_and_balls_that_
         assert complaints == []
 
 
+def test_the_sample_says_why_it_does_not_play(sample):
+    fetch_three_js()
+    with serving(sample) as address, chromium() as browser:
+        page = browser.new_page()
+        page.route("https://cdn.jsdelivr.net/**", lambda route: route.abort())
+        page.goto(f"{address}/index.html")
+        page.get_by_text("three.js comes from cdn.jsdelivr.net").wait_for()
+        page.unroute("https://cdn.jsdelivr.net/**")
+        page.route("https://cdn.jsdelivr.net/**", of_this_machine)
+        page.route("**/world.tsw", lambda route: route.fulfill(body="no world"))
+        page.goto(f"{address}/index.html")
+        page.get_by_text("world is no world file: give a folder that `taichi-soft export` wrote").wait_for()
+        assert page.locator("p").count() == 1
+
+
 def test_the_code_of_the_documentation_runs_in_a_browser(sample):
     first, _, second, _ = re.findall(r"```js\n(.*?)```", (ROOT / "docs" / "web.md").read_text(), re.DOTALL)
     imports = "".join(re.findall(r"^import .*\n", second, re.MULTILINE))
