@@ -83,6 +83,7 @@ dist-native: native
 	@cp engine_adapter/godot/demo/world.py assets/elephant.glb out/godot3
 	@$(BIN)/taichi-soft export out/godot3/world.py --axes y-up --out out/godot3/demo.softworld
 	@cd out/godot3 && cpack -B $(CURDIR)/dist > cpack.log || { cat cpack.log; exit 1; }
+	@rm -r dist/_CPack_Packages
 	@ls -l dist
 
 profile: $(VENV)/.demo
