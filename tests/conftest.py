@@ -63,7 +63,9 @@ SECONDS = {
     "levels/": (25, 150),
     "bodies/": (36, 296),
     "lab/peers/": (0, 240),
-    "lab/": (0, 355),
+    "lab/": (0, 255),
+    "doctor/": (0, 45),
+    "profiling/": (0, 110),
     "cli/": (0, 225),
     "demos/": (0, 620),
     "docs/": (1, 650),
@@ -89,7 +91,8 @@ NUMPY = ("meshing/", "cages/", "elements/materials/", "bake/test_formats", "test
 KERNEL = ("elements/", "contact/distances/", "contact/shapes/", "core/math/")
 WORLD = ("elements/laws/test_energy_laws",)
 SOAK = (
-    *("lab/", "demos/", "cli/", "native/", "live/test_served", "live/test_page", "live/test_measuring"),
+    *("lab/", "doctor/", "profiling/", "demos/", "cli/", "native/"),
+    *("live/test_served", "live/test_page", "live/test_measuring"),
     "feel/test_material_from_feel.py::test_random_wishes",
     "feel/test_material_from_feel.py::test_what_cannot",
     *(

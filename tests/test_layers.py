@@ -33,6 +33,8 @@ LAYERS = """
     render
     bake
     export
+    doctor
+    profiling
     lab
     live
     cli

@@ -10,8 +10,8 @@ import numpy as np
 from engine_adapter import EngineAdapter, FixedStep
 from taichi_soft.core.types import ScheduleName
 from taichi_soft.elements.materials import Material
-from taichi_soft.lab.profiling.spread import Spread, time_calls
 from taichi_soft.meshing import TetMesh, sphere
+from taichi_soft.profiling.spread import Spread, time_calls
 from taichi_soft.solver.kernels.phase_timing import PHASES, repeat_phase
 from taichi_soft.world.world import World, context_of_world
 

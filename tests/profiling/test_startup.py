@@ -3,7 +3,7 @@
 import pytest
 
 from taichi_soft.core.errors import DeviceError
-from taichi_soft.lab.profiling import startup
+from taichi_soft.profiling import startup
 
 
 def test_a_full_cache_is_quicker_and_the_first_frame_comes_before_all_is_warm():

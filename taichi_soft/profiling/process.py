@@ -6,7 +6,7 @@ import subprocess
 import sys
 
 from taichi_soft.core.errors import DeviceError
-from taichi_soft.lab.profiling.spread import Spread
+from taichi_soft.profiling.spread import Spread
 
 WARM_TURNS = 2
 

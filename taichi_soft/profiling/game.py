@@ -17,9 +17,9 @@ from taichi_soft.core.package_data import ASSETS
 from taichi_soft.core.types import LawName
 from taichi_soft.elements.materials import preset
 from taichi_soft.elements.materials.material import DAMPING_RATIO
-from taichi_soft.lab.profiling.spread import Spread, compare, time_calls
-from taichi_soft.lab.profiling.stolen import processor_ticks, stolen_since
 from taichi_soft.meshing import TetMesh, box, load_mesh, sphere
+from taichi_soft.profiling.spread import Spread, compare, time_calls
+from taichi_soft.profiling.stolen import processor_ticks, stolen_since
 from taichi_soft.world.body import Body
 from taichi_soft.world.world import World
 

@@ -15,8 +15,8 @@ import trimesh
 from engine_adapter import EngineAdapter, FixedStep
 from taichi_soft.bodies.asset import SoftBodyAsset
 from taichi_soft.elements.materials import Material
-from taichi_soft.lab.profiling.spread import Spread
-from taichi_soft.lab.profiling.stolen import processor_ticks, stolen_since
+from taichi_soft.profiling.spread import Spread
+from taichi_soft.profiling.stolen import processor_ticks, stolen_since
 from taichi_soft.world.body import Body
 from taichi_soft.world.world import World
 

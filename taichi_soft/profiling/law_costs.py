@@ -9,8 +9,8 @@ from functools import partial
 from taichi_soft.core.types import LawName, StrainName
 from taichi_soft.elements.laws import LAWS, BondLaw, Law, element_model
 from taichi_soft.elements.materials import AnisotropicMaterial, Material, Stiffness
-from taichi_soft.lab.profiling.spread import Spread, compare
 from taichi_soft.meshing import box
+from taichi_soft.profiling.spread import Spread, compare
 from taichi_soft.world.world import World
 
 MESH = box((1.0, 1.0, 1.0), (10, 10, 10))

@@ -8,7 +8,7 @@ import pytest
 
 from taichi_soft import box
 from taichi_soft.core.errors import DeviceError
-from taichi_soft.lab.profiling import (
+from taichi_soft.profiling import (
     compare_with_baseline,
     compile_baseline,
     devices,
@@ -21,9 +21,9 @@ from taichi_soft.lab.profiling import (
     measure_moments,
     scaling,
 )
-from taichi_soft.lab.profiling.report import tables
-from taichi_soft.lab.profiling.spread import Spread
-from taichi_soft.lab.profiling.stolen import processor_ticks, stolen_since
+from taichi_soft.profiling.report import tables
+from taichi_soft.profiling.spread import Spread
+from taichi_soft.profiling.stolen import processor_ticks, stolen_since
 
 needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C++ compiler here")
 
@@ -122,7 +122,7 @@ def test_a_device_is_compared_with_the_processor_scene_by_scene(monkeypatch):
 
 def test_stolen_time_is_told_of_what_the_processors_were_wanted_for(monkeypatch, tmp_path):
     times = tmp_path / "stat"
-    monkeypatch.setattr("taichi_soft.lab.profiling.stolen.TIMES", times)
+    monkeypatch.setattr("taichi_soft.profiling.stolen.TIMES", times)
     assert stolen_since(processor_ticks()) is None
     times.write_text("cpu  100 0 20 5000 30 0 0 10 0 0\ncpu0 1 2 3 4 5 6 7 8 0 0\n")
     before = processor_ticks()

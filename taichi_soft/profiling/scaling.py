@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from taichi_soft.lab.profiling.process import Process, compare_processes
-from taichi_soft.lab.profiling.spread import Spread
+from taichi_soft.profiling.process import Process, compare_processes
+from taichi_soft.profiling.spread import Spread
 
 BODIES = 64
 SUBSTEPS = (4, 14)
@@ -18,8 +18,8 @@ import sys
 from functools import partial
 from taichi_soft import init
 init("cpu", {threads}, {cores})
-from taichi_soft.lab.profiling.phases import spheres
-from taichi_soft.lab.profiling.spread import Spread, time_calls
+from taichi_soft.profiling.phases import spheres
+from taichi_soft.profiling.spread import Spread, time_calls
 step = partial(spheres({bodies}).step, 1e-3)
 for line in sys.stdin:
     print(Spread.of(time_calls(partial(step, int(line)), {steps})).median, flush=True)

@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from taichi_soft.cages.connected import components
 from taichi_soft.cages.welding import places_of
 from taichi_soft.meshing.surface import Surface, joined
-
-Ints = NDArray[np.int64]
 
 NO_AREA = 1e-12
 """Twice the area over the square of the longest side."""

@@ -8,9 +8,9 @@ from functools import partial
 import numpy as np
 
 from taichi_soft.elements.materials import Material
-from taichi_soft.lab.profiling.sparse import SparseBody
-from taichi_soft.lab.profiling.spread import Spread, compare
 from taichi_soft.meshing import box, sphere
+from taichi_soft.profiling.sparse import SparseBody
+from taichi_soft.profiling.spread import Spread, compare
 from taichi_soft.world.world import World
 
 GROWTH = 100

@@ -13,9 +13,9 @@ from taichi_soft.bodies.layout import arrange
 from taichi_soft.core.types import LawName
 from taichi_soft.elements.laws import element_model
 from taichi_soft.elements.materials import Material
-from taichi_soft.lab.profiling.baseline import Baseline
-from taichi_soft.lab.profiling.spread import Spread, compare
 from taichi_soft.meshing import box
+from taichi_soft.profiling.baseline import Baseline
+from taichi_soft.profiling.spread import Spread, compare
 from taichi_soft.world.world import World
 
 SIZES = {25_000: (17, 17, 17), 5_000: (10, 10, 10), 1_000: (6, 6, 6)}

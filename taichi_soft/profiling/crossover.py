@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from taichi_soft.lab.profiling.phases import spheres
-from taichi_soft.lab.profiling.spread import Spread, compare
 from taichi_soft.meshing import box
+from taichi_soft.profiling.phases import spheres
+from taichi_soft.profiling.spread import Spread, compare
 
 CELLS = (6, 10, 14, 18, 22, 28)
 SUBSTEPS = 20

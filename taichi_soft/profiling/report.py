@@ -10,11 +10,11 @@ from rich.table import Table
 
 from taichi_soft.elements.laws import LAWS
 from taichi_soft.elements.laws.law import ANISOTROPIC
-from taichi_soft.lab.profiling.budget import Budget
-from taichi_soft.lab.profiling.kept_budget import KeptBudget
-from taichi_soft.lab.profiling.law_costs import LawCost
-from taichi_soft.lab.profiling.phases import Phases
-from taichi_soft.lab.profiling.spread import Spread
+from taichi_soft.profiling.budget import Budget
+from taichi_soft.profiling.kept_budget import KeptBudget
+from taichi_soft.profiling.law_costs import LawCost
+from taichi_soft.profiling.phases import Phases
+from taichi_soft.profiling.spread import Spread
 
 
 def tables(found: dict[str, Any]) -> Iterator[tuple[str, Table]]:

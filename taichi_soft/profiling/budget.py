@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from taichi_soft.lab.profiling.phases import Phases, measure_phases
+from taichi_soft.profiling.phases import Phases, measure_phases
 
 FRAME_RATES = (60, 120)  # [Hz]
 

@@ -12,9 +12,9 @@ from surfaces import ball, joined, with_some_turned, with_triangles, without
 from taichi_soft import Material, MeshError, box, save_mesh
 from taichi_soft.cli import main
 from taichi_soft.core.extras import missing_packages
-from taichi_soft.lab.doctor import Grade, diagnose
-from taichi_soft.lab.doctor.mending import write_mended
-from taichi_soft.lab.doctor.surface import facts_of
+from taichi_soft.doctor import Grade, diagnose
+from taichi_soft.doctor.mending import write_mended
+from taichi_soft.doctor.surface import facts_of
 from taichi_soft.meshing.surfaces import read_surfaces
 
 RUBBER = Material(young=5e5, poisson=0.4, density=1000.0)

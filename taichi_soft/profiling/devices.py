@@ -9,10 +9,10 @@ import numpy as np
 
 from engine_adapter import EngineAdapter, FixedStep
 from taichi_soft.core.types import ArchName
-from taichi_soft.lab.profiling.phases import TINY_H, spheres
-from taichi_soft.lab.profiling.process import Process, compare_processes
-from taichi_soft.lab.profiling.spread import Spread, time_calls
 from taichi_soft.meshing import TetMesh, box, sphere
+from taichi_soft.profiling.phases import TINY_H, spheres
+from taichi_soft.profiling.process import Process, compare_processes
+from taichi_soft.profiling.spread import Spread, time_calls
 
 SUBSTEPS = 8
 SCENES = ((1, 6), (1, 14), (1, 28), (16, 0), (256, 0))
@@ -24,7 +24,7 @@ _PROGRAM = """
 import sys
 from taichi_soft import init
 init({arch!r}, {threads!r}, {cores!r})
-from taichi_soft.lab.profiling.devices import Frames
+from taichi_soft.profiling.devices import Frames
 frames = Frames()
 for line in sys.stdin:
     print(frames.time(*map(int, line.split())), flush=True)
