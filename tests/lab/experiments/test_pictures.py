@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from lab.experiments.pictures import GAP, frames_side_by_side, picture
 from taichi_soft import OptionError, box
-from taichi_soft.lab.experiments.pictures import GAP, frames_side_by_side, picture
 
 SIZE = (160, 120)
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from taichi_soft.lab.report import run
+from lab.report import run
 
 sys.path.insert(0, str(Path(__file__).parent))  # for `fakes`; worker processes take it over
 

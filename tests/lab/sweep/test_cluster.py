@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from acts import act, root
 
+from lab.sweep import Task, cluster_workers, compute_all, local_workers
 from taichi_soft.core.errors import SweepError
-from taichi_soft.lab.sweep import Task, cluster_workers, compute_all, local_workers
 
 TIME_LIMIT = 12.0
 """For a point that hangs [s]: longer than a shared machine stands still now and then."""
@@ -85,7 +85,7 @@ def test_the_same_numbers_come_from_a_cluster_and_from_this_machine(cluster):
 
 
 def test_workers_with_other_code_are_refused(cluster, monkeypatch):
-    monkeypatch.setattr("taichi_soft.lab.sweep.provenance._digest", lambda: "another")
+    monkeypatch.setattr("lab.sweep.provenance._digest", lambda: "another")
     with (
         pytest.raises(SweepError, match="install the same versions"),
         cluster_workers(cluster.scheduler_address),
@@ -121,7 +121,7 @@ def test_a_client_whose_thread_is_late_is_started_again(cluster, monkeypatch):
 
 def test_a_cluster_that_stands_still_ends_the_sweep(cluster, monkeypatch):
     """Its connections are open, but nobody answers."""
-    monkeypatch.setattr("taichi_soft.lab.sweep.cluster.ANSWER_LIMIT", 1.0)
+    monkeypatch.setattr("lab.sweep.cluster.ANSWER_LIMIT", 1.0)
     tasks = [Task("a", act, {"x": x, "do": "sleep", "seconds": 0.2}) for x in range(500)]
 
     def compute_some():
@@ -142,7 +142,7 @@ def test_a_cluster_that_stands_still_ends_the_sweep(cluster, monkeypatch):
 
 @pytest.mark.parametrize("address", ["127.0.0.1:1", "nonsense", "moon://x:1", ""])
 def test_no_cluster_is_one_line(address, monkeypatch):
-    monkeypatch.setattr("taichi_soft.lab.sweep.cluster.CONNECT_LIMIT", 1.0)
+    monkeypatch.setattr("lab.sweep.cluster.CONNECT_LIMIT", 1.0)
     with pytest.raises(SweepError, match="dask scheduler") as caught, cluster_workers(address):
         pass
     assert repr(address) in str(caught.value)

@@ -5,8 +5,8 @@ from contextlib import closing
 
 import pytest
 
+from lab.sweep import Outcome, Task, compute_all, schedule
 from taichi_soft.core.errors import SweepError
-from taichi_soft.lab.sweep import Outcome, Task, compute_all, schedule
 
 
 class Pretender:

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from acts import act
 
-from taichi_soft.lab.sweep import Task, compute_all, local_workers
+from lab.sweep import Task, compute_all, local_workers
 
 TIME_LIMIT = 12.0
 """For a point that hangs [s]: longer than a shared machine stands still now and then."""
@@ -80,7 +80,7 @@ def test_what_is_timed_runs_alone_after_all_else(crew):
 PROGRAM = """
 import sys
 from contextlib import closing
-from taichi_soft.lab.sweep import Task, compute_all, local_workers
+from lab.sweep import Task, compute_all, local_workers
 sys.path.insert(0, {folder!r})
 from acts import act
 
