@@ -14,7 +14,6 @@ EXTRAS = {
         "scipy": "scipy",
         "skfem": "scikit-fem",
     },
-    "cluster": {"distributed": "distributed"},
     "peers": {"mujoco": "mujoco", "newton": "newton", "pybullet": "pybullet"},
 }
 """By extra: its modules, and the packages that have them, as in pyproject.toml."""

@@ -215,7 +215,6 @@ by a branch."""
 NEEDS = {
     "lab/experiments/": "lab",
     "lab/report/": "lab",
-    "lab/sweep/test_cluster": "cluster",
     "docs/test_pages.py::test_the_code_of_a_page_runs_from_top_to_bottom[panda3d": "panda3d",
     "docs/test_pages.py::test_code_of_a_page_imports_public_names_only[panda3d": "panda3d",
 }

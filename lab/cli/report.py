@@ -11,7 +11,6 @@ from rich.markup import escape
 
 from lab.extras import require_report
 from taichi_soft.cli.console import Arch, console, errors, say
-from taichi_soft.core.errors import OptionError
 from taichi_soft.core.runtime import init
 
 
@@ -29,14 +28,6 @@ def report(
     ] = False,
     workers: Annotated[
         int | None, typer.Option(min=1, max=256, help="Processes; one per core by default.")
-    ] = None,
-    cluster: Annotated[
-        str | None,
-        typer.Option(
-            help="Address of a Dask scheduler, host:port, whose workers compute instead. Dask sends Python "
-            "objects by pickle both ways: whoever reaches that port can run code on its workers and on this "
-            "machine, so name a scheduler that you trust, in a network that you trust."
-        ),
     ] = None,
     arch: Arch = "auto",
     show_list: Annotated[
@@ -57,10 +48,6 @@ def report(
         for each in chosen:
             say(f"[bold]{each.name:24}[/]{escape(f'{each.title} ({each.source})')}")
         return
-    if cluster is not None and workers is not None:
-        raise OptionError(
-            f"--workers {workers} are of this machine, and --cluster {cluster} has its own: leave out one"
-        )
     require_report()
     folder = out or Path("out") / "report"
     require_writable(folder)
@@ -68,9 +55,7 @@ def report(
     if device.is_gpu and workers is None:
         workers = 1
     effort = Effort.QUICK if quick else Effort.FULL
-    concluded = run_experiments(
-        chosen, effort, folder / "data", errors, workers=workers, cluster=cluster, arch=device.arch
-    )
+    concluded = run_experiments(chosen, effort, folder / "data", errors, workers=workers, arch=device.arch)
     from lab.report.judgements import judge
     from lab.report.page import write_report
     from lab.report.terminal import print_section, print_verdicts
@@ -89,8 +74,7 @@ def report(
             str(folder),
             *["--quick"] * quick,
         ]
-        facts = machine_facts(device.arch, f"Dask, {cluster}" if cluster else "processes of this machine")
-        page = write_report(concluded, folder, shlex.join(command), effort, facts)
+        page = write_report(concluded, folder, shlex.join(command), effort, machine_facts(device.arch))
         print_verdicts(console, judge(concluded))
         say(f"wrote {escape(str(page))}")
     failed = sum(len(results.failed) for _, results, _ in concluded)

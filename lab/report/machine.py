@@ -10,11 +10,10 @@ from pathlib import Path
 PACKAGES = ("taichi-soft", "taichi", "numpy", "scipy", "scikit-fem")
 
 
-def machine_facts(arch: str, workers: str) -> dict[str, str]:
-    """Names and values for people: `arch` as Taichi knows it, and a few words on who computed."""
+def machine_facts(arch: str) -> dict[str, str]:
+    """Names and values for people: `arch` as Taichi knows it."""
     return {
         "device": f"{arch}, one thread per process",
-        "workers": workers,
         "processor": f"{_processor()}, {os.cpu_count()} cores",
         "platform": platform.platform(),
         "python": platform.python_version(),

@@ -163,7 +163,7 @@ def write_page(rows: Sequence[Result], path: Path, command: str, arch: ArchName)
 
 
 def _page(rows: Sequence[Result], command: str, arch: ArchName) -> Iterator[str]:
-    facts = machine_facts(arch, "processes of this machine")
+    facts = machine_facts(arch)
     yield "# Which bodies hold"
     yield ""
     yield (

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, closing, contextmanager
+from collections.abc import Iterable, Sequence
+from contextlib import ExitStack, closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -30,10 +30,7 @@ from lab.sweep import (
     Outcome,
     Store,
     Task,
-    Worker,
-    cluster_workers,
     compute_all,
-    local_workers,
     origin,
     show_progress,
 )
@@ -69,7 +66,6 @@ def run_experiments(
     console: Console,
     *,
     workers: int | None = None,
-    cluster: str | None = None,
     arch: ArchName = "cpu",
     time_limit: float = TIME_LIMIT,
 ) -> list[Concluded]:
@@ -79,9 +75,8 @@ def run_experiments(
     Args:
         console: for progress, and for what went wrong with single points.
         workers: processes on this machine, or, where None, one for each core.
-        cluster: address of a Dask scheduler, whose workers compute instead.
         time_limit: of a point [s].
-    Raises: SweepError before anything is computed, for a cluster or files that cannot be used.
+    Raises: SweepError before anything is computed, for files that cannot be used.
     """
     points = {experiment.name: experiment.points(effort) for experiment in experiments}
     with ExitStack() as stack:
@@ -100,28 +95,21 @@ def run_experiments(
         known = f", {total - len(tasks)} of them measured before: {folder}" if len(tasks) < total else ""
         _note(console, f"{total} points of {len(experiments)} experiments{known}")
         if tasks:
-            crew = stack.enter_context(_workers(cluster, workers, arch))
+            outcomes = stack.enter_context(
+                closing(compute_all(tasks, workers=workers, arch=arch, time_limit=time_limit))
+            )
             try:
-                _compute(tasks, crew, time_limit, stores, console)
+                _keep_all(outcomes, len(tasks), stores, console)
             except KeyboardInterrupt:
                 _note(console, f"what was computed is kept in {folder}: the same command goes on from there")
                 raise
         return [_conclude(each, _results(points[each.name], stores[each.name])) for each in experiments]
 
 
-@contextmanager
-def _workers(cluster: str | None, workers: int | None, arch: ArchName) -> Iterator[list[Worker]]:
-    with cluster_workers(cluster, arch) if cluster else local_workers(workers, arch) as crew:
-        yield crew
-
-
-def _compute(
-    tasks: list[Task], crew: list[Worker], time_limit: float, stores: dict[str, Store], console: Console
+def _keep_all(
+    outcomes: Iterable[tuple[Task, Outcome]], count: int, stores: dict[str, Store], console: Console
 ) -> None:
-    with (
-        show_progress(console, len(tasks)) as advance,
-        closing(compute_all(tasks, crew, time_limit)) as outcomes,
-    ):
+    with show_progress(console, count) as advance:
         for task, outcome in outcomes:
             stores[task.group].keep(task.point, outcome)
             if outcome.numbers is None:

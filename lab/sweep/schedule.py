@@ -2,130 +2,84 @@
 
 from __future__ import annotations
 
-import queue
-import threading
-import time
 from collections.abc import Generator, Iterator, Sequence
+from multiprocessing.connection import wait
 
-from lab.sweep.task import Outcome, Task, Worker
-from taichi_soft.core.errors import SweepError
+from lab.sweep.task import Outcome, Task
+from lab.sweep.worker import Worker
+from taichi_soft.core.cores import available_cores
+from taichi_soft.core.types import ArchName
 
 TIME_LIMIT = 1800.0
 """Of a point [s]."""
 
-PATIENCE = 30.0
-"""How long a worker without a process waits for another one [s]."""
+LOOK = 0.5
+"""Time limits are looked at this often, and Ctrl-C is where it does not interrupt a wait [s]."""
 
 
 def compute_all(
-    tasks: Sequence[Task], workers: Sequence[Worker], time_limit: float = TIME_LIMIT
+    tasks: Sequence[Task],
+    *,
+    workers: int | None = None,
+    arch: ArchName = "cpu",
+    time_limit: float = TIME_LIMIT,
 ) -> Generator[tuple[Task, Outcome], None, None]:
     """Compute points and yield them as they are done; those that have to be alone last, one after the other.
 
-    Closing the iterator stops what is being computed: use `contextlib.closing`.
-    Raises: SweepError where no worker is left.
+    The outcome of a point says what went wrong: an error, a process that was lost, too long a time. Closing
+    the iterator stops what is being computed: use `contextlib.closing`.
+
+    Args:
+        workers: processes of one thread each, started when they are needed; None: one for each core.
+        time_limit: of a point [s].
     """
-    alone = [task for task in tasks if task.is_alone]
-    together = [task for task in tasks if not task.is_alone]
-    yield from _compute(together, workers, time_limit)
-    first = next((worker for worker in workers if worker.is_ready()), workers[0])
-    yield from _compute(alone, [first], time_limit)
+    crew = [Worker(arch, time_limit) for _ in range(workers or len(available_cores()))]
+    try:
+        yield from _compute([task for task in tasks if not task.is_alone], crew)
+        yield from _compute([task for task in tasks if task.is_alone], crew[:1])
+    except BaseException:
+        for worker in crew:
+            worker.kill()
+        raise
+    finally:
+        for worker in crew:
+            worker.end()
 
 
-class _Waiting:
-    """Points not yet begun, by group, for several threads."""
+def _compute(tasks: Sequence[Task], crew: Sequence[Worker]) -> Iterator[tuple[Task, Outcome]]:
+    waiting = Waiting(tasks)
+    known: list[set[str]] = [set() for _ in crew]
+    while True:
+        for worker, groups in zip(crew, known, strict=True):
+            if not worker.is_busy and (task := waiting.take(groups)):
+                worker.begin(task)
+        busy = [worker for worker in crew if worker.is_busy]
+        if not busy:
+            return
+        wait([worker.pipe for worker in busy], LOOK)
+        for worker in busy:
+            if done := worker.look():
+                yield done
+
+
+class Waiting:
+    """Points not yet begun, by group."""
 
     def __init__(self, tasks: Sequence[Task]) -> None:
-        self._lock = threading.Lock()
         self._groups: dict[str, list[Task]] = {}
         self._begun: set[str] = set()
         for task in tasks:
             self._groups.setdefault(task.group, []).append(task)
 
-    def __len__(self) -> int:
-        with self._lock:
-            return sum(map(len, self._groups.values()))
-
-    def take(self, known: list[str]) -> Task | None:
+    def take(self, known: set[str]) -> Task | None:
         """The next point for a worker that has computed points of the groups `known`, which is added to: of
         these, or of a group that nobody has begun, or else of the one with most points left."""
-        with self._lock:
-            left = [name for name, tasks in self._groups.items() if tasks]
-            if not left:
-                return None
-            own = [name for name in left if name in known]
-            new = [name for name in left if name not in self._begun]
-            name = (own or new or sorted(left, key=lambda name: -len(self._groups[name])))[0]
-            self._begun.add(name)
-            known.append(name)
-            return self._groups[name].pop(0)
-
-    def clear(self) -> None:
-        """Nothing more is to be begun."""
-        with self._lock:
-            self._groups.clear()
-
-
-_Done = queue.SimpleQueue[tuple[Task, Outcome] | Exception | None]
-
-
-def _compute(
-    tasks: Sequence[Task], workers: Sequence[Worker], time_limit: float
-) -> Iterator[tuple[Task, Outcome]]:
-    if not tasks:
-        return
-    waiting, done = _Waiting(tasks), _Done()
-    threads = [
-        threading.Thread(target=_serve, args=(worker, waiting, done, time_limit), daemon=True)
-        for worker in workers
-    ]
-    for thread in threads:
-        thread.start()
-    try:
-        active = len(threads)
-        while active:
-            item = _next(done)
-            if item is None:
-                active -= 1
-            elif isinstance(item, Exception):
-                raise item
-            else:
-                yield item
-        if waiting:
-            raise SweepError(
-                f"no worker is left for {len(waiting)} points: start workers, and the same command again"
-            )
-    except BaseException:
-        waiting.clear()
-        for worker in workers:
-            worker.stop()
-        raise
-    finally:
-        for thread in threads:
-            thread.join()
-
-
-def _next(done: _Done) -> tuple[Task, Outcome] | Exception | None:
-    """Wait, but for no longer than it may take until Ctrl-C is heard, where a lock cannot be interrupted."""
-    while True:
-        try:
-            return done.get(timeout=0.5)
-        except queue.Empty:
-            continue
-
-
-def _serve(worker: Worker, waiting: _Waiting, done: _Done, time_limit: float) -> None:
-    """Compute points with one worker until none is waiting, or its process is lost for good."""
-    known: list[str] = []
-    seen = time.monotonic()
-    try:
-        while waiting and time.monotonic() < seen + PATIENCE:
-            if not worker.is_ready():
-                time.sleep(0.2)
-            elif task := waiting.take(known):
-                done.put((task, worker.compute(task, time_limit)))
-                seen = time.monotonic()
-    except Exception as error:
-        done.put(error)
-    finally:
-        done.put(None)
+        left = [name for name, tasks in self._groups.items() if tasks]
+        if not left:
+            return None
+        own = [name for name in left if name in known]
+        new = [name for name in left if name not in self._begun]
+        name = (own or new or sorted(left, key=lambda name: -len(self._groups[name])))[0]
+        self._begun.add(name)
+        known.add(name)
+        return self._groups[name].pop(0)

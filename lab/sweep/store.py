@@ -8,9 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from lab.sweep.task import Outcome
-from taichi_soft.core.errors import SweepError
+from taichi_soft.core.errors import TaichiSoftError
 
 FORMAT = "taichi-soft sweep 1"
+
+
+class SweepError(TaichiSoftError, RuntimeError):
+    """Points cannot be kept as asked."""
 
 
 class Store:

@@ -1,4 +1,4 @@
-"""What is to be computed, what came of it, and who computes."""
+"""What is to be computed, and what came of it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import traceback
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 from taichi_soft.core.runtime import init
 from taichi_soft.core.types import ArchName
@@ -37,19 +37,6 @@ class Outcome:
     numbers: dict[str, Any] | None
     error: str = ""
     seconds: float = 0.0
-
-
-class Worker(Protocol):
-    """A process somewhere that computes one point at a time."""
-
-    def is_ready(self) -> bool:
-        """Whether it can compute now; where its process was lost, another one may take its place."""
-
-    def compute(self, task: Task, time_limit: float) -> Outcome:
-        """Compute a point and wait for it, for `time_limit` [s]. What goes wrong is in its outcome."""
-
-    def stop(self) -> None:
-        """Give up what it computes; called from another thread."""
 
 
 def compute(

@@ -40,7 +40,7 @@ def test_the_list_names_every_experiment_and_computes_nothing(report, measured, 
 def test_help_says_what_every_option_does(report):
     code, output, errors = report("--help")
     assert (code, errors) == (0, "")
-    for option in ("--out", "--quick", "--workers", "--cluster", "--arch", "--list", "[names]..."):
+    for option in ("--out", "--quick", "--workers", "--arch", "--list", "[names]..."):
         assert option in output
 
 
@@ -53,7 +53,6 @@ def test_help_says_what_every_option_does(report):
         (["--out", "/proc/nowhere"], "'/proc/nowhere'"),
         (["--out", "file"], "'file'"),
         (["--out", "file/folder"], "'file/folder'"),
-        (["--workers", "2", "--cluster", "there:1"], "there:1"),
     ],
 )
 def test_what_cannot_be_done_is_one_line_before_anything_is_measured(

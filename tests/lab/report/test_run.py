@@ -9,8 +9,8 @@ from rich.console import Console
 
 from lab.experiments import EXPERIMENTS, Effort, Verdict
 from lab.report import run
-from lab.sweep import Store
-from taichi_soft.core.errors import OptionError, SweepError
+from lab.sweep import Store, SweepError
+from taichi_soft.core.errors import OptionError
 
 
 @pytest.fixture

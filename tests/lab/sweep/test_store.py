@@ -5,9 +5,8 @@ import math
 
 import pytest
 
-from lab.sweep import Outcome, Store, origin
+from lab.sweep import Outcome, Store, SweepError, origin
 from lab.sweep.provenance import sources
-from taichi_soft.core.errors import SweepError
 
 MINE = {"sources": "0123456789abcdef", "arch": "cpu"}
 OTHER = {"sources": "fedcba9876543210", "arch": "cpu"}
