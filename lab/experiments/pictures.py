@@ -21,9 +21,6 @@ from taichi_soft.render import (
     draw_text,
 )
 
-GAP = 4
-"""White between pictures that lie side by side [pixels]."""
-
 
 def picture(
     bodies: Sequence[tuple[TetMesh, ArrayLike]],
@@ -83,20 +80,6 @@ def picture(
     if values is not None and quantity:
         draw_text(image, [f"{quantity}: violet {low:.3g}, yellow {high:.3g}"], corner=Corner.TOP_LEFT)
     return image
-
-
-def frames_side_by_side(images: Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:
-    """One picture of several, from left to right; lower ones get white below. Raises: OptionError without."""
-    if not images:
-        raise OptionError("there is no picture to lay beside another")
-    height = max(len(image) for image in images)
-    width = sum(image.shape[1] for image in images) + GAP * (len(images) - 1)
-    strip = np.full((height, width, 3), 255, dtype=np.uint8)
-    left = 0
-    for image in images:
-        strip[: len(image), left : left + image.shape[1]] = image
-        left += image.shape[1] + GAP
-    return strip
 
 
 def _colour(

@@ -3,7 +3,7 @@
 from lab.peers.comparison import Entry, compare, missing_peers
 from lab.peers.course import Course
 from lab.peers.drop import Drop
-from lab.peers.measures import Outcome, measure
-from lab.peers.registry import PEERS, Peer
+from lab.peers.measures import measure
+from lab.peers.registry import PEERS
 
-__all__ = ["PEERS", "Course", "Drop", "Entry", "Outcome", "Peer", "compare", "measure", "missing_peers"]
+__all__ = ["PEERS", "Course", "Drop", "Entry", "compare", "measure", "missing_peers"]
