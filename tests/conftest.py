@@ -14,9 +14,10 @@ from hypothesis import settings
 from xdist.scheduler import LoadScopeScheduling
 from xdist.workermanage import NodeManager
 
+from lab.extras import EXTRAS as LAB_EXTRAS
 from taichi_soft import Material, World, box, init, load_mesh
 from taichi_soft.bodies.capacity import LEAST
-from taichi_soft.core.extras import missing_packages
+from taichi_soft.core.extras import EXTRAS, missing_among
 from taichi_soft.core.runtime import DEBUG
 
 UNTIL = "TAICHI_SOFT_SOAKS_UNTIL"
@@ -63,7 +64,9 @@ SECONDS = {
     "levels/": (25, 150),
     "bodies/": (36, 296),
     "lab/peers/": (0, 240),
-    "lab/": (0, 355),
+    "lab/": (0, 255),
+    "doctor/": (0, 45),
+    "profiling/": (0, 110),
     "cli/": (0, 225),
     "demos/": (0, 620),
     "docs/": (1, 650),
@@ -89,7 +92,17 @@ NUMPY = ("meshing/", "cages/", "elements/materials/", "bake/test_formats", "test
 KERNEL = ("elements/", "contact/distances/", "contact/shapes/", "core/math/")
 WORLD = ("elements/laws/test_energy_laws",)
 SOAK = (
-    *("lab/", "demos/", "cli/", "native/", "live/test_served", "live/test_page", "live/test_measuring"),
+    *(
+        "lab/",
+        "doctor/",
+        "profiling/",
+        "demos/",
+        "cli/",
+        "native/",
+        "live/test_served",
+        "live/test_page",
+        "live/test_measuring",
+    ),
     "feel/test_material_from_feel.py::test_random_wishes",
     "feel/test_material_from_feel.py::test_what_cannot",
     *(
@@ -200,9 +213,8 @@ by a branch."""
 
 
 NEEDS = {
-    "lab/experiments/": "report",
-    "lab/report/": "report",
-    "lab/sweep/test_cluster": "cluster",
+    "lab/experiments/": "lab",
+    "lab/report/": "lab",
     "docs/test_pages.py::test_the_code_of_a_page_runs_from_top_to_bottom[panda3d": "panda3d",
     "docs/test_pages.py::test_code_of_a_page_imports_public_names_only[panda3d": "panda3d",
 }
@@ -239,8 +251,8 @@ def pytest_collection_modifyitems(items):
         item.add_marker(tier_of(item))
         for start, extra in NEEDS.items():
             if item.nodeid.removeprefix("tests/").startswith(start):
-                missing = missing_packages(extra)
-                reason = f"needs {', '.join(missing)}: pip install 'taichi-soft[{extra}]'"
+                missing = missing_among({**EXTRAS, **LAB_EXTRAS}[extra])
+                reason = f"needs {', '.join(missing)}: pip install -e '.[{extra}]'"
                 item.add_marker(pytest.mark.skipif(bool(missing), reason=reason))
 
 

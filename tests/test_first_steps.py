@@ -9,6 +9,7 @@ from pathlib import Path
 import cv2
 import pytest
 
+from lab.extras import EXTRAS as LAB_EXTRAS
 from taichi_soft.core.extras import EXTRAS
 from taichi_soft.render.demos import demo_names
 
@@ -18,7 +19,7 @@ FOLLOWED = {"demo", "docs", "gallery"}
 TESTS = {"test", "test-all"}
 """Targets of make that run this file."""
 
-OPTIONAL = {module for modules in EXTRAS.values() for module in modules}
+OPTIONAL = {module for modules in (*EXTRAS.values(), *LAB_EXTRAS.values()) for module in modules}
 ABSENT = sorted(OPTIONAL - {*EXTRAS["cli"], *EXTRAS["film"]})
 
 HIDING = f"""

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import trimesh
 
+from lab.drop_test.robustness.foreign_meshes import sliver_lattice
 from taichi_soft import Material, SoftBodyAsset, SolverWarning, World, box, sphere
-from taichi_soft.lab.drop_test.robustness.foreign_meshes import sliver_lattice
 
 BALL = sphere(1.0, 2)
 RNG = np.random.default_rng(4)
