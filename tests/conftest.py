@@ -5,19 +5,22 @@ import os
 import signal
 import sys
 import time
-from collections import Counter
 from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import settings
-from xdist.scheduler import LoadScopeScheduling
 from xdist.workermanage import NodeManager
 
 from taichi_soft import Material, World, box, init, load_mesh
 from taichi_soft.bodies.capacity import LEAST
 from taichi_soft.core.extras import missing_packages
 from taichi_soft.core.runtime import DEBUG
+
+HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE / "shared"))  # what tests of several folders import
+
+from shares import Shares, place_of  # noqa: E402
 
 UNTIL = "TAICHI_SOFT_SOAKS_UNTIL"
 """Name of the environment variable with the time [s since 1970] after which no soak begins: `.ci/run` has so
@@ -35,57 +38,11 @@ NodeManager.EXIT_TIMEOUT = 300
 """How long a worker may take to end [s]. It keeps its kernels then; of a whole run that takes longer than the
 10 s after which it would be killed, and the next run would find none."""
 
-sys.path.insert(0, str(Path(__file__).parent / "shared"))  # what tests of several folders import
-
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     # A shell that runs the tests behind `&` has them ignore Ctrl-C, and the processes that they start too.
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
-SECONDS = {
-    "contact/distances/": (20, 0),
-    "contact/shapes/": (10, 0),
-    "contact/": (88, 430),
-    "solver/test_sleep": (5, 0),
-    "solver/test_islands": (6, 0),
-    "solver/test_repeated_steps": (1, 0),
-    "render/test_props": (3, 15),
-    "control/": (127, 275),
-    "levels/test_holding": (3, 40),
-    "engine_adapter/test_budget": (17, 0),
-    "events/": (28, 0),
-    "persistence/": (32, 163),
-    "engine_adapter/test_rollback": (0, 0),
-    "core/math/": (2, 0),
-    "core/": (33, 110),
-    "world/": (94, 397),
-    "cages/": (56, 120),
-    "feel/": (6, 90),
-    "levels/": (25, 150),
-    "bodies/": (36, 296),
-    "lab/peers/": (0, 240),
-    "lab/": (0, 355),
-    "cli/": (0, 225),
-    "demos/": (0, 620),
-    "docs/": (1, 650),
-    "solver/": (78, 1290),
-    "elements/": (140, 130),
-    "fracture/": (22, 90),
-    "engine_adapter/test_panda3d": (0, 0),
-    "engine_adapter/": (18, 0),
-    "render/": (66, 0),
-    "bake/test_formats": (1, 0),
-    "bake/": (1, 20),
-    "native/": (0, 2200),
-    "live/": (13, 244),
-    "test_readme": (1, 10),
-    "test_first_steps": (1, 240),
-    "test_package": (2, 60),
-    "": (40, 0),
-}
-"""What the tests of files that begin so take, those of `make test` and the soaks, with an empty kernel cache.
-Neighbours have worlds of the same kinds, which each worker compiles once."""
-
-NUMPY = ("meshing/", "cages/", "elements/materials/", "bake/test_formats", "test_layers")
+NUMPY = ("test_shares", "meshing/", "cages/", "elements/materials/", "bake/test_formats", "test_layers")
 KERNEL = ("elements/", "contact/distances/", "contact/shapes/", "core/math/")
 WORLD = ("elements/laws/test_energy_laws",)
 SOAK = (
@@ -225,16 +182,10 @@ def tier_of(item):
     return next((name for name, starts in tiers.items() if file.startswith(starts)), "world")
 
 
-def folder_of(nodeid):
-    """The entry of `SECONDS` that a test belongs to."""
-    return next(start for start in SECONDS if nodeid.removeprefix("tests/").startswith(start))
-
-
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    order = {start: i for i, start in enumerate(SECONDS)}
     files = {path: i for i, path in enumerate(dict.fromkeys(item.path for item in items))}
-    items.sort(key=lambda item: (order[folder_of(item.nodeid)], files[item.path], keeps_a_world(item)))
+    items.sort(key=lambda item: (place_of(item.nodeid), files[item.path], keeps_a_world(item)))
     for item in items:
         item.add_marker(tier_of(item))
         for start, extra in NEEDS.items():
@@ -278,36 +229,6 @@ def fail_if_skipped(report):
             return
         report.outcome = "failed"
         report.longrepr = f"skipped: {report.longrepr[-1]}"
-
-
-class Shares(LoadScopeScheduling):
-    """The tests in their order, cut into one share for each worker, between files.
-
-    Taichi's cache on disk finds a kernel only where as many fields were made before it as when it was kept.
-    So a worker has to run the same files in the same order every time.
-    """
-
-    share_of_file = None
-
-    def _split_scope(self, nodeid):
-        if self.share_of_file is None:
-            self.share_of_file = self._cut()
-        return self.share_of_file[nodeid.split("::")[0]]
-
-    def _cut(self):
-        seconds = self._seconds_of_files()
-        share, before, most = {}, 0.0, sum(seconds.values()) / self.numnodes
-        for file, its in seconds.items():
-            share[file] = f"share {min(int((before + its / 2) / most), self.numnodes - 1)}"
-            before += its
-        return share
-
-    def _seconds_of_files(self):
-        tiers = [(folder_of(nodeid), is_soak(nodeid)) for nodeid in self.collection]
-        counts, seconds = Counter(tiers), Counter()
-        for nodeid, (folder, is_long) in zip(self.collection, tiers, strict=True):
-            seconds[nodeid.split("::")[0]] += SECONDS[folder][is_long] / counts[folder, is_long] + 0.01
-        return seconds
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -368,7 +289,7 @@ def unfit_buffer(request):
     return request.param
 
 
-ASSETS = Path(__file__).parents[1] / "assets"
+ASSETS = HERE.parent / "assets"
 
 
 @pytest.fixture(scope="session")
