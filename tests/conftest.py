@@ -42,119 +42,22 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     # A shell that runs the tests behind `&` has them ignore Ctrl-C, and the processes that they start too.
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
-NUMPY = ("test_shares", "meshing/", "cages/", "elements/materials/", "bake/test_formats", "test_layers")
-KERNEL = ("elements/", "contact/distances/", "contact/shapes/", "core/math/")
-WORLD = ("elements/laws/test_energy_laws",)
-SOAK = (
-    *("lab/", "demos/", "cli/", "native/", "live/test_served", "live/test_page", "live/test_measuring"),
-    "feel/test_material_from_feel.py::test_random_wishes",
-    "feel/test_material_from_feel.py::test_what_cannot",
-    *(
-        "solver/integrators/test_implicit_euler",
-        "solver/integrators/test_motion",
-        "contact/test_implicit_contact",
-        "contact/test_hulls",
-    ),
-    *("solver/test_threads", "solver/test_skipping", "solver/test_long_steps", "solver/test_gpu_launch"),
-    *("solver/test_damping_ratio", "world/test_bodies", "world/test_pools", "world/test_finite_readout"),
-    *("elements/laws/test_anisotropy", "control/test_materials", "bodies/test_particle_bodies"),
-    *("bodies/test_stress", "bodies/test_states", "bodies/test_plasticity"),
-    *("fracture/test_cutting", "fracture/test_cut_snapshots"),
-    # What starts processes, or compiles a world of its own, to look after something else than physics.
-    *("control/test_easing", "engine_adapter/test_refused_steps", "world/test_handles_at_any_time"),
-    "contact/test_overlaps.py::test_30_bodies",
-    "contact/test_overlaps.py::test_two_bodies_that_start_inside_each_other_come_apart_without_being_thrown[im",
-    "docs/test_reference.py::test_an_example",
-    *("world/test_warm_up", "persistence/test_recorder", "solver/test_kernel_cache"),
-    *(f"core/test_threads.py::test_{name}" for name in ("a_", "worlds_that_compile")),
-    *(f"core/test_runtime.py::test_{name}" for name in ("starting_again", "the_threads_that_work")),
-    *(f"core/test_known_kernels.py::test_{name}" for name in ("a_later", "a_world", "a_machine")),
-    *(f"core/test_known_kernels.py::test_{name}" for name in ("after_an_update", "what_is_missing")),
-    "core/test_logging",
-    *(f"world/test_public_face.py::test_{name}" for name in ("every", "a_", "all_that", "nothing")),
-    "solver/test_recovery.py::test_a_wrecked_body_finds_its_shape_again[exact",
-    *(f"persistence/test_snapshot.py::test_{name}" for name in ("rest_shapes", "other_integrators")),
-    *(f"test_package.py::test_a_{name}" for name in ("source", "wheel")),
-    "docs/test_pages.py::test_the_code",
-    *(f"test_first_steps.py::test_the_{name}" for name in ("first_films", "documentation", "gallery")),
-    *(f"docs/test_gallery.py::test_{name}" for name in ("a_demo_that", "a_film", "films_of")),
-    "docs/test_playing_gallery",
-    *(
-        "control/test_joint_lives.py::test_a_recording",
-        "levels/test_holding.py::test_recordings",
-        "test_readme.py::test_the_level",
-    ),
-    *(f"levels/test_levels.py::test_{name}" for name in ("levels_in_contact", "after_warming", "warming")),
-    "bake/test_bake.py::test_a_body_that_goes",
-    # Worlds of kinds that one test has to itself; joints and motors by leapfrog are in `make test`.
-    "control/test_motors.py::test_a_force_changes_momentum_by_force_times_time[i",
-    "control/test_motors.py::test_a_torque_changes_angular_momentum_by_torque_times_time_and_momentum_by_nothing[la",
-    *(f"control/test_joints.py::test_a_{name}" for name in ("joint_works", "rope_is_held")),
-    "control/test_grabs.py::test_cloth_is_held",
-    "control/test_attachments.py::test_what_is_dragged_too_far_in_a_step_without_retries",
-    *(
-        "solver/test_coarse_steps.py::test_what_one_may_ask_of_implicit_euler",
-        "solver/test_floor.py::test_without",
-    ),
-    *("render/test_props.py::test_a_collider_is_drawn_on_its_way", "render/test_film.py::test_colors_of"),
-    *("contact/test_narrow_phase.py::test_a_tip", "persistence/test_snapshot.py::test_a_rope"),
-    # Meshers that are in none of the extras of `make test`.
-    "cages/test_methods",
-    # What takes long although its kernels are there.
-    *(
-        "cages/test_difficult_surfaces",
-        "cages/test_cage.py::test_a_bar_along",
-        "cages/test_thin.py::test_the_cell",
-        "cages/test_thin.py::test_a_table_on",
-    ),
-    *("live/test_frame_file.py::test_a_reader", "live/test_uploads.py::test_a_name"),
-    "render/test_renderer.py::test_same_bits",
-    *("cages/test_thin.py::test_the_octaves", "contact/test_soft_contact.py::test_a_coarse_plate"),
-    "contact/test_piles.py::test_a_block_bears_one_of_many_times_its_mass_for_a_minute[1000-50.0",
-    "contact/test_colliders.py::test_a_sheet_of_1_cm_lands_without_freezing[0.01",
-    *("core/test_kernel_cache.py::test_a_lock", "docs/test_pages.py::test_every_command"),
-    *(
-        "cages/test_cage.py::test_parts_that_do_not_touch",
-        "contact/shapes/test_mesh_shape.py::test_one_thread",
-    ),
-    # Processes that compile worlds; the first one of its kind is in `make test`.
-    *("core/test_signals.py::test_a_film", "core/test_runtime.py::test_more_threads"),
-    *(
-        f"core/test_runtime.py::test_{name}"
-        for name in ("left_alone_a_thread", "left_alone_threads", "where_the_system")
-    ),
-)
-"""Tiers, by the beginnings of files or tests. SOAK compiles or runs for more than some 40 s with an empty
-cache and is left to `make test-all`; NUMPY runs no kernel, KERNEL some by themselves; the rest, and
-what is named in WORLD, are whole worlds."""
-
-VARIANTS = {
-    "control/test_attachments": ("lazy_leapfrog", "implicit"),
-    "control/test_grabs": ("implicit",),
-    "control/test_pins": ("lazy_leapfrog", "implicit", "flat"),
-    "control/test_motors": ("lazy_leapfrog", "implicit"),
-    "control/test_surroundings": ("lazy_leapfrog", "implicit", "flat"),
-    "control/test_joints": ("soft",),
-    "solver/test_coarse_steps": ("flat",),
-    "elements/laws/test_energy_laws": ("flat",),
-    "elements/laws/": (
-        *("face-exact", "face-linear-off", "face-linear-tolerant"),
-        *("virial-exact-off", "virial-exact-tolerant", "exact-face"),
-    ),
-    "elements/laws/test_evaluation": ("face-linear-recover",),
-    "elements/laws/test_gradients": ("virial-exact-recover", "virial-linear-off"),
-    "fracture/test_tearing": ("virial", "st_venant_kirchhoff"),
-    # What takes long although its kernels are there.
-    "cages/test_cage": ("turned box", "capsule", "tube"),
-    "cages/test_thin": ("ball", "a wall"),
-    "meshing/test_locating.py::test_a_point_outside": ("torus",),
-    "render/test_video.py::test_a_killed_film": (".webm", ".gif"),
-    "solver/integrators/test_safe_step": ("cylinder", "cmpm"),
+TIERS = {
+    "cages": "numpy",
+    "cli": "soak",
+    "contact/distances": "kernel",
+    "contact/shapes": "kernel",
+    "core/math": "kernel",
+    "demos": "soak",
+    "elements": "kernel",
+    "elements/laws/test_energy_laws.py": "world",
+    "elements/materials": "numpy",
+    "lab": "soak",
+    "meshing": "numpy",
+    "native": "soak",
 }
-"""Soaks by the names of parameters, by the beginnings of files or tests. Other tests of `make test` have each
-of these integrators, schedules and laws (`control/test_forces`, `control/test_impulses`), or one that differs
-by a branch."""
-
+"""Tier of the tests of a folder or file that have no marker for one. The longest path counts; elsewhere it is
+"world"."""
 
 NEEDS = {
     "lab/experiments/": "report",
@@ -166,20 +69,15 @@ NEEDS = {
 """Extras that tests need beyond those of the extra `test`, by the beginnings of files."""
 
 
-def is_soak(nodeid):
-    """Whether a test is left to `make test-all`."""
-    file, _, parameters = nodeid.removeprefix("tests/").partition("[")
-    variants = [name for start, names in VARIANTS.items() if file.startswith(start) for name in names]
-    return nodeid.removeprefix("tests/").startswith(SOAK) or any(name in parameters for name in variants)
+def tiers_of(item):
+    """Tiers that a test is marked with."""
+    return [tier for tier in ("numpy", "kernel", "world", "soak") if item.get_closest_marker(tier)]
 
 
-def tier_of(item):
-    """The marker of a test."""
-    if is_soak(item.nodeid):
-        return "soak"
-    file = item.nodeid.removeprefix("tests/")
-    tiers = {"numpy": NUMPY, "world": WORLD, "kernel": KERNEL}
-    return next((name for name, starts in tiers.items() if file.startswith(starts)), "world")
+def tier_of(path):
+    """Tier of the tests of a file that have no marker for one."""
+    places = (place.as_posix() for place in (path, *path.parents))
+    return next((TIERS[place] for place in places if place in TIERS), "world")
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -187,7 +85,8 @@ def pytest_collection_modifyitems(items):
     files = {path: i for i, path in enumerate(dict.fromkeys(item.path for item in items))}
     items.sort(key=lambda item: (place_of(item.nodeid), files[item.path], keeps_a_world(item)))
     for item in items:
-        item.add_marker(tier_of(item))
+        if not tiers_of(item):
+            item.add_marker(tier_of(item.path.relative_to(HERE)))
         for start, extra in NEEDS.items():
             if item.nodeid.removeprefix("tests/").startswith(start):
                 missing = missing_packages(extra)
@@ -204,7 +103,10 @@ def keeps_a_world(item):
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item):
-    if is_soak(item.nodeid) and time.time() > float(os.environ.get(UNTIL, "inf")):
+    tiers = tiers_of(item)
+    if len(tiers) > 1:
+        pytest.fail(f"{item.nodeid} is marked {' and '.join(tiers)}: leave one of them", pytrace=False)
+    if tiers == ["soak"] and time.time() > float(os.environ.get(UNTIL, "inf")):
         pytest.skip(TIME_IS_UP)
 
 

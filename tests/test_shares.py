@@ -8,6 +8,8 @@ from types import SimpleNamespace
 import pytest
 from shares import Shares
 
+pytestmark = pytest.mark.numpy
+
 
 class Worker:
     """Starts a test only when it has the next one or none will come, as workers of pytest-xdist do."""

@@ -54,6 +54,7 @@ def slug(heading):
     return re.sub(r"[-\s]+", "-", kept)
 
 
+@pytest.mark.soak
 @pytest.mark.parametrize("name", [name for name, blocks in CODE.items() if blocks])
 def test_the_code_of_a_page_runs_from_top_to_bottom(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -101,6 +102,7 @@ def help_of(*command):
     return done.stdout
 
 
+@pytest.mark.soak
 @pytest.mark.parametrize("name", sorted(set(PAGES) - {"report/report.md"}))
 def test_every_command_and_option_of_a_page_exists(name):
     text = PAGES[name]
@@ -150,6 +152,7 @@ def test_every_choice_stands_in_its_table(page, names):
         assert re.search(rf"^\|.*`\"?{name}\"?`", PAGES[page], re.MULTILINE), name
 
 
+@pytest.mark.soak
 def test_every_command_stands_in_the_table_of_commands():
     rows = re.findall(r"^\| `taichi-soft ([\w-]+)[^`]*` \|", PAGES["command-line.md"], re.MULTILINE)
     assert [name for name in get_command(app).commands if name not in rows] == []
