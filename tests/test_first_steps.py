@@ -80,6 +80,7 @@ def test_every_target_of_make_that_the_first_pages_name_is_followed_here_or_runs
     assert {one or other for one, other in named} <= FOLLOWED | TESTS
 
 
+@pytest.mark.soak
 def test_the_first_films_are_there(run):
     run("make", "demo")
     film = cv2.VideoCapture(str(run.folder / "out" / "bounce.mp4"))
@@ -90,6 +91,7 @@ def test_the_first_films_are_there(run):
     assert (run.folder / "bounce.mp4").stat().st_size > 0
 
 
+@pytest.mark.soak
 def test_the_documentation_shows_a_still_of_every_demo(run):
     pytest.importorskip("mkdocs", reason="needs mkdocs-material: pip install 'taichi-soft[docs]'")
     run("make", "docs")
@@ -102,6 +104,7 @@ def test_the_documentation_shows_a_still_of_every_demo(run):
     assert "make gallery" in text
 
 
+@pytest.mark.soak
 def test_the_gallery_films_every_demo_with_the_extras_of_the_first_page(run):
     said = run("make", "gallery", "GALLERY=--seconds 0.1 --size 96x54")
     made = re.findall(r"^(\w+): \d+ kB$", said, re.MULTILINE)

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.numpy
+
 ROOT = Path(__file__).parents[1]
 
 # From the ground up. A package imports from itself and from lines below, whether the import runs, stands

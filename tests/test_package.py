@@ -135,6 +135,7 @@ def built(tmp_path_factory):
     return wheel, archive
 
 
+@pytest.mark.soak
 def test_a_source_archive_holds_every_file_of_the_checkout(built):
     listed = subprocess.run(["git", "ls-files"], cwd=ROOT, check=True, capture_output=True, text=True).stdout
     with tarfile.open(built[1]) as archive:
@@ -142,6 +143,7 @@ def test_a_source_archive_holds_every_file_of_the_checkout(built):
     assert set(listed.split("\n")) - {""} - held == set()
 
 
+@pytest.mark.soak
 def test_a_wheel_works_without_the_checkout(built, tmp_path):
     wheel, _ = built
     with zipfile.ZipFile(wheel) as files:

@@ -419,7 +419,7 @@ def test_a_body_that_starts_crushed_in_a_collider_is_refused_with_collider_and_d
     assert world.spawn(wrong.asset, position=(0, 0, -0.05)).is_alive
 
 
-@pytest.mark.parametrize("damping_ratio", [0.0, 0.01])
+@pytest.mark.parametrize("damping_ratio", [0.0, pytest.param(0.01, marks=pytest.mark.soak)])
 def test_a_sheet_of_1_cm_lands_without_freezing(damping_ratio):
     """From 2 m, flat and tilted, a hundred times as wide as thick."""
     world = room()

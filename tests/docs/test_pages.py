@@ -57,6 +57,7 @@ def slug(heading):
     return re.sub(r"[-\s]+", "-", kept)
 
 
+@pytest.mark.soak
 @pytest.mark.parametrize("name", [name for name, blocks in CODE.items() if blocks])
 def test_the_code_of_a_page_runs_from_top_to_bottom(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -109,6 +110,7 @@ PROGRAMS = {
 """Modules of command lines, and commands of which a page may name options."""
 
 
+@pytest.mark.soak
 @pytest.mark.parametrize("name", sorted(set(PAGES) - RECORDS))
 def test_every_command_and_option_of_a_page_exists(name):
     text = PAGES[name]
@@ -157,6 +159,7 @@ def test_every_choice_stands_in_its_table(page, names):
         assert re.search(rf"^\|.*`\"?{name}\"?`", PAGES[page], re.MULTILINE), name
 
 
+@pytest.mark.soak
 @pytest.mark.parametrize(("program", "its_app"), [("taichi-soft", app), ("python -m lab", lab_app)])
 def test_every_command_stands_in_the_table_of_commands(program, its_app):
     rows = re.findall(rf"^\| `{program} ([\w-]+)[^`]*` \|", PAGES["command-line.md"], re.MULTILINE)

@@ -22,6 +22,8 @@ sys.path.insert(0, str(ROOT / "docs"))
 
 import gallery_hooks  # noqa: E402
 
+pytestmark = pytest.mark.soak
+
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):

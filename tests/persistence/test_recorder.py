@@ -25,6 +25,8 @@ from taichi_soft.core.serialisation import to_json
 from taichi_soft.persistence.recorder import MARK, VERSION, read_recording
 from taichi_soft.render.replay import replay
 
+pytestmark = pytest.mark.soak
+
 
 @pytest.fixture(scope="module")
 def game(tmp_path_factory):

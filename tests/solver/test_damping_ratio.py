@@ -17,6 +17,8 @@ from taichi_soft.bodies.first_mode import first_frequency
 from taichi_soft.core.errors import MaterialError
 from taichi_soft.elements.laws import element_model, fit_model
 
+pytestmark = pytest.mark.soak
+
 YOUNG, POISSON, DENSITY = 1e5, 0.3, 1000.0
 BALL = sphere(1.0, 6)
 MESHES = {
