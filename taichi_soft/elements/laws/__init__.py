@@ -34,7 +34,7 @@ from taichi_soft.elements.laws.virial import virial_forces
 from taichi_soft.elements.laws.volume_springs import volume_spring_bonds
 from taichi_soft.elements.materials import CONSTANTS, AnisotropicMaterial, AnyMaterial, SpringMaterial
 from taichi_soft.meshing import BodyMesh, ParticleMesh, TetMesh
-from taichi_soft.meshing.advice import filling
+from taichi_soft.meshing.advice import fill_hint
 
 __all__ = [
     "LAWS",
@@ -181,7 +181,7 @@ def fit_model(model: ElementModel, mesh: BodyMesh, material: AnyMaterial) -> Ele
     law = model.law
     if not isinstance(mesh, BodyMesh):
         is_surface = hasattr(mesh, "faces") or hasattr(mesh, "geometry")
-        advice = f": {filling('mesh')}" if is_surface else ""
+        advice = f": {fill_hint('mesh')}" if is_surface else ""
         raise MeshError(f"mesh must be a TetMesh or a ParticleMesh, got {type(mesh).__name__}{advice}")
     if not isinstance(material, AnyMaterial):
         raise MaterialError(f"material must be a taichi_soft.Material, got {type(material).__name__}")
