@@ -333,7 +333,7 @@ class SoftBodyAsset:
             )
             if method != "lattice":
                 warn_of_short_steps(made.mesh, made.cell_size, method)
-            for words in made.told:
+            for words in made.notes:
                 _log.warning("%s", words)
             meshes.append(made.mesh)
         asset = cls(meshes[0], material, **{"skin": surfaces, **options})

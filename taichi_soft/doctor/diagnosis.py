@@ -119,7 +119,7 @@ def diagnose(
             found.say(Grade.BAD, str(error))
             return found
         asset = SoftBodyAsset(made.mesh, material, skin=surfaces)
-        for words in made.told:
+        for words in made.notes:
             found.say(Grade.NOTE, words)
         if made.is_refined:
             plain = tetrahedra_of(surfaces, cells=cells, refine=0).mesh

@@ -245,7 +245,7 @@ def test_what_was_assumed_and_repaired_of_a_file_is_logged(tmp_path, caplog):
     told = " ".join(warned)
     assert "no file 'gone.mtl' beside it" in told
     assert "12 of its 36 normals point away" in told
-    assert "is the origin now" in told
+    assert "is now the origin" in told
     assert "y is taken as up, as in most .obj files" in caplog.text
     caplog.clear()
     with caplog.at_level("INFO", logger="taichi_soft"):
