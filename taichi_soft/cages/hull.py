@@ -89,7 +89,7 @@ def as_hull(request: Any, surfaces: tuple[Surface, ...], outer: int) -> Hull | N
     if isinstance(request, (bool, int, float, np.number)):
         if not surfaces:
             raise OptionError(
-                f"hull={request!r} takes its points from a skin, and there is none: pass a skin, or a "
+                f"hull={request!r} takes its points from the skin, but there is no skin: pass one, or a "
                 "surface as hull"
             )
         return hull_of(surfaces, request)

@@ -10,7 +10,7 @@ import numpy as np
 
 from taichi_soft.bodies.asset import SoftBodyAsset
 from taichi_soft.bodies.first_mode import first_mode
-from taichi_soft.bodies.sag import MOST_SAG
+from taichi_soft.bodies.sag import MAX_SAG
 from taichi_soft.core.checks import as_number
 from taichi_soft.core.constants import GRAVITY_EARTH
 from taichi_soft.core.errors import OptionError
@@ -143,9 +143,9 @@ class _Body:
 
     def sag_of(self, share: float) -> float:
         """How far it sags, by its statics, if its column weighs `share` of Young's modulus."""
-        young = self.weight / MOST_SAG
+        young = self.weight / MAX_SAG
         material = self.material(young, DAMPING_RATIO * self.omega(young))
-        standing = self.trial.stand(material, share / MOST_SAG, 2 * pi / self.omega(young), 0.0)
+        standing = self.trial.stand(material, share / MAX_SAG, 2 * pi / self.omega(young), 0.0)
         _require_upright(standing.turn)
         return standing.held
 
@@ -154,10 +154,10 @@ class _Body:
 
         Raises: OptionError where it would take too soft a body.
         """
-        share, power, before = min(2 * sag, MOST_SAG), 1.0, (0.0, 0.0)
+        share, power, before = min(2 * sag, MAX_SAG), 1.0, (0.0, 0.0)
         for _ in range(MOST_TRIALS):
             seen = self.sag_of(share)
-            if share == MOST_SAG and seen < sag * (1 - CLOSE):
+            if share == MAX_SAG and seen < sag * (1 - CLOSE):
                 raise OptionError(
                     f"sag must be at most {0.99 * seen:.3g} for this body, got {sag:g}: what is softer turns "
                     "inside out where it lands"
@@ -168,7 +168,7 @@ class _Body:
             if before != (0.0, 0.0) and abs(point[0] - before[0]) > 1e-3:
                 power = min(max((point[1] - before[1]) / (point[0] - before[0]), 0.4), 2.0)
             before = point
-            share = min(share * (sag / seen) ** (1 / power), MOST_SAG)
+            share = min(share * (sag / seen) ** (1 / power), MAX_SAG)
         return share
 
 
@@ -266,10 +266,10 @@ class _Search:
                 f"{SCALES[0]:g} to {SCALES[1]:g} can be: with this sag the nearest wobble_hz is {nearest:.3g}"
             )
         share = scale * body.weight / self.young
-        if share > MOST_SAG * (1 + PROMISED):
+        if share > MAX_SAG * (1 + PROMISED):
             raise OptionError(
                 f"wobble_hz {hz:.3g} is so soft that the body turns inside out by its own weight: the "
-                f"nearest is {hz * sqrt(share / MOST_SAG):.3g}, or wish for a sag, which scales gravity"
+                f"nearest is {hz * sqrt(share / MAX_SAG):.3g}, or wish for a sag, which scales gravity"
             )
         excess = body.substeps * sqrt(self.young) / MANY_SUBSTEPS
         if excess > 1.0:

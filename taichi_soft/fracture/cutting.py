@@ -19,7 +19,14 @@ from taichi_soft.bodies.description import BodyDescription
 from taichi_soft.bodies.fields import BodyFields, with_spare_rows
 from taichi_soft.bodies.kernels.plasticity import read_rest_inverses
 from taichi_soft.bodies.layout import BodyArrays, arrange_part, blocks_of
-from taichi_soft.bodies.soft_body import Context, SoftBody, bars_to_cut, context_of, record_of, redescribe
+from taichi_soft.bodies.soft_body import (
+    Context,
+    SoftBody,
+    context_of,
+    record_of,
+    redescribe,
+    slices_against_cuts,
+)
 from taichi_soft.bodies.status import ABSENT, ACTIVE
 from taichi_soft.bodies.tet_constants import write_tet_constants
 from taichi_soft.contact.hull_fields import touching_rows
@@ -64,7 +71,7 @@ def require_cuttable(body: SoftBody) -> None:
         )
     if context.fields is None:
         raise StateError("the world is not built: call world.build() first, and cut what moves")
-    bars = bars_to_cut(body)
+    bars = slices_against_cuts(body)
     if bars:
         raise StateError(
             f"body {body.index} has {' and '.join(bars)}: release or remove them before it is cut"
@@ -204,13 +211,13 @@ def _settle(context: Context, body: SoftBody, pieces: list[_Piece], slots: list[
         rows[:, 15] = masses
         present = None if inverses is None else inverses[piece.tets][piece.arrays.tet_order]
         write_slot(context, state, slot, piece.arrays, rows, ACTIVE, body.index, present)
-    built.has_changed()
-    fallen = tuple(context.take_in(context, body.asset) for _ in pieces[1:])
+    built.mark_changed()
+    fallen = tuple(context.make_handle(context, body.asset) for _ in pieces[1:])
     vertices, tets = body.vertex_origins, body.tet_origins
     for each, piece in zip((body, *fallen), pieces, strict=True):
         redescribe(each, piece.description, piece.arrays)
         corners, order = piece.description.mesh.tets, piece.arrays.order
-        record_of(each).become(CutMesh(vertices[piece.vertices], order, tets[piece.tets], corners))
+        record_of(each).set_topology(CutMesh(vertices[piece.vertices], order, tets[piece.tets], corners))
     if record_of(body).friction is not None:
         for each in fallen:
             give_friction(state, each, body.friction)
@@ -220,7 +227,7 @@ def _settle(context: Context, body: SoftBody, pieces: list[_Piece], slots: list[
     context.of(Easings).share(
         body, tet_order, [(each, piece.tets) for each, piece in zip((body, *fallen), pieces, strict=True)]
     )
-    built.was_cut(body)
+    built.on_cut(body)
     return fallen
 
 

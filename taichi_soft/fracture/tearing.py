@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from taichi_soft.bodies.fields import BodyFields
 from taichi_soft.bodies.law_program import Program
 from taichi_soft.bodies.measures import positions_of, tet_stresses
-from taichi_soft.bodies.soft_body import Context, Slice, SoftBody, bars_to_cut, record_of
+from taichi_soft.bodies.soft_body import Context, Slice, SoftBody, record_of, slices_against_cuts
 from taichi_soft.core.errors import StateError
 from taichi_soft.core.serialisation import below
 from taichi_soft.fracture.cutting import divide
@@ -51,7 +51,7 @@ class Tears(Slice):
             self._limits = np.zeros(len(slots.slots), dtype=np.float32)
             self._found = np.zeros(len(slots.slots), dtype=np.int32)
             find_overloaded(state, program, self._limits, self._found)  # compiles
-            for body in slots.living:
+            for body in slots.occupants:
                 self.watch(body)
 
     def watch(self, body: SoftBody) -> None:
@@ -71,7 +71,7 @@ class Tears(Slice):
 
     def entries(self) -> list[list[Any]]:
         """Slots of the bodies that tear no more."""
-        return [[body.index] for body in self.context.slots.living if self.is_open and self.rests(body)]
+        return [[body.index] for body in self.context.slots.occupants if self.is_open and self.rests(body)]
 
     def serials(self, entries: list[list[Any]]) -> list[int]:
         """None."""
@@ -88,7 +88,7 @@ class Tears(Slice):
 
     def restore(self, read: Any) -> None:
         """Look at all bodies but those that were `read`."""
-        for body in self.context.slots.living:
+        for body in self.context.slots.occupants:
             self.watch(body)
             if body.index in read:
                 self.rest(body)
@@ -101,7 +101,7 @@ class Tears(Slice):
         find_overloaded(built.state, built.program, self._limits, self._found)
         for slot in np.flatnonzero(self._found).tolist():
             body = self.context.slots.slots[slot]
-            if body is None or bars_to_cut(body):
+            if body is None or slices_against_cuts(body):
                 continue
             version = body.topology_version
             try:

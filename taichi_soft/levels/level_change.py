@@ -71,16 +71,16 @@ def set_level(body: SoftBody, level: Any, release: Any) -> tuple[Handle, ...]:
     status = int(state.body_status[body.index])
     write_slot(context, state, body.index, arrays, rows.astype(np.float32), status, body.index, None)
     write_surface(context, state, body.index, target)
-    context.built.was_placed(body)
-    record_of(body).become(None, wanted)
+    context.built.on_placed(body)
+    record_of(body).set_topology(None, wanted)
     redescribe(body, target.description, arrays)
     if record_of(body).friction is not None:
         give_friction(state, body, body.friction)
     let_hold(hanging)
     for grab, place in grabbed:
         hold_at(grab, place)
-    context.built.was_cut(body)
-    context.built.rouse(body.index)
+    context.built.on_cut(body)
+    context.built.mark_modified(body.index)
     return tuple(released)
 
 
@@ -93,7 +93,7 @@ def bar_to_levels(body: SoftBody, *, may_release: bool = False) -> str:
     context = context_of(body)
     if context.fields is None:
         return "the world is not built: call world.build() first, and change what moves"
-    holds = [each.name for each in context.slices if each.bars_levels and each.holds(body)]
+    holds = [each.name for each in context.slices if each.prevents_levels and each.holds(body)]
     if holds and not may_release:
         return (
             f"body {body.index} has {' and '.join(holds)} that name its vertices: release or remove them "
@@ -120,9 +120,9 @@ def _make_room(
     """
     released: list[Handle] = []
     for each in context_of(body).slices:
-        if each.bars_levels and isinstance(each, Numbered):
+        if each.prevents_levels and isinstance(each, Numbered):
             released += each.holding(body)
-            each.let_go(body)
+            each.release_body(body)
     while True:  # without what was released fewer vertices are held, and others may have no place
         finest = _finest_held(body)
         held = _nearest_at(body, finest, level)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taichi_soft.bodies.asset import SoftBodyAsset
-from taichi_soft.bodies.skin import slopes_of
+from taichi_soft.bodies.skin import gradient_rows
 from taichi_soft.meshing import TetMesh
 from taichi_soft.meshing.locating import Locator
 
@@ -69,9 +69,9 @@ def _weights(
     their weights (e,).
 
     A corner has its share (k, 4), and passes on its gradient along its arm (k, 4, 3): what its neighbours
-    differ from it, by `slopes_of`.
+    differ from it, by `gradient_rows`.
     """
-    neighbours, first, slopes = slopes_of(mesh)
+    neighbours, first, slopes = gradient_rows(mesh)
     n, corner = len(mesh.vertices), corners.ravel().astype(np.int64)
     counts = np.diff(first)[corner]
     pair = np.repeat(np.arange(len(corner)), counts)  # a corner of an aim, and a neighbour of that

@@ -48,7 +48,7 @@ def _body_entry(body: SoftBody) -> list[Any]:
         record.first_step,
         None if failed is None else [failed.step, failed.time, failed.substeps, failed.h, failed.is_braked],
         as_plain(record.description.material) if is_own else None,
-        None if part is None else part.note,
+        None if part is None else part.summary,
         record.level,
         None if record.held is None or record.level == 0 else record.held.tolist(),
         record.friction,
@@ -95,7 +95,7 @@ def read_parts(context: WorldContext, bodies: list[Any], rows: NDArray[np.int32]
             n, m = (below(count, len(rows) + 1) for count in entry[4][:2])
             size = 2 * n + 5 * m
             parts[slot] = CutMesh.of_rows(rows[:size], n, m)
-            parts[slot].require_of(context.slots.assets[slot])
+            parts[slot].require_part_of(context.slots.assets[slot])
             if parts[slot].digest != entry[4][2]:
                 raise ValueError(f"what was cut off body {slot} has another name")
             rows = rows[size:]

@@ -23,7 +23,7 @@ def put_back(context: WorldContext, manifest: Manifest) -> None:
     clock.steps, clock.time, clock.last_dt = manifest.steps, manifest.time, manifest.last_dt
     settings = context.settings
     if (manifest.gravity != settings.gravity).any() or manifest.friction != settings.friction:
-        context.become(replace(settings, gravity=manifest.gravity, friction=manifest.friction))
+        context.apply_settings(replace(settings, gravity=manifest.gravity, friction=manifest.friction))
     for slot, wanted in enumerate(manifest.bodies):
         _put_back_body(context, simulation.state, slot, wanted)
     simulation.was_restored()
@@ -45,7 +45,7 @@ def _put_back_body(context: WorldContext, state: State, slot: int, wanted: BodyE
         present = _put_in(context, state, slot, wanted)
     record = record_of(present)
     if _fills(present) != (name_of(wanted.part), wanted.level):
-        record.become(wanted.part, wanted.level)
+        record.set_topology(wanted.part, wanted.level)
         record.description = _before_material(present, wanted)
     record.first_step, record.frozen_in, record.failure = wanted.first_step, wanted.failed, None
     record.held = wanted.held
@@ -85,7 +85,7 @@ def _put_in(context: WorldContext, state: State, slot: int, wanted: BodyEntry) -
     record = record_of(body)
     record.removed_in = None
     if _fills(body) != (name_of(wanted.part), wanted.level):
-        record.become(wanted.part, wanted.level)
+        record.set_topology(wanted.part, wanted.level)
     record.description = _before_material(body, wanted)
     context.slots.enter_at(body)
     return body

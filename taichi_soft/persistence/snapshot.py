@@ -54,7 +54,7 @@ def take_snapshot(context: WorldContext) -> bytes:
     table = _table(context, manifest["slices"])
     words = np.empty(int(table[-1, 2]), dtype=np.int32)
     copy_state(state, table, words, True)
-    parts = [record_of(body).part for body in context.slots.living]
+    parts = [record_of(body).part for body in context.slots.occupants]
     words = np.concatenate([words, *(part.rows for part in parts if part is not None)])
     memory = to_json(context.built.events.remember().plain)
     content = [to_json(manifest), words.astype("<i4").tobytes(), memory]

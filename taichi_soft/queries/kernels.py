@@ -4,7 +4,7 @@ Bodies are asked in ascending order and only a nearer answer replaces one: of eq
 face counts, whatever the number of threads.
 """
 
-from taichi_soft.bodies.kernels.faces import box_around, face_corners, face_count, is_inside, write_place
+from taichi_soft.bodies.kernels.faces import box_around, face_corners, face_count, is_inside, write_result
 from taichi_soft.bodies.status import ABSENT
 from taichi_soft.core.math.rows import row_behind
 from taichi_soft.core.math.triangle import closest_point_on_triangle, pierce_triangle, triangle_touches_box
@@ -42,7 +42,7 @@ def find_hits(
     Args:
         bodies: that can be hit, ascending.
         rays: (n, 8): origin [m], unit direction, farthest distance [m] and 1 to pass through back faces.
-        hits: (n, 12), see `write_place`; a ray that hits nothing leaves its row alone.
+        hits: (n, 12), see `write_result`; a ray that hits nothing leaves its row alone.
     """
     ti.loop_config(serialize=True)
     for i in range(bodies.shape[0]):
@@ -73,7 +73,7 @@ def find_hits(
                         best, best_body, best_face, weights = distance, body, face, w
                     face = row_behind(face)
         if best_body >= 0:
-            write_place(state, r, hits, best_body, best_face, weights, best, d)
+            write_result(state, r, hits, best_body, best_face, weights, best, d)
 
 
 @ti.kernel
@@ -88,7 +88,7 @@ def find_closest(
     Args:
         bodies: that are asked, ascending.
         asked: (4,): point [m] and square of the farthest distance [m^2].
-        found: (1, 13), see `write_place`, and 1 for inside; left alone where nothing is near enough.
+        found: (1, 13), see `write_result`, and 1 for inside; left alone where nothing is near enough.
     """
     ti.loop_config(serialize=True)
     for _ in range(1):
@@ -109,7 +109,7 @@ def find_closest(
                         best, best_body, best_face, weights, away = gap.dot(gap), body, face, w, -gap
                         is_in_box = beyond.max() == 0.0
         if best_body >= 0:
-            write_place(state, 0, found, best_body, best_face, weights, ti.sqrt(best), away)
+            write_result(state, 0, found, best_body, best_face, weights, ti.sqrt(best), away)
             found[0, 12] = 0.0
             if is_in_box and is_inside(state, best_body, x):
                 found[0, 12] = 1.0

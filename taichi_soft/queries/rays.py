@@ -102,7 +102,7 @@ def _hits(
     bodies: Iterable[SoftBody] | None,
     cull_back: bool,
 ) -> NDArray[np.float32]:
-    """One row for each ray, see `write_place`; body -1 where it hits nothing."""
+    """One row for each ray, see `write_result`; body -1 where it hits nothing."""
     if not isinstance(cull_back, (bool, np.bool_)):
         raise OptionError(f"cull_back must be True or False, got {cull_back!r}")
     rays[:, 6] = just_beyond(as_reach(max_distance))

@@ -28,7 +28,7 @@ from taichi_soft.solver.simulation import Simulation
 from taichi_soft.solver.substeps import Substeps
 from taichi_soft.world.body import Body
 from taichi_soft.world.building import build
-from taichi_soft.world.spawning import take_in
+from taichi_soft.world.spawning import make_handle
 from taichi_soft.world.warm_up import warm_up
 from taichi_soft.world.world_bodies import WorldBodies
 from taichi_soft.world.world_control import SLICES, WorldControl
@@ -144,7 +144,7 @@ class World(WorldBodies, WorldControl, WorldQueries, WorldEvents, WorldStates):
             slots=pools,
             layout=Scene(),
             renew_substeps=substeps.renew,
-            take_in=take_in,
+            make_handle=make_handle,
             contact=touching,
             substeps=substeps,
             make_body=Body,
