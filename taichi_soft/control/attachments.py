@@ -95,7 +95,7 @@ class Attachments(Slice):
 
     name = "attachments"
     prevents_cuts = False  # `share_attachments` lets pieces hang on
-    prevents_levels = False  # see `levels.hanging`
+    prevents_levels = False  # see `levels.reattaching`
 
     @property
     def _frames(self) -> Frames:

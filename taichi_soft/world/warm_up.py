@@ -19,7 +19,7 @@ from taichi_soft.control.frictions import give_friction
 from taichi_soft.control.impulses import apply_radial_impulse
 from taichi_soft.control.rigid_transform import carry
 from taichi_soft.core.types import Schedule
-from taichi_soft.levels.level_change import bar_to_levels
+from taichi_soft.levels.level_change import reason_against_level_change
 from taichi_soft.levels.passage import prepare
 from taichi_soft.persistence.snapshot import restore_snapshot, state_hash, take_snapshot
 from taichi_soft.queries import cast_ray, cast_rays, find_closest_point, find_in_box, find_in_sphere
@@ -121,7 +121,7 @@ def _control(context: WorldContext, body: Body, other: Body | None) -> None:
     body.set_velocity(0.0 * UP)
     body.set_gravity_scale(body.gravity_scale)
     body.set_sheltered(True)
-    if body.asset.coarser and not bar_to_levels(body):
+    if body.asset.coarser and not reason_against_level_change(body):
         level, version = body.level, body.topology_version
         for other_level in (1 if level == 0 else 0, level):
             body.set_level(other_level)
