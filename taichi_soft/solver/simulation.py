@@ -99,7 +99,7 @@ class Simulation:
             skipped = end_skips(self.state, len(self.pools.slots))
             self._is_still, self._skips = self._is_still and not skipped, False
         for body, pieces in self.tears.tear():
-            self.events.note_torn(clock.steps - 1, clock.time, body, pieces)
+            self.events.record_torn(clock.steps - 1, clock.time, body, pieces)
         return reports
 
     def trial_step(self, seconds: float) -> None:
@@ -127,7 +127,7 @@ class Simulation:
             record_of(body).frozen_in = FailedStep(
                 clock.steps, clock.time, finer * substeps, h / finer, is_braked
             )
-            self.events.note_frozen(body)
+            self.events.record_frozen(body)
             reports.append(
                 f"body {body.index} went non-finite in step {clock.steps}: put back to t = "
                 f"{clock.time:.4g} s and frozen; body.failure tells where it broke. {self._way_out(body)}"

@@ -141,7 +141,7 @@ class Body(BodyControl, BodyMeasures):
         """
         released = set_level(self, level, release)
         clock = self._context.clock
-        self._context.built.events.note_released(clock.steps, clock.time, self, released)
+        self._context.built.events.record_released(clock.steps, clock.time, self, released)
 
     def watch_stress(self, threshold: float | None) -> None:
         """Record a `StressExceeded` in every step in which tetrahedra come over a stress.
