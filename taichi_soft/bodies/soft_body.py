@@ -171,7 +171,7 @@ class Slice:
     # Snapshots. All of these are called in a built world.
 
     def entries(self) -> list[list[Any]]:
-        """Its Python data as plain rows."""
+        """The slice's Python data as plain rows."""
         return []
 
     def serials(self, entries: list[list[Any]]) -> list[int]:

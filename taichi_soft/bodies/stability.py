@@ -51,7 +51,7 @@ class StableStep:
     """Limit of the substep of one body."""
 
     limit: float  # [s], largest stable substep for small motion: at most 15 % below the true one, never above
-    stiffest_tet: int | None  # with the highest frequency of its own, in the caller's order
+    stiffest_tet: int | None  # tetrahedron with the highest frequency, in the caller's order
     period: float  # [s] of the fastest vibration
     stiffest_edge: tuple[int, int] | None = None  # instead of a tetrahedron, for forces along edges
     undamped: float = 0.0  # [s], limit without damping

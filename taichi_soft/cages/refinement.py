@@ -28,9 +28,9 @@ TRACE = 1e-3
 
 
 def traced(solid: Solid, points: FloatArray) -> tuple[Solid, Bools]:
-    """Fill every voxel that contains one of some points of the surface at least a little.
+    """Fill every voxel that contains a point of the surface at least a little.
 
-    Args: points: (k, 3) [m].
+    Args: points: points of the surface, (k, 3) [m].
     Returns: the solid, and True for these voxels.
     """
     shape = solid.fill.shape

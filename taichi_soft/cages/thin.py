@@ -99,7 +99,7 @@ def _cube_at(lattice: Lattice, points: FloatArray) -> Ints:
 
 
 def cubes_of(lattice: Lattice, points: FloatArray) -> Bools:
-    """True for cubes that contain one of some points, of the shape of the lattice."""
+    """True for each cube of the lattice that contains a point."""
     occupied = np.zeros(lattice.cubes, dtype=np.bool_)
     occupied[tuple(_cube_at(lattice, points).T)] = True
     return occupied

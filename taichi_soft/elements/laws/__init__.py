@@ -223,6 +223,7 @@ def _one_of(
     if requested is None:
         return supported[0] if supported else None
     if requested not in supported:
-        names = " or ".join(repr(member.value) for member in supported) or "none"
-        raise OptionError(f"law {law.name!r} has no {option}={requested.value!r}: it supports {names}")
+        names = " or ".join(repr(member.value) for member in supported)
+        fix = f"pass {names}" if names else f"leave {option} out"
+        raise OptionError(f"law {law.name!r} does not support {option}={requested.value!r}: {fix}")
     return requested

@@ -1,8 +1,9 @@
 """Recovery of flipped tetrahedra.
 
-Hooke's laws have no hold on a tetrahedron that is pressed flat: their forces are stress times deformed area,
-and only the area across the thinnest axis is left there. Beyond flat they would have no restoring force. A
-flipped tetrahedron therefore follows a separate energy in the principal stretches s0 >= s1 >= -s2 > 0 of F,
+Hooke's laws can hardly restore a tetrahedron that is pressed flat: their forces are stress times deformed
+area, and only the area across the thinnest axis is left there. Beyond flat they would have no restoring
+force. A flipped tetrahedron therefore follows a separate energy in the principal stretches s0 >= s1 >= -s2 >
+0 of F,
 
     psi = M/2 ((s0 - 1)^2 + (s1 - 1)^2) + phi(s2),   phi' = M (s2 - 1), but from 0 at flat in a steep ramp,
 

@@ -51,7 +51,7 @@ def tilted_normal(axis, rotation):
 
 
 def tilt_rows(rings: EdgeRings) -> tuple[Floats, Floats]:
-    """beta / pi, and the angle above the plane at rest, of each of `rings.neighbours`, (s,) each."""
+    """For each of `rings.neighbours`: beta / pi, and the angle above the plane at rest, (s,)."""
     mesh = rings.mesh
     edge, vertex = rings.neighbours
     ends = mesh.vertices[mesh.edges[edge]]
