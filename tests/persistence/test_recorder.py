@@ -204,7 +204,7 @@ def test_what_a_page_saved_replaces_the_steps_of_its_recording(game, tmp_path):
         with pytest.raises(SnapshotError):
             replay(saved)
     saved.write_text(json.dumps({"start": "", "entries": entries})[:-100])
-    with pytest.raises(SnapshotError, match=r"is cut off or damaged \(.*: save it again there"):
+    with pytest.raises(SnapshotError, match=r"is damaged \(.*: save it again there"):
         replay(saved)
     with pytest.raises(OptionError, match="steps"):
         replay(path, steps=-1)
