@@ -107,7 +107,8 @@ def test_a_test_that_ends_its_worker_is_reported_once_and_all_others_run(tmp_pat
         (tmp_path / f"test_{i}.py").write_text("def test():\n    pass\n")
     for i in (1, 6):
         (tmp_path / f"test_{i}.py").write_text(
-            "import os\ndef test():\n    os._exit(1)\ndef test_after():\n    pass\n"
+            "import os, time\ndef test():\n    time.sleep(1)  # pytest-xdist fails if it sends to a worker that ends\n"
+            "    os._exit(1)\ndef test_after():\n    pass\n"
         )
     options = ("-n", "2", "--dist", "loadscope", "--rootdir", tmp_path)
     command = [sys.executable, "-m", "pytest", *options, tmp_path]
