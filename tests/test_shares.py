@@ -95,7 +95,10 @@ def test_every_test_runs_once_in_the_order_of_its_file(count):
 
 
 def test_a_test_that_ends_its_worker_is_reported_once_and_all_others_run(tmp_path):
-    """Two of seven files have such a test, and leave a single test to the new worker."""
+    """Two of seven files have such a test, and leave a single test to the new worker.
+
+    They wait first: pytest-xdist itself fails if a message is on its way to a worker that ends.
+    """
     (tmp_path / "conftest.py").write_text(
         "import sys\n"
         f"sys.path.insert(0, {str(Path(__file__).parent / 'shared')!r})\n"
@@ -107,7 +110,7 @@ def test_a_test_that_ends_its_worker_is_reported_once_and_all_others_run(tmp_pat
         (tmp_path / f"test_{i}.py").write_text("def test():\n    pass\n")
     for i in (1, 6):
         (tmp_path / f"test_{i}.py").write_text(
-            "import os\ndef test():\n    os._exit(1)\ndef test_after():\n    pass\n"
+            "import os, time\ndef test():\n    time.sleep(1)\n    os._exit(1)\ndef test_after():\n    pass\n"
         )
     options = ("-n", "2", "--dist", "loadscope", "--rootdir", tmp_path)
     command = [sys.executable, "-m", "pytest", *options, tmp_path]
