@@ -1,5 +1,7 @@
 """Particles of one body against the colliders, in one thread."""
 
+from taichi_soft.contact.distances.distance import signed_distance
+from taichi_soft.contact.distances.kinds import ShapeKind
 from taichi_soft.contact.distances.sweep import NEVER, TOUCHING, distance_from, first_touch, rests_at
 from taichi_soft.contact.fields import NO_COLLIDER
 from taichi_soft.contact.kernels.rebound import add_normal_impulse
@@ -27,17 +29,43 @@ def in_frame(contact: ti.template(), c, x, time):
     return turned_back(spun(contact.collider_rotation[c], contact.collider_spin[c] * time), x - position)
 
 
-@ti.real_func
-def _clearance(
-    state: ti.template(), p: ti.i32, row: ti.i32, count: ti.i32, reach: ti.f32, since: ti.f32, left: ti.f32
-) -> ti.f32:
-    """How far a particle is from all colliders that are near, less what these may come nearer [m]."""
-    x, clearance = state.particle_position[p], ti.cast(reach, ti.f32)
-    for i in range(count):
-        c = state.contact.near[row + i]
-        distance = distance_from(state.contact, c, in_frame(state.contact, c, x, since))
-        clearance = ti.min(clearance, distance - state.contact.collider_speed[c] * left)
-    return clearance
+@ti.func
+def _measure_clearance(state: ti.template(), c, first, end, outer_only, since, left):
+    """Lower the clearance of particles to that from one collider, less what it may come nearer [m].
+
+    Args:
+        first, end: rows of outer particles where `outer_only` is 1, otherwise particles.
+    """
+    contact = state.contact
+    kind, parameters = contact.collider_kind[c], contact.collider_parameters[c]
+    resolution, offset = contact.collider_resolution[c], contact.collider_offset[c]
+    position = contact.collider_position[c] + contact.collider_velocity[c] * since
+    rotation = spun(contact.collider_rotation[c], contact.collider_spin[c] * since)
+    margin = contact.collider_surface[c].z + contact.collider_speed[c] * left
+    # The floor is a plane, and lies under most bodies: its distance is a few instructions alone.
+    plane = turned(rotation, ti.Vector([parameters[0], parameters[1], parameters[2]]))
+    is_plane = kind == ShapeKind.PLANE
+    for k in range(first, end):
+        p = k
+        if outer_only == 1:
+            p = state.touching.outer_particle[k]
+        beside = state.particle_position[p] - position
+        distance = plane.dot(beside)
+        if not is_plane:
+            x = turned_back(rotation, beside)
+            distance, _ = signed_distance(contact.samples, kind, parameters, resolution, offset, x)
+        contact.particle_clearance[p] = ti.min(contact.particle_clearance[p], distance - margin)
+
+
+@ti.func
+def _stays_clear(contact: ti.template(), c, lower, upper, since, left):
+    """True if a collider keeps away from a box until the end of the step.
+
+    Also for planes, whose own boxes have no end. No distance function returns more than the distance.
+    """
+    center, half_diagonal = 0.5 * (lower + upper), 0.5 * (upper - lower).norm()
+    distance = distance_from(contact, c, in_frame(contact, c, center, since))
+    return distance - contact.collider_speed[c] * left > half_diagonal
 
 
 @ti.real_func
@@ -70,24 +98,37 @@ def find_near_colliders(state: ti.template(), body: ti.i32, reach: ti.f32, since
             apart = 0
             for i in ti.static(range(3)):
                 apart = apart | int(low[i] > upper[i]) | int(high[i] < lower[i])
-            if apart == 0:
+            if apart == 0 and not _stays_clear(state.contact, c, lower, upper, since, left):
                 state.contact.near[row + count] = c
                 count += 1
     state.contact.near_count[body] = count
     state.contact.reach[body] = reach
     state.contact.gone[body] = 0.0
+    if count > 0:
+        _measure_clearances(state, body, row, count, reach, since, left, is_deep)
+
+
+@ti.func
+def _measure_clearances(state: ti.template(), body, row, count, reach, since, left, is_deep):
+    """Store how far each particle is clear of the first `count` near colliders; without any, nobody asks."""
+    outer, particles = state.touching.body_outer[body], state.body_particles[body]
     if is_deep:
         for p in range(particles[0], particles[1]):
-            clearance = _clearance(state, p, row, count, reach, since, left)
+            state.contact.particle_clearance[p] = reach
+        for i in range(count):
+            _measure_clearance(state, state.contact.near[row + i], particles[0], particles[1], 0, since, left)
+        for p in range(particles[0], particles[1]):
             # One that went in unseen is not thrown out at once.
-            state.contact.particle_clearance[p] = ti.select(clearance < 0.0, UNSEEN, clearance)
+            if state.contact.particle_clearance[p] < 0.0:
+                state.contact.particle_clearance[p] = UNSEEN
         if ti.static(state.capacity.contact.hull):
             if state.hull.body_points[body][0] < state.hull.body_points[body][1]:  # and these do not touch
                 for k in range(state.body_outer[body][0], state.body_outer[body][1]):
                     state.contact.particle_clearance[state.outer_particle[k]] = UNSEEN
     for k in range(outer[0], outer[1]):
-        p = state.touching.outer_particle[k]
-        state.contact.particle_clearance[p] = _clearance(state, p, row, count, reach, since, left)
+        state.contact.particle_clearance[state.touching.outer_particle[k]] = reach
+    for i in range(count):
+        _measure_clearance(state, state.contact.near[row + i], outer[0], outer[1], 1, since, left)
 
 
 @ti.real_func
