@@ -28,7 +28,7 @@ class RenderMesh:
     """The surface of one body for a renderer. Made by `Body.render_mesh`, and read-only.
 
     It has only the vertices on the surface, one copy for each side of a sharp edge. It never changes: a cut
-    body has other vertices, so its mesh is outdated and must be made again.
+    body has other vertices, so its mesh is outdated and must be rebuilt.
     Example:
         skin = body.render_mesh(crease=40)  # skin.triangles is the index buffer
         vertices = np.empty((skin.vertex_count, 3), np.float32)
