@@ -94,11 +94,38 @@ def test_every_test_runs_once_in_the_order_of_its_file(count):
         assert len(files_of(tests)) == len(tests) / 4
 
 
-def test_a_test_that_ends_its_worker_is_reported_once_and_all_others_run(tmp_path):
-    """Two of seven files have such a test, and leave a single test to the new worker.
+class EndedWorker(Worker):
+    """Its channel is closed already, and the scheduler has not heard of it."""
 
-    They wait first: pytest-xdist itself fails if a message is on its way to a worker that ends.
-    """
+    def send_runtest_some(self, indices):
+        raise OSError("cannot send (already closed?)")
+
+
+def test_a_crash_gives_no_files_to_a_worker_that_still_starts_and_takes_them_back_from_one_that_has_ended():
+    names, config = (
+        list(FIRST_SLOW),
+        SimpleNamespace(
+            cache=SimpleNamespace(get=lambda key, default: default, set=None),
+            add_cleanup=lambda function: None,
+            getvalue={"tx": ["popen"] * 2}.get,
+            option=SimpleNamespace(loadscopereorder=True),
+        ),
+    )
+    shares, sound, ended, new = Shares(config), Worker(), EndedWorker(), Worker()
+    for worker in (sound, ended):
+        shares.add_node(worker)
+        shares.add_node_collection(worker, names)
+    shares.schedule()
+    shares.add_node(new)
+    assert shares.remove_node(ended) in names
+    assert new.queue == []
+    shares.add_node_collection(new, names)
+    shares.schedule()
+    assert new.queue != []
+
+
+def test_a_test_that_ends_its_worker_is_reported_once_and_all_others_run(tmp_path):
+    """Two of seven files have such a test, and leave a single test to the new worker."""
     (tmp_path / "conftest.py").write_text(
         "import sys\n"
         f"sys.path.insert(0, {str(Path(__file__).parent / 'shared')!r})\n"
@@ -110,7 +137,7 @@ def test_a_test_that_ends_its_worker_is_reported_once_and_all_others_run(tmp_pat
         (tmp_path / f"test_{i}.py").write_text("def test():\n    pass\n")
     for i in (1, 6):
         (tmp_path / f"test_{i}.py").write_text(
-            "import os, time\ndef test():\n    time.sleep(1)\n    os._exit(1)\ndef test_after():\n    pass\n"
+            "import os\ndef test():\n    os._exit(1)\ndef test_after():\n    pass\n"
         )
     options = ("-n", "2", "--dist", "loadscope", "--rootdir", tmp_path)
     command = [sys.executable, "-m", "pytest", *options, tmp_path]
