@@ -13,7 +13,7 @@ from taichi_soft.bodies.description import outer_vertices
 from taichi_soft.bodies.soft_body import record_of
 from taichi_soft.contact.collider import FASTEST_SPIN, ColliderRow, row_of
 from taichi_soft.contact.shapes.shape import SEAM
-from taichi_soft.control.drives import LARGEST_PUSH
+from taichi_soft.control.drives import MAX_ACCELERATION
 from taichi_soft.control.frames import Frames
 from taichi_soft.control.grab_patch import FARTHEST_PULL, PATCH_SIZE, elements_of, wave_speed
 from taichi_soft.control.grabs import HIGHEST_SPEED, WEIGHTS, Grabs
@@ -87,7 +87,7 @@ def _of_world(context: WorldContext) -> Arrays:
         "world/stable": _floats([share, longest]),
         "world/limits": _floats(
             [
-                *(POSITION_LIMIT, VELOCITY_LIMIT, FASTEST_SPIN, LARGEST_IMPULSE, LARGEST_PUSH),
+                *(POSITION_LIMIT, VELOCITY_LIMIT, FASTEST_SPIN, LARGEST_IMPULSE, MAX_ACCELERATION),
                 *(SHORTEST_STEP, LONGEST_STEP),
             ]
         ),

@@ -12,7 +12,7 @@ import numpy as np
 
 from taichi_soft.bodies.asset import SoftBodyAsset
 from taichi_soft.bodies.failure import Failure
-from taichi_soft.control.drives import push_bodies
+from taichi_soft.control.drives import accelerate_bodies
 from taichi_soft.core.checks import as_count, as_path
 from taichi_soft.core.errors import FrozenBodyWarning, SnapshotError, TaichiSoftError, VideoError
 from taichi_soft.core.handles import Handle, handles_of, is_recorded
@@ -134,7 +134,7 @@ def _step(world: World, seconds: float, substeps: int | None, expected: str, pus
         if body is None:
             raise SnapshotError(f"body {serial} does not exist")
         rows.append((body, from_plain(data)))
-    push_bodies(rows)
+    accelerate_bodies(rows)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FrozenBodyWarning)  # the report lists failures
         world.step(seconds, substeps)
