@@ -1,4 +1,4 @@
-"""Finite or not, decided on the bits: fast-math compilers may assume that NaN never happens."""
+"""Test for finite numbers by their bits, because fast-math compilers may assume that NaN never happens."""
 
 from taichi_soft.core.runtime import ti
 
@@ -7,7 +7,7 @@ _EXPONENT = 0x7F800000
 
 @ti.func
 def is_finite(v):
-    """True (1) where no component of a vec3 is NaN, infinite or beyond float32."""
+    """1 if no component of a vec3 is NaN, infinite or beyond float32."""
     good = 1
     for i in ti.static(range(3)):
         if (ti.bit_cast(ti.cast(v[i], ti.f32), ti.i32) & _EXPONENT) == _EXPONENT:
@@ -17,7 +17,7 @@ def is_finite(v):
 
 @ti.func
 def is_within(v, limit):
-    """True (1) where every component of a vec3 is finite and nearer to zero than `limit`."""
+    """1 if every component of a vec3 is finite and its absolute value is below `limit`."""
     good = is_finite(v)
     for i in ti.static(range(3)):
         if not (ti.abs(v[i]) < limit):
