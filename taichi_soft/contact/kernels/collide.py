@@ -40,6 +40,17 @@ def _clearance(
     return clearance
 
 
+@ti.func
+def _stays_clear(contact: ti.template(), c, lower, upper, since, left):
+    """True if a collider keeps away from a box until the end of the step.
+
+    Also for planes, whose own boxes have no end. No distance function returns more than the distance.
+    """
+    center, half_diagonal = 0.5 * (lower + upper), 0.5 * (upper - lower).norm()
+    distance = distance_from(contact, c, in_frame(contact, c, center, since))
+    return distance - contact.collider_speed[c] * left > half_diagonal
+
+
 @ti.real_func
 def find_near_colliders(state: ti.template(), body: ti.i32, reach: ti.f32, since: ti.f32, left: ti.f32):
     """List the colliders that come within `reach` [m] of a body's particles, and how clear of them each is.
@@ -70,12 +81,20 @@ def find_near_colliders(state: ti.template(), body: ti.i32, reach: ti.f32, since
             apart = 0
             for i in ti.static(range(3)):
                 apart = apart | int(low[i] > upper[i]) | int(high[i] < lower[i])
-            if apart == 0:
+            if apart == 0 and not _stays_clear(state.contact, c, lower, upper, since, left):
                 state.contact.near[row + count] = c
                 count += 1
     state.contact.near_count[body] = count
     state.contact.reach[body] = reach
     state.contact.gone[body] = 0.0
+    if count > 0:
+        _measure_clearances(state, body, row, count, reach, since, left, is_deep)
+
+
+@ti.func
+def _measure_clearances(state: ti.template(), body, row, count, reach, since, left, is_deep):
+    """Store how far each particle is clear of the first `count` near colliders; without any, nobody asks."""
+    outer, particles = state.touching.body_outer[body], state.body_particles[body]
     if is_deep:
         for p in range(particles[0], particles[1]):
             clearance = _clearance(state, p, row, count, reach, since, left)

@@ -42,12 +42,13 @@ def _drift_block(state: ti.template(), body, first, count, h, since, gone):
     Returns: the square of the way of each [m^2].
     """
     positions = ti.Matrix.zero(state.real, LANES, 3)
+    meets_none = state.contact.near_count[body] == 0
     way2, passes = ti.Vector.zero(state.real, LANES), ti.Vector.zero(state.real, LANES)
     for lane in range(LANES):
         p = first + lane
         way = h * state.particle_velocity[p]
         x = state.particle_position[p] + way
-        is_far = state.contact.particle_clearance[p] > gone or state.particle_inv_mass[p] <= 0.0
+        is_far = meets_none or state.contact.particle_clearance[p] > gone or state.particle_inv_mass[p] <= 0.0
         for i in ti.static(range(3)):
             positions[lane, i] = x[i]
         passes[lane] = ti.select(is_far, 1.0, 0.0)
