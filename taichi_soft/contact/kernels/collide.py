@@ -1,5 +1,6 @@
 """Particles of one body against the colliders, in one thread."""
 
+from taichi_soft.contact.distances.distance import signed_distance
 from taichi_soft.contact.distances.sweep import NEVER, TOUCHING, distance_from, first_touch, rests_at
 from taichi_soft.contact.fields import NO_COLLIDER
 from taichi_soft.contact.kernels.rebound import add_normal_impulse
@@ -27,17 +28,26 @@ def in_frame(contact: ti.template(), c, x, time):
     return turned_back(spun(contact.collider_rotation[c], contact.collider_spin[c] * time), x - position)
 
 
-@ti.real_func
-def _clearance(
-    state: ti.template(), p: ti.i32, row: ti.i32, count: ti.i32, reach: ti.f32, since: ti.f32, left: ti.f32
-) -> ti.f32:
-    """How far a particle is from all colliders that are near, less what these may come nearer [m]."""
-    x, clearance = state.particle_position[p], ti.cast(reach, ti.f32)
-    for i in range(count):
-        c = state.contact.near[row + i]
-        distance = distance_from(state.contact, c, in_frame(state.contact, c, x, since))
-        clearance = ti.min(clearance, distance - state.contact.collider_speed[c] * left)
-    return clearance
+@ti.func
+def _measure_clearance(state: ti.template(), c, first, end, outer_only, since, left):
+    """Lower the clearance of particles to that from one collider, less what it may come nearer [m].
+
+    Args:
+        first, end: rows of outer particles where `outer_only` is 1, otherwise particles.
+    """
+    contact = state.contact
+    kind, parameters = contact.collider_kind[c], contact.collider_parameters[c]
+    resolution, offset = contact.collider_resolution[c], contact.collider_offset[c]
+    position = contact.collider_position[c] + contact.collider_velocity[c] * since
+    rotation = spun(contact.collider_rotation[c], contact.collider_spin[c] * since)
+    margin = contact.collider_surface[c].z + contact.collider_speed[c] * left
+    for k in range(first, end):
+        p = k
+        if outer_only == 1:
+            p = state.touching.outer_particle[k]
+        x = turned_back(rotation, state.particle_position[p] - position)
+        distance, _ = signed_distance(contact.samples, kind, parameters, resolution, offset, x)
+        contact.particle_clearance[p] = ti.min(contact.particle_clearance[p], distance - margin)
 
 
 @ti.func
@@ -97,16 +107,21 @@ def _measure_clearances(state: ti.template(), body, row, count, reach, since, le
     outer, particles = state.touching.body_outer[body], state.body_particles[body]
     if is_deep:
         for p in range(particles[0], particles[1]):
-            clearance = _clearance(state, p, row, count, reach, since, left)
+            state.contact.particle_clearance[p] = reach
+        for i in range(count):
+            _measure_clearance(state, state.contact.near[row + i], particles[0], particles[1], 0, since, left)
+        for p in range(particles[0], particles[1]):
             # One that went in unseen is not thrown out at once.
-            state.contact.particle_clearance[p] = ti.select(clearance < 0.0, UNSEEN, clearance)
+            if state.contact.particle_clearance[p] < 0.0:
+                state.contact.particle_clearance[p] = UNSEEN
         if ti.static(state.capacity.contact.hull):
             if state.hull.body_points[body][0] < state.hull.body_points[body][1]:  # and these do not touch
                 for k in range(state.body_outer[body][0], state.body_outer[body][1]):
                     state.contact.particle_clearance[state.outer_particle[k]] = UNSEEN
     for k in range(outer[0], outer[1]):
-        p = state.touching.outer_particle[k]
-        state.contact.particle_clearance[p] = _clearance(state, p, row, count, reach, since, left)
+        state.contact.particle_clearance[state.touching.outer_particle[k]] = reach
+    for i in range(count):
+        _measure_clearance(state, state.contact.near[row + i], outer[0], outer[1], 1, since, left)
 
 
 @ti.real_func
