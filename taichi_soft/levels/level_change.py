@@ -52,10 +52,8 @@ def set_level(body: SoftBody, level: Any, release: Any) -> tuple[Handle, ...]:
     wanted = as_count(level, "level", 0)
     count = len(body.asset.levels)
     if wanted >= count:
-        raise OptionError(
-            f"level is {wanted}, and the asset of body {body.index} has {count}: from_surface with "
-            "cells=(12, 8, 5) makes several"
-        )
+        fix = f"give 0 to {count - 1}" if count > 1 else "from_surface with cells=(12, 8, 5) makes several"
+        raise OptionError(f"level is {wanted}, and the asset of body {body.index} has {count}: {fix}")
     bar = bar_to_levels(body, may_release=may_release)
     if bar:
         raise StateError(bar)

@@ -54,7 +54,7 @@ def checks(compiled):
     return compiled("Checks", "TaichiSoft.cs", "Checks.cs")
 
 
-@pytest.mark.parametrize("name", ["heap", "free", "held", "joined"])
+@pytest.mark.parametrize("name", ["heap", "free", "held", "joined", "levels"])
 def test_a_game_in_csharp_has_the_same_bits(name, export, play, compiled, run):
     calls = list(GAMES[name][1]())
     folder = export(name)
@@ -87,7 +87,7 @@ REFUSED = {
     "zero in a name": "Argument: a zero is in a name",
     "empty list": "Argument: no vertex is named: give null for all",
     "targets": "Size: targets has 3 numbers: give 6",
-    "no level": "Argument: level is 1, and asset 0 has 1",
+    "no level": "Argument: level is 1, and asset 0 has 1: from_surface",
     "not pinned": "State: vertex 0 is not pinned: call ts_body_pin first",
     "snapshot": "Snapshot: 100 bytes are no snapshot",
     "room for a snapshot": r"Size: buffer has 3 bytes: give \d+",
@@ -147,12 +147,27 @@ def test_names_are_found_in_a_folder_with_a_name_beyond_ascii(export, checks, ru
     assert len(found) == 5 + 5 + 1 + 5  # bodies, assets, a frame, meshes
 
 
-def test_components_draw_a_body_in_unitys_axes(export, compiled, run):
-    program = compiled("Components", *COMPONENTS, "stubs/UnityEngine.cs", "stubs/BehaviourChecks.cs")
-    found = dict(line.split(": ") for line in run(program, export("heap", "--axes", "unity")))
+@pytest.fixture
+def components(compiled):
+    return compiled("Components", *COMPONENTS, "stubs/UnityEngine.cs", "stubs/BehaviourChecks.cs")
+
+
+def test_components_draw_a_body_in_unitys_axes(export, components, run):
+    found = dict(line.split(": ") for line in run(components, export("heap", "--axes", "unity")))
     assert found["allocated"] == "0"
     assert int(found["steps"]) > 500
     assert int(found["contacts"]) > 10
+
+
+TRIANGLES = {0: 184, 1: 96, 2: 28}
+"""On the surface of a bar of the scene `levels`, by level: two on each outer side of a cell."""
+
+
+def test_a_component_draws_the_mesh_of_the_level_that_its_body_is_at(export, components, run):
+    """The program compares meshes with those that the library reads by the names of their levels."""
+    *drawn, allocated = run(components, export("levels"), "levels")
+    assert drawn == [f"level {level}: {TRIANGLES[level]}" for level in (0, 2, 1, 1, 0, 2, 0, 1)]
+    assert allocated == "allocated: 0"
 
 
 def test_the_code_of_the_page_compiles(compiled, tmp_path):

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from games import line, lines_of
 from godot_build import GODOT, SCRIPTS, told
+from godot_games import HALF_TURN, UPRIGHT, levels_game
 from native_build import ROOT
 
-UPRIGHT, HALF_TURN = (0.0, 0.0, 0.0, 1.0), (0.0, 1.0, 0.0, 0.0)  # both are exact in Godot's Transform
 DT = 1 / 64
 
 
@@ -39,6 +39,17 @@ def run(engine, project):
         return done.stdout
 
     return printed
+
+
+@pytest.fixture(scope="module")
+def world_of(project, export):
+    """A function that copies a world of scenes.py into the project, once, and returns its folder."""
+
+    def folder(name):
+        found = project / f"{name}.softworld"
+        return found if found.exists() else shutil.copytree(export(name), found)
+
+    return folder
 
 
 @pytest.fixture(scope="module")
@@ -265,12 +276,164 @@ def game():
             yield line("overlap_box", (-1.5, 0.5, 0.0), HALF_TURN, (0.5, 0.25, 4.0))
 
 
-def test_a_game_in_godot_has_the_same_bits(run, project, play):
-    calls = list(game())
-    (project / "game.txt").write_text("\n".join(calls), encoding="utf-8")
+@pytest.mark.parametrize(("world", "game"), [("demo", game), ("levels", levels_game)])
+def test_a_game_in_godot_has_the_same_bits(world, game, run, project, world_of, play):
+    calls, folder = list(game()), world_of(world)
+    (project / "game.txt").write_text("\n".join([f"world {folder.name}", *calls]), encoding="utf-8")
     found = [row[5:] for row in run("play.gd").splitlines() if row.startswith("PLAY ")]
     assert len(set(found)) > 240
-    assert found == lines_of([play, project / "demo.softworld"], calls)
+    assert found == lines_of([play, folder], calls)
+
+
+@pytest.fixture(scope="module")
+def levels(run, project, world_of):
+    """What bodies with levels of detail tell of themselves and of what is drawn of them."""
+    world_of("levels")
+    text = (ROOT / "docs" / "godot.md").read_text(encoding="utf-8")
+    (script,) = re.findall(r"^```gdscript\n(# Coarser.*?)^```", text, re.DOTALL | re.MULTILINE)
+    (project / "page_levels.gd").write_text(f"extends Spatial\n\nvar world\n\n{script}", encoding="utf-8")
+    return told(run("levels.gd"))
+
+
+BARS = ((8, 3, 2), (5, 2, 2), (3, 1, 1))
+"""Cells of a bar at each level, as tests/native/scenes.py has them."""
+
+
+def surface_of(level):
+    """Vertices of a bar, those on its surface, and its triangles: a cell has two on each outer side."""
+    x, y, z = BARS[level]
+    own, inside = (x + 1) * (y + 1) * (z + 1), (x - 1) * (y - 1) * (z - 1)
+    return {"own": own, "places": own - inside, "triangles": 4 * (x * y + y * z + z * x)}
+
+
+def require_level(drawn, level):
+    """The mesh is that of a bar at this level, and its vertices are where the bar has its own."""
+    assert drawn["level"] == level
+    assert surface_of(level).items() <= drawn.items()
+    assert drawn["normals"]
+    assert drawn["apart"] < 1e-6
+    assert drawn["volume"] == pytest.approx(0.9 * 0.3 * 0.2, rel=0.1)  # fronts are outside
+
+
+def test_a_body_without_a_skin_is_drawn_by_the_mesh_of_its_level(levels):
+    assert levels["counts"] == [3, 3, 0]
+    assert levels["levels"] == [0, 1, -1]
+    assert levels["early"] == [False, -1, 0]  # the world has not started
+    for number, found in enumerate(levels["drawn"]):
+        level = (0, 2, 1, 1, 0, 2)[number // 2]
+        assert all(found["answers"])
+        require_level(found["bar"], level)
+        require_level(found["named"], level)  # its node names the mesh of level 1
+
+
+def test_a_skin_keeps_its_vertices_at_every_level(levels):
+    balls = [found["ball"] for found in levels["drawn"]]
+    assert len({(ball["places"], ball["triangles"]) for ball in balls}) == 1
+    assert len({ball["own"] for ball in balls}) == 3
+    for ball in balls:
+        assert ball["volume"] == pytest.approx(4 / 3 * np.pi * 0.25**3, rel=0.1)
+
+
+def test_a_refused_level_says_why_and_changes_nothing(levels):
+    expected = {
+        "below": "level is -1, and asset 1 has 3: give 0 to 2",
+        "beyond": "level is 3, and asset 1 has 3: give 0 to 2",
+        "joined": "the body in slot 3 has joints that name its vertices: release or remove them before",
+    }
+    assert levels["refused"].keys() == expected.keys()
+    for what, found in levels["refused"].items():
+        assert found["error"].startswith(expected[what])
+        assert not found["answer"], what
+        assert found["are_same"], what
+    assert levels["nobody"] == [False, "body 12345 is not in this world, or was taken out"]
+
+
+def test_release_lets_a_joint_go_with_the_change(levels):
+    released = levels["released"]
+    assert released["was"]
+    assert released["answer"]
+    assert released["joint"] == 0
+    require_level(released["drawn"], 1)
+
+
+def test_a_snapshot_restores_the_level_that_is_drawn(levels):
+    """And who comes into a slot begins at the finest level."""
+    coarse, restored, despawned, spawned = levels["rewind"]
+    require_level(coarse, 2)
+    require_level(restored, 0)
+    assert despawned == {}
+    require_level(spawned, 0)
+
+
+def test_the_script_of_the_page_chooses_levels_by_distance(levels):
+    assert levels["afar"] == [0, 1, 2, 2, 0]
+
+
+@pytest.fixture(scope="module")
+def drives(run, world_of):
+    """What bodies do under the functions of soft_world.gd for gravity, friction, joints and motors."""
+    world_of("joined")
+    return told(run("drives.gd"))
+
+
+def test_gravity_is_set(drives):
+    """Half a second of it."""
+    fall = drives["fall"]
+    assert fall["answer"]
+    assert fall["moved"] == pytest.approx([0.125, -0.25, 0.5], abs=0.005)
+
+
+def test_a_collider_brakes_by_its_friction(drives):
+    """From 1 m/s: without friction a second goes by, with it a length of v^2 / (2 mu g)."""
+    lengths = [found["moved"][1] for found in drives["floor"]]
+    assert all(found["answer"] for found in drives["floor"])
+    assert lengths == pytest.approx([1.0, 1 / (0.4 * 9.81), 1 / (0.8 * 9.81)], rel=0.05)
+
+
+def test_a_body_brakes_another_by_its_friction(drives):
+    assert [found["answers"] for found in drives["stack"]] == [[True, True]] * 2
+    slides, stays = (abs(found["apart"][0]) for found in drives["stack"])
+    assert slides > 0.12
+    assert stays < 0.06
+
+
+def test_a_joint_bears_a_body_until_it_is_released(drives):
+    hang = drives["hang"]
+    weight = 0.4 * 0.4 * 0.3 * 1000 * 9.81
+    assert hang["listed"]
+    assert hang["force"] == pytest.approx([0.0, 0.0, weight], abs=0.02 * weight)
+    assert hang["sank"] < 0.02
+    assert hang["released"] == [True, False]
+    assert hang["fell"] == pytest.approx(9.81 / 2 * (20 / 64) ** 2, rel=0.05)
+    assert hang["onto"] < 1e-4  # vertices that were joined one to one
+
+
+def test_a_motor_turns_a_body_as_it_is_set(drives):
+    turn = drives["turn"]
+    assert turn["listed"]
+    assert turn["answers"] == [True, True, True]
+    assert turn["speed"] == pytest.approx(3.0, rel=0.1)
+    assert turn["back"] == pytest.approx(-2.0, rel=0.1)
+    assert turn["coasts"] == pytest.approx(-2.0, abs=1.0)  # its limit is 0, though 9 rad/s are asked for
+    assert turn["removed"] == [True, False, 0]
+    assert turn["gone"] == [False, False]
+
+
+def test_joints_and_motors_are_found_by_name_and_number(drives):
+    assert drives["names"] == {
+        "there": True,
+        "numbers": [True, True],
+        "nobody": [0, 0, 0],
+        "set": [False, False],
+    }
+
+
+def test_these_tests_call_every_such_function_of_the_node():
+    node = (GODOT / "demo" / "addons" / "taichi_soft" / "soft_world.gd").read_text(encoding="utf-8")
+    named = re.findall(r"^func (\w*(?:gravity|friction|join|motor|level)\w*)\(", node, re.MULTILINE)
+    assert len(named) == 15
+    scripts = "".join((SCRIPTS / name).read_text(encoding="utf-8") for name in ("drives.gd", "levels.gd"))
+    assert [name for name in named if f"_world.{name}(" not in scripts] == []
 
 
 def test_the_script_of_the_page_runs(run, project):

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from games import hash_of, line, lines_of
 from godot4_host import GODOT, LIBRARY, VERSIONS, Name, Transform, registered, transform
+from godot_games import HALF_TURN, UPRIGHT, levels_game
 from native_build import ROOT
 
 DT = 1 / 64
@@ -111,9 +112,6 @@ def test_a_godot_that_lacks_something_is_refused_in_one_line(godot4, options, sa
     (text,) = (row for row in printed if not row.startswith("refused"))
     assert "taichi_soft_godot_init" in text
     assert said in text
-
-
-UPRIGHT, HALF_TURN = (0.0, 0.0, 0.0, 1.0), (0.0, 1.0, 0.0, 0.0)  # about y: both are exact in a Transform3D
 
 
 HELD = {  # by step
@@ -350,6 +348,26 @@ class Player:
     def restore(self):
         assert self.instance.restore(self.kept) is True
 
+    def impulse(self):
+        assert self.instance.apply_impulse(self.body(), self.take(3)) is True
+
+    def wake(self):
+        assert self.instance.wake() is True
+
+    def set_level(self):
+        assert self.instance.set_level(self.body(), self.whole(), self.whole()) is True
+
+    def level(self):
+        body = self.body()
+        self.say(f"{self.instance.get_level(body)} {self.instance.vertex_count(body)}")
+
+    def positions(self):
+        self.say(hash_of(self.instance.positions(self.body())))
+
+    def collider_impulse(self):
+        impulse, moment = self.instance.collider_impulse(self.whole())
+        self.say(hash_of([*impulse, *moment]))
+
     def status(self):
         self.say(self.instance.status(self.body()))
 
@@ -367,14 +385,24 @@ def test_a_game_has_the_same_bits_as_in_c(native_world, world, play):
     assert native_world.host.errors == []
 
 
+def test_a_game_with_levels_of_detail_has_the_same_bits_as_in_c(host, export, play):
+    calls, folder, instance = list(levels_game()), export("levels"), host.new()
+    assert instance.load(str(folder)) is True
+    found = Player(instance).play(calls)
+    assert len(set(found)) > 400
+    assert found == lines_of([play, folder], calls)
+    assert host.errors == []
+    instance.free()
+
+
 def test_what_is_read_is_what_the_library_has(native_world):
     """Of each kind of value that goes out."""
     native = native_world
     assert [native.count(kind) for kind in range(5)] == [10, 2, 4, 0, 2]
     brick = native.name_of(1, 1)
     assert native.find(1, brick) == native.find(1, Name(brick)) == 1
-    asset, vertices, triangles, has_uv = native.mesh_info(0)
-    assert (asset, has_uv) == (0, 0)
+    asset, vertices, triangles, has_uv, level = native.mesh_info(0)
+    assert (asset, has_uv, level) == (0, 0, 0)
     assert native.uvs(0).shape == (0, 2)
     body = native.body(0)
     positions, normals = native.mesh(body, 0)
@@ -534,6 +562,11 @@ def test_bad_arguments_are_errors_and_no_crash(host, world):
         ("detach", [12345, []], "body 12345 is not in this world"),
         ("frame_load", [12345, 0], "body 12345 is not in this world"),
         ("positions", [12345], "body 12345 is not in this world"),
+        ("set_level", [12345, 0, 0], "body 12345 is not in this world"),
+        ("set_level", [12345, 1.0, 0], "argument 2 is no whole number"),
+        ("get_level", [12345], "body 12345 is not in this world"),
+        ("vertex_count", [12345], "body 12345 is not in this world"),
+        ("level_count", [2], "there is no asset 2: there are 2"),
         ("count", [9], "argument 1 is 9: kinds are 0 to 4"),
         ("count", [True], "argument 1 is no whole number"),
         ("restore", [b"abc"], "3 bytes are no snapshot"),

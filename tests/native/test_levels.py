@@ -64,8 +64,8 @@ print(json.dumps([found, are_same, count.value, joint, levels]))
 """
 
 WANTED = {
-    "below": (ARGUMENT, "level is -1, and asset 1 has 3"),
-    "beyond": (ARGUMENT, "level is 3, and asset 1 has 3"),
+    "below": (ARGUMENT, "level is -1, and asset 1 has 3: give 0 to 2"),
+    "beyond": (ARGUMENT, "level is 3, and asset 1 has 3: give 0 to 2"),
     "joined": (STATE, "has joints that name its vertices"),
     "joined from the other side": (STATE, "release of 1"),
     "positions": (-6, "give room for 162"),

@@ -76,9 +76,12 @@ Variant name_of(Self self, In in) {
   return of(std::string(name));
 }
 
+// Asset, vertices, triangles, whether it has texture coordinates, and its level of detail: -1 for a skin.
 Variant mesh_info(Self self, In in) {
   const ts_mesh_info info = mesh_of(self, in.small(0));
-  return of_whole_numbers({info.asset, info.vertex_count, info.triangle_count, info.has_uv});
+  int32_t level = 0;
+  check(ts_mesh_get_level(self.scene, in.small(0), &level));
+  return of_whole_numbers({info.asset, info.vertex_count, info.triangle_count, info.has_uv, level});
 }
 
 Variant triangles(Self self, In in) {
@@ -215,14 +218,37 @@ Variant mesh(Self self, In in) {
 }
 
 Variant positions(Self self, In in) {
-  int32_t asset = 0;
-  ts_asset_info info{};
-  info.struct_size = sizeof info;
-  check(ts_body_get_asset(self.world, body_of(in), &asset));
-  check(ts_asset_get_info(self.scene, asset, &info));
-  self.positions.resize(3 * size_t(info.vertex_count));
+  int32_t count = 0;
+  check(ts_body_get_vertex_count(self.world, body_of(in), &count));
+  self.positions.resize(3 * size_t(count));
   check(ts_body_positions(self.world, body_of(in), 1.0, self.positions.data(), self.positions.size()));
   return of_triples(self.positions);
+}
+
+// ---- levels of detail ----
+
+Variant set_level(Self self, In in) {
+  check(ts_body_set_level(self.world, body_of(in), in.small(1), in.small(2)));
+  return of(true);
+}
+
+Variant get_level(Self self, In in) {
+  int32_t level = 0;
+  check(ts_body_get_level(self.world, body_of(in), &level));
+  return of(int64_t(level));
+}
+
+// Of an asset.
+Variant level_count(Self self, In in) {
+  int32_t found = 0;
+  check(ts_asset_get_level_count(self.scene, in.small(0), &found));
+  return of(int64_t(found));
+}
+
+Variant vertex_count(Self self, In in) {
+  int32_t found = 0;
+  check(ts_body_get_vertex_count(self.world, body_of(in), &found));
+  return of(int64_t(found));
 }
 
 // ---- what happened ----
@@ -567,6 +593,10 @@ const std::vector<Method> methods = {
     {"apply_impulse", 2, apply_impulse},
     {"mesh", 2, mesh},
     {"positions", 1, positions},
+    {"set_level", 3, set_level},
+    {"get_level", 1, get_level},
+    {"level_count", 1, level_count},
+    {"vertex_count", 1, vertex_count},
     {"record_events", 1, record_events},
     {"drain_events", 0, drain_events},
     {"dropped_events", 0, dropped_events},

@@ -21,10 +21,74 @@ namespace TaichiSoft
         [SerializeField, Tooltip("The mesh's name in the world file; empty for the first one of the body's asset")]
         private string mesh = "";
 
-        private int slot, number;
-        private Mesh drawn;
-        private Vector3[] vertices, normals;
-        private GCHandle vertexMemory, normalMemory; // pinned: the library writes there without a copy
+        // A mesh of the scene, and the memory into which the library writes it.
+        private sealed class Drawing
+        {
+            public readonly Mesh Mesh;
+            private readonly int number;
+            private readonly Vector3[] vertices, normals;
+            private GCHandle vertexMemory, normalMemory; // pinned: the library writes there without a copy
+
+            public Drawing(Scene scene, int number, string name)
+            {
+                this.number = number;
+                MeshInfo info = scene.GetMeshInfo(number);
+                vertices = new Vector3[info.VertexCount];
+                normals = new Vector3[info.VertexCount];
+                vertexMemory = GCHandle.Alloc(vertices, GCHandleType.Pinned);
+                normalMemory = GCHandle.Alloc(normals, GCHandleType.Pinned);
+                Mesh = new Mesh { name = name };
+                Mesh.MarkDynamic();
+                Mesh.indexFormat = info.VertexCount > 65535 ? IndexFormat.UInt32 : IndexFormat.UInt16;
+                Mesh.vertices = vertices;
+                if (info.HasUv) Mesh.uv = UvOf(scene, info);
+                var triangles = new int[3 * info.TriangleCount];
+                scene.GetTriangles(number, triangles);
+                Mesh.triangles = triangles;
+            }
+
+            private Vector2[] UvOf(Scene scene, MeshInfo info)
+            {
+                var numbers = new float[2 * info.VertexCount];
+                scene.GetUv(number, numbers);
+                var uv = new Vector2[info.VertexCount];
+                for (int i = 0; i < uv.Length; ++i) uv[i] = new Vector2(numbers[2 * i], numbers[2 * i + 1]);
+                return uv;
+            }
+
+            public void Read(Body body)
+            {
+                body.ReadMesh(
+                    number, vertexMemory.AddrOfPinnedObject(), normalMemory.AddrOfPinnedObject(), 3 * vertices.Length);
+                Fill();
+            }
+
+            public void Clear()
+            {
+                Array.Clear(vertices, 0, vertices.Length); // triangles without a size: nothing is seen
+                Fill();
+            }
+
+            private void Fill()
+            {
+                Mesh.vertices = vertices;
+                Mesh.normals = normals;
+                Mesh.RecalculateBounds();
+            }
+
+            public void Release()
+            {
+                if (vertexMemory.IsAllocated) vertexMemory.Free();
+                if (normalMemory.IsAllocated) normalMemory.Free();
+                Destroy(Mesh);
+            }
+        }
+
+        private int slot;
+        // By level of detail, so that a change of level allocates nothing. A skin draws every level, and is alone.
+        private Drawing[] drawings = new Drawing[0];
+        private Drawing shown;
+        private MeshFilter filter;
         private bool isSomebody = true;
 
         /// <summary>The body; ask IsSomebody of it, for a slot may be empty.</summary>
@@ -37,23 +101,36 @@ namespace TaichiSoft
         {
             Scene scene = world.Scene;
             slot = scene.Find(NameKind.Body, body);
-            number = mesh.Length > 0 ? scene.Find(NameKind.Mesh, mesh) : FirstMesh(scene);
-            MeshInfo info = scene.GetMeshInfo(number);
-            vertices = new Vector3[info.VertexCount];
-            normals = new Vector3[info.VertexCount];
-            vertexMemory = GCHandle.Alloc(vertices, GCHandleType.Pinned);
-            normalMemory = GCHandle.Alloc(normals, GCHandleType.Pinned);
-            drawn = new Mesh { name = body };
-            drawn.MarkDynamic();
-            drawn.indexFormat = info.VertexCount > 65535 ? IndexFormat.UInt32 : IndexFormat.UInt16;
-            drawn.vertices = vertices;
-            if (info.HasUv) drawn.uv = UvOf(scene, info);
-            var triangles = new int[3 * info.TriangleCount];
-            scene.GetTriangles(number, triangles);
-            drawn.triangles = triangles;
-            GetComponent<MeshFilter>().sharedMesh = drawn;
+            int number = mesh.Length > 0 ? scene.Find(NameKind.Mesh, mesh) : FirstMesh(scene);
+            if (scene.GetMeshLevel(number) < 0)
+            {
+                drawings = new[] { new Drawing(scene, number, body) };
+            }
+            else
+            {
+                AddLevels(scene, scene.GetMeshInfo(number).Asset);
+            }
+            filter = GetComponent<MeshFilter>();
+            Show(drawings[0]);
             // The library says places in the world, and a mesh has them in the game object.
             transform.SetPositionAndRotation(Vector3.zero, Quaternion.identity);
+        }
+
+        private void AddLevels(Scene scene, int asset)
+        {
+            drawings = new Drawing[scene.GetLevelCount(asset)];
+            int count = scene.GetInfo().MeshCount;
+            for (int i = 0; i < count; ++i)
+            {
+                if (scene.GetMeshInfo(i).Asset == asset) drawings[scene.GetMeshLevel(i)] = new Drawing(scene, i, body);
+            }
+        }
+
+        private void Show(Drawing drawing)
+        {
+            if (shown == drawing) return;
+            shown = drawing;
+            filter.sharedMesh = drawing.Mesh;
         }
 
         private int FirstMesh(Scene scene)
@@ -71,45 +148,31 @@ namespace TaichiSoft
             throw new SoftException(ErrorCode.Argument, "nothing is drawn of " + body);
         }
 
-        private Vector2[] UvOf(Scene scene, MeshInfo info)
-        {
-            var numbers = new float[2 * info.VertexCount];
-            scene.GetUv(number, numbers);
-            var uv = new Vector2[info.VertexCount];
-            for (int i = 0; i < uv.Length; ++i) uv[i] = new Vector2(numbers[2 * i], numbers[2 * i + 1]);
-            return uv;
-        }
-
         // After SoftWorldBehaviour.Update, which says how far the picture is.
         private void LateUpdate()
         {
-            if (drawn == null || world.World == null) return;
+            if (shown == null || world.World == null) return;
             Body found = Body;
             if (found.IsSomebody)
             {
-                found.ReadMesh(
-                    number, vertexMemory.AddrOfPinnedObject(), normalMemory.AddrOfPinnedObject(), 3 * vertices.Length);
+                Show(drawings.Length > 1 ? drawings[found.Level] : drawings[0]);
+                shown.Read(found);
             }
             else if (isSomebody)
             {
-                Array.Clear(vertices, 0, vertices.Length); // triangles without a size: nothing is seen
-            }
-            else
-            {
-                return;
+                shown.Clear();
             }
             isSomebody = found.IsSomebody;
-            drawn.vertices = vertices;
-            drawn.normals = normals;
-            drawn.RecalculateBounds();
         }
 
         private void OnDestroy()
         {
-            if (vertexMemory.IsAllocated) vertexMemory.Free();
-            if (normalMemory.IsAllocated) normalMemory.Free();
-            if (drawn != null) Destroy(drawn);
-            drawn = null;
+            foreach (Drawing each in drawings)
+            {
+                if (each != null) each.Release();
+            }
+            drawings = new Drawing[0];
+            shown = null;
         }
     }
 }

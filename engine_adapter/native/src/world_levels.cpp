@@ -128,8 +128,10 @@ int32_t World::level_of(int32_t slot) const { return levels_[size_t(slot)]; }
 void World::require_change(int32_t slot, int32_t level, bool may_release) const {
   const Asset& asset = whole_of(slot);
   if (level < 0 || size_t(level) >= asset.level_count()) {
-    fail(TS_ERROR_ARGUMENT, "level is %d, and asset %d has %zu: from_surface with cells=(12, 8, 5) makes several", level,
-         scene_->asset_of_slot[size_t(slot)], asset.level_count());
+    const std::string fix = asset.level_count() > 1 ? "give 0 to " + std::to_string(asset.level_count() - 1)
+                                                    : "from_surface with cells=(12, 8, 5) makes several";
+    fail(TS_ERROR_ARGUMENT, "level is %d, and asset %d has %zu: %s", level, scene_->asset_of_slot[size_t(slot)],
+         asset.level_count(), fix.c_str());
   }
   bool has_joints = false, has_motors = false;
   for (size_t j = 0; scene_->has_contact && j < kMostJoints; ++j) {

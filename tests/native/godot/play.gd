@@ -1,4 +1,5 @@
-# Plays a recorded game, `game.txt`, on the demo's world, and prints what engine_adapter/native/tests/play.c prints.
+# Plays a recorded game, `game.txt`, which begins with the name of its world. Prints what
+# engine_adapter/native/tests/play.c prints.
 extends SceneTree
 
 var _native: Reference
@@ -8,7 +9,6 @@ var _kept := PoolByteArray()
 
 func _init() -> void:
     _native = load("res://addons/taichi_soft/soft_world_native.gdns").new()
-    _native.load(ProjectSettings.globalize_path("res://demo.softworld"))
     var file := File.new()
     file.open("res://game.txt", File.READ)
     while not file.eof_reached():
@@ -22,6 +22,8 @@ func _init() -> void:
 
 func _play(call: String) -> void:
     match call:
+        "world":
+            _native.load(ProjectSettings.globalize_path("res://" + _numbers.pop_front()))
         "step":
             var dt := _number()
             _native.step(dt, int(_number()))
@@ -51,6 +53,18 @@ func _play(call: String) -> void:
             var body := _body()
             var velocity := _vector()
             _native.set_velocity(body, velocity, _vector())
+        "impulse":
+            var body := _body()
+            _native.apply_impulse(body, _vector())
+        "wake":
+            _native.wake()
+        "set_level":
+            var body := _body()
+            var level := int(_number())
+            _native.set_level(body, level, int(_number()))
+        "level":
+            var body := _body()
+            _say("%d %d" % [_native.get_level(body), _native.vertex_count(body)])
         "record_events":
             _native.record_events(int(_number()))
         "drain":
@@ -60,6 +74,10 @@ func _play(call: String) -> void:
                 var row := [events[i + 7], events[i + 4].x, events[i + 4].y, events[i + 4].z, events[i + 5]]
                 var who := [_slot(events[i + 1]), _slot(events[i + 2]), _hash_of(row)]
                 _say("%d %d %d %d %d %s" % ([events[i], events[i + 3], events[i + 6]] + who))
+        "raycast":
+            var origin := _vector()
+            var direction := _vector()
+            _say_hit(_native.raycast(origin, direction, _number()))
         "overlap_sphere":
             var center := _vector()
             _say_bodies(_native.overlap_sphere(center, _number()))
@@ -139,6 +157,10 @@ func _play(call: String) -> void:
             _native.restore(_kept)
         "status":
             _say(_native.status(_body()))
+        "positions":
+            _say(_hash(_native.positions(_body())))
+        "collider_impulse":
+            _say(_hash_of(_parts(_native.collider_impulse(int(_number())))))
         "mesh":
             var body := _body()
             var read: Array = _native.mesh(body, int(_number()))
@@ -182,6 +204,14 @@ func _grab() -> int:
 
 func _slot(body: int) -> int:
     return (body & 0xffffffff) - 1
+
+
+func _say_hit(hit: Array) -> void:
+    if not hit:
+        _say("nothing")
+        return
+    var row := [hit[2]] + _parts([hit[5], hit[3], hit[4]])
+    _say("%d %d %d %d %s" % ([_slot(hit[0])] + Array(hit[6]) + [_hash_of(row)]))
 
 
 func _say_bodies(bodies: Array) -> void:

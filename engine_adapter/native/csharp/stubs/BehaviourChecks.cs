@@ -1,5 +1,6 @@
 // Runs SoftWorldBehaviour and SoftBodyBehaviour on the stubs in the order in which Unity would: BehaviourChecks
-// FOLDER, a world with axes for Unity. A test of what they do, and none of Unity.
+// FOLDER, a world with axes for Unity. With a second argument, `levels`, the world is that of this name in
+// tests/native/scenes.py. A test of what they do, and none of Unity.
 using System;
 using System.IO;
 using System.Reflection;
@@ -10,6 +11,7 @@ namespace TaichiSoft
     internal static class BehaviourChecks
     {
         private const float Step = 1f / 50;
+        private static Action lateUpdates = () => { }, destroy = () => { }; // of the components that draw levels
 
         private static void Require(bool isTrue, string text)
         {
@@ -44,9 +46,120 @@ namespace TaichiSoft
         {
             Application.streamingAssetsPath = Path.GetDirectoryName(arguments[0]);
             Time.fixedDeltaTime = Step;
+            if (arguments.Length > 1)
+            {
+                CheckLevels(arguments[0]);
+            }
+            else
+            {
+                CheckFrames(arguments[0]);
+            }
+            return 0;
+        }
+
+        // The mesh of a level is drawn at this level: of bodies without a skin, whose assets have one for each.
+        private static void CheckLevels(string folder)
+        {
+            var world = new SoftWorldBehaviour();
+            Set(world, "folder", Path.GetFileName(folder));
+            Message(world, "Awake")();
+            MeshFilter bar = Drawn(world, "body3", ""), named = Drawn(world, "body4", "asset1.surface1");
+            MeshFilter ball = Drawn(world, "body0", "");
+            Mesh skin = ball.sharedMesh;
+            Action fixedUpdate = Message(world, "FixedUpdate"), update = Message(world, "Update");
+            Action frame = () =>
+            {
+                Time.fixedTime += Step;
+                Time.time = Time.fixedTime;
+                fixedUpdate();
+                update();
+                lateUpdates();
+            };
+
+            Body body = world.World.GetBody(3), other = world.World.GetBody(4), round = world.World.GetBody(0);
+            int[] levels = { 0, 2, 1, 1, 0, 2, 0, 1 };
+            foreach (int level in levels)
+            {
+                body.SetLevel(level);
+                other.SetLevel(2 - level);
+                round.SetLevel(level);
+                frame();
+                RequireLevel(world.Scene, bar.sharedMesh, body, level);
+                RequireLevel(world.Scene, named.sharedMesh, other, 2 - level);
+                Require(ball.sharedMesh == skin, "a skin is another mesh at another level");
+                Console.WriteLine("level {0}: {1}", level, bar.sharedMesh.triangles.Length / 3);
+            }
+            long before = GC.GetAllocatedBytesForCurrentThread();
+            for (int i = 0; i < 60; ++i)
+            {
+                body.SetLevel(i % 3);
+                frame();
+            }
+            Console.WriteLine("allocated: {0}", GC.GetAllocatedBytesForCurrentThread() - before);
+
+            byte[] kept = world.World.Snapshot();
+            body.SetLevel(0);
+            frame();
+            RequireLevel(world.Scene, bar.sharedMesh, body, 0);
+            world.World.Restore(kept);
+            frame();
+            RequireLevel(world.Scene, bar.sharedMesh, body, 2);
+            body.Despawn();
+            frame();
+            foreach (Vector3 vertex in bar.sharedMesh.vertices) Require(Dot(vertex, vertex) == 0, "nobody is drawn");
+            world.World.Spawn(1, new Placement(new Vector3d(4, 3, 3), Quaterniond.Identity)); // free in any axes
+            frame();
+            RequireLevel(world.Scene, bar.sharedMesh, world.World.GetBody(3), 0);
+            destroy();
+            Message(world, "OnDestroy")();
+            lateUpdates();
+        }
+
+        // A component that draws a body. Returns: where it puts its mesh.
+        private static MeshFilter Drawn(SoftWorldBehaviour world, string body, string mesh)
+        {
+            var filter = new MeshFilter();
+            var component = new SoftBodyBehaviour { transform = new Transform(), other = filter };
+            Set(component, "world", world);
+            Set(component, "body", body);
+            Set(component, "mesh", mesh);
+            Message(component, "Start")();
+            lateUpdates += Message(component, "LateUpdate");
+            destroy += Message(component, "OnDestroy");
+            return filter;
+        }
+
+        private static void RequireLevel(Scene scene, Mesh drawn, Body body, int level)
+        {
+            Require(body.Level == level, "the body is at another level");
+            int number = scene.Find(NameKind.Mesh, "asset1.surface" + (level == 0 ? "" : level.ToString()));
+            MeshInfo info = scene.GetMeshInfo(number);
+            float[] positions = new float[3 * info.VertexCount], normals = new float[3 * info.VertexCount];
+            body.ReadMesh(number, positions, normals);
+            var triangles = new int[3 * info.TriangleCount];
+            scene.GetTriangles(number, triangles);
+            Require(drawn.vertices.Length == info.VertexCount, "the mesh has the vertices of another level");
+            Require(drawn.normals.Length == info.VertexCount, "the mesh has the normals of another level");
+            Require(drawn.triangles.Length == triangles.Length, "the mesh has the triangles of another level");
+            for (int i = 0; i < triangles.Length; ++i) Require(drawn.triangles[i] == triangles[i], "another triangle");
+            for (int i = 0; i < info.VertexCount; ++i)
+            {
+                Vector3 place = drawn.vertices[i], normal = drawn.normals[i];
+                Require(IsAt(place, positions, 3 * i), "the mesh is elsewhere");
+                Require(IsAt(normal, normals, 3 * i), "a normal is another one");
+            }
+        }
+
+        private static bool IsAt(Vector3 vector, float[] numbers, int begin)
+        {
+            return vector.x == numbers[begin] && vector.y == numbers[begin + 1] && vector.z == numbers[begin + 2];
+        }
+
+        private static void CheckFrames(string folder)
+        {
             var lift = new Transform { rotation = Quaternion.identity };
             var world = new SoftWorldBehaviour();
-            Set(world, "folder", Path.GetFileName(arguments[0]));
+            Set(world, "folder", Path.GetFileName(folder));
             Set(
                 world, "colliders",
                 new[] { new SoftWorldBehaviour.Follower { name = "collider0", target = lift } });
@@ -119,7 +232,7 @@ namespace TaichiSoft
             Console.WriteLine("allocated: {0}", GC.GetAllocatedBytesForCurrentThread() - before);
 
             // The same steps without components.
-            var scene = new Scene(arguments[0]);
+            var scene = new Scene(folder);
             var plain = new World(scene);
             int asset = plain.GetBody(1).GetAsset();
             var expected = new float[3 * drawn.vertices.Length];
@@ -178,7 +291,6 @@ namespace TaichiSoft
             scene.Dispose();
             Console.WriteLine("steps: {0}", steps);
             Console.WriteLine("contacts: {0}", told[(int)EventKinds.ContactBegan]);
-            return 0;
         }
     }
 }

@@ -8,7 +8,7 @@ extends MeshInstance3D
 @export var world_path := NodePath()
 ## As the script of the world called it; empty where `body` is set, to what SoftWorld.spawn returned.
 @export var body_name := ""
-## Empty for the first mesh of the body's asset.
+## Empty for the first mesh of the body's asset. A body without a skin is drawn by the mesh of its level of detail.
 @export var mesh_name := ""
 
 var body := 0:
@@ -17,6 +17,7 @@ var body := 0:
 var _world: SoftWorld = null
 var _drawn := ArrayMesh.new()
 var _mesh := -1
+var _level := -1  # level of detail that the mesh draws; -1 for all of them: a skin
 var _arrays := []
 
 
@@ -50,7 +51,7 @@ func _process(_delta: float) -> void:
 func draw() -> void:
     if _mesh < 0 or _world.native == null:
         return
-    var read = _world.native.mesh(body, _mesh)
+    var read = _read()
     _drawn.clear_surfaces()
     if read == null:  # it was taken out of the world
         set_body(0)
@@ -73,24 +74,47 @@ func _on_started() -> void:
     set_body(_world.body(body_name) if body_name != "" else body)
 
 
+# Positions and normals; null if the body was removed from the world.
+func _read():
+    var native := _world.native
+    if _level >= 0:  # a snapshot can change the level, too
+        var level = native.get_level(body)
+        if level != null and level != _level:
+            _find_mesh()
+        if level == null or _mesh < 0:
+            return null
+    return native.mesh(body, _mesh)
+
+
 func _find_mesh() -> void:
     var native := _world.native
     var asset = native.asset_of(body)
     if asset == null:
         return
-    if mesh_name != "":
-        var found = native.find(SoftWorld.Kind.MESH, mesh_name)
-        _mesh = -1 if found == null else found
-    else:
-        for number in native.count(SoftWorld.Kind.MESH):
-            if native.mesh_info(number)[0] == asset:
-                _mesh = number
-                break
+    _mesh = _mesh_of(asset, native.get_level(body))
     if _mesh < 0:
         push_error("%s: the body has no mesh of that name" % name)
         return
+    _level = native.mesh_info(_mesh)[4]
     var uvs: PackedVector2Array = native.uvs(_mesh)
     _arrays = []
     _arrays.resize(Mesh.ARRAY_MAX)
     _arrays[Mesh.ARRAY_INDEX] = native.triangles(_mesh)
     _arrays[Mesh.ARRAY_TEX_UV] = uvs if uvs.size() > 0 else null
+
+
+# Number of the mesh that draws a level of detail of an asset; -1 for none.
+func _mesh_of(asset: int, level: int) -> int:
+    var native := _world.native
+    if mesh_name != "":
+        var named = native.find(SoftWorld.Kind.MESH, mesh_name)
+        if named == null:
+            return -1
+        var info = native.mesh_info(named)
+        if info[0] != asset or info[4] < 0:
+            return named
+    for number in native.count(SoftWorld.Kind.MESH):
+        var info = native.mesh_info(number)
+        if info[0] == asset and (info[4] < 0 or info[4] == level):
+            return number
+    return -1

@@ -309,7 +309,25 @@ func remove_motor(which: int) -> bool:
     return _is_started("remove_motor") and native.remove_motor(which) != null
 
 
-## Where the vertices of a body are, by their numbers.
+## Change the level of detail of a body: 0 is the finest. Returns false if joints, motors or attachments bar the change;
+## with `release` they are released. Each level has its own vertices.
+func set_level(which: int, level: int, release := false) -> bool:
+    return _is_started("set_level") and native.set_level(which, level, int(release)) != null
+
+
+## The level of detail of a body; -1 for no body.
+func get_level(which: int) -> int:
+    var found = native.get_level(which) if _is_started("get_level") else null
+    return -1 if found == null else found
+
+
+## Number of levels of detail that a body has; 0 for no body.
+func level_count(which: int) -> int:
+    var asset = native.asset_of(which) if _is_started("level_count") else null
+    return 0 if asset == null else native.level_count(asset)
+
+
+## Positions of the vertices of a body at its level of detail, by their numbers.
 func positions(which: int) -> PackedVector3Array:
     var found = native.positions(which) if _is_started("positions") else null
     return PackedVector3Array() if found == null else found
