@@ -31,18 +31,14 @@ ALL = 2**31 - 1
 Launch = Callable[[int, float], int]
 
 
-def choose_schedule(asked: Schedule, scene: Scene, device: Device, *, needs_bodies: bool) -> Schedule:
+def choose_schedule(asked: Schedule, scene: Scene, device: Device) -> Schedule:
     """The schedule to use where `asked` leaves it open.
-
-    `needs_bodies`: implicit solves and contact run in one thread per body only.
 
     A GPU needs one thread per tetrahedron. On a CPU, bodies run side by side as long as there are enough
     of them to keep the threads busy, or too few tetrahedra to be worth sharing.
     """
     if asked is not Schedule.AUTO:
         return asked
-    if needs_bodies:
-        return Schedule.PER_BODY
     if device.is_gpu:
         return Schedule.FLAT
     # A body without tetrahedra works on its edges, of which there are about twice as many per unit of work.

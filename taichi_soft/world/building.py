@@ -51,15 +51,10 @@ def build(context: WorldContext) -> Simulation:
         require_clear(colliders.handles, asset, free_points(asset, rows), f"body {slot}")
     device = init()
     context.built_with = [digest_of(handle.shape) for handle in colliders.all_handles]
-    has_contact = (
-        contact.soft
-        or contact.sleep_speed > 0.0
-        or len(colliders.handles) + contact.collider_room > 0
-        or _has_hulls(context)
-    )
+    settings = replace(context.settings, schedule=_schedule(context, device))
+    has_contact = settings.schedule is Schedule.PER_BODY
     if has_contact:
         _add_floor(context)
-    settings = replace(context.settings, schedule=_schedule(context, device, has_contact))
     capacity = _capacity(context, settings, has_contact)
     program = _program(context, settings, device, has_contact)
     if settings.integrator is Integrator.EXPLICIT_EULER:
@@ -113,17 +108,8 @@ def build(context: WorldContext) -> Simulation:
 
 
 def _add_floor(context: WorldContext) -> None:
-    """Make the floor one of the colliders. Raises: OptionError for what takes no colliders."""
+    """Make the floor one of the colliders."""
     settings = context.settings
-    if settings.schedule is Schedule.FLAT:
-        raise OptionError("schedule 'flat' has no colliders: it takes 'per_body' or 'auto'")
-    if settings.integrator is Integrator.EXPLICIT_EULER:
-        raise OptionError("integrator 'explicit_euler' has no colliders: any other has")
-    if settings.is_implicit and _has_hulls(context):
-        raise OptionError(
-            "integrator 'implicit_euler' takes no hulls, it holds vertices: take 'leapfrog', or assets "
-            "without hull"
-        )
     if settings.floor is not None:
         floor = context.colliders.floor = context.colliders.add(
             PlaneShape(),
@@ -138,15 +124,36 @@ def _add_floor(context: WorldContext) -> None:
         context.handles.enlist(floor)
 
 
-def _schedule(context: WorldContext, device: Device, has_contact: bool) -> Schedule:
-    asked = context.settings.schedule
-    is_cut = any(asset.spare_vertices or asset.coarser for asset in context.slots.kinds)
-    if is_cut and asked is Schedule.FLAT:
+def _schedule(context: WorldContext, device: Device) -> Schedule:
+    """The schedule of a world. Raises: OptionError for what the one asked for cannot do."""
+    settings, contact = context.settings, context.contact
+    asked = settings.schedule
+    if settings.integrator is Integrator.EXPLICIT_EULER:
+        if asked is Schedule.PER_BODY:
+            raise OptionError("integrator 'explicit_euler' runs by schedule 'flat' only: it has no colliders")
+        asked = Schedule.FLAT
+    for feature, is_asked in {
+        "bodies that are cut or have levels of detail": any(
+            asset.spare_vertices or asset.coarser for asset in context.slots.kinds
+        ),
+        "hulls": _has_hulls(context),
+        "colliders": len(context.colliders.handles) + contact.collider_room > 0,
+        "soft contact": contact.soft,
+        "sleep": contact.sleep_speed > 0.0,
+        "implicit Euler": settings.is_implicit,
+    }.items():
+        if is_asked and asked is Schedule.FLAT:
+            raise OptionError(
+                f"schedule 'flat' takes no {feature}: take 'per_body' or 'auto', with 'leapfrog' or 'lazy_leapfrog'"
+            )
+        if is_asked:
+            asked = Schedule.PER_BODY
+    if settings.is_implicit and _has_hulls(context):
         raise OptionError(
-            "schedule 'flat' takes no bodies that are cut or have levels of detail: take 'per_body' or 'auto'"
+            "integrator 'implicit_euler' takes no hulls, it holds vertices: take 'leapfrog', or assets "
+            "without hull"
         )
-    needs_bodies = context.settings.is_implicit or has_contact or is_cut
-    return choose_schedule(asked, context.layout, device, needs_bodies=needs_bodies)
+    return choose_schedule(asked, context.layout, device)
 
 
 def _capacity(context: WorldContext, settings: Settings, has_contact: bool) -> Capacity:
