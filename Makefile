@@ -2,7 +2,7 @@
 # make test: set everything up, run the tests that take minutes; make test-all: those that take an hour, too
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-fast test-all test-bounds native test-native test-platforms dist-native lint profile gallery docs clean
+.PHONY: help setup demo test test-fast test-all test-bounds native test-native test-platforms dist-native lint profile report peers gallery docs clean
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -18,6 +18,8 @@ help:
 	@echo "make test-platforms  set up, build it for other platforms, play games on all that run here"
 	@echo "make dist-native  build it for all platforms, pack it with headers, wrappers and sample into dist; and a project for Godot 3"
 	@echo "make profile  set up, measure what a frame costs here"
+	@echo "make report   set up, run the thesis's experiments, write out/report: takes minutes"
+	@echo "make peers    set up with other engines, drop one body in all of them, write out/peers.mp4"
 	@echo "make gallery  set up, film every demo and export worlds to play for the documentation: takes minutes"
 	@echo "make docs     set up, build the documentation into out/docs"
 	@echo "make lint     set up with every extra, check style and types"
@@ -83,10 +85,17 @@ dist-native: native
 	@cp engine_adapter/godot/demo/world.py assets/elephant.glb out/godot3
 	@$(BIN)/taichi-soft export out/godot3/world.py --axes y-up --out out/godot3/demo.softworld
 	@cd out/godot3 && cpack -B $(CURDIR)/dist > cpack.log || { cat cpack.log; exit 1; }
+	@rm -r dist/_CPack_Packages
 	@ls -l dist
 
 profile: $(VENV)/.demo
 	@$(BIN)/taichi-soft profile
+
+report: $(VENV)/.lab
+	@$(BIN)/python -m lab report $(REPORT)
+
+peers: $(VENV)/.demo $(VENV)/.peers
+	@$(BIN)/python -m lab peers $(PEERS)
 
 gallery: $(VENV)/.demo
 	@$(BIN)/python docs/make_gallery.py $(GALLERY)

@@ -1,5 +1,5 @@
 #!/bin/sh
-# Makes the environment in $1, unless it is there, and installs taichi-soft with the extra $2 (demo, test, dev).
+# Makes the environment in $1, unless it is there, and installs taichi-soft with the extra $2 (demo, lab, test, dev).
 # Uses uv if it is there, else venv + pip. PYTHON=/path/to/python names the interpreter to use.
 set -eu
 

@@ -11,7 +11,7 @@ from engine_adapter import FixedStep
 from taichi_soft import LAWS, Material, TetMesh, World, sphere
 from taichi_soft.cli import main
 from taichi_soft.core.extras import missing_packages
-from taichi_soft.lab.profiling.spread import time_calls
+from taichi_soft.profiling.spread import time_calls
 from taichi_soft.render import PALETTE, Camera
 from taichi_soft.render.film import Actor, Stage
 

@@ -15,9 +15,9 @@ import numpy as np
 from play import scenes
 
 from engine_adapter import FixedStep
+from lab.peers import Drop, compare, missing_peers
+from lab.peers.wall import draw_wall
 from taichi_soft.core.package_data import ASSETS
-from taichi_soft.lab.peers import Drop, compare, missing_peers
-from taichi_soft.lab.peers.wall import draw_wall
 from taichi_soft.render.demos import demo_names, load_demo
 from taichi_soft.render.film import Actor, Stage, film
 from taichi_soft.render.props import Prop

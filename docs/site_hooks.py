@@ -100,9 +100,9 @@ def _verdicts() -> str:
 
 
 def _report() -> str:
-    """`report.md` as a page with the style of those that `taichi-soft report` writes."""
+    """`report.md` as a page with the style of those that `python -m lab report` writes."""
     text = (REPORT / "report.md").read_text(encoding="utf-8")
     text = re.sub(r"^  - ", "    - ", text, flags=re.MULTILINE)  # a list in a list, four columns in
     body = markdown.markdown(text, extensions=["tables", "sane_lists"])
-    style = (ROOT / "taichi_soft/lab/report/templates/report.css").read_text(encoding="utf-8")
+    style = (ROOT / "lab/report/templates/report.css").read_text(encoding="utf-8")
     return PAGE.format(style=style, body=body)

@@ -5,19 +5,23 @@ import os
 import signal
 import sys
 import time
-from collections import Counter
 from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import settings
-from xdist.scheduler import LoadScopeScheduling
 from xdist.workermanage import NodeManager
 
+from lab.extras import EXTRAS as LAB_EXTRAS
 from taichi_soft import Material, World, box, init, load_mesh
 from taichi_soft.bodies.capacity import LEAST
-from taichi_soft.core.extras import missing_packages
+from taichi_soft.core.extras import EXTRAS, missing_among
 from taichi_soft.core.runtime import DEBUG
+
+HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE / "shared"))  # what tests of several folders import
+
+from shares import Shares, place_of  # noqa: E402
 
 UNTIL = "TAICHI_SOFT_SOAKS_UNTIL"
 """Name of the environment variable with the time [s since 1970] after which no soak begins: `.ci/run` has so
@@ -35,212 +39,60 @@ NodeManager.EXIT_TIMEOUT = 300
 """How long a worker may take to end [s]. It keeps its kernels then; of a whole run that takes longer than the
 10 s after which it would be killed, and the next run would find none."""
 
-sys.path.insert(0, str(Path(__file__).parent / "shared"))  # what tests of several folders import
-
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     # A shell that runs the tests behind `&` has them ignore Ctrl-C, and the processes that they start too.
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
-SECONDS = {
-    "contact/distances/": (20, 0),
-    "contact/shapes/": (10, 0),
-    "contact/": (88, 430),
-    "solver/test_sleep": (5, 0),
-    "solver/test_islands": (6, 0),
-    "solver/test_repeated_steps": (1, 0),
-    "render/test_props": (3, 15),
-    "control/": (127, 275),
-    "levels/test_holding": (3, 40),
-    "engine_adapter/test_budget": (17, 0),
-    "events/": (28, 0),
-    "persistence/": (32, 163),
-    "engine_adapter/test_rollback": (0, 0),
-    "core/math/": (2, 0),
-    "core/": (33, 110),
-    "world/": (94, 397),
-    "cages/": (56, 120),
-    "feel/": (6, 90),
-    "levels/": (25, 150),
-    "bodies/": (36, 296),
-    "lab/peers/": (0, 240),
-    "lab/": (0, 355),
-    "cli/": (0, 225),
-    "demos/": (0, 620),
-    "docs/": (1, 650),
-    "solver/": (78, 1290),
-    "elements/": (140, 130),
-    "fracture/": (22, 90),
-    "engine_adapter/test_panda3d": (0, 0),
-    "engine_adapter/": (18, 0),
-    "render/": (66, 0),
-    "bake/test_formats": (1, 0),
-    "bake/": (1, 20),
-    "native/": (0, 2200),
-    "live/": (13, 244),
-    "test_readme": (1, 10),
-    "test_first_steps": (1, 240),
-    "test_package": (2, 60),
-    "": (40, 0),
+TIERS = {
+    "cages": "numpy",
+    "cli": "soak",
+    "contact/distances": "kernel",
+    "contact/shapes": "kernel",
+    "core/math": "kernel",
+    "demos": "soak",
+    "doctor": "soak",
+    "elements": "kernel",
+    "elements/laws/test_energy_laws.py": "world",
+    "elements/materials": "numpy",
+    "lab": "soak",
+    "meshing": "numpy",
+    "native": "soak",
+    "profiling": "soak",
 }
-"""What the tests of files that begin so take, those of `make test` and the soaks, with an empty kernel cache.
-Neighbours have worlds of the same kinds, which each worker compiles once."""
-
-NUMPY = ("meshing/", "cages/", "elements/materials/", "bake/test_formats", "test_layers")
-KERNEL = ("elements/", "contact/distances/", "contact/shapes/", "core/math/")
-WORLD = ("elements/laws/test_energy_laws",)
-SOAK = (
-    *("lab/", "demos/", "cli/", "native/", "live/test_served", "live/test_page", "live/test_measuring"),
-    "feel/test_material_from_feel.py::test_random_wishes",
-    "feel/test_material_from_feel.py::test_what_cannot",
-    *(
-        "solver/integrators/test_implicit_euler",
-        "solver/integrators/test_motion",
-        "contact/test_implicit_contact",
-        "contact/test_hulls",
-    ),
-    *("solver/test_threads", "solver/test_skipping", "solver/test_long_steps", "solver/test_gpu_launch"),
-    *("solver/test_damping_ratio", "world/test_bodies", "world/test_pools", "world/test_finite_readout"),
-    *("elements/laws/test_anisotropy", "control/test_materials", "bodies/test_particle_bodies"),
-    *("bodies/test_stress", "bodies/test_states", "bodies/test_plasticity"),
-    *("fracture/test_cutting", "fracture/test_cut_snapshots"),
-    # What starts processes, or compiles a world of its own, to look after something else than physics.
-    *("control/test_easing", "engine_adapter/test_refused_steps", "world/test_handles_at_any_time"),
-    "contact/test_overlaps.py::test_30_bodies",
-    "contact/test_overlaps.py::test_two_bodies_that_start_inside_each_other_come_apart_without_being_thrown[im",
-    "docs/test_reference.py::test_an_example",
-    *("world/test_warm_up", "persistence/test_recorder", "solver/test_kernel_cache"),
-    *(f"core/test_threads.py::test_{name}" for name in ("a_", "worlds_that_compile")),
-    *(f"core/test_runtime.py::test_{name}" for name in ("starting_again", "the_threads_that_work")),
-    *(f"core/test_known_kernels.py::test_{name}" for name in ("a_later", "a_world", "a_machine")),
-    *(f"core/test_known_kernels.py::test_{name}" for name in ("after_an_update", "what_is_missing")),
-    "core/test_logging",
-    *(f"world/test_public_face.py::test_{name}" for name in ("every", "a_", "all_that", "nothing")),
-    "solver/test_recovery.py::test_a_wrecked_body_finds_its_shape_again[exact",
-    *(f"persistence/test_snapshot.py::test_{name}" for name in ("rest_shapes", "other_integrators")),
-    *(f"test_package.py::test_a_{name}" for name in ("source", "wheel")),
-    "docs/test_pages.py::test_the_code",
-    *(f"test_first_steps.py::test_the_{name}" for name in ("first_films", "documentation", "gallery")),
-    *(f"docs/test_gallery.py::test_{name}" for name in ("a_demo_that", "a_film", "films_of")),
-    "docs/test_playing_gallery",
-    *(
-        "control/test_joint_lives.py::test_a_recording",
-        "levels/test_holding.py::test_recordings",
-        "test_readme.py::test_the_level",
-    ),
-    *(f"levels/test_levels.py::test_{name}" for name in ("levels_in_contact", "after_warming", "warming")),
-    "bake/test_bake.py::test_a_body_that_goes",
-    # Worlds of kinds that one test has to itself; joints and motors by leapfrog are in `make test`.
-    "control/test_motors.py::test_a_force_changes_momentum_by_force_times_time[i",
-    "control/test_motors.py::test_a_torque_changes_angular_momentum_by_torque_times_time_and_momentum_by_nothing[la",
-    *(f"control/test_joints.py::test_a_{name}" for name in ("joint_works", "rope_is_held")),
-    "control/test_grabs.py::test_cloth_is_held",
-    "control/test_attachments.py::test_what_is_dragged_too_far_in_a_step_without_retries",
-    *(
-        "solver/test_coarse_steps.py::test_what_one_may_ask_of_implicit_euler",
-        "solver/test_floor.py::test_without",
-    ),
-    *("render/test_props.py::test_a_collider_is_drawn_on_its_way", "render/test_film.py::test_colors_of"),
-    *("contact/test_narrow_phase.py::test_a_tip", "persistence/test_snapshot.py::test_a_rope"),
-    # Meshers that are in none of the extras of `make test`.
-    "cages/test_methods",
-    # What takes long although its kernels are there.
-    *(
-        "cages/test_difficult_surfaces",
-        "cages/test_cage.py::test_a_bar_along",
-        "cages/test_thin.py::test_the_cell",
-        "cages/test_thin.py::test_a_table_on",
-    ),
-    *("live/test_frame_file.py::test_a_reader", "live/test_uploads.py::test_a_name"),
-    "render/test_renderer.py::test_same_bits",
-    *("cages/test_thin.py::test_the_octaves", "contact/test_soft_contact.py::test_a_coarse_plate"),
-    "contact/test_piles.py::test_a_block_bears_one_of_many_times_its_mass_for_a_minute[1000-50.0",
-    "contact/test_colliders.py::test_a_sheet_of_1_cm_lands_without_freezing[0.01",
-    *("core/test_kernel_cache.py::test_a_lock", "docs/test_pages.py::test_every_command"),
-    *(
-        "cages/test_cage.py::test_parts_that_do_not_touch",
-        "contact/shapes/test_mesh_shape.py::test_one_thread",
-    ),
-    # Processes that compile worlds; the first one of its kind is in `make test`.
-    *("core/test_signals.py::test_a_film", "core/test_runtime.py::test_more_threads"),
-    *(
-        f"core/test_runtime.py::test_{name}"
-        for name in ("left_alone_a_thread", "left_alone_threads", "where_the_system")
-    ),
-)
-"""Tiers, by the beginnings of files or tests. SOAK compiles or runs for more than some 40 s with an empty
-cache and is left to `make test-all`; NUMPY runs no kernel, KERNEL some by themselves; the rest, and
-what is named in WORLD, are whole worlds."""
-
-VARIANTS = {
-    "control/test_attachments": ("lazy_leapfrog", "implicit"),
-    "control/test_grabs": ("implicit",),
-    "control/test_pins": ("lazy_leapfrog", "implicit", "flat"),
-    "control/test_motors": ("lazy_leapfrog", "implicit"),
-    "control/test_surroundings": ("lazy_leapfrog", "implicit", "flat"),
-    "control/test_joints": ("soft",),
-    "solver/test_coarse_steps": ("flat",),
-    "elements/laws/test_energy_laws": ("flat",),
-    "elements/laws/": (
-        *("face-exact", "face-linear-off", "face-linear-tolerant"),
-        *("virial-exact-off", "virial-exact-tolerant", "exact-face"),
-    ),
-    "elements/laws/test_evaluation": ("face-linear-recover",),
-    "elements/laws/test_gradients": ("virial-exact-recover", "virial-linear-off"),
-    "fracture/test_tearing": ("virial", "st_venant_kirchhoff"),
-    # What takes long although its kernels are there.
-    "cages/test_cage": ("turned box", "capsule", "tube"),
-    "cages/test_thin": ("ball", "a wall"),
-    "meshing/test_locating.py::test_a_point_outside": ("torus",),
-    "render/test_video.py::test_a_killed_film": (".webm", ".gif"),
-    "solver/integrators/test_safe_step": ("cylinder", "cmpm"),
-}
-"""Soaks by the names of parameters, by the beginnings of files or tests. Other tests of `make test` have each
-of these integrators, schedules and laws (`control/test_forces`, `control/test_impulses`), or one that differs
-by a branch."""
-
+"""Tier of the tests of a folder or file that have no marker for one. The longest path counts; elsewhere it is
+"world"."""
 
 NEEDS = {
-    "lab/experiments/": "report",
-    "lab/report/": "report",
-    "lab/sweep/test_cluster": "cluster",
+    "lab/experiments/": "lab",
+    "lab/report/": "lab",
     "docs/test_pages.py::test_the_code_of_a_page_runs_from_top_to_bottom[panda3d": "panda3d",
     "docs/test_pages.py::test_code_of_a_page_imports_public_names_only[panda3d": "panda3d",
 }
 """Extras that tests need beyond those of the extra `test`, by the beginnings of files."""
 
 
-def is_soak(nodeid):
-    """Whether a test is left to `make test-all`."""
-    file, _, parameters = nodeid.removeprefix("tests/").partition("[")
-    variants = [name for start, names in VARIANTS.items() if file.startswith(start) for name in names]
-    return nodeid.removeprefix("tests/").startswith(SOAK) or any(name in parameters for name in variants)
+def tiers_of(item):
+    """Tiers that a test is marked with."""
+    return [tier for tier in ("numpy", "kernel", "world", "soak") if item.get_closest_marker(tier)]
 
 
-def tier_of(item):
-    """The marker of a test."""
-    if is_soak(item.nodeid):
-        return "soak"
-    file = item.nodeid.removeprefix("tests/")
-    tiers = {"numpy": NUMPY, "world": WORLD, "kernel": KERNEL}
-    return next((name for name, starts in tiers.items() if file.startswith(starts)), "world")
-
-
-def folder_of(nodeid):
-    """The entry of `SECONDS` that a test belongs to."""
-    return next(start for start in SECONDS if nodeid.removeprefix("tests/").startswith(start))
+def tier_of(path):
+    """Tier of the tests of a file that have no marker for one."""
+    places = (place.as_posix() for place in (path, *path.parents))
+    return next((TIERS[place] for place in places if place in TIERS), "world")
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    order = {start: i for i, start in enumerate(SECONDS)}
     files = {path: i for i, path in enumerate(dict.fromkeys(item.path for item in items))}
-    items.sort(key=lambda item: (order[folder_of(item.nodeid)], files[item.path], keeps_a_world(item)))
+    items.sort(key=lambda item: (place_of(item.nodeid), files[item.path], keeps_a_world(item)))
     for item in items:
-        item.add_marker(tier_of(item))
+        if not tiers_of(item):
+            item.add_marker(tier_of(item.path.relative_to(HERE)))
         for start, extra in NEEDS.items():
             if item.nodeid.removeprefix("tests/").startswith(start):
-                missing = missing_packages(extra)
-                reason = f"needs {', '.join(missing)}: pip install 'taichi-soft[{extra}]'"
+                missing = missing_among({**EXTRAS, **LAB_EXTRAS}[extra])
+                reason = f"needs {', '.join(missing)}: pip install -e '.[{extra}]'"
                 item.add_marker(pytest.mark.skipif(bool(missing), reason=reason))
 
 
@@ -253,7 +105,10 @@ def keeps_a_world(item):
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item):
-    if is_soak(item.nodeid) and time.time() > float(os.environ.get(UNTIL, "inf")):
+    tiers = tiers_of(item)
+    if len(tiers) > 1:
+        pytest.fail(f"{item.nodeid} is marked {' and '.join(tiers)}: leave one of them", pytrace=False)
+    if tiers == ["soak"] and time.time() > float(os.environ.get(UNTIL, "inf")):
         pytest.skip(TIME_IS_UP)
 
 
@@ -278,36 +133,6 @@ def fail_if_skipped(report):
             return
         report.outcome = "failed"
         report.longrepr = f"skipped: {report.longrepr[-1]}"
-
-
-class Shares(LoadScopeScheduling):
-    """The tests in their order, cut into one share for each worker, between files.
-
-    Taichi's cache on disk finds a kernel only where as many fields were made before it as when it was kept.
-    So a worker has to run the same files in the same order every time.
-    """
-
-    share_of_file = None
-
-    def _split_scope(self, nodeid):
-        if self.share_of_file is None:
-            self.share_of_file = self._cut()
-        return self.share_of_file[nodeid.split("::")[0]]
-
-    def _cut(self):
-        seconds = self._seconds_of_files()
-        share, before, most = {}, 0.0, sum(seconds.values()) / self.numnodes
-        for file, its in seconds.items():
-            share[file] = f"share {min(int((before + its / 2) / most), self.numnodes - 1)}"
-            before += its
-        return share
-
-    def _seconds_of_files(self):
-        tiers = [(folder_of(nodeid), is_soak(nodeid)) for nodeid in self.collection]
-        counts, seconds = Counter(tiers), Counter()
-        for nodeid, (folder, is_long) in zip(self.collection, tiers, strict=True):
-            seconds[nodeid.split("::")[0]] += SECONDS[folder][is_long] / counts[folder, is_long] + 0.01
-        return seconds
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -368,7 +193,7 @@ def unfit_buffer(request):
     return request.param
 
 
-ASSETS = Path(__file__).parents[1] / "assets"
+ASSETS = HERE.parent / "assets"
 
 
 @pytest.fixture(scope="session")

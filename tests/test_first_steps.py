@@ -9,6 +9,7 @@ from pathlib import Path
 import cv2
 import pytest
 
+from lab.extras import EXTRAS as LAB_EXTRAS
 from taichi_soft.core.extras import EXTRAS
 from taichi_soft.render.demos import demo_names
 
@@ -18,7 +19,7 @@ FOLLOWED = {"demo", "docs", "gallery"}
 TESTS = {"test", "test-all"}
 """Targets of make that run this file."""
 
-OPTIONAL = {module for modules in EXTRAS.values() for module in modules}
+OPTIONAL = {module for modules in (*EXTRAS.values(), *LAB_EXTRAS.values()) for module in modules}
 ABSENT = sorted(OPTIONAL - {*EXTRAS["cli"], *EXTRAS["film"]})
 
 HIDING = f"""
@@ -79,6 +80,7 @@ def test_every_target_of_make_that_the_first_pages_name_is_followed_here_or_runs
     assert {one or other for one, other in named} <= FOLLOWED | TESTS
 
 
+@pytest.mark.soak
 def test_the_first_films_are_there(run):
     run("make", "demo")
     film = cv2.VideoCapture(str(run.folder / "out" / "bounce.mp4"))
@@ -89,6 +91,7 @@ def test_the_first_films_are_there(run):
     assert (run.folder / "bounce.mp4").stat().st_size > 0
 
 
+@pytest.mark.soak
 def test_the_documentation_shows_a_still_of_every_demo(run):
     pytest.importorskip("mkdocs", reason="needs mkdocs-material: pip install 'taichi-soft[docs]'")
     run("make", "docs")
@@ -101,6 +104,7 @@ def test_the_documentation_shows_a_still_of_every_demo(run):
     assert "make gallery" in text
 
 
+@pytest.mark.soak
 def test_the_gallery_films_every_demo_with_the_extras_of_the_first_page(run):
     said = run("make", "gallery", "GALLERY=--seconds 0.1 --size 96x54")
     made = re.findall(r"^(\w+): \d+ kB$", said, re.MULTILINE)

@@ -1,12 +1,15 @@
 """Layers: every file imports only downwards, and nobody reads what is another's own."""
 
 import ast
+import re
 import subprocess
 import sys
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
+
+pytestmark = pytest.mark.numpy
 
 ROOT = Path(__file__).parents[1]
 
@@ -33,15 +36,17 @@ LAYERS = """
     render
     bake
     export
-    lab
+    doctor
+    profiling
     live
     cli
     __main__
     demos
+    lab
 """
 LEVEL = {name: level for level, name in enumerate(LAYERS.split())}
 
-OURS = ("taichi_soft", "engine_adapter", "demos")
+OURS = ("taichi_soft", "engine_adapter", "demos", "lab")
 
 PICTURES = ("artist", "camera_moves", "demos", "film", "framing", "props", "replay", "stage", "take")
 """Files of render that know worlds; the others draw triangles."""
@@ -64,11 +69,7 @@ def module_name(path):
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
-FILES = {
-    module_name(path): path
-    for folder in ("taichi_soft", "engine_adapter", "demos")
-    for path in sorted((ROOT / folder).rglob("*.py"))
-}
+FILES = {module_name(path): path for folder in OURS for path in sorted((ROOT / folder).rglob("*.py"))}
 SOURCES = {module: path.read_text(encoding="utf-8") for module, path in FILES.items()}
 
 
@@ -109,7 +110,7 @@ def upward_edges(module, imports):
     here = part_of(module)
     for name in imports:
         there = part_of(name)
-        if name.startswith(OURS) and LEVEL[there] > LEVEL[here]:
+        if name.split(".")[0] in OURS and LEVEL[there] > LEVEL[here]:
             yield f"{module} ({here}) imports {name} ({there})"
 
 
@@ -128,7 +129,7 @@ def others_names(source):
         for node in nodes
         if isinstance(node, (ast.Import, ast.ImportFrom))
         for alias in node.names
-        if not (getattr(node, "module", None) or alias.name).startswith(OURS)
+        if (getattr(node, "module", None) or alias.name).split(".")[0] not in OURS
     }
     own |= {
         node.attr
@@ -140,7 +141,7 @@ def others_names(source):
             root = ast.unparse(node.value)
             if node.attr not in own and root not in ("self", "cls") and root.split(".")[0] not in foreign:
                 yield node.attr
-        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith(OURS):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] in OURS:
             yield from (alias.name for alias in node.names if alias.name.startswith("_"))
 
 
@@ -178,6 +179,16 @@ assert all(getattr(taichi_soft, name) is getattr(engine_adapter, name) for name 
 assert set(engine_adapter.__all__) <= set(taichi_soft.__all__)
 """
     subprocess.run([sys.executable, "-c", program], check=True)
+
+
+def test_what_is_installed_does_not_know_the_lab():
+    """Nor do programs that it starts, or names that it imports later."""
+    naming = re.compile(r"""^\s*(?:from|import) lab\b|["']lab(?:\.[\w.]+)?["']""", re.MULTILINE)
+    installed = {m: s for m, s in SOURCES.items() if part_of(m) != "lab"}
+    assert len(installed) > 500
+    assert [module for module, source in installed.items() if naming.search(source)] == []
+    assert naming.search('PROGRAM = """\nfrom lab.sweep import Store\n"""')
+    assert naming.search('import_module("lab.report")')
 
 
 def test_no_circles():
@@ -262,6 +273,8 @@ def test_nobody_reads_what_is_anothers_own():
         ("taichi_soft.bodies.slots", "if TYPE_CHECKING:\n    from taichi_soft.world.body import Body"),
         ("taichi_soft.world.world", "from taichi_soft import Body"),
         ("taichi_soft.world.world", "from engine_adapter import FixedStep"),
+        ("taichi_soft.cli.app", "from lab.cli.report import report"),
+        ("demos.compare", "def f():\n    import lab.peers"),
         ("taichi_soft.elements.laws", "from ...solver.kernels import flat"),
     ],
 )
@@ -277,6 +290,7 @@ def test_an_upward_import_is_found(module, source):
         ("taichi_soft.world.body", "if TYPE_CHECKING:\n    from taichi_soft.world.world import World"),
         ("engine_adapter.adapter", "from taichi_soft import World"),
         ("demos.sphere", "from taichi_soft.render import Camera"),
+        ("lab.peers.wall", "from taichi_soft.render import Camera"),
         ("taichi_soft.world.world", "import numpy as np"),
     ],
 )

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+import lab.extras
 from taichi_soft import OptionError, cli
 from taichi_soft.core import extras
 from taichi_soft.core.package_data import ASSETS, DEMOS
@@ -17,8 +18,8 @@ from taichi_soft.core.package_data import ASSETS, DEMOS
 ROOT = Path(__file__).resolve().parents[1]
 CORE = ("taichi", "numpy", "trimesh")
 MESHERS = ("tetgen", "ftetwild")
-APART = (*MESHERS, "peers", "export")
-"""Extras that are not in `all`."""
+APART = (*MESHERS, "export")
+"""Extras of the library that are not in `all`."""
 
 
 def packages_of(extra):
@@ -40,19 +41,25 @@ def test_without_an_extra_a_game_installs_taichi_numpy_and_trimesh():
     )
 
 
-@pytest.mark.parametrize("extra", extras.EXTRAS)
+@pytest.mark.parametrize("extra", [*extras.EXTRAS, *lab.extras.EXTRAS])
 def test_an_extra_installs_the_packages_that_are_asked_for(extra):
-    asked = set(extras.EXTRAS[extra].values())
+    asked = set({**extras.EXTRAS, **lab.extras.EXTRAS}[extra].values())
     assert asked <= packages_of(extra)
     assert packages_of(extra) <= packages_of("dev")
-    if extra not in APART:
+    if extra not in (*APART, *lab.extras.EXTRAS):
         assert packages_of(extra) <= packages_of("all")
 
 
 def test_what_a_game_is_shipped_with_holds_no_mesher_or_engine_of_others():
     """TetGen is under the AGPL, fTetWild has no wheels for some machines. Engines and compilers are large."""
-    apart = set().union(*map(packages_of, APART)) - packages_of("cli")
+    apart = set().union(*map(packages_of, (*APART, "peers"))) - packages_of("cli")
     assert packages_of("all").isdisjoint(apart)
+
+
+def test_what_a_game_is_shipped_with_is_what_the_library_asks_for():
+    """Nothing is there for the lab alone, which a wheel has not."""
+    asked = set().union(*(extras.EXTRAS[extra].values() for extra in extras.EXTRAS if extra not in APART))
+    assert packages_of("all") == asked
 
 
 def test_the_core_imports_no_package_of_an_extra():
@@ -68,7 +75,8 @@ OPTIONAL = set(%r)
 sys.meta_path.insert(0, Missing())
 import engine_adapter, taichi_soft
 for found in pkgutil.walk_packages(taichi_soft.__path__, "taichi_soft."):
-    if found.name.split(".")[1] not in ("render", "cli", "lab", "live", "demos", "__main__"):
+    apart = found.name.split(".")[1] in ("render", "cli", "live", "demos", "__main__")
+    if not apart and found.name != "taichi_soft.profiling.report":
         importlib.import_module(found.name)
 world = taichi_soft.World()
 world.add_body(taichi_soft.box(), taichi_soft.Material(2e5, 0.3, 1000), position=(0, 0, 1))
@@ -81,12 +89,14 @@ print("imported")
 
 def test_a_missing_package_is_one_line_with_the_way_to_get_it(monkeypatch, capsys):
     monkeypatch.setattr(
-        extras, "find_spec", lambda name: None if name in ("jinja2", "skfem", "typer") else name
+        extras, "find_spec", lambda name: None if name in ("PIL", "pygltflib", "skfem", "typer") else name
     )
-    with pytest.raises(OptionError, match=r"a report needs jinja2, scikit-fem.*'taichi-soft\[report\]'"):
-        extras.require_extra("report", "a report needs")
+    with pytest.raises(OptionError, match=r"a clip needs pillow, pygltflib.*'taichi-soft\[bake\]'"):
+        extras.require_extra("bake", "a clip needs")
     with pytest.raises(ImportError):
-        extras.require_extra("report", "a report needs")
+        extras.require_extra("bake", "a clip needs")
+    with pytest.raises(OptionError, match=r"a report needs scikit-fem.*pip install -e '\.\[lab\]'"):
+        lab.extras.require_report()
     with pytest.raises(SystemExit) as ended:
         cli.main("info")
     assert ended.value.code == (
@@ -125,6 +135,7 @@ def built(tmp_path_factory):
     return wheel, archive
 
 
+@pytest.mark.soak
 def test_a_source_archive_holds_every_file_of_the_checkout(built):
     listed = subprocess.run(["git", "ls-files"], cwd=ROOT, check=True, capture_output=True, text=True).stdout
     with tarfile.open(built[1]) as archive:
@@ -132,6 +143,7 @@ def test_a_source_archive_holds_every_file_of_the_checkout(built):
     assert set(listed.split("\n")) - {""} - held == set()
 
 
+@pytest.mark.soak
 def test_a_wheel_works_without_the_checkout(built, tmp_path):
     wheel, _ = built
     with zipfile.ZipFile(wheel) as files:
@@ -139,6 +151,10 @@ def test_a_wheel_works_without_the_checkout(built, tmp_path):
         description = files.read(
             next(name for name in files.namelist() if name.endswith("METADATA"))
         ).decode()
+    assert {each.name for each in (tmp_path / "site").iterdir() if each.suffix != ".dist-info"} == {
+        *("taichi_soft", "engine_adapter")
+    }
+    assert not (tmp_path / "site/taichi_soft/lab").exists()
     assert {each.name for each in (tmp_path / "site/taichi_soft/demos").glob("*.py")} == {
         each.name for each in DEMOS.glob("*.py")
     }
@@ -158,6 +174,5 @@ def test_a_wheel_works_without_the_checkout(built, tmp_path):
         return done.stdout
 
     assert "bounce" in run("demo")
-    assert "fig-6.4" in run("report", "--list")
     run("demo", "bounce", "--seconds", "0.1", "--size", "64x48", "--out", "b.webm")
     assert (tmp_path / "b.webm").stat().st_size > 0

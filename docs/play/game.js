@@ -208,6 +208,11 @@ export class Game {
     this.hash = this.world.hash();
   }
 
+  /** The hash of the state in which a recording ends. */
+  get recordedHash() {
+    return this.steps < MOST_STEPS ? this.hash : this.entries.at(-1)[3];
+  }
+
   /** All that was done, and the recording that it began with, for `taichi-soft replay`. */
   recording(start) {
     let text = "";

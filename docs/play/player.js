@@ -259,16 +259,24 @@ function finish() {
 }
 
 async function save() {
-  const { name } = game.facts;
-  const file = `${name}.played.json`;
-  const { hash } = game;
   const playing = game;
-  const answer = await fetch(`${name}/${name}.recording`);
-  const text = playing.recording(new Uint8Array(await answer.arrayBuffer()));
+  const { name } = playing.facts;
+  const file = `${name}.played.json`;
+  let start;
+  try {
+    const answer = await fetch(`${name}/${name}.recording`);
+    if (!answer.ok) throw new Error(`${answer.status} ${answer.statusText}`);
+    start = new Uint8Array(await answer.arrayBuffer());
+  } catch (error) {
+    verdict.textContent = `This cannot be saved, because ${name}.recording cannot be read: ${error.message}`;
+    return;
+  }
+  // Only now, because the world went on meanwhile: the file and the hash are of one moment.
+  const [text, hash] = [playing.recording(start), playing.recordedHash];
   const href = URL.createObjectURL(new Blob([text], { type: "application/json" }));
   Object.assign(document.createElement("a"), { href, download: file }).click();
   URL.revokeObjectURL(href);
-  verdict.textContent = `On a PC, taichi-soft replay ${file} makes the same steps and prints ${hash}.`;
+  if (playing === game) verdict.textContent = `On a PC, taichi-soft replay ${file} makes the same steps and prints ${hash}.`;
 }
 
 const KEYS = {

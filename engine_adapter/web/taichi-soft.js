@@ -29,11 +29,39 @@ export class SoftError extends Error {
   }
 }
 
+// The bytes of an array of any type.
+function bytesIn(given, name) {
+  if (given instanceof ArrayBuffer) return new Uint8Array(given);
+  if (ArrayBuffer.isView(given)) return new Uint8Array(given.buffer, given.byteOffset, given.byteLength);
+  throw new SoftError(-1, `${name} is ${shown(given)}: give a typed array or an ArrayBuffer`);
+}
+
 // The numbers of a vector of any kind: an array, a typed array, a Vector3 or Quaternion of three.js.
 function vector(value, name, count = 3) {
   const found = typeof value?.[Symbol.iterator] === "function" ? Array.from(value, Number) : [];
   if (found.length === count) return found;
   throw new SoftError(-1, `${name} takes ${count} numbers, got ${Array.isArray(value) ? `[${value}]` : value}`);
+}
+
+function shown(value) {
+  if (typeof value === "string") return JSON.stringify(value);
+  return typeof value === "object" ? (value?.constructor?.name ?? "null") : String(value);
+}
+
+// A whole number of 32 bits. WebAssembly turns every other value into one: a text into 0, 2.7 into 2.
+function whole(value, name, way = "a whole number of 32 bits") {
+  if (Number.isInteger(value) && value === (value | 0)) return value;
+  throw new SoftError(-1, `${name} is ${shown(value)}: give ${way}`);
+}
+
+// 32 bits, as a number with or without a sign.
+const bits = (value, name) => whole(value > 0x7fffffff && value <= 0xffffffff ? value - 2 ** 32 : value, name);
+
+// A thing of a world. Its number or handle alone does not tell: other worlds have the same ones.
+function ownOf(world, thing, Kind, name, way) {
+  if (thing instanceof Kind && thing.world === world) return thing;
+  const what = thing instanceof Kind ? "of another world" : shown(thing);
+  throw new SoftError(-1, `${name} is ${what}: give ${way}`);
 }
 
 const poseOf = ({ position, rotation = UPRIGHT }) => [...vector(position, "position"), ...vector(rotation, "rotation", 4)];
@@ -108,13 +136,11 @@ class Native {
 
   // Calls a function with memory of its own for some bytes.
   lending(bytes, use) {
-    const view = bytes instanceof ArrayBuffer ? new Uint8Array(bytes) : bytes;
-    if (!ArrayBuffer.isView(view)) throw new SoftError(-1, `bytes are a typed array or an ArrayBuffer, got ${bytes}`);
-    const { buffer, byteOffset, byteLength } = view;
-    const at = this.allocate(byteLength);
+    const given = bytesIn(bytes, "bytes");
+    const at = this.allocate(given.length);
     try {
-      new Uint8Array(this.exports.memory.buffer).set(new Uint8Array(buffer, byteOffset, byteLength), at);
-      return use(at, byteLength);
+      new Uint8Array(this.exports.memory.buffer).set(given, at);
+      return use(at, given.length);
     } finally {
       this.exports.free(at);
     }
@@ -129,8 +155,7 @@ class Native {
     if (vertices === null) return use(0, 0);
     const numbers = Array.from(vertices);
     if (numbers.length === 0) throw new SoftError(-1, "no vertex is named: give null for all");
-    const wrong = numbers.find((each) => !Number.isInteger(each));
-    if (wrong !== undefined) throw new SoftError(-1, `vertices are whole numbers, got ${wrong}`);
+    for (const each of numbers) whole(each, "a vertex");
     return this.lending(Int32Array.from(numbers), (at) => use(at, numbers.length));
   }
 }
@@ -165,9 +190,10 @@ export class Scene {
     this.native.view.setUint32(small, 24, true);
     this.native.call("ts_scene_get_info", this.handle, small);
     const [slots, assets, colliders, frames, meshes] = [4, 8, 12, 16, 20].map((at) => this.native.int(small + at));
-    this.counts = { body: slots, asset: assets, collider: colliders, frame: frames, mesh: meshes };
     // Read once: worlds go on when the scene was unloaded.
     this.names = Object.fromEntries(Object.keys(KINDS).map((kind) => [kind, this.#names(kind)]));
+    const [joints, motors] = [this.names.joint.length, this.names.motor.length];
+    this.counts = { body: slots, asset: assets, collider: colliders, frame: frames, mesh: meshes, joint: joints, motor: motors };
     this.assets = this.names.asset.map((_, i) => this.#asset(i));
     this.meshes = this.names.mesh.map((_, i) => this.#mesh(i));
   }
@@ -220,7 +246,7 @@ export class Scene {
   /** Number of a thing, by its name. */
   find(kind, name) {
     const names = this.#namesOf(kind);
-    if (Number.isInteger(name)) return name;
+    if (typeof name === "number") return whole(name, kind);
     const number = names.indexOf(name);
     if (number >= 0) return number;
     throw new SoftError(-1, `no ${kind} is called ${name}: give a number, or one of these names: ${names.join(", ") || "none"}`);
@@ -276,15 +302,15 @@ export class World {
 
   /** One step of `dt` [s]; 0 substeps for as many as are stable. */
   step(dt = 1 / 60, substeps = 0) {
-    this.#call("ts_world_step", dt, substeps);
+    this.#call("ts_world_step", dt, whole(substeps, "substeps"));
   }
 
   /** How `advance` steps: time beyond `maxSteps` in a frame is dropped. */
   setFixedStep({ dt = 1 / 60, substeps = 0, maxSteps = 8 } = {}) {
     const { view, small } = this.native;
     view.setUint32(small, 24, true);
-    view.setInt32(small + 4, substeps, true);
-    view.setInt32(small + 8, maxSteps, true);
+    view.setInt32(small + 4, whole(substeps, "substeps"), true);
+    view.setInt32(small + 8, whole(maxSteps, "maxSteps"), true);
     view.setFloat64(small + 16, dt, true);
     this.#call("ts_world_set_fixed_step", small);
   }
@@ -398,8 +424,7 @@ export class World {
 
   /** Record events of these kinds, a sum of `EVENTS`; all by default, 0 for none. */
   recordEvents(kinds = 31) {
-    if (!Number.isInteger(kinds)) throw new SoftError(-1, `kinds is ${kinds}: give a sum of EVENTS`);
-    this.#call("ts_world_record_events", kinds);
+    this.#call("ts_world_record_events", whole(kinds, "kinds", "a sum of EVENTS"));
   }
 
   /** The events since the last call. */
@@ -540,8 +565,8 @@ export class World {
     view.setUint32(small, 64, true);
     view.setInt32(small + 4, SHAPES.indexOf(kind), true);
     native.doubles(small + 8, [...vector(size, "size"), friction, restitution, thickness]);
-    view.setInt32(small + 56, group, true);
-    view.setInt32(small + 60, mask, true);
+    view.setInt32(small + 56, bits(group, "group"), true);
+    view.setInt32(small + 60, bits(mask, "mask"), true);
     native.doubles(small + 64, poseOf({ position: ORIGIN, ...pose }));
     this.#call("ts_collider_add", small, small + 64, small + 128);
     return new Collider(this, native.int(small + 128));
@@ -559,7 +584,7 @@ export class World {
 
   /** The grab with a number from 0 to 15, or null. */
   grab(number) {
-    this.#call("ts_world_get_grab", number, this.native.small);
+    this.#call("ts_world_get_grab", whole(number, "number"), this.native.small);
     const handle = this.native.handle(this.native.small);
     return handle === 0n ? null : new Grab(this, handle);
   }
@@ -629,7 +654,7 @@ export class Body {
    * unless they are released.
    */
   setLevel(level, { release = false } = {}) {
-    this.#call("ts_body_set_level", level, Number(release));
+    this.#call("ts_body_set_level", whole(level, "level"), Number(release));
   }
 
   /** Number of vertices at its level. */
@@ -726,9 +751,14 @@ export class Body {
   }
 
   attach(vertices, frame, { feels = false } = {}) {
+    const { number } = this.#frame(frame);
     this.world.native.lendingVertices(vertices, (list, count) =>
-      this.#call("ts_body_attach", list, count, frame.number, Number(feels)),
+      this.#call("ts_body_attach", list, count, number, Number(feels)),
     );
+  }
+
+  #frame(frame) {
+    return ownOf(this.world, frame, Frame, "frame", "one of world.frame(name) or world.addFrame(pose)");
   }
 
   detach(vertices = null) {
@@ -737,13 +767,14 @@ export class Body {
 
   /** `force` [N] and `torque` [N m] of the body on a frame. */
   load(frame) {
-    this.#call("ts_body_get_load", frame.number, this.#small, this.#small + 24);
+    this.#call("ts_body_get_load", this.#frame(frame).number, this.#small, this.#small + 24);
     return { force: this.world.native.read(this.#small, 3), torque: this.world.native.read(this.#small + 24, 3) };
   }
 
   /** Let vertices be held by another body: where they are in it, or each at a vertex of it, `onto`. */
   join(vertices, other, { onto = null } = {}) {
     const { native } = this.world;
+    ownOf(this.world, other, Body, "other", "a body, such as world.body(name)");
     if (onto && onto.length !== vertices.length) throw new SoftError(-6, "onto names a vertex for each of vertices");
     native.lendingVertices(vertices, (list, count) =>
       native.lendingVertices(onto, (partners) =>
@@ -774,7 +805,7 @@ export class Body {
   grab({ triangle, weights, point }, { frequency = 5, maxForce = -1, target = point } = {}) {
     const { native } = this.world;
     native.view.setUint32(this.#small, 72, true);
-    native.view.setInt32(this.#small + 4, triangle, true);
+    native.view.setInt32(this.#small + 4, whole(triangle, "triangle"), true);
     native.doubles(this.#small + 8, [...vector(weights, "weights"), ...vector(target, "target"), frequency, maxForce]);
     this.#call("ts_body_grab", this.#small, this.#small + 128);
     return new Grab(this.world, native.handle(this.#small + 128));
@@ -993,20 +1024,70 @@ async function bytesOf(address) {
   return new Uint8Array(await answer.arrayBuffer());
 }
 
+const CRC = Uint32Array.from({ length: 256 }, (_, code) => {
+  for (let k = 0; k < 8; k += 1) code = code & 1 ? (code >>> 1) ^ 0xedb88320 : code >>> 1;
+  return code;
+});
+
+function checksum(bytes) {
+  let code = -1;
+  for (let i = 0; i < bytes.length; i += 1) code = CRC[(code ^ bytes[i]) & 255] ^ (code >>> 8);
+  return ~code >>> 0;
+}
+
+// The entry of a world file with a name: the place of its bytes and the count of its numbers. See archive.cpp.
+function entryOf(view, wanted) {
+  const filled = (size) => Math.ceil(size / 8) * 8;
+  const decoder = new TextDecoder();
+  const widths = [0, 1, 4, 8, 4, 8]; // of a number of each type [bytes]
+  let at = 32;
+  for (let left = view.getUint32(12, true); left > 0; left -= 1) {
+    const [length, type, dimensions] = [0, 4, 8].map((each) => view.getUint32(at + each, true));
+    at += 16;
+    let count = 1;
+    for (let k = 0; k < dimensions; k += 1, at += 8) count *= Number(view.getBigUint64(at, true));
+    const name = new Uint8Array(view.buffer, view.byteOffset + at, length);
+    at += filled(length);
+    if (length === wanted.length && decoder.decode(name) === wanted) return { at, count };
+    at += filled(count * widths[type]);
+  }
+  throw new RangeError(`no ${wanted}`);
+}
+
+// Whether a module has the size and checksum that its world file says. A world file that cannot be read is the library's to
+// refuse, which says what is wrong with it.
+function isOf(world, code) {
+  try {
+    const view = new DataView(world.buffer, world.byteOffset, world.byteLength);
+    const [files, sums] = ["kernels/files", "kernels/sums"].map((name) => entryOf(view, name));
+    const names = new TextDecoder().decode(new Uint8Array(view.buffer, view.byteOffset + files.at, files.count)).split("\0");
+    const at = sums.at + 16 * names.indexOf("web.wasm");
+    const [size, sum] = [at, at + 8].map((each) => Number(view.getBigInt64(each, true)));
+    return size === code.byteLength && sum === checksum(code);
+  } catch {
+    return true;
+  }
+}
+
 /** Compiles a world's module and reads its file: the bytes of `kernels/web.wasm` and of `world.tsw`. */
 export async function sceneOf(code, world) {
   if (typeof WebAssembly === "undefined") throw new SoftError(-9, "this browser has no WebAssembly");
-  const start = new Uint8Array(code.buffer ?? code, code.byteOffset ?? 0, Math.min(4, code.byteLength));
-  if (start.join() !== "0,97,115,109") {
+  const [module, file] = [bytesIn(code, "code"), bytesIn(world, "world")];
+  if (module.subarray(0, 4).join() !== "0,97,115,109") {
     throw new SoftError(-4, "the code is no module: is the folder one that taichi-soft export --for web wrote?");
   }
-  let module;
+  const compiling = WebAssembly.compile(module); // on another thread
+  compiling.catch(() => {}); // awaited below, unless the module is refused
+  if (!isOf(file, module)) {
+    throw new SoftError(-4, "the kernels are not those of this world file, or damaged: export it again, with both");
+  }
+  let compiled;
   try {
-    module = await WebAssembly.compile(code);
+    compiled = await compiling;
   } catch (error) {
     throw new SoftError(-9, `this browser cannot compile the world, for which it needs SIMD: ${error.message}`);
   }
-  return new Scene(module, world);
+  return new Scene(compiled, file);
 }
 
 /** Loads a folder that `taichi-soft export --for web` wrote. */

@@ -36,6 +36,12 @@ def sag(asset: SoftBodyAsset, gravity: float) -> float:
     return float(density * gravity * np.ptp(mesh.vertices, axis=0).min() * softness)
 
 
+def _rounded_up(number: float) -> float:
+    """Round a positive number up to two significant digits."""
+    step = 10.0 ** (np.floor(np.log10(number)) - 1)
+    return float(np.ceil(number / step) * step)
+
+
 def review_weight(assets: Iterable[SoftBodyAsset], gravity: NDArray[np.float64]) -> None:
     """Before a world is built: say which body is too soft for its weight, and what would bear it."""
     pull = float(np.linalg.norm(gravity))
@@ -47,7 +53,7 @@ def review_weight(assets: Iterable[SoftBodyAsset], gravity: NDArray[np.float64])
         warnings.warn(
             f"a body is too soft for its weight: {worst!r} weighs {found * young:.3g} Pa at its foot, and "
             f"its Young's modulus is {young:.3g} Pa. It may end flat and partly inside out. Take a "
-            f"modulus of {young * found / MOST_SAG:.2g} Pa, less gravity or a smaller body",
+            f"modulus of {_rounded_up(young * found / MOST_SAG):.2g} Pa, less gravity or a smaller body",
             TooSoftWarning,
             stacklevel=5,  # who called World.build
         )

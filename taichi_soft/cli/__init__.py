@@ -1,4 +1,4 @@
-"""The command line: demos, what was chosen on this machine, profiles, and the thesis's experiments."""
+"""The command line: demos and films, what was chosen on this machine, what a frame costs."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ from rich.markup import escape
 
 from taichi_soft.cli.console import Arch, Threads, say
 from taichi_soft.cli.filming import Blur, Fps, Out, Seconds, Size, Slow, Stats, make_film, size_of
-from taichi_soft.core.errors import OptionError
+from taichi_soft.cli.moved import refuse_moved
 from taichi_soft.core.runtime import init
 
 
@@ -28,28 +28,21 @@ def demo(
     ] = None,
     stats: Stats = False,
     video: Annotated[bool, typer.Option(help="Write a film, or only run and time the steps.")] = True,
-    peers: Annotated[
-        bool, typer.Option("--peers", help="compare: one drop here and in other engines.")
-    ] = False,
+    peers: Annotated[bool, typer.Option("--peers", hidden=True)] = False,
     arch: Arch = "auto",
     threads: Threads = None,
 ) -> None:
     """Run a demo without a display, film it, and say how fast it ran, as a multiple of real time."""
     from taichi_soft.render.demos import demo_names, load_demo
 
-    if peers and name != "compare":
-        raise OptionError("--peers belongs to the demo compare: taichi-soft demo compare --peers")
+    if peers:
+        refuse_moved("taichi-soft demo --peers", "peers")
     if name is None:
         for each in demo_names():
             summary = (load_demo(each).__doc__ or "").strip().splitlines()[0]
             say(f"[bold]{each:12}[/]{escape(summary)}")
         return
     pixels = size_of(size)
-    if peers:
-        from taichi_soft.cli.peers import film_peers
-
-        film_peers((out or Path("out") / "peers.mp4") if video else None, seconds, fps, pixels, arch, threads)
-        return
     module = load_demo(name)
     path = (out or Path("out") / f"{name}.mp4") if video else None
     init(arch, threads)

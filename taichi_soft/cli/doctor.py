@@ -37,8 +37,8 @@ def doctor(
     threads: Threads = None,
 ) -> None:
     """Say what is wrong with a mesh, and what the body costs that it makes. Ends with 1 if it makes none."""
-    from taichi_soft.lab.doctor import diagnose
-    from taichi_soft.lab.doctor.mending import write_mended
+    from taichi_soft.doctor import diagnose
+    from taichi_soft.doctor.mending import write_mended
     from taichi_soft.meshing.surfaces import read_surfaces
 
     made_of = preset(material)  # type: ignore[arg-type]

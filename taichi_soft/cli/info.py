@@ -27,7 +27,7 @@ def info(
     """Say which device, versions, laws and materials there are."""
     from taichi_soft.elements.laws import LAWS
     from taichi_soft.elements.materials import PRESETS
-    from taichi_soft.lab.profiling.baseline import find_compiler
+    from taichi_soft.profiling.baseline import find_compiler
 
     device = init(arch, threads)
     if laws or law:
@@ -54,8 +54,8 @@ def info(
 
 
 def __say_laws(names: list[str], as_json: bool) -> None:
-    from taichi_soft.lab.profiling import measure_laws
-    from taichi_soft.lab.profiling.report import law_rows, law_table
+    from taichi_soft.profiling import measure_laws
+    from taichi_soft.profiling.report import law_rows, law_table
 
     with errors.status("compiling and measuring laws"):
         costs = measure_laws(cast(list[LawName], names))  # which checks them

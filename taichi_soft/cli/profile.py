@@ -56,8 +56,8 @@ def profile(
 ) -> None:
     """Measure what a frame costs and how many bodies fit one of 60 Hz and of 120 Hz."""
     device = init(arch, threads, _cores_of(cores))
-    from taichi_soft.lab import profiling
-    from taichi_soft.lab.profiling import report
+    from taichi_soft import profiling
+    from taichi_soft.profiling import report
 
     library = profiling.compile_baseline() if baseline else None
     with errors.status("measuring frames") as status:

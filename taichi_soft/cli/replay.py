@@ -17,7 +17,7 @@ def replay(
     out: Annotated[
         Path | None, typer.Option(help="Picture of the end, .png; beside the recording by default.")
     ] = None,
-    steps: Annotated[int | None, typer.Option(help="Makes no more than so many of its steps.")] = None,
+    steps: Annotated[int | None, typer.Option(help="Makes at most this many of its steps.")] = None,
     arch: Arch = "auto",
     threads: Threads = None,
 ) -> None:

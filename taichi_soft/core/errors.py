@@ -44,10 +44,6 @@ class BakeError(TaichiSoftError, OSError):
     """A bake could not be written as asked."""
 
 
-class SweepError(TaichiSoftError, RuntimeError):
-    """Points cannot be computed or kept as asked."""
-
-
 class SlowStepWarning(UserWarning):
     """A step takes more than 500 substeps. It names the body, what asks for them, and the way out."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from importlib.util import find_spec
 
 from taichi_soft.core.errors import MissingExtraError
@@ -14,15 +15,6 @@ EXTRAS = {
     "export": {"llvmlite": "llvmlite", "ziglang": "ziglang"},
     "io": {"meshio": "meshio", "DracoPy": "dracopy"},
     "voronoi": {"scipy": "scipy"},
-    "report": {
-        "cv2": "opencv-python-headless",
-        "jinja2": "jinja2",
-        "matplotlib": "matplotlib",
-        "rich": "rich",
-        "scipy": "scipy",
-        "skfem": "scikit-fem",
-    },
-    "cluster": {"distributed": "distributed"},
     "panda3d": {"panda3d": "panda3d"},
     "live": {
         "websockets": "websockets",
@@ -32,15 +24,18 @@ EXTRAS = {
     },
     "tetgen": {"tetgen": "tetgen"},
     "ftetwild": {"pytetwild": "pytetwild"},
-    "peers": {"mujoco": "mujoco", "newton": "newton", "pybullet": "pybullet"},
 }
 """By extra: its modules, and the packages that have them, as in pyproject.toml."""
 
 
 def missing_packages(extra: str, *modules: str) -> list[str]:
     """Packages of the extra, or those of these modules, that are not installed."""
-    named = EXTRAS[extra]
-    return [named[module] for module in modules or named if not _is_there(module)]
+    return missing_among(EXTRAS[extra], *modules)
+
+
+def missing_among(packages: Mapping[str, str], *modules: str) -> list[str]:
+    """Packages that are not installed, of those by module, or of those of these modules."""
+    return [packages[module] for module in modules or packages if not _is_there(module)]
 
 
 def _is_there(module: str) -> bool:

@@ -187,7 +187,9 @@ def _read_played(data: bytes) -> tuple[dict[str, Any], bytes]:
     except (ValueError, LookupError, TypeError, RecursionError) as error:
         if isinstance(error, TaichiSoftError):
             raise
-        raise SnapshotError(f"this file of a page is not in order: {error!r}") from None
+        raise SnapshotError(
+            f"this is no file that a page saved, or it is cut off or damaged ({error!r}): save it again there"
+        ) from None
 
 
 def _read_sealed(data: bytes) -> tuple[dict[str, Any], bytes]:

@@ -431,6 +431,7 @@ def test_a_world_by_itself_makes_whole_steps_of_at_most_a_sixtieth_from_frame_to
     assert game.world.last_dt <= 1 / 60 + 1e-9
 
 
+@pytest.mark.soak
 def test_a_body_that_goes_and_is_restored_is_seen_when_it_was_there(tmp_path):
     """A clip of its own from then on: what it did is not drawn together in time."""
     world, kept, heights = World(), [], []

@@ -16,6 +16,8 @@ from taichi_soft.bake.gltf import write_glb
 from taichi_soft.bake.usd import write_usd
 from taichi_soft.bake.vertex_texture import WIDEST, write_vat
 
+pytestmark = pytest.mark.numpy
+
 
 def clip_of(vertices, shapes, *, name="clip", visual=None, first=0):
     """A fan of triangles, in each frame one of its shapes (by their numbers)."""

@@ -18,6 +18,8 @@ from taichi_soft import (
     sphere,
 )
 
+pytestmark = pytest.mark.soak
+
 
 @pytest.mark.parametrize("schedule", ["per_body", "flat"])
 def test_a_weight_on_a_spring_swings_as_the_pendulum_formula_says(schedule):

@@ -21,6 +21,8 @@ from taichi_soft import (
 from taichi_soft.bodies.kernels.plasticity import read_rest_inverses
 from taichi_soft.bodies.soft_body import rest_inverses_of
 
+pytestmark = pytest.mark.soak
+
 YOUNG, POISSON = 1e5, 0.3
 SHEAR = YOUNG / (2 * (1 + POISSON))
 CLAY = Material(YOUNG, POISSON, 1000.0, 20.0)

@@ -2,10 +2,14 @@
 
 import gc
 
+import pytest
+
 from taichi_soft import Material, World, box
 from taichi_soft.bodies import fields
 from taichi_soft.contact.fields import ContactCapacity
 from taichi_soft.solver.state import Capacity
+
+pytestmark = pytest.mark.soak
 
 CUBE = box(cells=(1, 1, 1))
 JELLY = Material(1e5, 0.2, 1000.0, 20.0)

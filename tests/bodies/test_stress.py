@@ -17,6 +17,8 @@ from taichi_soft import (
     internal_forces,
 )
 
+pytestmark = pytest.mark.soak
+
 DT = 1 / 60
 MESH = box((1, 1, 1), cells=(1, 1, 1))
 YOUNG, NU = 1e5, 0.3

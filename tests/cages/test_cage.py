@@ -43,7 +43,13 @@ SOLIDS = {
 }
 
 
-@pytest.fixture(scope="module", params=SOLIDS)
+SOAKS = ("turned box", "capsule", "tube")
+
+
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(name, marks=pytest.mark.soak if name in SOAKS else ()) for name in SOLIDS],
+)
 def made(request):
     mesh = SOLIDS[request.param]
     return mesh, cage(mesh, cells=12)
@@ -138,6 +144,7 @@ def test_the_stable_step_is_just_below_two_over_the_highest_frequency(made):
     assert 0.85 < limit / (2.0 / np.sqrt(square)) <= 1.0
 
 
+@pytest.mark.soak
 def test_a_bar_along_no_axis_bends_as_a_beam_and_the_better_the_finer():
     """Slowest bending of a free beam (Weaver, Timoshenko and Young, "Vibration problems in engineering", art.
     5.12): w = (4.730 / L)^2 sqrt(EI / rho A), less for rotation and shear: by 1 + (4.730 r / L)^2 / 2 times
@@ -153,6 +160,7 @@ def test_a_bar_along_no_axis_bends_as_a_beam_and_the_better_the_finer():
     assert errors[4] < errors[3] < errors[2]
 
 
+@pytest.mark.soak
 def test_parts_that_do_not_touch_stay_apart():
     gap = 0.02  # m, a tenth of a cell
     found = cage(joined(ball(), ball(at=(2.0 + gap, 0.0, 0.0))), cell_size=0.2)

@@ -6,6 +6,8 @@ from difficult_surfaces import BODIES, REFUSED, SCALED
 
 from taichi_soft import Material, MeshError, SoftBodyAsset, World
 
+pytestmark = pytest.mark.soak
+
 SOFT = Material(young=2e5, poisson=0.3, density=1000.0, damping_ratio=0.2)
 CELLS = 8
 APART = 3.0  # m

@@ -30,6 +30,8 @@ from taichi_soft.cages.mesher import winding_number
 from taichi_soft.core.extras import missing_packages
 from taichi_soft.meshing.surfaces import read_surfaces
 
+pytestmark = pytest.mark.soak
+
 JELLY = Material(young=2e5, poisson=0.3, density=1000.0, damping_ratio=0.2)
 CELLS = 6
 

@@ -109,6 +109,7 @@ def test_without_refinement_they_are_left_out_and_their_thickness_is_told():
     assert found.thin.lost == pytest.approx(LEG, rel=0.1)
 
 
+@pytest.mark.soak
 def test_the_cell_size_that_is_named_keeps_them_without_refinement():
     small = block((0.6, 0.4, 0.2), (0, 0, 0.6))
     legs = [block((0.006, 0.006, 0.6), (x, y, 0.3)) for x in (-0.2, 0.2) for y in (-0.1, 0.1)]
@@ -122,6 +123,7 @@ def test_the_cell_size_that_is_named_keeps_them_without_refinement():
     assert found.mesh.vertices[:, 2].min() < 0.03
 
 
+@pytest.mark.soak
 def test_the_octaves_that_are_named_keep_what_one_does_not():
     thin = table(0.006)
     once = tetrahedra_of(read_surfaces(thin), cells=6)
@@ -160,10 +162,12 @@ def test_a_thin_sheet_that_grows_from_a_body_is_kept():
 @pytest.mark.parametrize(
     "mesh",
     [
-        ball(),
+        pytest.param(ball(), marks=pytest.mark.soak),
         trimesh.creation.box((4.0, 1.0, 1.0)),
         trimesh.creation.box((1.0, 1.0, 0.02)),
-        joined(ball(0.5), with_triangles(ball(0.8), [[0, 1, 2], [0, 2, 1]])),
+        pytest.param(
+            joined(ball(0.5), with_triangles(ball(0.8), [[0, 1, 2], [0, 2, 1]])), marks=pytest.mark.soak
+        ),
     ],
     ids=["ball", "box", "sheet", "a wall without thickness"],
 )
@@ -202,6 +206,7 @@ def test_what_was_refined_is_logged(caplog):
     assert "refine=0" in caplog.text
 
 
+@pytest.mark.soak
 def test_a_table_on_thin_legs_stands_on_them():
     """Light and stiff enough: legs are as stiff as the cells that carry them."""
     light = Material(young=1e8, poisson=0.3, density=100.0, damping_ratio=0.3)

@@ -19,6 +19,8 @@ from taichi_soft import (
 )
 from taichi_soft.render.replay import replay
 
+pytestmark = pytest.mark.soak
+
 DT = 1 / 60
 JELLY = Material(2e6, 0.3, 500.0, damping_ratio=0.5)
 ALONG_AXES = np.vstack([np.eye(3), -np.eye(3)])

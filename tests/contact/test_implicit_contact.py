@@ -25,6 +25,8 @@ from taichi_soft import (
     sphere,
 )
 
+pytestmark = pytest.mark.soak
+
 G = 9.81
 DT = 1 / 60
 FIRM = Material(young=1e6, poisson=0.2, density=1000.0, damping=300.0)

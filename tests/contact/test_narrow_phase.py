@@ -130,6 +130,7 @@ def test_on_a_flat_surface_the_nearest_triangle_bears_however_it_was_before(cand
             assert candidates.friction_impulse()[over] == pytest.approx([0.1, 0.0, 0.0])
 
 
+@pytest.mark.soak
 def test_a_tip_in_a_valley_rests_on_both_its_sides():
     """Pressed into a groove of 15 degrees it lies still: one side at a time would throw it to the other."""
     groove = box((1, 1, 0.5), (4, 4, 2))

@@ -66,7 +66,7 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("integrator", ["leapfrog", "implicit_euler"])
+@pytest.mark.parametrize("integrator", ["leapfrog", pytest.param("implicit_euler", marks=pytest.mark.soak)])
 def test_two_bodies_that_start_inside_each_other_come_apart_without_being_thrown(integrator):
     """Each pair ends clear and at rest, parted no faster than it may; its centre of mass stays. Thrown apart
     then, it flies freely."""
@@ -106,6 +106,7 @@ def test_two_bodies_that_start_inside_each_other_come_apart_without_being_thrown
     np.testing.assert_allclose(now, np.add(apart, 1.0), atol=0.02)
 
 
+@pytest.mark.soak
 def test_30_bodies_spawned_at_one_place_over_a_floor_come_to_rest_beside_and_on_each_other():
     world = World(soft_contact=True, sleep_speed=0.02)
     ball = SoftBodyAsset(sphere(0.2, 2), Material(3e5, 0.3, 800.0, damping_ratio=0.3))

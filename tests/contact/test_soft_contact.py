@@ -206,6 +206,7 @@ def test_a_body_of_5_cm_rests_on_one_of_2_m():
     assert deepest(small, big) == 0.0
 
 
+@pytest.mark.soak
 @pytest.mark.filterwarnings("ignore::taichi_soft.FrozenBodyWarning")
 def test_a_coarse_plate_rests_on_a_mesh_that_has_far_more_triangles_near_each_of_its_vertices():
     """More than a search has room for: 16 per vertex, and 8 per vertex of the whole body."""

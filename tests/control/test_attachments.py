@@ -48,7 +48,7 @@ def at_rest(world, body):
     return world, body
 
 
-@pytest.fixture(params=KINDS)
+@pytest.fixture(params=["leapfrog", *(pytest.param(kind, marks=pytest.mark.soak) for kind in KINDS[1:])])
 def loose(request, made):
     return at_rest(*made[request.param])
 
@@ -224,6 +224,7 @@ def test_a_jump_leaves_no_trace_on_how_a_hanging_body_swings(plain):
     assert np.abs(kept_momentum(world, body)).max() == 0.0
 
 
+@pytest.mark.soak
 def test_what_is_dragged_too_far_in_a_step_without_retries_is_told_the_way_out():
     world = World(floor=-1e3, retries=0)
     body = world.add_body(box(cells=(2, 2, 2)), Material(1e5, 0.2, 1000.0, 200.0), law="virial")

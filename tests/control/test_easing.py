@@ -14,6 +14,8 @@ from taichi_soft import (
     box,
 )
 
+pytestmark = pytest.mark.soak
+
 DT, G = 1 / 60, 9.81
 SIDE, DENSITY = 0.4, 1000.0
 CUBE = box((SIDE, SIDE, SIDE), (3, 3, 3))

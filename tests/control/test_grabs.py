@@ -48,7 +48,7 @@ def at_rest(world):
     return world, *world.bodies
 
 
-@pytest.fixture(params=KINDS)
+@pytest.fixture(params=["leapfrog", pytest.param("implicit_euler", marks=pytest.mark.soak)])
 def floating(request, made):
     return at_rest(made[request.param])
 
@@ -186,6 +186,7 @@ def test_a_world_has_sixteen_hands(plain):
     assert not body.is_frozen
 
 
+@pytest.mark.soak
 def test_cloth_is_held_by_its_springs(made):
     world = World(floor=None)
     mesh = cloth((1.0, 1.0), (8, 8), 0.5)

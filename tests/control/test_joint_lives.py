@@ -141,6 +141,7 @@ def test_a_snapshot_carries_joints_to_the_bit(empty):
     assert len(names) == 2
 
 
+@pytest.mark.soak
 def test_a_recording_makes_joints_again(empty, tmp_path):
     world, kind = empty
     a = world.spawn(kind, position=(0, 0, 3.0))

@@ -55,7 +55,7 @@ def afresh(world):
     return world, *world.bodies
 
 
-@pytest.fixture(params=WAYS)
+@pytest.fixture(params=[pytest.param("soft", marks=pytest.mark.soak), "through"])
 def joined(request, made):
     return afresh(made[request.param])
 
@@ -134,6 +134,7 @@ def test_rows_run_out_and_come_back():
     assert not a.is_frozen
 
 
+@pytest.mark.soak
 def test_a_joint_works_whatever_groups_say():
     world = World(floor=None, soft_contact=True)
     a = world.add_body(BIG, JELLY, contact=Contact(mask=0))
@@ -148,6 +149,7 @@ def test_a_joint_works_whatever_groups_say():
     assert joint.force[2] == pytest.approx(1000 * G, rel=0.01)
 
 
+@pytest.mark.soak
 def test_a_rope_is_held_by_a_body_and_by_a_rope():
     world = World(floor=None, collider_room=1)
     line = rope(1.0, 8, 0.5)

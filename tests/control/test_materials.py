@@ -18,6 +18,8 @@ from taichi_soft import (
     cloth,
 )
 
+pytestmark = pytest.mark.soak
+
 CUBE = box(cells=(2, 2, 2))
 SHEET = cloth((1.0, 1.0), (4, 4), 2.0)
 SPREAD = np.linspace(0.5, 2.0, len(CUBE.tets))

@@ -11,7 +11,8 @@ HUB = np.flatnonzero(np.linalg.norm(WHEEL.vertices[:, :2], axis=1) < 0.2)
 BAR = box((0.6, 0.2, 0.2), cells=(6, 2, 2))
 END = np.flatnonzero(BAR.vertices[:, 0] < -0.29)
 RUBBER, JELLY = Material(1e6, 0.3, 1000.0), Material(1e5, 0.3, 1000.0)
-EXPLICIT = ("leapfrog", "lazy_leapfrog")
+EXPLICIT = ("leapfrog", pytest.param("lazy_leapfrog", marks=pytest.mark.soak))
+IMPLICIT = pytest.param("implicit_euler", marks=pytest.mark.soak)
 
 
 def made(mesh, material=RUBBER, *, pinned=(), position=(0.0, 0.0, 0.0), **options):
@@ -42,7 +43,7 @@ def test_a_torque_changes_angular_momentum_by_torque_times_time_and_momentum_by_
     np.testing.assert_allclose(body.momentum(), 0.0, atol=1e-3)
 
 
-@pytest.mark.parametrize("integrator", [*EXPLICIT, "implicit_euler"])
+@pytest.mark.parametrize("integrator", [*EXPLICIT, IMPLICIT])
 def test_a_force_changes_momentum_by_force_times_time(integrator):
     world, body = made(BAR, integrator=integrator)
     motor = world.add_motor(body, range(len(BAR.vertices)), (0, 3, 4), speed=90.0, max_force=30.0)
@@ -51,7 +52,7 @@ def test_a_force_changes_momentum_by_force_times_time(integrator):
     np.testing.assert_allclose(body.momentum(), (0, 18.0, 24.0), rtol=1e-3, atol=1e-3)
 
 
-@pytest.mark.parametrize("integrator", [*EXPLICIT, "implicit_euler"])
+@pytest.mark.parametrize("integrator", [*EXPLICIT, IMPLICIT])
 def test_a_wheel_is_brought_to_a_speed_and_held_there(integrator):
     """Angular momentum is moment of inertia times speed, and no more effort is needed."""
     world, body = made(WHEEL, integrator=integrator)
@@ -147,7 +148,7 @@ def test_what_is_removed_drives_no_longer_and_the_others_go_on():
     assert third.effort == 0.0
 
 
-@pytest.mark.parametrize("integrator", ["leapfrog", "implicit_euler"])
+@pytest.mark.parametrize("integrator", ["leapfrog", IMPLICIT])
 @pytest.mark.parametrize("limit", [{"max_torque": 1e12}, {"max_force": 1e12}], ids=str)
 def test_no_torque_and_no_speed_breaks_a_body(integrator, limit):
     floor = None if integrator == "implicit_euler" else -0.7

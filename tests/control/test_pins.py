@@ -7,6 +7,7 @@ from taichi_soft import Material, OptionError, StateError, World, box
 
 TOP = np.flatnonzero(box(cells=(2, 2, 2)).vertices[:, 2] > 0.4)
 NAN = float("nan")
+KINDS = ("leapfrog", "leapfrog flat", "lazy_leapfrog", "implicit")
 
 
 def make(kind):
@@ -22,10 +23,10 @@ def make(kind):
 
 @pytest.fixture(scope="module")
 def made():
-    return {kind: make(kind) for kind in ("leapfrog", "leapfrog flat", "lazy_leapfrog", "implicit")}
+    return {kind: make(kind) for kind in KINDS}
 
 
-@pytest.fixture(params=["leapfrog", "leapfrog flat", "lazy_leapfrog", "implicit"])
+@pytest.fixture(params=["leapfrog", *(pytest.param(kind, marks=pytest.mark.soak) for kind in KINDS[1:])])
 def falling(request, made):
     world, body = made[request.param]
     body.unpin()

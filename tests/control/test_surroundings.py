@@ -49,9 +49,9 @@ def book(share):
     "options",
     [
         {"integrator": "leapfrog"},
-        {"integrator": "lazy_leapfrog"},
-        {"integrator": "implicit_euler"},
-        {"schedule": "flat"},
+        pytest.param({"integrator": "lazy_leapfrog"}, marks=pytest.mark.soak),
+        pytest.param({"integrator": "implicit_euler"}, marks=pytest.mark.soak),
+        pytest.param({"schedule": "flat"}, marks=pytest.mark.soak),
     ],
     ids=lambda options: next(iter(options.values())),
 )
@@ -78,7 +78,7 @@ def test_a_free_fall_goes_on_by_the_gravity_that_was_set(options):
         assert body.gravitational_energy() == pytest.approx(energy, rel=1e-5)
 
 
-@pytest.mark.parametrize("integrator", ["leapfrog", "implicit_euler"])
+@pytest.mark.parametrize("integrator", ["leapfrog", pytest.param("implicit_euler", marks=pytest.mark.soak)])
 def test_a_block_slides_on_the_floor_where_its_friction_is_below_the_tangent(integrator):
     """Without colliders: at rest above the tangent, g (sin a - mu cos a) below it, and at rest again."""
     world = World(gravity=DOWN, friction=2 * np.tan(SLOPE), integrator=integrator)
@@ -97,7 +97,7 @@ def test_a_block_slides_on_the_floor_where_its_friction_is_below_the_tangent(int
     assert way(body) == pytest.approx(start, abs=1e-3)
 
 
-@pytest.mark.parametrize("integrator", ["leapfrog", "implicit_euler"])
+@pytest.mark.parametrize("integrator", ["leapfrog", pytest.param("implicit_euler", marks=pytest.mark.soak)])
 def test_a_world_built_with_other_gravity_and_friction_goes_on_from_a_snapshot(integrator):
     def made(**options):
         world = World(integrator=integrator, **options)

@@ -7,6 +7,8 @@ import time
 
 import pytest
 
+pytestmark = pytest.mark.soak
+
 PROGRAM = """
 from taichi_soft import init
 from taichi_soft.core.runtime import ti

@@ -66,6 +66,7 @@ def folder(tmp_path_factory):
     return folder, state, made
 
 
+@pytest.mark.soak
 def test_a_later_process_makes_no_kernel_from_its_source_and_moves_bodies_alike(folder):
     folder, state, made = folder
     again, made_again, known = play(folder)
@@ -74,6 +75,7 @@ def test_a_later_process_makes_no_kernel_from_its_source_and_moves_bodies_alike(
     assert again == state
 
 
+@pytest.mark.soak
 def test_a_world_of_another_size_takes_no_kernel_for_its_own(folder, tmp_path):
     folder, _, _ = folder
     sizes = (5, 7)  # in which some fields are the same, and lie elsewhere
@@ -83,6 +85,7 @@ def test_a_world_of_another_size_takes_no_kernel_for_its_own(folder, tmp_path):
     assert len(set(alone)) == len(alone)
 
 
+@pytest.mark.soak
 def test_what_is_missing_from_the_cache_is_made_from_its_source_again(folder):
     folder, state, made = folder
     assert len(json.loads((folder / INDEX).read_text())) >= len(made)
@@ -94,6 +97,7 @@ def test_what_is_missing_from_the_cache_is_made_from_its_source_again(folder):
     assert known == []
 
 
+@pytest.mark.soak
 @pytest.mark.parametrize("has_collider", [False, True], ids=["without contact", "with contact"])
 def test_a_machine_with_another_number_of_cores_finds_all_kernels_and_moves_bodies_alike(
     tmp_path, has_collider
@@ -104,6 +108,7 @@ def test_a_machine_with_another_number_of_cores_finds_all_kernels_and_moves_bodi
         assert (again, made_again, known) == (state, [], made)
 
 
+@pytest.mark.soak
 def test_after_an_update_kernels_are_made_once_and_then_known(tmp_path):
     """Taichi would find those that did not change, under the names that they had before."""
     state, made, _ = play(tmp_path, version="a")

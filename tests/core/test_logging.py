@@ -3,6 +3,10 @@
 import subprocess
 import sys
 
+import pytest
+
+pytestmark = pytest.mark.soak
+
 PROGRAM = """
 import logging
 {setup}

@@ -68,6 +68,7 @@ def test_threads_are_bound_to_cores_only_where_the_system_can(monkeypatch):
         init("cpu", cores=[0])
 
 
+@pytest.mark.soak
 @binding
 def test_the_threads_that_work_are_bound_to_a_core_each():
     """The system says where each thread may run, and which of them worked."""
@@ -127,6 +128,7 @@ assert device.threads == len(there) and init() is init(threads=len(there)) is de
         assert run(script, repr(options)) == f"{tuple(bound)} {bound}\n"
 
 
+@pytest.mark.soak
 @binding
 def test_where_the_system_refuses_no_thread_is_bound_and_cores_that_were_asked_for_are_an_error():
     """It refuses the second thread; the first is freed again."""
@@ -154,6 +156,7 @@ assert len(asked) > 2 and all(os.sched_getaffinity(thread) == there for thread i
         assert run(script, repr(options)) == f"{said}\n"
 
 
+@pytest.mark.soak
 @binding
 def test_left_alone_a_thread_that_somebody_else_starts_meanwhile_is_not_bound():
     script = """
@@ -171,6 +174,7 @@ assert os.sched_getaffinity(other.native_id) == os.sched_getaffinity(0)
     assert run(script) == "()\n"
 
 
+@pytest.mark.soak
 @binding
 def test_left_alone_threads_are_free_where_the_system_does_not_list_them():
     script = """
@@ -182,6 +186,7 @@ print(init().cores)
     assert run(script) == "()\n"
 
 
+@pytest.mark.soak
 def test_starting_again_otherwise():
     """In a process of its own: the first start fixes arch and threads, the second is a no-op or refused."""
     script = """
@@ -223,6 +228,7 @@ def test_no_device_before_the_start():
     assert "DeviceError: Taichi is not started" in done.stderr
 
 
+@pytest.mark.soak
 def test_more_threads_than_cores_are_not_waited_for():
     """The flat schedule's threads wait for each other, so there must be no more than run."""
     script = """

@@ -42,6 +42,7 @@ except KeyboardInterrupt:
     assert (done.returncode, done.stdout) == (0, "mine\n"), done.stderr
 
 
+@pytest.mark.soak
 @pytest.mark.parametrize(
     ("number", "status", "said"), [("SIGTERM", 143, ""), ("SIGINT", 130, "interrupted\n")]
 )

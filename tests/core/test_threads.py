@@ -69,6 +69,7 @@ def fallen():
     return played(made())
 
 
+@pytest.mark.soak
 def test_worlds_that_compile_at_once_in_two_threads_are_the_same_to_the_bit(fallen):
     worlds = [made(), made()]  # of fields of their own: neither has a kernel yet
     assert in_threads(*(lambda world=world: played(world) for world in worlds)) == [fallen, fallen]
@@ -179,6 +180,7 @@ def run(script):
     return done.returncode, done.stdout, done.stderr
 
 
+@pytest.mark.soak
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="only some systems fork")
 def test_a_child_that_is_forked_after_the_start_is_told_at_once_and_ends():
     script = """
@@ -212,6 +214,7 @@ print("done")
     assert (status, out) == (0, "done\n"), errors
 
 
+@pytest.mark.soak
 def test_a_spawned_process_makes_the_same_world(tmp_path):
     """Beside a process in which Taichi runs."""
     program = tmp_path / "spawning.py"
@@ -266,10 +269,12 @@ print("done")
 """
 
 
+@pytest.mark.soak
 def test_a_game_that_loads_in_a_thread_which_ends_plays_and_loads_on_elsewhere():
     assert run(LOADING)[:2] == (0, "done\n")
 
 
+@pytest.mark.soak
 def test_a_notebook_runs_cells_within_its_event_loop_and_writes_elsewhere():
     """As ipykernel: cells run in the main thread, in a loop, and what is printed goes to an object."""
     script = """

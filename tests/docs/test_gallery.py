@@ -156,6 +156,7 @@ def test_a_demo_without_a_word_on_what_to_notice_is_refused(tmp_path):
         gallery_hooks.Demo.of(tmp_path / "new.py")
 
 
+@pytest.mark.soak
 def test_a_film_of_the_gallery_ends_where_it_begins(tmp_path, monkeypatch):
     """Its last picture is nearer to its first one than the one before the fade is."""
     monkeypatch.setattr(make_gallery, "FOLDER", tmp_path)
@@ -175,6 +176,7 @@ def test_a_film_of_the_gallery_ends_where_it_begins(tmp_path, monkeypatch):
     assert gaps[0] < 0.5 * gaps[1]
 
 
+@pytest.mark.soak
 def test_a_demo_that_needs_a_missing_package_is_skipped_by_name(tmp_path, monkeypatch, capsys):
     def load(name):
         if name == "rich":
@@ -199,6 +201,7 @@ def test_a_demo_that_needs_a_missing_package_is_skipped_by_name(tmp_path, monkey
     assert film.get(cv2.CAP_PROP_FRAME_WIDTH) == 96
 
 
+@pytest.mark.soak
 @pytest.mark.parametrize("motion", ["reduce", "no-preference"])
 def test_films_of_the_gallery_play_in_view_unless_no_motion_is_wanted(folder, motion):
     film = folder / "attach.webm"

@@ -15,6 +15,7 @@ from typer.main import get_command
 
 import engine_adapter
 import taichi_soft
+from lab.cli.app import app as lab_app
 from taichi_soft import LAWS, PRESETS
 from taichi_soft.cli.app import app
 from taichi_soft.core.extras import EXTRAS
@@ -32,6 +33,8 @@ MADE = {
 PAGES = {
     path.relative_to(DOCS).as_posix(): path.read_text(encoding="utf-8") for path in sorted(DOCS.rglob("*.md"))
 }
+RECORDS = {"report/report.md", "sweep.md", "sweep-default.md"}
+"""Pages that a command wrote, which they name as it was called then."""
 CODE = {
     name: re.findall(r"^```python\n(.*?)^```", text, re.DOTALL | re.MULTILINE) for name, text in PAGES.items()
 }
@@ -54,6 +57,7 @@ def slug(heading):
     return re.sub(r"[-\s]+", "-", kept)
 
 
+@pytest.mark.soak
 @pytest.mark.parametrize("name", [name for name, blocks in CODE.items() if blocks])
 def test_the_code_of_a_page_runs_from_top_to_bottom(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -94,23 +98,28 @@ def test_every_page_is_in_the_navigation():
 
 
 @functools.cache
-def help_of(*command):
-    done = subprocess.run(
-        [sys.executable, "-m", "taichi_soft", *command, "--help"], capture_output=True, text=True
-    )
+def help_of(module, *command):
+    done = subprocess.run([sys.executable, "-m", module, *command, "--help"], capture_output=True, text=True)
     return done.stdout
 
 
-@pytest.mark.parametrize("name", sorted(set(PAGES) - {"report/report.md"}))
+PROGRAMS = {
+    "taichi-soft": ("taichi_soft", "bake|demo|film|info|profile|replay"),
+    "python -m lab": ("lab", "report|drop-test|peers"),
+}
+"""Modules of command lines, and commands of which a page may name options."""
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("name", sorted(set(PAGES) - RECORDS))
 def test_every_command_and_option_of_a_page_exists(name):
     text = PAGES[name]
-    for command, rest in re.findall(
-        r"taichi-soft (bake|demo|film|info|profile|drop-test|report|replay)\b([^`\n|]*)", text
-    ):
-        for option in re.findall(r"(?<!\S)--[a-z-]+", rest):
-            assert option in help_of(command), f"{name}: taichi-soft {command} {option}"
-    for command in re.findall(r"^ +taichi-soft ([\w-]+)|`taichi-soft ([\w-]+)", text, re.MULTILINE):
-        assert "".join(command) in help_of(), name
+    for program, (module, commands) in PROGRAMS.items():
+        for command, rest in re.findall(rf"{program} ({commands})\b([^`\n|]*)", text):
+            for option in re.findall(r"(?<!\S)--[a-z-]+", rest):
+                assert option in help_of(module, command), f"{name}: {program} {command} {option}"
+        for command in re.findall(rf"^ {{4}}{program} ([\w-]+)|`{program} ([\w-]+)", text, re.MULTILINE):
+            assert f"\n  {''.join(command)} " in help_of(module), name
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     for target in re.findall(r"^ +make ([\w-]+)|`make ([\w-]+)`", text, re.MULTILINE):
         assert f"\n{''.join(target)}:" in makefile, name
@@ -150,9 +159,12 @@ def test_every_choice_stands_in_its_table(page, names):
         assert re.search(rf"^\|.*`\"?{name}\"?`", PAGES[page], re.MULTILINE), name
 
 
-def test_every_command_stands_in_the_table_of_commands():
-    rows = re.findall(r"^\| `taichi-soft ([\w-]+)[^`]*` \|", PAGES["command-line.md"], re.MULTILINE)
-    assert [name for name in get_command(app).commands if name not in rows] == []
+@pytest.mark.soak
+@pytest.mark.parametrize(("program", "its_app"), [("taichi-soft", app), ("python -m lab", lab_app)])
+def test_every_command_stands_in_the_table_of_commands(program, its_app):
+    rows = re.findall(rf"^\| `{program} ([\w-]+)[^`]*` \|", PAGES["command-line.md"], re.MULTILINE)
+    commands = get_command(its_app).commands.items()
+    assert [name for name, command in commands if not command.hidden and name not in rows] == []
 
 
 def test_presets_have_the_numbers_of_the_table():

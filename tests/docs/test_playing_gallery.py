@@ -22,6 +22,8 @@ sys.path.insert(0, str(ROOT / "docs"))
 
 import gallery_hooks  # noqa: E402
 
+pytestmark = pytest.mark.soak
+
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
@@ -155,6 +157,64 @@ def test_a_jelly_is_pulled_set_and_reset_and_python_has_the_same_bits(browser, s
         said = replayed(file)
         assert f"up to step {count}" in said
         assert f"hash {shown}" in said
+
+
+SLOW = """() => {
+  const quick = window.fetch;
+  window.fetch = async (...given) => {
+    const answer = await quick(...given);
+    await new Promise((done) => setTimeout(done, 500));
+    return answer;
+  };
+}"""
+
+
+def test_a_world_that_goes_on_while_it_is_saved_has_the_hash_of_its_file(browser, site, tmp_path):
+    page, complaints, _ = playing(browser, site)
+    page.evaluate(SLOW)
+    count = steps_of(page)
+    file, _ = saved(page, tmp_path)
+    page.get_by_text("On a PC, taichi-soft replay").wait_for()
+    steps = [entry for entry in json.loads(file.read_text())["entries"] if entry[0] == "step"]
+    assert len(steps) > count + 10
+    assert f"prints {steps[-1][3]}." in page.locator("#verdict").inner_text()
+    page.route("**/*.recording", lambda route: route.abort())
+    page.get_by_role("button", name="Save what I did").click()
+    page.get_by_text("cannot be saved, because jelly.recording cannot be read").wait_for()
+    assert complaints == ["Failed to load resource: net::ERR_FAILED"]
+    page.close()
+
+
+LONG = """
+import { Game } from "./game.mjs";
+let state = 0;
+const world = {
+  snapshot: () => 0,
+  restore: () => (state = 0),
+  step: () => (state += 1),
+  hash: () => `state ${state}`,
+};
+const facts = { handles: { body: [], next: 1 }, controls: [], dt: 1 / 60 };
+const game = new Game({ createWorld: () => world }, facts);
+const found = [];
+for (let i = 0; i <= 36_002; i += 1) {
+  if (i === 10 || i > 35_999) found.push([game.hash, game.recordedHash, game.entries.at(-1)[3]]);
+  game.step();
+}
+console.log(JSON.stringify(found));
+"""
+
+
+def test_a_file_of_ten_minutes_ends_with_the_hash_of_their_last_step(tmp_path):
+    if shutil.which("node") is None:
+        pytest.skip("needs node: apt-get install nodejs")
+    shutil.copy(ROOT / "docs" / "play" / "game.js", tmp_path / "game.mjs")
+    (tmp_path / "long.mjs").write_text(LONG)
+    done = subprocess.run(["node", tmp_path / "long.mjs"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    end = "state 36000"
+    wanted = [["state 10"] * 3, [end] * 3, ["state 36001", end, end], ["state 36002", end, end]]
+    assert json.loads(done.stdout) == wanted
 
 
 def test_untouched_scenes_have_the_hash_of_python_and_the_back_button_leads_to_the_first(

@@ -12,6 +12,8 @@ from taichi_soft.core.container import seal, unseal
 from taichi_soft.persistence.snapshot import MARK, VERSION
 from taichi_soft.render.replay import replay
 
+pytestmark = pytest.mark.soak
+
 DT, SUBSTEPS = 1 / 60, 12
 BAR, SLAB = box((1.6, 0.4, 0.4), (8, 2, 2)), box((0.2, 0.8, 1.2), (1, 4, 6))
 FIRST, SECOND = ((0.03, 0.0, 0.0), (1.0, 0.1, 0.3)), ((0.03, 0.0, 0.0), (0.2, 1.0, 0.1))

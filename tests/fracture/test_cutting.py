@@ -18,6 +18,8 @@ from taichi_soft import (
     surface_mesh,
 )
 
+pytestmark = pytest.mark.soak
+
 DT = 1 / 60
 BAR = box((2.0, 0.5, 0.5), (8, 2, 2))
 SPREAD = np.linspace(0.8, 1.2, len(BAR.tets))

@@ -272,6 +272,7 @@ def test_a_listener_hears_of_what_was_released_and_who_records_other_kinds_does_
     world.record_events([Event])
 
 
+@pytest.mark.soak
 def test_recordings_make_changes_under_a_hand_and_releases_again(tmp_path):
     world, low, high = floating(record=100, gravity=(0, 0, -9.81), floor=0.0)
     joined(world, low, high)

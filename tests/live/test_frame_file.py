@@ -30,6 +30,7 @@ def test_there_is_no_picture_before_the_first(tmp_path):
     assert FrameFile(tmp_path / "frames", 10, 0, is_new=True).newest() is None
 
 
+@pytest.mark.soak
 def test_a_reader_never_sees_half_a_picture_while_another_process_writes(tmp_path):
     frames = FrameFile(tmp_path / "frames", 20_000, 3, is_new=True)
     writer = subprocess.Popen([sys.executable, "-c", WRITER, str(tmp_path / "frames")])

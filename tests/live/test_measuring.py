@@ -9,6 +9,8 @@ from taichi_soft import sphere
 from taichi_soft.live import measuring
 from taichi_soft.live.meters import STEPS
 
+pytestmark = pytest.mark.soak
+
 
 def test_a_measurement_counts_what_is_sent_and_orders_its_percentiles(monkeypatch):
     monkeypatch.setattr(measuring, "COUNTS", (1,))

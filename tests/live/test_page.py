@@ -17,6 +17,8 @@ from visitor import Visitor
 playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright: pip install playwright")
 PIL = pytest.importorskip("PIL.Image", reason="needs pillow")
 
+pytestmark = pytest.mark.soak
+
 
 @pytest.fixture(scope="module")
 def browser():

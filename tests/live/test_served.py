@@ -23,6 +23,8 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from taichi_soft import box
 
+pytestmark = pytest.mark.soak
+
 FACTS = """
 import json, runpy
 made = runpy.run_path("scene.py")

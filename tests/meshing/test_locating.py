@@ -46,7 +46,7 @@ def test_a_point_inside_is_found_in_a_tetrahedron_that_holds_it(name):
 
 
 @pytest.mark.parametrize("reach", [0.2, 5.0])
-@pytest.mark.parametrize("name", MESHES)
+@pytest.mark.parametrize("name", ["box", pytest.param("torus", marks=pytest.mark.soak)])
 def test_a_point_outside_gets_the_nearest_point_of_the_mesh(name, reach):
     mesh = MESHES[name]
     points = spread(mesh, 20, reach, seed=1)

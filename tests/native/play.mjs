@@ -95,10 +95,10 @@ export function play(scene, game) {
         tell(EVENTS[kind], collider, step, slotOf(each.body), slotOf(each.other), row);
       }
     },
-    attach: () => body().attach(list(), { number: one() }, { feels: one() === 1 }),
+    attach: () => body().attach(list(), world.frame(one()), { feels: one() === 1 }),
     detach: () => body().detach(list()),
     load() {
-      const { force, torque } = body().load({ number: one() });
+      const { force, torque } = body().load(world.frame(one()));
       tell(hashOf([...force, ...torque]));
     },
     grab() {

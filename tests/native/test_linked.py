@@ -2,8 +2,9 @@
 
 import subprocess
 
+import pytest
 from library import in_process
-from native_build import ROOT
+from native_build import ROOT, build
 
 PROGRAM = """
 #include <stdio.h>
@@ -40,14 +41,37 @@ print(json.dumps(soft.hash(world)))
 """
 
 
-def test_two_worlds_are_linked_into_a_game_and_move_as_those_that_are_opened(native, export, tmp_path):
+@pytest.fixture(scope="module")
+def archive(tmp_path_factory):
+    """Folder of the library as an archive."""
+    return build(tmp_path_factory.mktemp("archive"), "-DTAICHI_SOFT_STATIC=ON", targets=["taichi_soft"])
+
+
+@pytest.mark.parametrize("library", ["opened", "linked"])
+def test_two_worlds_are_linked_into_a_game_and_move_as_those_that_are_opened(
+    library, native, request, export, tmp_path
+):
     worlds = {name: export(name, "--static", "--for", "linux-x64") for name in ("heap", "free")}
     source, program = tmp_path / "linked.c", tmp_path / "linked"
     source.write_text(PROGRAM)
     include = ROOT / "engine_adapter" / "native" / "include"
     objects = [folder / "kernels" / "linux-x64.o" for folder in worlds.values()]
-    options = ["-std=c11", "-Wall", "-Wextra", "-Werror", f"-I{include}", f"-L{native}"]
-    command = ["gcc", source, *objects, *options, "-ltaichi_soft", f"-Wl,-rpath,{native}", "-o", program]
+    options = ["-std=c11", "-Wall", "-Wextra", "-Werror", f"-I{include}"]
+    if library == "opened":
+        options += [f"-L{native}", "-ltaichi_soft", f"-Wl,-rpath,{native}"]
+    else:
+        folder = request.getfixturevalue("archive")
+        assert not list(folder.glob("*.so"))
+        options += [
+            "-DTAICHI_SOFT_STATIC",
+            f"-L{folder}",
+            "-ltaichi_soft",
+            "-lstdc++",
+            "-lm",
+            "-lpthread",
+            "-ldl",
+        ]
+    command = ["gcc", source, *objects, *options, "-o", program]
     done = subprocess.run([str(each) for each in command], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     done = subprocess.run([program, worlds["heap"] / "world.tsw"], capture_output=True, text=True)

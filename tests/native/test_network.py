@@ -5,6 +5,7 @@ import re
 import shutil
 import struct
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -63,7 +64,7 @@ def plain(sample):
 def test_python_and_node_end_a_minute_of_play_over_a_bad_network_in_the_same_state(sample, arena, plain):
     """And in the state of a world that knew every input at once."""
     play, player = sample
-    reports, counts = play.session(arena, ticks=3600, seed=1, is_fast=True, cheat=-1)
+    reports, counts = play.session(arena, ticks=3600, seed=1, is_fast=True)
     inputs = [[player.press(tick, who) for tick in range(3600)] for who in (0, 1)]
     assert {each["hash"] for each in reports} == {plain(*inputs)}
     for each in reports:
@@ -82,6 +83,25 @@ def test_one_bit_of_an_input_is_noticed_by_both_at_the_next_hash(sample, arena):
     reports, _ = sample[0].session(arena, ticks=600, seed=2, is_fast=True, cheat=333)
     assert [each["desync"] for each in reports] == [360, 360]
     assert reports[0]["hash"] != reports[1]["hash"]
+
+
+@pytest.mark.parametrize(
+    ("options", "reason"),
+    [
+        (["--ticks", "0"], "--ticks is 0: give 1 or more"),
+        (["--ticks", "50", "--cheat", "50"], "--cheat is 50: give a tick from 0 to 49"),
+        (["--world", "nowhere"], "--world is nowhere: give a folder that taichi-soft export --for web wrote"),
+        (["--world", "."], "the game was not played to its end, for the reason above: node did not begin"),
+    ],
+)
+def test_a_game_that_cannot_begin_ends_at_once_with_the_reason(options, reason, tmp_path):
+    (tmp_path / "kernels").mkdir()
+    (tmp_path / "kernels" / "web.wasm").write_bytes(b"no module")
+    command = [sys.executable, WEB / "network" / "play.py", "--fast", *options]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=50)
+    assert done.returncode != 0
+    assert reason in done.stderr
+    assert "Traceback" not in done.stderr
 
 
 def datagram(start, first, inputs, **other):

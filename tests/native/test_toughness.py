@@ -80,6 +80,64 @@ def test_a_world_file_that_is_damaged_anywhere_is_refused(native, heap, tmp_path
     assert taken == []
 
 
+LOADED = """
+try:
+    world = soft.create(soft.load(arguments[0]))
+    for _ in range(30):
+        soft.step(world)
+    print(json.dumps([0, str(soft.hash(world))]))
+except RefusedError as refused:
+    print(json.dumps([refused.code, refused.text]))
+"""
+
+
+def test_a_game_ships_either_file_for_its_processor_and_is_told_where_both_are_missing(
+    native, heap, tmp_path
+):
+    whole, copy = in_process(native, LOADED, heap), shutil.copytree(heap, tmp_path / "copy")
+    assert whole[0] == 0
+    (copy / "kernels" / "linux-x64-v3.so").unlink()
+    assert in_process(native, LOADED, copy) == whole
+    (copy / "kernels" / "linux-x64.so").unlink()
+    code, text = in_process(native, LOADED, copy)
+    assert code == FILE
+    assert text.endswith(
+        "linux-x64.so, which belongs to the world file: copy it there, or export the world again"
+    )
+
+
+@pytest.mark.parametrize(
+    ("options", "way_out"),
+    [
+        (["--for", "linux-arm64"], "but linux-arm64.so: export it again, with --for linux-x64"),
+        (["--static"], "linux-x64-v3.o: call ts_scene_load_linked, or export it again without --static"),
+    ],
+)
+def test_a_world_for_another_machine_is_refused_with_the_way_out(options, way_out, native, export):
+    code, text = in_process(native, LOADED, export("heap", *options))
+    assert code == FILE
+    assert text.endswith(way_out)
+
+
+NAMED = """
+from ctypes import byref, c_int32
+scene, found = soft.load(arguments[0]), []
+for kind in (0, 3):
+    try:
+        soft.call("ts_scene_find", scene, c_int32(kind), b"nobody", byref(c_int32()))
+    except RefusedError as refused:
+        found.append(refused.text)
+print(json.dumps(found))
+"""
+
+
+def test_a_wrong_name_is_refused_with_those_that_there_are(native, heap):
+    among_bodies, among_frames = in_process(native, NAMED, heap)
+    names = ", ".join(f"body{i}" for i in range(10))
+    assert among_bodies == f"nothing of that kind is called nobody: give one of {names}"
+    assert among_frames == "nothing of that kind is called nobody: the world file has none of that kind"
+
+
 GROWTH = """
 import resource
 def used():

@@ -25,6 +25,8 @@ from taichi_soft.core.serialisation import to_json
 from taichi_soft.persistence.recorder import MARK, VERSION, read_recording
 from taichi_soft.render.replay import replay
 
+pytestmark = pytest.mark.soak
+
 
 @pytest.fixture(scope="module")
 def game(tmp_path_factory):
@@ -201,6 +203,9 @@ def test_what_a_page_saved_replaces_the_steps_of_its_recording(game, tmp_path):
         saved.write_text(content)
         with pytest.raises(SnapshotError):
             replay(saved)
+    saved.write_text(json.dumps({"start": "", "entries": entries})[:-100])
+    with pytest.raises(SnapshotError, match=r"is cut off or damaged \(.*: save it again there"):
+        replay(saved)
     with pytest.raises(OptionError, match="steps"):
         replay(path, steps=-1)
 

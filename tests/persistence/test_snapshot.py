@@ -258,6 +258,7 @@ def test_materials_that_were_set_come_back(small):
     assert np.isclose(mass, 800.0)
 
 
+@pytest.mark.soak
 @pytest.mark.parametrize("integrator", ["implicit_euler", "lazy_leapfrog"])
 def test_other_integrators_go_on_the_same(integrator):
     world = World(integrator=integrator)
@@ -460,6 +461,7 @@ def test_it_is_no_call_before_build():
             call()
 
 
+@pytest.mark.soak
 def test_a_rope_goes_on_the_same():
     world = World()
     world.add_body(
@@ -505,6 +507,7 @@ def bendable():
     return world
 
 
+@pytest.mark.soak
 def test_rest_shapes_come_back(bendable):
     body = bendable.bodies[0]
     data, bent, before = bendable.snapshot(), body.plastic_strains(), bendable.state_hash()

@@ -295,6 +295,7 @@ def test_simulated_time_is_that_of_the_world():
     assert report.simulated == stage.world.time > 0.4
 
 
+@pytest.mark.soak
 def test_colors_of_bodies_and_colliders_are_explained_and_told_apart(tmp_path):
     """The bar and the legend stand in the upper right corner; a collider may have a colour of its own."""
     world = World()

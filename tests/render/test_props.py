@@ -36,6 +36,7 @@ def world():
     return world
 
 
+@pytest.mark.soak
 def test_a_collider_is_drawn_on_its_way_between_the_last_two_steps(world):
     collider = world.colliders[0]
     scenery = Scenery(world)

@@ -307,6 +307,7 @@ print(hashlib.sha256(picture.tobytes()).hexdigest())
 """
 
 
+@pytest.mark.soak
 def test_same_bits_for_one_thread_and_two_and_every_time(renderer):
     first, second = (renderer.render([ball(), ball(0.6, 0.2, 1.2)]) for _ in range(2))
     np.testing.assert_array_equal(first, second)

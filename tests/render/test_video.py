@@ -283,7 +283,15 @@ def encoder_of(folder):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
-@pytest.mark.parametrize("suffix", [".mp4", ".webm", ".gif", ".png"])
+@pytest.mark.parametrize(
+    "suffix",
+    [
+        ".mp4",
+        pytest.param(".webm", marks=pytest.mark.soak),
+        pytest.param(".gif", marks=pytest.mark.soak),
+        ".png",
+    ],
+)
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
 def test_a_killed_film_leaves_no_process_and_what_it_left_is_removed_by_the_next(tmp_path, suffix, number):
     path = tmp_path / f"film{suffix}"

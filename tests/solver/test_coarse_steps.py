@@ -37,7 +37,7 @@ def left_by_a_coarse_step(retries, schedule, **options):
     return world, body, before
 
 
-@pytest.mark.parametrize("schedule", ["per_body", "flat"])
+@pytest.mark.parametrize("schedule", ["per_body", pytest.param("flat", marks=pytest.mark.soak)])
 def test_a_step_too_coarse_is_made_again_finer_in_a_world_without_colliders(schedule):
     _world, body, momentum = left_by_a_coarse_step(3, schedule)
     assert not body.is_frozen
@@ -45,7 +45,7 @@ def test_a_step_too_coarse_is_made_again_finer_in_a_world_without_colliders(sche
     np.testing.assert_allclose(body.momentum(), momentum, rtol=1e-4)
 
 
-@pytest.mark.parametrize("schedule", ["per_body", "flat"])
+@pytest.mark.parametrize("schedule", ["per_body", pytest.param("flat", marks=pytest.mark.soak)])
 def test_without_retries_it_freezes_at_once(schedule):
     _world, body, _ = left_by_a_coarse_step(0, schedule)
     assert body.is_frozen
@@ -122,6 +122,7 @@ def test_a_world_that_may_not_take_so_many_refuses_and_stays_as_it_was():
         small.step(1 / 60)
 
 
+@pytest.mark.soak
 def test_what_one_may_ask_of_implicit_euler_is_bounded_too():
     world = World(max_substeps=2, integrator="implicit_euler")
     world.add_body(rope(1.0, 8, 1.0), SpringMaterial(1e9), law="springs", position=(0, 0, 3))

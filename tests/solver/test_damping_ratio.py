@@ -10,12 +10,14 @@ import trimesh
 from mode_oracle import assembled_stiffness, first_mode, lumped_masses
 from random_meshes import scattered
 
+from lab.drop_test.robustness.foreign_meshes import FOREIGN_MESHES
 from taichi_soft import Material, SoftBodyAsset, TetMesh, World, beam, box, internal_forces, sphere
 from taichi_soft.bodies.description import BodyDescription
 from taichi_soft.bodies.first_mode import first_frequency
 from taichi_soft.core.errors import MaterialError
 from taichi_soft.elements.laws import element_model, fit_model
-from taichi_soft.lab.drop_test.robustness.foreign_meshes import FOREIGN_MESHES
+
+pytestmark = pytest.mark.soak
 
 YOUNG, POISSON, DENSITY = 1e5, 0.3, 1000.0
 BALL = sphere(1.0, 6)

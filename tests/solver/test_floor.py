@@ -27,6 +27,7 @@ def test_a_body_comes_to_rest_on_the_floor(solo, cube, height):
     assert 1 - 2 * sag < top < 1 - 0.5 * sag
 
 
+@pytest.mark.soak
 def test_without_a_floor_bodies_fall_on(solo, cube, jelly):
     world, body = solo(cube, jelly, {"floor": None})
     for _ in range(120):
@@ -67,6 +68,7 @@ def slide(solo, friction, seconds=1.5):
     return body.center_of_mass()[0] - start, body.momentum()[0] / 500
 
 
+@pytest.mark.soak
 def test_without_friction_nothing_is_lost(solo):
     way, speed = slide(solo, 0.0)
     assert way == pytest.approx(3.0, rel=1e-3)

@@ -7,6 +7,8 @@ from taichi_soft import Device, FrozenBodyWarning, Material, World, box, sphere
 from taichi_soft.core.types import Schedule
 from taichi_soft.solver.schedules import choose_schedule, make_launch
 
+pytestmark = pytest.mark.soak
+
 GPU = Device("cuda", 1, "pretended")
 
 

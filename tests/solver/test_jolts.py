@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from lab.drop_test.robustness.cells import choose_cells
+from lab.drop_test.robustness.foreign_meshes import FOREIGN_MESHES
+from lab.drop_test.robustness.trial import run_cell
 from taichi_soft import Material, World
-from taichi_soft.lab.drop_test.robustness.cells import choose_cells
-from taichi_soft.lab.drop_test.robustness.foreign_meshes import FOREIGN_MESHES
-from taichi_soft.lab.drop_test.robustness.trial import run_cell
 
 DT, HEIGHT = 1 / 60, 2.0
 

@@ -4,6 +4,10 @@ import os
 import subprocess
 import sys
 
+import pytest
+
+pytestmark = pytest.mark.soak
+
 PROGRAM = """
 from taichi_soft import Material, World, box, init
 init("cpu", threads=1)

@@ -9,6 +9,8 @@ import pytest
 from taichi_soft import Material, World, box, sphere
 from taichi_soft.solver import schedules
 
+pytestmark = pytest.mark.soak
+
 BALL, CUBE = sphere(0.3, 3), box((0.5,) * 3, (3, 3, 3))
 MATERIAL = Material(3e5, 0.3, 500.0)
 OPTIONS = {

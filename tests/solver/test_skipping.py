@@ -19,6 +19,8 @@ from taichi_soft import (
 )
 from taichi_soft.render.replay import replay
 
+pytestmark = pytest.mark.soak
+
 DT = 1 / 60
 EDGE = 0.5
 BLOCK = box((EDGE,) * 3, (2, 2, 2))

@@ -10,6 +10,8 @@ from thread_scenes import SCENES
 
 from taichi_soft import init
 
+pytestmark = pytest.mark.soak
+
 PROGRAM = Path(__file__).parents[1] / "shared" / "thread_scenes.py"
 
 

@@ -9,6 +9,8 @@ import pytest
 from taichi_soft import Material, StateError, World, beam, box, sphere
 from taichi_soft.bodies import fields as states
 
+pytestmark = pytest.mark.soak
+
 # mesh, material, options: everything in which bodies can differ.
 KINDS = {
     "cube": (box(cells=(2, 2, 2)), Material(1e5, 0.2, 1000.0, 20.0), {}),

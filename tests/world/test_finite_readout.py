@@ -12,9 +12,12 @@ BLOCK = box((0.4, 0.4, 0.4), cells=(2, 2, 2))
 LEFT = np.flatnonzero(BLOCK.vertices[:, 0] < -0.19)
 JELLY = Material(3e4, 0.3, 500.0, 5.0)
 
-pytestmark = pytest.mark.filterwarnings(
-    "ignore::taichi_soft.FrozenBodyWarning", "ignore::taichi_soft.UnstableStepWarning"
-)
+pytestmark = [
+    pytest.mark.soak,
+    pytest.mark.filterwarnings(
+        "ignore::taichi_soft.FrozenBodyWarning", "ignore::taichi_soft.UnstableStepWarning"
+    ),
+]
 
 
 def held_world(**options):

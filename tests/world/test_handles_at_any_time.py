@@ -25,6 +25,8 @@ from taichi_soft import (
     rope,
 )
 
+pytestmark = pytest.mark.soak
+
 COARSE, FINE = box((0.4, 0.4, 0.4), cells=(1, 1, 1)), box((0.4, 0.4, 0.4), cells=(3, 3, 3))
 SKIN = (COARSE.vertices, COARSE.surface)
 LEAST_KEPT, MOST_KEPT = 12, 50

@@ -26,6 +26,8 @@ from taichi_soft.core.first_launch import FirstLaunches
 from taichi_soft.core.types import Schedule
 from taichi_soft.solver.schedules import make_launch
 
+pytestmark = pytest.mark.soak
+
 DT = 1 / 60
 JELLY = Material(1e5, 0.2, 1000.0, 20.0)
 MESH, BALL = box(cells=(2, 2, 2)), sphere(0.5, 2)

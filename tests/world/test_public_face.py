@@ -102,6 +102,7 @@ def refused(game, call, *arguments, **options):
     return f"changes {changed}" if changed else None
 
 
+@pytest.mark.soak
 @pytest.mark.parametrize("name", NAMES)
 def test_every_bad_value_of_every_argument_is_refused_and_nothing_changes(game, name):
     kind, _, method = name.partition(".")
@@ -119,6 +120,7 @@ def test_every_bad_value_of_every_argument_is_refused_and_nothing_changes(game, 
     assert not wrong, "\n".join(wrong)
 
 
+@pytest.mark.soak
 @pytest.mark.parametrize("kind", MAKERS, ids=lambda kind: kind.__name__)
 def test_nothing_is_made_of_bad_values(game, kind):
     takes, wrong = MAKERS[kind], []
@@ -133,6 +135,7 @@ def test_nothing_is_made_of_bad_values(game, kind):
     assert not wrong, "\n".join(wrong)
 
 
+@pytest.mark.soak
 @pytest.mark.parametrize("kind", DEAD)
 def test_a_dead_handle_does_nothing_and_says_so(game, kind):
     handle, wrong = getattr(game, DEAD[kind]), []
@@ -153,6 +156,7 @@ def test_a_dead_handle_does_nothing_and_says_so(game, kind):
         getattr(handle, name)
 
 
+@pytest.mark.soak
 @pytest.mark.filterwarnings(
     "ignore::taichi_soft.FrozenBodyWarning", "ignore::taichi_soft.UnstableStepWarning"
 )
@@ -185,6 +189,7 @@ BAD_FIELDS = {
 }
 
 
+@pytest.mark.soak
 @pytest.mark.parametrize("name", BAD_FIELDS)
 def test_a_force_field_that_gives_no_accelerations_stops_the_step(game, name):
     game.world.set_force_field(BAD_FIELDS[name])
@@ -274,6 +279,7 @@ def story(game, acts, *, with_bad):
     return told
 
 
+@pytest.mark.soak
 @settings(
     max_examples=30,
     phases=[Phase.explicit, Phase.generate],

@@ -25,6 +25,8 @@ from taichi_soft.control.kernels.joints import MOST_JOINTS
 from taichi_soft.control.kernels.motors import MOST_MOTORS
 from taichi_soft.core.compilation import BURST
 
+pytestmark = pytest.mark.soak
+
 
 @pytest.fixture(scope="module")
 def compiled():

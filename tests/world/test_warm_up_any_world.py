@@ -18,6 +18,8 @@ from taichi_soft import (
 )
 from taichi_soft.core.compilation import BURST
 
+pytestmark = pytest.mark.soak
+
 JELLY, SPRINGS = Material(3e4, 0.3, 800.0, 5.0), SpringMaterial(2000.0, 2.0)
 STIFF, STIFF_SPRINGS = Material(6e4, 0.3, 800.0, 5.0), SpringMaterial(3000.0, 2.0)
 CORNER = TetMesh([[0, 0, 0], [0.2, 0, 0], [0, 0.2, 0], [0, 0, 0.2]], [[0, 1, 2, 3]])

@@ -28,7 +28,9 @@
 extern "C" {
 #endif
 
-#if defined(_WIN32)
+#if defined(TAICHI_SOFT_STATIC)
+#define TS_API
+#elif defined(_WIN32)
 #ifdef TAICHI_SOFT_BUILDS
 #define TS_API __declspec(dllexport)
 #else

@@ -55,6 +55,17 @@ ts_result guarded(Function function) noexcept {
 #endif
 }
 
+// What to give instead of a wrong name: as many names as fit into an error's text.
+std::string choice(const std::vector<std::string>& names) {
+  if (names.empty()) return "the world file has none of that kind";
+  std::string found = "give one of ";
+  for (size_t i = 0; i < names.size(); ++i) {
+    if (found.size() + names[i].size() > 300) return found + "and " + std::to_string(names.size() - i) + " more";
+    found += names[i] + (i + 1 < names.size() ? ", " : "");
+  }
+  return found;
+}
+
 // A world for the time of one call, which no other thread can use meanwhile.
 class Turn {
  public:
@@ -352,7 +363,9 @@ ts_result ts_scene_find(ts_scene scene, int32_t kind, const char* name, int32_t*
     given(number, "number");
     const auto& names = found->names(kind);
     const auto at = std::find(names.begin(), names.end(), given(name, "name"));
-    if (at == names.end()) fail(TS_ERROR_ARGUMENT, "nothing of that kind is called %.100s", name);
+    if (at == names.end()) {
+      fail(TS_ERROR_ARGUMENT, "nothing of that kind is called %.100s: %s", name, choice(names).c_str());
+    }
     *number = int32_t(at - names.begin());
   });
 }

@@ -51,18 +51,33 @@ std::string texts(const std::vector<std::string>& names) {
   return found.empty() ? "nothing" : found;
 }
 
+// The best file that was exported for this machine and is there, by its number: a game may ship one of several.
+size_t choose(const std::filesystem::path& folder, const std::vector<std::string>& files) {
+  const std::vector<std::string> wanted = wanted_files();
+  std::filesystem::path missing;
+  for (const std::string& name : wanted) {
+    const auto found = std::find(files.begin(), files.end(), name);
+    if (found == files.end()) continue;
+    missing = std::filesystem::absolute(folder / name);
+    std::error_code ignored;
+    if (std::filesystem::exists(missing, ignored)) return size_t(found - files.begin());
+  }
+  if (!missing.empty()) {
+    fail(TS_ERROR_FILE, "cannot read %s, which belongs to the world file: copy it there, or export the world again",
+         missing.u8string().c_str());
+  }
+  const std::filesystem::path platform = wanted.back();
+  const bool is_linked = !files.empty() && std::filesystem::path(files[0]).extension() == ".o";
+  const std::string way_out = is_linked ? "call ts_scene_load_linked, or export it again without --static"
+                                        : "export it again, with --for " + platform.stem().string();
+  fail(TS_ERROR_FILE, "the world file has no machine code for this machine, %s, but %s: %s", wanted.back().c_str(),
+       texts(files).c_str(), way_out.c_str());
+}
+
 }  // namespace
 
 Kernels::Kernels(const std::string& folder, const std::vector<std::string>& files, const std::vector<int64_t>& sums) {
-  const std::vector<std::string> wanted = wanted_files();
-  size_t file = files.size();
-  for (auto name = wanted.begin(); name != wanted.end() && file == files.size(); ++name) {
-    file = size_t(std::find(files.begin(), files.end(), *name) - files.begin());
-  }
-  if (file == files.size()) {
-    fail(TS_ERROR_FILE, "the world file has no machine code for this machine, %s, but %s: export it again, with --for",
-         wanted.back().c_str(), texts(files).c_str());
-  }
+  const size_t file = choose(std::filesystem::u8path(folder), files);
   const std::filesystem::path path = std::filesystem::absolute(std::filesystem::u8path(folder) / files[file]);
   const std::vector<char> bytes = read_file(path.u8string());
   if (int64_t(bytes.size()) != sums[2 * file] || int64_t(checksum(bytes.data(), bytes.size())) != sums[2 * file + 1]) {

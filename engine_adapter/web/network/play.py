@@ -1,7 +1,7 @@
 """Play a game between Python and node over a slow network that loses messages, and compare the two worlds.
 
-    python engine_adapter/web/network/play.py           # in real time
-    python engine_adapter/web/network/play.py --fast    # the same game on a simulated clock
+    .venv/bin/python engine_adapter/web/network/play.py           # in real time
+    .venv/bin/python engine_adapter/web/network/play.py --fast    # the same game on a simulated clock
 
 Each player is a process and sends UDP datagrams to this process, which is the network between them: it
 delays, loses, copies and reorders datagrams.
@@ -25,6 +25,7 @@ from typing import Any
 
 HERE = Path(__file__).parent
 DT = 1 / 60
+NAMES = ("Python", "node")  # of the players
 DELAY, JITTER, STALL = 0.1, 0.05, 0.2  # of every message, up to more, and more of a few [s]
 LOST, STALLED, COPIED = 0.1, 0.02, 0.02  # parts of all messages
 LATE_START = (0, 20)  # frames after which each player begins
@@ -74,9 +75,20 @@ class Line:
         self.socket.settimeout(PATIENCE)
         self.port = self.socket.getsockname()[1]
 
-    def meet(self) -> None:
-        """Wait until the player is there."""
-        self.socket.connect(self.socket.recvfrom(16)[1])
+    def meet(self, process: subprocess.Popen[str], name: str) -> None:
+        """Wait until the player is there. Raises: ChildProcessError if its process ends before."""
+        self.socket.settimeout(0.1)
+        end = time.monotonic() + PATIENCE
+        while time.monotonic() < end:
+            try:
+                self.socket.connect(self.socket.recvfrom(16)[1])
+            except TimeoutError:
+                if process.poll() is not None:
+                    break
+            else:
+                self.socket.settimeout(PATIENCE)
+                return
+        raise ChildProcessError(f"{name} did not begin")
 
     def send(self, data: bytes) -> None:
         """Send to the player."""
@@ -126,12 +138,12 @@ def run(lines: list[Line], network: Network) -> None:
 
 
 def session(
-    folder: Path, *, ticks: int, seed: int, is_fast: bool, cheat: int
+    folder: Path, *, ticks: int, seed: int, is_fast: bool, cheat: int | None = None
 ) -> tuple[list[dict[str, Any]], Counter[str]]:
     """Run both processes. Returns: what each reports, and what the network did."""
     lines, network = [Line(), Line()], Network(seed)
     commands: list[list[str | Path]] = [
-        [sys.executable, HERE / "player.py", "--cheat", str(cheat)],
+        [sys.executable, HERE / "player.py", *([] if cheat is None else ["--cheat", str(cheat)])],
         ["node", HERE / "player.mjs", folder],
     ]
     options = ["--ticks", str(ticks), *(["--fast"] if is_fast else [])]
@@ -140,8 +152,8 @@ def session(
         for command, line in zip(commands, lines, strict=True)
     ]
     try:
-        for line in lines:
-            line.meet()
+        for line, process, name in zip(lines, processes, NAMES, strict=True):
+            line.meet(process, name)
         for line in lines:
             line.send(b"start")
         (run_fast if is_fast else run)(lines, network)
@@ -162,7 +174,12 @@ def session(
 def export(folder: Path) -> None:
     """Write the same world for node."""
     command = ["export", str(HERE / "arena.py"), "--out", str(folder), "--for", "web"]
-    subprocess.run([sys.executable, "-m", "taichi_soft", *command], check=True, stdout=subprocess.DEVNULL)
+    done = subprocess.run([sys.executable, "-m", "taichi_soft", *command], stdout=subprocess.DEVNULL)
+    if done.returncode != 0:
+        sys.exit(
+            f"the world was not exported by {sys.executable}, for the reason above. "
+            "In a checkout where `make setup` was run, use .venv/bin/python"
+        )
 
 
 def main() -> None:
@@ -171,11 +188,15 @@ def main() -> None:
     parser.add_argument("--fast", action="store_true", help="on a simulated clock, as fast as both can")
     parser.add_argument("--ticks", type=int, default=3600, help="of 1/60 s (default 3600)")
     parser.add_argument("--seed", type=int, default=1, help="of the network (default 1)")
-    parser.add_argument(
-        "--cheat", type=int, default=-1, metavar="TICK", help="change a bit in Python's world"
-    )
+    parser.add_argument("--cheat", type=int, metavar="TICK", help="change a bit in Python's world")
     parser.add_argument("--world", type=Path, help="folder of the exported world, if there is one already")
     options = parser.parse_args()
+    if options.ticks < 1:
+        parser.error(f"--ticks is {options.ticks}: give 1 or more")
+    if options.cheat is not None and not 0 <= options.cheat < options.ticks:
+        parser.error(f"--cheat is {options.cheat}: give a tick from 0 to {options.ticks - 1}")
+    if options.world is not None and not (options.world / "kernels" / "web.wasm").is_file():
+        parser.error(f"--world is {options.world}: give a folder that taichi-soft export --for web wrote")
     if shutil.which("node") is None:
         sys.exit("needs node: apt-get install nodejs")
     with tempfile.TemporaryDirectory() as scratch:
@@ -183,9 +204,12 @@ def main() -> None:
         if options.world is None:
             export(folder)
         asked = dict(ticks=options.ticks, seed=options.seed, is_fast=options.fast, cheat=options.cheat)
-        reports, counts = session(folder, **asked)
+        try:
+            reports, counts = session(folder, **asked)
+        except (ChildProcessError, TimeoutError) as error:
+            sys.exit(f"the game was not played to its end, for the reason above: {error}")
     print(", ".join(f"{counts[name]:,} {name}" for name in ("sent", "lost", "copied", "overtaken")))
-    for name, found in zip(("Python", "node"), reports, strict=True):
+    for name, found in zip(NAMES, reports, strict=True):
         print(
             f"{name}: {found['ticks']:,} ticks, {found['rollbacks']:,} rollbacks, the longest "
             f"{found['longest']} ticks; {found['remade']:,} ticks repeated, {found['ms']:.2f} ms each; "

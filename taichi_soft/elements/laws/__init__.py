@@ -162,8 +162,8 @@ def element_model(
 def default_law(material: AnyMaterial, strain: StrainName | None, flips: FlipsName | None) -> LawName:
     """Name of the law that a body has where none is named.
 
-    Neo-Hookean: no body froze by it, and every wreck came back (`taichi-soft drop-test --sweep`). The virial
-    one for options that only the thesis's laws have and for an `AnisotropicMaterial`; springs for a
+    Neo-Hookean: no body froze by it, and every wreck came back (`python -m lab drop-test --sweep`). The
+    virial one for options that only the thesis's laws have and for an `AnisotropicMaterial`; springs for a
     `SpringMaterial`.
     """
     if isinstance(material, SpringMaterial):

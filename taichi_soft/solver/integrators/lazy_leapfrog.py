@@ -5,6 +5,6 @@ from taichi_soft.core.runtime import ti
 
 @ti.func
 def lazy_leapfrog(x, v, a, h, kick):
-    """Position and velocity one substep later: velocity first, position with the new velocity."""
-    v_new = v + h * a
+    """Position after `h` [s] with the new velocity, which comes first. `kick` is a whole substep [s]."""
+    v_new = v + kick * a
     return x + h * v_new, v_new

@@ -25,7 +25,7 @@ from taichi_soft.elements.kernels.bonds import lane_pressure, store_block_pressu
 from taichi_soft.elements.kernels.edges import edge_force_of
 from taichi_soft.elements.kernels.elastic import store_block_forces, store_lane_forces
 from taichi_soft.elements.kernels.internal_forces import clear_forces
-from taichi_soft.solver.kernels.motion import JOLT, moved_particle
+from taichi_soft.solver.kernels.motion import JOLT, kick_time, moved_particle
 from taichi_soft.solver.kernels.vibration import damp_vibration, kept_vibration
 
 _FAILING, _DONE = 5, 6  # above the status of any body: the step is made again, or need not be
@@ -86,15 +86,10 @@ def gathered_force(state: ti.template(), p):
 
 
 @ti.func
-def _kick_of(state: ti.template(), body, h, s):
-    return ti.select(s == 0, 0.5 * (state.body_velocity_lag[body] + h), h)
-
-
-@ti.func
 def _move_phase(state: ti.template(), program: ti.template(), p, h, s):
     body = state.particle_body[p]
     if state.body_status[body] == ACTIVE:
-        kick = _kick_of(state, body, h, s)
+        kick = kick_time(state, program, body, h, s)
         force, gravity = gathered_force(state, p), gravity_on(state, body)
         x, v, a = moved_particle(state, program, p, force, gravity, h, kick)
         state.particle_position[p] = x
@@ -118,7 +113,7 @@ def _gather_phase(state: ti.template(), p, h, s, substeps):
 @ti.func
 def _damp_phase(state: ti.template(), program: ti.template(), body, h, s, substeps):
     if _is_damped_now(state, body, h, s, substeps):
-        damp_vibration(state, program, body, _kick_of(state, body, h, s), h, s, substeps)
+        damp_vibration(state, program, body, kick_time(state, program, body, h, s), h, s, substeps)
         clear_forces(state, body)
 
 

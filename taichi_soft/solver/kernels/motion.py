@@ -4,6 +4,7 @@ from taichi_soft.bodies.kernels.particles import gravity_on
 from taichi_soft.contact.distances.floor import resolve_floor
 from taichi_soft.core.constants import LANES, ROW_BITS
 from taichi_soft.core.runtime import ti
+from taichi_soft.core.types import Integrator
 
 JOLT = 1.0
 """By how much the forces of one substep may change a particle's velocity, over the speed of sound in its
@@ -13,6 +14,16 @@ cross the smallest tetrahedron."""
 PRESSED = 4.0
 """The same for a particle that something held in the last substep, over `JOLT`: most of its change is taken
 by what it presses against."""
+
+
+@ti.func
+def kick_time(state: ti.template(), program: ti.template(), body, h, s):
+    """How long forces act before the drift of substep `s` of `h` [s]: by leapfrog, the first ends the lag."""
+    kick = ti.cast(h, state.real)
+    if ti.static(program.integrator != Integrator.LAZY_LEAPFROG):  # whose velocities do not lag
+        if s == 0:
+            kick = 0.5 * (state.body_velocity_lag[body] + h)
+    return kick
 
 
 @ti.func

@@ -39,7 +39,7 @@ from taichi_soft.solver.kernels.drift import drift_body, has_drifted, is_clear
 from taichi_soft.solver.kernels.implicit_euler import implicit_substep, keeps_shape
 from taichi_soft.solver.kernels.jobs import OWNER, run_job
 from taichi_soft.solver.kernels.kick import kick_among_colliders
-from taichi_soft.solver.kernels.motion import move_body
+from taichi_soft.solver.kernels.motion import kick_time, move_body
 from taichi_soft.solver.kernels.vibration import damp_body, to_positions
 from taichi_soft.solver.step_fields import Job
 
@@ -83,7 +83,7 @@ def advance_body(state: ti.template(), program: ti.template(), body, now, drifts
         drifts: whether its particles drift in the kick, as nothing but the floor can be in the way.
     Returns: whether forces changed no velocity by too much at once (1); by implicit Euler always.
     """
-    kick = _kick_time(state, body, now)
+    kick = kick_time(state, program, body, now.h, now.s)
     felt = _felt_time(program, kick, now)
     blow_on(state, body, now.h)
     push_particles(state, body, _drive_time(program, now))
@@ -142,15 +142,6 @@ def _do_other_phase(state: ti.template(), program: ti.template(), island: ti.i32
 def each_body(state: ti.template(), program: ti.template(), island, job):
     """Have every body of an island make a phase, and wait for all."""
     run_job(state, program, do_phase, island, OWNER, job)
-
-
-@ti.func
-def _kick_time(state: ti.template(), body, job):
-    """For how long forces act before a substep's drift [s]. The first ends the lag of the velocities."""
-    kick = ti.cast(job.h, ti.f32)
-    if job.s == 0:
-        kick = 0.5 * (state.body_velocity_lag[body] + job.h)
-    return kick
 
 
 @ti.func

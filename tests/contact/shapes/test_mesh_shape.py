@@ -187,6 +187,7 @@ def test_cache_must_be_true_or_false():
         MeshShape(CUBE, cache="yes")
 
 
+@pytest.mark.soak
 def test_one_thread_gives_the_same_bits_as_all():
     script = """
 import sys

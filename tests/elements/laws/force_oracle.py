@@ -8,6 +8,7 @@ sigma times a third of the outward area vector of the face opposite to it.
 from itertools import combinations
 
 import numpy as np
+import pytest
 
 from taichi_soft import Material, TetMesh, box, sphere, torus
 
@@ -15,7 +16,12 @@ LAWS = ("virial", "face")
 STRAINS = ("linear", "exact")
 FLIPS = ("tolerant", "off", "recover")
 MODES = [(law, strain, flips) for law in LAWS for strain in STRAINS for flips in FLIPS]
-MODE_IDS = ["-".join(mode) for mode in MODES]
+SOAKS = [
+    *(("virial", "exact", flips) for flips in ("tolerant", "off")),
+    *(("face", "linear", flips) for flips in ("tolerant", "off")),
+    *(("face", "exact", flips) for flips in FLIPS),
+]
+"""Modes that `make test` leaves to `make test-all`: each of their choices is in another mode, too."""
 
 ONE_TET = TetMesh([[0.1, 0.0, 0.0], [1.2, 0.1, -0.1], [0.2, 0.9, 0.0], [0.3, 0.2, 1.1]], [[0, 1, 2, 3]])
 MESHES = {
@@ -27,6 +33,14 @@ MESHES = {
 
 # The face opposite to each vertex, wound so that its right-hand normal points out of an upright tetrahedron.
 OPPOSITE_FACES = ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1))
+
+
+def params_of(modes):
+    """Parameters of a test, one for each mode."""
+    return [
+        pytest.param(*mode, id="-".join(mode), marks=pytest.mark.soak if mode in SOAKS else ())
+        for mode in modes
+    ]
 
 
 def lame(young, poisson):

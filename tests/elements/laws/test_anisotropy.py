@@ -20,6 +20,8 @@ from taichi_soft import (
 )
 from taichi_soft.elements.laws import element_model
 
+pytestmark = pytest.mark.soak
+
 STVK = ("st_venant_kirchhoff", None, None)
 # "face" makes the same forces of a stress as "virial" (test_stress_to_forces), so one of it will do.
 MODES = [*(mode for mode in oracle.MODES if mode[0] == "virial"), ("face", "exact", "recover"), STVK]

@@ -18,9 +18,9 @@ MATERIAL = Material(1e6, 0.3, 1000.0, 50.0)
     ("law", "strain", "flips"),
     [
         ("virial", "linear", "tolerant"),
-        ("virial", "exact", "off"),
-        ("face", "linear", "recover"),
-        ("face", "exact", "recover"),
+        pytest.param("virial", "exact", "off", marks=pytest.mark.soak),
+        pytest.param("face", "linear", "recover", marks=pytest.mark.soak),
+        pytest.param("face", "exact", "recover", marks=pytest.mark.soak),
     ],
 )
 @settings(max_examples=8)

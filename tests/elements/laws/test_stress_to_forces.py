@@ -10,7 +10,7 @@ from taichi_soft import Material, box, cylinder, internal_forces
 
 MESHES = oracle.MESHES
 UPRIGHT = pytest.mark.parametrize("strain", oracle.STRAINS)
-EACH_MODE = pytest.mark.parametrize(("law", "strain", "flips"), oracle.MODES, ids=oracle.MODE_IDS)
+EACH_MODE = pytest.mark.parametrize(("law", "strain", "flips"), oracle.params_of(oracle.MODES))
 seeds = st.integers(0, 2**32 - 1)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from taichi_soft.lab.drop_test import distances
+from lab.drop_test import distances
 
 POINTS = np.random.default_rng(3).uniform(-2.0, 2.0, (400, 3))
 SIZE = np.array([1.0, 2.0, 0.5])

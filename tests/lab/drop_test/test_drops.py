@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from taichi_soft.lab.drop_test import Summary, make_case, run_cases
-from taichi_soft.lab.drop_test.case import FASTEST, LARGEST, MOST_SAG, SHAPES, SMALLEST, SOFTEST, STIFFEST
-from taichi_soft.lab.drop_test.trial import PER_SHAPE, batches
+from lab.drop_test import Summary, make_case, run_cases
+from lab.drop_test.case import FASTEST, LARGEST, MOST_SAG, SHAPES, SMALLEST, SOFTEST, STIFFEST
+from lab.drop_test.trial import PER_SHAPE, batches
 
 SEED, COUNT = 0, 30
 

@@ -7,13 +7,13 @@ from math import inf
 import numpy as np
 import pytest
 
+from lab.drop_test.robustness import GROUPS, Verdict, choose_cells, law_variants, run_cell
+from lab.drop_test.robustness.cells import AXES, USUAL
+from lab.drop_test.robustness.verdict import Ending, judge
+from lab.drop_test.robustness.wrecks import WRECKS, distance_from_rest, wrecked
 from taichi_soft import LAWS, sphere
 from taichi_soft.core.errors import OptionError
 from taichi_soft.core.math.rotations import matrix_of
-from taichi_soft.lab.drop_test.robustness import GROUPS, Verdict, choose_cells, law_variants, run_cell
-from taichi_soft.lab.drop_test.robustness.cells import AXES, USUAL
-from taichi_soft.lab.drop_test.robustness.verdict import Ending, judge
-from taichi_soft.lab.drop_test.robustness.wrecks import WRECKS, distance_from_rest, wrecked
 
 SOUND = Ending(tets=40, failure=None, is_finite=True, flipped=0, speed=6.0, fastest=6.3)
 PLAIN = {

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from taichi_soft.lab.drop_test.robustness import foreign_meshes
-from taichi_soft.lab.drop_test.robustness.foreign_meshes import FOREIGN_MESHES, flat_body, sliver_lattice
-from taichi_soft.lab.drop_test.robustness.own_meshes import OWN_MESHES
+from lab.drop_test.robustness import foreign_meshes
+from lab.drop_test.robustness.foreign_meshes import FOREIGN_MESHES, flat_body, sliver_lattice
+from lab.drop_test.robustness.own_meshes import OWN_MESHES
 
 
 @pytest.fixture(scope="module")

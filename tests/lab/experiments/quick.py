@@ -7,13 +7,13 @@ from contextlib import closing
 from functools import cache
 from pathlib import Path
 
-from taichi_soft.lab.experiments import EXPERIMENTS, Effort, Result, Results, section_of
-from taichi_soft.lab.sweep import Outcome, Store, origin
+from lab.experiments import EXPERIMENTS, Effort, Result, Results, section_of
+from lab.sweep import Outcome, Store, origin
 
 
 @cache
 def quick_folder():
-    """Where `taichi-soft report --quick --out` finds what these tests measured."""
+    """Where `python -m lab report --quick --out` finds what these tests measured."""
     kept = tempfile.TemporaryDirectory(prefix="taichi-soft-quick-")
     quick_folder.kept = kept  # until this process ends
     return Path(kept.name)

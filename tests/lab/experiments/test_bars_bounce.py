@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from quick import quick_results
 
-from taichi_soft.lab.experiments import EXPERIMENTS, Results, Verdict, section_of
-from taichi_soft.lab.experiments.bars_bounce import DT, bars_mesh, bending, flight_of, frequency_of
+from lab.experiments import EXPERIMENTS, Results, Verdict, section_of
+from lab.experiments.bars_bounce import DT, bars_mesh, bending, flight_of, frequency_of
 
 EXPERIMENT = EXPERIMENTS["fig-6.2"]
 

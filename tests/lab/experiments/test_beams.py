@@ -5,8 +5,8 @@ from copy import deepcopy
 import pytest
 from quick import quick_results
 
+from lab.experiments import EXPERIMENTS, Results, Verdict, section_of
 from taichi_soft import LAWS
-from taichi_soft.lab.experiments import EXPERIMENTS, Results, Verdict, section_of
 
 EXPERIMENT = EXPERIMENTS["beams"]
 SOLID = ("virial", "face", "st_venant_kirchhoff", "neo_hookean")

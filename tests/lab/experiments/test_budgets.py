@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from quick import quick_results
 
+from lab.experiments import Result, Results, Verdict, section_of
+from lab.experiments.dynamics import ENERGY_BUDGET, MOMENTUM_BUDGET
+from lab.experiments.dynamics.energy_budget import _damping_power, _energy_density
 from taichi_soft import box
-from taichi_soft.lab.experiments import Result, Results, Verdict, section_of
-from taichi_soft.lab.experiments.dynamics import ENERGY_BUDGET, MOMENTUM_BUDGET
-from taichi_soft.lab.experiments.dynamics.energy_budget import _damping_power, _energy_density
 
 
 @pytest.mark.parametrize("law", ["st_venant_kirchhoff", "neo_hookean"])

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from quick import altered, findings, quick_results, verdicts
 
-from taichi_soft.lab.experiments import Verdict
-from taichi_soft.lab.experiments.oscillators import run_oscillators
+from lab.experiments import Verdict
+from lab.experiments.oscillators import run_oscillators
 
 EULER = ("explicit_euler", "implicit_euler")
 

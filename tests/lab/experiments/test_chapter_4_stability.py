@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from quick import altered, findings, quick_results, verdicts
 
+from lab.experiments import Verdict
+from lab.experiments.anisotropy import mesh_of
+from lab.experiments.law_stability import ShakenBody, vibration
 from taichi_soft import Material, box, load_mesh
 from taichi_soft.core.package_data import ASSETS
-from taichi_soft.lab.experiments import Verdict
-from taichi_soft.lab.experiments.anisotropy import mesh_of
-from taichi_soft.lab.experiments.law_stability import ShakenBody, vibration
 
 
 def ring_and_fit(mesh, e):

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from quick import altered, findings, quick_results, verdicts
 
+from lab.experiments import Verdict
+from lab.experiments.anisotropy import mesh_of
+from lab.experiments.directional_stiffness import directions
 from taichi_soft import Material, voronoi_graph
-from taichi_soft.lab.experiments import Verdict
-from taichi_soft.lab.experiments.anisotropy import mesh_of
-from taichi_soft.lab.experiments.directional_stiffness import directions
 from taichi_soft.meshing import EdgeRings
 
 SHARE = Material(1.0, 0.25, 1.0)

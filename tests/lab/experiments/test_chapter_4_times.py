@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from quick import altered, quick_results, verdicts
 
-from taichi_soft.lab.experiments import Effort, Verdict
-from taichi_soft.lab.experiments.cmpm_drop import FRAME, FRAMES
-from taichi_soft.lab.experiments.implicit_step import points
+from lab.experiments import Effort, Verdict
+from lab.experiments.cmpm_drop import FRAME, FRAMES
+from lab.experiments.implicit_step import points
 
 
 def test_the_best_fitting_plane_is_judged_by_time_step_and_growth():

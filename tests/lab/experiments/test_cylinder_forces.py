@@ -7,8 +7,8 @@ import pytest
 from linear_oracle import force_on_top
 from quick import quick_results
 
+from lab.experiments import EXPERIMENTS, Results, Verdict, section_of
 from taichi_soft import cylinder
-from taichi_soft.lab.experiments import EXPERIMENTS, Results, Verdict, section_of
 
 EXPERIMENT = EXPERIMENTS["fig-6.4"]
 

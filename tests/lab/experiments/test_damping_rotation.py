@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from quick import quick_results
 
-from taichi_soft.lab.experiments import EXPERIMENTS, Results, Verdict, section_of
-from taichi_soft.lab.experiments.damping_rotation import body_mesh, rate
+from lab.experiments import EXPERIMENTS, Results, Verdict, section_of
+from lab.experiments.damping_rotation import body_mesh, rate
 
 EXPERIMENT = EXPERIMENTS["damping-rotation"]
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from quick import quick_results
 
-from taichi_soft.lab.experiments import EXPERIMENTS, Result, Results, Verdict, section_of
-from taichi_soft.lab.experiments.density_bounce import DT, block, density_of, side
+from lab.experiments import EXPERIMENTS, Result, Results, Verdict, section_of
+from lab.experiments.density_bounce import DT, block, density_of, side
 
 EXPERIMENT = EXPERIMENTS["density-bounce"]
 

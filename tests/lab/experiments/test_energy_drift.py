@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from quick import quick_results
 
+from lab.experiments import EXPERIMENTS, Results, Verdict, section_of
+from lab.experiments.energy_drift import damping_ratio, growth
 from taichi_soft import Material, box, internal_forces
-from taichi_soft.lab.experiments import EXPERIMENTS, Results, Verdict, section_of
-from taichi_soft.lab.experiments.energy_drift import damping_ratio, growth
 
 EXPERIMENT = EXPERIMENTS["energy-drift"]
 

@@ -4,7 +4,7 @@ from copy import deepcopy
 
 from quick import quick_results
 
-from taichi_soft.lab.experiments import EXPERIMENTS, Results, Verdict, section_of
+from lab.experiments import EXPERIMENTS, Results, Verdict, section_of
 
 EXPERIMENT = EXPERIMENTS["finite-elements"]
 SOLID = ("virial", "face", "st_venant_kirchhoff", "neo_hookean")

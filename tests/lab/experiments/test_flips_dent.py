@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from quick import quick_results
 
+from lab.experiments import EXPERIMENTS, Results, Verdict, section_of
 from taichi_soft import load_mesh
 from taichi_soft.core.package_data import ASSETS
-from taichi_soft.lab.experiments import EXPERIMENTS, Results, Verdict, section_of
 
 EXPERIMENT = EXPERIMENTS["flips-dent"]
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from quick import quick_results
 
+from lab.experiments import Result, Results, Verdict, section_of
+from lab.experiments.dynamics import HERTZ
+from lab.experiments.dynamics.contact_elements import contact_forces
+from lab.experiments.dynamics.pressed_sphere import DEPTHS, RADIUS, graded_sphere
 from taichi_soft import Material, box
-from taichi_soft.lab.experiments import Result, Results, Verdict, section_of
-from taichi_soft.lab.experiments.dynamics import HERTZ
-from taichi_soft.lab.experiments.dynamics.contact_elements import contact_forces
-from taichi_soft.lab.experiments.dynamics.pressed_sphere import DEPTHS, RADIUS, graded_sphere
 
 HERTZ_FORCES = 4 / 3 * 1e6 / (1 - 0.3**2) * np.sqrt(RADIUS) * (RADIUS * np.array(DEPTHS)) ** 1.5
 

@@ -2,9 +2,9 @@
 
 import pytest
 
-from taichi_soft.lab.experiments import EXPERIMENTS, Finding, Results, Section, Verdict
-from taichi_soft.lab.experiments.judgement import judged_but_for
-from taichi_soft.lab.report.judgements import judge
+from lab.experiments import EXPERIMENTS, Finding, Results, Section, Verdict
+from lab.experiments.judgement import judged_but_for
+from lab.report.judgements import judge
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 
 from quick import quick_results
 
-from taichi_soft.lab.experiments import EXPERIMENTS, Effort, Result, Results, Verdict, section_of
+from lab.experiments import EXPERIMENTS, Effort, Result, Results, Verdict, section_of
 
 
 def test_leapfrog_comes_back_and_the_euler_methods_do_not():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from quick import quick_results
 
-from taichi_soft.lab.experiments import EXPERIMENTS, Result, Results, Verdict, section_of
+from lab.experiments import EXPERIMENTS, Result, Results, Verdict, section_of
 
 EXPERIMENT = EXPERIMENTS["linear-strain"]
 

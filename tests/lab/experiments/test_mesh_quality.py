@@ -7,8 +7,8 @@ import pytest
 from linear_motion import quadratic_form
 from quick import quick_results
 
-from taichi_soft.lab.experiments import EXPERIMENTS, Results, Verdict, section_of
-from taichi_soft.lab.experiments.mesh_quality import cubes, spoilt_cube
+from lab.experiments import EXPERIMENTS, Results, Verdict, section_of
+from lab.experiments.mesh_quality import cubes, spoilt_cube
 
 EXPERIMENT = EXPERIMENTS["mesh-quality"]
 

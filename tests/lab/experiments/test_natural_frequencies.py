@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from quick import quick_results
 
-from taichi_soft import Material, box
-from taichi_soft.lab.experiments import Result, Results, Verdict, section_of
-from taichi_soft.lab.experiments.dynamics import FREQUENCIES
-from taichi_soft.lab.experiments.dynamics.beam_theory import (
+from lab.experiments import Result, Results, Verdict, section_of
+from lab.experiments.dynamics import FREQUENCIES
+from lab.experiments.dynamics.beam_theory import (
     Beam,
     euler_bernoulli_frequency,
     timoshenko_frequency,
 )
-from taichi_soft.lab.experiments.dynamics.vibration_modes import bending_frequency
+from lab.experiments.dynamics.vibration_modes import bending_frequency
+from taichi_soft import Material, box
 
 BEAM = Beam(2.0, 0.3, 0.2, 1e6, 0.3, 1000.0)
 

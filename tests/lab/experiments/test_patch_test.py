@@ -3,8 +3,8 @@
 import numpy as np
 from quick import quick_results
 
-from taichi_soft.lab.experiments import EXPERIMENTS, Result, Results, Verdict, section_of
-from taichi_soft.lab.experiments.patch_test import TETRAHEDRAL
+from lab.experiments import EXPERIMENTS, Result, Results, Verdict, section_of
+from lab.experiments.patch_test import TETRAHEDRAL
 
 EXPERIMENT = EXPERIMENTS["patch-test"]
 

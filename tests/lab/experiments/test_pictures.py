@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from lab.experiments.pictures import picture
 from taichi_soft import OptionError, box
-from taichi_soft.lab.experiments.pictures import GAP, frames_side_by_side, picture
 
 SIZE = (160, 120)
 
@@ -85,18 +85,3 @@ def test_what_cannot_be_drawn_is_refused(cube):
     ):
         with pytest.raises(OptionError, match=said):
             picture(*arguments)
-
-
-def test_pictures_side_by_side_are_whole():
-    rng = np.random.default_rng(2)
-    images = [rng.integers(0, 256, (h, w, 3), dtype=np.uint8) for h, w in ((20, 30), (26, 11), (5, 7))]
-    strip = frames_side_by_side(images)
-    assert strip.shape == (26, 30 + 11 + 7 + 2 * GAP, 3)
-    left = 0
-    for image in images:
-        height, width = image.shape[:2]
-        np.testing.assert_array_equal(strip[:height, left : left + width], image)
-        assert (strip[height:, left : left + width] == 255).all()
-        left += width + GAP
-    with pytest.raises(OptionError, match="no picture"):
-        frames_side_by_side([])

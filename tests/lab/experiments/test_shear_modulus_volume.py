@@ -3,7 +3,7 @@
 import pytest
 from quick import quick_results
 
-from taichi_soft.lab.experiments import EXPERIMENTS, Effort, Result, Results, Verdict, section_of
+from lab.experiments import EXPERIMENTS, Effort, Result, Results, Verdict, section_of
 
 EXPERIMENT = EXPERIMENTS["shear-modulus-volume"]
 

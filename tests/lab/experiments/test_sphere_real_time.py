@@ -5,8 +5,8 @@ import copy
 import pytest
 from quick import quick_results
 
-from taichi_soft.lab.experiments import EXPERIMENTS, Results, Verdict, section_of
-from taichi_soft.lab.experiments.sphere_real_time import nanoseconds, real_time_factor
+from lab.experiments import EXPERIMENTS, Results, Verdict, section_of
+from lab.experiments.sphere_real_time import nanoseconds, real_time_factor
 
 EXPERIMENT = EXPERIMENTS["sphere-real-time"]
 

@@ -7,9 +7,9 @@ import pytest
 from linear_motion import quadratic_form
 from quick import quick_results
 
-from taichi_soft.lab.experiments import EXPERIMENTS, Result, Results, Verdict, section_of
-from taichi_soft.lab.experiments.sphere_outcomes import outcomes, window
-from taichi_soft.lab.experiments.stability_map import sphere_mesh
+from lab.experiments import EXPERIMENTS, Result, Results, Verdict, section_of
+from lab.experiments.sphere_outcomes import outcomes, window
+from lab.experiments.stability_map import sphere_mesh
 
 EXPERIMENT = EXPERIMENTS["stability-map"]
 

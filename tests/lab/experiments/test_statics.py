@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from lab.experiments.end_loads import free_ends, held_ends, theory
+from lab.experiments.irregular_block import irregular_block
+from lab.experiments.linear_elasticity import FiniteElements
+from lab.experiments.statics import Loading, NoEquilibriumError, StaticBody
 from taichi_soft import Material, edges_as_particles, force_gradient
 from taichi_soft.elements.laws.springs import spring_bonds
-from taichi_soft.lab.experiments.end_loads import free_ends, held_ends, theory
-from taichi_soft.lab.experiments.irregular_block import irregular_block
-from taichi_soft.lab.experiments.linear_elasticity import FiniteElements
-from taichi_soft.lab.experiments.statics import Loading, NoEquilibriumError, StaticBody
 
 MATERIAL = Material(young=1e6, poisson=0.3, density=1000.0)
 BLOCK = irregular_block(2.0, 1.0, 2)

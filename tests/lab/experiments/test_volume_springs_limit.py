@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from lab.experiments import EXPERIMENTS, Effort, Result, Results, Verdict, section_of
+from lab.experiments.irregular import cube
 from taichi_soft import Material, internal_forces
-from taichi_soft.lab.experiments import EXPERIMENTS, Effort, Result, Results, Verdict, section_of
-from taichi_soft.lab.experiments.irregular import cube
 
 EXPERIMENT = EXPERIMENTS["volume-springs-limit"]
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from quick import quick_results
 
-from taichi_soft.lab.experiments import EXPERIMENTS, Results, Verdict, section_of
-from taichi_soft.lab.experiments.irregular import cube
+from lab.experiments import EXPERIMENTS, Results, Verdict, section_of
+from lab.experiments.irregular import cube
 
 EXPERIMENT = EXPERIMENTS["fig-5.1-5.2"]
 

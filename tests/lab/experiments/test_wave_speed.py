@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from quick import quick_results
 
-from taichi_soft.lab.experiments import Result, Results, Verdict, section_of
-from taichi_soft.lab.experiments.dynamics import WAVE_SPEED
+from lab.experiments import Result, Results, Verdict, section_of
+from lab.experiments.dynamics import WAVE_SPEED
 
 SPEED = np.sqrt(1e6 / 1000)
 

@@ -1,4 +1,4 @@
-"""`taichi-soft report --quick` as a whole, with the points that the tests beside this one have measured."""
+"""`python -m lab report --quick` as a whole, with the points that the tests beside this one have measured."""
 
 import csv
 import subprocess
@@ -7,7 +7,7 @@ import sys
 import pytest
 from quick import quick_folder
 
-from taichi_soft.lab.experiments import CLAIMS, EXPERIMENTS
+from lab.experiments import CLAIMS, EXPERIMENTS
 
 TIMED = {claim for each in EXPERIMENTS.values() if each.is_timing for claim in each.claims}
 """Judged by a clock, which other tests disturb."""
@@ -27,7 +27,7 @@ PARTLY = {
 
 @pytest.fixture(scope="module")
 def report():
-    command = [sys.executable, "-m", "taichi_soft", "report", "--quick", "--arch", "cpu", "--workers", "1"]
+    command = [sys.executable, "-m", "lab", "report", "--quick", "--arch", "cpu", "--workers", "1"]
     done = subprocess.run([*command, "--out", quick_folder()], capture_output=True, text=True, timeout=1200)
     assert done.returncode == 0, done.stdout + done.stderr
     return quick_folder()

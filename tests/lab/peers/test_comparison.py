@@ -6,15 +6,14 @@ import cv2
 import numpy as np
 import pytest
 
+from lab import peers
+from lab.cli.peers import peers as film_peers
+from lab.peers import Course, Drop, Entry, compare, comparison, measure
+from lab.peers.course import RATE, Simulation, record
+from lab.peers.drop import GRAVITY
+from lab.peers.reference import Reference
+from lab.peers.wall import captions, film_wall
 from taichi_soft import OptionError, StateError, VideoError, box, sphere
-from taichi_soft.cli.demo import demo
-from taichi_soft.cli.peers import film_peers
-from taichi_soft.lab import peers
-from taichi_soft.lab.peers import Course, Drop, Entry, compare, comparison, measure
-from taichi_soft.lab.peers.course import RATE, Simulation, record
-from taichi_soft.lab.peers.drop import GRAVITY
-from taichi_soft.lab.peers.reference import Reference
-from taichi_soft.lab.peers.wall import captions, film_wall
 from taichi_soft.render import VideoWriter
 
 SMALL = Drop(mesh=sphere(0.5, 2), height=0.4, seconds=0.8)
@@ -153,9 +152,9 @@ def test_the_command_names_what_is_missing_and_writes_the_film(monkeypatch, caps
     monkeypatch.setattr(peers, "missing_peers", lambda: ["mujoco", "newton"])
     monkeypatch.setattr(peers, "compare", lambda drop, show: entries)
     monkeypatch.setattr(peers, "Drop", lambda: SMALL)
-    film_peers(tmp_path / "w.mp4", 0.5, 10.0, (320, 160), "cpu", None)
+    film_peers(tmp_path / "w.mp4", 0.5, 10.0, "320x160", arch="cpu")
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0] == "not installed here: mujoco, newton: pip install 'taichi-soft[peers]'"
+    assert lines[0] == "not installed here: mujoco, newton: pip install -e '.[peers]'"
     assert lines[1].endswith("w.mp4: 5 frames, 0.5 s")
     assert lines[2].startswith("taichi-soft; 1.0 ms")
     assert Path(tmp_path / "w.mp4").stat().st_size > 0
@@ -169,9 +168,4 @@ def test_a_film_that_cannot_be_written_is_refused_before_anything_is_simulated(
 ):
     monkeypatch.setattr(peers, "compare", lambda *_: pytest.fail("simulated"))
     with pytest.raises(error):
-        film_peers(tmp_path / name, seconds, 10.0, (320, 160), "cpu", None)
-
-
-def test_peers_are_refused_for_other_demos():
-    with pytest.raises(OptionError, match="--peers belongs to the demo compare"):
-        demo("bounce", peers=True)
+        film_peers(tmp_path / name, seconds, 10.0, "320x160", arch="cpu")

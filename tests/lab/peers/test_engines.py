@@ -6,12 +6,12 @@ from functools import cache
 import numpy as np
 import pytest
 
+from lab.extras import how_to_install, missing_packages
+from lab.peers import PEERS, Drop, measure
+from lab.peers.course import RATE
+from lab.peers.ours import simulate
+from lab.peers.reference import simulate_reference
 from taichi_soft import sphere
-from taichi_soft.core.extras import missing_packages
-from taichi_soft.lab.peers import PEERS, Drop, measure
-from taichi_soft.lab.peers.course import RATE
-from taichi_soft.lab.peers.ours import simulate
-from taichi_soft.lab.peers.reference import simulate_reference
 
 DROP = Drop(mesh=sphere(0.5, 2), height=0.4, seconds=0.8)
 TOUCH = np.sqrt(2 * DROP.height / 9.81)
@@ -33,7 +33,7 @@ def course_of(name):
 def course(request):
     module = MODULES.get(request.param)
     if module and missing_packages("peers", module):
-        pytest.skip(f"needs {module}: pip install 'taichi-soft[peers]'")
+        pytest.skip(f"needs {module}: {how_to_install('peers')}")
     return course_of(request.param)
 
 

@@ -1,12 +1,11 @@
 """Experiments that cost nothing, and where they are computed."""
 
 import sys
-from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
 
-from taichi_soft.lab.report import run
+from lab.report import run
 
 sys.path.insert(0, str(Path(__file__).parent))  # for `fakes`; worker processes take it over
 
@@ -20,22 +19,15 @@ def measured(tmp_path, monkeypatch):
     return lambda: (log.read_text().split(), log.write_text(""))[0]
 
 
-class Here:
-    """Computes in this process."""
-
-    def is_ready(self):
-        return True
-
-    def compute(self, task, time_limit):
+def compute_here(tasks, *, workers, arch, time_limit):
+    """As `compute_all`, in this process."""
+    for task in tasks:
         try:
-            return run.Outcome(task.function(task.point))
+            yield task, run.Outcome(task.function(task.point))
         except ValueError as error:
-            return run.Outcome(None, str(error))
-
-    def stop(self):
-        pass
+            yield task, run.Outcome(None, str(error))
 
 
 @pytest.fixture
 def here(monkeypatch):
-    monkeypatch.setattr(run, "local_workers", lambda workers, arch: nullcontext([Here()]))
+    monkeypatch.setattr(run, "compute_all", compute_here)

@@ -3,7 +3,7 @@
 import os
 from pathlib import Path
 
-from taichi_soft.lab.experiments import Effort, Experiment, Finding, Section, Table, Verdict
+from lab.experiments import Effort, Experiment, Finding, Section, Table, Verdict
 
 
 def points(effort):

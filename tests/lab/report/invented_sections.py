@@ -3,7 +3,7 @@ points that failed."""
 
 import numpy as np
 
-from taichi_soft.lab.experiments import (
+from lab.experiments import (
     CLAIMS,
     Experiment,
     Finding,

@@ -2,8 +2,8 @@
 
 import pytest
 
-from taichi_soft.lab.experiments import EXPERIMENTS, Result, Results, Section
-from taichi_soft.lab.report.law_checks import law_table
+from lab.experiments import EXPERIMENTS, Result, Results, Section
+from lab.report.law_checks import law_table
 
 NOTHING = Section((), ())
 

@@ -15,8 +15,7 @@ import invented_sections as invented
 import numpy as np
 import pytest
 
-from taichi_soft import OptionError
-from taichi_soft.lab.experiments import (
+from lab.experiments import (
     CLAIMS,
     Effort,
     Finding,
@@ -27,10 +26,11 @@ from taichi_soft.lab.experiments import (
     Table,
     Verdict,
 )
-from taichi_soft.lab.report.markdown import escaped
-from taichi_soft.lab.report.page import write_report
-from taichi_soft.lab.report.plots import png_of
-from taichi_soft.lab.report.wording import duration, legible, readable
+from lab.report.markdown import escaped
+from lab.report.page import write_report
+from lab.report.plots import png_of
+from lab.report.wording import duration, legible, readable
+from taichi_soft import OptionError
 
 VOID = {"meta", "img", "br", "hr", "link", "input"}
 
@@ -82,7 +82,7 @@ def written(tmp_path_factory):
     path = write_report(
         invented.INVENTED,
         directory,
-        f"taichi-soft report --out '{invented.HOSTILE}'",
+        f"python -m lab report --out '{invented.HOSTILE}'",
         Effort.QUICK,
         {"machine": "abacus & sons", invented.HOSTILE: invented.HOSTILE},
     )
@@ -434,7 +434,7 @@ def test_a_file_where_the_directory_should_be_is_refused(tmp_path):
 @pytest.mark.parametrize("name", ["jinja2", "matplotlib"])
 def test_a_missing_package_is_named_with_its_extra(name, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, name, None)
-    with pytest.raises(OptionError, match=rf"needs {name}, .*'taichi-soft\[report\]'"):
+    with pytest.raises(OptionError, match=rf"needs {name}, .*pip install -e '\.\[lab\]'"):
         write_report([], tmp_path / "new", "c", Effort.QUICK, {})
     assert not (tmp_path / "new").exists()
 

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from taichi_soft.lab.experiments import CLAIMS, EXPERIMENTS, Effort, Result, Results, Verdict, section_of
-from taichi_soft.lab.report.markdown import escaped
-from taichi_soft.lab.report.wording import legible
+from lab.experiments import CLAIMS, EXPERIMENTS, Effort, Result, Results, Verdict, section_of
+from lab.report.markdown import escaped
+from lab.report.wording import legible
 
 ROOT = Path(__file__).resolve().parents[3]
 REPORT = ROOT / "docs" / "report"

@@ -6,11 +6,11 @@ import sys
 import pytest
 from rich.console import Console
 
+from lab.drop_test.robustness import Verdict, choose_cells
+from lab.experiments import Result
+from lab.report import robustness
+from lab.sweep import Store
 from taichi_soft.core.errors import OptionError
-from taichi_soft.lab.drop_test.robustness import Verdict, choose_cells
-from taichi_soft.lab.experiments import Result
-from taichi_soft.lab.report import robustness
-from taichi_soft.lab.sweep import Store
 
 VERDICTS = ("ok", "frozen", "inverted", "too slow")
 
@@ -40,7 +40,7 @@ def sweep(folder, cells, console):
 
 
 def page(rows, path):
-    robustness.write_page(rows, path, "taichi-soft drop-test --sweep", "cpu")
+    robustness.write_page(rows, path, "python -m lab drop-test --sweep", "cpu")
     return path.read_text()
 
 

@@ -7,10 +7,10 @@ import pytest
 from fakes import CARELESS, ROUGH, SQUARES
 from rich.console import Console
 
-from taichi_soft.core.errors import OptionError, SweepError
-from taichi_soft.lab.experiments import EXPERIMENTS, Effort, Verdict
-from taichi_soft.lab.report import run
-from taichi_soft.lab.sweep import Store
+from lab.experiments import EXPERIMENTS, Effort, Verdict
+from lab.report import run
+from lab.sweep import Store, SweepError
+from taichi_soft.core.errors import OptionError
 
 
 @pytest.fixture

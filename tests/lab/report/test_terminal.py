@@ -6,9 +6,9 @@ import invented_sections as invented
 import pytest
 from rich.console import Console
 
-from taichi_soft.lab.experiments import CLAIMS
-from taichi_soft.lab.report.judgements import judge
-from taichi_soft.lab.report.terminal import print_section, print_verdicts
+from lab.experiments import CLAIMS
+from lab.report.judgements import judge
+from lab.report.terminal import print_section, print_verdicts
 
 
 def printed(show, *arguments, **options):

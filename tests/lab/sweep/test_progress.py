@@ -5,7 +5,7 @@ import io
 import pytest
 from rich.console import Console
 
-from taichi_soft.lab.sweep import progress, show_progress
+from lab.sweep import progress, show_progress
 
 
 def shown(console):

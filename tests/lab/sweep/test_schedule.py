@@ -1,50 +1,27 @@
-"""Who computes what next, with workers that only pretend."""
+"""Which point is computed next, and when processes start and end."""
 
-import threading
+import os
 from contextlib import closing
 
 import pytest
+from acts import act, root
 
-from taichi_soft.core.errors import SweepError
-from taichi_soft.lab.sweep import Outcome, Task, compute_all, schedule
-
-
-class Pretender:
-    """Computes `lives` points, then its process is lost for good."""
-
-    def __init__(self, lives=100):
-        self.lives, self.groups = lives, []
-        self.stopped = threading.Event()
-
-    def is_ready(self):
-        return self.lives > 0
-
-    def compute(self, task, time_limit):
-        self.lives -= 1
-        self.groups.append(task.group)
-        if task.point == {"wait": True}:
-            self.stopped.wait()
-        if task.point == {"bug": True}:
-            raise ZeroDivisionError
-        return Outcome({}, seconds=time_limit)
-
-    def stop(self):
-        self.stopped.set()
+from lab.sweep import Outcome, Task, compute_all, schedule
 
 
-def tasks(groups):
-    return [Task(group, dict, {"x": x}) for x, group in enumerate(groups)]
+def tasks(groups, function=root, **point):
+    return [Task(group, function, {"x": x, **point}) for x, group in enumerate(groups)]
 
 
 def test_one_worker_ends_a_group_before_it_begins_another():
-    worker = Pretender()
-    assert len(list(compute_all(tasks("abcabcaab"), [worker], 2.0))) == 9
-    assert "".join(worker.groups) == "aaaabbbcc"
+    done = [task for task, _ in compute_all(tasks("abcabcaab"), workers=1)]
+    assert "".join(task.group for task in done) == "aaaabbbcc"
+    assert [task.point["x"] for task in done] == [0, 3, 6, 7, 1, 4, 8, 2, 5]
 
 
 def test_workers_keep_to_their_groups_then_begin_others_then_help_where_most_is_left():
-    waiting = schedule._Waiting(tasks("abbbbcccccc"))
-    known = [[], [], []]
+    waiting = schedule.Waiting(tasks("abbbbcccccc"))
+    known = [set(), set(), set()]
     taken = [[waiting.take(each) for each in known] for _ in range(4)]
     assert taken[-1].pop() is None
     groups = [[task.group for task in row] for row in taken]
@@ -52,39 +29,32 @@ def test_workers_keep_to_their_groups_then_begin_others_then_help_where_most_is_
     assert sorted(task.point["x"] for row in taken for task in row) == list(range(11))
 
 
-def test_nothing_to_compute():
-    assert list(compute_all([], [Pretender()])) == []
+def test_nothing_to_compute_starts_no_process(monkeypatch):
+    monkeypatch.setattr(schedule.Worker, "begin", lambda *_: pytest.fail("it was given a point"))
+    assert list(compute_all([])) == []
 
 
-def test_where_a_worker_is_lost_another_computes_the_rest(monkeypatch):
-    monkeypatch.setattr(schedule, "PATIENCE", 0.3)
-    lost, sound = Pretender(lives=1), Pretender()
-    assert len(list(compute_all(tasks("aabb"), [lost, sound]))) == 4
-    assert len(lost.groups) <= 1
+def test_numbers_are_the_same_for_any_number_of_workers():
+    points = tasks("abababababab")
+    found = [{t.point["x"]: o.numbers for t, o in compute_all(points, workers=n)} for n in (1, 3)]
+    assert found[0] == found[1] == {x: {"root": x**0.5, "kinds": [True, "a", [1e-300]]} for x in range(12)}
 
 
-def test_where_no_worker_is_left_the_sweep_says_how_many_points_are_missing(monkeypatch):
-    monkeypatch.setattr(schedule, "PATIENCE", 0.3)
-    done = []
-    with pytest.raises(SweepError, match="no worker is left for 3 points"):
-        done.extend(compute_all(tasks("aaaaa"), [Pretender(lives=1), Pretender(lives=1)]))
-    with pytest.raises(SweepError, match="no worker is left for 1 points"):
-        done.extend(compute_all([Task("a", dict, {}, is_alone=True)], [Pretender(lives=0)]))
+def test_who_looks_no_further_ends_the_process_and_what_it_computes():
+    points = [Task("a", act, {"x": x, "do": "sleep", "seconds": 600 * x}) for x in range(2)]
+    with closing(compute_all(points, workers=1)) as done:
+        _, outcome = next(done)
+        os.kill(outcome.numbers["pid"], 0)
+    with pytest.raises(ProcessLookupError):
+        os.kill(outcome.numbers["pid"], 0)
 
 
-def test_what_runs_alone_runs_on_a_worker_that_is_left():
-    assert (
-        len(list(compute_all([Task("a", dict, {}, is_alone=True)], [Pretender(lives=0), Pretender()]))) == 1
-    )
+def test_a_function_that_no_process_can_find_is_an_error_of_the_caller():
+    with pytest.raises(AttributeError, match="local"):
+        list(compute_all([Task("a", lambda point: point, {})]))
 
 
-def test_who_looks_no_further_stops_what_is_being_computed():
-    worker = Pretender()
-    with closing(compute_all([Task("a", dict, {}), Task("a", dict, {"wait": True})], [worker])) as done:
-        next(done)
-    assert worker.stopped.is_set()
-
-
-def test_an_error_of_the_worker_itself_is_raised():
-    with pytest.raises(ZeroDivisionError):
-        list(compute_all([Task("a", dict, {"bug": True})], [Pretender()]))
+def test_a_process_that_does_not_start_in_time_loses_its_point(monkeypatch):
+    monkeypatch.setattr("lab.sweep.worker.START_LIMIT", 0.1)
+    ((_, outcome),) = compute_all(tasks("a"), workers=1)
+    assert outcome == Outcome(None, "stopped: it did not start within 0.1 s", outcome.seconds)

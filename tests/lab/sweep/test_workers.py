@@ -10,30 +10,24 @@ from pathlib import Path
 import pytest
 from acts import act
 
-from taichi_soft.lab.sweep import Task, compute_all, local_workers
+from lab.sweep import Task, compute_all
 
 TIME_LIMIT = 12.0
 """For a point that hangs [s]: longer than a shared machine stands still now and then."""
 
 
-@pytest.fixture(scope="module")
-def crew():
-    with local_workers(2) as crew:
-        yield crew
-
-
-def compute(points, crew):
-    """Outcomes by x, in the order in which they came."""
+def compute(points):
+    """Outcomes by x, in the order in which they came from two processes."""
     tasks = [Task("a", act, p, p.pop("is_alone", False)) for p in points]
-    with closing(compute_all(tasks, crew, TIME_LIMIT)) as done:
+    with closing(compute_all(tasks, workers=2, time_limit=TIME_LIMIT)) as done:
         return {task.point["x"]: outcome for task, outcome in done}
 
 
 @pytest.fixture(scope="module")
-def rough(crew):
+def rough():
     """Points of which some raise, die, hang or measure nonsense; one of each kind between sound ones."""
     acts = ("", "raise", "", "exit", "", "kill", "", "sleep", "", "numpy", "number", "")
-    return compute([{"x": x, "do": do, "seconds": 600} for x, do in enumerate(acts)], crew)
+    return compute([{"x": x, "do": do, "seconds": 600} for x, do in enumerate(acts)])
 
 
 def test_every_point_has_an_outcome_whatever_happens_to_others(rough):
@@ -68,9 +62,9 @@ def test_numbers_come_as_they_come_from_a_file(rough):
     assert isinstance(pair, list)
 
 
-def test_what_is_timed_runs_alone_after_all_else(crew):
+def test_what_is_timed_runs_alone_after_all_else():
     points = [{"x": x, "do": "sleep", "seconds": 0.1, "is_alone": x < 4} for x in range(8)]
-    outcomes = compute(points, crew)
+    outcomes = compute(points)
     assert list(outcomes)[4:] == [0, 1, 2, 3]
     begun = {x: outcomes[x].numbers["begun"] for x in outcomes}
     assert begun[0] > max(begun[x] + 0.1 for x in range(4, 8))
@@ -80,27 +74,40 @@ def test_what_is_timed_runs_alone_after_all_else(crew):
 PROGRAM = """
 import sys
 from contextlib import closing
-from taichi_soft.lab.sweep import Task, compute_all, local_workers
+from lab.sweep import Task, compute_all
 sys.path.insert(0, {folder!r})
 from acts import act
 
 if __name__ == "__main__":
-    tasks = [Task("a", act, {{"x": x, "do": "sleep", "seconds": 600 * x}}) for x in range(2)]
-    with local_workers(1) as crew, closing(compute_all(tasks, crew)) as done:
+    tasks = [Task("a", act, {{"x": x, "do": "sleep", "seconds": {seconds} * x}}) for x in range(2)]
+    with closing(compute_all(tasks, workers=1)) as done:
         for task, outcome in done:
             print(outcome.numbers["pid"], flush=True)
 """
 
 
+def begun(tmp_path, seconds):
+    """A program whose process has computed a point, and computes one that takes so long."""
+    program = tmp_path / "program.py"
+    program.write_text(PROGRAM.format(folder=str(Path(__file__).parent), seconds=seconds))
+    return subprocess.Popen(
+        [sys.executable, str(program)],
+        **{"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "start_new_session": True},
+    )
+
+
+def test_where_the_program_is_killed_its_processes_end_with_their_points(tmp_path):
+    """They have its output, which ends with the last of them."""
+    with begun(tmp_path, seconds=1) as process:
+        process.stdout.readline()
+        process.kill()
+        process.communicate(timeout=60)
+
+
 @pytest.mark.skipif(os.name == "nt", reason="Ctrl-C of a terminal, as POSIX has it")
 def test_ctrl_c_ends_all_processes_at_once_and_without_their_tracebacks(tmp_path):
     """The terminal sends it to the workers too."""
-    program = tmp_path / "program.py"
-    program.write_text(PROGRAM.format(folder=str(Path(__file__).parent)))
-    with subprocess.Popen(
-        [sys.executable, str(program)],
-        **{"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "start_new_session": True},
-    ) as process:
+    with begun(tmp_path, seconds=600) as process:
         worker = int(process.stdout.readline())
         os.killpg(process.pid, signal.SIGINT)
         _, errors = process.communicate(timeout=120)  # their points take longer

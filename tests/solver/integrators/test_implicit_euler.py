@@ -23,6 +23,8 @@ from taichi_soft import (
     sphere,
 )
 
+pytestmark = pytest.mark.soak
+
 
 def make_world(mesh, material, *, floor=None, integrator="implicit_euler", **options):
     world = World(floor=floor, integrator=integrator, **options.pop("world", {}))

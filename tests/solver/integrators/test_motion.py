@@ -9,6 +9,8 @@ import pytest
 from taichi_soft import Material, box, internal_forces, sphere, stable_step
 from taichi_soft.elements.laws import element_model
 
+pytestmark = pytest.mark.soak
+
 CUBE = box((1.0, 1.0, 1.0), (1, 1, 1))
 BALL = sphere(0.5, 2)
 JELLY = Material(1e5, 0.25, 1000.0, damping_ratio=0.0)  # at nu = 1/4 the linear strain has an energy

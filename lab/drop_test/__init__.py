@@ -1,0 +1,7 @@
+"""Random bodies dropped onto random courses: what breaks, and how often."""
+
+from lab.drop_test.case import make_case
+from lab.drop_test.summary import Summary
+from lab.drop_test.trial import run_cases
+
+__all__ = ["Summary", "make_case", "run_cases"]

@@ -1,0 +1,58 @@
+"""What became of a case."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from lab.drop_test.case import Case
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a case ended."""
+
+    case: Case
+    frozen_at: float | None  # [s], where something went non-finite
+    out: float  # how far a vertex of the surface was beyond floor, wall or lid at any time [m]
+    out_through: str | None  # which of them, where that was farther than it may be
+    inside: float  # how deep a vertex of the surface ended in another solid [m]
+    inside_of: str | None  # which, where that was deeper than it may be
+    rest_at: float | None  # [s], None where it never came to rest
+    speed: float  # root mean square over vertices at the end, in sizes per second
+    flipped: int  # tetrahedra inside out at the end
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """What went wrong, worst first; empty where all went well."""
+        found = (
+            ("non-finite", self.frozen_at is not None),
+            ("through the room", self.out_through is not None),
+            ("in an obstacle", self.inside_of is not None),
+            ("not at rest", self.rest_at is None and self.frozen_at is None),
+            ("inside out", self.flipped > 0),
+        )
+        return tuple(name for name, is_so in found if is_so)
+
+    def badness(self, fault: str) -> float:
+        """How bad a fault is, to sort by: the earlier, farther, deeper, faster or more."""
+        share = self.flipped / len(self.case.mesh.tets)
+        early = -(self.frozen_at or 0.0)
+        return dict(zip(FAULTS, (early, self.out, self.inside, self.speed, share), strict=True))[fault]
+
+    def __str__(self) -> str:
+        found = []
+        if self.frozen_at is not None:
+            found.append(f"non-finite at {self.frozen_at:.2f} s")
+        if self.out_through is not None:
+            found.append(f"{self.out:.3g} m through the {self.out_through}")
+        if self.inside_of is not None:
+            found.append(f"{self.inside:.3g} m deep in the {self.inside_of}")
+        if self.rest_at is None and self.frozen_at is None:
+            found.append(f"still {self.speed:.3g} sizes per second")
+        if self.flipped:
+            found.append(f"{self.flipped} of {len(self.case.mesh.tets)} tetrahedra inside out")
+        return f"case {self.case.number}: {', '.join(found) or 'sound'} - {self.case}"
+
+
+FAULTS = ("non-finite", "through the room", "in an obstacle", "not at rest", "inside out")
+"""All kinds, worst first."""

@@ -1,0 +1,7 @@
+"""One body at a time, dropped or wrecked: meshes, materials and steps that a library has to bear."""
+
+from lab.drop_test.robustness.cells import GROUPS, choose_cells, law_variants
+from lab.drop_test.robustness.trial import run_cell
+from lab.drop_test.robustness.verdict import Verdict
+
+__all__ = ["GROUPS", "Verdict", "choose_cells", "law_variants", "run_cell"]

@@ -1,0 +1,189 @@
+"""Which cells there are: groups of bodies, times laws, times dampings. A cell is plain data."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from lab.drop_test.case import MOST_SAG, edge_damping
+from lab.drop_test.robustness.foreign_meshes import FOREIGN_MESHES
+from lab.drop_test.robustness.own_meshes import OWN_MESHES
+from lab.drop_test.robustness.wrecks import WRECKS
+from taichi_soft import TetMesh
+from taichi_soft.core.constants import GRAVITY_EARTH
+from taichi_soft.core.errors import OptionError
+from taichi_soft.core.types import FlipsName, LawName
+from taichi_soft.elements.laws import LAWS, EnergyLaw, StressLaw
+
+Cell = dict[str, Any]
+"""group, name, mesh, scale, young, poisson, density, dt, wreck, seed; law and flips (None: what a game gets
+by default) and damping, a name in `DAMPINGS`."""
+
+MESHES: dict[str, Callable[[], TetMesh]] = {**OWN_MESHES, **FOREIGN_MESHES}
+
+USUAL: Cell = {
+    "scale": 1.0,
+    "young": 1e6,
+    "poisson": 0.3,
+    "density": 1000.0,
+    "dt": 1 / 60,
+    "wreck": None,
+    "seed": 0,
+}
+"""What a cell is where nothing else is said."""
+
+AXES: dict[str, tuple[float, ...]] = {
+    "young": (1e4, 1e5, 1e6, 1e7, 1e8, 1e9),
+    "poisson": (0.0, 0.3, 0.45, 0.49),
+    "density": (10.0, 100.0, 1000.0, 10_000.0),
+    "scale": (0.01, 0.1, 1.0, 10.0),
+    "dt": (1 / 30, 1 / 60, 1 / 120),
+}
+"""Of the group `cells`, in which each is a mesh of a metre."""
+
+CELL_COUNT = 153
+CELL_MESHES = ("sphere 4", "beam 3", "cylinder 3", "torus 2")
+
+DAMPINGS: dict[str, Callable[[TetMesh, Cell], dict[str, float]]] = {
+    "default": lambda mesh, cell: {},
+    "none": lambda mesh, cell: {"damping_ratio": 0.0},
+    "edges 0.2": lambda mesh, cell: {
+        "damping": edge_damping(mesh, cell["young"], cell["density"], 0.2),
+        "damping_ratio": 0.0,
+    },
+}
+"""What `Material` is given beside E, nu and density."""
+
+WRECKED_MESHES = ("box 2", "box 4", "slab 2", "sphere 2", "sphere 4")
+WRECKED_SEEDS = range(3)
+
+
+def law_variants() -> list[tuple[str | None, str | None]]:
+    """Law and flips: those of a game that names neither, then each law on tetrahedra with each it takes."""
+    laws = [law for law in LAWS.values() if isinstance(law, StressLaw | EnergyLaw)]
+    return [(None, None), *((law.name, flips.value) for law in laws for flips in law.flips)]
+
+
+def choose_cells(
+    groups: list[str] | None = None,
+    *,
+    law: LawName | None = None,
+    flips: FlipsName | None = None,
+    damping: str | None = None,
+    count: int | None = None,
+    wrecks: int = 0,
+) -> list[Cell]:
+    """Cells of some groups, by some laws.
+
+    Args:
+        groups: names in `GROUPS`; None means all.
+        law: "default" for what a game gets that names neither law nor flips; None means all of them.
+        flips: of `law`, or of all that take it.
+        damping: a name in `DAMPINGS`; None means the default one, and of named laws all.
+        count: of each group, a sample that grows with it; None means all.
+        wrecks: how many random ones to add, to `wrecked` or as a group of their own.
+    Raises: OptionError for names that are not known.
+    """
+    for name in groups or []:
+        _require_known("--only", name, GROUPS)
+    if damping is not None:
+        _require_known("--damping", damping, DAMPINGS)
+    variants = [
+        (each, way)
+        for each, way in law_variants()
+        if law in (None, each or "default") and (flips is None or flips == way)
+    ]
+    if not variants:
+        known = ", ".join(f"{each} {way}" for each, way in law_variants()[1:])
+        raise OptionError(f"no law {law!r} with flips {flips!r}: choose 'default' or of {known}")
+    found = []
+    for name, make in GROUPS.items():
+        if groups is None or name in groups:
+            bodies = list(make())
+            found += bodies if count is None else [bodies[k] for k in _some(len(bodies), count)]
+    if wrecks and (groups is None or "wrecked" in groups):
+        found += [random_wreck(number) for number in range(wrecks)]
+    return [
+        {**body, "law": each, "flips": way, "damping": chosen}
+        for each, way in variants
+        for chosen in ([damping] if damping else ["default"] if each is None else DAMPINGS)
+        for body in found
+    ]
+
+
+def _require_known(option: str, name: str, known: Any) -> None:
+    if name not in known:
+        raise OptionError(f"{option} {name!r} is not known: choose of {', '.join(known)}")
+
+
+def _some(total: int, count: int) -> list[int]:
+    """`count` of `total` numbers, at random but always the same; a larger sample holds the smaller one."""
+    return sorted(np.random.default_rng(0).permutation(total)[:count].tolist())
+
+
+def _own() -> Iterator[Cell]:
+    for name in OWN_MESHES:
+        yield {"group": "own", "name": name, "mesh": name, **USUAL}
+
+
+def _foreign() -> Iterator[Cell]:
+    for name in FOREIGN_MESHES:
+        yield {"group": "foreign", "name": name, "mesh": name, **USUAL}
+
+
+def _grid() -> Iterator[Cell]:
+    """Each axis against each other with the rest as usual, then more of the full grid at random."""
+    names = list(AXES)
+    usual = tuple(USUAL[name] for name in names)
+    chosen = {
+        tuple({**dict(zip(names, usual, strict=True)), a: x, b: y}.values())
+        for a, b in product(names, names)
+        for x, y in product(AXES[a], AXES[b])
+    }
+    rest = sorted(set(product(*AXES.values())) - chosen)
+    rng = np.random.default_rng(0)
+    missing = CELL_COUNT - len(chosen)
+    extra = [rest[k] for k in sorted(rng.choice(len(rest), max(0, missing), replace=False))]
+    for number, values in enumerate([*sorted(chosen), *extra]):
+        cell = dict(zip(names, values, strict=True))
+        name = (
+            f"{number}: E {cell['young']:.0e}, nu {cell['poisson']:g}, {cell['density']:g} kg/m^3, "
+            f"{cell['scale']:g} m, 1/{1 / cell['dt']:.0f} s"
+        )
+        mesh = CELL_MESHES[number % len(CELL_MESHES)]
+        yield {"group": "cells", "name": name, "mesh": mesh, **USUAL, **cell}
+
+
+def _wrecked() -> Iterator[Cell]:
+    for mesh, wreck, seed in product(WRECKED_MESHES, WRECKS, WRECKED_SEEDS):
+        name = f"{mesh}, {wreck}, seed {seed}"
+        yield {"group": "wrecked", "name": name, "mesh": mesh, **USUAL, "wreck": wreck, "seed": seed}
+
+
+def random_wreck(number: int) -> Cell:
+    """A box or sphere of some size and material, wrecked somehow; stiff enough to bear its own weight."""
+    rng = np.random.default_rng([number, 22])
+    mesh, wreck = str(rng.choice(WRECKED_MESHES)), str(rng.choice(list(WRECKS)))
+    scale, density = (float(np.exp(rng.uniform(*np.log(ends)))) for ends in ((0.1, 3.0), (100.0, 3000.0)))
+    stiffness = float(np.exp(rng.uniform(np.log(1 / MOST_SAG), np.log(100 / MOST_SAG))))
+    values = {
+        "scale": scale,
+        "young": stiffness * density * GRAVITY_EARTH * scale,
+        "poisson": float(rng.uniform(0.0, 0.45)),
+        "density": density,
+    }
+    name = f"random {number}: {mesh}, {wreck}, {scale:.2g} m, E {values['young']:.1e}"
+    body = {"group": "random wrecks", "name": name, "mesh": mesh, **USUAL, **values}
+    return {**body, "wreck": wreck, "seed": number}
+
+
+GROUPS: dict[str, Callable[[], Iterator[Cell]]] = {
+    "foreign": _foreign,
+    "own": _own,
+    "cells": _grid,
+    "wrecked": _wrecked,
+}
+"""By name; bodies without law, flips and damping."""

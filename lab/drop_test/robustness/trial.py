@@ -1,0 +1,194 @@
+"""One cell: built with what it names and nothing else, dropped or left to itself, and judged."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from lab.drop_test.robustness.cells import DAMPINGS, MESHES, Cell
+from lab.drop_test.robustness.verdict import MOST_SUBSTEPS, Ending, Verdict, judge
+from lab.drop_test.robustness.wrecks import distance_from_rest, wrecked
+from taichi_soft import FrozenBodyWarning, Material, TetMesh, TooSoftWarning, World
+from taichi_soft.core.constants import GRAVITY_EARTH
+from taichi_soft.core.errors import TaichiSoftError
+from taichi_soft.world.body import Body
+
+DROP, DROP_TIME = 2.0, 2.5
+"""Height [m] and time [s]: a fall of 0.64 s, an impact, and what bounces falls once more."""
+
+RECOVERY_TIME, CALM_TIME = 10.0, 0.5
+"""Within which no tetrahedron may be inside out any more, and for how long to take it as settled [s]."""
+
+REST_SPEED, LONGEST_REST = 1e-4, 60.0
+"""At rest is what is slower than so many sizes per second (root mean square over mass). To come there without
+gravity a body has as long as waves take to cross it `REST_CROSSINGS` times, and at most so long [s]."""
+
+REST_CROSSINGS = 60.0
+
+MOST_WORK = 2e9
+"""Tetrahedra times substeps of a cell, half a minute: what would take more is too slow as well."""
+
+
+def run_cell(cell: Cell) -> dict[str, Any]:
+    """What became of a cell: verdict and reason, and the facts of its mesh and its step. Plain data."""
+    mesh = cell_mesh(cell["mesh"], cell["scale"])
+    squared_sound = cell["young"] / cell["density"]
+    facts = {
+        "tets": len(mesh.tets),
+        "min_dihedral": float(mesh.quality.min_dihedral.min()),  # [degrees]
+        "substeps": None,  # of 1/60 s
+        "mach": math.sqrt(2 * GRAVITY_EARTH * DROP / squared_sound),  # of the impact
+        "sag": GRAVITY_EARTH * float(np.ptp(mesh.vertices, axis=0).max()) / squared_sound,  # in its size
+    }
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        try:
+            world, body = _build(cell, mesh)
+            facts["substeps"] = world.stable_substeps(1 / 60)
+        except TaichiSoftError as error:
+            reason = f"{type(error).__name__}: {error}"
+            return {**facts, "verdict": Verdict.REFUSED.value, "reason": reason}
+    said = sorted({f"{each.category.__name__}: {each.message}" for each in caught})
+    slow = _too_slow(cell, world, body)
+    if slow is not None:
+        reason = "; ".join([slow, *said]) if said else f"{slow}; nothing was said when it was built"
+        return {**facts, "verdict": Verdict.TOO_SLOW.value, "reason": reason}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FrozenBodyWarning)
+        verdict, reason = judge(_try(cell, world, body))
+    told = next((str(each.message) for each in caught if each.category is TooSoftWarning), None)
+    if verdict is Verdict.INVERTED and told is not None:
+        verdict, reason = Verdict.TOO_SOFT, f"{reason}; when it was built: {told}"
+    return {**facts, "verdict": verdict.value, "reason": reason}
+
+
+@lru_cache(maxsize=128)
+def cell_mesh(name: str, scale: float) -> TetMesh:
+    """A mesh by its name, all lengths multiplied."""
+    mesh = MESHES[name]()
+    return mesh if scale == 1.0 else TetMesh(mesh.vertices * scale, mesh.tets)
+
+
+def _build(cell: Cell, mesh: TetMesh) -> tuple[World, Body]:
+    """A world with nothing but the body, high above the floor."""
+    damping = DAMPINGS[cell["damping"]](mesh, cell)
+    material = Material(cell["young"], cell["poisson"], cell["density"], **damping)
+    named = {option: cell[option] for option in ("law", "flips") if cell[option] is not None}
+    world = World()
+    height = DROP + float(np.ptp(mesh.vertices, axis=0).max())
+    body = world.add_body(mesh, material, position=(0.0, 0.0, height), **named)
+    world.build()
+    return world, body
+
+
+def _too_slow(cell: Cell, world: World, body: Body) -> str | None:
+    """Why it is not worth trying, None where it is."""
+    substeps = world.stable_substeps(1 / 60)
+    if substeps > MOST_SUBSTEPS:
+        return f"{substeps} substeps for 1/60 s ({body.stable_step.stiffest})"
+    steps = _steps(cell)
+    work = steps * world.stable_substeps(cell["dt"]) * len(body.tets)
+    return f"{work:.2g} substeps of tetrahedra in {steps} steps" if work > MOST_WORK else None
+
+
+def _steps(cell: Cell) -> int:
+    dt: float = cell["dt"]
+    return round((DROP_TIME if cell["wreck"] is None else RECOVERY_TIME) / dt)
+
+
+def _try(cell: Cell, world: World, body: Body) -> Ending:
+    """Put the body where it begins, and see."""
+    x = body.mesh.vertices
+    rest = x - (x.min(axis=0) + x.max(axis=0)) / 2
+    size = float(np.ptp(rest, axis=0).max())
+    is_wrecked = cell["wreck"] is not None
+    start = wrecked(rest, cell["wreck"], cell["seed"]) if is_wrecked else rest
+    gap = 0.1 * size if is_wrecked else DROP
+    height = gap - float(min(rest[:, 2].min(), start[:, 2].min()))
+    body.set_motion(start + np.array([0.0, 0.0, height]), np.zeros_like(start))
+    run = _Run(world, body, rest, size, cell["dt"])
+    if is_wrecked:
+        run.recover(_steps(cell), size * math.sqrt(cell["density"] / cell["young"]))
+    else:
+        run.fall(_steps(cell))
+    return run.ending(math.inf if is_wrecked else math.sqrt(2 * GRAVITY_EARTH * (height + size)))
+
+
+@dataclass
+class _Run:
+    """A body on its way."""
+
+    world: World
+    body: Body
+    rest: np.ndarray[Any, np.dtype[np.float64]]
+    size: float  # [m]
+    dt: float  # [s]
+
+    def fall(self, steps: int) -> None:
+        """Let it fall and bounce."""
+        for _ in range(steps):
+            if self.body.is_frozen:
+                return
+            self.world.step(self.dt)
+
+    def recover(self, steps: int, crossing: float) -> None:
+        """Until no tetrahedron is inside out; then without gravity, braked, until it is at rest.
+
+        Args:
+            crossing: time in which a wave goes once through the body [s].
+        """
+        calm = 0
+        for _ in range(steps):
+            self.world.step(self.dt)
+            if self.body.is_frozen:
+                return
+            calm = calm + 1 if not self.body.flipped_count() else 0
+            if calm * self.dt >= CALM_TIME:
+                break
+        else:
+            return
+        self.body.set_gravity_scale(0.0)
+        self.body.set_linear_damping(1.0 / crossing)
+        for step in range(math.ceil(min(REST_CROSSINGS * crossing, LONGEST_REST) / self.dt)):
+            self.world.step(self.dt)
+            if self.body.is_frozen or (step > 30 and self.speed < REST_SPEED * self.size):
+                return
+
+    @property
+    def speed(self) -> float:
+        """Root mean square over mass [m/s]."""
+        velocities, masses = self.body.velocities().astype(np.float64), self.body.masses
+        return float(np.sqrt(masses @ (velocities**2).sum(axis=1) / masses.sum()))
+
+    def ending(self, fastest: float) -> Ending:
+        """What is to be judged; `fastest` is infinite where the body was wrecked."""
+        body = self.body
+        now = body.positions().astype(np.float64)
+        is_finite = bool(np.isfinite(now).all())
+        return Ending(
+            tets=len(body.tets),
+            failure=_failure_of(body) if body.is_frozen else None,
+            is_finite=is_finite,
+            flipped=body.flipped_count(),
+            speed=self.speed if is_finite else math.inf,
+            fastest=fastest,
+            distance=distance_from_rest(self.rest, now, body.masses)
+            if is_finite and math.isinf(fastest)
+            else 0.0,
+        )
+
+
+def _failure_of(body: Body) -> str:
+    failure = body.failure
+    if failure is None or failure.tetrahedron is None:
+        return "it cannot be told which tetrahedron broke first"
+    mesh = body.mesh
+    assert isinstance(mesh, TetMesh)
+    angle = mesh.quality.min_dihedral[failure.tetrahedron]
+    first = f"tetrahedron {failure.tetrahedron} (smallest angle {angle:.2g} degrees)"
+    return f"at {failure.time:.2f} s, first {first}"

@@ -1,0 +1,134 @@
+"""Loads on the ends of a bar along x: what is driven, and the work that belongs to it.
+
+All are of small strain, `STRAIN` at most within a uniform bar. Stiffness is defined by work: that of a drive
+by q is what its reactions do, over q^2; that of a force F is F^2 over what it does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lab.experiments.sparse_gradient import Floats
+from lab.experiments.statics import Equilibrium, Loading, Mask
+from taichi_soft import TetMesh
+
+STRAIN = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class EndLoad:
+    """A load on a bar.
+
+    Args:
+        amplitude: q, the drive [m or rad], or F, the force [N].
+        traction: (3,) on the right end [Pa]; zero where the load is a drive.
+    """
+
+    loading: Loading
+    amplitude: float
+    traction: Floats
+
+    def stiffness(self, settled: Equilibrium) -> float:
+        """N/m or N m, where a body has settled under the load."""
+        work = float(((settled.reactions + self.loading.forces) * settled.displacement).sum())
+        return self.amplitude**2 / work if self.traction.any() else work / self.amplitude**2
+
+
+def ends(mesh: TetMesh) -> tuple[Mask, Mask]:
+    """Which vertices lie in the left and the right end, (n,) each."""
+    x = mesh.vertices[:, 0]
+    reach = 1e-9 * (x.max() - x.min())
+    return x - x.min() < reach, x.max() - x < reach
+
+
+def held_ends(mesh: TetMesh) -> dict[str, EndLoad]:
+    """Both ends held wholly, as if glued to rigid plates, of which the right or both move."""
+    left, right = ends(mesh)
+    length, width = np.ptp(mesh.vertices, axis=0)[:2]
+    y, z = mesh.vertices[:, 1], mesh.vertices[:, 2]
+    none, side = np.zeros_like(y), np.where(right, 0.5, -0.5)
+
+    def driven(q: float, *along: Any) -> EndLoad:
+        return _driven(mesh, np.repeat((left | right)[:, None], 3, axis=1), q, *along)
+
+    return {
+        "tension": driven(STRAIN * length, right * 1.0, none, none),
+        "shear": driven(STRAIN * length, none, none, right * 1.0),
+        "torsion": driven(2 * STRAIN * length / width, none, -z * right, y * right),
+        "bending": driven(2 * STRAIN * length / width, z * side, none, none),
+    }
+
+
+def free_ends(mesh: TetMesh) -> dict[str, EndLoad]:
+    """Loads of which theory knows the answer: ends that are free to contract, or to warp; and a cantilever.
+
+    Tension and bending drive the ends along x alone, torsion across x alone: with the stresses of a uniform
+    bar, and of Saint-Venant's, these are exact solutions of linear elasticity up to the ends. In shear the
+    whole surface slides uniformly along z, as free sides would bulge.
+    """
+    left, right = ends(mesh)
+    length, width = np.ptp(mesh.vertices, axis=0)[:2]
+    y, z = mesh.vertices[:, 1], mesh.vertices[:, 2]
+    none, side = np.zeros_like(y), np.where(right, 0.5, -0.5)
+    along = np.zeros(mesh.vertices.shape, bool)
+    along[left | right, 0] = True
+    low = np.flatnonzero(left)[np.argsort(y[left] + z[left])[0]]
+    next_to = np.flatnonzero(left)[np.argsort(z[left] - y[left])[0]]
+    along[low, 1:] = along[next_to, 2] = True  # holds the bar in y and z, and against turning about x
+    across = np.zeros(mesh.vertices.shape, bool)
+    across[left | right, 1:] = True
+    across[low, 0] = True
+    surface = np.zeros(mesh.vertices.shape, bool)
+    surface[mesh.surface] = True
+    beyond = mesh.vertices[:, 0] - mesh.vertices[:, 0].min()
+    root = np.repeat(left[:, None], 3, axis=1)
+    pressure = STRAIN * 1e6 * width / length
+    traction = np.array([0.0, 0.0, -pressure])
+    loading = Loading(root, np.zeros(root.shape), end_forces(mesh, traction))
+    return {
+        "tension": _driven(mesh, along, STRAIN * length, side, none, none),
+        "shear": _driven(mesh, surface, STRAIN * length, none, none, beyond / length),
+        "torsion": _driven(mesh, across, 2 * STRAIN * length / width, none, -z * right, y * right),
+        "bending": _driven(mesh, along, 2 * STRAIN * length / width, z * side, none, none),
+        "cantilever": EndLoad(loading, pressure * width**2, traction),
+    }
+
+
+def end_forces(mesh: TetMesh, traction: Floats) -> Floats:
+    """Forces of a traction on the right end [Pa], a third of each triangle's on its corners, (n, 3) [N]."""
+    _, right = ends(mesh)
+    triangles: NDArray[np.int32] = mesh.surface[right[mesh.surface].all(axis=1)]
+    corners = mesh.vertices[triangles]
+    arms = corners[:, 1:] - corners[:, :1]
+    areas = np.linalg.norm(np.cross(arms[:, 0], arms[:, 1]), axis=1) / 2
+    shares = np.bincount(triangles.ravel(), np.repeat(areas / 3, 3), len(mesh.vertices))
+    return np.outer(shares, traction)
+
+
+def theory(young: float, poisson: float, length: float, width: float) -> dict[str, float]:
+    """Stiffness of `free_ends` on a bar of square section.
+
+    E A / L; G A / L; G J / L with Saint-Venant's J; E I / L; and Timoshenko's cantilever, with Cowper's shear
+    coefficient (1966) of a rectangle.
+    """
+    shear, area, inertia = young / (2 * (1 + poisson)), width**2, width**4 / 12
+    odd = np.arange(1, 40, 2)
+    torsion = width**4 / 3 * (1 - 192 / np.pi**5 * float((np.tanh(odd * np.pi / 2) / odd**5).sum()))
+    coefficient = 10 * (1 + poisson) / (12 + 11 * poisson)
+    sag = length**3 / (3 * young * inertia) + length / (coefficient * shear * area)
+    return {
+        "tension": young * area / length,
+        "shear": shear * area / length,
+        "torsion": shear * torsion / length,
+        "bending": young * inertia / length,
+        "cantilever": 1 / sag,
+    }
+
+
+def _driven(mesh: TetMesh, mask: Mask, q: float, *per_unit: Any) -> EndLoad:
+    moves = np.where(mask, q * np.stack(per_unit, axis=1), 0.0)
+    return EndLoad(Loading(mask, moves, np.zeros_like(moves)), q, np.zeros(3))

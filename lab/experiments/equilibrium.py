@@ -1,0 +1,118 @@
+"""Bodies at rest between plates: vertices at both ends are driven, the others go where no force is left.
+
+What a damped body comes to in the end, found without waiting: Newton's method on its forces in float64.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lab.experiments.sparse_gradient import Floats, SparseGradient
+from taichi_soft.meshing import TetMesh
+
+Forces = Callable[[Floats], Floats]
+"""Positions (n, 3) [m] to forces (n, 3) [N]."""
+
+SMALLEST = 1e-9
+"""Largest force left on what is free, over the largest of all."""
+DIFFERENCE = 1e-6
+"""Way that vertices are moved to find a gradient, over the mean length of an edge."""
+
+
+class Plates:
+    """A body about the origin, its lowest and highest vertices on plates across z.
+
+    Args:
+        mesh: at rest, of the same cross-section at all heights.
+        slide: vertices on the plates move freely along them; else they keep their places there.
+    """
+
+    def __init__(self, mesh: TetMesh, *, slide: bool = False) -> None:
+        self.mesh = mesh
+        z = mesh.vertices[:, 2]
+        self.height = float(np.ptp(z))
+        self.top: NDArray[np.bool_] = z > z.max() - 1e-9 * self.height
+        bottom = z < z.min() + 1e-9 * self.height
+        driven = np.repeat((self.top | bottom)[:, None], 3, axis=1)
+        if slide:
+            driven[:, :2] = False
+            axis = np.hypot(*mesh.vertices[:, :2].T) + 1e9 * ~bottom
+            driven[axis.argmin(), :2] = True  # what the body could do as a whole
+            driven[np.where(bottom, mesh.vertices[:, 0], -np.inf).argmax(), 1] = True
+        self.free: NDArray[np.int64] = np.flatnonzero(~driven)
+        """Coordinates, 3 vertex + axis."""
+        self._gradient = SparseGradient(_neighbours(mesh), DIFFERENCE * float(mesh.edge_lengths.mean()))
+
+    @property
+    def area(self) -> float:
+        """Of the cross-section [m^2]."""
+        return self.mesh.volume / self.height
+
+    def pull(self, forces: Floats) -> Floats:
+        """What drives the top, of the forces of the body there, (3,) [N]."""
+        return np.asarray(-forces[self.top].sum(axis=0))
+
+    def path(self, forces: Forces, direction: Sequence[float], shares: Sequence[float]) -> list[Floats]:
+        """States of rest while the top goes from its place in `direction`, the bottom held.
+
+        Args:
+            shares: ways of the top over the height, ascending from above 0: steps small enough to keep to
+                the branch from rest.
+        Returns: one for each share, up to the first for which there is none.
+        """
+        z = self.mesh.vertices[:, 2:]
+        x = self.mesh.vertices.copy()
+        rate, reached, states = (z - z.min()) * np.asarray(direction), 0.0, []
+        for share in shares:
+            rested = self.rest(forces, x + (share - reached) * rate)
+            if rested is None:
+                break
+            rate = (rested - x) / (share - reached)
+            x, reached = rested, share
+            states.append(x)
+        return states
+
+    def rest(self, forces: Forces, start: Floats) -> Floats | None:
+        """Where the free coordinates come to rest from `start`; None where they do not."""
+        from scipy.sparse.linalg import splu
+
+        x, f = start, forces(start)
+        left, inverse, is_new = np.abs(f.ravel()[self.free]).max(), None, False
+        for _ in range(30):
+            if left <= SMALLEST * np.abs(f).max():
+                return x
+            if inverse is None:
+                inverse, is_new = splu(-self.gradient(forces, x)), True
+            way = np.zeros(x.size)
+            way[self.free] = inverse.solve(f.ravel()[self.free])
+            for halvings in range(8):
+                trial = x + way.reshape(-1, 3) / 2**halvings
+                trial_f = forces(trial)
+                trial_left = np.abs(trial_f.ravel()[self.free]).max()
+                if trial_left < left or not is_new:
+                    break
+            else:
+                return None
+            if trial_left > 0.2 * left:
+                inverse = None
+            if trial_left < left:
+                x, f, left = trial, trial_f, trial_left
+            is_new = False
+        return None
+
+    def gradient(self, forces: Forces, x: Floats) -> Any:
+        """df/dx of the free coordinates there, a sparse matrix [N/m], by central differences."""
+        return self._gradient.at(forces, x)[self.free][:, self.free].tocsc()
+
+
+def _neighbours(mesh: TetMesh) -> Any:
+    """Which vertices are the same or share an edge: sparse, symmetric (n, n)."""
+    from scipy.sparse import csr_matrix
+
+    every = np.arange(len(mesh.vertices))
+    near = np.concatenate([mesh.edges, mesh.edges[:, ::-1], np.column_stack([every, every])])
+    return csr_matrix((np.ones(len(near)), near.T), shape=(len(every), len(every)))

@@ -1,0 +1,31 @@
+"""Laws with the strains that they take, as points of experiments name them."""
+
+from __future__ import annotations
+
+from lab.experiments.experiment import Effort, Point
+from taichi_soft import LAWS
+from taichi_soft.core.types import LawName, Strain
+from taichi_soft.elements.laws import BondLaw
+
+
+def variants(effort: Effort) -> list[Point]:
+    """{"law": name, "strain": name or None}, those on tetrahedra first; when it must be quick, without the
+    exact strain by the faces, whose forces are those of the virial theorem."""
+    every = [
+        {"law": law.name, "strain": strain and strain.value}
+        for law in LAWS.values()
+        for strain in (law.strains if len(law.strains) > 1 else (None,))
+    ]
+    if effort is Effort.QUICK:
+        every.remove({"law": "face", "strain": Strain.EXACT.value})
+    return every
+
+
+def is_tetrahedral(law: LawName) -> bool:
+    """Whether it turns the stress of tetrahedra into forces; others act along edges."""
+    return not isinstance(LAWS[law], BondLaw)
+
+
+def label(point: Point) -> str:
+    """For rows of tables."""
+    return str(point["law"]) + (f", {point['strain']} strain" if point["strain"] else "")

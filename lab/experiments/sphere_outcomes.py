@@ -1,0 +1,62 @@
+"""What became of dropped spheres of many moduli, and between which moduli they stayed whole."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from lab.experiments.experiment import Numbers
+
+OUTCOMES = ("collapses", "dented", "whole", "explodes")
+
+COLLAPSED = 0.5
+"""Part of its volume, or less, that is left of a sphere that has collapsed. The thesis has no number."""
+
+Window = tuple[float, float, float, float]
+"""Edges as `window` gives them [Pa]."""
+
+
+def outcomes(numbers: Numbers, collapsed: float = COLLAPSED) -> list[str]:
+    """What became of each sphere.
+
+    One explodes if it goes non-finite or doubles in extent, and is dented if more than a hundredth of its
+    tetrahedra stay inside out; where these leave it this part of its volume or less it has collapsed.
+    """
+    ends = []
+    for volume, flipped, frozen, extent in zip(
+        numbers["volume"], numbers["flipped"], numbers["frozen"], numbers["extent"], strict=True
+    ):
+        if frozen or extent > 2.0:
+            ends.append("explodes")
+        elif flipped > 0.01:
+            ends.append("collapses" if volume <= collapsed else "dented")
+        else:
+            ends.append("whole")
+    return ends
+
+
+def window(numbers: Numbers, collapsed: float = COLLAPSED) -> Window:
+    """Edges, each as a bracket [Pa], of the longest unbroken row of whole spheres: the lower from the last
+    one that is neither whole nor dented to the first of the row, the upper from its last to the next that
+    explodes."""
+    young, ends = numbers["young"], outcomes(numbers, collapsed)
+    first, last = _longest_row(end == "whole" for end in ends)
+    if first > last:
+        return np.inf, np.inf, 0.0, 0.0
+    gone = [i for i in range(first) if ends[i] not in ("dented", "whole")]
+    exploded = [i for i in range(last, len(ends)) if ends[i] == "explodes"]
+    low = young[gone[-1]] if gone else 0.0
+    high = young[exploded[0]] if exploded else np.inf
+    return low, young[first], young[last], high
+
+
+def _longest_row(values: Iterable[bool]) -> tuple[int, int]:
+    """Where the longest row of true values begins and ends; the end lies before the beginning if none is."""
+    best, start, at = (0, -1), 0, -1
+    for at, value in enumerate(values):
+        if not value:
+            start = at + 1
+        elif at - start > best[1] - best[0]:
+            best = start, at
+    return best

@@ -1,0 +1,37 @@
+"""Extras of a checkout: packages that only the lab needs, and how to get them where one is missing."""
+
+from __future__ import annotations
+
+from taichi_soft.core.errors import MissingExtraError
+from taichi_soft.core.extras import missing_among
+
+EXTRAS = {
+    "lab": {
+        "cv2": "opencv-python-headless",
+        "jinja2": "jinja2",
+        "matplotlib": "matplotlib",
+        "rich": "rich",
+        "scipy": "scipy",
+        "skfem": "scikit-fem",
+    },
+    "peers": {"mujoco": "mujoco", "newton": "newton", "pybullet": "pybullet"},
+}
+"""By extra: its modules, and the packages that have them, as in pyproject.toml."""
+
+
+def missing_packages(extra: str, *modules: str) -> list[str]:
+    """Packages of the extra, or those of these modules, that are not installed."""
+    return missing_among(EXTRAS[extra], *modules)
+
+
+def how_to_install(extra: str) -> str:
+    """The command that installs an extra, in the folder of the checkout."""
+    return f"pip install -e '.[{extra}]'"
+
+
+def require_report() -> None:
+    """Raises: MissingExtraError in one line where a package is missing that a report needs."""
+    missing = missing_packages("lab")
+    if missing:
+        names = ", ".join(missing)
+        raise MissingExtraError(f"a report needs {names}, not installed here: run {how_to_install('lab')}")

@@ -1,0 +1,9 @@
+"""The same drop here, in other engines, and in a fine reference: what each costs, and how far off it is."""
+
+from lab.peers.comparison import Entry, compare, missing_peers
+from lab.peers.course import Course
+from lab.peers.drop import Drop
+from lab.peers.measures import measure
+from lab.peers.registry import PEERS
+
+__all__ = ["PEERS", "Course", "Drop", "Entry", "compare", "measure", "missing_peers"]

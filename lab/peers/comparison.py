@@ -1,0 +1,83 @@
+"""One drop in every engine that is installed, beside the reference."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from lab.extras import missing_packages
+from lab.peers import ours
+from lab.peers.course import Course, Progress
+from lab.peers.drop import Drop
+from lab.peers.measures import Outcome, measure
+from lab.peers.reference import simulate_reference
+from lab.peers.registry import PEERS
+
+OURS, REFERENCE = "taichi-soft", "reference"
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What came out in one engine, or in the reference."""
+
+    name: str
+    course: Course
+    outcome: Outcome
+    reference: Outcome
+
+    @property
+    def is_reference(self) -> bool:
+        """Whether the others are measured by it."""
+        return self.name == REFERENCE
+
+    @property
+    def cost(self) -> float:
+        """Median time of simulating 1/60 s [s]."""
+        return float(np.median(self.course.frame_times))
+
+    @property
+    def squash_error(self) -> float:
+        """Relative, above 0 where it is squashed too much."""
+        return self.outcome.squash / self.reference.squash - 1.0
+
+    @property
+    def bounce_error(self) -> float:
+        """Relative, above 0 where it bounces too high."""
+        return self.outcome.bounce / self.reference.bounce - 1.0
+
+
+def missing_peers() -> list[str]:
+    """Packages of engines that are not installed."""
+    return missing_packages("peers")
+
+
+def compare(
+    drop: Drop | None = None, on_frame: Callable[[str, int, int], object] | None = None
+) -> list[Entry]:
+    """The drop here, in the reference, and in every engine that is installed, in this order.
+
+    Args:
+        on_frame: called with (name, frames made, frames in all).
+    """
+    drop = Drop() if drop is None else drop
+    there = [peer for peer in PEERS if not missing_packages("peers", peer.module)]
+    runs = {
+        OURS: ours.simulate,
+        REFERENCE: simulate_reference,
+        **{peer.name: peer.simulate for peer in there},
+    }
+    courses = {name: simulate(drop, _telling(name, on_frame)) for name, simulate in runs.items()}
+    outcomes = {name: measure(drop, course) for name, course in courses.items()}
+    return [Entry(name, course, outcomes[name], outcomes[REFERENCE]) for name, course in courses.items()]
+
+
+def _telling(name: str, on_frame: Callable[[str, int, int], object] | None) -> Progress | None:
+    if on_frame is None:
+        return None
+
+    def tell(done: int, total: int) -> None:
+        on_frame(name, done, total)
+
+    return tell

@@ -1,0 +1,47 @@
+"""What a drop is judged by: how far the body was squashed, and how high it bounced."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lab.peers.course import Course
+from lab.peers.drop import Drop
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Two numbers of a course."""
+
+    squash: float  # how much lower its highest vertex stands at the deepest moment, in its own heights
+    bounce: float  # how high the centre of mass rises again, in the height that it fell from
+
+
+def measure(drop: Drop, course: Course) -> Outcome:
+    """Both, between the moments noted: through the three about an extreme goes a parabola.
+
+    The centre of mass weighs vertices as the drop does, whatever the engine gave them.
+    """
+    tops = course.positions[:, :, 2].max(axis=1)
+    centers = course.positions[:, :, 2] @ drop.masses / drop.masses.sum()
+    landed = int(np.argmax(course.positions[:, :, 2].min(axis=1) < 0.05 * drop.height))
+    turn = landed + int(np.argmax(np.diff(centers[landed:]) > 0.0))  # the centre is lowest
+    again = turn + int(np.argmax(np.append(np.diff(centers[turn:]), -1.0) < 0.0))  # and highest
+    about = slice(max(landed, turn - 6), turn + 7)
+    lowest = about.start + int(tops[about].argmin())
+    size = float(np.ptp(drop.mesh.vertices[:, 2]))
+    rest = float(centers[0]) - drop.height  # of the centre, where the body just touches the floor
+    return Outcome(1.0 - _extreme(tops, lowest) / size, (_extreme(centers, again) - rest) / drop.height)
+
+
+def _extreme(values: Floats, index: int) -> float:
+    """Of the parabola through a value and its neighbours."""
+    if not 0 < index < len(values) - 1:
+        return float(values[index])
+    before, here, after = (float(value) for value in values[index - 1 : index + 2])
+    bend = before - 2.0 * here + after
+    return here if bend == 0.0 else here - (after - before) ** 2 / (8.0 * bend)

@@ -1,0 +1,27 @@
+"""The engines that the drop is made in, beside this one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from lab.peers import bullet, mujoco_flex, newton_vbd
+from lab.peers.course import Course, Progress
+from lab.peers.drop import Drop
+
+
+@dataclass(frozen=True)
+class Peer:
+    """An engine of others, or one of its integrators."""
+
+    name: str
+    module: str  # of Python, as in the extra `peers`
+    simulate: Callable[[Drop, Progress | None], Course]
+
+
+PEERS = (
+    Peer("MuJoCo, implicit", "mujoco", mujoco_flex.simulate_discrete),
+    Peer("MuJoCo, explicit", "mujoco", mujoco_flex.simulate_euler),
+    Peer("PyBullet", "pybullet", bullet.simulate),
+    Peer("Newton on the CPU", "newton", newton_vbd.simulate),
+)

@@ -1,0 +1,38 @@
+"""What a report was made with."""
+
+from __future__ import annotations
+
+import os
+import platform
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+PACKAGES = ("taichi-soft", "taichi", "numpy", "scipy", "scikit-fem")
+
+
+def machine_facts(arch: str) -> dict[str, str]:
+    """Names and values for people: `arch` as Taichi knows it."""
+    return {
+        "device": f"{arch}, one thread per process",
+        "processor": f"{_processor()}, {os.cpu_count()} cores",
+        "platform": platform.platform(),
+        "python": platform.python_version(),
+        **{name: _version_of(name) for name in PACKAGES},
+    }
+
+
+def _processor() -> str:
+    """Its name, where the system tells."""
+    information = Path("/proc/cpuinfo")
+    if information.exists():
+        for line in information.read_text().splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.processor() or platform.machine()
+
+
+def _version_of(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return "not installed"

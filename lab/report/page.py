@@ -1,0 +1,112 @@
+"""The report: one page that holds everything, the same in Markdown, and every number as CSV."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from lab.experiments import CLAIMS, Effort
+from lab.extras import require_report
+from lab.report.exhibits import Exhibit, Sheet, exhibit_of, file_name, require_distinct, sheet_of
+from lab.report.judgements import OF_MANY, Concluded, Judgement, counts, judge
+from lab.report.law_checks import law_table
+from lab.report.markdown import Literal, escaped
+from lab.report.spreadsheets import csv_of_judgements
+from lab.report.wording import duration, point_line
+from taichi_soft.core.errors import OptionError
+
+TEMPLATES = Path(__file__).parent / "templates"
+
+
+def write_report(
+    sections: Sequence[Concluded], directory: Path, command: str, effort: Effort, facts: dict[str, str]
+) -> Path:
+    """Write what experiments showed, in the order given.
+
+    Args:
+        directory: of `report.html` and `report.md`, `verdicts.csv`, and the folders `plots`, `pictures`,
+            `tables` and `points`. It is made if it is missing; other files in it stay.
+        command: that makes this report again.
+        facts: names and values: the machine, versions.
+    Returns: the path of `report.html`, which needs no other file.
+    Raises: OptionError without the extra `lab`, for names used twice, findings about no claim, rows or
+        pictures of a wrong shape, and a directory that takes no files. What was there before is then still
+        whole.
+    """
+    require_report()
+    require_distinct((experiment.name for experiment, _, _ in sections), "the report")
+    judgements = judge(sections)
+    exhibits = [exhibit_of(*section) for section in sections]
+    laws = law_table(sections)
+    sheets = [sheet_of(laws, "tables/laws.csv")] if laws else []
+    files = _data_files(exhibits, judgements, sheets)
+    values: dict[str, Any] = {
+        "claims": CLAIMS,
+        "judgements": judgements,
+        "chapters": list(dict.fromkeys(each.chapter for each in judgements)),
+        "counts": counts(judgements),
+        "plural": OF_MANY,
+        "exhibits": exhibits,
+        "sheets": sheets,
+        "seconds": sum(each.seconds for each in exhibits),
+        "date": datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z"),
+        "command": command,
+        "effort": effort,
+        "facts": facts,
+    }
+    for name in ("report.md", "report.html"):
+        files[name] = _filled(name, values).encode("utf-8", "backslashreplace")
+    _replace(directory, files)
+    return directory / "report.html"
+
+
+def _filled(name: str, values: dict[str, Any]) -> str:
+    """A template with its values, each escaped as the format wants it."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    is_html = name.endswith(".html")
+    environment = Environment(
+        loader=FileSystemLoader(TEMPLATES),
+        autoescape=is_html,
+        finalize=None if is_html else escaped,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    environment.filters.update(duration=duration, point_line=point_line, file_name=file_name, raw=Literal)
+    return environment.get_template(name).render(values)
+
+
+def _data_files(
+    exhibits: Sequence[Exhibit], judgements: Sequence[Judgement], sheets: Sequence[Sheet]
+) -> dict[str, bytes]:
+    """All files but the pages, by their paths in the directory."""
+    texts = {"verdicts.csv": csv_of_judgements(judgements)} | {sheet.path: sheet.csv for sheet in sheets}
+    files: dict[str, bytes] = {}
+    for each in exhibits:
+        texts[each.points_path] = each.points_csv
+        texts.update((sheet.path, sheet.csv) for sheet in each.sheets)
+        files.update((image.path, image.png) for image in (*each.plots, *each.pictures) if image.png)
+    return files | {path: text.encode("utf-8", "backslashreplace") for path, text in texts.items()}
+
+
+def _replace(directory: Path, files: dict[str, bytes]) -> None:
+    """Write all files beside their places, and move them there when all are whole."""
+    parts: dict[Path, Path] = {}
+    try:
+        for path, data in files.items():
+            target = directory / path
+            target.parent.mkdir(parents=True, exist_ok=True)
+            parts[target] = target.with_name(f".{target.name}.part")
+            parts[target].write_bytes(data)
+        for target, part in parts.items():  # the pages come last
+            os.replace(part, target)
+    except OSError as error:
+        raise OptionError(f"cannot write the report to {directory}: {error.strerror or error}") from error
+    finally:
+        for part in parts.values():
+            part.unlink(missing_ok=True)

@@ -1,0 +1,63 @@
+"""Numbers as CSV, with all their digits."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from lab.experiments import Results, Table
+from lab.report.judgements import Judgement
+from lab.report.wording import plain
+
+
+def csv_of_table(table: Table) -> str:
+    """Its columns and rows."""
+    return _written([table.columns, *table.rows])
+
+
+def csv_of_points(results: Results) -> str:
+    """A row per point: what was varied, what was measured (lists as JSON), why it failed, and its time."""
+    varied = list(dict.fromkeys(name for row in results.rows for name in row.point))
+    measured = list(dict.fromkeys(name for row in results.rows for name in row.numbers or {}))
+    rows: list[Sequence[Any]] = [
+        [
+            *(f"point.{name}" for name in varied),
+            *(f"measured.{name}" for name in measured),
+            "error",
+            "seconds",
+        ]
+    ]
+    for row in results.rows:
+        numbers = row.numbers or {}
+        found = [*(row.point.get(name) for name in varied), *(numbers.get(name) for name in measured)]
+        rows.append([*found, row.error, row.seconds])
+    return _written(rows)
+
+
+def csv_of_judgements(judgements: Iterable[Judgement]) -> str:
+    """A row per finding, and one for each claim without any."""
+    rows: list[Sequence[Any]] = [
+        ("claim", "chapter", "source", "text", "verdict", "measured", "why", "experiment")
+    ]
+    for each in judgements:
+        about = (each.key, each.chapter, each.claim.source, each.claim.text)
+        for experiment, finding in each.findings:
+            rows.append((*about, finding.verdict.value, finding.measured, finding.why, experiment.name))
+        if not each.findings:
+            rows.append((*about, each.outcome, "", "", ""))
+    return _written(rows)
+
+
+def _written(rows: Iterable[Sequence[Any]]) -> str:
+    file = io.StringIO()
+    csv.writer(file, lineterminator="\n").writerows([_cell(value) for value in row] for row in rows)
+    return file.getvalue()
+
+
+def _cell(value: Any) -> Any:
+    """Numbers as Python writes them, which is exact; lists and what is true as JSON."""
+    value = plain(value)
+    return json.dumps(value, default=plain) if isinstance(value, (list, tuple, dict, bool)) else value

@@ -1,0 +1,123 @@
+"""A process on this machine that computes points."""
+
+from __future__ import annotations
+
+import multiprocessing
+import signal
+import time
+from contextlib import suppress
+from multiprocessing import resource_tracker
+from multiprocessing.connection import Connection
+from multiprocessing.context import SpawnProcess
+
+from lab.sweep.task import Outcome, Task, compute
+from taichi_soft.core.types import ArchName
+
+CONTEXT = multiprocessing.get_context("spawn")
+
+START_LIMIT = 120.0
+"""For a new process to start Python, import this package and start Taichi [s]."""
+
+END_LIMIT = 10.0
+"""For a process to end by itself, in which Taichi writes compiled kernels to its cache [s]."""
+
+
+class Worker:
+    """A process that computes one point at a time; where it was lost, the next point starts another one.
+
+    `concurrent.futures` would not do: before Python 3.14 it cannot end a process that hangs, it does not say
+    how a process died, and where its own process is killed, it leaves the others behind for ever.
+    """
+
+    def __init__(self, arch: ArchName, time_limit: float) -> None:
+        self._arch, self._time_limit = arch, time_limit
+        self._task: Task | None = None
+        self._process: SpawnProcess | None = None
+        self._pipe: Connection | None = None
+        self._is_starting = False
+        self._began = 0.0
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether it has a point whose outcome nobody has yet."""
+        return self._task is not None
+
+    @property
+    def pipe(self) -> Connection:
+        """Can be read as soon as `look` may find something."""
+        assert self._pipe is not None
+        return self._pipe
+
+    def begin(self, task: Task) -> None:
+        """Have a point computed, without waiting for it."""
+        if self._process is None:
+            self._start()
+        self._task, self._began = task, time.perf_counter()
+        with suppress(OSError):  # the process is gone: `look` says so
+            self.pipe.send((task.function, task.point))
+
+    def look(self) -> tuple[Task, Outcome] | None:
+        """The point and what came of it; None while it is being computed."""
+        task = self._task
+        assert task is not None
+        try:
+            while self.pipe.poll():
+                outcome: Outcome | None = self.pipe.recv()
+                if outcome is not None:
+                    self._task = None
+                    return task, outcome
+                self._is_starting, self._began = False, time.perf_counter()
+            limit, what = self._time_limit, "took longer than"
+            if self._is_starting:
+                limit, what = START_LIMIT, "did not start within"
+            if time.perf_counter() < self._began + limit:
+                return None
+            self.kill()
+            error = f"stopped: it {what} {limit:g} s"
+        except (EOFError, OSError):
+            error = f"its process was lost: {self.end()}"
+        self._task = None
+        return task, Outcome(None, error, time.perf_counter() - self._began)
+
+    def kill(self) -> None:
+        """End the process at once, whatever it computes."""
+        if self._process is not None:
+            self._process.kill()
+            self.end()
+
+    def end(self) -> str:
+        """Let the process end by itself, and say how it did."""
+        if self._process is None:
+            return ""
+        self.pipe.close()
+        self._process.join(END_LIMIT)
+        self._process.kill()
+        self._process.join()
+        code = self._process.exitcode
+        self._process = self._pipe = None
+        return f"exit code {code}" if code is None or code >= 0 else f"killed by {signal.Signals(-code).name}"
+
+    def _start(self) -> None:
+        """The process does not see Ctrl-C: it ends with the pipe."""
+        self._is_starting = True
+        self._pipe, theirs = CONTEXT.Pipe()
+        self._process = CONTEXT.Process(target=_serve, args=(theirs, self._arch), daemon=True)
+        if hasattr(signal, "pthread_sigmask"):
+            resource_tracker.ensure_running()  # or it would be started below, and unblock signals
+            before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+            self._process.start()
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        else:
+            self._process.start()
+        theirs.close()
+
+
+def _serve(pipe: Connection, arch: ArchName) -> None:
+    """Compute what is sent until nobody is there any more."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    compute(arch, dict, {})  # starts Taichi
+    with suppress(EOFError, ConnectionError):
+        pipe.send(None)
+        while True:
+            function, point = pipe.recv()
+            pipe.send(compute(arch, function, point))

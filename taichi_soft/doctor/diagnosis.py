@@ -1,0 +1,231 @@
+"""Findings and figures of one mesh file, as advice."""
+
+from __future__ import annotations
+
+import time
+import warnings
+from dataclasses import asdict, dataclass, field
+from enum import Enum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from taichi_soft.bodies.asset import SoftBodyAsset
+from taichi_soft.bodies.sag import MOST_SAG, sag
+from taichi_soft.cages import tetrahedra_of
+from taichi_soft.core.constants import GRAVITY_EARTH
+from taichi_soft.core.errors import MeshError, TaichiSoftError
+from taichi_soft.core.types import CageMethodName
+from taichi_soft.doctor.surface import SurfaceFacts, facts_of
+from taichi_soft.elements.materials import Material
+from taichi_soft.meshing import TetMesh, load_mesh
+from taichi_soft.meshing.io import SURFACES
+from taichi_soft.meshing.surfaces import Up, assumed_up, read_surfaces
+from taichi_soft.world.world import World
+
+FRAME = 1 / 60
+"""Of a game [s]."""
+
+MOST_SUBSTEPS = 500
+"""Of a frame: from there on `World` warns that a body is too stiff or too fine for a game."""
+
+SMALLEST, LARGEST = 0.02, 50.0
+"""Of a thing in a game [m]: what is outside is likely in another unit."""
+
+THIN = 0.5
+"""Part of a tetrahedron that is solid, below which the solid is thin there."""
+
+MOST_THIN = 0.3
+"""Of the solid that may lie in such tetrahedra: every surface has some."""
+
+TRIALS = 30
+"""Frames that are timed."""
+
+
+class Grade(str, Enum):
+    """How grave a finding is."""
+
+    GOOD = "good"
+    NOTE = "note"
+    BAD = "bad"  # it would not simulate
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that was looked at, in words."""
+
+    grade: Grade
+    text: str
+
+
+@dataclass
+class Diagnosis:
+    """All that was found."""
+
+    name: str
+    findings: list[Finding] = field(default_factory=list)
+    surface: SurfaceFacts | None = None
+    figures: dict[str, float] = field(default_factory=dict)  # of the body, by name with unit
+
+    @property
+    def is_fit(self) -> bool:
+        """Whether it would simulate."""
+        return all(finding.grade is not Grade.BAD for finding in self.findings)
+
+    def as_plain(self) -> dict[str, Any]:
+        """For JSON."""
+        return {
+            "file": self.name,
+            "would_simulate": self.is_fit,
+            "findings": [{"grade": each.grade.value, "text": each.text} for each in self.findings],
+            "surface": None if self.surface is None else asdict(self.surface),
+            "body": self.figures,
+        }
+
+    def say(self, grade: Grade, text: str) -> None:
+        """Note a finding."""
+        self.findings.append(Finding(grade, text))
+
+
+def diagnose(
+    path: Path,
+    material: Material,
+    *,
+    cells: int | None = None,
+    method: CageMethodName = "lattice",
+    up: Up | None = None,
+) -> Diagnosis:
+    """Look at a file, make a body of it, and time its frames.
+
+    Args:
+        path: of a surface that `read_surfaces` takes, or of tetrahedra that `load_mesh` takes.
+        material: of the body.
+        cells, method, up: as of `SoftBodyAsset.from_surface`.
+    Raises: MeshError or OptionError for what cannot be read.
+    """
+    found = Diagnosis(path.name)
+    if path.suffix.lower() in SURFACES:
+        surfaces = read_surfaces(path, up)
+        if up is None and (assumed := assumed_up(path)):
+            found.say(Grade.GOOD, assumed)
+        for note in dict.fromkeys(note for each in surfaces for note in each.notes):
+            found.say(Grade.NOTE, note)
+        found.surface = facts_of(surfaces)
+        _judge_surface(found, found.surface)
+        try:
+            made = tetrahedra_of(surfaces, cells=cells, method=method)
+        except MeshError as error:
+            found.say(Grade.BAD, str(error))
+            return found
+        asset = SoftBodyAsset(made.mesh, material, skin=surfaces)
+        for words in made.told:
+            found.say(Grade.NOTE, words)
+        if made.is_refined:
+            plain = tetrahedra_of(surfaces, cells=cells, refine=0).mesh
+            _judge_refinement(found, asset, SoftBodyAsset(plain, material))
+    else:
+        asset = SoftBodyAsset(load_mesh(path), material)
+        _judge_size(found, float(np.ptp(asset.mesh.vertices, axis=0).max()))
+    _judge_body(found, asset)
+    return found
+
+
+def _judge_size(found: Diagnosis, size: float) -> None:
+    if not SMALLEST <= size <= LARGEST:
+        unit, factor = ("millimetres", 0.001) if size > LARGEST else ("metres that were divided", 1000.0)
+        found.say(
+            Grade.NOTE,
+            f"it is {size:.4g} m long: likely another unit, such as {unit}. Scale it by {factor:g} if so",
+        )
+
+
+def _judge_surface(found: Diagnosis, facts: SurfaceFacts) -> None:
+    meshes = "1 mesh" if facts.meshes == 1 else f"{facts.meshes} meshes"
+    found.say(
+        Grade.GOOD,
+        f"{facts.triangles:,} triangles in {meshes} and {facts.parts} connected "
+        f"{'part' if facts.parts == 1 else 'parts'}, {facts.size:.4g} m long",
+    )
+    _judge_size(found, facts.size)
+    if facts.open_edges == facts.crowded_edges == facts.turned_edges == 0:
+        found.say(Grade.GOOD, "it is closed, and all triangles face the same way")
+    for count, text in (
+        (facts.open_edges, "open edges: holes are closed by straight lines where the body is made"),
+        (facts.turned_edges, "edges at which triangles face opposite ways: that does no harm here"),
+        (facts.crowded_edges, "edges of more than two triangles: walls within count for nothing"),
+        (facts.flat_triangles, "triangles without area: they count for nothing"),
+        (facts.repeated_triangles, "triangles that are there twice: they count once"),
+    ):
+        if count:
+            found.say(Grade.NOTE, f"{count:,} {text}")
+
+
+def _judge_refinement(found: Diagnosis, asset: SoftBodyAsset, plain: SoftBodyAsset) -> None:
+    """Say what limbs and sheets cost that are too thin for the cells."""
+    counts = [len(each.mesh.tets) for each in (plain, asset) if isinstance(each.mesh, TetMesh)]
+    shorter = plain.stable_step.recommended / asset.stable_step.recommended
+    found.say(
+        Grade.NOTE,
+        f"to keep them takes {counts[1]:,} tetrahedra instead of {counts[0]:,}, and substeps that are "
+        f"{shorter:.1f} times as short",
+    )
+
+
+def _judge_body(found: Diagnosis, asset: SoftBodyAsset) -> None:
+    mesh, step = asset.mesh, asset.stable_step
+    assert isinstance(mesh, TetMesh)
+    substeps = int(np.ceil(FRAME / step.recommended))
+    quality = mesh.quality
+    found.figures = {
+        "tetrahedra": len(mesh.tets),
+        "vertices": len(mesh.vertices),
+        "mass [kg]": float(asset.description.masses.sum()),
+        "least dihedral angle [degrees]": float(quality.min_dihedral.min()),
+        "greatest dihedral angle [degrees]": float(quality.max_dihedral.max()),
+        "stable substep [s]": step.recommended,
+        "substeps of a 60 Hz frame": substeps,
+        "first frequency [Hz]": asset.first_frequency / (2 * np.pi),
+    }
+    thin = float((mesh.volumes * mesh.fill)[mesh.fill < THIN].sum() / (mesh.volumes * mesh.fill).sum())
+    if thin > MOST_THIN:
+        found.say(
+            Grade.NOTE,
+            f"{100 * thin:.0f} % of it is thinner than a cell, and moves more stiffly than it should: take "
+            "twice the cells if that matters",
+        )
+    squash = sag(asset, GRAVITY_EARTH)
+    found.figures["sag under its own weight [%]"] = 50.0 * squash
+    if squash > MOST_SAG:
+        young = squash / MOST_SAG * float(np.mean(np.asarray(asset.description.per_tet("young") / mesh.fill)))
+        found.say(
+            Grade.BAD,
+            f"it cannot bear its own weight: take a Young's modulus of {young:.2g} Pa or a smaller body",
+        )
+    if substeps > MOST_SUBSTEPS:
+        found.say(Grade.BAD, f"{substeps:,} substeps for a frame of a game: {step.reason}")
+        return
+    try:
+        found.figures["milliseconds of a 60 Hz frame here"] = 1e3 * _frame_time(asset, substeps)
+    except TaichiSoftError as error:
+        found.say(Grade.BAD, str(error))
+        return
+    if found.is_fit:
+        found.say(Grade.GOOD, "it would simulate")
+
+
+def _frame_time(asset: SoftBodyAsset, substeps: int) -> float:
+    """Median of what a frame takes while the body falls and lands [s]."""
+    world = World()
+    low = float(asset.mesh.vertices[:, 2].min())
+    world.add_body(asset, position=(0.0, 0.0, 0.01 - low))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        world.build()
+        world.step(FRAME, substeps)
+        times = []
+        for _ in range(TRIALS):
+            start = time.perf_counter()
+            world.step(FRAME, substeps)
+            times.append(time.perf_counter() - start)
+    return float(np.median(times))

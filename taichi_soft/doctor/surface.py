@@ -1,0 +1,61 @@
+"""What can be said of the triangles of a surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from taichi_soft.cages.connected import components
+from taichi_soft.cages.welding import places_of
+from taichi_soft.meshing.surface import Surface, joined
+
+NO_AREA = 1e-12
+"""Twice the area over the square of the longest side."""
+
+
+@dataclass(frozen=True)
+class SurfaceFacts:
+    """Counts of what is in the triangles of all meshes of a file, vertices at the same place being one."""
+
+    meshes: int
+    vertices: int
+    triangles: int
+    parts: int  # that hang together by vertices
+    size: float  # longest side of the box round it [m]
+    open_edges: int  # of one triangle only
+    crowded_edges: int  # of more than two
+    turned_edges: int  # through which both triangles run the same way
+    flat_triangles: int  # without area
+    repeated_triangles: int
+
+
+def facts_of(surfaces: tuple[Surface, ...]) -> SurfaceFacts:
+    """Look at surfaces as one."""
+    vertices, triangles = joined(surfaces)
+    size = float(np.ptp(vertices[np.unique(triangles)], axis=0).max())
+    welded = places_of(vertices, size)[triangles]
+    a, b, c = np.moveaxis(vertices[triangles], 1, 0)
+    doubled = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    is_flat = (doubled <= NO_AREA * size**2) | (np.diff(np.sort(welded, axis=1), axis=1) == 0).any(axis=1)
+    sound = welded[~is_flat]
+    unique = np.unique(np.sort(sound, axis=1), axis=0)
+    ends = sound[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    edges, edge = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True)
+    uses = np.bincount(edge.reshape(-1), minlength=len(edges))
+    balance = np.bincount(edge.reshape(-1), np.where(ends[:, 0] < ends[:, 1], 1.0, -1.0), len(edges))
+    used, rows = np.unique(sound, return_inverse=True)
+    rows = rows.reshape(-1, 3)
+    parts = components(len(used), np.concatenate([rows[:, :2], rows[:, 1:]]))
+    return SurfaceFacts(
+        len(surfaces),
+        len(vertices),
+        len(triangles),
+        int(parts.max(initial=-1)) + 1,
+        size,
+        int((uses == 1).sum()),
+        int((uses > 2).sum()),
+        int(((uses == 2) & (balance != 0)).sum()),
+        int(is_flat.sum()),
+        len(sound) - len(unique),
+    )

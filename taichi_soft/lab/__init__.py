@@ -1,1 +1,0 @@
-"""What measures and judges: experiments, reports, profiles, the drop test."""

@@ -1,7 +1,0 @@
-"""One body at a time, dropped or wrecked: meshes, materials and steps that a library has to bear."""
-
-from taichi_soft.lab.drop_test.robustness.cells import DAMPINGS, GROUPS, choose_cells, law_variants
-from taichi_soft.lab.drop_test.robustness.trial import run_cell
-from taichi_soft.lab.drop_test.robustness.verdict import Verdict
-
-__all__ = ["DAMPINGS", "GROUPS", "Verdict", "choose_cells", "law_variants", "run_cell"]

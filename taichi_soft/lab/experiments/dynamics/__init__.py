@@ -1,9 +1,0 @@
-"""Motion against theory, beyond the thesis: frequencies, waves, contact, and what is conserved."""
-
-from taichi_soft.lab.experiments.dynamics.energy_budget import ENERGY_BUDGET
-from taichi_soft.lab.experiments.dynamics.hertz import HERTZ
-from taichi_soft.lab.experiments.dynamics.momentum_budget import MOMENTUM_BUDGET
-from taichi_soft.lab.experiments.dynamics.natural_frequencies import FREQUENCIES
-from taichi_soft.lab.experiments.dynamics.wave_speed import WAVE_SPEED
-
-__all__ = ["ENERGY_BUDGET", "FREQUENCIES", "HERTZ", "MOMENTUM_BUDGET", "WAVE_SPEED"]

@@ -1,0 +1,73 @@
+"""Time per element and substep against plain C++, in turns within one run."""
+
+from __future__ import annotations
+
+import ctypes
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from taichi_soft.bodies.description import BodyDescription
+from taichi_soft.bodies.layout import arrange
+from taichi_soft.core.types import LawName
+from taichi_soft.elements.laws import element_model
+from taichi_soft.elements.materials import Material
+from taichi_soft.meshing import box
+from taichi_soft.profiling.baseline import Baseline
+from taichi_soft.profiling.spread import Spread, compare
+from taichi_soft.world.world import World
+
+SIZES = {25_000: (17, 17, 17), 5_000: (10, 10, 10), 1_000: (6, 6, 6)}
+"""Cells of a box that has about as many tetrahedra. The largest first: the others take over its kernels."""
+
+MATERIAL = Material(young=1.0e5, poisson=0.1, density=1000.0, damping=0.1, damping_ratio=0.0)
+SUBSTEP = 1.0e-5  # [s], far below every limit: the bodies just fall
+PUSHED_APART = 0.02  # initial stretch, so that elastic forces act
+
+
+NATIVE_LAWS: tuple[LawName, ...] = ("virial", "springs", "volume_springs")
+"""What `baseline.cpp` has."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """One body on one thread, with Taichi and in C++."""
+
+    law: LawName
+    element: str  # "tetrahedron" or "edge"
+    tets: int
+    taichi: Spread  # [ns per element and substep], Python included
+    native: Spread
+    ratio: Spread  # Taichi over C++, pair by pair
+    deviation: float  # largest difference in position after the same steps, over the body's size
+
+
+def compare_with_baseline(
+    library: ctypes.CDLL,
+    repeats: int = 31,
+    sizes: dict[int, tuple[int, int, int]] = SIZES,
+    laws: tuple[LawName, ...] = NATIVE_LAWS,
+) -> list[Comparison]:
+    """Measure every law and size against the library that `compile_baseline` made."""
+    return [_compare(library, repeats, cells, law) for law in laws for cells in sizes.values()]
+
+
+def _compare(library: ctypes.CDLL, repeats: int, cells: tuple[int, int, int], law: LawName) -> Comparison:
+    mesh = box((1.0, 1.0, 1.0), cells)
+    world = World(floor=None, schedule="per_body")
+    body = world.add_body(mesh, MATERIAL, law=law, position=(0.0, 0.0, 1.0))
+    world.build()
+    model = element_model(law)
+    arrays = arrange(BodyDescription(mesh, MATERIAL, model))
+    native = Baseline(library, arrays)
+    stretched = mesh.vertices * (1.0 + PUSHED_APART) + (0.0, 0.0, 1.0)
+    body.set_motion(stretched, np.zeros_like(stretched))
+    native.positions[:] = stretched[arrays.order]
+    element, count = ("edge", len(mesh.edges)) if model.has_bonds else ("tetrahedron", len(mesh.tets))
+    substeps = max(4, 2_000_000 // len(mesh.tets) // 10)
+    dt = substeps * SUBSTEP
+    ours, theirs = partial(world.step, dt, substeps), partial(native.step, substeps, SUBSTEP)
+    spreads = compare(ours, theirs, repeats, 1e9 / substeps / count)
+    moved = np.abs(body.positions()[arrays.order] - native.positions).max()
+    return Comparison(law, element, len(mesh.tets), *spreads, float(moved / np.ptp(mesh.vertices)))

@@ -1,0 +1,102 @@
+"""From how many tetrahedra on a GPU is faster than the CPU's threads. A process has one device."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from engine_adapter import EngineAdapter, FixedStep
+from taichi_soft.core.types import ArchName
+from taichi_soft.meshing import TetMesh, box, sphere
+from taichi_soft.profiling.phases import TINY_H, spheres
+from taichi_soft.profiling.process import Process, compare_processes
+from taichi_soft.profiling.spread import Spread, time_calls
+
+SUBSTEPS = 8
+SCENES = ((1, 6), (1, 14), (1, 28), (16, 0), (256, 0))
+"""Bodies, and cells along each side of a box; 0: a sphere of 1,280 tetrahedra. None touches another."""
+
+STEPS_PER_TURN = 3
+
+_PROGRAM = """
+import sys
+from taichi_soft import init
+init({arch!r}, {threads!r}, {cores!r})
+from taichi_soft.profiling.devices import Frames
+frames = Frames()
+for line in sys.stdin:
+    print(frames.time(*map(int, line.split())), flush=True)
+"""
+
+
+@dataclass(frozen=True)
+class DeviceGain:
+    """A frame of 8 substeps [ms], all positions read after it, on the CPU and on a GPU."""
+
+    bodies: int
+    tets: int
+    cpu: Spread
+    gpu: Spread
+    gain: Spread  # the CPU's time over the GPU's, pair by pair
+
+
+class Frames:
+    """Of one scene after the other, in this process."""
+
+    def __init__(self) -> None:
+        self._scene: tuple[int, int] | None = None
+        self._frame: Callable[[], None] = lambda: None
+
+    def time(self, bodies: int, cells: int) -> float:
+        """What a frame takes [s], the median of a few."""
+        if self._scene != (bodies, cells):
+            self._scene, self._frame = (bodies, cells), _make_frame(bodies, cells)
+        return Spread.of(time_calls(self._frame, STEPS_PER_TURN)).median
+
+
+def _make_frame(bodies: int, cells: int) -> Callable[[], None]:
+    world = spheres(bodies, mesh=_mesh(cells))
+    adapter = EngineAdapter(world, FixedStep(dt=SUBSTEPS * TINY_H, substeps=SUBSTEPS))
+    buffers = [np.empty((body.vertex_count, 3), dtype=np.float32) for body in world.bodies]
+
+    def frame() -> None:
+        adapter.step()
+        for body, rows in zip(world.bodies, buffers, strict=True):
+            adapter.positions(body, rows)
+
+    return frame
+
+
+def measure_devices(
+    gpu: ArchName,
+    threads: int,
+    cores: tuple[int, ...],
+    repeats: int,
+    scenes: tuple[tuple[int, int], ...] = SCENES,
+) -> list[DeviceGain]:
+    """Time the CPU's `threads` and a GPU, in turns.
+
+    Args:
+        gpu: "cuda", "vulkan" or "metal".
+        cores: to which the threads are bound, or none.
+    Raises: DeviceError if a process fails, as where there is no such GPU.
+    """
+    with _start("cpu", threads, cores) as one, _start(gpu, None, None) as other:
+        return [_compare(one, other, *scene, repeats) for scene in scenes]
+
+
+def _start(arch: ArchName, threads: int | None, cores: tuple[int, ...] | None) -> Process:
+    program = _PROGRAM.format(arch=arch, threads=None if cores else threads, cores=cores or None)
+    advice = f"try `taichi-soft profile --arch {arch}`, which shows why"
+    return Process(program, f"a process on {arch!r}", advice)
+
+
+def _compare(cpu: Process, gpu: Process, bodies: int, cells: int, repeats: int) -> DeviceGain:
+    tets = bodies * len(_mesh(cells).tets)
+    return DeviceGain(bodies, tets, *compare_processes(cpu, gpu, f"{bodies} {cells}", repeats))
+
+
+def _mesh(cells: int) -> TetMesh:
+    return box((1.0, 1.0, 1.0), (cells,) * 3) if cells else sphere(radius=1.0, resolution=4)

@@ -1,0 +1,65 @@
+"""What each force law costs, in turns with the thesis's."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+from taichi_soft.core.types import LawName, StrainName
+from taichi_soft.elements.laws import LAWS, BondLaw, Law, element_model
+from taichi_soft.elements.materials import AnisotropicMaterial, Material, Stiffness
+from taichi_soft.meshing import box
+from taichi_soft.profiling.spread import Spread, compare
+from taichi_soft.world.world import World
+
+MESH = box((1.0, 1.0, 1.0), (10, 10, 10))
+TETS, EDGES = len(MESH.tets), len(MESH.edges)
+MATERIAL = Material(young=1.0e5, poisson=0.3, density=1000.0, damping=0.1, damping_ratio=0.0)
+WOODEN = AnisotropicMaterial(Stiffness.isotropic(1.0e5, 0.3), density=1000.0, damping=0.1)
+SUBSTEPS = 40
+SUBSTEP = 1.0e-5  # [s], far below every limit: the bodies just fall
+
+
+@dataclass(frozen=True)
+class LawCost:
+    """A law with one of the strains it takes, None where it has none to choose, and one kind of material."""
+
+    law: LawName
+    strain: StrainName | None
+    is_anisotropic: bool
+    element: str  # that it works on: "tetrahedron" or "edge"
+    cost: Spread  # of a whole substep, edge damping included [ns per element]
+    ratio: Spread  # over that of "virial" with the linear strain, pair by pair
+
+
+def kinds_of(laws: Iterable[Law]) -> list[tuple[Law, StrainName | None, bool]]:
+    """Each law with every strain, None where it has none to choose, and once with anisotropic material."""
+    found: list[tuple[Law, StrainName | None, bool]] = []
+    for law in laws:
+        strains: list[StrainName | None] = [strain.value for strain in law.strains] or [None]
+        found += [(law, strain, False) for strain in strains]
+        found += [(law, strains[0], True)] * law.takes_anisotropy
+    return found
+
+
+def measure_laws(names: Sequence[LawName] = tuple(LAWS), repeats: int = 11) -> list[LawCost]:
+    """Measure every kind of these laws, on one body and so on one thread. Raises: OptionError for no law."""
+    laws = [element_model(name).law for name in names]
+    usual = _falling("virial", None, MATERIAL)
+    found = []
+    for law, strain, is_anisotropic in kinds_of(laws):
+        element, count = ("edge", EDGES) if isinstance(law, BondLaw) else ("tetrahedron", TETS)
+        moving = _falling(law.name, strain, WOODEN if is_anisotropic else MATERIAL)
+        cost, _, ratio = compare(moving, usual, repeats, 1e9 / SUBSTEPS / count)
+        found.append(LawCost(law.name, strain, is_anisotropic, element, cost, ratio))
+    return found
+
+
+def _falling(
+    law: LawName, strain: StrainName | None, material: Material | AnisotropicMaterial
+) -> partial[None]:
+    world = World(floor=None, schedule="per_body")
+    world.add_body(MESH, material, law=law, strain=strain)
+    world.build()
+    return partial(world.step, SUBSTEPS * SUBSTEP, SUBSTEPS)

@@ -1,0 +1,57 @@
+"""How much faster many bodies run on several threads. Taichi's thread count is fixed per process."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from taichi_soft.profiling.process import Process, compare_processes
+from taichi_soft.profiling.spread import Spread
+
+BODIES = 64
+SUBSTEPS = (4, 14)
+"""Of a step: what this body needs at 60 Hz, and the thesis's 700 per second at 50 Hz."""
+
+STEPS_PER_TURN = 5
+
+_PROGRAM = """
+import sys
+from functools import partial
+from taichi_soft import init
+init("cpu", {threads}, {cores})
+from taichi_soft.profiling.phases import spheres
+from taichi_soft.profiling.spread import Spread, time_calls
+step = partial(spheres({bodies}).step, 1e-3)
+for line in sys.stdin:
+    print(Spread.of(time_calls(partial(step, int(line)), {steps})).median, flush=True)
+"""
+
+
+@dataclass(frozen=True)
+class Scaling:
+    """One step of 64 spheres [ms], on one thread and on several."""
+
+    substeps: int
+    threads: int
+    single: Spread
+    parallel: Spread
+    speedup: Spread  # pair by pair
+
+
+def measure_scaling(threads: int, cores: tuple[int, ...], repeats: int) -> list[Scaling]:
+    """Time one thread and `threads`, in turns.
+
+    Args:
+        cores: to which the latter are bound, or none.
+    Raises: DeviceError if a process fails.
+    """
+    with _start(1) as single, _start(threads, cores) as parallel:
+        return [
+            Scaling(substeps, threads, *compare_processes(single, parallel, str(substeps), repeats))
+            for substeps in SUBSTEPS
+        ]
+
+
+def _start(threads: int, cores: tuple[int, ...] = ()) -> Process:
+    program = _PROGRAM.format(threads=threads, cores=cores or None, bodies=BODIES, steps=STEPS_PER_TURN)
+    advice = f"try `taichi-soft profile --threads {threads}`, which shows why"
+    return Process(program, f"a process of {threads} threads", advice)

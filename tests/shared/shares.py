@@ -1,0 +1,82 @@
+"""Which worker runs which test files, and in which order."""
+
+from collections import Counter
+
+from xdist.scheduler import LoadScopeScheduling
+
+FILES = """
+    contact/ solver/test_sleep solver/test_islands solver/test_repeated_steps render/test_props
+    control/ levels/test_holding engine_adapter/test_budget
+    events/ persistence/ engine_adapter/test_rollback
+    core/ world/ cages/ feel/ levels/ bodies/ lab/ doctor/ profiling/ cli/ demos/ docs/
+    solver/ elements/ fracture/ engine_adapter/ render/ bake/ native/ live/
+"""
+"""Files in the order in which they run, by the beginnings of their paths; others come last. Neighbours have
+worlds of the same kinds, whose kernels each worker compiles once."""
+ORDER = FILES.split()
+
+SECONDS = "taichi_soft/seconds"
+"""Key in pytest's cache: duration of each test in its first run on this machine [s]."""
+
+
+def place_of(nodeid):
+    """Index in `ORDER` of a test's file."""
+    file = nodeid.removeprefix("tests/")
+    return next((i for i, start in enumerate(ORDER) if file.startswith(start)), len(ORDER))
+
+
+class Shares(LoadScopeScheduling):
+    """Scheduler that cuts the list of files into one share per worker. A worker that has finished its share
+    takes the last file of the longest other one.
+
+    Taichi's cache on disk finds a kernel only if the process has allocated as many fields before it as when
+    the kernel was stored. So each worker should run the same files in the same order every time, and shares
+    must not move with each measurement: the first duration of each test counts, until `pytest --cache-clear`.
+    """
+
+    def __init__(self, config, log=None):
+        super().__init__(config, log)
+        self.seconds = dict(config.cache.get(SECONDS, {}))
+        self.seconds_of_file, self.share_of_file, self.share_of_node = Counter(), {}, {}
+        config.add_cleanup(lambda: config.cache.set(SECONDS, self.seconds))
+
+    def mark_test_complete(self, node, item_index, duration=0):
+        self.seconds.setdefault(self.collection[item_index], max(round(duration, 2), 0.01))
+        super().mark_test_complete(node, item_index, duration)
+
+    def remove_node(self, node):
+        """Report a test that ended its worker once. The base class would run it again in each new worker."""
+        units = self.assigned_work[node]
+        crashed = next((test for unit in units.values() for test, done in unit.items() if not done), None)
+        if crashed:
+            units[self._split_scope(crashed)][crashed] = True
+        super().remove_node(node)
+        return crashed
+
+    def _split_scope(self, nodeid):
+        return nodeid.split("::")[0]
+
+    def _assign_work_unit(self, node):
+        self.workqueue.move_to_end(self._next_file(node), last=False)
+        super()._assign_work_unit(node)
+        if self.workqueue and self._pending_of(self.assigned_work[node]) < 2:
+            self._assign_work_unit(node)  # a worker starts a test only when it has the next one
+
+    def _next_file(self, node):
+        if not self.share_of_file:
+            self._cut()
+        share = self.share_of_node.setdefault(node, len(self.share_of_node))
+        waiting = {}
+        for file in filter(self.workqueue.__contains__, self.share_of_file):
+            waiting.setdefault(self.share_of_file[file], []).append(file)
+        if share in waiting:
+            return waiting[share][0]
+        return max(waiting.values(), key=lambda files: sum(self.seconds_of_file[file] for file in files))[-1]
+
+    def _cut(self):
+        for nodeid in self.collection:  # 1 s for a test without a record
+            self.seconds_of_file[self._split_scope(nodeid)] += self.seconds.get(nodeid, 1.0)
+        before, length = 0.0, self.seconds_of_file.total() / self.numnodes
+        for file, seconds in self.seconds_of_file.items():
+            self.share_of_file[file] = int((before + seconds / 2) / length)
+            before += seconds
