@@ -197,10 +197,7 @@ class Joints(Numbered[Joint]):
         if context.settings.is_implicit:
             raise StateError("implicit_euler has no joints: make the world with integrator='leapfrog'")
         if not context.built.program.has_contact:
-            raise StateError(
-                "joints need bodies that are stepped together: make the world with soft_contact=True, or "
-                "with collider_room=1 where bodies shall not touch each other"
-            )
+            raise StateError("schedule 'flat' has no joints: make the world with schedule='per_body'")
         free = self.free_number()
         used = self.rows_in_use
         if used + len(vertices) > JOINT_ROWS:

@@ -285,10 +285,7 @@ class Motors(Numbered[Motor]):
         place = None if point is None else as_vector(point, "point", "m")
         require_substeps(context, "motors")
         if not context.built.program.has_contact:
-            raise StateError(
-                "motors need a world that is made for contact: give it a collider, soft_contact=True, or "
-                "collider_room=1 where there is nothing to touch but the floor"
-            )
+            raise StateError("schedule 'flat' has no motors: make the world with schedule='per_body'")
         positions, masses = body.positions()[vertices].astype(np.float64), body.masses[vertices]
         drive = Drive(turns, stays, direction / length, place, wanted, limit)
         if not stays:

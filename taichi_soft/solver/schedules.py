@@ -6,7 +6,7 @@ from taichi_soft.bodies.layout import Scene
 from taichi_soft.core.runtime import Device
 from taichi_soft.core.types import Integrator, Schedule
 from taichi_soft.solver.kernels.flat import begin_flat, end_flat, finish_flat, step_flat_cpu, substep_flat
-from taichi_soft.solver.kernels.step import UNFINISHED, step_in_turn, step_islands, step_per_body
+from taichi_soft.solver.kernels.step import UNFINISHED, step_islands
 from taichi_soft.solver.program import StepProgram
 from taichi_soft.solver.state import State
 
@@ -66,16 +66,8 @@ def make_launch(
     bodies, particles = len(scene.bodies), scene.particle_count
     blocks, edges = scene.block_count, scene.edge_count
 
-    step_bodies = step_in_turn if bodies == 1 or device.threads == 1 else step_per_body
     helpers = 0 if device.is_gpu else min(device.threads, bodies) - 1
     stretch = most_substeps(scene, program.integrator)
-
-    def per_body(substeps: int, h: float) -> int:
-        most = stretch if substeps > stretch else ALL
-        found = int(step_bodies(state, program, bodies, substeps, h, most, 0))
-        while found == UNFINISHED:
-            found = int(step_bodies(state, program, bodies, substeps, h, most, 1))
-        return found
 
     def by_islands(substeps: int, h: float) -> int:
         most = stretch if substeps > stretch else ALL
@@ -117,5 +109,5 @@ def make_launch(
         return failed
 
     if schedule is Schedule.PER_BODY:
-        return by_islands if program.has_contact else per_body
+        return by_islands
     return flat_gpu if device.is_gpu else flat_cpu

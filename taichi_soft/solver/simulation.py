@@ -119,7 +119,7 @@ class Simulation:
         # What freezes a body is the last of several attempts.
         finer, is_braked = 1 << self.settings.retries, self.settings.retries > 0
         if self.settings.is_implicit:
-            finer, is_braked = MOST_PIECES if self.program.has_contact else 1, False
+            finer, is_braked = MOST_PIECES, False
         status = self.state.body_status.to_numpy()
         for body in self.pools.living:
             if status[body.index] != FROZEN or body.is_frozen:

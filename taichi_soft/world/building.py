@@ -144,7 +144,7 @@ def _schedule(context: WorldContext, device: Device) -> Schedule:
     }.items():
         if is_asked and asked is Schedule.FLAT:
             raise OptionError(
-                f"schedule 'flat' takes no {feature}: take 'per_body' or 'auto', with 'leapfrog' or 'lazy_leapfrog'"
+                f"schedule 'flat' takes no {feature}: take 'per_body' or 'auto', and not 'explicit_euler'"
             )
         if is_asked:
             asked = Schedule.PER_BODY

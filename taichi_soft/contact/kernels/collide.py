@@ -110,25 +110,29 @@ def find_near_colliders(state: ti.template(), body: ti.i32, reach: ti.f32, since
 
 @ti.func
 def _measure_clearances(state: ti.template(), body, row, count, reach, since, left, is_deep):
-    """Store how far each particle is clear of the first `count` near colliders; without any, nobody asks."""
-    outer, particles = state.touching.body_outer[body], state.body_particles[body]
-    if is_deep:
-        for p in range(particles[0], particles[1]):
-            state.contact.particle_clearance[p] = reach
+    """Store how far each particle is clear of the first `count` near colliders.
+
+    Planes stop all particles, or inner ones of a body that folds would go below the floor.
+    """
+    contact, outer, particles = state.contact, state.touching.body_outer[body], state.body_particles[body]
+    for p in range(particles[0], particles[1]):
+        contact.particle_clearance[p] = UNSEEN
+    touches_by_points = 0  # of its hull
+    if ti.static(state.capacity.contact.hull):
+        touches_by_points = int(state.hull.body_points[body][0] < state.hull.body_points[body][1])
+    if touches_by_points == 0:
         for i in range(count):
-            _measure_clearance(state, state.contact.near[row + i], particles[0], particles[1], 0, since, left)
-        for p in range(particles[0], particles[1]):
-            # One that went in unseen is not thrown out at once.
-            if state.contact.particle_clearance[p] < 0.0:
-                state.contact.particle_clearance[p] = UNSEEN
-        if ti.static(state.capacity.contact.hull):
-            if state.hull.body_points[body][0] < state.hull.body_points[body][1]:  # and these do not touch
-                for k in range(state.body_outer[body][0], state.body_outer[body][1]):
-                    state.contact.particle_clearance[state.outer_particle[k]] = UNSEEN
+            c = contact.near[row + i]
+            if is_deep or contact.collider_kind[c] == ShapeKind.PLANE:
+                _measure_clearance(state, c, particles[0], particles[1], 0, since, left)
+        if is_deep:
+            for p in range(particles[0], particles[1]):
+                if contact.particle_clearance[p] < 0.0:  # it went in unseen, and is not thrown out at once
+                    contact.particle_clearance[p] = UNSEEN
     for k in range(outer[0], outer[1]):
-        state.contact.particle_clearance[state.touching.outer_particle[k]] = reach
+        contact.particle_clearance[state.touching.outer_particle[k]] = reach
     for i in range(count):
-        _measure_clearance(state, state.contact.near[row + i], outer[0], outer[1], 1, since, left)
+        _measure_clearance(state, contact.near[row + i], outer[0], outer[1], 1, since, left)
 
 
 @ti.real_func
@@ -141,12 +145,6 @@ def forget_contacts(state: ti.template(), body: ti.i32):
         state.contact.normal_impulse[row] = ti.Vector.zero(ti.f32, 3)
         state.contact.normal_impulse_rates[row] = ti.Vector.zero(ti.f32, 3)
         row = row_behind(row)
-    was_deep = state.contact.reach[body] > DEEP * state.body_edge[body]
-    if was_deep and state.contact.near_count[body] > 0:
-        p = state.body_particles[body][0]
-        while p < state.body_particles[body][1]:
-            state.contact.particle_clearance[p] = UNSEEN  # the next search may leave those inside alone
-            p = row_behind(p)
     state.contact.near_count[body] = 0
     state.contact.reach[body] = ti.select(state.contact.collider_count[None] == 0, 1e30, -1.0)
     state.contact.gone[body] = 0.0

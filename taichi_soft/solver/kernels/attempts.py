@@ -24,33 +24,13 @@ from taichi_soft.solver.kernels.untangling import MOST_REFINEMENT
 
 
 @ti.func
-def rows_of(state: ti.template(), program: ti.template(), island):
-    """First row of an island's bodies, and the row behind the last."""
-    first, end = island, island + 1
-    if ti.static(program.has_contact):
-        first, end = state.contact.island_first[island], state.contact.island_first[island + 1]
-    return first, end
-
-
-@ti.func
-def body_at(state: ti.template(), program: ti.template(), row):
-    """The body in such a row."""
-    body = row
-    if ti.static(program.has_contact):
-        body = state.contact.island_body[row]
-    return body
-
-
-@ti.func
 def attempts_of(state: ti.template(), program: ti.template()):
     """How often substeps are halved; and the number of the last attempt, which is as fine as the one before
     and braked, or the same number."""
     halvings = state.retries[None]
     last = ti.select(halvings > 0, halvings + 1, 0)
     if ti.static(program.integrator == Integrator.IMPLICIT_EULER):
-        # Without contact it cuts its substeps by itself.
-        halvings = ti.static(MOST_PIECES.bit_length() - 1 if program.has_contact else 0)
-        last = halvings
+        halvings = last = ti.static(MOST_PIECES.bit_length() - 1)
     return halvings, last
 
 
@@ -61,10 +41,10 @@ def refined_substeps(state: ti.template(), program: ti.template(), island, subst
     least = ti.cast(substeps, ti.f32)
     if ti.static(program.integrator != Integrator.IMPLICIT_EULER):
         if state.retries[None] > 0:
-            first, end = rows_of(state, program, island)
+            first, end = state.contact.island_first[island], state.contact.island_first[island + 1]
             row = first
             while row < end:
-                body = body_at(state, program, row)
+                body = state.contact.island_body[row]
                 if state.body_status[body] == ACTIVE and state.body_refinement[body] > 1.0:
                     at_rest = dt * state.body_sound_speed[body] / state.body_stride[body]
                     # A forged snapshot may say anything.
@@ -87,8 +67,7 @@ def begin_body(state: ti.template(), program: ti.template(), body: ti.i32):
                 if state.body_status[body] == FROZEN:  # nobody aims at where its pins go, and begins anew
                     state.particle_reaction[p] = ti.Vector.zero(state.real, 3)
                 state.prev_reaction[p] = state.particle_reaction[p]
-        if ti.static(program.has_contact):
-            _begin_contacts(state, program, body)
+        _begin_contacts(state, program, body)
 
 
 @ti.func
@@ -123,36 +102,35 @@ def _put_back_body(state: ti.template(), program: ti.template(), body):
         restore_particle(state, p)
         if state.body_drives[body] & FEELS_REACTION != 0:
             state.particle_reaction[p] = state.prev_reaction[p]
-        if ti.static(program.has_contact and state.capacity.implicit):
+        if ti.static(state.capacity.implicit):
             state.particle_contact[p] = state.prev_contact[p]
         p = row_behind(p)
     clear_forces(state, body)
-    if ti.static(program.has_contact):
-        take_back_rebounds(state, body)
-        forget_contacts(state, body)
-        if ti.static(state.capacity.contact.hull):
-            forget_held(state, body)
-        if ti.static(program.has_soft_contact):
-            forget_candidates(state, body)  # for good, as the island looks for others before it goes on
+    take_back_rebounds(state, body)
+    forget_contacts(state, body)
+    if ti.static(state.capacity.contact.hull):
+        forget_held(state, body)
+    if ti.static(program.has_soft_contact):
+        forget_candidates(state, body)  # for good, as the island looks for others before it goes on
 
 
 @ti.real_func
 def put_back_island(state: ti.template(), program: ti.template(), island: ti.i32):
     """Put an island back to where it was before the step."""
-    first, end = rows_of(state, program, island)
+    first, end = state.contact.island_first[island], state.contact.island_first[island + 1]
     for row in range(first, end):
-        _put_back_body(state, program, body_at(state, program, row))
+        _put_back_body(state, program, state.contact.island_body[row])
     if ti.static(program.has_soft_contact):
         forget_touches(state, island)
 
 
 @ti.func
-def brake_island(state: ti.template(), program: ti.template(), island, is_braked):
+def brake_island(state: ti.template(), island, is_braked):
     """Brake the vibrations of all that is in an island sharply (1), or no longer (0)."""
-    first, end = rows_of(state, program, island)
+    first, end = state.contact.island_first[island], state.contact.island_first[island + 1]
     row = first
     while row < end:
-        state.body_is_braked[body_at(state, program, row)] = is_braked
+        state.body_is_braked[state.contact.island_body[row]] = is_braked
         row = row_behind(row)
 
 
@@ -168,12 +146,12 @@ def body_is_sound(state: ti.template(), body):
 
 
 @ti.func
-def island_is_sound(state: ti.template(), program: ti.template(), island):
+def island_is_sound(state: ti.template(), island):
     """Whether all that moves in an island can still be computed with (1)."""
     sound = 1
-    first, end = rows_of(state, program, island)
+    first, end = state.contact.island_first[island], state.contact.island_first[island + 1]
     for row in range(first, end):
-        body = body_at(state, program, row)
+        body = state.contact.island_body[row]
         if state.body_status[body] == ACTIVE:
             sound = sound & body_is_sound(state, body)
     return sound

@@ -50,7 +50,7 @@ def _end_active_body(state: ti.template(), program: ti.template(), body, substep
             note_way_of_hulled(state, body, substeps * h)
         if ti.static(program.integrator == Integrator.IMPLICIT_EULER):
             failed = failed | int(state.body_residual[body] > state.solver[None][0])
-    elif ti.static(program.has_contact):
+    else:
         forget_contacts(state, body)  # it was put back: nothing has touched it
     return failed
 

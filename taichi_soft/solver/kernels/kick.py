@@ -11,12 +11,30 @@ from taichi_soft.core.math.tensors import widened
 from taichi_soft.core.runtime import ti
 from taichi_soft.core.types import Integrator
 from taichi_soft.solver.kernels.implicit_contact import kick_implicitly
-from taichi_soft.solver.kernels.motion import JOLT, PRESSED
 from taichi_soft.solver.step_fields import Job
+
+JOLT = 1.0
+"""By how much the forces of one substep may change a particle's velocity, over the speed of sound in its
+body. Stable vibrations stay below it, on slivers too: a stable substep is about as long as sound takes to
+cross the smallest tetrahedron."""
+
+PRESSED = 4.0
+"""The same for a particle that something held in the last substep, over `JOLT`: most of its change is taken
+by what it presses against."""
 
 EXPLODING = 20.0
 """Way of a particle within one substep, over the mean edge of its body's surface, from which the body is
 taken to be exploding: others pass through it until it is frozen or calm."""
+
+
+@ti.func
+def kick_time(state: ti.template(), program: ti.template(), body, h, s):
+    """How long forces act before the drift of substep `s` of `h` [s]: by leapfrog, the first ends the lag."""
+    kick = ti.cast(h, state.real)
+    if ti.static(program.integrator != Integrator.LAZY_LEAPFROG):  # whose velocities do not lag
+        if s == 0:
+            kick = 0.5 * (state.body_velocity_lag[body] + h)
+    return kick
 
 
 @ti.func

@@ -1,4 +1,4 @@
-"""One substep, phase by phase, in the order in which they run: with contact and without.
+"""One substep, phase by phase, in the order in which they run.
 
     each body by itself     wind, drives
                             internal forces, reactions of pins, grabs, motors
@@ -9,8 +9,7 @@
     each body by itself     drift: new positions
 
 Contact takes velocities away before they move anything. Joints make good in the next substep what it changes
-of them. Without contact each body is an island of its own, and its kick and drift are one pass over its
-particles.
+of them. A body alone that meets no collider drifts in its kick, in one pass over its particles.
 """
 
 from taichi_soft.bodies.status import ACTIVE, JOINED
@@ -36,10 +35,9 @@ from taichi_soft.solver.kernels.attempts import begin_body
 from taichi_soft.solver.kernels.body_end import end_body
 from taichi_soft.solver.kernels.calming import calm_body, update_rest_state
 from taichi_soft.solver.kernels.drift import drift_body, has_drifted, is_clear
-from taichi_soft.solver.kernels.implicit_euler import implicit_substep, keeps_shape
+from taichi_soft.solver.kernels.implicit_euler import keeps_shape, slow_down
 from taichi_soft.solver.kernels.jobs import OWNER, run_job
-from taichi_soft.solver.kernels.kick import kick_among_colliders
-from taichi_soft.solver.kernels.motion import kick_time, move_body
+from taichi_soft.solver.kernels.kick import kick_among_colliders, kick_time
 from taichi_soft.solver.kernels.vibration import damp_body, to_positions
 from taichi_soft.solver.step_fields import Job
 
@@ -62,27 +60,18 @@ def substep(state: ti.template(), program: ti.template(), island, now, run: ti.t
         now: a `Moment`.
         run: a `Progress`, which becomes that after the substep.
     """
-    if ti.static(program.has_contact):
-        drift_time = _kick_bodies(state, program, island, now, run)
-        speed, impact_speed = _compare_speeds(state, island, now, run)
-        if _has_drifted(state, island, now, run, drift_time) == 0:
-            joint_speed, joint_impact = _solve_joints(state, program, island, now, run)
-            _solve_contact(state, program, island, now, run, ti.max(impact_speed, joint_impact))
-            _drift_bodies(state, program, island, now, run, ti.max(speed, joint_speed))
-        _check_shapes(state, program, island, run)
-    else:
-        run.is_stable = run.is_stable & advance_body(state, program, island, now, True)
+    drift_time = _kick_bodies(state, program, island, now, run)
+    speed, impact_speed = _compare_speeds(state, island, now, run)
+    if _has_drifted(state, island, now, run, drift_time) == 0:
+        joint_speed, joint_impact = _solve_joints(state, program, island, now, run)
+        _solve_contact(state, program, island, now, run, ti.max(impact_speed, joint_impact))
+        _drift_bodies(state, program, island, now, run, ti.max(speed, joint_speed))
+    _check_shapes(state, program, island, now, run)
 
 
 @ti.func
-def advance_body(state: ti.template(), program: ti.template(), body, now, drifts: ti.template()):
-    """The phases of one body by itself.
-
-    Args:
-        now: a `Moment`, or a `Job` where the body is among colliders.
-        drifts: whether its particles drift in the kick, as nothing but the floor can be in the way.
-    Returns: whether forces changed no velocity by too much at once (1); by implicit Euler always.
-    """
+def _advance_body(state: ti.template(), program: ti.template(), body, now):
+    """The phases of one body by itself: wind, drives and forces, damping, kick. `now`: a `Job`."""
     kick = kick_time(state, program, body, now.h, now.s)
     felt = _felt_time(program, kick, now)
     blow_on(state, body, now.h)
@@ -91,14 +80,22 @@ def advance_body(state: ti.template(), program: ti.template(), body, now, drifts
         accumulate_forces(state, program, body)
         add_reactions(state, body, felt)
         pull_grabs(state, body, now.h, felt)
-    if ti.static(program.has_contact):  # its code, even unused, takes others 5 % of their time
-        run_motors(state, program, body, now.h, felt, int(now.s == 0))
-        if now.s == 0:
-            update_rest_state(state, body)
+    run_motors(state, program, body, now.h, felt, int(now.s == 0))
+    if now.s == 0:
+        update_rest_state(state, body)
     damp_body(state, program, body, felt, now.h, now.s, now.substeps)
-    if ti.static(program.has_contact and program.integrator != Integrator.IMPLICIT_EULER):
+    if ti.static(program.integrator != Integrator.IMPLICIT_EULER):
         calm_body(state, program, body, to_positions(program, felt, now.h), now.h, now.s, now.substeps)
-    return _kick(state, program, body, now, kick, drifts)
+    kick_among_colliders(state, program, body, now, kick)
+
+
+@ti.func
+def substep_alone(state: ti.template(), program: ti.template(), body, now):
+    """One substep of one body among colliders, without other bodies, to find out what broke it."""
+    job = Job(s=now.s, substeps=now.substeps, h=now.h, since=now.since, left=now.left)
+    _advance_body(state, program, body, job)
+    job.fastest = state.contact.body_speed[body]
+    drift_body(state, body, job)
 
 
 @ti.func
@@ -107,7 +104,7 @@ def do_phase(state: ti.template(), program: ti.template(), island, body, job):
     if job.phase != KICK:
         _do_other_phase(state, program, island, body, job)
     elif state.body_status[body] == ACTIVE:
-        advance_body(state, program, body, job, False)
+        _advance_body(state, program, body, job)
 
 
 @ti.real_func
@@ -159,18 +156,6 @@ def _felt_time(program: ti.template(), kick, job):
 def _drive_time(program: ti.template(), job):
     """For how long drives act before a substep [s]: by leapfrog the last half comes after the last one."""
     return 0.5 * job.h if ti.static(program.integrator == Integrator.LEAPFROG) and job.s == 0 else job.h
-
-
-@ti.func
-def _kick(state: ti.template(), program: ti.template(), body, job, kick, drifts: ti.template()):
-    is_stable = 1
-    if ti.static(not drifts):
-        is_stable = kick_among_colliders(state, program, body, job, kick)
-    elif ti.static(program.integrator == Integrator.IMPLICIT_EULER):
-        implicit_substep(state, program, body, job.h, int(job.s == 0))
-    else:
-        is_stable = move_body(state, program, body, job.h, kick)
-    return is_stable
 
 
 @ti.func
@@ -285,10 +270,15 @@ def _drift_bodies(state: ti.template(), program: ti.template(), island, now, run
 
 
 @ti.func
-def _check_shapes(state: ti.template(), program: ti.template(), island, run: ti.template()):
-    """By implicit Euler, which takes forces as linear: whether no body changed its shape by too much."""
+def _check_shapes(state: ti.template(), program: ti.template(), island, now, run: ti.template()):
+    """By implicit Euler, which takes forces as linear: whether no body changed its shape by too much.
+
+    What changes too much in the last attempt loses speed: it would be thrown apart.
+    """
     if ti.static(program.integrator == Integrator.IMPLICIT_EULER):
         for i in range(state.contact.island_first[island], state.contact.island_first[island + 1]):
             body = state.contact.island_body[i]
             if state.body_status[body] == ACTIVE:
+                if now.is_last == 1:
+                    slow_down(state, body, now.h)
                 run.is_stable = run.is_stable & int(keeps_shape(state, body))
